@@ -1,0 +1,1 @@
+"""Models, filters, smoothers, system identification, and the tests that say whether to believe them."""

@@ -1,0 +1,219 @@
+"""`estimate_bulk_modulus(record, parameters)`: a number, an interval, a verdict; or a sentence instead of a number."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TypeVar
+
+import numpy as np
+
+from estimation.bounds import at_bulk_modulus, bulk_modulus_bound
+from estimation.consistency import Gate, consistency_gate
+from estimation.eha import BULK_MODULUS, FORMS
+from estimation.gaussian import Gaussian
+from estimation.measurement_noise import measurement_variances
+from estimation.model import ProcessModel
+from estimation.run import METHODS, Estimate, available_channels, run_filter
+from plant.eha import EhaParameters
+from plant.errors import HydrostateError
+from plant.record import Record
+
+T = TypeVar("T")
+
+LARGEST_BOUND = 0.03
+"""Relative Cramér-Rao bound above which bulk modulus is called not observable (errata E13) [fraction]."""
+
+PRESSURE_NOISE_LOGGED = 3e8
+"""Process-noise density of differential pressure where it is logged [Pa^2/s]. It stands for the flows that a lumped
+model leaves out (make-up, changing volumes); without the sensor the model's own, small one holds the pressure."""
+
+START_STD = 3e8
+"""Standard deviation of the first guess [Pa]: convergence is driven by it (errata E10)."""
+
+NORMAL_95 = 1.959963984540054
+"""Half-width of a 95 % normal interval, in standard deviations."""
+
+
+class Outcome(StrEnum):
+    """How a log fared; the words that JSON prints."""
+
+    OK = "ok"
+    NOT_OBSERVABLE = "not_observable"
+    DIVERGED = "diverged"
+    FAILED = "failed"
+
+
+OUTCOMES: Mapping[Outcome, str] = {
+    Outcome.OK: "The result stands, with the interval and the gate's verdict beside it.",
+    Outcome.NOT_OBSERVABLE: (
+        "This drive and these sensors hold too little about bulk modulus: the Cramér-Rao bound is over 3 %. "
+        "Log differential pressure, or drive with larger, slower steps."
+    ),
+    Outcome.DIVERGED: "The estimate stopped being finite; check units, rig parameters and the form.",
+    Outcome.FAILED: "The log could not be read or used; the message says why.",
+}
+"""What each outcome means, as a sentence for a reader."""
+
+
+@dataclass(frozen=True, eq=False)
+class BulkModulusEstimate:
+    """Effective bulk modulus of a log.
+
+    Parameters
+    ----------
+    outcome : Outcome
+        How it went.
+    value : float or None
+        Effective bulk modulus, convention of equation 5.8 (errata E2) [Pa]; None unless the outcome is ok.
+    std : float or None
+        Its standard deviation [Pa].
+    bound : float
+        Relative posterior Cramér-Rao bound [fraction].
+    gate : Gate
+        Whether value and interval can be believed.
+    estimate : Estimate
+        The filtered log.
+    """
+
+    outcome: Outcome
+    value: float | None
+    std: float | None
+    bound: float
+    gate: Gate
+    estimate: Estimate
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """The 95 % interval [Pa], or None where there is no value."""
+        if self.value is None or self.std is None:
+            return None
+        return self.value - NORMAL_95 * self.std, self.value + NORMAL_95 * self.std
+
+
+def first_belief(model: ProcessModel, record: Record, start: float, start_std: float) -> Gaussian:
+    """Return the belief before the first sample: at the first position, at rest, at the guessed bulk modulus.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The process model.
+    record : Record
+        The log.
+    start : float
+        First guess of effective bulk modulus [Pa].
+    start_std : float
+        Its standard deviation [Pa].
+
+    Returns
+    -------
+    Gaussian
+        The prior.
+    """
+    firsts = {"position_m": _first(record, "position_m"), BULK_MODULUS: start}
+    firsts["differential_pressure_pa"] = _first(record, "differential_pressure_pa")
+    spreads = {
+        "position_m": 1e-5,
+        "velocity_m_s": 1e-3,
+        "acceleration_m_s2": 10.0,
+        "differential_pressure_pa": 1e5,
+        BULK_MODULUS: start_std,
+    }
+    mean = np.array([firsts.get(state.name, 0.0) for state in model.states])
+    return Gaussian(mean, np.diag([spreads[state.name] ** 2 for state in model.states]))
+
+
+def _first(record: Record, channel: str) -> float:
+    if channel not in record:
+        return 0.0
+    present = record[channel][np.isfinite(record[channel])]
+    return float(present[0]) if len(present) else 0.0
+
+
+def estimate_bulk_modulus(
+    record: Record,
+    parameters: EhaParameters,
+    *,
+    form: str = "pressure",
+    method: str = "ekf",
+    start: float | None = None,
+    start_std: float = START_STD,
+) -> BulkModulusEstimate:
+    """Estimate effective bulk modulus from a log, the other parameters being known.
+
+    Without ``differential_pressure_pa`` the estimate rests on how the piston starts, stops and rings; where it sticks
+    there is nothing to rest on, and the outcome says so instead of printing a number (errata E13).
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    parameters : EhaParameters
+        The actuator; its bulk modulus is where the bound is taken, and the default first guess.
+    form : str
+        ``"pressure"`` (ours) or ``"acceleration"`` (the published one, valid between reversals only, errata E9).
+    method : str
+        A filter of `estimation.run.METHODS`.
+    start : float, optional
+        First guess [Pa].
+    start_std : float
+        Its standard deviation [Pa].
+
+    Returns
+    -------
+    BulkModulusEstimate
+        Mean over the last 20 % of the log, with interval, bound and verdict.
+
+    Raises
+    ------
+    HydrostateError
+        If the form or method is unknown, or the first guess is not usable.
+    LogError
+        If the log has neither position nor velocity.
+    """
+    model = _chosen(FORMS, form, "form")
+    guess = parameters.bulk_modulus if start is None else start
+    if not (np.isfinite(guess) and guess >= 0.0 and np.isfinite(start_std) and start_std > 0.0):
+        raise HydrostateError(f"the first guess must be 0 Pa or more, its deviation positive, got {guess}, {start_std}")
+    prior = first_belief(model, record, guess, start_std)
+    channels = available_channels(model, record)
+    variances = measurement_variances(record, channels)
+    noise = {"differential_pressure_pa": PRESSURE_NOISE_LOGGED} if "differential_pressure_pa" in channels else {}
+    estimate = run_filter(
+        _chosen(METHODS, method, "method"),
+        model,
+        prior,
+        record,
+        parameters,
+        channels=channels,
+        variances=variances,
+        noise=noise,
+    )
+    value, std = estimate.settled(BULK_MODULUS)
+    if not (np.isfinite(value) and np.isfinite(std)):
+        gate = Gate(False, (OUTCOMES[Outcome.DIVERGED],))
+        return BulkModulusEstimate(Outcome.DIVERGED, None, None, float("inf"), gate, estimate)
+    bound = max(
+        bulk_modulus_bound(
+            model,
+            prior,
+            record,
+            at_bulk_modulus(parameters, at),
+            channels=channels,
+            variances=variances,
+            noise=noise,
+        )
+        / at
+        for at in {parameters.bulk_modulus, max(value, 1e-3 * parameters.bulk_modulus)}
+    )
+    if bound > LARGEST_BOUND:
+        reason = f"the Cramér-Rao bound is {100.0 * min(bound, 9.99):.0f} % of the value, over 3 %: not observable"
+        gate = Gate(False, (reason,))
+        return BulkModulusEstimate(Outcome.NOT_OBSERVABLE, None, None, bound, gate, estimate)
+    gate = consistency_gate(estimate, BULK_MODULUS)
+    return BulkModulusEstimate(Outcome.OK, value, std, bound, gate, estimate)
+
+
+def _chosen(registry: Mapping[str, T], name: str, what: str) -> T:
+    if name not in registry:
+        raise HydrostateError(f"{what} must be one of {', '.join(registry)}, got {name!r}")
+    return registry[name]

@@ -1,0 +1,132 @@
+"""Can an estimate be believed? NEES and NIS with their chi-square bounds, and the gate that every estimate passes.
+
+Source of the tests: Bar-Shalom, Li and Kirubarajan (2001), section 5.4.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from estimation.run import Estimate
+
+Array = NDArray[np.float64]
+
+LARGEST_NIS = 2.0
+"""Mean NIS of a channel above which the filter is called overconfident; 1 is expected [dimensionless]."""
+
+LARGEST_DRIFT = 0.03
+"""Relative change of the estimate over the last fifths of a run above which it is called unsettled [fraction]."""
+
+
+@dataclass(frozen=True)
+class Gate:
+    """The verdict on an estimate.
+
+    Parameters
+    ----------
+    passed : bool
+        Whether the estimate and its interval can be believed.
+    reasons : tuple of str
+        One sentence for each thing that speaks against it.
+    """
+
+    passed: bool
+    reasons: tuple[str, ...]
+
+
+def nees(errors: Array, covariances: Array) -> Array:
+    """Return the normalised estimation error squared of each run.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (runs, n)
+        Estimate minus truth, in the belief's units.
+    covariances : ndarray, shape (runs, n, n)
+        Covariances believed.
+
+    Returns
+    -------
+    ndarray, shape (runs,)
+        Chi-square with n degrees of freedom where the filter is consistent.
+
+    Examples
+    --------
+    >>> nees(np.array([[2.0, 0.0]]), np.array([[[4.0, 0.0], [0.0, 1.0]]])).tolist()
+    [1.0]
+    """
+    return np.einsum("ri,ri->r", errors, np.linalg.solve(covariances, errors[..., None])[..., 0])
+
+
+def mean_chi_square_bounds(degrees: int, count: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Return the interval in which the mean of chi-square statistics falls.
+
+    Parameters
+    ----------
+    degrees : int
+        Degrees of freedom of one statistic: states for NEES, channels for NIS.
+    count : int
+        How many statistics are averaged.
+    confidence : float
+        Probability of the interval [probability].
+
+    Returns
+    -------
+    tuple of float
+        Lower and upper bound.
+
+    Examples
+    --------
+    >>> low, high = mean_chi_square_bounds(2, 50)
+    >>> round(low, 2), round(high, 2)
+    (1.48, 2.59)
+    """
+    tail = 0.5 * (1.0 - confidence)
+    low, high = chi2.ppf([tail, 1.0 - tail], degrees * count) / count
+    return float(low), float(high)
+
+
+def consistency_gate(estimate: Estimate, state: str) -> Gate:
+    """Judge whether an estimate of a state can be believed.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        The filtered log.
+    state : str
+        The state in question.
+
+    Returns
+    -------
+    Gate
+        Passed, or the reasons against it.
+    """
+    reasons = [_overconfidence(channel, nis) for channel, nis in estimate.nis.items() if nis > LARGEST_NIS]
+    reasons += _unsettled(estimate, state)
+    reasons += _at_a_bound(estimate, state)
+    return Gate(not reasons, tuple(reasons))
+
+
+def _overconfidence(channel: str, nis: float) -> str:
+    return (
+        f"the residuals of {channel} are {nis**0.5:.1f} times larger than the filter expects (NIS {nis:.1f}, "
+        "1 is expected): model and log disagree, and the interval is too narrow"
+    )
+
+
+def _unsettled(estimate: Estimate, state: str) -> list[str]:
+    mean, std = estimate.track(state)
+    fifth = max(1, len(mean) // 5)
+    last, before = float(np.mean(mean[-fifth:])), float(np.mean(mean[-2 * fifth : -fifth]))
+    allowed = 3.0 * float(std[-1]) + LARGEST_DRIFT * abs(last)
+    if abs(last - before) <= allowed:
+        return []
+    return [f"{state} still moved by {last - before:.3g} over the last fifth of the log: it has not settled"]
+
+
+def _at_a_bound(estimate: Estimate, state: str) -> list[str]:
+    value, _ = estimate.settled(state)
+    variable = estimate.model.states[estimate.model.index(state)]
+    inside = variable.lower + variable.scale * 1e-3 < value < variable.upper * 0.999
+    return [] if inside else [f"{state} ended at its physical bound ({value:.3g} {variable.unit})"]

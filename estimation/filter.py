@@ -1,0 +1,130 @@
+"""What a filter is given, and what it returns: the contract of every method in `METHODS`.
+
+A method is a function ``method(problem) -> Trace``. To add one, write such a function in a file of its own and give it
+a line in `estimation.run.METHODS`; nothing else changes.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.model import ProcessModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FilterProblem:
+    """One filtering task in the model's scaled units, ready for a kernel.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The process model.
+    channels : tuple of str
+        Measured channels, in the order of their columns.
+    mean : ndarray, shape (n,)
+        Prior mean, scaled.
+    covariance : ndarray, shape (n, n)
+        Prior covariance, scaled.
+    speed : ndarray, shape (samples,)
+        Motor speed [rad/s], no sample missing.
+    measured : ndarray, shape (samples, channels)
+        Measurements in SI; NaN is missing.
+    parameters : ndarray, shape (parameters,)
+        Row of parameters in SI.
+    noise : ndarray, shape (n,)
+        Process-noise density, scaled units squared a second.
+    variances : ndarray, shape (channels,)
+        Measurement variances in SI.
+    sample_time : float
+        Seconds between samples [s].
+    substeps : int
+        Model steps a sample.
+    every : int
+        The track keeps every so many samples.
+    keep_innovations : bool
+        Whether every residual is kept.
+    """
+
+    model: ProcessModel
+    channels: tuple[str, ...]
+    mean: Array
+    covariance: Array
+    speed: Array
+    measured: Array
+    parameters: Array
+    noise: Array
+    variances: Array
+    sample_time: float
+    substeps: int
+    every: int
+    keep_innovations: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """What a method returns, in the model's scaled units.
+
+    Parameters
+    ----------
+    mean, covariance : ndarray, shapes (n,) and (n, n)
+        Final belief.
+    track, track_variance : ndarray, shape (rows, n)
+        Mean and variance at every so many samples.
+    nis : ndarray, shape (channels,)
+        Sum of squared normalised innovations.
+    count : ndarray, shape (channels,)
+        Count of samples present.
+    log_likelihood : float
+        Sum of the innovations' Gaussian log densities [dimensionless].
+    residuals, residual_variances : ndarray, shape (samples or 0, channels)
+        Every innovation and its variance in SI, if kept.
+    """
+
+    mean: Array
+    covariance: Array
+    track: Array
+    track_variance: Array
+    nis: Array
+    count: Array
+    log_likelihood: float
+    residuals: Array
+    residual_variances: Array
+
+
+Method: TypeAlias = Callable[[FilterProblem], Trace]
+"""A filter: from a problem to its trace."""
+
+
+def empty_trace(problem: FilterProblem) -> Trace:
+    """Return a trace with its arrays allocated, the belief set to the prior.
+
+    Parameters
+    ----------
+    problem : FilterProblem
+        The task.
+
+    Returns
+    -------
+    Trace
+        Arrays for the method to fill.
+    """
+    samples, channels = problem.measured.shape
+    rows = (samples - 1) // problem.every + 1
+    kept = samples if problem.keep_innovations else 0
+    width = problem.model.width
+    return Trace(
+        mean=problem.mean.copy(),
+        covariance=problem.covariance.copy(),
+        track=np.empty((rows, width)),
+        track_variance=np.empty((rows, width)),
+        nis=np.zeros(channels),
+        count=np.zeros(channels),
+        log_likelihood=0.0,
+        residuals=np.empty((kept, channels)),
+        residual_variances=np.empty((kept, channels)),
+    )

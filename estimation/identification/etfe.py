@@ -1,0 +1,181 @@
+"""Empirical transfer function estimates: a frequency response straight from the data, with its coherence."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.signal import csd, welch
+
+from estimation.identification.linear_model import ComplexArray, FloatArray
+from plant.errors import HydrostateError
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """A frequency response estimated without a parametric model.
+
+    Parameters
+    ----------
+    frequency_hz : ndarray, shape (k,)
+        Frequencies [Hz]; those at which the input has no power are left out.
+    response : ndarray of complex, shape (k,)
+        Output per input [output unit per input unit].
+    coherence : ndarray, shape (k,)
+        Squared coherence, 0 to 1: the share of the output's power that the input explains.
+    gain_std : ndarray, shape (k,)
+        Standard deviation of ``|response|`` by its asymptotic variance (Bendat and Piersol, Random Data,
+        9.1); the bias from smoothing over `resolution_hz` is not in it.
+    resolution_hz : float
+        Width over which the estimate is smoothed [Hz]; narrower peaks are flattened.
+    """
+
+    frequency_hz: FloatArray
+    response: ComplexArray
+    coherence: FloatArray
+    gain_std: FloatArray
+    resolution_hz: float
+
+
+def etfe(
+    u: ArrayLike, y: ArrayLike, sample_time: float, *, lag_window: int | None = None
+) -> FrequencyResponse:
+    """Return the empirical transfer function estimate smoothed by a Hann lag window (Blackman and Tukey).
+
+    Parameters
+    ----------
+    u, y : array_like, shape (n,)
+        Input and output, no gaps; means are removed.
+    sample_time : float
+        Seconds between samples.
+    lag_window : int, optional
+        Half length of the Hann window in lags; a twentieth of the record unless told. Longer resolves
+        narrower peaks and is noisier.
+
+    Returns
+    -------
+    FrequencyResponse
+        At ``lag_window + 1`` frequencies from 0 to Nyquist.
+
+    Raises
+    ------
+    HydrostateError
+        If the arrays do not match, hold unusable values, or are too short, or the window does not fit.
+
+    Examples
+    --------
+    >>> u = np.random.default_rng(1).standard_normal(4000)
+    >>> estimate = etfe(u, 2.0 * u, 0.01)
+    >>> bool(np.allclose(estimate.response, 2.0)), round(estimate.resolution_hz, 9)
+    (True, 0.5)
+    """
+    inputs, outputs = _checked(u, y, sample_time)
+    n = inputs.size
+    lags = max(n // 20, 8) if lag_window is None else lag_window
+    if not 1 < lags < n // 2:
+        raise HydrostateError(f"lag_window must lie between 2 and half the record ({n // 2}), got {lags}")
+    spectrum_u, spectrum_y = np.fft.rfft(inputs, 2 * n), np.fft.rfft(outputs, 2 * n)
+
+    def smoothed(product: ComplexArray) -> ComplexArray:
+        correlation = np.fft.irfft(product)
+        half = 0.5 * (1.0 + np.cos(np.pi * np.arange(lags) / lags))
+        windowed = np.zeros(2 * lags)
+        windowed[:lags] = half * correlation[:lags]
+        windowed[lags + 1 :] = half[:0:-1] * correlation[-lags + 1 :]
+        return np.fft.rfft(windowed)
+
+    power_u = smoothed(spectrum_u * np.conj(spectrum_u)).real
+    power_y = smoothed(spectrum_y * np.conj(spectrum_y)).real
+    cross = smoothed(spectrum_y * np.conj(spectrum_u))
+    frequency = np.arange(lags + 1) / (2.0 * lags * sample_time)
+    # the Hann window's spectrum has small negative lobes, which can win where a signal has next to no power
+    usable = (power_u > 0.0) & (power_y > 0.0)
+    squared = np.clip(np.abs(cross[usable]) ** 2 / (power_u[usable] * power_y[usable]), 0.0, 1.0)
+    averages = n / (
+        0.75 * lags
+    )  # a Hann lag window passes 3/4 of a rectangular window's variance, 2 * lags wide
+    response = cross[usable] / power_u[usable]
+    return FrequencyResponse(
+        frequency[usable],
+        response,
+        squared,
+        _gain_std(response, squared, averages),
+        1.0 / (lags * sample_time),
+    )
+
+
+def etfe_welch(
+    u: ArrayLike, y: ArrayLike, sample_time: float, *, segment_length: int | None = None
+) -> FrequencyResponse:
+    """Return the frequency response by averaged Hann-windowed segments, half overlapping (Welch).
+
+    Parameters
+    ----------
+    u, y : array_like, shape (n,)
+        Input and output, no gaps; the mean of each segment is removed, so the response at 0 Hz is left out.
+    sample_time : float
+        Seconds between samples.
+    segment_length : int, optional
+        Samples a segment; a tenth of the record unless told.
+
+    Returns
+    -------
+    FrequencyResponse
+        At ``segment_length // 2`` frequencies above 0 up to Nyquist.
+
+    Raises
+    ------
+    HydrostateError
+        If the arrays do not match, hold unusable values, or are too short, or fewer than two segments fit.
+
+    Examples
+    --------
+    >>> u = np.random.default_rng(1).standard_normal(4000)
+    >>> bool(np.allclose(etfe_welch(u, 2.0 * u, 0.01).coherence, 1.0))
+    True
+    """
+    inputs, outputs = _checked(u, y, sample_time)
+    length = max(inputs.size // 10, 8) if segment_length is None else segment_length
+    if not 8 <= length <= 2 * inputs.size // 3:
+        raise HydrostateError(
+            f"segment_length must lie between 8 and two thirds of the record, {2 * inputs.size // 3}, "
+            f"got {length}"
+        )
+    rate = 1.0 / sample_time
+    frequency, power_u = welch(inputs, rate, nperseg=length)
+    cross = csd(inputs, outputs, rate, nperseg=length)[1]
+    power_y = welch(outputs, rate, nperseg=length)[1]
+    usable = (power_u > 0.0) & (power_y > 0.0) & (frequency > 0.0)
+    squared = np.clip(np.abs(cross[usable]) ** 2 / (power_u[usable] * power_y[usable]), 0.0, 1.0)
+    segments = 2.0 * inputs.size / length - 1.0
+    averages = 9.0 / 11.0 * segments  # half-overlapping Hann segments are worth 9/11 of independent ones
+    response = np.asarray(cross[usable] / power_u[usable], dtype=np.complex128)
+    return FrequencyResponse(
+        frequency[usable],
+        response,
+        squared,
+        _gain_std(response, squared, averages),
+        1.5 / (length * sample_time),
+    )
+
+
+def _gain_std(response: ComplexArray, squared: FloatArray, averages: float) -> FloatArray:
+    unexplained = (1.0 - squared) / np.maximum(squared, np.finfo(float).tiny)
+    return np.abs(response) * np.sqrt(unexplained / (2.0 * averages))
+
+
+def _checked(u: ArrayLike, y: ArrayLike, sample_time: float) -> tuple[FloatArray, FloatArray]:
+    inputs, outputs = np.asarray(u, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    if not (np.isfinite(sample_time) and sample_time > 0.0):
+        raise HydrostateError(f"sample_time must be positive and finite, got {sample_time!r}")
+    if inputs.ndim != 1 or inputs.shape != outputs.shape or inputs.size < 64:
+        raise HydrostateError(
+            "input and output must be one-dimensional, of one length, and 64 samples or longer, "
+            f"got shapes {inputs.shape} and {outputs.shape}"
+        )
+    if not (np.isfinite(inputs).all() and np.isfinite(outputs).all()):
+        raise HydrostateError(
+            "a frequency response needs input and output without gaps, got NaN or infinite values"
+        )
+    if inputs.min() == inputs.max():
+        raise HydrostateError(f"the input must vary, got the constant {inputs[0]:g}")
+    return inputs - inputs.mean(), outputs - outputs.mean()

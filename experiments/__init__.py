@@ -1,0 +1,1 @@
+"""Studies, published numbers, figures, reports, and the command `hydrostate`."""

@@ -1,0 +1,110 @@
+"""The published results of the EHA paper, as printed: Tables 1 to 6 and the scalars of the text.
+
+Nothing here is corrected. What the project departs from is told in ``docs/errata.md``, by number.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from types import MappingProxyType
+from typing import Literal, TypeAlias, get_args
+
+import pandas as pd
+
+from plant.errors import HydrostateError
+from plant.units import PSI
+
+TableName: TypeAlias = Literal[
+    "conditions", "parameters", "leakage", "friction", "rmse", "transfer_functions"
+]
+"""The six tables, in the paper's order."""
+
+
+@dataclass(frozen=True)
+class PublishedScalar:
+    """A number that stands in the paper's text and in none of its tables.
+
+    Parameters
+    ----------
+    value : float
+        As printed, in units of `unit`.
+    unit : str
+        The printed unit.
+    si_value : float
+        The same in SI, in units of `si_unit`.
+    si_unit : str
+        The SI unit; ``"1"`` for a ratio.
+    meaning : str
+        What the number is.
+    where : str
+        Section of the paper, with the erratum where one applies.
+    """
+
+    value: float
+    unit: str
+    si_value: float
+    si_unit: str
+    meaning: str
+    where: str
+
+
+def _percent_of_normal(value: float, what: str) -> PublishedScalar:
+    return PublishedScalar(value, "%", value / 100.0, "1", f"{what}, of normal", "section 3, errata E7")
+
+
+SCALARS: Mapping[str, PublishedScalar] = MappingProxyType(
+    {
+        "normal_differential_pressure": PublishedScalar(
+            58.0, "psi", 58.0 * PSI, "Pa", "differential pressure when normal", "section 3, errata E7"
+        ),
+        "minor_leakage_velocity": _percent_of_normal(75.0, "velocity under minor leakage"),
+        "major_leakage_velocity": _percent_of_normal(50.0, "velocity under major leakage"),
+        "minor_friction_pressure": _percent_of_normal(200.0, "differential pressure under minor friction"),
+        "major_friction_pressure": _percent_of_normal(300.0, "differential pressure under major friction"),
+        "bandwidth": PublishedScalar(
+            25.0, "Hz", 25.0, "Hz", "bandwidth of the actuator", "section 7, errata E14"
+        ),
+        "bulk_modulus": PublishedScalar(
+            2.07e8, "Pa", 2.07e8, "Pa", "effective bulk modulus, by the filter", "section 7, errata E2"
+        ),
+        "earlier_bulk_modulus": PublishedScalar(
+            2.1e8, "Pa", 2.1e8, "Pa", "effective bulk modulus of the earlier work", "section 7, errata E20"
+        ),
+    }
+)
+"""The text's scalars by name."""
+
+_FILES: Mapping[TableName, str] = MappingProxyType(
+    {name: f"eha_table{number}_{name}.csv" for number, name in enumerate(get_args(TableName), start=1)}
+)
+
+
+def load(name: TableName) -> pd.DataFrame:
+    """Return a published table, one row a line of the paper's, columns named with their units.
+
+    Parameters
+    ----------
+    name : {"conditions", "parameters", "leakage", "friction", "rmse", "transfer_functions"}
+        Which of Tables 1 to 6, in this order. The transfer functions are
+        ``(b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2)``, their sample time and input are not given (errata E14).
+
+    Returns
+    -------
+    pandas.DataFrame
+        The table as printed; a fresh copy at each call.
+
+    Raises
+    ------
+    HydrostateError
+        If there is no such table.
+
+    Examples
+    --------
+    >>> table = load("leakage").set_index("leakage")
+    >>> table.loc["major", "leakage_coefficient_m3_per_s_pa"]
+    np.float64(6.006e-11)
+    """
+    if name not in _FILES:
+        raise HydrostateError(f"published table must be one of {', '.join(_FILES)}, got {name!r}")
+    with files(__name__).joinpath(_FILES[name]).open(encoding="utf-8") as stream:
+        return pd.read_csv(stream, keep_default_na=False)

@@ -1,0 +1,102 @@
+"""Banks of models, one a condition: the lumped mathematical model, and the identified transfer functions."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.identification.from_record import identify_record
+from estimation.identification.linear_model import LinearModel
+from estimation.identification.preprocess import bridged
+from faults.conditions import CONDITIONS, parameters_for
+from plant.eha import EhaParameters
+from plant.integrate import compile_trajectory, parameter_row
+from plant.record import Record
+from plant.sensors import BENCH, Sensors
+from plant.signals import make_drive
+from plant.simulate import LUMPED, simulate
+
+Array = NDArray[np.float64]
+
+IDENTIFICATION_TIME = 0.001
+"""Sample time of the transfer functions [s]: inferred for Table 6 (errata E14)."""
+
+IDENTIFICATION_DURATION = 20.0
+"""Length of the identification run [s]."""
+
+
+def mathematical_bank(rig: EhaParameters) -> Mapping[str, EhaParameters]:
+    """Return the actuator's parameters in each of the nine conditions.
+
+    Parameters
+    ----------
+    rig : EhaParameters
+        The healthy actuator.
+
+    Returns
+    -------
+    Mapping[str, EhaParameters]
+        Parameters by condition name.
+    """
+    return MappingProxyType({name: parameters_for(condition, rig) for name, condition in CONDITIONS.items()})
+
+
+def predict_run(record: Record, parameters: EhaParameters) -> Mapping[str, Array]:
+    """Return what the lumped model does from rest under a record's drive.
+
+    Parameters
+    ----------
+    record : Record
+        The log; only its motor speed is used.
+    parameters : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    Mapping[str, ndarray of shape (n,)]
+        Position, velocity and differential pressure in SI.
+    """
+    run = compile_trajectory(LUMPED.name, LUMPED.step, len(LUMPED.states))
+    rows = parameter_row(parameters)[None]
+    speed = bridged(record["motor_speed_rad_s"])
+    substeps = max(1, round(record.sample_time / 1e-4))
+    states = run(np.zeros(len(LUMPED.states)), speed, rows, record.sample_time, substeps)
+    return LUMPED.channels(states, rows)
+
+
+def identify_bank(
+    rig: EhaParameters,
+    rng: np.random.Generator,
+    *,
+    sensors: Sensors = BENCH,
+    duration: float = IDENTIFICATION_DURATION,
+) -> Mapping[str, LinearModel]:
+    """Identify the nine transfer functions from simulated tests, as section 4 does from its bench.
+
+    Each condition is driven by a pseudo-random binary signal of 4 V and fitted with an output-error model of Table 6's
+    structure (three numerator coefficients, second order). Input and output are used alike (errata E15).
+
+    Parameters
+    ----------
+    rig : EhaParameters
+        The healthy actuator.
+    rng : numpy.random.Generator
+        Source of the drives and of sensor noise; each condition draws from a stream of its own.
+    sensors : Sensors
+        What the bench sees.
+    duration : float
+        Length of each test [s].
+
+    Returns
+    -------
+    Mapping[str, LinearModel]
+        Motor speed [rad/s] to velocity [m/s], by condition name.
+    """
+    models: dict[str, LinearModel] = {}
+    for (name, condition), stream in zip(CONDITIONS.items(), rng.spawn(len(CONDITIONS)), strict=True):
+        parameters = parameters_for(condition, rig)
+        drive = make_drive("prbs", duration, IDENTIFICATION_TIME, parameters, stream)
+        record = simulate(LUMPED, drive, IDENTIFICATION_TIME, parameters, sensors=sensors, rng=stream)
+        models[name] = identify_record(record, sample_time=IDENTIFICATION_TIME)
+    return MappingProxyType(models)

@@ -1,0 +1,187 @@
+"""Which condition is a log in? Every condition's model is run on it; the smallest root-mean-square error wins.
+
+Two banks, as in section 6 of the paper: the identified transfer functions, and the mathematical models.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from estimation.identification.linear_model import LinearModel
+from estimation.identification.preprocess import bridged, resample
+from faults.bank import predict_run
+from plant.eha import EhaParameters
+from plant.errors import LogError
+from plant.record import Record
+from plant.sensors import differentiated
+
+Array = NDArray[np.float64]
+
+SCORED = ("velocity_m_s", "differential_pressure_pa")
+"""Channels whose error counts. Position is left out: it drifts with every error in velocity."""
+
+POSITION_WINDOW = 0.01
+"""Window over which position is differentiated where velocity was not logged [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """Errors of a bank on a log.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        One row a condition: ``score``, and ``rmse_<channel>`` [SI] for each channel that counts.
+    channels : tuple of str
+        The channels that counted.
+    """
+
+    table: pd.DataFrame
+    channels: tuple[str, ...]
+
+    @property
+    def condition(self) -> str:
+        """The condition with the smallest score."""
+        return str(self.table["score"].idxmin())
+
+    @property
+    def by_condition(self) -> Mapping[str, float]:
+        """Score by condition name."""
+        return MappingProxyType({str(name): float(score) for name, score in self.table["score"].items()})
+
+
+def score_mathematical(record: Record, bank: Mapping[str, EhaParameters], *, pressure: bool = True) -> Scores:
+    """Score every condition's lumped model on a log.
+
+    Where one channel counts, the score is its RMSE in SI. Where velocity and differential pressure both count, each
+    RMSE is divided by the channel's own root mean square in the log and the score is the root mean square of the
+    two [dimensionless]: friction shows in pressure, leakage in velocity.
+
+    Parameters
+    ----------
+    record : Record
+        The log. Without ``differential_pressure_pa`` friction classes are told apart by velocity alone.
+    bank : Mapping[str, EhaParameters]
+        Parameters by condition name.
+    pressure : bool
+        Whether differential pressure counts where it is logged; Table 5 uses velocity alone.
+
+    Returns
+    -------
+    Scores
+        Errors by condition.
+
+    Raises
+    ------
+    LogError
+        If the log has neither velocity nor position.
+    """
+    measured = {"velocity_m_s": measured_velocity(record)}
+    if pressure and "differential_pressure_pa" in record:
+        measured["differential_pressure_pa"] = record["differential_pressure_pa"]
+    rows = {
+        name: {f"rmse_{channel}": rmse(measured[channel], predicted[channel]) for channel in measured}
+        for name, predicted in ((name, predict_run(record, parameters)) for name, parameters in bank.items())
+    }
+    return _scored(rows, measured)
+
+
+def score_transfer_functions(record: Record, bank: Mapping[str, LinearModel]) -> Scores:
+    """Score every condition's transfer function on a log, by its RMSE in velocity [m/s].
+
+    Parameters
+    ----------
+    record : Record
+        The log; it is resampled to the models' sample time.
+    bank : Mapping[str, LinearModel]
+        Transfer functions from motor speed to velocity, by condition name.
+
+    Returns
+    -------
+    Scores
+        Errors by condition.
+
+    Raises
+    ------
+    LogError
+        If the log has neither velocity nor position.
+    """
+    speed = bridged(record["motor_speed_rad_s"])
+    velocity = measured_velocity(record)
+    rows: dict[str, dict[str, float]] = {}
+    for name, model in bank.items():
+        u = resample(speed, record.sample_time, model.sample_time)
+        y = resample(velocity, record.sample_time, model.sample_time)
+        rows[name] = {"rmse_velocity_m_s": rmse(y, model.simulate(u))}
+    return _scored(rows, {"velocity_m_s": velocity})
+
+
+def measured_velocity(record: Record) -> Array:
+    """Return the logged velocity, or the derivative of the logged position.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Velocity [m/s]; NaN where it is missing.
+
+    Raises
+    ------
+    LogError
+        If the log has neither.
+    """
+    if "velocity_m_s" in record:
+        return record["velocity_m_s"]
+    if "position_m" not in record:
+        raise LogError(f"velocity_m_s or position_m is wanted, the log has {', '.join(record)}")
+    return differentiated(bridged(record["position_m"]), record.sample_time, POSITION_WINDOW)
+
+
+def rmse(measured: Array, predicted: Array) -> float:
+    """Return the root-mean-square difference over the samples that are present.
+
+    Parameters
+    ----------
+    measured : ndarray, shape (n,)
+        A channel; NaN is missing.
+    predicted : ndarray, shape (n,)
+        The same channel from a model.
+
+    Returns
+    -------
+    float
+        Their root-mean-square difference, in the channel's unit.
+
+    Examples
+    --------
+    >>> rmse(np.array([1.0, np.nan, 3.0]), np.array([0.0, 5.0, 4.0]))
+    1.0
+    """
+    return float(np.sqrt(np.nanmean((measured - predicted) ** 2)))
+
+
+def _scored(rows: Mapping[str, Mapping[str, float]], measured: Mapping[str, Array]) -> Scores:
+    table = pd.DataFrame.from_dict({name: dict(row) for name, row in rows.items()}, orient="index")
+    table.index.name = "condition"
+    if len(measured) == 1:
+        (channel,) = measured
+        table.insert(0, "score", table[f"rmse_{channel}"])
+        return Scores(table, (channel,))
+    squares = sum((table[f"rmse_{channel}"] / _size(values)) ** 2 for channel, values in measured.items())
+    table.insert(0, "score", np.sqrt(np.asarray(squares, dtype=np.float64) / len(measured)))
+    return Scores(table, tuple(measured))
+
+
+def _size(values: Array) -> float:
+    size = float(np.sqrt(np.nanmean(values**2)))
+    if size == 0.0:
+        raise LogError("a channel that is zero throughout cannot be scored: nothing was measured")
+    return size

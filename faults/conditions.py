@@ -1,0 +1,272 @@
+"""The nine conditions of Table 1 as changes of parameters, and the same two axes as continuous severity."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from math import isfinite
+from types import MappingProxyType
+from typing import Annotated, Literal, TypeAlias, get_args
+
+from plant.eha import EhaParameters
+from plant.errors import HydrostateError
+from plant.units import SI
+
+Level: TypeAlias = Literal["none", "minor", "major"]
+
+LEVELS: tuple[Level, ...] = get_args(Level)
+"""The levels in rising order; a level's place is its severity."""
+
+PAPER_RIG = EhaParameters()
+"""The rig on which Tables 3 and 4 were measured."""
+
+HIGHEST_SEVERITY = 5.0
+"""End of the extrapolation: above leakage 5.5 the paper's rig does not move at its rated speed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeakageLevel:
+    """One row of Table 3."""
+
+    leakage_coefficient: Annotated[float, SI("m^3/(s Pa)", "lumped leakage L_t", "Table 3, errata E5")]
+    flow_bias: Annotated[float, SI("m^3/s", "flow bias Q_b", "Table 3")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionLevel:
+    """One row of Table 4."""
+
+    friction_quadratic: Annotated[float, SI("N s^2/m^2", "quadratic friction a_1", "Table 4")]
+    friction_linear: Annotated[float, SI("N s/m", "linear friction a_2", "Table 4, errata E12")]
+    friction_coulomb: Annotated[float, SI("N", "Coulomb friction a_3", "Table 4")]
+
+
+LEAKAGE_TABLE: Mapping[Level, LeakageLevel] = MappingProxyType(
+    {
+        "none": LeakageLevel(leakage_coefficient=4.784e-12, flow_bias=2.413e-6),
+        "minor": LeakageLevel(leakage_coefficient=2.523e-11, flow_bias=1.382e-5),
+        "major": LeakageLevel(leakage_coefficient=6.006e-11, flow_bias=1.465e-5),
+    }
+)
+"""Table 3, by leakage level."""
+
+FRICTION_TABLE: Mapping[Level, FrictionLevel] = MappingProxyType(
+    {
+        "none": FrictionLevel(friction_quadratic=6.589e4, friction_linear=2.144e3, friction_coulomb=436.0),
+        "minor": FrictionLevel(friction_quadratic=1.162e6, friction_linear=-7.440e3, friction_coulomb=500.0),
+        "major": FrictionLevel(friction_quadratic=4.462e6, friction_linear=1.863e4, friction_coulomb=551.0),
+    }
+)
+"""Table 4, by friction level."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A working condition of Table 1: a level of leakage and a level of friction.
+
+    Parameters
+    ----------
+    name : str
+        Its name in results.
+    leakage, friction : {"none", "minor", "major"}
+        The two levels.
+
+    Raises
+    ------
+    HydrostateError
+        If a level is unknown.
+    """
+
+    name: str
+    leakage: Level
+    friction: Level
+
+    def __post_init__(self) -> None:
+        for axis, level in (("leakage", self.leakage), ("friction", self.friction)):
+            if level not in LEVELS:
+                raise HydrostateError(f"{axis} level must be one of {', '.join(LEVELS)}, got {level!r}")
+
+
+def _nine_conditions() -> Mapping[str, Condition]:
+    nine = (
+        Condition("normal", "none", "none"),
+        Condition("minor_leakage", "minor", "none"),
+        Condition("major_leakage", "major", "none"),
+        Condition("minor_friction", "none", "minor"),
+        Condition("major_friction", "none", "major"),
+        Condition("minor_leakage_minor_friction", "minor", "minor"),
+        Condition("major_leakage_minor_friction", "major", "minor"),
+        Condition("minor_leakage_major_friction", "minor", "major"),
+        Condition("major_leakage_major_friction", "major", "major"),
+    )
+    return MappingProxyType({condition.name: condition for condition in nine})
+
+
+CONDITIONS: Mapping[str, Condition] = _nine_conditions()
+"""The nine conditions by name, in the order of Table 1."""
+
+
+def find_condition(name: str) -> Condition:
+    """Return the condition of this name.
+
+    Parameters
+    ----------
+    name : str
+        One of `CONDITIONS`.
+
+    Returns
+    -------
+    Condition
+        The condition.
+
+    Raises
+    ------
+    HydrostateError
+        If there is none of this name.
+
+    Examples
+    --------
+    >>> find_condition("minor_leakage").leakage
+    'minor'
+    """
+    if name not in CONDITIONS:
+        raise HydrostateError(f"condition must be one of {', '.join(CONDITIONS)}, got {name!r}")
+    return CONDITIONS[name]
+
+
+def parameters_for(condition: Condition, base: EhaParameters = PAPER_RIG) -> EhaParameters:
+    """Return the actuator in a condition: Tables 3 and 4 on the paper's rig, a like change on any other.
+
+    Parameters
+    ----------
+    condition : Condition
+        The condition.
+    base : EhaParameters
+        The healthy actuator.
+
+    Returns
+    -------
+    EhaParameters
+        The base with its leakage, flow bias and friction changed as `severity` describes.
+
+    Examples
+    --------
+    >>> parameters_for(CONDITIONS["major_friction"]).friction_quadratic
+    4462000.0
+    """
+    return severity(LEVELS.index(condition.leakage), LEVELS.index(condition.friction), base)
+
+
+def severity(leakage: float, friction: float, base: EhaParameters = PAPER_RIG) -> EhaParameters:
+    """Return the actuator at a continuous severity of leakage and of friction: 0 is none, 1 minor, 2 major.
+
+    Every coefficient runs linearly between the rows of Tables 3 and 4 and beyond the last, so that friction
+    force and lost flow rise with severity at every velocity and pressure, although a_2 alone dips
+    (errata E12).
+
+    A base that is not the paper's rig keeps its own values at 0 and has the tables' increments over "none"
+    added, in the spirit of section 3: leakage is defined by the share of velocity it costs, friction by the
+    pressure it adds. Leakage and flow bias scale with the rated pump flow ``D_p * rated_speed``, so that
+    the same pressure loses the same share of it; friction scales so that it adds the same pressure at the
+    same share of the ideal rated velocity ``v = D_p * rated_speed / A``:
+    a_1 with ``A / v^2``, a_2 with ``A / v``, a_3 with ``A``, all relative to the paper's rig.
+
+    Parameters
+    ----------
+    leakage, friction : float
+        Severities [dimensionless], 0 to `HIGHEST_SEVERITY`.
+    base : EhaParameters
+        The healthy actuator.
+
+    Returns
+    -------
+    EhaParameters
+        The faulty actuator.
+
+    Raises
+    ------
+    HydrostateError
+        If a severity is not between 0 and `HIGHEST_SEVERITY`.
+
+    Examples
+    --------
+    >>> round(severity(0.5, 0.0).leakage_coefficient, 15)
+    1.5007e-11
+    """
+    _require_severity("leakage severity", leakage)
+    _require_severity("friction severity", friction)
+    leaking = _changed(base, LEAKAGE_TABLE, leakage, _leakage_scales(base))
+    rubbing = _changed(base, FRICTION_TABLE, friction, _friction_scales(base))
+    return replace(base, **leaking, **rubbing)
+
+
+def nearest_level(severity: float) -> Level:
+    """Return the level whose severity is nearest: none below 0.5, minor below 1.5, else major.
+
+    Parameters
+    ----------
+    severity : float
+        Severity [dimensionless], not negative.
+
+    Returns
+    -------
+    {"none", "minor", "major"}
+        The level.
+
+    Raises
+    ------
+    HydrostateError
+        If the severity is negative or not a number.
+
+    Examples
+    --------
+    >>> nearest_level(1.4)
+    'minor'
+    """
+    if not severity >= 0.0:
+        raise HydrostateError(f"severity must not be negative, got {severity!r}")
+    if severity < 0.5:
+        return "none"
+    return "minor" if severity < 1.5 else "major"
+
+
+def _changed(
+    base: EhaParameters,
+    table: Mapping[Level, LeakageLevel] | Mapping[Level, FrictionLevel],
+    amount: float,
+    scales: Mapping[str, float],
+) -> dict[str, float]:
+    """Return the base's coefficients plus the table's scaled increments, exact at every row of the table."""
+    if amount == 0.0:
+        return {}
+    row = min(int(amount), len(LEVELS) - 1)
+    upper = min(row + 1, len(LEVELS) - 1)
+    healthy, reached, low, high = (asdict(table[LEVELS[i]]) for i in (0, row, upper - 1, upper))
+    changed: dict[str, float] = {}
+    for name, scale in scales.items():
+        faulty = reached[name] + (amount - row) * (high[name] - low[name])
+        kept = getattr(base, name) - scale * healthy[name]
+        changed[name] = scale * faulty + kept
+    return changed
+
+
+def _rated_flow(p: EhaParameters) -> float:
+    return p.pump_displacement * p.rated_speed
+
+
+def _leakage_scales(base: EhaParameters) -> Mapping[str, float]:
+    flow = _rated_flow(base) / _rated_flow(PAPER_RIG)
+    return {"leakage_coefficient": flow, "flow_bias": flow}
+
+
+def _friction_scales(base: EhaParameters) -> Mapping[str, float]:
+    area = base.piston_area / PAPER_RIG.piston_area
+    velocity = _rated_flow(base) / _rated_flow(PAPER_RIG) / area
+    return {
+        "friction_quadratic": area / velocity**2,
+        "friction_linear": area / velocity,
+        "friction_coulomb": area,
+    }
+
+
+def _require_severity(name: str, value: float) -> None:
+    if not (isfinite(value) and 0.0 <= value <= HIGHEST_SEVERITY):
+        raise HydrostateError(f"{name} must be between 0 and {HIGHEST_SEVERITY:g}, got {value!r}")

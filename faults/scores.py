@@ -1,0 +1,51 @@
+"""How good is a classifier? Confusion matrix and accuracy over labelled runs."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from faults.conditions import CONDITIONS
+
+
+def confusion_matrix(true: Sequence[str], found: Sequence[str]) -> pd.DataFrame:
+    """Count how often each true condition was found to be which.
+
+    Parameters
+    ----------
+    true : sequence of str
+        True condition of each run.
+    found : sequence of str
+        Condition that was found.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Counts; a row for each true condition, a column for each found one, in the order of Table 1.
+
+    Examples
+    --------
+    >>> int(confusion_matrix(["normal", "normal"], ["normal", "minor_leakage"]).loc["normal", "minor_leakage"])
+    1
+    """
+    names = list(CONDITIONS)
+    counts = pd.DataFrame(0, index=pd.Index(names, name="true"), columns=pd.Index(names, name="found"))
+    for actual, answer in zip(true, found, strict=True):
+        counts.loc[actual, answer] += 1
+    return counts
+
+
+def accuracy(confusion: pd.DataFrame) -> float:
+    """Return the share of runs whose condition was found.
+
+    Parameters
+    ----------
+    confusion : pandas.DataFrame
+        From `confusion_matrix`.
+
+    Returns
+    -------
+    float
+        Between 0 and 1 [fraction].
+    """
+    total = int(confusion.to_numpy().sum())
+    return float(confusion.to_numpy().trace() / total) if total else float("nan")

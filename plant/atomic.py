@@ -1,0 +1,39 @@
+"""Files that are there whole or not at all."""
+
+import os
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from secrets import token_hex
+from typing import BinaryIO
+
+
+@contextmanager
+def replacing(path: Path) -> Generator[BinaryIO]:
+    """Open a temporary file that takes the name ``path`` when the block ends well, and vanishes otherwise.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write or to replace; its folder must exist.
+
+    Yields
+    ------
+    BinaryIO
+        The temporary file, open for writing bytes.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written, or ``path`` is a folder.
+    """
+    temporary = path.with_name(f".{path.name}.{token_hex(4)}.tmp")
+    try:
+        with temporary.open("xb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise

@@ -1,0 +1,6 @@
+"""Readable scalar models in, generated kernels out.
+
+A model is a plain Python function of scalars. Traced once with symbols, it becomes a graph of arithmetic
+(`expression`), is differentiated there, and is written to a Numba source file (`source`, `kernel_file`) that can be
+cached across processes. The same function runs on floats and arrays through `functions`.
+"""

@@ -1,0 +1,323 @@
+"""Arithmetic as a graph: what a model function returns when it is called with symbols.
+
+Equal sub-expressions are one node, so common sub-expressions cost nothing, and differentiation works node by node:
+its size grows with the model's operations, not with the size of the expanded formula.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+Number: TypeAlias = float | int
+
+
+@dataclass(frozen=True, eq=False)
+class Expression:
+    """One operation of the graph.
+
+    Parameters
+    ----------
+    operation : str
+        ``symbol``, ``constant``, a name of `OPERATIONS`, or a comparison.
+    arguments : tuple of Expression
+        Operands.
+    value : float or str
+        A constant's value, or a symbol's name.
+    """
+
+    operation: str
+    arguments: tuple["Expression", ...]
+    value: float | str = 0.0
+
+    def __add__(self, other: "Expression | Number") -> "Expression":
+        return _add(self, as_expression(other))
+
+    def __radd__(self, other: Number) -> "Expression":
+        return _add(as_expression(other), self)
+
+    def __sub__(self, other: "Expression | Number") -> "Expression":
+        return _subtract(self, as_expression(other))
+
+    def __rsub__(self, other: Number) -> "Expression":
+        return _subtract(as_expression(other), self)
+
+    def __mul__(self, other: "Expression | Number") -> "Expression":
+        return _multiply(self, as_expression(other))
+
+    def __rmul__(self, other: Number) -> "Expression":
+        return _multiply(as_expression(other), self)
+
+    def __truediv__(self, other: "Expression | Number") -> "Expression":
+        return _divide(self, as_expression(other))
+
+    def __rtruediv__(self, other: Number) -> "Expression":
+        return _divide(as_expression(other), self)
+
+    def __pow__(self, exponent: int) -> "Expression":
+        result: Expression = ONE
+        for _ in range(abs(exponent)):
+            result = result * self
+        return result if exponent >= 0 else ONE / result
+
+    def __neg__(self) -> "Expression":
+        return ZERO - self
+
+    def __pos__(self) -> "Expression":
+        return self
+
+    def __abs__(self) -> "Expression":
+        return unary("abs", self)
+
+    def __lt__(self, other: "Expression | Number") -> "Expression":
+        return node("<", self, as_expression(other))
+
+    def __le__(self, other: "Expression | Number") -> "Expression":
+        return node("<=", self, as_expression(other))
+
+    def __gt__(self, other: "Expression | Number") -> "Expression":
+        return node(">", self, as_expression(other))
+
+    def __ge__(self, other: "Expression | Number") -> "Expression":
+        return node(">=", self, as_expression(other))
+
+    def __bool__(self) -> bool:
+        raise TypeError("a model must choose with where(condition, a, b), not with if: its values are symbols here")
+
+
+_NODES: dict[tuple[str, tuple[int, ...], float | str], Expression] = {}
+
+
+def node(operation: str, *arguments: Expression, value: float | str = 0.0) -> Expression:
+    """Return the one node for this operation on these arguments.
+
+    Parameters
+    ----------
+    operation : str
+        Name of the operation.
+    *arguments : Expression
+        Operands.
+    value : float or str
+        A constant's value, or a symbol's name.
+
+    Returns
+    -------
+    Expression
+        The node, made on first use.
+    """
+    key = (operation, tuple(id(argument) for argument in arguments), value)
+    if key not in _NODES:
+        _NODES[key] = Expression(operation, arguments, value)
+    return _NODES[key]
+
+
+def constant(value: float) -> Expression:
+    """Return the node of a number.
+
+    Parameters
+    ----------
+    value : float
+        The number, dimensionless here.
+
+    Returns
+    -------
+    Expression
+        Its node.
+    """
+    return node("constant", value=float(value))
+
+
+def symbol(name: str) -> Expression:
+    """Return the node of a named input.
+
+    Parameters
+    ----------
+    name : str
+        A Python identifier.
+
+    Returns
+    -------
+    Expression
+        Its node.
+    """
+    return node("symbol", value=name)
+
+
+def as_expression(value: "Expression | Number") -> Expression:
+    """Return the value itself, or the constant node of a number.
+
+    Parameters
+    ----------
+    value : Expression or float
+        What to wrap, dimensionless here.
+
+    Returns
+    -------
+    Expression
+        A node.
+    """
+    return value if isinstance(value, Expression) else constant(float(value))
+
+
+ZERO = constant(0.0)
+ONE = constant(1.0)
+
+
+def _add(a: Expression, b: Expression) -> Expression:
+    if a is ZERO:
+        return b
+    return a if b is ZERO else node("+", a, b)
+
+
+def _subtract(a: Expression, b: Expression) -> Expression:
+    if b is ZERO:
+        return a
+    return ZERO if a is b else node("-", a, b)
+
+
+def _multiply(a: Expression, b: Expression) -> Expression:
+    if a is ZERO or b is ZERO:
+        return ZERO
+    if a is ONE:
+        return b
+    return a if b is ONE else node("*", a, b)
+
+
+def _divide(a: Expression, b: Expression) -> Expression:
+    if a is ZERO or b is ONE:
+        return a
+    return node("/", a, b)
+
+
+def unary(operation: str, a: Expression) -> Expression:
+    """Return a one-argument function of a node: ``abs sign sqrt exp tanh``.
+
+    Parameters
+    ----------
+    operation : str
+        Name of the function.
+    a : Expression
+        Its argument.
+
+    Returns
+    -------
+    Expression
+        The node.
+    """
+    return node(operation, a)
+
+
+def select(condition: Expression, a: Expression, b: Expression) -> Expression:
+    """Return ``a`` where the condition holds, else ``b``.
+
+    Parameters
+    ----------
+    condition : Expression
+        A comparison.
+    a, b : Expression
+        The two values.
+
+    Returns
+    -------
+    Expression
+        The node; ``a`` itself where both are the same.
+    """
+    return a if a is b else node("where", condition, a, b)
+
+
+def ordered(outputs: Iterable[Expression]) -> list[Expression]:
+    """Return every node that the outputs need, operands before results.
+
+    Parameters
+    ----------
+    outputs : iterable of Expression
+        What is wanted in the end.
+
+    Returns
+    -------
+    list of Expression
+        A topological order.
+    """
+    order: list[Expression] = []
+    seen: set[int] = set()
+    stack: list[tuple[Expression, bool]] = [(output, False) for output in reversed(list(outputs))]
+    while stack:
+        item, ready = stack.pop()
+        if ready:
+            order.append(item)
+        elif id(item) not in seen:
+            seen.add(id(item))
+            stack.append((item, True))
+            stack.extend((argument, False) for argument in reversed(item.arguments) if id(argument) not in seen)
+    return order
+
+
+def _local_derivatives(item: Expression) -> Sequence[Expression]:
+    """Return the derivative of a node with respect to each argument; signs and choices are held constant."""
+    a = item.arguments[0]
+    match item.operation:
+        case "+":
+            return ONE, ONE
+        case "-":
+            return ONE, -ONE
+        case "*":
+            return item.arguments[1], a
+        case "/":
+            b = item.arguments[1]
+            return ONE / b, -(item / b)
+        case "abs":
+            return (unary("sign", a),)
+        case "sign":
+            return (ZERO,)
+        case "sqrt":
+            return (0.5 / item,)
+        case "exp":
+            return (item,)
+        case "tanh":
+            return (ONE - item * item,)
+        case "where":
+            return ZERO, select(a, ONE, ZERO), select(a, ZERO, ONE)
+        case _:
+            return tuple(ZERO for _ in item.arguments)
+
+
+def jacobian(outputs: Sequence[Expression], inputs: Sequence[Expression]) -> list[list[Expression]]:
+    """Differentiate every output with respect to every input, with sign() and where() held constant.
+
+    Parameters
+    ----------
+    outputs : sequence of Expression
+        What is differentiated.
+    inputs : sequence of Expression
+        Symbols.
+
+    Returns
+    -------
+    list of list of Expression
+        ``result[i][j]`` is the derivative of output i by input j; `ZERO` where it vanishes structurally.
+    """
+    order = ordered(outputs)
+    locals_of = {id(item): _local_derivatives(item) for item in order if item.arguments}
+    columns: list[dict[int, Expression]] = []
+    for variable in inputs:
+        tangent: dict[int, Expression] = {id(variable): ONE}
+        for item in order:
+            if not item.arguments:
+                continue
+            total: Expression = ZERO
+            for argument, local in zip(item.arguments, locals_of[id(item)], strict=True):
+                inner = tangent.get(id(argument), ZERO)
+                if inner is not ZERO and local is not ZERO:
+                    total = total + _chain(item, local, inner)
+            if total is not ZERO:
+                tangent[id(item)] = total
+        columns.append(tangent)
+    return [[tangent.get(id(output), ZERO) for tangent in columns] for output in outputs]
+
+
+def _chain(item: Expression, local: Expression, inner: Expression) -> Expression:
+    """Multiply by a local derivative; a choice chooses the tangent rather than multiplying it by 0 or 1."""
+    if item.operation != "where":
+        return local * inner
+    condition = item.arguments[0]
+    chosen = local.arguments[1] is ONE
+    return select(condition, inner, ZERO) if chosen else select(condition, ZERO, inner)

@@ -1,0 +1,77 @@
+"""Keeps generated kernels as files, so that Numba's cache serves later processes.
+
+A function compiled from a string cannot be cached, and Numba does not notice a change in a function that a cached
+one calls. So a kernel file is self-contained and its name is a hash of its own text and of the Numba version.
+"""
+
+import hashlib
+import importlib.util
+import logging
+import os
+import sys
+import tempfile
+from pathlib import Path
+from types import ModuleType
+
+import numba
+import platformdirs
+
+logger = logging.getLogger("hydrostate")
+
+
+def cache_folder() -> Path:
+    """Return the folder of generated kernels: ``HYDROSTATE_CACHE``, or the user's cache directory."""
+    chosen = os.environ.get("HYDROSTATE_CACHE")
+    return Path(chosen) if chosen else Path(platformdirs.user_cache_dir("hydrostate"))
+
+
+def load_kernel(name: str, source: str) -> ModuleType:
+    """Write a kernel's source to the cache folder, unless it is there, and import it.
+
+    Parameters
+    ----------
+    name : str
+        What the kernel is, for the file's name.
+    source : str
+        Python source that imports all it needs.
+
+    Returns
+    -------
+    ModuleType
+        The imported file. Calling its functions compiles them, unless an earlier process did.
+    """
+    digest = hashlib.sha256(f"{numba.__version__}\n{source}".encode()).hexdigest()[:16]
+    module_name = f"hydrostate_{name}_{digest}"
+    if module_name in sys.modules:
+        return sys.modules[module_name]
+    path = _written(module_name, source)
+    spec = importlib.util.spec_from_file_location(module_name, path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"the generated kernel {path} cannot be imported")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def _written(module_name: str, source: str) -> Path:
+    """Return the kernel's file; where the cache folder cannot be written, one in a temporary folder."""
+    folder = cache_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / f"{module_name}.py"
+        if not path.exists():
+            _write_whole(path, source)
+    except OSError as error:
+        logger.warning("kernels cannot be cached in %s (%s); compiling for this run only", folder, error.strerror)
+        path = Path(tempfile.mkdtemp(prefix="hydrostate-")) / f"{module_name}.py"
+        _write_whole(path, source)
+        return path
+    return path
+
+
+def _write_whole(path: Path, source: str) -> None:
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        file.write(source)
+    Path(temporary).replace(path)

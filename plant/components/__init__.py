@@ -1,0 +1,1 @@
+"""Pure functions, one physical law each, grouped by the part they belong to."""

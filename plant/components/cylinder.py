@@ -1,0 +1,65 @@
+"""The piston's friction, as a force law and as the implicit step that really sticks."""
+
+from plant.compiled.functions import Scalar, absolute, maximum, sign, sqrt
+
+
+def quadratic_friction(
+    velocity: Scalar, direction: Scalar, quadratic: Scalar, linear: Scalar, coulomb: Scalar
+) -> Scalar:
+    """Return the friction force of a sliding piston, equation 5.10.
+
+    Parameters
+    ----------
+    velocity : float or Expression
+        Piston velocity [m/s].
+    direction : float or Expression
+        Sense of sliding, -1 or 1 [dimensionless]; the velocity's sign, or the sense in which it is about to break loose.
+    quadratic, linear, coulomb : float or Expression
+        Coefficients a_1 [N s^2/m^2], a_2 [N s/m], a_3 [N].
+
+    Returns
+    -------
+    float or Expression
+        Force against the motion [N].
+
+    Examples
+    --------
+    >>> round(quadratic_friction(0.04, 1.0, 6.589e4, 2.144e3, 436.0), 3)
+    627.184
+    """
+    return linear * velocity + (quadratic * velocity**2 + coulomb) * direction
+
+
+def velocity_under_friction(push: Scalar, resistance: Scalar, quadratic: Scalar, coulomb: Scalar) -> Scalar:
+    """Solve ``resistance * v + quadratic * v * |v| + coulomb * Sgn(v) = push`` for v, where Sgn(0) is all of [-1, 1].
+
+    This is the force balance 5.9 with friction 5.10 over one implicit step. Below the Coulomb force the answer is
+    exactly zero, so the piston sticks; above it there is one root as long as the resistance is positive, in a form
+    that loses no digits to cancellation.
+
+    Parameters
+    ----------
+    push : float or Expression
+        Driving force, with the momentum carried in by the step [N].
+    resistance : float or Expression
+        Everything proportional to the new velocity [N s/m], positive.
+    quadratic : float or Expression
+        Quadratic friction a_1 [N s^2/m^2].
+    coulomb : float or Expression
+        Coulomb friction a_3 [N].
+
+    Returns
+    -------
+    float or Expression
+        New velocity [m/s].
+
+    Examples
+    --------
+    >>> float(velocity_under_friction(400.0, 1e4, 6.589e4, 436.0))
+    0.0
+    >>> v = float(velocity_under_friction(-900.0, 1e4, 6.589e4, 436.0))
+    >>> round(1e4 * v - 6.589e4 * v * v - 436.0, 9)
+    -900.0
+    """
+    excess = maximum(absolute(push) - coulomb, 0.0)
+    return sign(push) * 2.0 * excess / (resistance + sqrt(resistance**2 + 4.0 * quadratic * excess))

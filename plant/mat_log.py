@@ -1,0 +1,95 @@
+"""MAT logs, to version 7: one struct whose fields are columns, or plain variables."""
+
+import re
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, BinaryIO, cast
+
+import numpy as np
+import scipy.io
+from numpy.typing import NDArray
+
+from plant.columns import TRUTH, Column, numbers
+from plant.csv_log import Choose
+from plant.errors import LogError
+
+Values = NDArray[np.float64]
+
+STRUCT = "record"
+METADATA = "metadata_json"
+
+
+def read_mat(path: Path, choose: Choose) -> tuple[dict[Column, Values], str | None]:
+    """Return the columns of a MAT log that ``choose`` picks by name, and the metadata text it carries.
+
+    Parameters
+    ----------
+    path : Path
+        A MAT file of version 4 to 7.
+    choose : Callable[[Sequence[str]], Sequence[Column]]
+        Picks columns from their names.
+
+    Returns
+    -------
+    columns : dict[Column, ndarray, shape (n,)]
+        Values as logged.
+    metadata : str or None
+        The JSON text that `write_mat` put there.
+
+    Raises
+    ------
+    LogError
+        If it is of version 7.3, or a column is no vector of real numbers.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            content: dict[str, Any] = scipy.io.loadmat(path, simplify_cells=True)
+    except NotImplementedError as error:
+        raise LogError(f"{path}: MAT files to version 7 are read, got 7.3; save it with '-v7'") from error
+    table = _table({name: value for name, value in content.items() if not name.startswith("__")})
+    names = [name for name in table if name != METADATA]
+    out: dict[Column, Values] = {}
+    for column in choose(names):
+        try:
+            out[column] = numbers(np.atleast_1d(np.asarray(table[names[column.position]])), column.name, str(path))
+        except LogError:
+            if not column.channel.startswith(TRUTH):
+                raise
+    text = table.get(METADATA)
+    return out, text if isinstance(text, str) else None
+
+
+def _table(content: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the struct that holds the columns: the one named record, the only one, or the file itself."""
+    structs = {name: value for name, value in content.items() if isinstance(value, dict)}
+    if STRUCT in structs:
+        return structs[STRUCT]
+    return next(iter(structs.values())) if len(structs) == 1 and len(content) == 1 else content
+
+
+def write_mat(columns: Mapping[str, Values], metadata: str, file: BinaryIO, source: str) -> None:
+    """Write columns as the fields of one struct named ``record``.
+
+    Parameters
+    ----------
+    columns : Mapping[str, ndarray, shape (n,)]
+        Values by column name.
+    metadata : str
+        JSON text, kept in the field ``metadata_json``.
+    file : BinaryIO
+        Where to, open for writing.
+    source : str
+        What messages call the file.
+
+    Raises
+    ------
+    LogError
+        If a column's name cannot be a MATLAB field name.
+    """
+    for name in columns:
+        if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,62}", name) is None:
+            raise LogError(f"{source}: a MATLAB field name is wanted (63 letters, digits, _), got {name!r}")
+    struct = {STRUCT: {**columns, METADATA: metadata}}
+    scipy.io.savemat(cast(Any, file), struct, long_field_names=True, oned_as="column", do_compression=True)

@@ -1,0 +1,170 @@
+"""What in a log looks like a slip of units, for actuators between a desk model and an excavator."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Plausible:
+    """Where the largest magnitude of a channel (of a position, the span) is usually found."""
+
+    least: float
+    most: float
+    unit: str
+    if_less: str
+    if_more: str
+
+
+_PRESSURE = Plausible(1e4, 1e8, "Pa", "kPa or bar read as Pa", "Pa read as kPa or bar")
+LIMITS: Mapping[str, Plausible] = MappingProxyType(
+    {
+        "motor_speed_rad_s": Plausible(0.5, 2000.0, "rad/s", "krad/s read as rad/s", "mrad/s read as rad/s"),
+        "position_m": Plausible(1e-6, 5.0, "m", "km read as m, or mm converted twice", "mm read as m"),
+        "velocity_m_s": Plausible(1e-5, 10.0, "m/s", "km/s read as m/s, or mm/s converted twice", "mm/s read as m/s"),
+        "differential_pressure_pa": _PRESSURE,
+        "pressure_a_pa": _PRESSURE,
+        "pressure_b_pa": _PRESSURE,
+        "motor_voltage_v": Plausible(1e-2, 2e3, "V", "kV read as V", "mV read as V"),
+    }
+)
+"""Each channel that has a usual magnitude; judged: a thousandfold slip of common rigs crosses a limit."""
+
+SAMPLE_TIME = (5e-6, 0.5)
+"""Sample times [s] between which hydraulics is logged."""
+
+SLIP = 30.0
+"""Ratio of displacement to integrated velocity that no calibration error explains."""
+
+ALIKE, ALIKE_SUMS = 0.5, 0.9
+"""Correlations from which two rates, or two running sums (which drift), are taken to show one motion."""
+
+TRAVEL = (1e-6, 0.1)
+"""Piston travel a radian of pump [m], pump displacement over piston area: 3.7e-4 for the paper's rig."""
+
+
+def implausible(sample_time: float, channels: Mapping[str, Values], source: str) -> list[str]:
+    """Return a sentence for each thing that looks like a slip of units, or that nothing moves.
+
+    Parameters
+    ----------
+    sample_time : float
+        Seconds between samples.
+    channels : Mapping[str, ndarray, shape (n,)]
+        Values in SI, NaN where a sample is missing.
+    source : str
+        What sentences call the log.
+
+    Returns
+    -------
+    list[str]
+        The sentences; none for a plausible log.
+
+    Examples
+    --------
+    >>> speed = 100.0 * np.sin(np.arange(100.0))
+    >>> implausible(1e-3, {"motor_speed_rad_s": 1e3 * speed}, "a.csv")[0]
+    'a.csv: motor_speed_rad_s reaches 1e+05 rad/s, at most 2000 is usual; looks like mrad/s read as rad/s'
+    """
+    still = _still(channels, source)
+    notes = [] if still is None else [still]
+    if sample_time < SAMPLE_TIME[0]:
+        notes.append(f"{source}: the sample time is {sample_time:.3g} s; looks like s read as ms")
+    if sample_time > SAMPLE_TIME[1]:
+        notes.append(f"{source}: the sample time is {sample_time:.3g} s; looks like ms read as s")
+    for name, limits in LIMITS.items():
+        if name in channels:
+            notes += _out_of_range(name, channels[name], limits, source)
+    return notes + _displaced(sample_time, channels, source) + _pumped(sample_time, channels, source)
+
+
+def _span(values: Values) -> float:
+    return float(np.nanmax(values) - np.nanmin(values))
+
+
+def _still(channels: Mapping[str, Values], source: str) -> str | None:
+    if "motor_speed_rad_s" in channels and _span(channels["motor_speed_rad_s"]) == 0.0:
+        return f"{source}: motor_speed_rad_s is constant, as if nothing moves: little can be learnt"
+    motion = [name for name in ("position_m", "velocity_m_s") if name in channels]
+    if motion and all(_span(channels[name]) == 0.0 for name in motion):
+        return f"{source}: {' and '.join(motion)} stay constant: nothing moves, and little can be learnt"
+    return None
+
+
+def _out_of_range(name: str, values: Values, limits: Plausible, source: str) -> list[str]:
+    is_position = name == "position_m"
+    size = _span(values) if is_position else float(max(np.nanmax(values), -np.nanmin(values)))
+    verb = "spans" if is_position else "reaches"
+    if size > limits.most:
+        seen = f"{source}: {name} {verb} {size:.3g} {limits.unit}, at most {limits.most:g} is usual"
+        return [f"{seen}; looks like {limits.if_more}"]
+    if 0.0 < size < limits.least and (_above_noise(values) or not is_position):
+        seen = f"{source}: {name} {verb} only {size:.3g} {limits.unit}, at least {limits.least:g} is usual"
+        return [f"{seen}; looks like {limits.if_less}"]
+    return []
+
+
+def _above_noise(values: Values) -> bool:
+    """Tell a signal from sensor noise: white noise, or its derivative, has large second differences."""
+    if _span(values) == 0.0:
+        return False
+    scaled = values / np.nanmax(np.abs(values))
+    noise = float(np.nanmean(np.diff(scaled, 2) ** 2)) / 6.0
+    return float(np.nanvar(scaled)) > 4.0 * noise
+
+
+def _displaced(sample_time: float, channels: Mapping[str, Values], source: str) -> list[str]:
+    """Compare the position with the integral of the velocity."""
+    if "position_m" not in channels or "velocity_m_s" not in channels:
+        return []
+    ratio = _gain(channels["position_m"], _integrated(sample_time, channels["velocity_m_s"]), ALIKE_SUMS)
+    if ratio is None or 1.0 / SLIP < ratio < SLIP or not _above_noise(channels["velocity_m_s"]):
+        return []
+    slip = "mm read as m, or s read as ms" if ratio > 1.0 else "mm/s read as m/s, or ms read as s"
+    seen = f"{source}: position_m moves {ratio:.3g} times as far as velocity_m_s integrates to"
+    return [f"{seen}; looks like {slip}"]
+
+
+def _pumped(sample_time: float, channels: Mapping[str, Values], source: str) -> list[str]:
+    """Compare the piston's motion with the pump's."""
+    if "motor_speed_rad_s" not in channels:
+        return []
+    speed = channels["motor_speed_rad_s"]
+    if "velocity_m_s" in channels:
+        name, travel = "velocity_m_s", _gain(channels["velocity_m_s"], speed, ALIKE)
+    elif "position_m" in channels:
+        turned = _integrated(sample_time, speed)
+        name, travel = "position_m", _gain(channels["position_m"], turned, ALIKE_SUMS)
+    else:
+        return []
+    if travel is None or TRAVEL[0] < travel < TRAVEL[1]:
+        return []
+    seen = f"{source}: the piston travels {travel:.2g} m a radian of the pump"
+    return [f"{seen}, {TRAVEL[0]:g} to {TRAVEL[1]:g} is usual; looks like a wrong unit of {name} or speed"]
+
+
+def _integrated(sample_time: float, rate: Values) -> Values:
+    return np.cumsum(np.where(np.isfinite(rate), rate, 0.0)) * sample_time
+
+
+def _gain(output: Values, cause: Values, alike: float) -> float | None:
+    """Return the ratio of sizes of two signals without their trends, None where their shapes differ."""
+    there = np.isfinite(output) & np.isfinite(cause)
+    if there.sum() < 3 or not _above_noise(output):
+        return None
+    y, x = _detrended(output[there]), _detrended(cause[there])
+    size_y, size_x = float(np.linalg.norm(y)), float(np.linalg.norm(x))
+    if size_x == 0.0 or size_y == 0.0 or not abs(float(y @ x)) >= alike * size_x * size_y:
+        return None
+    return size_y / size_x
+
+
+def _detrended(values: Values) -> Values:
+    ramp = np.linspace(-1.0, 1.0, len(values))
+    level = values - values.mean()
+    return level - ramp * float(ramp @ level) / float(ramp @ ramp)

@@ -1,0 +1,238 @@
+"""What a log must satisfy to be trusted: a clock, few enough gaps, finite numbers. Says what it mended."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.columns import TIME, TRUTH
+from plant.errors import LogError
+from plant.plausibility import implausible
+
+REQUIRED = ("motor_speed_rad_s", "position_m or velocity_m_s")
+"""Channels that a log must hold: all of these, either one where a line says "or"."""
+
+FEWEST_SAMPLES = 10
+MOST_MISSING = 0.05
+MOST_JITTER = 0.01
+ROUNDING = 1e-6
+
+Values = NDArray[np.float64]
+Channels = Mapping[str, Values]
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A uniform clock: sample time [s] and the time of the first sample [s]."""
+
+    sample_time: float
+    start_time: float
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A log on a uniform clock, and what was mended on the way.
+
+    Parameters
+    ----------
+    sample_time, start_time : float
+        The clock [s].
+    channels : Mapping[str, ndarray, shape (n,)]
+        Values in SI, NaN where a sample is missing.
+    notes : tuple[str, ...]
+        Sentences for the reader: what was resampled, masked, dropped, or looks wrong.
+    """
+
+    sample_time: float
+    start_time: float
+    channels: Channels
+    notes: tuple[str, ...] = ()
+
+
+def trusted(
+    columns: Channels, *, source: str, required: Collection[str] = REQUIRED, clock: Clock | None = None
+) -> Checked:
+    """Return a log on a uniform clock if it can be trusted.
+
+    Parameters
+    ----------
+    columns : Mapping[str, ndarray, shape (n,)]
+        ``time_s`` and the channels, in SI.
+    source : str
+        What messages call the log.
+    required : Collection[str]
+        Channels that must be there; ``"position_m or velocity_m_s"`` asks for one of the two.
+    clock : Clock, optional
+        The clock that the log was written with; used where the time column agrees with it.
+
+    Returns
+    -------
+    Checked
+        Clock, channels, and notes.
+
+    Raises
+    ------
+    LogError
+        If a required channel is missing or over 5 % empty, a value is infinite, time does not increase or is
+        not uniform within 1 %, or there are fewer than 10 samples.
+
+    Examples
+    --------
+    >>> ramp = np.arange(20.0)
+    >>> log = {"time_s": 1e-3 * ramp, "motor_speed_rad_s": ramp, "velocity_m_s": 1e-3 * ramp}
+    >>> round(trusted(log, source="a.csv").sample_time, 12)
+    0.001
+    """
+    notes: list[str] = []
+    with np.errstate(over="ignore", invalid="ignore"):  # a hostile 1e308 is refused or noted like others
+        complete = _derived(columns)
+        _present(complete, [TIME, *required], source)
+        _same_length(complete, source)
+        _finite(complete, source)
+        timed = _rows_with_time(complete, source, notes)
+        on_clock = _uniform(timed, source, clock, notes)
+        channels = _masked(on_clock.channels, required, source, notes)
+        notes += implausible(on_clock.sample_time, channels, source)
+    return Checked(on_clock.sample_time, on_clock.start_time, channels, tuple(notes))
+
+
+def _alternatives(wanted: str) -> list[str]:
+    return [name.strip() for name in wanted.split(" or ")]
+
+
+def _present(columns: Channels, required: Collection[str], source: str) -> None:
+    missing = [wanted for wanted in required if not any(name in columns for name in _alternatives(wanted))]
+    if missing:
+        known = ", ".join(columns) or "none that is known"
+        raise LogError(f"{source}: column {' and '.join(missing)} is missing, the log has {known}")
+    if set(columns) <= {TIME}:
+        raise LogError(f"{source}: at least one channel is wanted beside {TIME}, the log has none that is known")
+
+
+def _same_length(columns: Channels, source: str) -> None:
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise LogError(f"{source}: columns must have one length, got {lengths}")
+    if lengths[TIME] < FEWEST_SAMPLES:
+        raise LogError(f"{source}: at least {FEWEST_SAMPLES} samples are wanted, got {lengths[TIME]}")
+
+
+def _finite(columns: Channels, source: str) -> None:
+    for name, values in columns.items():
+        infinite = np.isinf(values)
+        if infinite.any():
+            row = int(np.argmax(infinite))
+            raise LogError(f"{source}: {name} must be finite, got {values[row]} in row {row + 1}")
+
+
+def _rows_with_time(columns: Channels, source: str, notes: list[str]) -> Channels:
+    """Drop the rows whose time is empty; inside the log they leave gaps, which are counted again there."""
+    empty = np.isnan(columns[TIME])
+    count, total = int(empty.sum()), len(empty)
+    if count == 0:
+        return columns
+    if count > MOST_MISSING * total or total - count < FEWEST_SAMPLES:
+        raise LogError(f"{source}: {TIME} is missing in {_share(count, total)}, at most 5 % may be")
+    notes.append(f"{source}: {TIME} is missing in {_share(count, total)}; those rows are left out")
+    return {name: values[~empty] for name, values in columns.items()}
+
+
+def _share(count: int, total: int) -> str:
+    return f"{count} of {total} samples ({100.0 * count / total:.2g} %)"
+
+
+def _uniform(columns: Channels, source: str, clock: Clock | None, notes: list[str]) -> Checked:
+    time = columns[TIME]
+    channels = {name: values for name, values in columns.items() if name != TIME}
+    if clock is not None and _agrees(time, clock):
+        return Checked(clock.sample_time, clock.start_time, channels)
+    ticks = _ticks(time, source)
+    sample_time = float((time[-1] - time[0]) / ticks.sum())
+    jitter = float(np.abs(np.diff(time) / sample_time - ticks).max())
+    slots = np.concatenate(([0.0], np.cumsum(ticks)))
+    if jitter > max(ROUNDING, _resolution(time, sample_time)):
+        notes.append(f"{source}: {TIME} jitters by {100.0 * jitter:.2g} % of {sample_time:.6g} s; resampled")
+        even = time[0] + sample_time * slots
+        channels = {name: _resampled(even, time, values) for name, values in channels.items()}
+    return Checked(sample_time, float(time[0]), _spread(channels, slots.astype(np.int64)))
+
+
+def _ticks(time: Values, source: str) -> Values:
+    """Return how many sample times each step takes, after refusing all that is no whole number of them."""
+    step = np.diff(time)
+    if step.min() <= 0.0:
+        row = int(np.argmax(step <= 0.0))
+        got = f"{time[row + 1]:.12g} in row {row + 2} after {time[row]:.12g}"
+        raise LogError(f"{source}: {TIME} must increase, got {got}")
+    middle = float(np.partition(step, len(step) // 2)[len(step) // 2])
+    nominal = float(np.mean(step[np.abs(step - middle) <= 0.5 * middle]))  # the median of rounded steps is rounded
+    ticks = np.rint(step / nominal)
+    off = np.abs(step / nominal - ticks)
+    off[~(ticks >= 1.0)] = np.inf
+    worst = int(np.argmax(off))
+    if not off[worst] <= MOST_JITTER:
+        raise LogError(
+            f"{source}: {TIME} must be uniform within 1 % or leave out whole samples, got a step of "
+            f"{step[worst]:.6g} s from row {worst + 1} to {worst + 2} at a sample time of {nominal:.6g} s"
+        )
+    total, there = float(ticks.sum()) + 1.0, len(time)
+    if total - there > MOST_MISSING * total:
+        raise LogError(f"{source}: {TIME} leaves out {total - there:.0f} of {total:.0f} samples, wanted at most 5 %")
+    return ticks
+
+
+def _agrees(time: Values, clock: Clock) -> bool:
+    error = np.abs(clock.start_time + clock.sample_time * np.arange(len(time)) - time).max()
+    return bool(error <= (ROUNDING + _resolution(time, clock.sample_time)) * clock.sample_time)
+
+
+def _resolution(time: Values, sample_time: float) -> float:
+    """Return what rounding of the times themselves to floats can look like, in sample times."""
+    return 4.0 * float(np.spacing(np.abs(time[[0, -1]]).max())) / sample_time
+
+
+def _resampled(wanted: Values, time: Values, values: Values) -> Values:
+    """Interpolate linearly between the samples that are there; those that are missing stay missing."""
+    there = np.isfinite(values)
+    if not there.any():
+        return values
+    moved = np.interp(wanted, time[there], values[there])
+    moved[~there] = np.nan
+    return moved
+
+
+def _spread(channels: Channels, slots: NDArray[np.int64]) -> Channels:
+    """Put the samples in their slots of the uniform clock, NaN in the slots that the log leaves out."""
+    total = int(slots[-1]) + 1
+    if total == len(slots):
+        return channels
+    out = {name: np.full(total, np.nan) for name in channels}
+    for name, values in channels.items():
+        out[name][slots] = values
+    return out
+
+
+def _derived(channels: Channels) -> Channels:
+    wanted, a, b = "differential_pressure_pa", "pressure_a_pa", "pressure_b_pa"
+    if wanted in channels or a not in channels or b not in channels:
+        return channels
+    return {**channels, wanted: channels[a] - channels[b]}
+
+
+def _masked(channels: Channels, required: Collection[str], source: str, notes: list[str]) -> Channels:
+    kept = dict(channels)
+    for name, values in channels.items():
+        count, total = int(np.isnan(values).sum()), len(values)
+        if count == 0 or name.startswith(TRUTH):
+            continue
+        if count <= MOST_MISSING * total:
+            notes.append(f"{source}: {name} is missing in {_share(count, total)}; they are masked")
+            continue
+        del kept[name]
+        if not all(any(other in kept for other in _alternatives(wanted)) for wanted in required):
+            raise LogError(f"{source}: {name} is missing in {_share(count, total)}, at most 5 % may be")
+        notes.append(f"{source}: {name} is missing in {_share(count, total)}; the channel is left out")
+    if not kept:
+        raise LogError(f"{source}: no channel has 95 % of its samples")
+    return kept

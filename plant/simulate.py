@@ -1,0 +1,147 @@
+"""`simulate(plant, drive, ...) -> Record`: a run of a plant under a drive, seen through its sensors."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.components.cylinder import quadratic_friction
+from plant.eha import EhaParameters, lumped_step, reduced_derivative
+from plant.errors import DriveError, HydrostateError
+from plant.integrate import StepFunction, compile_trajectory, parameter_row, ros2_step
+from plant.parameter_path import ParameterPath
+from plant.record import Record
+from plant.sensors import IDEAL, Sensors, measure
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Plant:
+    """An actuator model that can be simulated.
+
+    Parameters
+    ----------
+    name : str
+        Its name in the registry and in metadata.
+    states : tuple of str
+        State names with their unit.
+    step : callable
+        ``step(state, speeds, parameters, h)``, see `plant.integrate.StepFunction`.
+    channels : callable
+        ``channels(states (n, width), parameter rows (1 or n, parameters))``, which returns position, velocity and
+        differential pressure.
+    substeps : int
+        Steps of the integrator in 0.1 ms, enough for relative errors under 1e-4.
+    """
+
+    name: str
+    states: tuple[str, ...]
+    step: StepFunction
+    channels: Callable[[Array, Array], Mapping[str, Array]]
+    substeps: int
+
+
+def _lumped_channels(states: Array, rows: Array) -> Mapping[str, Array]:
+    del rows
+    position, velocity, pressure = states.T
+    return {"position_m": position, "velocity_m_s": velocity, "differential_pressure_pa": pressure}
+
+
+def _reduced_channels(states: Array, rows: Array) -> Mapping[str, Array]:
+    """Differential pressure follows from the force balance 5.12; the reduced plant has no state for it."""
+    position, velocity, acceleration = states.T
+    A, M, a1, a2, a3 = (rows[:, i] for i in _FORCE_COLUMNS)
+    friction = quadratic_friction(velocity, np.sign(velocity), a1, a2, a3)
+    pressure = (M * acceleration + friction) / A
+    return {"position_m": position, "velocity_m_s": velocity, "differential_pressure_pa": pressure}
+
+
+_FORCE_COLUMNS = tuple(
+    list(EhaParameters.__dataclass_fields__).index(name)
+    for name in ("piston_area", "moving_mass", "friction_quadratic", "friction_linear", "friction_coulomb")
+)
+
+REDUCED = Plant(
+    "reduced",
+    ("position_m", "velocity_m_s", "acceleration_m_s2"),
+    ros2_step(reduced_derivative),
+    _reduced_channels,
+    8,
+)
+LUMPED = Plant("lumped", ("position_m", "velocity_m_s", "differential_pressure_pa"), lumped_step, _lumped_channels, 4)
+
+PLANTS: Mapping[str, Plant] = MappingProxyType({plant.name: plant for plant in (REDUCED, LUMPED)})
+"""The plants, by name."""
+
+
+def simulate(
+    plant: Plant,
+    drive: Array,
+    sample_time: float,
+    parameters: EhaParameters | ParameterPath,
+    *,
+    sensors: Sensors = IDEAL,
+    rng: np.random.Generator | None = None,
+    keep_truth: bool = False,
+) -> Record:
+    """Run a plant from rest under a drive and return what its sensors log.
+
+    Parameters
+    ----------
+    plant : Plant
+        `REDUCED` or `LUMPED`.
+    drive : ndarray, shape (n,)
+        Motor speed at the samples [rad/s], linear between.
+    sample_time : float
+        Seconds between samples [s].
+    parameters : EhaParameters or ParameterPath
+        The actuator, constant or changing with time.
+    sensors : Sensors
+        What the bench sees; `IDEAL` by default.
+    rng : numpy.random.Generator, optional
+        Source of sensor noise; needed unless the sensors are ideal.
+    keep_truth : bool
+        Whether the noiseless channels stand beside the sensors' as ``true_...``.
+
+    Returns
+    -------
+    Record
+        The run.
+
+    Raises
+    ------
+    DriveError
+        If the drive is not a finite series of at least two samples.
+    HydrostateError
+        If the simulated state stops being finite.
+
+    Examples
+    --------
+    >>> record = simulate(LUMPED, np.full(10001, 125.66), 1e-4, EhaParameters())
+    >>> round(float(record["velocity_m_s"][-1]), 4)
+    0.0431
+    """
+    speed = np.ascontiguousarray(drive, dtype=np.float64)
+    if speed.ndim != 1 or len(speed) < 2 or not np.all(np.isfinite(speed)):
+        raise DriveError(f"a drive must be a finite series of at least 2 samples, got shape {speed.shape}")
+    path = parameters if isinstance(parameters, ParameterPath) else ParameterPath.constant(parameters)
+    rows = np.ascontiguousarray(path.sample(sample_time * np.arange(len(speed))))
+    substeps = max(1, round(plant.substeps * sample_time / 1e-4))
+    run = compile_trajectory(plant.name, plant.step, len(plant.states))
+    states = run(np.zeros(len(plant.states)), speed, rows, sample_time, substeps)
+    if not np.all(np.isfinite(states)):
+        when = sample_time * int(np.argmax(~np.isfinite(states).all(axis=1)))
+        raise HydrostateError(f"the {plant.name} plant stopped being finite at {when:.4f} s: check its parameters")
+    metadata = {"plant": plant.name, "parameters": asdict(path.parameters[0])}
+    truth = Record(sample_time, {"motor_speed_rad_s": speed, **plant.channels(states, rows)}, metadata)
+    if sensors == IDEAL and rng is None:
+        return truth
+    if rng is None:
+        raise HydrostateError("simulate() needs rng for sensors with noise, got None")
+    return measure(truth, sensors, rng, keep_truth=keep_truth)
+
+
+__all__ = ["LUMPED", "PLANTS", "REDUCED", "Plant", "parameter_row", "simulate"]

@@ -1,0 +1,143 @@
+"""Units: notes on parameters, readable by machine, and conversion of a log's columns to SI at the door.
+
+Inside the project everything is SI; a unit stands only in a name's suffix (``speed_rpm``) or in an `SI` note.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cache
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
+
+if TYPE_CHECKING:
+    import pint
+
+RPM = 0.10471975511965977
+"""One revolution a minute, in rad/s."""
+
+PSI = 6894.757293168361
+"""One pound-force a square inch, in Pa."""
+
+BAR = 1e5
+"""One bar, in Pa."""
+
+LITRE_PER_MINUTE = 1e-3 / 60.0
+"""One litre a minute, in m^3/s."""
+
+
+@dataclass(frozen=True)
+class SI:
+    """The note on a parameter: its unit, its meaning, and where its value comes from.
+
+    Parameters
+    ----------
+    unit : str
+        SI unit, written with ``^`` and ``/``: ``"m^3/(s Pa)"``.
+    meaning : str
+        What the quantity is, in a few words.
+    source : str
+        Table, equation or section of the source, with the erratum where one applies.
+    """
+
+    unit: str
+    meaning: str
+    source: str
+
+
+@cache
+def notes(parameter_class: type) -> Mapping[str, SI]:
+    """Return the `SI` note of every field of a parameter dataclass.
+
+    Parameters
+    ----------
+    parameter_class : type
+        A dataclass whose fields are ``Annotated[float, SI(...)]``.
+
+    Returns
+    -------
+    Mapping[str, SI]
+        One note for each field name, in field order.
+
+    Raises
+    ------
+    TypeError
+        If a field carries no note.
+
+    Examples
+    --------
+    >>> from plant.eha import EhaParameters
+    >>> notes(EhaParameters)["piston_area"].unit
+    'm^2'
+    """
+    hints = get_type_hints(parameter_class, include_extras=True)
+    found: dict[str, SI] = {}
+    for field in fields(parameter_class):
+        hint = hints[field.name]
+        extras = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
+        note = next((extra for extra in extras if isinstance(extra, SI)), None)
+        if note is None:
+            raise TypeError(f"{parameter_class.__name__}.{field.name} must carry an SI note, got {hint}")
+        found[field.name] = note
+    return found
+
+
+@cache
+def unit_registry() -> "pint.UnitRegistry[Any]":
+    """Return the project's one pint registry, with the shop's ``lpm`` and ``rev`` added."""
+    import pint
+
+    registry: pint.UnitRegistry[Any] = pint.UnitRegistry()
+    registry.define("lpm = liter / minute")
+    registry.define("rev = revolution")
+    return registry
+
+
+LOWER_CASE: Mapping[str, str] = MappingProxyType(
+    {"pa": "Pa", "kpa": "kPa", "mpa": "MPa", "gpa": "GPa", "v": "V", "mv": "mV", "kv": "kV", "hz": "Hz"}
+)
+"""Units that column names write in lower case, where pint reads another unit or none (``pa``: pico-year)."""
+
+
+def conversion_to(unit: str, wanted: str) -> tuple[float, float]:
+    """Return ``(factor, offset)`` such that ``value * factor + offset`` is in the wanted unit.
+
+    Parameters
+    ----------
+    unit : str
+        The unit that the values come in, e.g. ``"mm"``, ``"rpm"``, ``"bar"``.
+    wanted : str
+        The unit that is wanted, e.g. ``"m"``.
+
+    Returns
+    -------
+    tuple[float, float]
+        Factor and offset of the affine conversion.
+
+    Raises
+    ------
+    ValueError
+        If the unit is unknown, or measures something else.
+
+    Examples
+    --------
+    >>> factor, offset = conversion_to("mm", "m")
+    >>> round(factor, 12), offset
+    (0.001, 0.0)
+    """
+    import pint
+
+    registry = unit_registry()
+    name = LOWER_CASE.get(unit, unit)
+    try:
+        zero = float(registry.Quantity(0.0, name).to(wanted).magnitude)
+        one = float(registry.Quantity(1.0, name).to(wanted).magnitude)
+        turns = "radian" in str(registry.Quantity(1.0, name).to_base_units().units)
+    except pint.UndefinedUnitError as error:
+        raise ValueError(f"unit {unit!r} is unknown, wanted one that converts to {wanted!r}") from error
+    except pint.DimensionalityError as error:
+        raise ValueError(f"unit {unit!r} does not convert to {wanted!r}") from error
+    except Exception as error:  # pint parses with several exception types of its own and of tokenize
+        raise ValueError(f"unit {unit!r} cannot be read, wanted one that converts to {wanted!r}") from error
+    if turns != ("rad" in wanted):  # pint takes 1 Hz for 1 rad/s
+        raise ValueError(f"unit {unit!r} leaves the angle out, wanted one that converts to {wanted!r}, as rpm does")
+    return one - zero, zero

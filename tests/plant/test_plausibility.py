@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+
+from plant.plausibility import implausible
+
+T = 1e-3
+TIME = T * np.arange(4000)
+RNG = np.random.default_rng(5)
+SPEED = 120.0 * np.sin(2.0 * np.pi * TIME) + 0.05 * RNG.standard_normal(len(TIME))
+TRUE_VELOCITY = 0.04 * np.sin(2.0 * np.pi * TIME)
+LOG = {
+    "motor_speed_rad_s": SPEED,
+    "position_m": np.round(np.cumsum(TRUE_VELOCITY) * T, 6),
+    "velocity_m_s": TRUE_VELOCITY + 1e-3 * RNG.standard_normal(len(TIME)),
+    "differential_pressure_pa": 3e5 * np.sin(2.0 * np.pi * TIME),
+    "pressure_a_pa": 1e6 + 2e5 * np.sin(2.0 * np.pi * TIME),
+    "pressure_b_pa": 1e6 - 2e5 * np.sin(2.0 * np.pi * TIME),
+    "motor_voltage_v": 4.0 * np.sin(2.0 * np.pi * TIME),
+}
+
+
+def test_a_plausible_log_gives_no_note() -> None:
+    assert implausible(T, LOG, "a.csv") == []
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+@pytest.mark.parametrize("name", list(LOG))
+def test_a_channel_wrong_by_a_thousand_is_noticed(name: str, factor: float) -> None:
+    notes = implausible(T, {**LOG, name: factor * LOG[name]}, "a.csv")
+    assert any("looks like" in note for note in notes)
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+@pytest.mark.parametrize("name", ["position_m", "velocity_m_s"])
+def test_a_slip_is_noticed_without_the_other_of_position_and_velocity(name: str, factor: float) -> None:
+    slipped = {"motor_speed_rad_s": SPEED, name: factor * LOG[name]}
+    assert any("looks like" in note for note in implausible(T, slipped, "a.csv"))
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+def test_a_sample_time_wrong_by_a_thousand_is_noticed(factor: float) -> None:
+    notes = implausible(factor * T, LOG, "a.csv")
+    assert any("sample time" in note for note in notes)
+    assert any("integrates to" in note for note in notes)
+
+
+def test_a_note_says_what_was_seen_and_which_slip_explains_it() -> None:
+    (first, *_) = implausible(T, {**LOG, "position_m": 1e3 * LOG["position_m"]}, "a.csv")
+    assert first == "a.csv: position_m spans 12.7 m, at most 5 is usual; looks like mm read as m"
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_sensor_noise_on_a_stuck_piston_is_no_slip_of_units(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    position = np.round(2e-7 * rng.standard_normal(len(TIME)) + 3e-7, 6)
+    noisy = 1e-3 * rng.standard_normal(len(TIME)) + 2e-4
+    for velocity in (noisy, np.gradient(position, T)):
+        stuck = {**LOG, "position_m": position, "velocity_m_s": velocity}
+        assert implausible(T, stuck, "a.csv") == []
+
+
+def test_a_finely_resolved_stuck_piston_is_no_slip_of_units() -> None:
+    position = 1e-8 * np.random.default_rng(2).standard_normal(len(TIME))
+    assert implausible(T, {"motor_speed_rad_s": SPEED, "position_m": position}, "a.csv") == []
+
+
+def test_a_log_in_which_nothing_moves_says_so() -> None:
+    still = np.zeros(len(TIME))
+    (note,) = implausible(T, {**LOG, "position_m": still, "velocity_m_s": still}, "a.csv")
+    assert "position_m and velocity_m_s stay constant: nothing moves" in note
+    (note,) = implausible(T, {**LOG, "motor_speed_rad_s": still}, "a.csv")
+    assert "motor_speed_rad_s is constant" in note
+
+
+def test_missing_samples_do_not_hide_a_slip() -> None:
+    position = 1e3 * LOG["position_m"] / 4.0
+    position[100:150] = np.nan
+    assert any("integrates to" in note for note in implausible(T, {**LOG, "position_m": position}, "a.csv"))

@@ -1,0 +1,44 @@
+import pytest
+
+from plant.units import BAR, LITRE_PER_MINUTE, PSI, RPM, conversion_to
+
+
+@pytest.mark.parametrize(
+    ("unit", "wanted", "factor"),
+    [
+        ("mm", "m", 1e-3),
+        ("rpm", "rad/s", RPM),
+        ("rev/min", "rad/s", RPM),
+        ("deg/s", "rad/s", 0.017453292519943295),
+        ("bar", "Pa", BAR),
+        ("psi", "Pa", PSI),
+        ("mpa", "Pa", 1e6),
+        ("mPa", "Pa", 1e-3),
+        ("kpa", "Pa", 1e3),
+        ("mv", "V", 1e-3),
+        ("lpm", "m^3/s", LITRE_PER_MINUTE),
+    ],
+)
+def test_units_of_the_bench_convert_to_si(unit: str, wanted: str, factor: float) -> None:
+    assert conversion_to(unit, wanted) == (pytest.approx(factor, rel=1e-14), 0.0)
+
+
+def test_conversion_carries_the_offset_of_a_temperature() -> None:
+    factor, offset = conversion_to("degC", "kelvin")
+    assert (factor, offset) == (pytest.approx(1.0), pytest.approx(273.15))
+
+
+@pytest.mark.parametrize("unit", ["furlongz", "kg", "", "2 mm", "(", "5", "mm +"])
+def test_what_is_no_length_is_refused(unit: str) -> None:
+    with pytest.raises(ValueError, match="unit"):
+        conversion_to(unit, "m")
+
+
+def test_hertz_is_no_angular_speed() -> None:
+    with pytest.raises(ValueError, match="leaves the angle out"):
+        conversion_to("Hz", "rad/s")
+
+
+def test_a_speed_of_a_shaft_is_no_frequency() -> None:
+    with pytest.raises(ValueError, match="angle"):
+        conversion_to("rad/s", "Hz")
