@@ -83,8 +83,8 @@ def mean_chi_square_bounds(degrees: int, count: int, confidence: float = 0.95) -
     (1.48, 2.59)
     """
     tail = 0.5 * (1.0 - confidence)
-    low, high = chi2.ppf([tail, 1.0 - tail], degrees * count) / count
-    return float(low), float(high)
+    low, high = (float(chi2.ppf(p, degrees * count)) / count for p in (tail, 1.0 - tail))
+    return low, high
 
 
 def consistency_gate(estimate: Estimate, state: str) -> Gate:

@@ -20,7 +20,7 @@ BULK_MODULUS_STATE = StateVariable(BULK_MODULUS, "Pa", 1e8, 0.0, 0.0, 2e10)
 """Constant in time; scaled by 1e8 (errata E10); held between nothing and ten times pure oil."""
 
 
-def with_bulk_modulus(p: EhaValues, bulk_modulus: Scalar) -> EhaValues:
+def with_bulk_modulus(p: EhaValues, bulk_modulus: Scalar) -> SimpleNamespace:
     """Return the parameters with another effective bulk modulus, which may be an expression.
 
     Parameters

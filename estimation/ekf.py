@@ -41,4 +41,4 @@ def ekf(problem: FilterProblem) -> Trace:
         trace.residuals,
         trace.residual_variances,
     )
-    return replace(trace, nis=nis, count=count, log_likelihood=float(log_likelihood))
+    return replace(trace, nis=nis, count=count, log_likelihood=log_likelihood)

@@ -6,6 +6,7 @@ is overridden here, the Jacobian is set before each `predict`, and one update ta
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
@@ -40,13 +41,13 @@ def filterpy_ekf(problem: FilterProblem) -> Trace:
     Returns
     -------
     Trace
-        Its result; the residuals are those of the joint update, so their log-likelihood and total NIS equal the
-        sequential ones while single channels differ.
+        Its result. The joint innovations are given as the sequential ones that they are equal to, channel by channel;
+        where a sample is missing, residual and variance are NaN.
     """
     trace = empty_trace(problem)
-    width = problem.model.width
     H = _observation_matrix(problem)
-    kalman = _ModelFilter(dim_x=width, dim_z=len(problem.channels))
+    lower, upper = (np.array([getattr(s, end) / s.scale for s in problem.model.states]) for end in ("lower", "upper"))
+    kalman = _ModelFilter(dim_x=problem.model.width, dim_z=len(problem.channels))
     kalman.x, kalman.P = problem.mean.copy(), problem.covariance.copy()
     kalman.Q = np.diag(problem.noise) * problem.sample_time / problem.substeps
     log_likelihood = 0.0
@@ -54,8 +55,16 @@ def filterpy_ekf(problem: FilterProblem) -> Trace:
         if k:
             _predict(kalman, problem, k)
         present = np.isfinite(y)
+        residual, variance = np.full_like(y, np.nan), np.full_like(y, np.nan)
         if np.any(present):
-            log_likelihood += _update(kalman, y, H, present, problem.variances, trace)
+            residual[present], variance[present] = _update(kalman, y[present], H[present], problem.variances[present])
+            kalman.x = np.clip(kalman.x, lower, upper)
+            ratio = residual[present] ** 2 / variance[present]
+            trace.nis[present] += ratio
+            trace.count[present] += 1.0
+            log_likelihood -= 0.5 * float(np.sum(ratio + np.log(2.0 * math.pi * variance[present])))
+        if problem.keep_innovations:
+            trace.residuals[k], trace.residual_variances[k] = residual, variance
         if k % problem.every == 0:
             trace.track[k // problem.every] = kalman.x
             trace.track_variance[k // problem.every] = np.diag(kalman.P)
@@ -64,7 +73,7 @@ def filterpy_ekf(problem: FilterProblem) -> Trace:
 
 def _observation_matrix(problem: FilterProblem) -> Array:
     """Return the matrix of the channels; every model of this project observes linearly."""
-    parameters = dict(zip(PARAMETER_NAMES, problem.parameters, strict=True))
+    parameters = SimpleNamespace(**dict(zip(PARAMETER_NAMES, problem.parameters, strict=True)))
     rows: list[list[float]] = []
     for channel in problem.channels:
         row: list[float] = []
@@ -85,16 +94,12 @@ def _predict(kalman: _ModelFilter, problem: FilterProblem, k: int) -> None:
         kalman.predict()
 
 
-def _update(kalman: _ModelFilter, y: Array, H: Array, present: Array, variances: Array, trace: Trace) -> float:
-    rows = H[present]
-    kalman.update(
-        y[present],
-        HJacobian=lambda x: rows,
-        Hx=lambda x: rows @ x,
-        R=np.diag(variances[present]),
-    )
-    residual, spread = kalman.y, kalman.S
-    trace.nis[present] += residual**2 / np.diag(spread)
-    trace.count[present] += 1.0
-    _, log_determinant = np.linalg.slogdet(2.0 * math.pi * spread)
-    return float(-0.5 * (residual @ np.linalg.solve(spread, residual) + log_determinant))
+def _update(kalman: _ModelFilter, y: Array, rows: Array, variances: Array) -> tuple[Array, Array]:
+    """Update with all channels at once; return what updating with one after the other would have seen.
+
+    With ``S = L L'``, the sequential innovations are ``diag(L) * solve(L, y)`` and their variances ``diag(L)**2``.
+    """
+    kalman.update(y, HJacobian=lambda _: rows, Hx=lambda x: rows @ x, R=np.diag(variances))
+    root = np.asarray(np.linalg.cholesky(kalman.S), dtype=np.float64)
+    size = np.diag(root)
+    return size * np.linalg.solve(root, kalman.y), size**2

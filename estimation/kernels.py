@@ -10,12 +10,17 @@ from functools import cache
 from types import ModuleType
 from typing import TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from estimation.model import ProcessModel
 from plant.compiled.expression import ZERO, Expression, as_expression, jacobian, select, symbol, unary
 from plant.compiled.functions import maximum, minimum
 from plant.compiled.kernel_file import load_kernel
 from plant.compiled.source import statements
 from plant.integrate import PARAMETER_NAMES, parameter_symbols
+
+Array: TypeAlias = NDArray[np.float64]
 
 Covariance: TypeAlias = dict[tuple[int, int], Expression]
 """Upper triangle: ``P[i, j]`` with i <= j."""
@@ -111,7 +116,7 @@ def update_expressions(model: ProcessModel, channels: Sequence[str]) -> dict[str
         New value of each mean and covariance symbol, residuals ``e`` and their variances ``s``.
     """
     n = model.width
-    mean, P = _state_symbols(model)
+    mean, covariance = _state_symbols(model)
     outputs: dict[str, Expression] = {}
     prior = list(mean)
     physical = tuple(z * state.scale for z, state in zip(prior, model.states, strict=True))
@@ -122,15 +127,15 @@ def update_expressions(model: ProcessModel, channels: Sequence[str]) -> dict[str
         present = unary("present", y)
         moved = _total([H[i] * (mean[i] - prior[i]) for i in range(n)])
         residual = y - (predicted[channel] + moved)
-        PH = [_total([_entry(P, i, j) * H[j] for j in range(n)]) for i in range(n)]
+        PH = [_total([_entry(covariance, i, j) * H[j] for j in range(n)]) for i in range(n)]
         variance = _total([H[i] * PH[i] for i in range(n)]) + r
         weight = select(present, 1.0 / variance, ZERO)
         step = weight * select(present, residual, ZERO)
-        P = {(i, j): P[i, j] - PH[i] * PH[j] * weight for i, j in P}
+        covariance = {(i, j): entry - PH[i] * PH[j] * weight for (i, j), entry in covariance.items()}
         mean = [z + PH[i] * step for i, z in enumerate(mean)]
         outputs[f"e{c}"], outputs[f"s{c}"] = residual, variance
     outputs |= {f"z{i}": z for i, z in enumerate(_bounded(model, mean))}
-    return outputs | {f"P{i}{j}": value for (i, j), value in P.items()}
+    return outputs | {f"P{i}{j}": value for (i, j), value in covariance.items()}
 
 
 _RUN = '''"""Generated: extended Kalman filter on the {name} form."""
@@ -220,7 +225,7 @@ def ekf_source(model: ProcessModel, channels: tuple[str, ...]) -> str:
 
 
 @cache
-def compile_ekf(model: ProcessModel, channels: tuple[str, ...]) -> Callable[..., tuple[object, ...]]:
+def compile_ekf(model: ProcessModel, channels: tuple[str, ...]) -> Callable[..., tuple[Array, Array, float]]:
     """Generate and load the extended Kalman filter of a model for a set of channels.
 
     Parameters
@@ -233,7 +238,7 @@ def compile_ekf(model: ProcessModel, channels: tuple[str, ...]) -> Callable[...,
     Returns
     -------
     callable
-        The kernel's ``run``; see `estimation.run` for its arguments.
+        The kernel's ``run``; see `estimation.ekf` for its arguments.
     """
     return load_kernel(f"ekf_{model.name}", ekf_source(model, channels)).run
 

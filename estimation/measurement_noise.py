@@ -1,4 +1,4 @@
-"""Measurement noise read off the log itself."""
+"""Measurement noise read off the log itself, not taken as published (errata E11)."""
 
 from collections.abc import Mapping, Sequence
 
@@ -25,8 +25,8 @@ def measurement_variances(record: Record, channels: Sequence[str]) -> Mapping[st
     """Estimate each channel's measurement variance from its second differences.
 
     A second difference removes everything smooth and holds six times the variance of white noise; its median absolute
-    deviation ignores the moments at which the piston really jumps. One twelfth of the squared quantum is the least
-    that a quantised channel can have.
+    deviation ignores the moments at which the piston really jumps. A channel that mostly repeats its last value is
+    taken for quantised: one twelfth of the squared quantum is the least that it can have.
 
     Parameters
     ----------
@@ -54,8 +54,16 @@ def measurement_variances(record: Record, channels: Sequence[str]) -> Mapping[st
 def _variance(channel: str, values: Array) -> float:
     bends = np.diff(values, n=2)
     bends = bends[np.isfinite(bends)]
-    smallest = SMALLEST_VARIANCE.get(channel, 0.0)
+    smallest = max(SMALLEST_VARIANCE.get(channel, 0.0), _quantum(values) ** 2 / 12.0)
     if not len(bends):
         return smallest
     deviation = NORMAL_MAD * float(np.median(np.abs(bends - np.median(bends)))) / np.sqrt(6.0)
     return max(deviation**2, smallest)
+
+
+def _quantum(values: Array) -> float:
+    """Return the smallest step of a channel that mostly does not move; 0 for any other."""
+    steps = np.abs(np.diff(values))
+    moved = steps[steps > 0.0]
+    held = np.count_nonzero(steps == 0.0)
+    return float(np.min(moved)) if held > len(moved) > 0 else 0.0

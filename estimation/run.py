@@ -49,7 +49,8 @@ class Estimate:
     belief : Gaussian
         Belief after the last sample.
     nis : Mapping[str, float]
-        Mean normalised innovation squared of each channel; 1 where the filter believes what the log shows.
+        Mean normalised innovation squared of each channel [dimensionless]; 1 where the filter believes what the log
+        shows, NaN where the channel was never present.
     log_likelihood : float
         Log-likelihood of the log [dimensionless].
     residuals, residual_variances : ndarray, shape (samples or 0, channels)
@@ -193,7 +194,7 @@ def available_channels(model: ProcessModel, record: Record) -> tuple[str, ...]:
 
 def _in_si(problem: FilterProblem, trace: Trace, start_time: float) -> Estimate:
     scale = np.array([state.scale for state in problem.model.states])
-    rows = np.arange(len(trace.track))
+    rows = np.arange(len(trace.track), dtype=np.float64)
     means = {
         channel: float(total / count) if count else float("nan")
         for channel, total, count in zip(problem.channels, trace.nis, trace.count, strict=True)
@@ -209,7 +210,7 @@ def _in_si(problem: FilterProblem, trace: Trace, start_time: float) -> Estimate:
     return Estimate(
         model=problem.model,
         channels=problem.channels,
-        time=start_time + rows * problem.every * problem.sample_time,
+        time=start_time + problem.sample_time * problem.every * rows,
         mean=trace.track * scale,
         variance=np.maximum(trace.track_variance, 0.0) * scale**2,
         belief=belief,

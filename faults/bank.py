@@ -1,6 +1,7 @@
 """Banks of models, one a condition: the lumped mathematical model, and the identified transfer functions."""
 
 from collections.abc import Mapping
+from math import ceil
 from types import MappingProxyType
 
 import numpy as np
@@ -9,7 +10,8 @@ from numpy.typing import NDArray
 from estimation.identification.from_record import identify_record
 from estimation.identification.linear_model import LinearModel
 from estimation.identification.preprocess import bridged
-from faults.conditions import CONDITIONS, parameters_for
+from estimation.run import LONGEST_STEP
+from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.eha import EhaParameters
 from plant.integrate import compile_trajectory, parameter_row
 from plant.record import Record
@@ -60,9 +62,42 @@ def predict_run(record: Record, parameters: EhaParameters) -> Mapping[str, Array
     run = compile_trajectory(LUMPED.name, LUMPED.step, len(LUMPED.states))
     rows = parameter_row(parameters)[None]
     speed = bridged(record["motor_speed_rad_s"])
-    substeps = max(1, round(record.sample_time / 1e-4))
+    substeps = max(1, ceil(record.sample_time / LONGEST_STEP - 1e-9))
     states = run(np.zeros(len(LUMPED.states)), speed, rows, record.sample_time, substeps)
     return LUMPED.channels(states, rows)
+
+
+def identification_run(
+    rig: EhaParameters,
+    condition: Condition,
+    rng: np.random.Generator,
+    *,
+    sensors: Sensors = BENCH,
+    duration: float = IDENTIFICATION_DURATION,
+) -> Record:
+    """Simulate the identification test of section 4: a pseudo-random binary signal of 4 V.
+
+    Parameters
+    ----------
+    rig : EhaParameters
+        The healthy actuator.
+    condition : Condition
+        The condition it is in.
+    rng : numpy.random.Generator
+        Source of the drive and of sensor noise.
+    sensors : Sensors
+        What the bench sees.
+    duration : float
+        Length of the test [s].
+
+    Returns
+    -------
+    Record
+        The run, at `IDENTIFICATION_TIME`.
+    """
+    parameters = parameters_for(condition, rig)
+    drive = make_drive("prbs", duration, IDENTIFICATION_TIME, parameters, rng)
+    return simulate(LUMPED, drive, IDENTIFICATION_TIME, parameters, sensors=sensors, rng=rng)
 
 
 def identify_bank(
@@ -74,8 +109,8 @@ def identify_bank(
 ) -> Mapping[str, LinearModel]:
     """Identify the nine transfer functions from simulated tests, as section 4 does from its bench.
 
-    Each condition is driven by a pseudo-random binary signal of 4 V and fitted with an output-error model of Table 6's
-    structure (three numerator coefficients, second order). Input and output are used alike (errata E15).
+    Each test is fitted with an output-error model of Table 6's structure: three numerator coefficients, second order.
+    Input and output are used alike (errata E15).
 
     Parameters
     ----------
@@ -95,8 +130,6 @@ def identify_bank(
     """
     models: dict[str, LinearModel] = {}
     for (name, condition), stream in zip(CONDITIONS.items(), rng.spawn(len(CONDITIONS)), strict=True):
-        parameters = parameters_for(condition, rig)
-        drive = make_drive("prbs", duration, IDENTIFICATION_TIME, parameters, stream)
-        record = simulate(LUMPED, drive, IDENTIFICATION_TIME, parameters, sensors=sensors, rng=stream)
+        record = identification_run(rig, condition, stream, sensors=sensors, duration=duration)
         models[name] = identify_record(record, sample_time=IDENTIFICATION_TIME)
     return MappingProxyType(models)

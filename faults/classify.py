@@ -25,7 +25,7 @@ SCORED = ("velocity_m_s", "differential_pressure_pa")
 """Channels whose error counts. Position is left out: it drifts with every error in velocity."""
 
 POSITION_WINDOW = 0.01
-"""Window over which position is differentiated where velocity was not logged [s]."""
+"""Window over which position is differentiated where velocity was not logged [s]; two samples of a slower log."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +47,21 @@ class Scores:
     def condition(self) -> str:
         """The condition with the smallest score."""
         return str(self.table["score"].idxmin())
+
+    def of_one(self, channel: str) -> "Scores":
+        """Return the scores as they are when one channel counts alone.
+
+        Parameters
+        ----------
+        channel : str
+            One of `channels`.
+
+        Returns
+        -------
+        Scores
+            With the channel's RMSE [SI] as score.
+        """
+        return Scores(self.table.assign(score=self.table[f"rmse_{channel}"]), (channel,))
 
     @property
     def by_condition(self) -> Mapping[str, float]:
@@ -142,7 +157,8 @@ def measured_velocity(record: Record) -> Array:
         return record["velocity_m_s"]
     if "position_m" not in record:
         raise LogError(f"velocity_m_s or position_m is wanted, the log has {', '.join(record)}")
-    return differentiated(bridged(record["position_m"]), record.sample_time, POSITION_WINDOW)
+    window = max(POSITION_WINDOW, 2.0 * record.sample_time)
+    return differentiated(bridged(record["position_m"]), record.sample_time, window)
 
 
 def rmse(measured: Array, predicted: Array) -> float:

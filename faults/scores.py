@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 import pandas as pd
 
 from faults.conditions import CONDITIONS
@@ -22,16 +23,21 @@ def confusion_matrix(true: Sequence[str], found: Sequence[str]) -> pd.DataFrame:
     pandas.DataFrame
         Counts; a row for each true condition, a column for each found one, in the order of Table 1.
 
+    Raises
+    ------
+    ValueError
+        If the lengths differ, or a condition is not one of Table 1.
+
     Examples
     --------
     >>> int(confusion_matrix(["normal", "normal"], ["normal", "minor_leakage"]).loc["normal", "minor_leakage"])
     1
     """
     names = list(CONDITIONS)
-    counts = pd.DataFrame(0, index=pd.Index(names, name="true"), columns=pd.Index(names, name="found"))
+    counts = np.zeros((len(names), len(names)), dtype=np.int64)
     for actual, answer in zip(true, found, strict=True):
-        counts.loc[actual, answer] += 1
-    return counts
+        counts[names.index(actual), names.index(answer)] += 1
+    return pd.DataFrame(counts, index=pd.Index(names, name="true"), columns=pd.Index(names, name="found"))
 
 
 def accuracy(confusion: pd.DataFrame) -> float:

@@ -5,7 +5,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -238,72 +237,19 @@ def parse_columns(texts: Sequence[str]) -> dict[str, str]:
     return check_columns(mapping)
 
 
-def number(text: str) -> float:
-    """Return a cell of text as a number, NaN if it is empty or says that nothing was measured.
-
-    Parameters
-    ----------
-    text : str
-        The cell.
-
-    Returns
-    -------
-    float
-        Its value.
-
-    Raises
-    ------
-    ValueError
-        If the text is not a number.
-    """
-    cell = text.strip()
-    if cell.lower() in {"", "na", "n/a", "#n/a", "null", "none", "nan", "-nan"}:
-        return float("nan")
-    if "_" in cell:  # Python reads 1_000, no logger writes it
-        raise ValueError(cell)
-    return float(cell)
-
-
-def numbers(values: NDArray[Any], name: str, source: str) -> NDArray[np.float64]:
-    """Return a column as floats, shape (n,), NaN where it says that nothing was measured.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        Numbers, or objects and text that may be numbers.
-    name, source : str
-        The column and the log, for messages.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        The numbers.
-
-    Raises
-    ------
-    LogError
-        If the column is not one-dimensional, or a value is not a real number; it names the first.
-    """
-    if values.ndim != 1:
-        raise LogError(f"{source}: column {name!r} must be one-dimensional, got shape {values.shape}")
-    if values.dtype.kind in "fiub":
-        return np.ascontiguousarray(values, dtype=np.float64)
-    out = np.empty(len(values))
-    for row, value in enumerate(values):
-        try:
-            out[row] = np.nan if value is None else number(value) if isinstance(value, str) else float(value)
-        except (TypeError, ValueError) as error:
-            raise LogError(not_a_number(source, name, row, value)) from error
-    return out
-
-
-def not_a_number(source: str, name: str, row: int, value: object) -> str:
-    """Return the sentence for a cell that is not a number; ``row`` counts from 0, the sentence from 1."""
-    return f"{source}: column {name!r} must hold numbers, got {str(value)[:40]!r} in row {row + 1}"
-
-
 def converted(raw: Mapping[Column, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
-    """Return columns as channels in SI, each shape (n,)."""
+    """Return columns as channels in SI.
+
+    Parameters
+    ----------
+    raw : Mapping[Column, ndarray, shape (n,)]
+        Values in the units of the log.
+
+    Returns
+    -------
+    dict[str, ndarray, shape (n,)]
+        Values in SI by channel.
+    """
     return {
         column.channel: values
         if (column.factor, column.offset) == (1.0, 0.0)

@@ -15,21 +15,29 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from pyarrow import csv as arrow_csv
 
-from plant.columns import TRUTH, Column, not_a_number, number
+from plant.cells import MISSING, not_a_number, number
+from plant.columns import TRUTH, Column
 from plant.errors import LogError
 
 Values = NDArray[np.float64]
 Choose = Callable[[Sequence[str]], Sequence[Column]]
-
-MISSING = ("", "NaN", "nan", "-NaN", "-nan", "NA", "N/A", "n/a", "#N/A", "NULL", "null", "None")
-"""Cells that say that nothing was measured."""
 
 LONGEST_HEADER = 1 << 20
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How a CSV is written: column names, lines down to the header, delimiter, and decimal point."""
+    """How a CSV is written.
+
+    Parameters
+    ----------
+    names : tuple[str, ...]
+        Column names, as the header gives them.
+    header_lines : int
+        Lines down to the header, with it.
+    delimiter, decimal_point : str
+        One character each.
+    """
 
     names: tuple[str, ...]
     header_lines: int

@@ -7,7 +7,8 @@ pressure as a state, so that friction enters undifferentiated and the piston rea
 
 from dataclasses import dataclass, fields
 from math import isfinite
-from typing import Annotated, Protocol
+from types import SimpleNamespace
+from typing import Annotated, TypeAlias
 
 from plant.compiled.functions import Scalar, absolute, sign, where
 from plant.components.cylinder import quadratic_friction, velocity_under_friction
@@ -77,33 +78,8 @@ MAY_BE_ZERO = frozenset(
 """Parameters that a healthy or idealised actuator may have at exactly zero."""
 
 
-class EhaValues(Protocol):
-    """What the models read: `EhaParameters`, or the same names holding expressions."""
-
-    @property
-    def pump_displacement(self) -> Scalar: ...
-    @property
-    def piston_area(self) -> Scalar: ...
-    @property
-    def chamber_volume(self) -> Scalar: ...
-    @property
-    def moving_mass(self) -> Scalar: ...
-    @property
-    def bulk_modulus(self) -> Scalar: ...
-    @property
-    def leakage_coefficient(self) -> Scalar: ...
-    @property
-    def flow_bias(self) -> Scalar: ...
-    @property
-    def friction_quadratic(self) -> Scalar: ...
-    @property
-    def friction_linear(self) -> Scalar: ...
-    @property
-    def friction_coulomb(self) -> Scalar: ...
-    @property
-    def relief_pressure(self) -> Scalar: ...
-    @property
-    def relief_conductance(self) -> Scalar: ...
+EhaValues: TypeAlias = EhaParameters | SimpleNamespace
+"""What the models read: the parameters, or a namespace of the same names holding expressions."""
 
 
 def reduced_derivative(

@@ -65,9 +65,9 @@ def solve_linear(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]) ->
     Parameters
     ----------
     matrix : sequence of sequence of Expression, shape (n, n)
-        Diagonally dominant for small steps; structural zeros cost nothing.
+        Diagonally dominant for small steps; structural zeros cost nothing [any unit].
     right : sequence of Expression, shape (n,)
-        Right-hand side.
+        Right-hand side [any unit].
 
     Returns
     -------

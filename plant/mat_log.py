@@ -1,7 +1,6 @@
 """MAT logs, to version 7: one struct whose fields are columns, or plain variables."""
 
 import re
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, cast
@@ -10,14 +9,18 @@ import numpy as np
 import scipy.io
 from numpy.typing import NDArray
 
-from plant.columns import TRUTH, Column, numbers
+from plant.cells import numbers
+from plant.columns import TRUTH, Column
 from plant.csv_log import Choose
 from plant.errors import LogError
+from plant.mat_reader import DamagedMatError, Value, read_variables
 
 Values = NDArray[np.float64]
 
 STRUCT = "record"
 METADATA = "metadata_json"
+NEWER = (b"\x00\x02IM", b"\x02\x00MI")
+"""Version and byte order of a MAT 7.3, which is an HDF5 file."""
 
 
 def read_mat(path: Path, choose: Choose) -> tuple[dict[Column, Values], str | None]:
@@ -26,7 +29,7 @@ def read_mat(path: Path, choose: Choose) -> tuple[dict[Column, Values], str | No
     Parameters
     ----------
     path : Path
-        A MAT file of version 4 to 7.
+        A MAT file of version 5 to 7.
     choose : Callable[[Sequence[str]], Sequence[Column]]
         Picks columns from their names.
 
@@ -40,20 +43,21 @@ def read_mat(path: Path, choose: Choose) -> tuple[dict[Column, Values], str | No
     Raises
     ------
     LogError
-        If it is of version 7.3, or a column is no vector of real numbers.
+        If it is of another version or damaged, or a column is no vector of real numbers.
     """
+    content = path.read_bytes()
+    if content[124:128] in NEWER:
+        raise LogError(f"{path}: MAT files to version 7 are read, got 7.3; save it with '-v7'")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            content: dict[str, Any] = scipy.io.loadmat(path, simplify_cells=True)
-    except NotImplementedError as error:
-        raise LogError(f"{path}: MAT files to version 7 are read, got 7.3; save it with '-v7'") from error
-    table = _table({name: value for name, value in content.items() if not name.startswith("__")})
+        table = _table(read_variables(content))
+    except DamagedMatError as error:
+        raise LogError(f"{path}: cannot be read as mat: {error}") from error
     names = [name for name in table if name != METADATA]
     out: dict[Column, Values] = {}
     for column in choose(names):
+        values = np.atleast_1d(np.asarray(table[names[column.position]]))
         try:
-            out[column] = numbers(np.atleast_1d(np.asarray(table[names[column.position]])), column.name, str(path))
+            out[column] = numbers(values, column.name, str(path))
         except LogError:
             if not column.channel.startswith(TRUTH):
                 raise
@@ -61,9 +65,9 @@ def read_mat(path: Path, choose: Choose) -> tuple[dict[Column, Values], str | No
     return out, text if isinstance(text, str) else None
 
 
-def _table(content: Mapping[str, Any]) -> Mapping[str, Any]:
+def _table(content: Mapping[str, Value]) -> Mapping[str, Value]:
     """Return the struct that holds the columns: the one named record, the only one, or the file itself."""
-    structs = {name: value for name, value in content.items() if isinstance(value, dict)}
+    structs = {name: value for name, value in content.items() if isinstance(value, Mapping)}
     if STRUCT in structs:
         return structs[STRUCT]
     return next(iter(structs.values())) if len(structs) == 1 and len(content) == 1 else content

@@ -12,7 +12,17 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Plausible:
-    """Where the largest magnitude of a channel (of a position, the span) is usually found."""
+    """Where the largest magnitude of a channel (of a position, the span) is usually found.
+
+    Parameters
+    ----------
+    least, most : float
+        The bounds, in units of ``unit``.
+    unit : str
+        The channel's SI unit.
+    if_less, if_more : str
+        The slip of units that a value below or above the bounds looks like.
+    """
 
     least: float
     most: float
@@ -35,6 +45,9 @@ LIMITS: Mapping[str, Plausible] = MappingProxyType(
 )
 """Each channel that has a usual magnitude; judged: a thousandfold slip of common rigs crosses a limit."""
 
+MOTION = ("motor_speed_rad_s", "position_m", "velocity_m_s")
+"""Channels that show one motion: where one is out of range, comparing it with the others says nothing more."""
+
 SAMPLE_TIME = (5e-6, 0.5)
 """Sample times [s] between which hydraulics is logged."""
 
@@ -54,7 +67,7 @@ def implausible(sample_time: float, channels: Mapping[str, Values], source: str)
     Parameters
     ----------
     sample_time : float
-        Seconds between samples.
+        Time between samples [s].
     channels : Mapping[str, ndarray, shape (n,)]
         Values in SI, NaN where a sample is missing.
     source : str
@@ -72,15 +85,17 @@ def implausible(sample_time: float, channels: Mapping[str, Values], source: str)
     'a.csv: motor_speed_rad_s reaches 1e+05 rad/s, at most 2000 is usual; looks like mrad/s read as rad/s'
     """
     still = _still(channels, source)
-    notes = [] if still is None else [still]
+    slips: list[str] = []
     if sample_time < SAMPLE_TIME[0]:
-        notes.append(f"{source}: the sample time is {sample_time:.3g} s; looks like s read as ms")
+        slips.append(f"{source}: the sample time is {sample_time:.3g} s; looks like s read as ms")
     if sample_time > SAMPLE_TIME[1]:
-        notes.append(f"{source}: the sample time is {sample_time:.3g} s; looks like ms read as s")
-    for name, limits in LIMITS.items():
-        if name in channels:
-            notes += _out_of_range(name, channels[name], limits, source)
-    return notes + _displaced(sample_time, channels, source) + _pumped(sample_time, channels, source)
+        slips.append(f"{source}: the sample time is {sample_time:.3g} s; looks like ms read as s")
+    for name in MOTION:
+        slips += _out_of_range(name, channels, source)
+    slips = slips or _displaced(sample_time, channels, source) or _pumped(sample_time, channels, source)
+    for name in sorted(LIMITS.keys() - MOTION):
+        slips += _out_of_range(name, channels, source)
+    return slips if still is None else [still, *slips]
 
 
 def _span(values: Values) -> float:
@@ -96,7 +111,10 @@ def _still(channels: Mapping[str, Values], source: str) -> str | None:
     return None
 
 
-def _out_of_range(name: str, values: Values, limits: Plausible, source: str) -> list[str]:
+def _out_of_range(name: str, channels: Mapping[str, Values], source: str) -> list[str]:
+    if name not in channels:
+        return []
+    values, limits = channels[name], LIMITS[name]
     is_position = name == "position_m"
     size = _span(values) if is_position else float(max(np.nanmax(values), -np.nanmin(values)))
     verb = "spans" if is_position else "reaches"

@@ -10,8 +10,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from plant.cells import numbers
 from plant.columns import CHANNELS as CHANNELS
-from plant.columns import converted, numbers, resolve_columns
+from plant.columns import converted, resolve_columns
 from plant.errors import LogError, LogWarning
 from plant.record_checks import REQUIRED, trusted
 
@@ -38,7 +39,7 @@ class Record:
     Parameters
     ----------
     sample_time : float
-        Seconds between samples, positive.
+        Time between samples [s], positive.
     channels : Mapping[str, ndarray, shape (n,)]
         Values in SI under their channel name (``motor_speed_rad_s``); NaN marks a missing sample.
         Simulated truth may stand beside the sensors under other names (``true_...``).

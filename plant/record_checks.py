@@ -24,7 +24,15 @@ Channels = Mapping[str, Values]
 
 @dataclass(frozen=True)
 class Clock:
-    """A uniform clock: sample time [s] and the time of the first sample [s]."""
+    """A uniform clock.
+
+    Parameters
+    ----------
+    sample_time : float
+        Time between samples [s].
+    start_time : float
+        Time of the first sample [s].
+    """
 
     sample_time: float
     start_time: float
@@ -171,7 +179,7 @@ def _ticks(time: Values, source: str) -> Values:
     off = np.abs(step / nominal - ticks)
     off[~(ticks >= 1.0)] = np.inf
     worst = int(np.argmax(off))
-    if not off[worst] <= MOST_JITTER:
+    if not off[worst] <= MOST_JITTER + ROUNDING:
         raise LogError(
             f"{source}: {TIME} must be uniform within 1 % or leave out whole samples, got a step of "
             f"{step[worst]:.6g} s from row {worst + 1} to {worst + 2} at a sample time of {nominal:.6g} s"

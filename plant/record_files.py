@@ -14,7 +14,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from plant.atomic import replacing
-from plant.columns import TIME, TRUTH, Column, converted, numbers, resolve_columns
+from plant.cells import numbers
+from plant.columns import TIME, TRUTH, Column, converted, resolve_columns
 from plant.csv_log import Choose, read_csv, write_csv
 from plant.errors import HydrostateError, LogError, LogWarning
 from plant.mat_log import read_mat, write_mat
@@ -25,14 +26,7 @@ Values = NDArray[np.float64]
 Raw = tuple[dict[Column, Values], str | None]
 
 SCHEMA_KEY = b"hydrostate"
-SUFFIXES = {
-    ".csv": "csv",
-    ".txt": "csv",
-    ".gz": "csv",
-    ".parquet": "parquet",
-    ".pq": "parquet",
-    ".mat": "mat",
-}
+SUFFIXES = {".csv": "csv", ".txt": "csv", ".gz": "csv", ".parquet": "parquet", ".mat": "mat"}
 """File formats by suffix."""
 
 
@@ -44,7 +38,7 @@ def read_record(
     Parameters
     ----------
     path : str or Path
-        A ``.csv`` or ``.txt`` (also ``.gz``), ``.parquet``, or ``.mat`` (to version 7) file.
+        A ``.csv`` or ``.txt`` (also ``.gz``), ``.parquet``, or ``.mat`` (versions 5 to 7) file.
     columns : Mapping[str, str], optional
         Foreign columns by channel, with a unit where it is not SI: ``{"position_m": "POS_MM:mm"}``.
     required : Collection[str]
@@ -114,7 +108,18 @@ def write_record(record: Record, path: str | Path) -> None:
 
 
 def sidecar(path: Path) -> Path:
-    """Return the file beside a CSV that holds its metadata: ``run.csv.json`` for ``run.csv``."""
+    """Return the file beside a CSV that holds its metadata.
+
+    Parameters
+    ----------
+    path : Path
+        The CSV.
+
+    Returns
+    -------
+    Path
+        ``run.csv.json`` for ``run.csv``.
+    """
     return path.with_name(path.name + ".json")
 
 

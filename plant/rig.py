@@ -45,7 +45,7 @@ class Rig:
     parameters : EhaParameters
         Its parameters, SI.
     uncertainties : Mapping[str, float]
-        Relative standard deviation by parameter, 0.3 for 30 %; a parameter without one is taken as known.
+        Relative standard deviation by parameter, a fraction, 0.3 for 30 %; a parameter without one is taken as known.
     columns : Mapping[str, str]
         Foreign log columns by channel: ``{"position_m": "POS_MM:mm"}``.
 

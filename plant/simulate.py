@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from plant.components.cylinder import quadratic_friction
 from plant.eha import EhaParameters, lumped_step, reduced_derivative
 from plant.errors import DriveError, HydrostateError
-from plant.integrate import StepFunction, compile_trajectory, parameter_row, ros2_step
+from plant.integrate import StepFunction, compile_trajectory, ros2_step
 from plant.parameter_path import ParameterPath
 from plant.record import Record
 from plant.sensors import IDEAL, Sensors, measure
@@ -125,8 +125,11 @@ def simulate(
     0.0431
     """
     speed = np.ascontiguousarray(drive, dtype=np.float64)
-    if speed.ndim != 1 or len(speed) < 2 or not np.all(np.isfinite(speed)):
-        raise DriveError(f"a drive must be a finite series of at least 2 samples, got shape {speed.shape}")
+    if speed.ndim != 1 or len(speed) < 2:
+        raise DriveError(f"a drive must be a series of at least 2 samples, got shape {speed.shape}")
+    if not np.all(np.isfinite(speed)):
+        where = int(np.argmin(np.isfinite(speed)))
+        raise DriveError(f"a drive must be finite, got {speed[where]} at sample {where}")
     path = parameters if isinstance(parameters, ParameterPath) else ParameterPath.constant(parameters)
     rows = np.ascontiguousarray(path.sample(sample_time * np.arange(len(speed))))
     substeps = max(1, round(plant.substeps * sample_time / 1e-4))
@@ -138,10 +141,7 @@ def simulate(
     metadata = {"plant": plant.name, "parameters": asdict(path.parameters[0])}
     truth = Record(sample_time, {"motor_speed_rad_s": speed, **plant.channels(states, rows)}, metadata)
     if sensors == IDEAL and rng is None:
-        return truth
+        return truth.replace(**{f"true_{name}": truth[name] for name in truth}) if keep_truth else truth
     if rng is None:
         raise HydrostateError("simulate() needs rng for sensors with noise, got None")
     return measure(truth, sensors, rng, keep_truth=keep_truth)
-
-
-__all__ = ["LUMPED", "PLANTS", "REDUCED", "Plant", "parameter_row", "simulate"]

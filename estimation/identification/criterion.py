@@ -88,9 +88,7 @@ def stabilised(denominator: FloatArray, n_samples: int) -> FloatArray:
     roots = np.roots(denominator).astype(np.complex128)
     radius = np.abs(roots)
     outside = radius >= 1.0
-    wanted = np.where(
-        outside, np.minimum(1.0 / np.where(outside, radius, 1.0), 1.0 - 1.0 / n_samples), radius
-    )
+    wanted = np.where(outside, np.minimum(1.0 / np.where(outside, radius, 1.0), 1.0 - 1.0 / n_samples), radius)
     shrink = np.where(outside, wanted / np.where(outside, radius, 1.0), 1.0)
     return polynomial(roots * shrink)
 

@@ -36,9 +36,7 @@ class FrequencyResponse:
     resolution_hz: float
 
 
-def etfe(
-    u: ArrayLike, y: ArrayLike, sample_time: float, *, lag_window: int | None = None
-) -> FrequencyResponse:
+def etfe(u: ArrayLike, y: ArrayLike, sample_time: float, *, lag_window: int | None = None) -> FrequencyResponse:
     """Return the empirical transfer function estimate smoothed by a Hann lag window (Blackman and Tukey).
 
     Parameters
@@ -90,9 +88,7 @@ def etfe(
     # the Hann window's spectrum has small negative lobes, which can win where a signal has next to no power
     usable = (power_u > 0.0) & (power_y > 0.0)
     squared = np.clip(np.abs(cross[usable]) ** 2 / (power_u[usable] * power_y[usable]), 0.0, 1.0)
-    averages = n / (
-        0.75 * lags
-    )  # a Hann lag window passes 3/4 of a rectangular window's variance, 2 * lags wide
+    averages = n / (0.75 * lags)  # a Hann lag window passes 3/4 of a rectangular window's variance, 2 * lags wide
     response = cross[usable] / power_u[usable]
     return FrequencyResponse(
         frequency[usable],
@@ -137,8 +133,7 @@ def etfe_welch(
     length = max(inputs.size // 10, 8) if segment_length is None else segment_length
     if not 8 <= length <= 2 * inputs.size // 3:
         raise HydrostateError(
-            f"segment_length must lie between 8 and two thirds of the record, {2 * inputs.size // 3}, "
-            f"got {length}"
+            f"segment_length must lie between 8 and two thirds of the record, {2 * inputs.size // 3}, got {length}"
         )
     rate = 1.0 / sample_time
     frequency, power_u = welch(inputs, rate, nperseg=length)
@@ -173,9 +168,7 @@ def _checked(u: ArrayLike, y: ArrayLike, sample_time: float) -> tuple[FloatArray
             f"got shapes {inputs.shape} and {outputs.shape}"
         )
     if not (np.isfinite(inputs).all() and np.isfinite(outputs).all()):
-        raise HydrostateError(
-            "a frequency response needs input and output without gaps, got NaN or infinite values"
-        )
+        raise HydrostateError("a frequency response needs input and output without gaps, got NaN or infinite values")
     if inputs.min() == inputs.max():
         raise HydrostateError(f"the input must vary, got the constant {inputs[0]:g}")
     return inputs - inputs.mean(), outputs - outputs.mean()

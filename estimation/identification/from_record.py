@@ -81,9 +81,7 @@ def _output(record: Record, name: str) -> FloatArray:
     if name in record or name != "velocity_m_s" or "position_m" not in record:
         return record[name]
     if len(record) < 3:
-        raise LogError(
-            f"velocity by differentiation needs 3 samples of 'position_m' or more, got {len(record)}"
-        )
+        raise LogError(f"velocity by differentiation needs 3 samples of 'position_m' or more, got {len(record)}")
     warnings.warn(
         "channel 'velocity_m_s' is absent: it is differentiated from 'position_m' by central differences, "
         "which amplifies its noise",

@@ -2,9 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import control
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +11,9 @@ from scipy.optimize import brentq
 from scipy.signal import freqz, lfilter
 
 from plant.errors import HydrostateError
+
+if TYPE_CHECKING:
+    import control
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -94,9 +96,7 @@ class LinearModel:
         if f.size < 1 or f[0] != 1.0:
             raise HydrostateError(f"denominator must be monic (begin with 1), got {f.tolist()}")
         if not 0 <= self.delay < b.size or b[: self.delay].any():
-            raise HydrostateError(
-                f"numerator must begin with {self.delay} zeros for the delay, got {b.tolist()}"
-            )
+            raise HydrostateError(f"numerator must begin with {self.delay} zeros for the delay, got {b.tolist()}")
         p, n_states = b.size - self.delay + f.size - 1, max(b.size, f.size) - 1
         covariance = _frozen(np.full((p, p), np.nan) if np.size(self.covariance) == 0 else self.covariance)
         state = _frozen(np.zeros(n_states) if np.size(self.initial_state) == 0 else self.initial_state)
@@ -198,13 +198,13 @@ class LinearModel:
             Output [output unit].
         """
         values = np.asarray(u, dtype=np.float64)
-        state = (
-            np.zeros_like(self.initial_state) if initial is None else np.asarray(initial, dtype=np.float64)
-        )
+        state = np.zeros_like(self.initial_state) if initial is None else np.asarray(initial, dtype=np.float64)
         return np.asarray(lfilter(self.numerator, self.denominator, values, zi=state)[0], dtype=np.float64)
 
-    def to_control(self) -> control.TransferFunction:
+    def to_control(self) -> "control.TransferFunction":
         """Return the model as a python-control object, with sample time and signal names."""
+        import control  # slow to import, and few callers need it
+
         length = max(self.numerator.size, self.denominator.size)
         numerator = np.pad(self.numerator, (0, length - self.numerator.size))
         denominator = np.pad(self.denominator, (0, length - self.denominator.size))
@@ -266,9 +266,7 @@ class LinearModel:
                 data_hash=values["data_hash"],
             )
         except KeyError as error:
-            raise HydrostateError(
-                f"entry {error} of a linear model is wanted, got {', '.join(values)}"
-            ) from error
+            raise HydrostateError(f"entry {error} of a linear model is wanted, got {', '.join(values)}") from error
 
 
 def _or_none(value: float) -> float | None:

@@ -115,9 +115,7 @@ def fit_output_error(
     spread = _covariance(jacobian, residual, int(used.sum()), covariance == "coloured")
 
     n_b, n_f = structure.n_numerator, structure.n_denominator
-    unscale = np.concatenate(
-        [np.full(n_b, y_scale / u_scale), np.ones(n_f), np.full(structure.n_initial, y_scale)]
-    )
+    unscale = np.concatenate([np.full(n_b, y_scale / u_scale), np.ones(n_f), np.full(structure.n_initial, y_scale)])
     b, f, state = structure.split(theta * unscale)
     rss = float(residual @ residual) * y_scale**2
     n_used = int(used.sum())
@@ -169,8 +167,7 @@ def _checked_data(
     n_bad = int(np.count_nonzero(~np.isfinite(inputs)))
     if n_bad:
         raise HydrostateError(
-            f"input {input_name!r} must be known at every sample, got {n_bad} missing or infinite "
-            f"of {inputs.size}"
+            f"input {input_name!r} must be known at every sample, got {n_bad} missing or infinite of {inputs.size}"
         )
     if np.isinf(outputs).any():
         raise HydrostateError(f"output {output_name!r} must be finite or missing (NaN), got infinite values")
@@ -178,8 +175,7 @@ def _checked_data(
     wanted = SAMPLES_PER_PARAMETER * structure.n_parameters
     if n_used < wanted:
         raise HydrostateError(
-            f"a fit of {structure.n_parameters} values needs at least {wanted} samples of {output_name!r}, "
-            f"got {n_used}"
+            f"a fit of {structure.n_parameters} values needs at least {wanted} samples of {output_name!r}, got {n_used}"
         )
     if np.nanmin(outputs) == np.nanmax(outputs):
         raise HydrostateError(f"output {output_name!r} must vary, got {np.nanmin(outputs):g} throughout")
@@ -231,8 +227,7 @@ def _liveliest_section(u: FloatArray, used: BoolArray) -> slice:
     if n_sections == 1:
         return slice(None)
     moves = [
-        float(np.var(u[k : k + length]) * used[k : k + length].mean())
-        for k in range(0, n_sections * length, length)
+        float(np.var(u[k : k + length]) * used[k : k + length].mean()) for k in range(0, n_sections * length, length)
     ]
     begin = int(np.argmax(moves)) * length
     return slice(begin, begin + length)

@@ -24,6 +24,9 @@ STARTS = 4
 CANCELLED = 3
 """Candidates with a nearly cancelled real pole that are handed on beside these."""
 
+NUDGES = np.linspace(-0.15, 0.15, 13)
+"""Relative changes of the poles' logarithms, within the spacing of the grid."""
+
 DAMPING_RATIOS = (0.03, 0.1, 0.25, 0.5, 0.8)
 """Damping ratios of the complex pairs that are tried."""
 
@@ -78,8 +81,14 @@ def _nearly_cancelled(
     A slow pole that a zero nearly cancels, as in Minor Leakage of Table 6, explains little power and never
     ranks among the best, but has a basin of its own.
     """
-    candidates = _extended(fewer[None, :], singles)
-    explained = np.pad(_explained_power(structure, candidates, spectra), 1, constant_values=-np.inf)
+    # the poles already there sit on the grid: all are let move a little, lest the new one serve to correct them
+    # (a negative real pole stays, since its power would be complex without a conjugate)
+    movable = (fewer.imag != 0.0) | (fewer.real > 0.0)
+    shifted = fewer ** (1.0 + movable * NUDGES[:, None])
+    candidates = _extended(shifted, singles)
+    power = _explained_power(structure, candidates, spectra).reshape(NUDGES.size, len(singles))
+    candidates = candidates.reshape(NUDGES.size, len(singles), -1)[power.argmax(axis=0), np.arange(len(singles))]
+    explained = np.pad(power.max(axis=0), 1, constant_values=-np.inf)
     peak = (explained[1:-1] > explained[:-2]) & (explained[1:-1] > explained[2:])
     order = np.argsort(-np.where(peak, explained[1:-1], -np.inf))
     return list(candidates[order[: min(CANCELLED, int(peak.sum()))]])

@@ -10,6 +10,9 @@ from scipy.signal import butter, sosfiltfilt
 from estimation.identification.linear_model import FloatArray
 from plant.errors import HydrostateError, LogWarning
 
+FEWEST_SAMPLES = 4
+"""A cubic needs as many."""
+
 ANTI_ALIAS_ORDER = 8
 """Order of the Butterworth filter before decimation, run forth and back."""
 
@@ -131,17 +134,15 @@ def resample(x: ArrayLike, sample_time: float, new_sample_time: float) -> FloatA
     ratio = new_sample_time / sample_time
     if np.isclose(ratio, 1.0, rtol=0.5 / max(values.size, 1), atol=0.0):
         return values
+    if values.size < FEWEST_SAMPLES:
+        raise HydrostateError(f"resampling needs {FEWEST_SAMPLES} samples or more, got {values.size}")
     missing = np.isnan(values)
     if ratio > 1.0:
         cutoff = ANTI_ALIAS_SHARE * 0.5 / new_sample_time
         smooth = bridged(_low_pass(values, sample_time, cutoff, ANTI_ALIAS_ORDER))
     else:
         smooth = bridged(values)
-    step = (
-        float(round(ratio))
-        if abs(ratio - round(ratio)) * values.size < 0.5 * ratio and ratio > 1.0
-        else ratio
-    )
+    step = float(round(ratio)) if abs(ratio - round(ratio)) * values.size < 0.5 * ratio and ratio > 1.0 else ratio
     position = step * np.arange(int(np.floor((values.size - 1) / step * (1.0 + np.finfo(float).eps))) + 1)
     nearest = np.clip(np.rint(position).astype(np.intp), 0, values.size - 1)
     taken = smooth[nearest] if step == round(step) else CubicSpline(np.arange(values.size), smooth)(position)

@@ -105,7 +105,7 @@ def reduced_high_order_arx(n_denominator: int, u: FloatArray, y: FloatArray) -> 
     """
     order = min(HIGH_ORDER, u.size // 10)
     b, f = least_squares_arx(order + 1, order, 0, u, y)
-    pulse = np.zeros(min(IMPULSE_SAMPLES, u.size // 4))
+    pulse = np.zeros(min(IMPULSE_SAMPLES, max(u.size // 4, 10 * n_denominator)))
     pulse[0] = 1.0
     response = np.asarray(lfilter(b, stabilised(f, u.size), pulse))[1:]
     half = (response.size + 1) // 2
@@ -114,9 +114,7 @@ def reduced_high_order_arx(n_denominator: int, u: FloatArray, y: FloatArray) -> 
     return polynomial(np.linalg.eigvals(shift).astype(np.complex128))
 
 
-def refine_by_instruments(
-    structure: Structure, denominator: FloatArray, u: FloatArray, y: FloatArray
-) -> FloatArray:
+def refine_by_instruments(structure: Structure, denominator: FloatArray, u: FloatArray, y: FloatArray) -> FloatArray:
     """Return the denominator refined by simplified refined instrumental variables (Young, 1976).
 
     Each pass filters input and output by the present ``1/F`` and takes the noise-free simulated output as the

@@ -81,9 +81,7 @@ def fit_percent(y: ArrayLike, simulated: ArrayLike) -> float:
     0.0
     """
     measured, model = _together(y, simulated)
-    return float(
-        100.0 * (1.0 - np.linalg.norm(measured - model) / np.linalg.norm(measured - measured.mean()))
-    )
+    return float(100.0 * (1.0 - np.linalg.norm(measured - model) / np.linalg.norm(measured - measured.mean())))
 
 
 def rmse(y: ArrayLike, simulated: ArrayLike) -> float:
@@ -194,9 +192,7 @@ def cross_correlation_test(
     rank = int(np.count_nonzero(strength > max(columns.shape) * np.finfo(float).eps * 1e2 * strength[0]))
     freedom = int(known.sum()) - absorbed.shape[1]
     if freedom <= rank:
-        raise HydrostateError(
-            f"a cross-correlation test over {n_lags} lags needs more samples, got {known.sum()}"
-        )
+        raise HydrostateError(f"a cross-correlation test over {n_lags} lags needs more samples, got {known.sum()}")
     remaining = values[known]
     if jacobian is None:
         remaining = remaining - remaining.mean()
@@ -227,9 +223,7 @@ def estimate_initial_state(model: LinearModel, u: ArrayLike, y: ArrayLike) -> Fl
     # beside a zero input only the initial state is free
     structure = Structure(1, model.denominator.size - 1, model.initial_state.size)
     known = np.isfinite(missing)
-    theta = profile(
-        structure, model.denominator, np.zeros(outputs.size), np.where(known, missing, 0.0), known
-    )[1]
+    theta = profile(structure, model.denominator, np.zeros(outputs.size), np.where(known, missing, 0.0), known)[1]
     return theta[model.denominator.size : model.denominator.size + model.initial_state.size]
 
 
@@ -276,9 +270,7 @@ def validate(
 def _together(y: ArrayLike, simulated: ArrayLike) -> tuple[FloatArray, FloatArray]:
     measured, model = np.asarray(y, dtype=np.float64), np.asarray(simulated, dtype=np.float64)
     if measured.shape != model.shape:
-        raise HydrostateError(
-            f"measured and simulated output must match, got {measured.shape} and {model.shape}"
-        )
+        raise HydrostateError(f"measured and simulated output must match, got {measured.shape} and {model.shape}")
     known = np.isfinite(measured)
     if not known.any():
         raise HydrostateError("at least one measured sample is wanted, got none")

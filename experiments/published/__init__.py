@@ -14,9 +14,7 @@ import pandas as pd
 from plant.errors import HydrostateError
 from plant.units import PSI
 
-TableName: TypeAlias = Literal[
-    "conditions", "parameters", "leakage", "friction", "rmse", "transfer_functions"
-]
+TableName: TypeAlias = Literal["conditions", "parameters", "leakage", "friction", "rmse", "transfer_functions"]
 """The six tables, in the paper's order."""
 
 
@@ -61,9 +59,7 @@ SCALARS: Mapping[str, PublishedScalar] = MappingProxyType(
         "major_leakage_velocity": _percent_of_normal(50.0, "velocity under major leakage"),
         "minor_friction_pressure": _percent_of_normal(200.0, "differential pressure under minor friction"),
         "major_friction_pressure": _percent_of_normal(300.0, "differential pressure under major friction"),
-        "bandwidth": PublishedScalar(
-            25.0, "Hz", 25.0, "Hz", "bandwidth of the actuator", "section 7, errata E14"
-        ),
+        "bandwidth": PublishedScalar(25.0, "Hz", 25.0, "Hz", "bandwidth of the actuator", "section 7, errata E14"),
         "bulk_modulus": PublishedScalar(
             2.07e8, "Pa", 2.07e8, "Pa", "effective bulk modulus, by the filter", "section 7, errata E2"
         ),

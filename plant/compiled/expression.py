@@ -18,11 +18,16 @@ class Expression:
     Parameters
     ----------
     operation : str
-        ``symbol``, ``constant``, a name of `OPERATIONS`, or a comparison.
+        ``symbol``, ``constant``, a comparison, or another operation that `plant.compiled.source` can spell.
     arguments : tuple of Expression
         Operands.
     value : float or str
-        A constant's value, or a symbol's name.
+        A constant's value [any unit], or a symbol's name.
+
+    Raises
+    ------
+    TypeError
+        If a model uses it as a truth value, compares it with ``==``, or raises it to a broken power.
     """
 
     operation: str
@@ -53,9 +58,11 @@ class Expression:
     def __rtruediv__(self, other: Number) -> "Expression":
         return _divide(as_expression(other), self)
 
-    def __pow__(self, exponent: int) -> "Expression":
+    def __pow__(self, exponent: Number) -> "Expression":
+        if exponent != int(exponent):
+            raise TypeError(f"a model may raise to whole powers only, beside sqrt and exp, got {exponent}")
         result: Expression = ONE
-        for _ in range(abs(exponent)):
+        for _ in range(abs(int(exponent))):
             result = result * self
         return result if exponent >= 0 else ONE / result
 
@@ -80,6 +87,11 @@ class Expression:
     def __ge__(self, other: "Expression | Number") -> "Expression":
         return node(">=", self, as_expression(other))
 
+    def __eq__(self, other: object) -> bool:
+        raise TypeError("a model must compare with <, <=, > or >=, not with == or !=: its values are symbols here")
+
+    __hash__ = object.__hash__
+
     def __bool__(self) -> bool:
         raise TypeError("a model must choose with where(condition, a, b), not with if: its values are symbols here")
 
@@ -97,7 +109,7 @@ def node(operation: str, *arguments: Expression, value: float | str = 0.0) -> Ex
     *arguments : Expression
         Operands.
     value : float or str
-        A constant's value, or a symbol's name.
+        A constant's value [any unit], or a symbol's name.
 
     Returns
     -------
@@ -105,9 +117,7 @@ def node(operation: str, *arguments: Expression, value: float | str = 0.0) -> Ex
         The node, made on first use.
     """
     key = (operation, tuple(id(argument) for argument in arguments), value)
-    if key not in _NODES:
-        _NODES[key] = Expression(operation, arguments, value)
-    return _NODES[key]
+    return _NODES.setdefault(key, Expression(operation, arguments, value))
 
 
 def constant(value: float) -> Expression:
@@ -276,8 +286,10 @@ def _local_derivatives(item: Expression) -> Sequence[Expression]:
             return (ONE - item * item,)
         case "where":
             return ZERO, select(a, ONE, ZERO), select(a, ZERO, ONE)
-        case _:
+        case "<" | "<=" | ">" | ">=" | "present":
             return tuple(ZERO for _ in item.arguments)
+        case _:
+            raise NotImplementedError(f"operation {item.operation!r} has no derivative yet")
 
 
 def jacobian(outputs: Sequence[Expression], inputs: Sequence[Expression]) -> list[list[Expression]]:

@@ -10,6 +10,7 @@ import logging
 import os
 import sys
 import tempfile
+import threading
 from pathlib import Path
 from types import ModuleType
 
@@ -17,6 +18,9 @@ import numba
 import platformdirs
 
 logger = logging.getLogger("hydrostate")
+
+_LOADING = threading.Lock()
+"""Held while a kernel file is written and imported, so that threads share one module."""
 
 
 def cache_folder() -> Path:
@@ -42,8 +46,11 @@ def load_kernel(name: str, source: str) -> ModuleType:
     """
     digest = hashlib.sha256(f"{numba.__version__}\n{source}".encode()).hexdigest()[:16]
     module_name = f"hydrostate_{name}_{digest}"
-    if module_name in sys.modules:
-        return sys.modules[module_name]
+    with _LOADING:
+        return sys.modules.get(module_name) or _imported(module_name, source)
+
+
+def _imported(module_name: str, source: str) -> ModuleType:
     path = _written(module_name, source)
     spec = importlib.util.spec_from_file_location(module_name, path)
     if spec is None or spec.loader is None:

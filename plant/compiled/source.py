@@ -19,7 +19,6 @@ _TEMPLATES: Mapping[str, str] = {
     "sqrt": "math.sqrt({0})",
     "exp": "math.exp({0})",
     "tanh": "math.tanh({0})",
-    "log": "math.log({0})",
     "where": "({1} if {0} else {2})",
 }
 """How each operation is spelt; a new one needs a line here and one in `expression._local_derivatives`."""

@@ -13,7 +13,7 @@ def quadratic_friction(
     velocity : float or Expression
         Piston velocity [m/s].
     direction : float or Expression
-        Sense of sliding, -1 or 1 [dimensionless]; the velocity's sign, or the sense in which it is about to break loose.
+        Sense of sliding, -1 or 1 [dimensionless]; the velocity's sign, or the sense in which it will break loose.
     quadratic, linear, coulomb : float or Expression
         Coefficients a_1 [N s^2/m^2], a_2 [N s/m], a_3 [N].
 
@@ -33,9 +33,9 @@ def quadratic_friction(
 def velocity_under_friction(push: Scalar, resistance: Scalar, quadratic: Scalar, coulomb: Scalar) -> Scalar:
     """Solve ``resistance * v + quadratic * v * |v| + coulomb * Sgn(v) = push`` for v, where Sgn(0) is all of [-1, 1].
 
-    This is the force balance 5.9 with friction 5.10 over one implicit step. Below the Coulomb force the answer is
-    exactly zero, so the piston sticks; above it there is one root as long as the resistance is positive, in a form
-    that loses no digits to cancellation.
+    This is the force balance, equation 5.9, with the friction of equation 5.10 over one implicit step. Below the
+    Coulomb force the answer is exactly zero, so the piston sticks; above it there is one root as long as the resistance
+    is positive, in a form that loses no digits to cancellation.
 
     Parameters
     ----------

@@ -58,6 +58,12 @@ def test_jitter_within_one_percent_is_resampled_with_a_note() -> None:
     np.testing.assert_allclose(checked.channels["velocity_m_s"], 0.03 * np.sin(phase * even), atol=2e-8)
 
 
+def test_jitter_of_exactly_one_percent_is_accepted() -> None:
+    time = TIME.copy()
+    time[700] += 0.01 * 1e-3
+    assert "jitters by 1 %" in check(time).notes[0]
+
+
 @pytest.mark.parametrize("shift", [0.011, 0.3])
 def test_jitter_beyond_one_percent_is_refused_with_its_rows(shift: float) -> None:
     time = TIME.copy()

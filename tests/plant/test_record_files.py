@@ -185,7 +185,7 @@ def test_decimal_commas_between_semicolons_are_read(tmp_path: Path) -> None:
 
 def test_the_csv_of_an_unruly_logger_is_read(tmp_path: Path) -> None:
     rows = [f" {t:.3f} ,{w:+.6f},run 1,{v:.9f}" for t, w, v in zip(TIME, SPEED, VELOCITY, strict=True)]
-    rows[7] = rows[7].rsplit(",", 1)[0] + ", none "
+    rows[7] = rows[7].rsplit(",", 1)[0] + ", None "
     text = '\ufeff\r\n"time_s" , motor_speed_rad_s,"note, free",velocity_m_s\r\n' + "\r\n".join(rows) + "\r\n\r\n"
     (tmp_path / "run.CSV").write_bytes(text.encode())
     with pytest.warns(LogWarning, match="velocity_m_s is missing in 1 of 200"):

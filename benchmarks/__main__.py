@@ -1,0 +1,24 @@
+"""Run one benchmark by name, or all."""
+
+import importlib
+import sys
+
+NAMES = ("bulk_modulus", "classification", "foreign_logs", "filter_speed")
+"""Every benchmark, in the order of `make benchmark`."""
+
+
+def main() -> int:
+    """Run the named benchmark with its own arguments, or every one with its defaults."""
+    if len(sys.argv) > 1:
+        if sys.argv[1] not in NAMES:
+            print(f"benchmark must be one of {', '.join(NAMES)}, got {sys.argv[1]!r}", file=sys.stderr)
+            return 2
+        return int(importlib.import_module(f"benchmarks.{sys.argv[1]}").main(sys.argv[2:]) > 0)
+    misses = 0
+    for name in NAMES:
+        print(f"\n== {name}")
+        misses += importlib.import_module(f"benchmarks.{name}").main([])
+    return int(misses > 0)
+
+
+sys.exit(main())

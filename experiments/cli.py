@@ -1,0 +1,91 @@
+"""The command ``hydrostate``: study, simulate, estimate, identify, diagnose, conditions, rig."""
+
+from importlib.metadata import version
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated
+
+import typer
+
+from experiments import cli_conditions, cli_diagnose, cli_estimate, cli_identify, cli_simulate
+from experiments.cli_options import SEED, Json, Seed
+from experiments.cli_streams import HydrostateGroup, emit
+from experiments.json_output import json_text
+
+EPILOG = """
+Exit codes: 0 all done, not_observable included; 1 some logs failed or diverged, each named on standard error, or an
+internal error; 2 nothing could be done (usage, no log that can be read); 130 interrupted.
+
+Outcome of a log: ok; not_observable, drive and sensors hold too little, so no number is given; diverged, the result
+stopped being finite; failed, the message says why.
+
+Environment: HYDROSTATE_CACHE is the folder of compiled kernels, HYDROSTATE_DEBUG=1 shows where an internal error arose.
+
+Example: hydrostate simulate --condition minor_leakage --out run.csv, then hydrostate diagnose run.csv
+"""
+
+app = typer.Typer(
+    name="hydrostate",
+    cls=HydrostateGroup,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    context_settings={"help_option_names": ["--help", "-h"]},
+    epilog=EPILOG,
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        emit(f"hydrostate {version('hydrostate')}")
+        raise typer.Exit
+
+
+@app.callback()
+def root(
+    shown: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Say what is wrong inside an electro-hydrostatic actuator, from the signals that a bench already logs."""
+    del shown
+
+
+@app.command(epilog="Example: hydrostate study --out results/nine-conditions --seed 2024")
+def study(
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the report.")] = Path(
+        "results/nine-conditions"
+    ),
+    seed: Seed = SEED,
+    quick: Annotated[bool, typer.Option("--quick", help="A smaller study, in under 20 s.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Simulate, estimate, identify and diagnose the nine conditions; write a report beside the published results.
+
+    The last line of standard output is the report's path.
+    """
+    from rich.console import Console
+
+    from experiments.study import study_command
+
+    begin = perf_counter()
+    report = study_command(out, seed, quick, Console(stderr=True))
+    if as_json:
+        emit(json_text([{"outcome": "ok", "report": str(report), "seconds": perf_counter() - begin}]))
+    else:
+        emit(str(report))
+
+
+for module in (cli_simulate, cli_estimate, cli_identify, cli_diagnose, cli_conditions):
+    app.add_typer(module.commands)
+app.add_typer(cli_conditions.rig_commands, name="rig")
+
+
+def main() -> None:
+    """Run the command line and exit with its code."""
+    app()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,73 @@
+"""`hydrostate conditions`: the nine conditions; `hydrostate rig init`: a rig file to fill in."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from experiments.cli_logs import Batch, finish
+from experiments.cli_options import SEED, Json, Out, RigFile, Seed, load_rig
+from experiments.cli_streams import emit, table
+from experiments.json_output import Result, prepare_output
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from rich.console import RenderableType
+
+commands = typer.Typer()
+rig_commands = typer.Typer(no_args_is_help=True, help="Files that describe an actuator which is not the paper's.")
+
+
+@commands.command(epilog="Example: hydrostate conditions --rig rig.toml")
+def conditions(rig: RigFile = None, out: Out = None, seed: Seed = SEED, as_json: Json = False) -> None:
+    """List the nine conditions of Table 1 with the parameters that make them, in SI.
+
+    On a rig that is not the paper's, the changes of Tables 3 and 4 are scaled to its flow and area. The seed changes
+    nothing.
+    """
+    from faults.conditions import CONDITIONS, parameters_for
+
+    bench = load_rig(rig)
+    prepare_output(out)
+    results = tuple(
+        {
+            "condition": condition.name,
+            "outcome": "ok",
+            "leakage": condition.leakage,
+            "friction": condition.friction,
+            "parameters": asdict(parameters_for(condition, bench.parameters)),
+            "rig": bench.name,
+            "seed": seed,
+        }
+        for condition in CONDITIONS.values()
+    )
+    finish(Batch(results, len(results)), _screen, as_json=as_json, out=out)
+
+
+def _screen(results: "Sequence[Result]") -> "Iterable[RenderableType]":
+    from plant.eha import EhaParameters
+    from plant.units import notes
+
+    shown_names = ("leakage_coefficient", "flow_bias", "friction_quadratic", "friction_linear", "friction_coulomb")
+    units = notes(EhaParameters)
+    headings = [f"{units[name].meaning.rsplit(' ', 1)[-1]} [{units[name].unit}]" for name in shown_names]
+    shown = table("condition", "leakage", "friction", *headings)
+    for result in results:
+        numbers = [f"{result['parameters'][name]:.4g}" for name in shown_names]
+        shown.add_row(result["condition"], result["leakage"], result["friction"], *numbers)
+    yield shown
+
+
+@rig_commands.command("init", epilog="Example: hydrostate rig init bench2.toml")
+def rig_init(
+    path: Annotated[Path, typer.Argument(metavar="PATH", help="File to write; an existing one is kept.")] = Path(
+        "rig.toml"
+    ),
+) -> None:
+    """Write a commented rig file (TOML, SI) that describes the paper's actuator, to be changed into yours."""
+    from plant.rig import write_rig_template
+
+    write_rig_template(path)
+    emit(f"{path}: fill in your actuator's parameters, then pass it as --rig {path}")

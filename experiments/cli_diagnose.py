@@ -1,0 +1,229 @@
+"""`hydrostate diagnose LOG...`: which of the nine conditions each log was taken in."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from experiments.cli_logs import finish, read_log, run_logs
+from experiments.cli_options import (
+    SEED,
+    Columns,
+    Json,
+    Logs,
+    Out,
+    RigFile,
+    Seed,
+    load_columns,
+    load_rig,
+)
+from experiments.cli_streams import note, table
+from experiments.json_output import Result, prepare_output
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from estimation.identification.linear_model import LinearModel
+    from faults.classify import Scores
+    from plant.eha import EhaParameters
+    from plant.record import Record
+
+PRESSURE = "differential_pressure_pa"
+
+ABSENCE_COSTS = (
+    f"without {PRESSURE} friction shows in velocity alone, so conditions that differ in friction lie closer together"
+)
+"""What it costs a diagnosis that differential pressure is not there."""
+
+TOLD_APART = 1.001
+"""Least ratio of the runner-up's score to the best at which a class is named [dimensionless]."""
+
+MARGINS = ((1.05, "too close to call"), (1.25, "a narrow margin"), (2.0, "a clear margin"), (math.inf, "a wide margin"))
+"""Words for the ratio of the runner-up's score to the best, up to each bound [dimensionless]."""
+
+POOR_FIT = 0.5
+"""Share of the signal that the best model may leave unexplained without a warning [fraction]."""
+
+MOST_TABLES = 3
+"""Up to so many logs, every condition's score is shown."""
+
+NOTHING: Result = {
+    "condition": None,
+    "scores": {},
+    "probabilities": None,
+    "channels": [],
+    "runner_up": None,
+    "margin": None,
+    "transfer_function_scores": None,
+    "transfer_function_condition": None,
+}
+"""The entries of a log that could not be used."""
+
+commands = typer.Typer()
+
+
+@commands.command(epilog="Example: hydrostate diagnose run*.csv --rig rig.toml --out diagnosis")
+def diagnose(
+    logs: Logs,
+    condition: Annotated[
+        str | None,
+        typer.Option(
+            "--condition", metavar="NAME", help="The condition that you expect; the result says if it agrees."
+        ),
+    ] = None,
+    rig: RigFile = None,
+    columns: Columns = None,
+    transfer_functions: Annotated[
+        bool,
+        typer.Option(
+            "--transfer-functions/--no-transfer-functions",
+            help="Also score nine transfer functions, identified from simulated tests of the rig (about 10 s, once).",
+        ),
+    ] = False,
+    no_pressure: Annotated[
+        bool, typer.Option("--no-pressure", help="Use velocity alone, even if differential pressure is logged.")
+    ] = False,
+    out: Out = None,
+    seed: Seed = SEED,
+    as_json: Json = False,
+) -> None:
+    """Say which of the nine conditions of leakage and friction each log fits best.
+
+    Every condition's model is run under the log's motor speed; its score is the root-mean-square error, in velocity
+    [m/s], or relative to the signals [dimensionless] where differential pressure counts too. The smallest wins. The
+    seed draws the tests behind the transfer functions.
+    """
+    from faults.bank import mathematical_bank
+    from faults.conditions import find_condition
+
+    bench, mapping = load_rig(rig), load_columns(columns)
+    if condition is not None:
+        find_condition(condition)
+    prepare_output(out)
+    bank = mathematical_bank(bench.parameters)
+    linear = _identified(bench.parameters, seed) if transfer_functions else None
+    chosen = {"expected": condition, "rig": bench.name, "seed": seed}
+
+    def work(log: Path) -> Result:
+        record = read_log(log, bench.columns, mapping)
+        if no_pressure:
+            record = record.replace(**{PRESSURE: None})
+        return {**_diagnosed(record, bank, linear, condition), **chosen}
+
+    batch = run_logs(logs, work, {**NOTHING, **chosen}, "diagnosing")
+    finish(batch, _screen, as_json=as_json, out=out)
+
+
+def _identified(rig: "EhaParameters", seed: int) -> "Mapping[str, LinearModel]":
+    import warnings
+
+    import numpy as np
+
+    from faults.bank import identify_bank
+    from plant.errors import LogWarning
+
+    note("identifying nine transfer functions from simulated tests of the rig")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        return identify_bank(rig, np.random.default_rng(seed))
+
+
+def _diagnosed(
+    record: "Record",
+    bank: "Mapping[str, EhaParameters]",
+    linear: "Mapping[str, LinearModel] | None",
+    expected: str | None,
+) -> dict[str, Any]:
+    from faults.classify import score_mathematical, score_transfer_functions
+
+    scores = score_mathematical(record, bank)
+    found = {**NOTHING, **_verdict(scores), "warnings": _poor_fit(scores, record)}
+    if linear is not None:
+        others = score_transfer_functions(record, linear)
+        found["transfer_function_scores"] = dict(others.by_condition)
+        found["transfer_function_condition"] = others.condition
+    if expected is not None and found["condition"] is not None:
+        verb = "is" if found["condition"] == expected else "is not"
+        found["message"] += f"; this {verb} {expected}, as expected" if verb == "is" else f"; {expected} was expected"
+    if PRESSURE not in scores.channels:
+        found["message"] += f"; {ABSENCE_COSTS}"
+    return found
+
+
+def _verdict(scores: "Scores") -> dict[str, Any]:
+    ranked = sorted(scores.by_condition.items(), key=lambda item: item[1] if math.isfinite(item[1]) else math.inf)
+    (best, least), (second, next_least) = ranked[:2]
+    entries = {"outcome": "ok", "scores": dict(scores.by_condition), "channels": list(scores.channels)}
+    if not math.isfinite(least):
+        return {**entries, "outcome": "diverged", "message": "no condition's model stayed finite; check units and rig"}
+    margin = next_least / least if least > 0.0 else (math.inf if next_least > 0.0 else 1.0)
+    if margin < TOLD_APART:
+        said = "no class: under this drive the models move alike; drive the actuator, at best with steps"
+        return {**entries, "outcome": "not_observable", "margin": margin, "message": said}
+    said = f"{best}, with {_in_words(margin)} over {second}"
+    return {**entries, "condition": best, "runner_up": second, "margin": margin, "message": said}
+
+
+def _in_words(margin: float) -> str:
+    words = next(words for bound, words in MARGINS if margin < bound or bound == math.inf)
+    if not math.isfinite(margin):
+        return words
+    error = f"{100.0 * (margin - 1.0):.0f} % larger" if margin < 2.0 else f"{margin:.1f} times as large"
+    return f"{words} (error {error})"
+
+
+def _poor_fit(scores: "Scores", record: "Record") -> list[str]:
+    """Return a warning where even the best model explains little of the log."""
+    import numpy as np
+
+    from faults.classify import measured_velocity
+
+    unexplained = min(scores.by_condition.values())
+    if len(scores.channels) == 1:
+        size = float(np.sqrt(np.nanmean(measured_velocity(record) ** 2)))
+        unexplained = unexplained / size if size > 0.0 else 0.0
+    if not unexplained > POOR_FIT:
+        return []
+    return [
+        f"none of the nine fits: the best leaves {100.0 * unexplained:.0f} % of the signal unexplained; "
+        "check the rig file and the columns' units"
+    ]
+
+
+def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
+    if len(results) <= MOST_TABLES:
+        for result in results:
+            yield _scores_table(result)
+            yield f"{result['file']}: {result['message']}"
+        return
+    shown = table("log", "condition", "runner-up", "margin")
+    for result in results:
+        margin = result["margin"]
+        words = "-" if margin is None else _in_words(margin)
+        shown.add_row(result["file"], result["condition"] or "-", result["runner_up"] or "-", words)
+    yield shown
+    for result in results:
+        if result["outcome"] != "ok" or PRESSURE not in result["channels"] or result["expected"] is not None:
+            yield f"{result['file']}: {result['message']}"
+
+
+def _scores_table(result: Result) -> "RenderableType":
+    unit = "1" if PRESSURE in result["channels"] else "m/s"
+    others = result["transfer_function_scores"]
+    headings = ["condition", f"model error [{unit}]", *([] if others is None else ["transfer function [m/s]"]), ""]
+    shown = table(*headings, title=result["file"])
+    for name, score in result["scores"].items():
+        marks = [words for words, best in _winners(result).items() if best == name]
+        cells = [name, f"{score:.4g}", *([] if others is None else [f"{others[name]:.4g}"]), ", ".join(marks)]
+        shown.add_row(*cells, style="bold" if name == result["condition"] else None)
+    return shown
+
+
+def _winners(result: Result) -> dict[str, str | None]:
+    return {
+        "<- best": result["condition"],
+        "runner-up": result["runner_up"],
+        "best transfer function": result["transfer_function_condition"],
+    }

@@ -1,0 +1,166 @@
+"""`hydrostate estimate LOG...`: effective bulk modulus of each log, or a sentence why not."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from experiments.cli_logs import finish, read_log, run_logs
+from experiments.cli_options import (
+    SEED,
+    Columns,
+    ConditionName,
+    Json,
+    Logs,
+    Out,
+    RigFile,
+    Seed,
+    load_columns,
+    load_rig,
+    require_one_of,
+    require_positive,
+)
+from experiments.cli_streams import note, table
+from experiments.json_output import Result, prepare_output
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from estimation.bulk_modulus import BulkModulusEstimate
+
+PRESSURE = "differential_pressure_pa"
+
+ABSENCE_COSTS = (
+    f"without {PRESSURE} the estimate rests on how the piston starts, stops and rings: it needs steps and a friction "
+    "that is known, is about three times less certain, and holds nothing while the piston sticks (errata E13)"
+)
+"""What it costs an estimate that differential pressure is not there."""
+
+NOTHING: Result = {
+    "bulk_modulus_pa": {"value": None, "std": None, "ci95": None},
+    "nis": {},
+    "method": None,
+    "form": None,
+    "gate": {"passed": False, "reasons": []},
+    "bound_percent": None,
+    "condition": None,
+    "channels": [],
+}
+"""The entries of a log that could not be used."""
+
+commands = typer.Typer()
+
+
+@commands.command(
+    epilog="Example: hydrostate estimate run1.csv run2.csv --condition minor_leakage --start 5e7 --start-std 1e8 --json"
+)
+def estimate(
+    logs: Logs,
+    form: Annotated[
+        str, typer.Option(metavar="FORM", help="Process model: pressure (ours) or acceleration (the published one).")
+    ] = "pressure",
+    method: Annotated[str, typer.Option(metavar="METHOD", help="Filter: ekf or filterpy-ekf.")] = "ekf",
+    condition: ConditionName = None,
+    rig: RigFile = None,
+    columns: Columns = None,
+    start: Annotated[
+        float | None, typer.Option(metavar="PA", help="First guess of bulk modulus [Pa]; the rig's if not given.")
+    ] = None,
+    start_std: Annotated[
+        float,
+        typer.Option(
+            metavar="PA", help="Standard deviation of the first guess [Pa]; convergence needs 1e8.", show_default="3e8"
+        ),
+    ] = 3e8,
+    no_pressure: Annotated[
+        bool, typer.Option("--no-pressure", help="Use position and velocity alone, even if pressure is logged.")
+    ] = False,
+    out: Out = None,
+    seed: Seed = SEED,
+    as_json: Json = False,
+) -> None:
+    """Estimate effective bulk modulus [Pa] from each log, with a 95 % interval and a verdict.
+
+    Leakage and friction are taken from the rig, or from the condition if one is given. Where drive and sensors
+    hold too little (Cramér-Rao bound over 3 %), the outcome is not_observable and no number is printed. Nothing here
+    is random, so the seed changes nothing.
+    """
+    from estimation.bulk_modulus import estimate_bulk_modulus
+    from estimation.eha import FORMS
+    from estimation.run import METHODS
+    from faults.conditions import find_condition, parameters_for
+
+    require_one_of("--form", form, list(FORMS))
+    require_one_of("--method", method, list(METHODS))
+    require_positive("--start-std", start_std, "Pa")
+    if start != 0.0:
+        require_positive("--start", start, "Pa")
+    bench, mapping = load_rig(rig), load_columns(columns)
+    parameters = bench.parameters
+    if condition is not None:
+        parameters = parameters_for(find_condition(condition), parameters)
+    prepare_output(out)
+    chosen = {"method": method, "form": form, "condition": condition, "rig": bench.name, "seed": seed}
+
+    def work(log: Path) -> Result:
+        record = read_log(log, bench.columns, mapping)
+        if no_pressure:
+            record = record.replace(**{PRESSURE: None})
+        found = estimate_bulk_modulus(record, parameters, form=form, method=method, start=start, start_std=start_std)
+        return {**_entries(found), **chosen}
+
+    if condition is None:
+        note(f"no --condition: leakage and friction are taken to be those of the rig {bench.name!r}, healthy")
+    batch = run_logs(logs, work, {**NOTHING, **chosen}, "estimating")
+    finish(batch, _screen, as_json=as_json, out=out)
+
+
+def _entries(found: "BulkModulusEstimate") -> dict[str, Any]:
+    return {
+        "outcome": found.outcome.value,
+        "bulk_modulus_pa": {"value": found.value, "std": found.std, "ci95": found.interval},
+        "nis": dict(found.estimate.nis),
+        "gate": {"passed": found.gate.passed, "reasons": list(found.gate.reasons)},
+        "bound_percent": 100.0 * found.bound,
+        "channels": list(found.estimate.channels),
+        "message": _message(found),
+    }
+
+
+def _message(found: "BulkModulusEstimate") -> str:
+    from estimation.bulk_modulus import OUTCOMES
+
+    if found.value is not None and found.interval is not None:
+        low, high = (1e-6 * end for end in found.interval)
+        said = f"bulk modulus {1e-6 * found.value:.2f} MPa, 95 % interval {low:.2f} to {high:.2f} MPa"
+        said += "".join(f"; {reason}" for reason in found.gate.reasons)
+    else:
+        said = OUTCOMES[found.outcome]
+    if PRESSURE in found.estimate.channels:
+        return said
+    if found.estimate.model.name == "acceleration":
+        return f"{said}; the acceleration form does not use {PRESSURE}, and breaks down at reversals (errata E9)"
+    return f"{said}; {ABSENCE_COSTS}"
+
+
+def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
+    shown = table("log", "bulk modulus [MPa]", "std [MPa]", "95 % interval [MPa]", "bound [%]", "verdict")
+    for result in results:
+        shown.add_row(*_row(result))
+    yield shown
+    for result in results:
+        if not result["gate"]["passed"] or PRESSURE not in result["channels"]:
+            yield f"{result['file']}: {result['message']}"
+
+
+def _row(result: Result) -> list[str]:
+    modulus = result["bulk_modulus_pa"]
+    verdict = result["outcome"].replace("_", " ")
+    bound = f"{result['bound_percent']:.3g}"
+    if modulus["value"] is None:
+        return [result["file"], "-", "-", "-", bound, verdict]
+    low, high = modulus["ci95"]
+    trusted = verdict if result["gate"]["passed"] else "gate not passed"
+    numbers = [f"{1e-6 * value:.2f}" for value in (modulus["value"], modulus["std"])]
+    return [result["file"], *numbers, f"{1e-6 * low:.2f} to {1e-6 * high:.2f}", bound, trusted]

@@ -1,0 +1,198 @@
+"""Several logs, one after the other: one that fails is named and the rest are done."""
+
+import re
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import typer
+
+from experiments.cli_streams import INTERRUPTED, SOME_FAILED, USAGE, emit, note, progress, rendered, unexpected
+from experiments.json_output import Result, json_text, write_results
+from plant.errors import HydrostateError, LogError, LogWarning
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from plant.record import Record
+
+ABSENT = re.compile(r"column .* is wanted for (\w+), the log has")
+"""How `plant.columns` says that a mapped column is not in a log."""
+
+Work: TypeAlias = Callable[[Path], Result]
+"""What a command does with one log."""
+
+Screen: TypeAlias = Callable[[Sequence[Result]], Iterable["RenderableType"]]
+"""What a command shows of the logs that did not fail."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What came of several logs.
+
+    Parameters
+    ----------
+    results : tuple of Mapping
+        One object a log, in order.
+    total : int
+        How many logs there were.
+    """
+
+    results: tuple[Result, ...]
+    total: int
+
+    @property
+    def done(self) -> tuple[Result, ...]:
+        """The results of logs that could be used."""
+        return tuple(result for result in self.results if result["outcome"] != "failed")
+
+    @property
+    def exit_code(self) -> int:
+        """0 all done, 1 some failed or diverged, 2 nothing could be done, 130 interrupted."""
+        if len(self.results) < self.total:
+            return INTERRUPTED
+        if not self.done:
+            return USAGE
+        fine = all(result["outcome"] not in {"failed", "diverged"} for result in self.results)
+        return 0 if fine else SOME_FAILED
+
+
+def run_logs(logs: Sequence[Path], work: Work, blank: Result, what: str) -> Batch:
+    """Do the work on every log, until interrupted.
+
+    Failures and warnings go to standard error as they come, after the log's name.
+
+    Parameters
+    ----------
+    logs : sequence of Path
+        The logs.
+    work : callable
+        Takes a log's path and returns its entries.
+    blank : Mapping
+        Entries of a log that failed.
+    what : str
+        What the progress bar says.
+
+    Returns
+    -------
+    Batch
+        The results so far.
+    """
+    results: list[Result] = []
+    try:
+        with progress(len(logs), what) as advance:
+            for log in logs:
+                results.append(_one(log, work, blank))
+                advance()
+    except KeyboardInterrupt:
+        note(f"interrupted after {len(results)} of {len(logs)} logs")
+    return Batch(tuple(results), len(logs))
+
+
+def _one(log: Path, work: Work, blank: Result) -> Result:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("always", LogWarning)
+        try:
+            result = dict(work(log))
+        except HydrostateError as error:
+            result = _failure(blank, _without(log, str(error)))
+        except Exception as error:  # whatever a log brings up must not cost the others their results
+            result = _failure(blank, unexpected(error))
+    said = [_without(log, str(one.message)) for one in caught if issubclass(one.category, LogWarning)]
+    said = list(dict.fromkeys([*said, *result.get("warnings", ())]))
+    for sentence in said:
+        note(f"{log}: warning: {sentence}")
+    if result["outcome"] in {"failed", "diverged"}:
+        note(f"{log}: {result['message']}")
+    return {"file": str(log), **result, "warnings": said}
+
+
+def _failure(blank: Result, message: str) -> dict[str, Any]:
+    return {"outcome": "failed", **blank, "message": message}
+
+
+def _without(log: Path, sentence: str) -> str:
+    return sentence.removeprefix(f"{log}: ")
+
+
+def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None) -> None:
+    """Print what was found, write it if wanted, and leave with the exit code.
+
+    Parameters
+    ----------
+    batch : Batch
+        The results.
+    screen : callable
+        What is shown of them to a reader.
+    as_json : bool
+        Whether a program reads instead.
+    out : Path or None
+        Where results are written too.
+
+    Raises
+    ------
+    typer.Exit
+        Always, with the exit code.
+    """
+    if as_json:
+        emit(json_text(batch.results))
+    elif batch.done:
+        emit(rendered(*screen(batch.done)))
+    code = batch.exit_code
+    if out is not None:
+        try:
+            note(f"written: {', '.join(str(path) for path in write_results(batch.results, out))}")
+        except HydrostateError as error:
+            note(str(error))
+            code = code or SOME_FAILED
+    raise typer.Exit(code)
+
+
+def read_log(path: Path, rig_columns: Mapping[str, str], columns: Mapping[str, str]) -> "Record":
+    """Read a log by a rig's column names and the command line's, which go first.
+
+    A rig names the columns of a bench, not of every log: one that a log lacks is looked for under the channel's own
+    name, with a warning. A column of the command line must be there.
+
+    Parameters
+    ----------
+    path : Path
+        The log.
+    rig_columns, columns : Mapping[str, str]
+        Foreign column by channel, from the rig file and from the command line.
+
+    Returns
+    -------
+    Record
+        The log.
+
+    Raises
+    ------
+    LogError
+        If it cannot be read or trusted.
+
+    Warns
+    -----
+    LogWarning
+        If a column of the rig's is not in the log.
+    """
+    from plant.record_files import read_record
+
+    absent: list[str] = []
+    try:
+        while True:
+            kept = {channel: name for channel, name in rig_columns.items() if channel not in absent}
+            try:
+                return read_record(path, columns={**kept, **columns})
+            except LogError as error:
+                missed = ABSENT.search(str(error))
+                if missed is None or missed[1] not in kept or missed[1] in columns:
+                    raise
+                absent.append(missed[1])
+    finally:
+        if absent:
+            names = ", ".join(rig_columns[channel] for channel in absent)
+            warnings.warn(f"the log has no {names} of the rig's columns", LogWarning, stacklevel=2)

@@ -1,0 +1,158 @@
+"""Options that several commands share, each written once."""
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeAlias
+
+import typer
+
+from plant.errors import HydrostateError
+
+if TYPE_CHECKING:
+    from plant.rig import Rig
+
+Logs: TypeAlias = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="LOG",
+        help="Logs: CSV, Parquet or MAT, with time_s, motor_speed_rad_s, and position_m or velocity_m_s; "
+        "differential_pressure_pa is optional. Another unit stands in the name (position_mm, motor_speed_rpm).",
+        show_default=False,
+    ),
+]
+Json: TypeAlias = Annotated[
+    bool, typer.Option("--json", help="Print one JSON document, a list with one object a log; notes go to stderr.")
+]
+Out: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        "-o",
+        metavar="DIR",
+        help="Also write results.json and results.csv into this folder; a name ending in .json is one file.",
+    ),
+]
+Seed: TypeAlias = Annotated[
+    int, typer.Option("--seed", min=0, metavar="INT", help="Seed of all that is random; kept in the results.")
+]
+RigFile: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "--rig",
+        metavar="FILE",
+        help="Rig file (TOML): parameters in SI, and what the logs call their columns; see `hydrostate rig init`. "
+        "Without it, the paper's actuator.",
+    ),
+]
+Columns: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--columns",
+        metavar="CHANNEL=NAME:UNIT",
+        help="A column under another name, with its unit if it is not SI: position_m=POS_MM:mm. Repeat it, or "
+        "separate several by commas.",
+    ),
+]
+ConditionName: TypeAlias = Annotated[
+    str | None, typer.Option("--condition", metavar="NAME", help="A condition by name, see `hydrostate conditions`.")
+]
+
+SEED = 2024
+"""Seed where none is given."""
+
+NOT_RANDOM = "nothing here is random"
+
+
+def load_rig(path: Path | None) -> "Rig":
+    """Return the rig of a file, the paper's where there is none.
+
+    Parameters
+    ----------
+    path : Path or None
+        The rig file.
+
+    Returns
+    -------
+    Rig
+        The rig.
+
+    Raises
+    ------
+    RigError
+        If the file is not usable.
+    """
+    from plant.rig import Rig, read_rig
+
+    return Rig() if path is None else read_rig(path)
+
+
+def load_columns(texts: Sequence[str] | None) -> dict[str, str]:
+    """Return ``--columns`` as a mapping of channels to foreign columns.
+
+    Parameters
+    ----------
+    texts : sequence of str or None
+        ``CHANNEL=NAME:UNIT``, one or several with commas between.
+
+    Returns
+    -------
+    dict[str, str]
+        Foreign column, with its unit, by channel.
+
+    Raises
+    ------
+    RigError
+        If one is not usable.
+
+    Examples
+    --------
+    >>> load_columns(["position_m=POS, MM:mm,motor_speed_rad_s=RPM:rpm"])
+    {'position_m': 'POS, MM:mm', 'motor_speed_rad_s': 'RPM:rpm'}
+    """
+    from plant.columns import parse_columns
+
+    return parse_columns([part for text in texts or () for part in re.split(r",(?=\s*[A-Za-z]\w*=)", text)])
+
+
+def require_positive(option: str, value: float | None, unit: str) -> None:
+    """Refuse an option whose number is not positive and finite; None, not given, passes.
+
+    Parameters
+    ----------
+    option : str
+        Its name on the command line.
+    value : float or None
+        Its value, in `unit`.
+    unit : str
+        For the message.
+
+    Raises
+    ------
+    HydrostateError
+        If it is not positive and finite.
+    """
+    if value is not None and not (math.isfinite(value) and value > 0.0):
+        raise HydrostateError(f"{option} must be positive and finite, got {value:g} {unit}")
+
+
+def require_one_of(option: str, value: str, known: Sequence[str]) -> None:
+    """Refuse an option that is none of the names known.
+
+    Parameters
+    ----------
+    option : str
+        Its name on the command line.
+    value : str
+        What was given.
+    known : sequence of str
+        The names.
+
+    Raises
+    ------
+    HydrostateError
+        If it is none of them.
+    """
+    if value not in known:
+        raise HydrostateError(f"{option} must be one of {', '.join(known)}, got {value!r}")

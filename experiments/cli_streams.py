@@ -1,0 +1,274 @@
+"""What reaches the terminal: results on standard output, all else on standard error, and no traceback."""
+
+import io
+import logging
+import os
+import sys
+import traceback
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, TextIO
+
+import typer
+from typer.core import TyperGroup
+
+from plant.errors import HydrostateError
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.table import Table
+
+PIPE_WIDTH = 120
+"""Columns of a table that is not printed on a terminal."""
+
+USAGE, SOME_FAILED, INTERRUPTED = 2, 1, 130
+"""Exit codes beside 0."""
+
+
+def emit(text: str, *, err: bool = False) -> None:
+    """Write a line to standard output or error; a reader that has gone away (``| head``) changes nothing else.
+
+    Parameters
+    ----------
+    text : str
+        The line or lines, without the last line's end.
+    err : bool
+        Whether it is a note, for standard error.
+    """
+    stream = sys.stderr if err else sys.stdout
+    try:
+        stream.write(text + "\n")
+        stream.flush()
+    except BrokenPipeError:
+        _to_nowhere(stream)
+
+
+def note(sentence: str) -> None:
+    """Write a sentence to standard error.
+
+    Parameters
+    ----------
+    sentence : str
+        What the user should know.
+    """
+    emit(" ".join(sentence.split()), err=True)
+
+
+def _to_nowhere(stream: TextIO) -> None:
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
+
+
+def table(*headings: str, title: str | None = None) -> "Table":
+    """Return an empty table; file names in it are folded, never cut.
+
+    Parameters
+    ----------
+    *headings : str
+        One a column, with its unit; one that ends in ``]`` or ``±`` holds numbers and is set to the right.
+    title : str, optional
+        Line above.
+
+    Returns
+    -------
+    rich.table.Table
+        The table.
+    """
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    unicode = "utf" in (getattr(sys.stdout, "encoding", None) or "").lower()
+    made = Table(
+        box=box.SIMPLE_HEAD if unicode else box.ASCII,
+        title=None if title is None else Text(title),
+        title_justify="left",
+    )
+    for heading in headings:
+        numeric = heading.endswith("]")
+        made.add_column(Text(heading), justify="right" if numeric else "left", overflow="fold", no_wrap=numeric)
+    return made
+
+
+def rendered(*parts: "RenderableType") -> str:
+    """Return tables and sentences as text for standard output, with colours only on a terminal.
+
+    Parameters
+    ----------
+    *parts : str, rich.text.Text or rich.table.Table
+        What is shown, in order; a plain text is shown as it is.
+
+    Returns
+    -------
+    str
+        The text, without its last line's end.
+    """
+    from rich.console import Console
+
+    terminal = sys.stdout.isatty()
+    console = Console(
+        file=io.StringIO(),
+        force_terminal=terminal,
+        width=None if terminal else PIPE_WIDTH,
+        markup=False,
+        highlight=False,
+        emoji=False,
+    )
+    with console.capture() as captured:
+        for part in parts:
+            console.print(part, soft_wrap=isinstance(part, str))
+    return "\n".join(line.rstrip() for line in captured.get().splitlines())
+
+
+@contextmanager
+def progress(total: int, what: str) -> Generator[Callable[[], None]]:
+    """Show a bar on standard error, if that is a terminal and there is more than one piece of work.
+
+    Parameters
+    ----------
+    total : int
+        Pieces of work.
+    what : str
+        What is being done.
+
+    Yields
+    ------
+    callable
+        To be called after every piece.
+    """
+    if total < 2 or not sys.stderr.isatty():
+        yield lambda: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda: bar.advance(task)
+
+
+class _KernelNotice(logging.Handler):
+    """Says once that kernels are being compiled, and passes warnings on."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.INFO)
+        self.said = False
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.levelno >= logging.WARNING:
+            note(f"warning: {record.getMessage()}")
+        elif not self.said:
+            self.said = True
+            note("compiling kernels, once: this takes some seconds, later runs find them compiled")
+
+
+@contextmanager
+def _kernel_notices() -> Generator[None]:
+    logger, handler = logging.getLogger("hydrostate"), _KernelNotice()
+    level, propagate = logger.level, logger.propagate
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    logger.propagate = False
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(level)
+        logger.propagate = propagate
+
+
+def unexpected(error: Exception) -> str:
+    """Return the sentence for an error that no check foresaw; ``HYDROSTATE_DEBUG=1`` prints where it arose.
+
+    Parameters
+    ----------
+    error : Exception
+        The error, while it is being handled.
+
+    Returns
+    -------
+    str
+        The sentence.
+    """
+    if os.environ.get("HYDROSTATE_DEBUG", "") not in {"", "0"}:
+        emit("".join(traceback.format_exception(error)).rstrip(), err=True)
+    said = " ".join(str(error).split())[:200]
+    what = type(error).__name__ + (f": {said}" if said else "")
+    return f"an internal error ({what}), please report it; HYDROSTATE_DEBUG=1 shows where it arose"
+
+
+def guarded(run: Callable[[], object]) -> int:
+    """Run the command line; whatever goes wrong becomes one sentence and an exit code.
+
+    Parameters
+    ----------
+    run : callable
+        Parses arguments and runs a command; returns its exit code, or something else for 0.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        with _kernel_notices():
+            code = run()
+        emit_nothing_more()
+    except (KeyboardInterrupt, typer.Abort):
+        note("hydrostate: interrupted")
+        return INTERRUPTED
+    except HydrostateError as error:
+        note(f"hydrostate: {error}")
+        return USAGE
+    except OSError as error:
+        _to_nowhere(sys.stdout)
+        note(f"hydrostate: {error}")
+        return SOME_FAILED
+    except Exception as error:
+        said = _usage_sentence(error)
+        if said is None:
+            note(f"hydrostate: {unexpected(error)}")
+            return SOME_FAILED
+        if said:
+            note(said)
+        return USAGE
+    return code if isinstance(code, int) else 0
+
+
+def emit_nothing_more() -> None:
+    """Flush standard output now, where a reader that has gone away can still be noticed quietly."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _to_nowhere(sys.stdout)
+
+
+def _usage_sentence(error: Exception) -> str | None:
+    """Return what the parser says of wrong arguments, empty where it has shown the help, None for other errors."""
+    message = getattr(error, "format_message", None)
+    if message is None:
+        return None
+    context = getattr(error, "ctx", None)
+    command = getattr(context, "command_path", "hydrostate")
+    said = str(message())
+    return f"{command}: {said}" if said else ""
+
+
+class HydrostateGroup(TyperGroup):
+    """The command line, with its errors as sentences and the exit codes that the help promises."""
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run the command line and exit.
+
+        Parameters
+        ----------
+        *args, **kwargs : object
+            As the parser takes them.
+        """
+        kwargs["standalone_mode"] = False
+        sys.exit(guarded(lambda: super(HydrostateGroup, self).main(*args, **kwargs)))

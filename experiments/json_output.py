@@ -1,0 +1,183 @@
+"""Results as one JSON document and one table, the contract that other programs read.
+
+Every command prints a list, one object a log, in which an unknown number is null: later versions add entries and
+rename none.
+"""
+
+import csv
+import io
+import json
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from enum import Enum
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from plant.atomic import replacing
+from plant.errors import HydrostateError
+
+Result: TypeAlias = Mapping[str, Any]
+"""What one log gave, by entry of the JSON contract."""
+
+
+def plain(value: object) -> Any:
+    """Return a value as JSON knows it; a number that is not finite becomes None.
+
+    Parameters
+    ----------
+    value : object
+        Numbers, text, mappings, sequences and NumPy arrays, nested.
+
+    Returns
+    -------
+    object
+        None, bool, int, float, str, list or dict.
+
+    Examples
+    --------
+    >>> plain({"value": float("nan"), "ci95": (1.0, float("inf"))})
+    {'value': None, 'ci95': [1.0, None]}
+    """
+    if isinstance(value, Enum):
+        return plain(value.value)
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, Sequence | set | frozenset):
+        return [plain(item) for item in value]
+    if hasattr(value, "tolist"):  # NumPy's arrays and scalars, without importing it for a help text
+        return plain(value.tolist())  # pyright: ignore[reportAttributeAccessIssue] -- asked for above
+    return str(value)
+
+
+def json_text(results: Sequence[Result]) -> str:
+    """Return results as one JSON document, in ASCII so that any terminal or pipe carries it.
+
+    Parameters
+    ----------
+    results : sequence of Mapping
+        One object a log.
+
+    Returns
+    -------
+    str
+        The document.
+    """
+    return json.dumps(plain(list(results)), indent=2, allow_nan=False)
+
+
+def flat(result: Result, prefix: str = "") -> dict[str, Any]:
+    """Return nested entries as one row of a table, ``bulk_modulus_pa.value`` for a value within another.
+
+    Parameters
+    ----------
+    result : Mapping
+        The entries.
+    prefix : str
+        What stands in front of every name.
+
+    Returns
+    -------
+    dict[str, Any]
+        Numbers, text and None by dotted name; a list is written as JSON.
+
+    Examples
+    --------
+    >>> flat({"gate": {"passed": True, "reasons": ["a"]}})
+    {'gate.passed': True, 'gate.reasons': '["a"]'}
+    """
+    row: dict[str, Any] = {}
+    for name, value in plain(result).items():
+        if isinstance(value, dict):
+            row |= flat(value, f"{prefix}{name}.")
+        else:
+            row[prefix + name] = json.dumps(value) if isinstance(value, list) else value
+    return row
+
+
+def csv_text(results: Iterable[Result]) -> str:
+    """Return results as a CSV table, one row a log.
+
+    Parameters
+    ----------
+    results : iterable of Mapping
+        One object a log.
+
+    Returns
+    -------
+    str
+        The table; an entry that a log does not have is empty.
+    """
+    rows = [flat(result) for result in results]
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    text = io.StringIO()
+    writer = csv.DictWriter(text, names, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def prepare_output(out: Path | None) -> None:
+    """Make the folder that results will be written to, before any work is done for them.
+
+    Parameters
+    ----------
+    out : Path or None
+        A folder, or a file that ends in ``.json``; None writes nothing.
+
+    Raises
+    ------
+    HydrostateError
+        If the folder cannot be made or written.
+    """
+    if out is None:
+        return
+    folder = _folder(out)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise HydrostateError(f"--out {out}: the folder cannot be made: {error.strerror or error}") from error
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise HydrostateError(f"--out {out}: there is no permission to write there")
+    if out != folder and out.is_dir():
+        raise HydrostateError(f"--out {out}: a file is wanted, got a directory")
+
+
+def write_results(results: Sequence[Result], out: Path) -> list[Path]:
+    """Write results; a reader sees the old file or the whole new one, never a part.
+
+    Parameters
+    ----------
+    results : sequence of Mapping
+        One object a log.
+    out : Path
+        A folder, which gets ``results.json`` and ``results.csv``; or a file that ends in ``.json``.
+
+    Returns
+    -------
+    list[Path]
+        The files written.
+
+    Raises
+    ------
+    HydrostateError
+        If they cannot be written.
+    """
+    texts = {out: json_text(results)}
+    if out == _folder(out):
+        texts = {out / "results.json": json_text(results), out / "results.csv": csv_text(results)}
+    for path, text in texts.items():
+        try:
+            with replacing(path) as file:
+                file.write(text.encode() if path.suffix == ".csv" else (text + "\n").encode())
+        except OSError as error:
+            raise HydrostateError(f"{path}: cannot be written: {error.strerror or error}") from error
+    return list(texts)
+
+
+def _folder(out: Path) -> Path:
+    return out.parent if out.suffix.lower() == ".json" else out

@@ -1,0 +1,50 @@
+"""How large a nine-condition study is."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class StudySettings:
+    """Size and seed of a nine-condition study.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of every random stream.
+    starts : tuple of float
+        First guesses of effective bulk modulus [Pa], as in Figure 11.
+    duration : float
+        Length of the estimation and validation runs [s].
+    sample_time : float
+        Their sample time, section 7 [s].
+    identification_duration : float
+        Length of the identification runs [s].
+    seeds : int
+        Runs a condition in the classification.
+    classification_sample_time : float
+        Sample time of the classification runs [s].
+    """
+
+    seed: int = 2024
+    starts: tuple[float, ...] = (0.0, 0.5e8, 1e8, 2e8, 3e8, 4e8, 5e8)
+    duration: float = 10.0
+    sample_time: float = 1e-4
+    identification_duration: float = 20.0
+    seeds: int = 20
+    classification_sample_time: float = 1e-3
+
+
+def quick_settings(seed: int) -> StudySettings:
+    """Return a small study: the same nine conditions and parts, fewer starts and seeds, shorter identification runs.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of every random stream.
+
+    Returns
+    -------
+    StudySettings
+        The small size.
+    """
+    return StudySettings(seed=seed, starts=(0.0, 5e8), identification_duration=8.0, seeds=2)
