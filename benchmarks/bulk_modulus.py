@@ -26,7 +26,7 @@ CELLS = (
     ("lumped", "pressure", "steps", False, 3.0),
     ("lumped", "pressure", "sine", False, None),
 )
-"""Plant, form, drive, pressure logged, tolerance in percent; no tolerance where "not observable" is the right answer."""
+"""Plant, form, drive, pressure logged, tolerance in percent: none where "not observable" is the right answer."""
 
 Cell = tuple[str, str, str, bool, float | None]
 

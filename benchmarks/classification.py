@@ -2,6 +2,7 @@
 
 import argparse
 
+from experiments.frames import cell
 from experiments.studies.settings import StudySettings
 from experiments.studies.transfer_functions import identification_study
 from experiments.studies.validation import classification_study, validation_study
@@ -32,9 +33,7 @@ def main(arguments: list[str]) -> int:
     better = int(rmse["mathematical_is_better"].sum())
     print(f"\nmathematical model better in {better} of 9 conditions (8 wanted)")
     short = [
-        key
-        for key, wanted in WANTED.items()
-        if float(summary.set_index(["bank", "variant"]).loc[key, "accuracy"]) < wanted
+        key for key, wanted in WANTED.items() if cell(summary.set_index(["bank", "variant"]), key, "accuracy") < wanted
     ]
     print(f"banks below what is wanted: {short or 'none'}")
     return len(short) + (better < 8)

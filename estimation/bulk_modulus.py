@@ -1,6 +1,6 @@
 """`estimate_bulk_modulus(record, parameters)`: a number, an interval, a verdict; or a sentence instead of a number."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeVar
@@ -174,43 +174,46 @@ def estimate_bulk_modulus(
     guess = parameters.bulk_modulus if start is None else start
     if not (np.isfinite(guess) and guess >= 0.0 and np.isfinite(start_std) and start_std > 0.0):
         raise HydrostateError(f"the first guess must be 0 Pa or more, its deviation positive, got {guess}, {start_std}")
-    prior = first_belief(model, record, guess, start_std)
+    chosen = _chosen(METHODS, method, "method")
     channels = available_channels(model, record)
     variances = measurement_variances(record, channels)
     noise = {"differential_pressure_pa": PRESSURE_NOISE_LOGGED} if "differential_pressure_pa" in channels else {}
-    estimate = run_filter(
-        _chosen(METHODS, method, "method"),
-        model,
-        prior,
-        record,
-        parameters,
-        channels=channels,
-        variances=variances,
-        noise=noise,
-    )
+
+    def filtered(first_guess: float) -> Estimate:
+        prior = first_belief(model, record, first_guess, start_std)
+        return run_filter(chosen, model, prior, record, parameters, channels=channels, variances=variances, noise=noise)
+
+    def bound_at(bulk_modulus: float) -> float:
+        prior = first_belief(model, record, bulk_modulus, start_std)
+        actuator = at_bulk_modulus(parameters, bulk_modulus)
+        std = bulk_modulus_bound(model, prior, record, actuator, channels=channels, variances=variances, noise=noise)
+        return std / bulk_modulus
+
+    estimate = _settled(filtered, guess)
     value, std = estimate.settled(BULK_MODULUS)
     if not (np.isfinite(value) and np.isfinite(std)):
         gate = Gate(False, (OUTCOMES[Outcome.DIVERGED],))
         return BulkModulusEstimate(Outcome.DIVERGED, None, None, float("inf"), gate, estimate)
-    bound = max(
-        bulk_modulus_bound(
-            model,
-            prior,
-            record,
-            at_bulk_modulus(parameters, at),
-            channels=channels,
-            variances=variances,
-            noise=noise,
-        )
-        / at
-        for at in {parameters.bulk_modulus, max(value, 1e-3 * parameters.bulk_modulus)}
-    )
+    nominal = parameters.bulk_modulus
+    bound = max(bound_at(nominal), bound_at(max(value, 1e-3 * nominal)))
     if bound > LARGEST_BOUND:
         reason = f"the Cramér-Rao bound is {100.0 * min(bound, 9.99):.0f} % of the value, over 3 %: not observable"
-        gate = Gate(False, (reason,))
-        return BulkModulusEstimate(Outcome.NOT_OBSERVABLE, None, None, bound, gate, estimate)
-    gate = consistency_gate(estimate, BULK_MODULUS)
-    return BulkModulusEstimate(Outcome.OK, value, std, bound, gate, estimate)
+        return BulkModulusEstimate(Outcome.NOT_OBSERVABLE, None, None, bound, Gate(False, (reason,)), estimate)
+    return BulkModulusEstimate(Outcome.OK, value, std, bound, consistency_gate(estimate, BULK_MODULUS), estimate)
+
+
+def _settled(filtered: Callable[[float], Estimate], guess: float) -> Estimate:
+    """Filter from the first guess; where the gate objects, again from where that ended, and keep the likelier.
+
+    A first guess far below the truth predicts no motion at all, and the filter may then spend its prior on the wrong
+    side. The second pass begins near the answer with the same wide prior.
+    """
+    first = filtered(guess)
+    value, _ = first.settled(BULK_MODULUS)
+    if not np.isfinite(value) or consistency_gate(first, BULK_MODULUS).passed:
+        return first
+    second = filtered(max(value, 0.0))
+    return second if second.log_likelihood > first.log_likelihood else first
 
 
 def _chosen(registry: Mapping[str, T], name: str, what: str) -> T:

@@ -114,7 +114,7 @@ ACCELERATION_FORM = ProcessModel(
 PRESSURE_FORM = ProcessModel(
     "pressure",
     (
-        StateVariable("position_m", "m", 1e-3, 1e-14),
+        StateVariable("position_m", "m", 1e-3, 1e-13),
         StateVariable("velocity_m_s", "m/s", 1e-2, 1e-2),
         StateVariable("differential_pressure_pa", "Pa", 1e5, 1e6),
         BULK_MODULUS_STATE,

@@ -9,6 +9,7 @@ import typer
 
 from experiments.cli_logs import finish, read_log, run_logs
 from experiments.cli_options import (
+    PRESSURE,
     SEED,
     Columns,
     Json,
@@ -19,7 +20,7 @@ from experiments.cli_options import (
     load_columns,
     load_rig,
 )
-from experiments.cli_streams import note, table
+from experiments.cli_streams import clauses, note, table
 from experiments.json_output import Result, prepare_output
 
 if TYPE_CHECKING:
@@ -30,11 +31,7 @@ if TYPE_CHECKING:
     from plant.eha import EhaParameters
     from plant.record import Record
 
-PRESSURE = "differential_pressure_pa"
-
-ABSENCE_COSTS = (
-    f"without {PRESSURE} friction shows in velocity alone, so conditions that differ in friction lie closer together"
-)
+ABSENCE_COSTS = f"without {PRESSURE} friction shows in velocity alone: margins are smaller as a rule"
 """What it costs a diagnosis that differential pressure is not there."""
 
 TOLD_APART = 1.001
@@ -79,7 +76,7 @@ def diagnose(
         bool,
         typer.Option(
             "--transfer-functions/--no-transfer-functions",
-            help="Also score nine transfer functions, identified from simulated tests of the rig (about 10 s, once).",
+            help="Also score nine transfer functions, identified from simulated tests of the rig (some 20 s, once).",
         ),
     ] = False,
     no_pressure: Annotated[
@@ -139,17 +136,18 @@ def _diagnosed(
     from faults.classify import score_mathematical, score_transfer_functions
 
     scores = score_mathematical(record, bank)
-    found = {**NOTHING, **_verdict(scores), "warnings": _poor_fit(scores, record)}
+    found = {**NOTHING, **_verdict(scores)}
+    said = [found["message"]]
     if linear is not None:
         others = score_transfer_functions(record, linear)
         found["transfer_function_scores"] = dict(others.by_condition)
         found["transfer_function_condition"] = others.condition
     if expected is not None and found["condition"] is not None:
-        verb = "is" if found["condition"] == expected else "is not"
-        found["message"] += f"; this {verb} {expected}, as expected" if verb == "is" else f"; {expected} was expected"
+        said.append("as expected" if found["condition"] == expected else f"{expected} was expected")
     if PRESSURE not in scores.channels:
-        found["message"] += f"; {ABSENCE_COSTS}"
-    return found
+        said.append(ABSENCE_COSTS)
+    doubts = _poor_fit(scores, record) if found["outcome"] == "ok" else []
+    return {**found, "message": clauses(said), "warnings": doubts}
 
 
 def _verdict(scores: "Scores") -> dict[str, Any]:
@@ -193,20 +191,26 @@ def _poor_fit(scores: "Scores", record: "Record") -> list[str]:
 
 
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
-    if len(results) <= MOST_TABLES:
-        for result in results:
-            yield _scores_table(result)
-            yield f"{result['file']}: {result['message']}"
-        return
+    cost = f"; {ABSENCE_COSTS}"
+    lacking = sum(PRESSURE not in result["channels"] for result in results)
+    detailed = len(results) <= MOST_TABLES
+    if detailed:
+        yield from (_scores_table(result) for result in results)
+    else:
+        yield _summary(results)
+    for result in results:
+        if detailed or result["outcome"] != "ok" or result["expected"] is not None:
+            yield f"{result['file']}: {result['message'].removesuffix(cost)}"
+    if lacking:
+        yield f"{lacking} of {len(results)} logs: {ABSENCE_COSTS}"
+
+
+def _summary(results: Sequence[Result]) -> "RenderableType":
     shown = table("log", "condition", "runner-up", "margin")
     for result in results:
-        margin = result["margin"]
-        words = "-" if margin is None else _in_words(margin)
+        words = "-" if result["margin"] is None else _in_words(result["margin"])
         shown.add_row(result["file"], result["condition"] or "-", result["runner_up"] or "-", words)
-    yield shown
-    for result in results:
-        if result["outcome"] != "ok" or PRESSURE not in result["channels"] or result["expected"] is not None:
-            yield f"{result['file']}: {result['message']}"
+    return shown
 
 
 def _scores_table(result: Result) -> "RenderableType":

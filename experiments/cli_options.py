@@ -59,10 +59,11 @@ ConditionName: TypeAlias = Annotated[
     str | None, typer.Option("--condition", metavar="NAME", help="A condition by name, see `hydrostate conditions`.")
 ]
 
+PRESSURE = "differential_pressure_pa"
+"""The channel that is optional everywhere."""
+
 SEED = 2024
 """Seed where none is given."""
-
-NOT_RANDOM = "nothing here is random"
 
 
 def load_rig(path: Path | None) -> "Rig":

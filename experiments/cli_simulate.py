@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from experiments.cli_options import (
+    PRESSURE,
     SEED,
     ConditionName,
     Json,
@@ -25,8 +26,6 @@ from plant.errors import HydrostateError
 if TYPE_CHECKING:
     from plant.eha import EhaParameters
     from plant.record import Record
-
-PRESSURE = "differential_pressure_pa"
 
 commands = typer.Typer()
 

@@ -5,8 +5,8 @@ import logging
 import os
 import sys
 import traceback
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterable
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TextIO
 
 import typer
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
-PIPE_WIDTH = 120
-"""Columns of a table that is not printed on a terminal."""
+PIPE_WIDTH = 200
+"""Most columns of a table that is not printed on a terminal, where no line should be folded."""
 
 USAGE, SOME_FAILED, INTERRUPTED = 2, 1, 130
 """Exit codes beside 0."""
@@ -54,10 +54,32 @@ def note(sentence: str) -> None:
     emit(" ".join(sentence.split()), err=True)
 
 
+def clauses(parts: Iterable[str]) -> str:
+    """Return several statements as one sentence.
+
+    Parameters
+    ----------
+    parts : iterable of str
+        The statements, with or without a full stop.
+
+    Returns
+    -------
+    str
+        The sentence, without a full stop.
+
+    Examples
+    --------
+    >>> clauses(["It stuck.", "drive it harder"])
+    'It stuck; drive it harder'
+    """
+    return "; ".join(part.rstrip(".") for part in parts)
+
+
 def _to_nowhere(stream: TextIO) -> None:
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, stream.fileno())
-    os.close(nowhere)
+    with suppress(OSError):  # a stream in memory has no number
+        number, nowhere = stream.fileno(), os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, number)
+        os.close(nowhere)
 
 
 def table(*headings: str, title: str | None = None) -> "Table":
@@ -118,7 +140,7 @@ def rendered(*parts: "RenderableType") -> str:
     with console.capture() as captured:
         for part in parts:
             console.print(part, soft_wrap=isinstance(part, str))
-    return "\n".join(line.rstrip() for line in captured.get().splitlines())
+    return "\n".join(line.rstrip() for line in captured.get().strip("\n").splitlines())
 
 
 @contextmanager

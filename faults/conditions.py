@@ -8,6 +8,7 @@ from typing import Annotated, Literal, TypeAlias, get_args
 
 from plant.eha import EhaParameters
 from plant.errors import HydrostateError
+from plant.steady_state import steady_state
 from plant.units import SI
 
 Level: TypeAlias = Literal["none", "minor", "major"]
@@ -163,11 +164,11 @@ def severity(leakage: float, friction: float, base: EhaParameters = PAPER_RIG) -
     (errata E12).
 
     A base that is not the paper's rig keeps its own values at 0 and has the tables' increments over "none"
-    added, in the spirit of section 3: leakage is defined by the share of velocity it costs, friction by the
-    pressure it adds. Leakage and flow bias scale with the rated pump flow ``D_p * rated_speed``, so that
-    the same pressure loses the same share of it; friction scales so that it adds the same pressure at the
-    same share of the ideal rated velocity ``v = D_p * rated_speed / A``:
-    a_1 with ``A / v^2``, a_2 with ``A / v``, a_3 with ``A``, all relative to the paper's rig.
+    added so that they mean the same: section 3 defines leakage by the share of velocity it costs and friction by the
+    share of pressure it adds, both in the normal state at rated speed. So flow bias scales with the rated pump flow
+    ``Q = D_p * rated_speed``, the leakage coefficient with ``Q / p``, and friction with ``p A`` at the same share of
+    the ideal velocity ``v = Q / A``: a_1 with ``p A / v^2``, a_2 with ``p A / v``, a_3 with ``p A``, where p is the
+    differential pressure that the healthy actuator settles at, all relative to the paper's rig.
 
     Parameters
     ----------
@@ -252,18 +253,26 @@ def _rated_flow(p: EhaParameters) -> float:
     return p.pump_displacement * p.rated_speed
 
 
+def _pressure_ratio(base: EhaParameters) -> float:
+    """Return the healthy pressure at rated speed over the paper's; 1 for an actuator that needs none."""
+    _, pressure = steady_state(base.rated_speed, base)
+    _, paper = steady_state(PAPER_RIG.rated_speed, PAPER_RIG)
+    return pressure / paper if pressure > 0.0 else 1.0
+
+
 def _leakage_scales(base: EhaParameters) -> Mapping[str, float]:
     flow = _rated_flow(base) / _rated_flow(PAPER_RIG)
-    return {"leakage_coefficient": flow, "flow_bias": flow}
+    return {"leakage_coefficient": flow / _pressure_ratio(base), "flow_bias": flow}
 
 
 def _friction_scales(base: EhaParameters) -> Mapping[str, float]:
     area = base.piston_area / PAPER_RIG.piston_area
     velocity = _rated_flow(base) / _rated_flow(PAPER_RIG) / area
+    force = area * _pressure_ratio(base)
     return {
-        "friction_quadratic": area / velocity**2,
-        "friction_linear": area / velocity,
-        "friction_coulomb": area,
+        "friction_quadratic": force / velocity**2,
+        "friction_linear": force / velocity,
+        "friction_coulomb": force,
     }
 
 

@@ -104,7 +104,7 @@ def require_positive(name: str, value: float, unit: str) -> None:
     name : str
         What it is called in the message.
     value : float
-        The number.
+        The number [in the unit given].
     unit : str
         Its unit, for the message.
 

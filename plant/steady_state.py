@@ -1,6 +1,8 @@
 """Where the actuator settles under a constant motor speed: equations 5.7, 5.8 and 5.11."""
 
-from plant.components.cylinder import velocity_under_friction
+from math import copysign
+
+from plant.components.cylinder import quadratic_friction, velocity_under_friction
 from plant.components.valves import pumped_flow
 from plant.eha import EhaParameters
 
@@ -16,7 +18,7 @@ def steady_state(speed: float, p: EhaParameters) -> tuple[float, float]:
     speed : float
         Motor speed [rad/s].
     p : EhaParameters
-        The actuator; its leakage must be positive.
+        The actuator.
 
     Returns
     -------
@@ -39,6 +41,10 @@ def steady_state(speed: float, p: EhaParameters) -> tuple[float, float]:
 
 def _settled(flow: float, leakage: float, relief: float, p: EhaParameters) -> tuple[float, float]:
     A, conductance = p.piston_area, leakage + relief
+    if conductance == 0.0:
+        velocity, direction = flow / A, copysign(1.0, flow)
+        force = quadratic_friction(velocity, direction, p.friction_quadratic, p.friction_linear, p.friction_coulomb)
+        return velocity, float(force) / A
     resistance = A * A / conductance + p.friction_linear
     push = A * flow / conductance
     velocity = float(velocity_under_friction(push, resistance, p.friction_quadratic, p.friction_coulomb))

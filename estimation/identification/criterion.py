@@ -49,7 +49,18 @@ class Structure:
         return self.n_numerator + self.n_denominator + self.n_initial
 
     def split(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return numerator with its leading zeros, monic denominator, and initial state."""
+        """Return numerator with its leading zeros, monic denominator, and initial state.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (n_parameters,)
+            All free values: numerator, denominator, initial state.
+
+        Returns
+        -------
+        tuple of ndarray
+            Shapes (delay + n_numerator,), (n_denominator + 1,), (n_states,).
+        """
         n_b, n_f = self.n_numerator, self.n_denominator
         b = np.concatenate([np.zeros(self.delay), theta[:n_b]])
         f = np.concatenate([[1.0], theta[n_b : n_b + n_f]])
@@ -58,12 +69,34 @@ class Structure:
 
 
 def polynomial(poles: ComplexArray) -> FloatArray:
-    """Return the monic polynomial with these roots, which come in conjugate pairs, shape (n + 1,)."""
+    """Return the monic polynomial with these roots.
+
+    Parameters
+    ----------
+    poles : ndarray of complex, shape (n,)
+        In conjugate pairs.
+
+    Returns
+    -------
+    ndarray, shape (n + 1,)
+        Its coefficients.
+    """
     return np.real(np.poly(poles)).astype(np.float64)
 
 
 def is_stable(denominator: FloatArray) -> bool:
-    """Return whether every root of a monic denominator lies inside the unit circle."""
+    """Return whether every root of a monic denominator lies inside the unit circle.
+
+    Parameters
+    ----------
+    denominator : ndarray, shape (n + 1,)
+        Monic.
+
+    Returns
+    -------
+    bool
+        False, too, where a coefficient is not finite.
+    """
     return bool(np.isfinite(denominator).all() and (np.abs(np.roots(denominator)) < 1.0).all())
 
 
@@ -94,7 +127,22 @@ def stabilised(denominator: FloatArray, n_samples: int) -> FloatArray:
 
 
 def predict(structure: Structure, theta: FloatArray, u: FloatArray) -> FloatArray:
-    """Return the model's output, shape (n,)."""
+    """Return the model's output.
+
+    Parameters
+    ----------
+    structure : Structure
+        How many coefficients of each kind.
+    theta : ndarray, shape (n_parameters,)
+        All free values.
+    u : ndarray, shape (n,)
+        Input.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Output.
+    """
     b, f, state = structure.split(theta)
     return np.asarray(lfilter(b, f, u, zi=state)[0], dtype=np.float64)
 

@@ -44,7 +44,7 @@ def etfe(u: ArrayLike, y: ArrayLike, sample_time: float, *, lag_window: int | No
     u, y : array_like, shape (n,)
         Input and output, no gaps; means are removed.
     sample_time : float
-        Seconds between samples.
+        Seconds between samples [s].
     lag_window : int, optional
         Half length of the Hann window in lags; a twentieth of the record unless told. Longer resolves
         narrower peaks and is noisier.
@@ -109,7 +109,7 @@ def etfe_welch(
     u, y : array_like, shape (n,)
         Input and output, no gaps; the mean of each segment is removed, so the response at 0 Hz is left out.
     sample_time : float
-        Seconds between samples.
+        Seconds between samples [s].
     segment_length : int, optional
         Samples a segment; a tenth of the record unless told.
 

@@ -40,7 +40,7 @@ class LinearModel:
     denominator : ndarray, shape (n_denominator + 1,)
         ``f``: monic, coefficients of ``q^0, q^-1, ...``.
     sample_time : float
-        Seconds between samples.
+        Seconds between samples [s].
     input_name, output_name : str
         Channel names, which carry the units (``motor_speed_rad_s``).
     delay : int

@@ -27,11 +27,11 @@ class OrderTest:
         Of the Hankel matrix of the estimated impulse response (Figure 7 of the EHA paper)
         [output unit per input unit].
     hankel_noise_floor : float
-        Largest such value that noise with the residual's spectrum gives.
+        Largest such value that noise with the residual's spectrum gives [output unit per input unit].
     projected_singular_values : ndarray, shape (i,)
         Of the future outputs projected on the past beside the future inputs (MOESP) [output unit].
     projected_noise_floor : float
-        Likewise.
+        Likewise [output unit].
     suggested_order : int
         Projected singular values above their floor.
     """
@@ -145,7 +145,7 @@ def order_table(
     u, y : array_like, shape (n,)
         Input and output, as `fit_output_error` takes them.
     sample_time : float
-        Seconds between samples.
+        Seconds between samples [s].
     orders : tuple of int
         Denominator coefficients; the numerator has one more, or as many behind a delay.
     delay : int

@@ -70,7 +70,7 @@ def fit_output_error(
     y : array_like, shape (n,)
         Output, in the unit that its name says; NaN where missing.
     sample_time : float
-        Seconds between samples.
+        Seconds between samples [s].
     n_numerator, n_denominator : int
         Free coefficients of ``B`` and ``F``, at least 1 each.
     delay : int
@@ -139,7 +139,20 @@ def fit_output_error(
 
 
 def data_hash(u: FloatArray, y: FloatArray, sample_time: float) -> str:
-    """Return the SHA-256 of input, output and sample time as little-endian doubles."""
+    """Return the SHA-256 of input, output and sample time as little-endian doubles.
+
+    Parameters
+    ----------
+    u, y : ndarray, shape (n,)
+        Input and output.
+    sample_time : float
+        Seconds between samples [s].
+
+    Returns
+    -------
+    str
+        Hexadecimal digest.
+    """
     digest = hashlib.sha256()
     for values in (u, y, np.array([sample_time])):
         digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())

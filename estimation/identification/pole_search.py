@@ -78,7 +78,7 @@ def _nearly_cancelled(
 ) -> list[ComplexArray]:
     """Return the best model of one order less with a real pole added wherever that is locally best.
 
-    A slow pole that a zero nearly cancels, as in Minor Leakage of Table 6, explains little power and never
+    A slow pole that a zero nearly cancels, as in the fourth model of Table 6, explains little power and never
     ranks among the best, but has a basin of its own.
     """
     # the poles already there sit on the grid: all are let move a little, lest the new one serve to correct them

@@ -63,7 +63,7 @@ def zero_phase_filter(
         Input and output; gaps (NaN) are bridged by straight lines for the filter, and stay gaps in the
         result.
     sample_time : float
-        Seconds between samples.
+        Seconds between samples [s].
     cutoff_hz : float
         -3 dB frequency of one pass [Hz]; two passes make it -6 dB.
     order : int
@@ -110,7 +110,7 @@ def resample(x: ArrayLike, sample_time: float, new_sample_time: float) -> FloatA
     x : array_like, shape (n,)
         Any signal; NaN where missing.
     sample_time, new_sample_time : float
-        Seconds between samples, before and after.
+        Seconds between samples [s], before and after.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """Where an output-error fit begins: at several denominators, since one start often ends in a local minimum.
 
 From a random stable start Levenberg-Marquardt reaches the global minimum of a Table 6 model in 64 to 96 % of
-runs; Minor Leakage at high noise has two basins side by side. The starts here are of four kinds:
+runs; the fourth of them at high noise has two basins side by side. The starts here are of four kinds:
 least-squares ARX, a high-order ARX model reduced through the Hankel matrix of its impulse response, refined
 instrumental variables (SRIV) from both, and a search over pole positions
 (`estimation.identification.pole_search`).
@@ -51,7 +51,22 @@ def starting_denominators(structure: Structure, u: FloatArray, y: FloatArray) ->
 
 
 def lagged(x: FloatArray, first: int, count: int) -> FloatArray:
-    """Return ``x[t - first - k]`` for k < count as columns, zero before the record, shape (n, count)."""
+    """Return ``x[t - first - k]`` for k < count as columns, zero before the record.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+        A signal.
+    first : int
+        Smallest lag, in samples.
+    count : int
+        Number of lags.
+
+    Returns
+    -------
+    ndarray, shape (n, count)
+        One lag a column.
+    """
     if count == 0:
         return np.empty((x.size, 0))
     padded = np.concatenate([np.zeros(first + count - 1), x])

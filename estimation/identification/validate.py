@@ -22,7 +22,7 @@ class ResidualTest:
     Parameters
     ----------
     statistic : float
-        The test statistic.
+        The test statistic [dimensionless].
     degrees_of_freedom : int
         Of its chi-square distribution under the null hypothesis.
     p_value : float
@@ -34,7 +34,18 @@ class ResidualTest:
     p_value: float
 
     def passed(self, level: float = 0.05) -> bool:
-        """Return whether the model survives at this significance level."""
+        """Return whether the model survives.
+
+        Parameters
+        ----------
+        level : float
+            Significance level [probability].
+
+        Returns
+        -------
+        bool
+            True where the statistic is no surprise.
+        """
         return self.p_value >= level
 
 

@@ -6,6 +6,7 @@ from dataclasses import fields
 import pandas as pd
 
 from estimation.identification.linear_model import LinearModel
+from experiments.frames import cell
 from experiments.published import SCALARS, load
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha import EhaParameters
@@ -37,8 +38,8 @@ def condition_table(rig: EhaParameters) -> pd.DataFrame:
                 "condition": name,
                 "leakage": condition.leakage,
                 "friction": condition.friction,
-                "throttle_a_v": float(published.loc[name, "throttle_a_v"]),
-                "throttle_b_v": float(published.loc[name, "throttle_b_v"]),
+                "throttle_a_v": cell(published, name, "throttle_a_v"),
+                "throttle_b_v": cell(published, name, "throttle_b_v"),
                 "leakage_coefficient_m3_s_pa": p.leakage_coefficient,
                 "flow_bias_m3_s": p.flow_bias,
                 "friction_quadratic_n_s2_m2": p.friction_quadratic,
@@ -100,11 +101,11 @@ def scalar_table(conditions: pd.DataFrame, library: Mapping[str, LinearModel], b
     by_name = conditions.set_index("condition")
 
     def percent(name: str, quantity: str) -> float:
-        return float(by_name.loc[name, f"{quantity}_percent_of_normal"]) / 100.0
+        return cell(by_name, name, f"{quantity}_percent_of_normal") / 100.0
 
     bandwidth = library["normal"].bandwidth_hz
     ours = {
-        "normal_differential_pressure": float(by_name.loc["normal", "steady_pressure_pa"]),
+        "normal_differential_pressure": cell(by_name, "normal", "steady_pressure_pa"),
         "minor_leakage_velocity": percent("minor_leakage", "velocity"),
         "major_leakage_velocity": percent("major_leakage", "velocity"),
         "minor_friction_pressure": percent("minor_friction", "pressure"),

@@ -13,6 +13,7 @@ from estimation.identification.order import order_test
 from estimation.identification.output_error import fit_output_error
 from estimation.identification.preprocess import zero_phase_filter
 from experiments.executors import side_by_side
+from experiments.frames import cell
 from experiments.published import load
 from experiments.streams import stream
 from experiments.studies.settings import StudySettings
@@ -84,7 +85,7 @@ def transfer_function_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
         row: dict[str, object] = {"condition": name}
         row |= dict(zip(names, values, strict=True))
         row |= {f"{key}_std": std for key, std in zip(names, model.coefficient_std, strict=True)}
-        low, high = printed_gain_interval([str(published.loc[name, key]) for key in names])
+        low, high = printed_gain_interval([repr(cell(published, name, key)) for key in names])
         row |= {
             "dc_gain": model.dc_gain,
             "dc_gain_std": model.dc_gain_std,
@@ -92,7 +93,7 @@ def transfer_function_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
             "fit_percent": model.fit_percent,
             "jump_ratio": values[0] / model.dc_gain,
         }
-        row |= {f"published_{key}": float(published.loc[name, key]) for key in names}
+        row |= {f"published_{key}": cell(published, name, key) for key in names}
         row |= {"published_dc_gain_low": low, "published_dc_gain_high": high}
         rows.append(row)
     return pd.DataFrame(rows)

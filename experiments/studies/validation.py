@@ -7,6 +7,7 @@ import pandas as pd
 
 from estimation.identification.linear_model import LinearModel
 from experiments.executors import side_by_side
+from experiments.frames import cell
 from experiments.published import load
 from experiments.streams import stream
 from experiments.studies.settings import StudySettings
@@ -89,8 +90,8 @@ def validation_study(
                 "condition": name,
                 "rmse_transfer_function_m_s": identified,
                 "rmse_mathematical_m_s": mathematical,
-                "published_rmse_transfer_function_m_s": float(published.loc[name, "rmse_system_id_m_per_s"]),
-                "published_rmse_mathematical_m_s": float(published.loc[name, "rmse_mathematical_m_per_s"]),
+                "published_rmse_transfer_function_m_s": cell(published, name, "rmse_system_id_m_per_s"),
+                "published_rmse_mathematical_m_s": cell(published, name, "rmse_mathematical_m_per_s"),
                 "mathematical_is_better": mathematical < identified,
             }
         )

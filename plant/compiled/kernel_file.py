@@ -52,6 +52,8 @@ def load_kernel(name: str, source: str) -> ModuleType:
 
 def _imported(module_name: str, source: str) -> ModuleType:
     path = _written(module_name, source)
+    if not any((path.parent / "__pycache__").glob(f"{module_name}.*.nbi")):  # Numba's index of what it has compiled
+        logger.info("compiling the kernel %s", module_name)
     spec = importlib.util.spec_from_file_location(module_name, path)
     if spec is None or spec.loader is None:
         raise ImportError(f"the generated kernel {path} cannot be imported")

@@ -1,0 +1,80 @@
+"""The errata in one line each, for reports; told in full, with reasons, in ``docs/errata.md``."""
+
+import re
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from markupsafe import Markup, escape
+
+ERRATA: Mapping[str, str] = MappingProxyType(
+    {
+        "E1": "Pump displacement is read as m³/rad; Table 2 prints the unit of a flow.",
+        "E2": "Bulk modulus is in the convention of the paper's equations, V₀/β; one sentence there halves it.",
+        "E3": "The friction term of equation 7.3 is divided by M alone; V₀ cancels.",
+        "E4": "Jacobians are differentiated from the models, not copied from 7.5, which gives one element twice.",
+        "E5": "Leakage coefficients are read as m³/(s Pa); Table 3 prints another unit.",
+        "E6": "Throttle voltages differ between text and Table 1; they enter no model.",
+        "E7": "Tables 3 and 4 do not give the percentages by which section 3 defines minor and major; tables are followed.",
+        "E8": "A loss cannot exceed the flow: the flow bias makes a dead zone and never pumps backward.",
+        "E9": "The published filter differentiates friction through its jump at rest, so a reversal misleads it.",
+        "E10": "The published settings leave bulk modulus almost nothing to move by; the first guess gets a wide deviation.",
+        "E11": "The published noise levels are too large for these signals; ours come from the sensors.",
+        "E12": "The linear friction of minor friction is negative as printed, and kept.",
+        "E13": "On the 10 Hz sine most of a half cycle's flow goes into loading the oil, so a real piston mostly sticks; "
+        "without pressure the log then holds nothing about bulk modulus.",
+        "E14": "Table 6 gives neither sample time nor input unit, and its rounding hardly fixes some gains; both are inferred.",
+        "E15": "Eight of the models in Table 6 jump at once, which a mass cannot do; filtering the output alone does that.",
+        "E16": "Two sections are numbered 6, and Table 4's caption says leakage; read as sense demands.",
+        "E17": "The outlet's case leakage in 5.2 belongs to the other port.",
+        "E18": "The sentence after 5.4 sets P₂ equal to itself; P₂ = P_b is meant.",
+        "E19": "Equations 5.13 and 5.14 lack a dot and a sign, which are restored.",
+        "E20": "The paper's 2.07e8 Pa is the truth of these simulations; its earlier 2.1e8 Pa stands beside it.",
+    }
+)
+"""One sentence an erratum, by number."""
+
+_NUMBER = re.compile(r"\b(E\d{1,2})\b")
+_LINK = re.compile(r'href="#(E\d{1,2})"')
+
+
+def linked(text: str) -> Markup:
+    """Return a text with its errata numbers linked to the report's list.
+
+    Parameters
+    ----------
+    text : str
+        Plain text.
+
+    Returns
+    -------
+    Markup
+        The same, escaped, each number of `ERRATA` a link.
+
+    Examples
+    --------
+    >>> linked("sticks (errata E9) & stays")
+    Markup('sticks (errata <a href="#E9">E9</a>) &amp; stays')
+    """
+
+    def link(found: re.Match[str]) -> str:
+        number = found[1]
+        return f'<a href="#{number}">{number}</a>' if number in ERRATA else number
+
+    return Markup(_NUMBER.sub(link, str(escape(text))))  # noqa: S704 - escaped just before
+
+
+def linked_errata(html: str) -> Mapping[str, str]:
+    """Return the errata that a page links to, in order of number.
+
+    Parameters
+    ----------
+    html : str
+        A page with links made by `linked`.
+
+    Returns
+    -------
+    Mapping[str, str]
+        The one-line text by number.
+    """
+    found = set(_LINK.findall(html))
+    return {number: text for number, text in ERRATA.items() if number in found}

@@ -1,0 +1,186 @@
+"""Tables for a reader: sensible digits, engineering notation, units in the header."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+from markupsafe import Markup, escape
+
+MISSING = "–"
+"""What stands where there is no number."""
+
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+PLAIN_FROM, PLAIN_TO = 1e-3, 1e5
+"""Between these magnitudes a number is written without an exponent."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell that says more than a number.
+
+    Parameters
+    ----------
+    text : str
+        What is written.
+    tone : str
+        Class of the cell: ``"good"``, ``"bad"``, ``"none"``, or empty.
+    """
+
+    text: str
+    tone: str = ""
+
+
+@dataclass(frozen=True)
+class Column:
+    """How one column of a data frame is shown.
+
+    Parameters
+    ----------
+    source : str
+        Name in the data frame.
+    header : str
+        Heading.
+    unit : str
+        Unit as shown, after scaling; empty for words.
+    scale : float
+        Factor from SI to the unit shown [dimensionless].
+    digits : int
+        Significant digits.
+    words : callable, optional
+        From a value to what is written, instead of a number.
+    """
+
+    source: str
+    header: str
+    unit: str = ""
+    scale: float = 1.0
+    digits: int = 4
+    words: Callable[[Any], str | Cell | Markup] | None = None
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """Write a number as an engineer does: exponents in threes, no more digits than are asked for.
+
+    Parameters
+    ----------
+    value : float or None
+        The number [any unit].
+    digits : int
+        Significant digits.
+
+    Returns
+    -------
+    str
+        The number, or a dash where there is none.
+
+    Examples
+    --------
+    >>> number(4.784e-12), number(2.07e8, 3), number(0.04311), number(0.0), number(None)
+    ('4.784 × 10⁻¹²', '207 × 10⁶', '0.04311', '0', '–')
+    """
+    if value is None or not math.isfinite(value):
+        return MISSING
+    if value == 0.0:
+        return "0"
+    rounded = float(f"{value:.{digits - 1}e}")
+    magnitude = math.floor(math.log10(abs(rounded)))
+    if PLAIN_FROM <= abs(rounded) < PLAIN_TO:
+        return f"{rounded:.{max(0, digits - 1 - magnitude)}f}".replace("-", "−")
+    exponent = 3 * (magnitude // 3)
+    mantissa = f"{rounded / 10.0**exponent:.{max(0, digits - 1 - (magnitude - exponent))}f}".replace("-", "−")
+    return f"{mantissa} × 10{str(exponent).translate(SUPERSCRIPTS)}"
+
+
+def exact(value: float) -> str:
+    """Write a number as it was given, for parameters and settings.
+
+    Parameters
+    ----------
+    value : float
+        The number [any unit].
+
+    Returns
+    -------
+    str
+        The shortest decimals that give it back to ten digits, with exponents in threes.
+
+    Examples
+    --------
+    >>> exact(1.52e-3), exact(436.0), exact(2.07e8), exact(1e-8)
+    ('0.00152', '436', '207 × 10⁶', '10 × 10⁻⁹')
+    """
+    shown, times, power = number(value, 10).partition(" × ")
+    return (shown.rstrip("0").rstrip(".") if "." in shown else shown) + times + power
+
+
+def pretty_unit(unit: str) -> str:
+    """Return a unit with raised exponents.
+
+    Parameters
+    ----------
+    unit : str
+        As in the parameters' notes.
+
+    Returns
+    -------
+    str
+        As shown.
+
+    Examples
+    --------
+    >>> pretty_unit("N s^2/m^2")
+    'N s²/m²'
+    """
+    head, *rest = unit.split("^")
+    return head + "".join(part[:1].translate(SUPERSCRIPTS) + part[1:] for part in rest)
+
+
+def html_table(frame: pd.DataFrame, columns: Sequence[Column], caption: str) -> Markup:
+    """Return a data frame as an HTML table in a box that scrolls sideways.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        The rows.
+    columns : sequence of Column
+        What is shown of them, and how.
+    caption : str
+        What the table holds.
+
+    Returns
+    -------
+    Markup
+        Escaped HTML.
+    """
+    head = Markup("").join(
+        Markup('<th scope="col">{}{}</th>').format(
+            column.header, Markup("<small>{}</small>").format(column.unit) if column.unit else ""
+        )
+        for column in columns
+    )
+    rows = Markup("\n").join(
+        Markup("<tr>{}</tr>").format(Markup("").join(_cell(column, row[column.source]) for column in columns))
+        for row in frame.to_dict("records")
+    )
+    return Markup(
+        '<div class="scroll"><table>\n<caption>{}</caption>\n<thead><tr>{}</tr></thead>\n<tbody>\n{}\n</tbody></table></div>'
+    ).format(caption, head, rows)
+
+
+def _cell(column: Column, value: Any) -> Markup:
+    if column.words is not None:
+        shown = column.words(value)
+    elif isinstance(value, str | Cell):
+        shown = value
+    else:
+        return Markup('<td class="number">{}</td>').format(number(_scaled(value, column.scale), column.digits))
+    if isinstance(shown, Cell):
+        return Markup('<td class="{}">{}</td>').format(shown.tone, shown.text)
+    return Markup("<td>{}</td>").format(escape(shown))
+
+
+def _scaled(value: Any, scale: float) -> float | None:
+    return None if value is None else scale * float(value)

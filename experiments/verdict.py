@@ -1,0 +1,81 @@
+"""The study's outcome in three sentences."""
+
+from collections.abc import Mapping
+
+from experiments.findings import (
+    POSITION_SINE,
+    POSITION_STEPS,
+    PRESSURE_SINE,
+    PRESSURE_STEPS,
+    PUBLISHED_WAY_STUCK,
+    ClassAccuracy,
+    ExperimentKey,
+    Recovery,
+    class_accuracies,
+    recoveries,
+)
+from experiments.study import StudyResult
+
+
+def verdict(result: StudyResult) -> tuple[str, str, str]:
+    """Say in three sentences what a study found.
+
+    Parameters
+    ----------
+    result : StudyResult
+        What a study found.
+
+    Returns
+    -------
+    tuple of str
+        On the bulk modulus, on the fault classes, and on what cannot be observed.
+    """
+    found = recoveries(result.tables["bulk_modulus"])
+    truth = float(result.manifest["parameters"]["bulk_modulus"])
+    return (
+        _bulk_modulus_sentence(found, truth),
+        _class_sentence(class_accuracies(result.tables)),
+        _limit_sentence(found[POSITION_SINE], found[PUBLISHED_WAY_STUCK]),
+    )
+
+
+def _bulk_modulus_sentence(found: Mapping[ExperimentKey, Recovery], truth: float) -> str:
+    sine, steps, alone = found[PRESSURE_SINE], found[PRESSURE_STEPS], found[POSITION_STEPS]
+    if sine.mean_pa is None or steps.mean_pa is None:
+        return "With differential pressure logged, no bulk modulus was recovered: see the table of estimates."
+    mean = (sine.mean_pa + steps.mean_pa) / 2.0
+    worst = max(sine.worst_error_percent or 0.0, steps.worst_error_percent or 0.0)
+    conditions = min(sine.recovered, steps.recovered)
+    second = (
+        ""
+        if alone.worst_error_percent is None
+        else f", and {alone.worst_error_percent:.2g} % with position and velocity alone on the nine steps"
+    )
+    return (
+        f"With differential pressure logged, effective bulk modulus comes back in {conditions} of {sine.conditions} "
+        f"conditions from every first guess: {mean / 1e8:.3f}e8 Pa on average, the truth being {truth / 1e8:.3f}e8 Pa, "
+        f"and the worst of {sine.estimates + steps.estimates} estimates is {worst:.2g} % off{second}."
+    )
+
+
+def _class_sentence(classes: tuple[ClassAccuracy, ...]) -> str:
+    runs, best = classes[0].runs, classes[0].bank
+    percent = {(entry.bank, entry.variant): entry.percent for entry in classes}
+    others = "; ".join(
+        f"{bank}: {percent[bank, 'nominal']:.3g} % and {percent[bank, 'spread']:.3g} %"
+        for bank in dict.fromkeys(entry.bank for entry in classes)
+        if bank != best
+    )
+    return (
+        f"The fault class is right in {percent[best, 'nominal']:.3g} % of {runs} runs with the tables' parameters and "
+        f"in {percent[best, 'spread']:.3g} % of {runs} with parameters spread around them ({best}; {others})."
+    )
+
+
+def _limit_sentence(stuck: Recovery, published: Recovery) -> str:
+    return (
+        f"Where the 10 Hz sine moves a piston that sticks and no pressure is logged, bulk modulus is not observable in "
+        f"{len(stuck.unobservable)} of {stuck.conditions} conditions, and the published filter recovers it in "
+        f"{published.recovered} of {published.conditions}: log differential pressure, or drive with larger, slower "
+        f"steps."
+    )

@@ -1,0 +1,216 @@
+import csv
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from typer.testing import CliRunner, Result
+
+import faults.conditions
+from experiments.cli import app
+from faults.conditions import CONDITIONS
+from plant.eha import EhaParameters
+from plant.rig import read_rig
+
+PUBLISHED = Path(__file__).resolve().parents[2] / "experiments" / "published"
+COMMANDS = ("study", "simulate", "estimate", "identify", "diagnose", "conditions")
+
+
+def invoke(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def process(*arguments: object, **environment: str) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-m", "experiments.cli", *map(str, arguments)]
+    variables = {**os.environ, **environment}
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=variables)  # noqa: S603 - our own command
+
+
+@pytest.mark.parametrize("command", [(name,) for name in COMMANDS] + [("rig", "init")])
+def test_help_gives_an_example_that_parses_so_far(command: tuple[str, ...]) -> None:
+    shown = invoke(*command, "--help")
+    assert shown.exit_code == 0
+    assert f"Example: hydrostate {' '.join(command)}" in " ".join(shown.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("command", "units"),
+    [
+        ("simulate", ["[s]", "[dimensionless]"]),
+        ("estimate", ["[Pa]", "SI"]),
+        ("identify", ["[s]", "[Hz]", "[rad/s]", "[m/s]"]),
+        ("diagnose", ["[m/s]", "[dimensionless]"]),
+    ],
+)
+def test_help_says_units(command: str, units: list[str]) -> None:
+    shown = invoke(command, "--help").stdout
+    assert [unit for unit in units if unit not in shown] == []
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_the_common_options(command: str) -> None:
+    shown = invoke(command, "--help").stdout
+    assert all(option in shown for option in ("--json", "--out", "--seed"))
+
+
+def test_help_says_what_the_exit_codes_and_outcomes_mean() -> None:
+    shown = " ".join(invoke("--help").stdout.split())
+    for meaning in (
+        "0 all done",
+        "1 some logs failed",
+        "2 nothing could be done",
+        "not_observable",
+        "HYDROSTATE_DEBUG",
+    ):
+        assert meaning in shown
+
+
+def test_help_and_version_wait_for_no_heavy_import() -> None:
+    code = (
+        "import sys\nfrom experiments.cli import app\n"
+        "for option in ('--help', '--version'):\n"
+        "    try:\n        app([option])\n    except SystemExit as end:\n        assert end.code == 0\n"
+        "print(sorted({'numpy', 'scipy', 'numba', 'matplotlib', 'pandas', 'pint'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)  # noqa: S603
+    assert done.stdout.splitlines()[-2:] == ["hydrostate 0.1.0", "[]"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["bogus"], "hydrostate: No such command 'bogus'."),
+        (["estimate"], "hydrostate estimate: Missing argument 'LOG'."),
+        (
+            ["estimate", "a.csv", "--sart", "1"],
+            "hydrostate estimate: No such option: --sart (Possible options: --start",
+        ),
+        (["estimate", "a.csv", "--form", "force"], "--form must be one of acceleration, pressure, got 'force'"),
+        (["estimate", "a.csv", "--method", "ukf9"], "--method must be one of ekf, filterpy-ekf, got 'ukf9'"),
+        (["estimate", "a.csv", "--condition", "bad"], "condition must be one of normal, minor_leakage"),
+        (["diagnose", "a.csv", "--condition", "bad"], "condition must be one of normal, minor_leakage"),
+        (["estimate", "a.csv", "--start", "-1"], "--start must be positive and finite, got -1 Pa"),
+        (["estimate", "a.csv", "--start", "nan"], "--start must be positive and finite, got nan Pa"),
+        (["estimate", "a.csv", "--start-std", "0"], "--start-std must be positive and finite, got 0 Pa"),
+        (["estimate", "a.csv", "--rig", "none.toml"], "none.toml: cannot be read: No such file or directory"),
+        (["estimate", "a.csv", "--columns", "position_m"], "columns are wanted as CHANNEL=NAME:UNIT"),
+        (["estimate", "a.csv", "--columns", "position_m=X:furlongs/h"], "position_m=X:furlongs/h"),
+        (["diagnose", "a.csv", "--columns", "depth=X"], "channel 'depth' is unknown"),
+        (["identify", "a.csv", "--filter-hz", "0"], "--filter-hz must be positive and finite, got 0 Hz"),
+        (["identify", "a.csv", "--order", "0"], "Invalid value for '--order'"),
+        (["simulate"], "hydrostate simulate: Missing option '--out' / '-o'."),
+        (["simulate", "-o", "a.xls"], "--out must end in .csv"),
+        (["simulate", "-o", "a.csv", "--plant", "toy"], "--plant must be one of reduced, lumped, got 'toy'"),
+        (["simulate", "-o", "a.csv", "--drive", "walk"], "--drive must be one of sine"),
+        (["simulate", "-o", "a.csv", "--duration", "inf"], "--duration must be positive and finite, got inf s"),
+        (["simulate", "-o", "a.csv", "--leakage-severity", "9"], "leakage severity must be between 0 and 5, got 9.0"),
+        (
+            ["simulate", "-o", "a.csv", "--leakage-severity", "1", "--condition", "normal"],
+            "a --condition or severities are wanted, got both",
+        ),
+        (["conditions", "--seed", "-1"], "Invalid value for '--seed'"),
+    ],
+)
+def test_a_wrong_request_is_refused_in_one_sentence(
+    arguments: list[str], sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    refused = invoke(*arguments)
+    assert refused.exit_code == 2
+    assert sentence in refused.stderr
+    assert len(refused.stderr.splitlines()) == 1
+    assert refused.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_internal_error_is_a_sentence_and_a_traceback_on_request_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise RuntimeError("the\nmill is broken")
+
+    monkeypatch.setattr(faults.conditions, "parameters_for", broken)
+    monkeypatch.delenv("HYDROSTATE_DEBUG", raising=False)
+    quiet = invoke("conditions")
+    assert quiet.exit_code == 1
+    assert quiet.stderr.splitlines() == [
+        "hydrostate: an internal error (RuntimeError: the mill is broken), please report it; "
+        "HYDROSTATE_DEBUG=1 shows where it arose"
+    ]
+    monkeypatch.setenv("HYDROSTATE_DEBUG", "1")
+    assert "Traceback (most recent call last)" in invoke("conditions").stderr
+
+
+def test_the_nine_conditions_have_the_names_of_table_1() -> None:
+    with (PUBLISHED / "eha_table1_conditions.csv").open() as file:
+        names = [row["condition"] for row in csv.DictReader(file)]
+    found = json.loads(invoke("conditions", "--json").stdout)
+    assert [one["condition"] for one in found] == names
+    assert found[4]["parameters"]["friction_quadratic"] == 4.462e6
+
+
+def test_conditions_are_shown_with_units() -> None:
+    shown = invoke("conditions").stdout
+    assert all(name in shown for name in CONDITIONS)
+    assert "L_t [m^3/(s Pa)]" in shown
+
+
+def test_rig_init_writes_a_file_once(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    assert invoke("rig", "init", path).exit_code == 0
+    assert read_rig(path).parameters == EhaParameters()
+    path.write_text("# mine")
+    again = invoke("rig", "init", path)
+    assert again.exit_code == 2
+    assert again.stderr.splitlines() == [f"hydrostate: {path}: there is such a file already, and it is not overwritten"]
+    assert path.read_text() == "# mine"
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_study_ends_with_the_reports_path(as_json: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[Path, int, bool]] = []
+
+    def command(out: Path, seed: int, quick: bool, console: object) -> Path:
+        del console
+        asked.append((out, seed, quick))
+        return out / "report.html"
+
+    monkeypatch.setitem(sys.modules, "experiments.study", SimpleNamespace(study_command=command))
+    done = invoke("study", "--quick", "--out", tmp_path, "--seed", 7, *(["--json"] if as_json else []))
+    assert done.exit_code == 0
+    assert asked == [(tmp_path, 7, True)]
+    if as_json:
+        (found,) = json.loads(done.stdout)
+        assert (found["outcome"], found["report"]) == ("ok", str(tmp_path / "report.html"))
+        assert found["seconds"] >= 0.0
+    else:
+        assert done.stdout.splitlines()[-1] == str(tmp_path / "report.html")
+
+
+def test_the_command_runs_as_a_process_with_its_exit_codes(tmp_path: Path) -> None:
+    (tmp_path / "empty.csv").write_text("")
+    fine, refused = process("conditions", "--json"), process("estimate", tmp_path / "empty.csv", "--json")
+    assert (fine.returncode, len(json.loads(fine.stdout)), fine.stderr) == (0, 9, "")
+    assert refused.returncode == 2
+    assert [one["outcome"] for one in json.loads(refused.stdout)] == ["failed"]
+    assert "empty.csv: a header line is wanted, the file is empty" in refused.stderr
+    assert "Traceback" not in refused.stderr
+
+
+def test_a_reader_that_goes_away_is_no_error() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "experiments.cli", "conditions", "--json"]
+    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)  # noqa: S603
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_compiling_is_announced_once(tmp_path: Path) -> None:
+    arguments = ("simulate", "--duration", 0.1, "--sample-time", 1e-3, "-o", tmp_path / "run.parquet")
+    first, second = (process(*arguments, HYDROSTATE_CACHE=str(tmp_path / "cache")) for _ in range(2))
+    assert (first.returncode, second.returncode) == (0, 0)
+    assert [line[:17] for line in first.stderr.splitlines()] == ["compiling kernels"]
+    assert second.stderr == ""
+    assert first.stdout == second.stdout

@@ -1,0 +1,180 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+import plant.record_files
+from estimation.bulk_modulus import OUTCOMES
+from experiments.cli import app
+from experiments.cli_logs import Batch, read_log
+from plant.errors import LogError, LogWarning
+from plant.record import Record
+from plant.record_files import read_record, write_record
+
+WORDS = {outcome.value for outcome in OUTCOMES}
+VERBS = ("estimate", "identify", "diagnose")
+
+
+def invoke(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("good") / "good.csv"
+    made = invoke("simulate", "--drive", "prbs", "--duration", 4, "--sample-time", 1e-3, "-o", path)
+    assert made.exit_code == 0, made.output
+    return path
+
+
+def hostile(folder: Path, good: Path) -> dict[str, Path]:
+    """Write one file of every kind that must be refused, by a part of the sentence."""
+    lines = good.read_text().splitlines()
+    files = {
+        "a header line is wanted": b"",
+        "at least 10 samples": (lines[0] + "\n").encode(),
+        "column motor_speed_rad_s is missing": b"time_s,position_m\n" + b"".join(b"%d,1\n" % i for i in range(20)),
+        "unit 'parsnip' is unknown": "\n".join(
+            [lines[0].replace("position_m", "position_parsnip"), *lines[1:]]
+        ).encode(),
+        "must hold numbers, got 'oops'": "\n".join([*lines[:30], "0.029,oops,0,0,0", *lines[31:]]).encode(),
+        "must be finite": "\n".join([*lines[:30], "0.029,inf,0,0,0", *lines[31:]]).encode(),
+        "got binary data": bytes(range(256)),
+    }
+    paths: dict[str, Path] = {}
+    for number, (sentence, content) in enumerate(files.items()):
+        paths[sentence] = folder / f"hostile{number}.csv"
+        paths[sentence].write_bytes(content)
+    paths["there is no such file"] = folder / "none.csv"
+    paths["a file is wanted, got a directory"] = folder
+    return paths
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_hostile_logs_among_good_ones_are_named_and_the_rest_done(verb: str, good: Path, tmp_path: Path) -> None:
+    bad = list(hostile(tmp_path, good).values())
+    done = invoke(verb, good, *bad, good, "--json")
+    results = json.loads(done.stdout)
+    assert done.exit_code == 1
+    assert [one["file"] for one in results] == [str(path) for path in (good, *bad, good)]
+    assert [one["outcome"] for one in results] == ["ok", *["failed"] * len(bad), "ok"]
+    assert {one["outcome"] for one in results} <= WORDS
+    assert results[0] == results[-1]
+    assert all(set(one) == set(results[0]) for one in results[1:-1]) or verb == "identify"
+    for path, one in zip(bad, results[1:-1], strict=True):
+        assert f"{path}: {one['message']}" in done.stderr.splitlines()
+    assert "Traceback" not in done.output
+
+
+def test_each_hostile_log_gets_a_sentence_of_its_own(good: Path, tmp_path: Path) -> None:
+    files = hostile(tmp_path, good)
+    results = json.loads(invoke("diagnose", *files.values(), "--json").stdout)
+    assert [sentence for sentence, one in zip(files, results, strict=True) if sentence not in one["message"]] == []
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_nothing_readable_is_exit_code_2(verb: str, tmp_path: Path) -> None:
+    done = invoke(verb, tmp_path / "a.csv", tmp_path / "b.csv", "--out", tmp_path / "out", "--json")
+    assert done.exit_code == 2
+    assert [one["outcome"] for one in json.loads(done.stdout)] == ["failed", "failed"]
+    assert json.loads((tmp_path / "out" / "results.json").read_text()) == json.loads(done.stdout)
+
+
+def test_an_internal_error_on_one_log_costs_the_others_nothing(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(path: Path, **_: object) -> Record:
+        if path.name == "broken.csv":
+            raise RuntimeError("the mill is broken")
+        return read_record(path)
+
+    monkeypatch.setattr(plant.record_files, "read_record", broken)
+    done = invoke("diagnose", good.with_name("broken.csv"), good, "--json")
+    assert done.exit_code == 1
+    assert [one["outcome"] for one in json.loads(done.stdout)] == ["failed", "ok"]
+    assert "broken.csv: an internal error (RuntimeError: the mill is broken), please report it" in done.stderr
+
+
+def test_an_interruption_keeps_what_is_done(good: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(path: Path, **_: object) -> Record:
+        if path.name == "second.csv":
+            raise KeyboardInterrupt
+        return read_record(path)
+
+    monkeypatch.setattr(plant.record_files, "read_record", interrupted)
+    done = invoke("diagnose", good, good.with_name("second.csv"), good, "--json", "--out", tmp_path)
+    assert done.exit_code == 130
+    assert "interrupted after 1 of 3 logs" in done.stderr.splitlines()
+    assert [one["file"] for one in json.loads(done.stdout)] == [str(good)]
+    assert len(json.loads((tmp_path / "results.json").read_text())) == 1
+
+
+def test_a_warning_is_printed_with_the_log_and_kept_in_the_result(good: Path, tmp_path: Path) -> None:
+    record = read_record(good)
+    gappy = record["velocity_m_s"].copy()
+    gappy[100:150] = np.nan
+    write_record(record.replace(velocity_m_s=gappy), tmp_path / "gappy.csv")
+    done = invoke("diagnose", good, tmp_path / "gappy.csv", "--json")
+    plain, warned = json.loads(done.stdout)
+    assert plain["warnings"] == []
+    (sentence,) = warned["warnings"]
+    assert "velocity_m_s" in sentence
+    assert f"{tmp_path / 'gappy.csv'}: warning: {sentence}" in done.stderr.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "total", "code"),
+    [
+        (("ok", "ok"), 2, 0),
+        (("ok", "not_observable"), 2, 0),
+        (("not_observable",), 1, 0),
+        (("ok", "failed"), 2, 1),
+        (("diverged", "ok"), 2, 1),
+        (("diverged", "failed"), 2, 1),
+        (("failed", "failed"), 2, 2),
+        (("ok",), 2, 130),
+        ((), 2, 130),
+    ],
+)
+def test_exit_code_follows_from_the_outcomes(outcomes: tuple[str, ...], total: int, code: int) -> None:
+    assert Batch(tuple({"outcome": outcome} for outcome in outcomes), total).exit_code == code
+
+
+def test_results_beside_the_screen_are_those_of_the_document(good: Path, tmp_path: Path) -> None:
+    shown = invoke("diagnose", good, "--out", tmp_path / "new")
+    printed = json.loads(invoke("diagnose", good, "--json").stdout)
+    assert shown.exit_code == 0
+    assert json.loads((tmp_path / "new" / "results.json").read_text()) == printed
+    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["results.csv", "results.json"]
+
+
+def test_a_full_disk_costs_the_file_and_not_the_screen(
+    good: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    done = invoke("diagnose", good, "--json", "--out", tmp_path)
+    assert done.exit_code == 1
+    assert json.loads(done.stdout)[0]["outcome"] == "ok"
+    assert "No space left on device" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_rigs_columns_that_a_log_lacks_are_named(good: Path) -> None:
+    columns = {"position_m": "POS_MM:mm", "differential_pressure_pa": "DP_BAR:bar"}
+    with pytest.warns(LogWarning, match="the log has no POS_MM:mm, DP_BAR:bar of the rig's columns"):
+        record = read_log(good, columns, {})
+    assert "differential_pressure_pa" in record
+
+
+def test_a_column_asked_for_on_the_command_line_must_be_there(good: Path) -> None:
+    done = invoke("estimate", good, "--columns", "position_m=POS_MM:mm", "--json")
+    assert done.exit_code == 2
+    assert "column 'POS_MM' is wanted for position_m" in json.loads(done.stdout)[0]["message"]
+
+
+def test_the_command_line_goes_before_the_rig(good: Path) -> None:
+    with pytest.raises(LogError, match="'OTHER' is wanted"):
+        read_log(good, {"position_m": "position_m"}, {"position_m": "OTHER"})

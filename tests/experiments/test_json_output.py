@@ -1,0 +1,68 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation.bulk_modulus import Outcome
+from experiments.json_output import csv_text, json_text, plain, prepare_output, write_results
+from plant.errors import HydrostateError
+
+
+def test_no_number_that_json_lacks_gets_through() -> None:
+    text = json_text([{"value": float("nan"), "ci95": (-np.inf, np.float64(1.5)), "rows": np.array([[np.nan, 2.0]])}])
+    assert json.loads(text) == [{"value": None, "ci95": [None, 1.5], "rows": [[None, 2.0]]}]
+
+
+def test_words_paths_and_counts_are_plain() -> None:
+    values = {"outcome": Outcome.OK, "file": Path("a.csv"), "count": np.int64(3), "passed": np.bool_(True)}
+    found = plain(values)
+    assert found == {"outcome": "ok", "file": "a.csv", "count": 3, "passed": True}
+    assert type(found["outcome"]) is str
+
+
+def test_the_document_is_ascii_and_keeps_every_name() -> None:
+    text = json_text([{"file": "Prüfstand \udc80.csv"}])
+    assert text.isascii()
+    assert json.loads(text)[0]["file"] == "Prüfstand \udc80.csv"
+
+
+def test_table_has_a_column_for_every_entry_of_any_log() -> None:
+    text = csv_text([{"file": "a", "gate": {"passed": True}}, {"file": "b", "scores": {"normal": 1.0}}])
+    assert text.splitlines() == ["file,gate.passed,scores.normal", "a,True,", "b,,1.0"]
+
+
+def test_results_replace_older_ones_and_leave_nothing_else(tmp_path: Path) -> None:
+    out = tmp_path / "new" / "folder"
+    prepare_output(out)
+    write_results([{"file": "old"}], out)
+    write_results([{"file": "new"}], out)
+    assert json.loads((out / "results.json").read_text()) == [{"file": "new"}]
+    assert sorted(path.name for path in out.iterdir()) == ["results.csv", "results.json"]
+
+
+def test_a_name_in_json_is_one_file(tmp_path: Path) -> None:
+    out = tmp_path / "model.json"
+    prepare_output(out)
+    assert write_results([{"file": "a"}], out) == [out]
+    assert [path.name for path in tmp_path.iterdir()] == ["model.json"]
+
+
+def test_results_that_cannot_be_written_leave_the_old_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_results([{"file": "old"}], tmp_path)
+
+    def full(*_: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(HydrostateError, match=r"results\.json: cannot be written: No space left"):
+        write_results([{"file": "new"}], tmp_path)
+    assert json.loads((tmp_path / "results.json").read_text()) == [{"file": "old"}]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["results.csv", "results.json"]
+
+
+def test_a_file_is_no_folder_for_results(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("mine")
+    with pytest.raises(HydrostateError, match=r"--out .*taken: the folder cannot be made"):
+        prepare_output(tmp_path / "taken")
+    assert (tmp_path / "taken").read_text() == "mine"
