@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from estimation.bounds import at_bulk_modulus, bulk_modulus_bound
-from estimation.consistency import Gate, consistency_gate
+from estimation.consistency import Gate, consistency_gate, describes
 from estimation.eha import BULK_MODULUS, FORMS
 from estimation.gaussian import Gaussian
 from estimation.measurement_noise import measurement_variances
@@ -39,6 +39,7 @@ class Outcome(StrEnum):
 
     OK = "ok"
     NOT_OBSERVABLE = "not_observable"
+    MISMATCH = "mismatch"
     DIVERGED = "diverged"
     FAILED = "failed"
 
@@ -48,6 +49,10 @@ OUTCOMES: Mapping[Outcome, str] = {
     Outcome.NOT_OBSERVABLE: (
         "This drive and these sensors hold too little about bulk modulus: the Cramér-Rao bound is over 3 %. "
         "Log differential pressure, or drive with larger, slower steps."
+    ),
+    Outcome.MISMATCH: (
+        "The log is nothing like what the model does, so no number is given: the residuals are ten times larger than "
+        "expected or more, or the estimate ran into its physical bound. Check units, rig and condition; log pressure."
     ),
     Outcome.DIVERGED: "The estimate stopped being finite; check units, rig parameters and the form.",
     Outcome.FAILED: "The log could not be read or used; the message says why.",
@@ -199,7 +204,10 @@ def estimate_bulk_modulus(
     if bound > LARGEST_BOUND:
         reason = f"the Cramér-Rao bound is {100.0 * min(bound, 9.99):.0f} % of the value, over 3 %: not observable"
         return BulkModulusEstimate(Outcome.NOT_OBSERVABLE, None, None, bound, Gate(False, (reason,)), estimate)
-    return BulkModulusEstimate(Outcome.OK, value, std, bound, consistency_gate(estimate, BULK_MODULUS), estimate)
+    gate = consistency_gate(estimate, BULK_MODULUS)
+    if not describes(estimate, BULK_MODULUS):
+        return BulkModulusEstimate(Outcome.MISMATCH, None, None, bound, gate, estimate)
+    return BulkModulusEstimate(Outcome.OK, value, std, bound, gate, estimate)
 
 
 def _settled(filtered: Callable[[float], Estimate], guess: float) -> Estimate:

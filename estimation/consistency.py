@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 LARGEST_NIS = 2.0
 """Mean NIS of a channel above which the filter is called overconfident; 1 is expected [dimensionless]."""
 
+MISMATCH_NIS = 100.0
+"""Mean NIS of a channel from which the model is said not to describe the log at all [dimensionless]."""
+
 LARGEST_DRIFT = 0.03
 """Relative change of the estimate over the last fifths of a run above which it is called unsettled [fraction]."""
 
@@ -106,6 +109,24 @@ def consistency_gate(estimate: Estimate, state: str) -> Gate:
     reasons += _unsettled(estimate, state)
     reasons += _at_a_bound(estimate, state)
     return Gate(not reasons, tuple(reasons))
+
+
+def describes(estimate: Estimate, state: str) -> bool:
+    """Return whether the model describes the log at all, however roughly.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        The filtered log.
+    state : str
+        The state in question.
+
+    Returns
+    -------
+    bool
+        False where a channel's residuals are ten times larger than expected, or the state sits at a physical bound.
+    """
+    return not _at_a_bound(estimate, state) and all(nis < MISMATCH_NIS for nis in estimate.nis.values())
 
 
 def _overconfidence(channel: str, nis: float) -> str:

@@ -16,8 +16,8 @@ EPILOG = """
 Exit codes: 0 all done, not_observable included; 1 some logs failed or diverged, each named on standard error, or an
 internal error; 2 nothing could be done (usage, no log that can be read); 130 interrupted.
 
-Outcome of a log: ok; not_observable, drive and sensors hold too little, so no number is given; diverged, the result
-stopped being finite; failed, the message says why.
+Outcome of a log: ok; not_observable, drive and sensors hold too little, so no number is given; mismatch, the model does
+not describe the log, so no number is given; diverged, the result stopped being finite; failed, the message says why.
 
 Environment: HYDROSTATE_CACHE is the folder of compiled kernels, HYDROSTATE_DEBUG=1 shows where an internal error arose.
 
@@ -67,7 +67,7 @@ def study(
     """
     from rich.console import Console
 
-    from experiments.study import study_command
+    from experiments.study_command import study_command
 
     begin = perf_counter()
     report = study_command(out, seed, quick, Console(stderr=True))

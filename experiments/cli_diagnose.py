@@ -20,7 +20,7 @@ from experiments.cli_options import (
     load_columns,
     load_rig,
 )
-from experiments.cli_streams import clauses, note, table
+from experiments.cli_streams import clauses, note, short_names, table
 from experiments.json_output import Result, prepare_output
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ ABSENCE_COSTS = f"without {PRESSURE} friction shows in velocity alone: margins a
 TOLD_APART = 1.001
 """Least ratio of the runner-up's score to the best at which a class is named [dimensionless]."""
 
-MARGINS = ((1.05, "too close to call"), (1.25, "a narrow margin"), (2.0, "a clear margin"), (math.inf, "a wide margin"))
+MARGINS = ((1.05, "too close to call"), (1.25, "narrow"), (2.0, "clear"), (math.inf, "wide"))
 """Words for the ratio of the runner-up's score to the best, up to each bound [dimensionless]."""
 
 POOR_FIT = 0.5
@@ -160,16 +160,21 @@ def _verdict(scores: "Scores") -> dict[str, Any]:
     if margin < TOLD_APART:
         said = "no class: under this drive the models move alike; drive the actuator, at best with steps"
         return {**entries, "outcome": "not_observable", "margin": margin, "message": said}
-    said = f"{best}, with {_in_words(margin)} over {second}"
+    said = _in_words(best, second, margin)
     return {**entries, "condition": best, "runner_up": second, "margin": margin, "message": said}
 
 
-def _in_words(margin: float) -> str:
-    words = next(words for bound, words in MARGINS if margin < bound or bound == math.inf)
+def _word(margin: float) -> str:
+    return next(word for bound, word in MARGINS if margin < bound or bound == math.inf)
+
+
+def _in_words(best: str, second: str, margin: float) -> str:
+    if margin < MARGINS[0][0]:
+        return f"{best}, but {_word(margin)}: the error of {second} is only {100.0 * (margin - 1.0):.1f} % larger"
     if not math.isfinite(margin):
-        return words
+        return f"{best}, which fits exactly, as {second} does not"
     error = f"{100.0 * (margin - 1.0):.0f} % larger" if margin < 2.0 else f"{margin:.1f} times as large"
-    return f"{words} (error {error})"
+    return f"{best}, by a {_word(margin)} margin: the error of {second} is {error}"
 
 
 def _poor_fit(scores: "Scores", record: "Record") -> list[str]:
@@ -206,10 +211,11 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
 
 
 def _summary(results: Sequence[Result]) -> "RenderableType":
-    shown = table("log", "condition", "runner-up", "margin")
-    for result in results:
-        words = "-" if result["margin"] is None else _in_words(result["margin"])
-        shown.add_row(result["file"], result["condition"] or "-", result["runner_up"] or "-", words)
+    shown = table("log", "condition", "runner-up", "error of runner-up / best")
+    for name, result in zip(short_names(results), results, strict=True):
+        margin = result["margin"]
+        words = "-" if margin is None or result["condition"] is None else f"{margin:.2f}, {_word(margin)}"
+        shown.add_row(name, result["condition"] or "-", result["runner_up"] or "-", words)
     return shown
 
 

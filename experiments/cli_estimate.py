@@ -22,7 +22,7 @@ from experiments.cli_options import (
     require_one_of,
     require_positive,
 )
-from experiments.cli_streams import clauses, note, table
+from experiments.cli_streams import clauses, note, short_names, table
 from experiments.json_output import Result, prepare_output
 
 if TYPE_CHECKING:
@@ -32,10 +32,12 @@ if TYPE_CHECKING:
 
 ABSENCE_COSTS = (
     f"without {PRESSURE} the estimate rests on how the piston starts, stops and rings, so on a friction model that is "
-    "right: of 18 logs of a foreign bench it came within 10 % on 4, with it on all; while the piston sticks nothing is "
-    "left (errata E13)"
+    "right, which no foreign bench grants; while the piston sticks nothing is left (errata E13)"
 )
 """What it costs an estimate that differential pressure is not there."""
+
+MOST_MESSAGES = 3
+"""Up to so many logs, everything that speaks against a result is shown."""
 
 NOTHING: Result = {
     "bulk_modulus_pa": {"value": None, "std": None, "ci95": None},
@@ -135,7 +137,7 @@ def _message(found: "BulkModulusEstimate") -> str:
         low, high = (1e-6 * end for end in found.interval)
         said = [f"bulk modulus {1e-6 * found.value:.2f} MPa, 95 % interval {low:.2f} to {high:.2f} MPa"]
         if not found.gate.passed:
-            said += ["not to be relied on", *found.gate.reasons]
+            said.append(f"not to be relied on: {clauses(found.gate.reasons)}")
     else:
         said = [OUTCOMES[found.outcome]]
     return clauses([*said, *_absence(found.estimate.channels, found.estimate.model.name)])
@@ -151,25 +153,27 @@ def _absence(channels: Sequence[str], form: str) -> list[str]:
 
 
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
-    shown = table("log", "bulk modulus [MPa]", "std [MPa]", "95 % interval [MPa]", "bound [%]", "verdict")
-    for result in results:
-        shown.add_row(*_row(result))
+    shown = table("log", "bulk modulus [MPa]", "95 % interval [MPa]", "bound [%]", "verdict")
+    for name, result in zip(short_names(results), results, strict=True):
+        shown.add_row(name, *_cells(result))
     yield shown
-    lost = ["; " + text for result in results for text in _absence(result["channels"], result["form"])]
-    for result in results:
-        if not result["gate"]["passed"]:
-            yield f"{result['file']}: {result['message'].removesuffix(lost[0] if lost else '')}"
+    lost = [text for result in results for text in _absence(result["channels"], result["form"])]
+    doubtful = [result for result in results if not result["gate"]["passed"]]
+    if len(results) <= MOST_MESSAGES:
+        for result in doubtful:
+            yield f"{result['file']}: {result['message'].removesuffix(f'; {lost[0]}' if lost else '')}"
+    elif doubtful:
+        yield f"{len(doubtful)} of {len(results)} logs gave nothing to be relied on; --json and --out give the reasons"
     if lost:
-        yield f"{len(lost)} of {len(results)} logs: {lost[0].removeprefix('; ')}"
+        yield f"{len(lost)} of {len(results)} logs: {lost[0]}"
 
 
-def _row(result: Result) -> list[str]:
+def _cells(result: Result) -> list[str]:
     modulus = result["bulk_modulus_pa"]
     verdict = result["outcome"].replace("_", " ")
-    bound = f"{result['bound_percent']:.3g}"
+    bound = f"{result['bound_percent']:.2g}"
     if modulus["value"] is None:
-        return [result["file"], "-", "-", "-", bound, verdict]
-    low, high = modulus["ci95"]
-    trusted = verdict if result["gate"]["passed"] else "gate not passed"
-    numbers = [f"{1e-6 * value:.2f}" for value in (modulus["value"], modulus["std"])]
-    return [result["file"], *numbers, f"{1e-6 * low:.2f} to {1e-6 * high:.2f}", bound, trusted]
+        return ["-", "-", bound, verdict]
+    low, high = (f"{1e-6 * end:.2f}" for end in modulus["ci95"])
+    trusted = verdict if result["gate"]["passed"] else "doubtful"
+    return [f"{1e-6 * modulus['value']:.2f}", f"{low} to {high}", bound, trusted]

@@ -19,7 +19,7 @@ from experiments.cli_options import (
     load_rig,
     require_positive,
 )
-from experiments.cli_streams import table
+from experiments.cli_streams import short_names, table
 from experiments.json_output import Result, prepare_output
 
 if TYPE_CHECKING:
@@ -116,12 +116,12 @@ def _entries(model: "LinearModel") -> dict[str, Any]:
 
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     shown = table("log", "fit [%]", "gain", "bandwidth [Hz]", "coefficients, q^0 q^-1 ...")
-    for result in results:
+    for name, result in zip(short_names(results), results, strict=True):
         gain = result["dc_gain"]
         bandwidth = "-" if result["bandwidth_hz"] is None else f"{result['bandwidth_hz']:.3g}"
         coefficients = f"b {_spaced(result['numerator'])}\nf {_spaced(result['denominator'])}"
         spread = f"{gain['value']:.4g} ± {gain['std']:.1g}"
-        shown.add_row(result["file"], f"{result['fit_percent']:.2f}", spread, bandwidth, coefficients)
+        shown.add_row(name, f"{result['fit_percent']:.2f}", spread, bandwidth, coefficients)
     yield shown
     first = results[0]
     yield f"From {first['input']} to {first['output']}, ± one standard deviation; sample times are in --json and --out."

@@ -125,7 +125,7 @@ def require_positive(option: str, value: float | None, unit: str) -> None:
     option : str
         Its name on the command line.
     value : float or None
-        Its value, in `unit`.
+        Its value [in that unit].
     unit : str
         For the message.
 

@@ -5,9 +5,9 @@ import logging
 import os
 import sys
 import traceback
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 import typer
 from typer.core import TyperGroup
@@ -111,6 +111,24 @@ def table(*headings: str, title: str | None = None) -> "Table":
         numeric = heading.endswith("]")
         made.add_column(Text(heading), justify="right" if numeric else "left", overflow="fold", no_wrap=numeric)
     return made
+
+
+def short_names(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what a narrow table calls the logs: their names, with folders only where names alone are not told apart.
+
+    Parameters
+    ----------
+    results : sequence of Mapping
+        One object a log, with its ``file``.
+
+    Returns
+    -------
+    list[str]
+        One name a log.
+    """
+    files = [str(result["file"]) for result in results]
+    names = [file.replace(os.sep, "/").rsplit("/", 1)[-1] for file in files]
+    return names if len(set(names)) == len(set(files)) else files
 
 
 def rendered(*parts: "RenderableType") -> str:
@@ -284,7 +302,7 @@ def _usage_sentence(error: Exception) -> str | None:
 class HydrostateGroup(TyperGroup):
     """The command line, with its errors as sentences and the exit codes that the help promises."""
 
-    def main(self, *args: Any, **kwargs: Any) -> Any:
+    def main(self, *args: Any, **kwargs: Any) -> NoReturn:
         """Run the command line and exit.
 
         Parameters

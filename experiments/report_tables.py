@@ -16,13 +16,13 @@ from experiments.findings import (
     recoveries,
 )
 from experiments.study import StudyResult
-from experiments.tables import MISSING, Cell, Column, exact, html_table, number, pretty_unit
-from experiments.words import in_words
+from experiments.tables import MINUS, MISSING, Cell, Column, exact, fixed, html_table, number, pretty_unit
+from experiments.words import bank_in_words, in_words
 
 MILLI, KILO_PASCAL, TENTH_GIGA_PASCAL = 1e3, 1e-3, 1e-8
 """From m to mm, from Pa to kPa, from Pa to 1e8 Pa."""
 
-CONDITION = Column("condition", "condition", words=in_words)
+CONDITION = Column("condition", "condition", words=lambda name: Cell(in_words(name), "name"))
 
 SCALAR_UNITS: Mapping[str, tuple[str, float]] = {"1": ("%", 100.0), "Hz": ("Hz", 1.0), "Pa": ("Pa", 1.0)}
 """How a scalar is shown, by its SI unit."""
@@ -114,7 +114,7 @@ def _recoveries(found: Iterable[Recovery]) -> Markup:
         Column("missed", "conditions missed"),
     )
     return html_table(
-        pd.DataFrame(rows, dtype=object), columns, "Bulk modulus: the six experiments, all first guesses."
+        pd.DataFrame(rows, dtype=object), columns, "The experiments, over all conditions and first guesses."
     )
 
 
@@ -159,26 +159,26 @@ def _transfer_functions(frame: pd.DataFrame) -> Markup:
         ours: dict[str, object] = {"condition": in_words(str(row["condition"])), "source": "ours"}
         ours |= {name: number(row[name]) for name in names}
         ours |= {
-            "gain": f"{number(MILLI * row['dc_gain'], 3)} ± {number(1.96 * MILLI * row['dc_gain_std'], 1)}",
-            "bandwidth": number(row["bandwidth_hz"], 2),
-            "fit": number(row["fit_percent"], 3),
-            "jump": number(row["jump_ratio"], 2),
+            "gain": f"{fixed(MILLI * row['dc_gain'], 4)} ± {fixed(1.96 * MILLI * row['dc_gain_std'], 4)}",
+            "bandwidth": fixed(row["bandwidth_hz"], 1),
+            "fit": fixed(row["fit_percent"], 1),
+            "jump": fixed(row["jump_ratio"], 2),
         }
         printed: dict[str, object] = {"condition": "", "source": "Table 6"}
         printed |= {name: exact(row[f"published_{name}"]) for name in names}
         low, high = MILLI * row["published_dc_gain_low"], MILLI * row["published_dc_gain_high"]
-        printed |= {"gain": f"{number(low, 2)} to {number(high, 2)}"}
+        printed |= {"gain": f"{fixed(low, 3)} to {fixed(high, 3)}"}
         printed |= dict.fromkeys(("bandwidth", "fit", "jump"), MISSING)
         rows += [ours, printed]
     right: Callable[[str], Cell] = lambda text: Cell(text, "number")  # noqa: E731 - a shared cell writer
     columns = (
-        Column("condition", "condition"),
-        Column("source", "model"),
+        Column("condition", "condition", words=lambda name: Cell(name, "name")),
+        Column("source", "model", words=lambda source: Cell(source, "name")),
         *(Column(name, name, words=right) for name in names),
         Column("gain", "steady gain", "mm/s per rad/s, 95 %", words=right),
-        Column("bandwidth", "−3 dB", "Hz", words=right),
+        Column("bandwidth", f"{MINUS}3 dB", "Hz", words=right),
         Column("fit", "fit", "%", words=right),
-        Column("jump", "b0 / gain", "1", words=right),
+        Column("jump", "b0 / gain", "ratio", words=right),
     )
     caption = "(b0 z² + b1 z + b2) / (z² + a1 z + a2), from motor speed in rad/s to velocity in m/s, beside Table 6."
     return html_table(pd.DataFrame(rows), columns, caption)
@@ -188,9 +188,9 @@ def _filtering(frame: pd.DataFrame) -> Markup:
     columns = (
         Column("variant", "zero-phase filter"),
         Column("pole_frequency_hz", "pole frequency", "Hz", digits=3),
-        Column("damping", "damping", "1", digits=3),
-        Column("dc_gain", "steady gain", "1", digits=4),
-        Column("jump_ratio", "b0 / gain", "1", digits=2),
+        Column("damping", "damping", "ratio", digits=3),
+        Column("dc_gain", "steady gain", "ratio", digits=4),
+        Column("jump_ratio", "b0 / gain", "ratio", words=lambda value: Cell(fixed(value, 3), "number")),
     )
     return html_table(frame, columns, "What filtering does to a fit, on a known 30 Hz resonance that does not jump.")
 
@@ -214,7 +214,7 @@ def _rmse(frame: pd.DataFrame) -> Markup:
 def _classification(tables: Tables) -> Markup:
     rows = [
         {
-            "bank": entry.bank,
+            "bank": bank_in_words(entry.bank),
             "variant": entry.variant,
             "runs": str(entry.runs),
             "percent": entry.percent,

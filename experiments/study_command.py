@@ -36,7 +36,6 @@ def study_command(out: Path, seed: int, quick: bool, console: Console) -> Path:
     """
     check_target(out)
     settings = quick_settings(seed) if quick else StudySettings(seed=seed)
-    console.print("The first run compiles its kernels, which takes some seconds; later runs reuse them.")
     columns = (
         SpinnerColumn(),
         TextColumn("{task.description}"),

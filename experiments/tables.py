@@ -8,8 +8,10 @@ from typing import Any
 import pandas as pd
 from markupsafe import Markup, escape
 
-MISSING = "–"
+MISSING = "\N{EN DASH}"
 """What stands where there is no number."""
+
+MINUS, TIMES = "\N{MINUS SIGN}", " \N{MULTIPLICATION SIGN} "
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -88,10 +90,35 @@ def number(value: float | None, digits: int = 4) -> str:
     rounded = float(f"{value:.{digits - 1}e}")
     magnitude = math.floor(math.log10(abs(rounded)))
     if PLAIN_FROM <= abs(rounded) < PLAIN_TO:
-        return f"{rounded:.{max(0, digits - 1 - magnitude)}f}".replace("-", "−")
+        return f"{rounded:.{max(0, digits - 1 - magnitude)}f}".replace("-", MINUS)
     exponent = 3 * (magnitude // 3)
-    mantissa = f"{rounded / 10.0**exponent:.{max(0, digits - 1 - (magnitude - exponent))}f}".replace("-", "−")
-    return f"{mantissa} × 10{str(exponent).translate(SUPERSCRIPTS)}"
+    mantissa = f"{rounded / 10.0**exponent:.{max(0, digits - 1 - (magnitude - exponent))}f}".replace("-", MINUS)
+    return f"{mantissa}{TIMES}10{str(exponent).translate(SUPERSCRIPTS)}"
+
+
+def fixed(value: float | None, decimals: int) -> str:
+    """Write a number with so many decimals, for columns that are compared.
+
+    Parameters
+    ----------
+    value : float or None
+        The number [any unit].
+    decimals : int
+        Digits behind the point.
+
+    Returns
+    -------
+    str
+        The number, or a dash where there is none; zero has no sign.
+
+    Examples
+    --------
+    >>> fixed(0.2714, 2), fixed(-0.0002, 2), fixed(None, 2)
+    ('0.27', '0.00', '–')
+    """
+    if value is None or not math.isfinite(value):
+        return MISSING
+    return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", MINUS)
 
 
 def exact(value: float) -> str:
@@ -112,7 +139,7 @@ def exact(value: float) -> str:
     >>> exact(1.52e-3), exact(436.0), exact(2.07e8), exact(1e-8)
     ('0.00152', '436', '207 × 10⁶', '10 × 10⁻⁹')
     """
-    shown, times, power = number(value, 10).partition(" × ")
+    shown, times, power = number(value, 10).partition(TIMES)
     return (shown.rstrip("0").rstrip(".") if "." in shown else shown) + times + power
 
 
@@ -155,18 +182,19 @@ def html_table(frame: pd.DataFrame, columns: Sequence[Column], caption: str) -> 
     Markup
         Escaped HTML.
     """
+    body = [[_cell(column, row[column.source]) for column in columns] for row in frame.to_dict("records")]
     head = Markup("").join(
-        Markup('<th scope="col">{}{}</th>').format(
-            column.header, Markup("<small>{}</small>").format(column.unit) if column.unit else ""
+        Markup('<th scope="col" class="{}">{}{}</th>').format(
+            "number" if all('class="number"' in cell for cell in cells) else "",
+            column.header,
+            Markup("<small>{}</small>").format(column.unit) if column.unit else "",
         )
-        for column in columns
+        for column, *cells in zip(columns, *body, strict=True)
     )
-    rows = Markup("\n").join(
-        Markup("<tr>{}</tr>").format(Markup("").join(_cell(column, row[column.source]) for column in columns))
-        for row in frame.to_dict("records")
-    )
+    rows = Markup("\n").join(Markup("<tr>{}</tr>").format(Markup("").join(cells)) for cells in body)
     return Markup(
-        '<div class="scroll"><table>\n<caption>{}</caption>\n<thead><tr>{}</tr></thead>\n<tbody>\n{}\n</tbody></table></div>'
+        '<div class="scroll"><table>\n<caption>{}</caption>\n'
+        "<thead><tr>{}</tr></thead>\n<tbody>\n{}\n</tbody></table></div>"
     ).format(caption, head, rows)
 
 

@@ -15,6 +15,7 @@ from experiments.findings import (
     recoveries,
 )
 from experiments.study import StudyResult
+from experiments.words import TRANSFER_FUNCTIONS, WITH_PRESSURE, WITHOUT_PRESSURE
 
 
 def verdict(result: StudyResult) -> tuple[str, str, str]:
@@ -59,16 +60,15 @@ def _bulk_modulus_sentence(found: Mapping[ExperimentKey, Recovery], truth: float
 
 
 def _class_sentence(classes: tuple[ClassAccuracy, ...]) -> str:
-    runs, best = classes[0].runs, classes[0].bank
-    percent = {(entry.bank, entry.variant): entry.percent for entry in classes}
-    others = "; ".join(
-        f"{bank}: {percent[bank, 'nominal']:.3g} % and {percent[bank, 'spread']:.3g} %"
-        for bank in dict.fromkeys(entry.bank for entry in classes)
-        if bank != best
-    )
+    percent = {
+        bank: tuple(f"{entry.percent:.3g} %" for entry in classes if entry.bank == bank)
+        for bank in (WITH_PRESSURE, WITHOUT_PRESSURE, TRANSFER_FUNCTIONS)
+    }
+    nominal, spread = percent[WITH_PRESSURE]
     return (
-        f"The fault class is right in {percent[best, 'nominal']:.3g} % of {runs} runs with the tables' parameters and "
-        f"in {percent[best, 'spread']:.3g} % of {runs} with parameters spread around them ({best}; {others})."
+        f"The fault class is right in {nominal} of {classes[0].runs} runs with the tables' parameters, and in {spread} "
+        "with parameters spread around them, by mathematical models with pressure logged; without pressure these are "
+        f"{' and '.join(percent[WITHOUT_PRESSURE])}, by transfer functions {' and '.join(percent[TRANSFER_FUNCTIONS])}."
     )
 
 

@@ -1,5 +1,9 @@
 """Names in results as a reader wants them."""
 
+from experiments.studies.validation import BANKS
+
+WITH_PRESSURE, WITHOUT_PRESSURE, TRANSFER_FUNCTIONS = BANKS
+
 
 def in_words(condition: str) -> str:
     """Return a condition's name for a reader.
@@ -44,3 +48,24 @@ def in_short(condition: str) -> str:
     for word, shortened in (("minor", "min."), ("major", "maj."), ("leakage", "leak."), ("friction", "fric.")):
         short = short.replace(word, shortened)
     return short
+
+
+def bank_in_words(bank: str) -> str:
+    """Return a classifier's name for a reader.
+
+    Parameters
+    ----------
+    bank : str
+        Name in results.
+
+    Returns
+    -------
+    str
+        The same, saying what was not logged.
+
+    Examples
+    --------
+    >>> bank_in_words("mathematical")
+    'mathematical, velocity alone'
+    """
+    return f"{bank}, velocity alone" if bank == WITHOUT_PRESSURE else bank

@@ -162,7 +162,7 @@ def measured_velocity(record: Record) -> Array:
 
 
 def rmse(measured: Array, predicted: Array) -> float:
-    """Return the root-mean-square difference over the samples that are present.
+    """Return the root-mean-square difference over the measured samples; infinite where a model ran away.
 
     Parameters
     ----------
@@ -181,6 +181,8 @@ def rmse(measured: Array, predicted: Array) -> float:
     >>> rmse(np.array([1.0, np.nan, 3.0]), np.array([0.0, 5.0, 4.0]))
     1.0
     """
+    if not np.all(np.isfinite(predicted)):
+        return float("inf")
     return float(np.sqrt(np.nanmean((measured - predicted) ** 2)))
 
 

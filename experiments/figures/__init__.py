@@ -90,8 +90,8 @@ PUBLISHED = Convergence(
 FIGURES: Mapping[str, FigureKind] = MappingProxyType(
     {
         "convergence_pressure_form": FigureKind(
-            "The analogue of the paper's Figure 11. Every first guess runs into the simulated bulk modulus, "
-            "in every condition, within the first few samples of pressure.",
+            "The analogue of the paper's Figure 11, by our filter. Dots on the left are the first guesses; curves that "
+            "meet on the dashed line have found the simulated bulk modulus.",
             partial(_convergence, OURS),
         ),
         "convergence_without_pressure": FigureKind(
@@ -104,8 +104,8 @@ FIGURES: Mapping[str, FigureKind] = MappingProxyType(
             partial(_convergence, PUBLISHED),
         ),
         "forms_on_sticking_plant": FigureKind(
-            "One dot a first guess. The published form settles far from the truth on a plant that sticks (errata E9); "
-            "the pressure form does not.",
+            "One dot a first guess. The published form differentiates friction, which jumps when the piston stops "
+            "(errata E9); the pressure form does not.",
             lambda result: draw_forms(result.tables["bulk_modulus"], _truth(result)),
         ),
         "estimates": FigureKind(

@@ -10,16 +10,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from experiments.figures.style import BLUE, VERMILION, panels
-from experiments.words import in_short, in_words
+from experiments.words import bank_in_words, in_short, in_words
 
 DARK = 0.25
 """Share of the colour scale below which white ink is read better."""
 
 COUNTS = LinearSegmentedColormap.from_list("counts", ["white", BLUE])
 """From no run to all."""
-
-BANK_WORDS = {"mathematical": "mathematical, velocity alone"}
-"""Banks whose name in results says too little above a panel."""
 
 ERRORS = LinearSegmentedColormap.from_list("errors", [BLUE, "#dbe8f0", "white", "#f5ddcc"])
 """From the smallest error to the largest."""
@@ -50,7 +47,7 @@ def draw_confusions(confusions: Mapping[tuple[str, str], pd.DataFrame], accuracy
         matrix = confusions[bank, variant]
         _counts(axis, matrix.to_numpy())
         score = 100.0 * float(right.loc[(bank, variant)])
-        axis.set_title(f"{BANK_WORDS.get(bank, bank)}\n{variant} parameters: {score:.1f} % right", loc="left")
+        axis.set_title(f"{bank_in_words(bank)}\n{variant} parameters: {score:.1f} % right", loc="left")
         _class_ticks(axis, list(matrix.columns))
         axis.set_ylabel("true class" if place % len(banks) == 0 else "")
         axis.set_xlabel("class found" if place >= len(order) - len(banks) else "")

@@ -55,8 +55,6 @@ STYLE: Mapping[RcKeyType, Any] = MappingProxyType(
         "hatch.linewidth": 0.6,
         "svg.fonttype": "path",
         "svg.hashsalt": "hydrostate",
-        "path.simplify": True,
-        "path.simplify_threshold": 0.5,
     }
 )
 """Matplotlib settings, in force while a figure is drawn and while it is saved."""

@@ -142,6 +142,16 @@ def test_an_internal_error_is_a_sentence_and_a_traceback_on_request_only(monkeyp
     assert "Traceback (most recent call last)" in invoke("conditions").stderr
 
 
+def test_an_interruption_is_exit_code_130_without_a_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(faults.conditions, "parameters_for", interrupted)
+    stopped = invoke("conditions")
+    assert (stopped.exit_code, stopped.stdout) == (130, "")
+    assert "Traceback" not in stopped.stderr
+
+
 def test_the_nine_conditions_have_the_names_of_table_1() -> None:
     with (PUBLISHED / "eha_table1_conditions.csv").open() as file:
         names = [row["condition"] for row in csv.DictReader(file)]
@@ -176,7 +186,7 @@ def test_study_ends_with_the_reports_path(as_json: bool, tmp_path: Path, monkeyp
         asked.append((out, seed, quick))
         return out / "report.html"
 
-    monkeypatch.setitem(sys.modules, "experiments.study", SimpleNamespace(study_command=command))
+    monkeypatch.setitem(sys.modules, "experiments.study_command", SimpleNamespace(study_command=command))
     done = invoke("study", "--quick", "--out", tmp_path, "--seed", 7, *(["--json"] if as_json else []))
     assert done.exit_code == 0
     assert asked == [(tmp_path, 7, True)]

@@ -179,17 +179,17 @@ def test_diagnose_names_the_condition_in_every_format(steps: dict[str, Path]) ->
         assert [one["condition"], one["runner_up"]] == ranked[:2]
         assert one["transfer_function_scores"] is None
         assert "normal was expected" in one["message"]
-        assert f"over {one['runner_up']}" in one["message"]
+        assert f"the error of {one['runner_up']} is" in one["message"]
 
 
 def test_diagnose_marks_the_best_on_the_screen(steps: dict[str, Path]) -> None:
     shown = invoke("diagnose", steps[".csv"]).stdout
     (marked,) = [line for line in shown.splitlines() if "<- best" in line]
     assert marked.split()[0] == "minor_friction"
-    assert "minor_friction, with a wide margin" in shown
+    assert "minor_friction, by a wide margin: the error of" in shown
     many = invoke("diagnose", *[steps[".csv"]] * 4).stdout
     assert "<- best" not in many
-    assert many.count("a wide margin") == 4
+    assert many.count(", wide") == 4
 
 
 def test_no_class_is_given_where_nothing_moves(folder: Path) -> None:
