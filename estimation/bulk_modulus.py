@@ -8,8 +8,10 @@ from typing import TypeVar
 import numpy as np
 
 from estimation.bounds import at_bulk_modulus, bulk_modulus_bound
-from estimation.consistency import Gate, consistency_gate, describes
+from estimation.consistency import MISMATCH_NIS, Gate, consistency_gate, describes
 from estimation.eha import BULK_MODULUS, FORMS
+from estimation.filter import Method
+from estimation.flow_fit import FLOW_CHANNELS, REPORTED, FlowFit, fit_flow
 from estimation.gaussian import Gaussian
 from estimation.measurement_noise import measurement_variances
 from estimation.model import ProcessModel
@@ -73,11 +75,19 @@ class BulkModulusEstimate:
     std : float or None
         Its standard deviation [Pa].
     bound : float
-        Relative posterior Cramér-Rao bound [fraction].
+        Relative Cramér-Rao bound [fraction].
     gate : Gate
         Whether value and interval can be believed.
-    estimate : Estimate
-        The filtered log.
+    form : str
+        What was believed of the actuator: ``flow``, ``pressure`` or ``acceleration``.
+    channels : tuple of str
+        Channels that were used beside motor speed.
+    nis : Mapping[str, float]
+        Mean squared normalised residual of each predicted channel; 1 where the model explains the log [dimensionless].
+    others : Mapping[str, tuple of float]
+        What was estimated along with it: value and standard deviation in SI, by parameter name.
+    estimate : Estimate or None
+        The filtered log, where a filter was used.
     """
 
     outcome: Outcome
@@ -85,7 +95,11 @@ class BulkModulusEstimate:
     std: float | None
     bound: float
     gate: Gate
-    estimate: Estimate
+    form: str
+    channels: tuple[str, ...]
+    nis: Mapping[str, float]
+    others: Mapping[str, tuple[float, float]]
+    estimate: Estimate | None
 
     @property
     def interval(self) -> tuple[float, float] | None:
@@ -138,15 +152,17 @@ def estimate_bulk_modulus(
     record: Record,
     parameters: EhaParameters,
     *,
-    form: str = "pressure",
+    form: str = "auto",
     method: str = "ekf",
     start: float | None = None,
     start_std: float = START_STD,
 ) -> BulkModulusEstimate:
-    """Estimate effective bulk modulus from a log, the other parameters being known.
+    """Estimate effective bulk modulus from a log.
 
-    Without ``differential_pressure_pa`` the estimate rests on how the piston starts, stops and rings; where it sticks
-    there is nothing to rest on, and the outcome says so instead of printing a number (errata E13).
+    With position and ``differential_pressure_pa`` logged, the flow form fits it with leakage and flow bias, and friction
+    plays no part (`estimation.flow`). Without, a filter takes leakage and friction as known and the estimate
+    rests on how the piston starts, stops and rings; where it sticks there is nothing to rest on, and the outcome says
+    so instead of printing a number (errata E13).
 
     Parameters
     ----------
@@ -155,38 +171,73 @@ def estimate_bulk_modulus(
     parameters : EhaParameters
         The actuator; its bulk modulus is where the bound is taken, and the default first guess.
     form : str
-        ``"pressure"`` (ours) or ``"acceleration"`` (the published one, valid between reversals only, errata E9).
+        ``"flow"``, ``"pressure"``, ``"acceleration"`` (the published one, valid between reversals only, errata E9), or
+        ``"auto"``: flow where its channels are logged, else pressure.
     method : str
-        A filter of `estimation.run.METHODS`.
+        A filter of `estimation.run.METHODS`, for the forms that are filtered.
     start : float, optional
         First guess [Pa].
     start_std : float
-        Its standard deviation [Pa].
+        Its standard deviation, for the forms that are filtered [Pa].
 
     Returns
     -------
     BulkModulusEstimate
-        Mean over the last 20 % of the log, with interval, bound and verdict.
+        Value, interval, bound and verdict; a filter's value is its mean over the last 20 % of the log.
 
     Raises
     ------
     HydrostateError
         If the form or method is unknown, or the first guess is not usable.
     LogError
-        If the log has neither position nor velocity.
+        If the log lacks what the form needs.
     """
-    model = _chosen(FORMS, form, "form")
     guess = parameters.bulk_modulus if start is None else start
     if not (np.isfinite(guess) and guess >= 0.0 and np.isfinite(start_std) and start_std > 0.0):
         raise HydrostateError(f"the first guess must be 0 Pa or more, its deviation positive, got {guess}, {start_std}")
-    chosen = _chosen(METHODS, method, "method")
+    if form == "flow" or (form == "auto" and all(channel in record for channel in FLOW_CHANNELS)):
+        return _flow_estimate(fit_flow(record, parameters, guess))
+    model = _chosen(FORMS, "pressure" if form == "auto" else form, "form")
+    return _filter_estimate(record, parameters, model, _chosen(METHODS, method, "method"), guess, start_std)
+
+
+def _flow_estimate(fit: FlowFit) -> BulkModulusEstimate:
+    value, std = fit.parameters["bulk_modulus"]
+    gate = Gate(not fit.reasons, fit.reasons)
+    outcome = Outcome.OK
+    if fit.bound > LARGEST_BOUND:
+        outcome, gate = Outcome.NOT_OBSERVABLE, Gate(False, (_too_wide(fit.bound),))
+    elif fit.chi_square >= MISMATCH_NIS:
+        outcome = Outcome.MISMATCH
+    known = outcome is Outcome.OK
+    return BulkModulusEstimate(
+        outcome=outcome,
+        value=value if known else None,
+        std=std if known else None,
+        bound=fit.bound,
+        gate=gate,
+        form="flow",
+        channels=FLOW_CHANNELS,
+        nis={"differential_pressure_pa": fit.chi_square},
+        others={name: found for name, found in fit.parameters.items() if known and name in REPORTED},
+        estimate=None,
+    )
+
+
+def _too_wide(bound: float) -> str:
+    return f"the Cramér-Rao bound is {100.0 * min(bound, 9.99):.0f} % of the value, over 3 %: not observable"
+
+
+def _filter_estimate(
+    record: Record, parameters: EhaParameters, model: ProcessModel, method: Method, guess: float, start_std: float
+) -> BulkModulusEstimate:
     channels = available_channels(model, record)
     variances = measurement_variances(record, channels)
     noise = {"differential_pressure_pa": PRESSURE_NOISE_LOGGED} if "differential_pressure_pa" in channels else {}
 
     def filtered(first_guess: float) -> Estimate:
         prior = first_belief(model, record, first_guess, start_std)
-        return run_filter(chosen, model, prior, record, parameters, channels=channels, variances=variances, noise=noise)
+        return run_filter(method, model, prior, record, parameters, channels=channels, variances=variances, noise=noise)
 
     def bound_at(bulk_modulus: float) -> float:
         prior = first_belief(model, record, bulk_modulus, start_std)
@@ -196,18 +247,32 @@ def estimate_bulk_modulus(
 
     estimate = _settled(filtered, guess)
     value, std = estimate.settled(BULK_MODULUS)
-    if not (np.isfinite(value) and np.isfinite(std)):
-        gate = Gate(False, (OUTCOMES[Outcome.DIVERGED],))
-        return BulkModulusEstimate(Outcome.DIVERGED, None, None, float("inf"), gate, estimate)
     nominal = parameters.bulk_modulus
-    bound = max(bound_at(nominal), bound_at(max(value, 1e-3 * nominal)))
+    finite = bool(np.isfinite(value) and np.isfinite(std))
+    bound = max(bound_at(nominal), bound_at(max(value, 1e-3 * nominal))) if finite else float("inf")
+    outcome, gate = _verdict(estimate, finite, bound)
+    known = outcome is Outcome.OK
+    return BulkModulusEstimate(
+        outcome=outcome,
+        value=value if known else None,
+        std=std if known else None,
+        bound=bound,
+        gate=gate,
+        form=model.name,
+        channels=channels,
+        nis=estimate.nis,
+        others={},
+        estimate=estimate,
+    )
+
+
+def _verdict(estimate: Estimate, finite: bool, bound: float) -> tuple[Outcome, Gate]:
+    if not finite:
+        return Outcome.DIVERGED, Gate(False, (OUTCOMES[Outcome.DIVERGED],))
     if bound > LARGEST_BOUND:
-        reason = f"the Cramér-Rao bound is {100.0 * min(bound, 9.99):.0f} % of the value, over 3 %: not observable"
-        return BulkModulusEstimate(Outcome.NOT_OBSERVABLE, None, None, bound, Gate(False, (reason,)), estimate)
+        return Outcome.NOT_OBSERVABLE, Gate(False, (_too_wide(bound),))
     gate = consistency_gate(estimate, BULK_MODULUS)
-    if not describes(estimate, BULK_MODULUS):
-        return BulkModulusEstimate(Outcome.MISMATCH, None, None, bound, gate, estimate)
-    return BulkModulusEstimate(Outcome.OK, value, std, bound, gate, estimate)
+    return (Outcome.OK if describes(estimate, BULK_MODULUS) else Outcome.MISMATCH), gate
 
 
 def _settled(filtered: Callable[[float], Estimate], guess: float) -> Estimate:

@@ -97,9 +97,12 @@ def _predict(kalman: _ModelFilter, problem: FilterProblem, k: int) -> None:
 def _update(kalman: _ModelFilter, y: Array, rows: Array, variances: Array) -> tuple[Array, Array]:
     """Update with all channels at once; return what updating with one after the other would have seen.
 
-    With ``S = L L'``, the sequential innovations are ``diag(L) * solve(L, y)`` and their variances ``diag(L)**2``.
+    Channels are counted in their own standard deviations, since filterpy inverts the innovations' covariance. With
+    ``S = L L'``, the sequential innovations are ``diag(L) * solve(L, residual)`` and their variances ``diag(L)**2``.
     """
-    kalman.update(y, HJacobian=lambda _: rows, Hx=lambda x: rows @ x, R=np.diag(variances))
+    unit = np.sqrt(variances)
+    H = rows / unit[:, None]
+    kalman.update(y / unit, HJacobian=lambda _: H, Hx=lambda x: H @ x, R=np.eye(len(y)))
     root = np.asarray(np.linalg.cholesky(kalman.S), dtype=np.float64)
-    size = np.diag(root)
+    size = unit * np.diag(root)
     return size * np.linalg.solve(root, kalman.y), size**2

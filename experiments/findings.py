@@ -8,11 +8,20 @@ from typing import NamedTuple, cast
 import numpy as np
 import pandas as pd
 
+from estimation.bulk_modulus import Outcome
 from experiments.words import in_words
 
 
 class ExperimentKey(NamedTuple):
-    """What tells the experiments of the table ``bulk_modulus`` apart."""
+    """What tells the experiments of the table ``bulk_modulus`` apart.
+
+    Parameters
+    ----------
+    plant, form, drive : str
+        Names in the table.
+    pressure_logged : bool
+        Whether differential pressure was in the log.
+    """
 
     plant: str
     form: str
@@ -59,9 +68,9 @@ class Recovery:
     recovered : int
         Conditions whose every estimate is a number within `wanted_percent`, or where nothing is wanted, within 3 %.
     unobservable : tuple of str
-        Conditions in which no first guess led to a number.
+        Conditions in which bulk modulus is not observable, from any first guess.
     missed : tuple of str
-        Conditions with a number outside, in words with the error.
+        The other conditions, in words, with the error or the outcome.
     wanted_percent : float or None
         The largest error that is wanted [percent].
     mean_pa, worst_error_percent : float or None
@@ -178,10 +187,12 @@ def _recovery(key: ExperimentKey, rows: pd.DataFrame) -> Recovery:
     for name, found in groups:
         errors = found["error_percent"].astype(float)
         worst = float(errors.abs().max())
-        if errors.isna().all():
+        outcomes = [str(outcome).replace("_", " ") for outcome in found["outcome"][errors.isna()].unique()]
+        if (found["outcome"] == Outcome.NOT_OBSERVABLE.value).all():
             unobservable.append(in_words(str(name)))
-        elif errors.isna().any() or worst > limit:
-            missed.append(f"{in_words(str(name))} ({worst:.3g} % off)")
+        elif outcomes or worst > limit:
+            why = [*outcomes, *([f"{worst:.3g} % off"] if np.isfinite(worst) else [])]
+            missed.append(f"{in_words(str(name))} ({', '.join(why)})")
     values = rows["value_pa"].astype(float).dropna()
     return Recovery(
         key=key,

@@ -1,5 +1,6 @@
 """The report's tables by name: which columns of the study's tables a reader sees, in which units."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -27,6 +28,16 @@ CONDITION = Column("condition", "condition", words=lambda name: Cell(in_words(na
 SCALAR_UNITS: Mapping[str, tuple[str, float]] = {"1": ("%", 100.0), "Hz": ("Hz", 1.0), "Pa": ("Pa", 1.0)}
 """How a scalar is shown, by its SI unit."""
 
+SETTING_UNITS: Mapping[str, str] = {
+    "starts": " [Pa]",
+    "duration": " [s]",
+    "sample_time": " [s]",
+    "identification_duration": " [s]",
+    "classification_sample_time": " [s]",
+    "seeds": " [count]",
+}
+"""Units of the study's settings."""
+
 Tables = Mapping[str, pd.DataFrame]
 
 
@@ -53,7 +64,7 @@ def report_tables(result: StudyResult) -> Mapping[str, Markup]:
         "rmse": lambda found: _rmse(found.tables["validation_rmse"]),
         "classification": lambda found: _classification(found.tables),
         "scalars": lambda found: _scalars(found.tables["scalars"]),
-        "settings": lambda found: _pairs(found.manifest["settings"], "Settings of this run"),
+        "settings": lambda found: _settings(found.manifest["settings"]),
         "versions": lambda found: _pairs(
             {"python": found.manifest["python"], **found.manifest["versions"]}, "Versions that ran it"
         ),
@@ -142,9 +153,9 @@ def _estimates(frame: pd.DataFrame) -> Markup:
 def _estimate(rows: pd.DataFrame, key: ExperimentKey) -> Cell:
     values = rows["value_pa"].astype(float).dropna()
     if values.empty:
-        bound = number(float(rows["bound_percent"].min()), 2)
+        bound = float(rows["bound_percent"].min())
         outcome = str(rows["outcome"].iloc[0]).replace("_", " ")
-        return Cell(f"{outcome} (bound {bound} %)", "none")
+        return Cell(f"{outcome} (bound {number(bound, 2)} %)" if math.isfinite(bound) else outcome, "none")
     digits = 4 if key.form == "pressure" or key.plant == "reduced" else 2
     low, high = (number(TENTH_GIGA_PASCAL * value, digits) for value in (values.min(), values.max()))
     worst = number(float(rows["error_percent"].astype(float).abs().max()), 2)
@@ -257,8 +268,13 @@ def _scalars(frame: pd.DataFrame) -> Markup:
     return html_table(pd.DataFrame(rows), columns, "The scalars of the paper's text, beside ours.")
 
 
+def _settings(values: Mapping[str, Any]) -> Markup:
+    with_units = {f"{name.replace('_', ' ')}{SETTING_UNITS.get(name, '')}": value for name, value in values.items()}
+    return _pairs(with_units, "Settings of this run")
+
+
 def _pairs(values: Mapping[str, Any], caption: str) -> Markup:
-    rows = [{"name": name.replace("_", " "), "value": _plainly(value)} for name, value in values.items()]
+    rows = [{"name": name, "value": _plainly(value)} for name, value in values.items()]
     columns = (Column("name", "name"), Column("value", "value"))
     return html_table(pd.DataFrame(rows, dtype=object), columns, caption)
 
@@ -266,4 +282,4 @@ def _pairs(values: Mapping[str, Any], caption: str) -> Markup:
 def _plainly(value: object) -> str:
     if isinstance(value, tuple | list):
         return ", ".join(_plainly(entry) for entry in value)
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return exact(value) if isinstance(value, float) else str(value)

@@ -58,9 +58,7 @@ def write_study(result: StudyResult, folder: Path) -> Path:
             _fill(temporary, result)
             _swap(temporary, target)
     except OSError as error:
-        raise HydrostateError(
-            f"result folder {folder} must be in a place that can be written, got: {error.strerror or error}"
-        ) from error
+        raise _unwritable(folder, error) from error
     return folder / "report.html"
 
 
@@ -83,6 +81,13 @@ def check_target(folder: Path) -> Path:
         If it is a file, is or holds the current folder, or holds anything that no study wrote, or if nothing can be
         written there.
     """
+    try:
+        return _checked(folder)
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+
+
+def _checked(folder: Path) -> Path:
     target = folder.resolve()
     if Path.cwd().is_relative_to(target):
         raise HydrostateError(
@@ -90,10 +95,7 @@ def check_target(folder: Path) -> Path:
         )
     if target.exists() and not target.is_dir():
         raise HydrostateError(f"result folder must be a folder or not exist yet, got the file {folder}")
-    try:
-        strangers = sorted(_strangers(target)) if target.exists() else []
-    except OSError as error:
-        raise HydrostateError(f"result folder {folder} must be readable, got: {error.strerror or error}") from error
+    strangers = sorted(_strangers(target)) if target.exists() else []
     if strangers:
         raise HydrostateError(
             f"result folder must be new, empty, or an earlier study's result, got {folder}, "
@@ -103,6 +105,12 @@ def check_target(folder: Path) -> Path:
     if not (nearest.is_dir() and os.access(nearest, os.W_OK | os.X_OK)):
         raise HydrostateError(f"result folder {folder} must be in a place that can be written, got {nearest}")
     return target
+
+
+def _unwritable(folder: Path, error: OSError) -> HydrostateError:
+    return HydrostateError(
+        f"result folder {folder} must be in a place that can be written, got: {error.strerror or error}"
+    )
 
 
 def _strangers(folder: Path) -> set[str]:
@@ -168,7 +176,6 @@ def _write_figures(folder: Path, result: StudyResult) -> Mapping[str, bytes]:
         with styled():
             buffer = BytesIO()
             figure.savefig(buffer, format="svg", metadata={"Date": None})
-            figure.set_layout_engine("none")  # the layout is found; finding it again costs as much as drawing
             figure.savefig(folder / f"{name}.png", dpi=PNG_DOTS_PER_INCH)
         drawn[name] = buffer.getvalue()
         (folder / f"{name}.svg").write_bytes(drawn[name])

@@ -50,6 +50,10 @@ class EhaParameters:
         float,
         SI("m^3/(s Pa)", "relief flow a pascal above the setting", "judged: rated pump flow within 7 kPa"),
     ] = 1e-8
+    accumulator_pressure: Annotated[float, SI("Pa", "inner circuit, absolute", "section 2: 40 psi")] = 2.758e5
+    makeup_conductance: Annotated[
+        float, SI("m^3/(s Pa)", "make-up flow a pascal below the inner circuit", "judged: the paper gives none")
+    ] = 1e-9
     motor_speed_per_volt: Annotated[
         float, SI("rad/(s V)", "motor speed a volt of command", "section 7: 4 V is 1200 rpm, errata E1")
     ] = 31.41592653589793
@@ -73,7 +77,14 @@ class EhaParameters:
 
 
 MAY_BE_ZERO = frozenset(
-    {"leakage_coefficient", "flow_bias", "friction_quadratic", "friction_coulomb", "relief_conductance"}
+    {
+        "leakage_coefficient",
+        "flow_bias",
+        "friction_quadratic",
+        "friction_coulomb",
+        "relief_conductance",
+        "makeup_conductance",
+    }
 )
 """Parameters that a healthy or idealised actuator may have at exactly zero."""
 

@@ -6,7 +6,7 @@ derivative and its Jacobian to LSODA, as the reference in tests.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields
+from dataclasses import astuple, fields
 from functools import cache
 from types import SimpleNamespace
 from typing import Any, Literal, TypeAlias
@@ -38,13 +38,13 @@ PARAMETER_NAMES = tuple(field.name for field in fields(EhaParameters))
 """Order of the columns of a parameter row."""
 
 
-def parameter_symbols() -> SimpleNamespace:
+def parameter_symbols(parameter_class: type[EhaParameters] = EhaParameters) -> SimpleNamespace:
     """Return a namespace with one symbol for each parameter of the actuator."""
-    return SimpleNamespace(**{name: symbol(name) for name in PARAMETER_NAMES})
+    return SimpleNamespace(**{field.name: symbol(field.name) for field in fields(parameter_class)})
 
 
 def parameter_row(parameters: EhaParameters) -> NDArray[np.float64]:
-    """Return the parameters as an array, in the order of `PARAMETER_NAMES`.
+    """Return the parameters as an array, in the order of their fields, which begins with `PARAMETER_NAMES`.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def parameter_row(parameters: EhaParameters) -> NDArray[np.float64]:
     ndarray, shape (parameters,)
         Their values in SI.
     """
-    return np.array([getattr(parameters, name) for name in PARAMETER_NAMES], dtype=np.float64)
+    return np.array(astuple(parameters), dtype=np.float64)
 
 
 def solve_linear(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]) -> list[Scalar]:
@@ -188,7 +188,9 @@ def run(initial, speed, parameters, sample_time, substeps):
 
 
 @cache
-def compile_trajectory(name: str, step: StepFunction, width: int) -> Trajectory:
+def compile_trajectory(
+    name: str, step: StepFunction, width: int, parameter_class: type[EhaParameters] = EhaParameters
+) -> Trajectory:
     """Generate the kernel that runs a step function along a drive.
 
     Parameters
@@ -199,6 +201,8 @@ def compile_trajectory(name: str, step: StepFunction, width: int) -> Trajectory:
         ``step(state, speeds, parameters, h)``, written for symbols.
     width : int
         Count of states.
+    parameter_class : type
+        What the parameter rows hold, field by field.
 
     Returns
     -------
@@ -208,10 +212,10 @@ def compile_trajectory(name: str, step: StepFunction, width: int) -> Trajectory:
     """
     state = tuple(symbol(f"x{i}") for i in range(width))
     speeds = (symbol("u_start"), symbol("u_end"))
-    result: list[Expression] = list(step(state, speeds, parameter_symbols(), symbol("h")))
+    result: list[Expression] = list(step(state, speeds, parameter_symbols(parameter_class), symbol("h")))
     outputs = {f"x{i}": value for i, value in enumerate(result)}
     used = symbols_in(result)
-    columns = [(i, parameter) for i, parameter in enumerate(PARAMETER_NAMES) if parameter in used]
+    columns = [(i, field.name) for i, field in enumerate(fields(parameter_class)) if field.name in used]
     source = _TRAJECTORY.format(
         name=name,
         width=width,

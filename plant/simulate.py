@@ -1,12 +1,14 @@
 """`simulate(plant, drive, ...) -> Record`: a run of a plant under a drive, seen through its sensors."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
-from types import MappingProxyType
+from dataclasses import asdict, dataclass, fields, replace
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.circuit import STATES, at_rest, circuit_breaches, circuit_channels, circuit_derivative
+from plant.circuit_parameters import CircuitParameters, circuit_of
 from plant.components.cylinder import quadratic_friction
 from plant.eha import EhaParameters, lumped_step, reduced_derivative
 from plant.errors import DriveError, HydrostateError
@@ -16,6 +18,20 @@ from plant.record import Record
 from plant.sensors import IDEAL, Sensors, measure
 
 Array = NDArray[np.float64]
+
+
+def _as_is(parameters: EhaParameters) -> EhaParameters:
+    return parameters
+
+
+def _from_zero(row: Array) -> Array:
+    del row
+    return np.zeros(3)
+
+
+def _never(states: Array) -> Mapping[str, NDArray[np.bool_]]:
+    del states
+    return {}
 
 
 @dataclass(frozen=True)
@@ -32,9 +48,17 @@ class Plant:
         ``step(state, speeds, parameters, h)``, see `plant.integrate.StepFunction`.
     channels : callable
         ``channels(states (n, width), parameter rows (1 or n, parameters))``, which returns position, velocity and
-        differential pressure.
+        differential pressure, and more where the plant has more; a motor speed among them replaces the command.
     substeps : int
         Steps of the integrator in 0.1 ms, enough for relative errors under 1e-4.
+    parameter_class : type
+        What its parameter rows hold.
+    complete : callable
+        ``complete(parameters)``, which returns an actuator's parameters as that class.
+    start : callable
+        ``start(parameter row)``, the state at rest.
+    breaches : callable
+        ``breaches(states)``: by reason, the samples at which the run left what the model describes.
     """
 
     name: str
@@ -42,6 +66,10 @@ class Plant:
     step: StepFunction
     channels: Callable[[Array, Array], Mapping[str, Array]]
     substeps: int
+    parameter_class: type[EhaParameters] = EhaParameters
+    complete: Callable[[EhaParameters], EhaParameters] = _as_is
+    start: Callable[[Array], Array] = _from_zero
+    breaches: Callable[[Array], Mapping[str, NDArray[np.bool_]]] = _never
 
 
 def _lumped_channels(states: Array, rows: Array) -> Mapping[str, Array]:
@@ -73,7 +101,25 @@ REDUCED = Plant(
 )
 LUMPED = Plant("lumped", ("position_m", "velocity_m_s", "differential_pressure_pa"), lumped_step, _lumped_channels, 4)
 
-PLANTS: Mapping[str, Plant] = MappingProxyType({plant.name: plant for plant in (REDUCED, LUMPED)})
+
+def _circuit_values(rows: Array) -> SimpleNamespace:
+    """Return the circuit's parameters by name, from one row or a column of them."""
+    return SimpleNamespace(**{field.name: rows[..., i] for i, field in enumerate(fields(CircuitParameters))})
+
+
+CIRCUIT = Plant(
+    "circuit",
+    STATES,
+    ros2_step(circuit_derivative),
+    lambda states, rows: circuit_channels(states, _circuit_values(rows)),
+    4,
+    CircuitParameters,
+    circuit_of,
+    lambda row: np.array(at_rest(_circuit_values(row)), dtype=np.float64),
+    circuit_breaches,
+)
+
+PLANTS: Mapping[str, Plant] = MappingProxyType({plant.name: plant for plant in (REDUCED, LUMPED, CIRCUIT)})
 """The plants, by name."""
 
 
@@ -92,13 +138,13 @@ def simulate(
     Parameters
     ----------
     plant : Plant
-        `REDUCED` or `LUMPED`.
+        `REDUCED`, `LUMPED` or `CIRCUIT`.
     drive : ndarray, shape (n,)
-        Motor speed at the samples [rad/s], linear between.
+        Motor speed at the samples [rad/s], linear between; for a plant with a motor of its own, what is asked of it.
     sample_time : float
         Seconds between samples [s].
     parameters : EhaParameters or ParameterPath
-        The actuator, constant or changing with time.
+        The actuator, constant or changing with time; the circuit also takes an actuator without its circuit.
     sensors : Sensors
         What the bench sees; `IDEAL` by default.
     rng : numpy.random.Generator, optional
@@ -116,7 +162,7 @@ def simulate(
     DriveError
         If the drive is not a finite series of at least two samples.
     HydrostateError
-        If the simulated state stops being finite.
+        If the simulated state stops being finite or leaves what the model describes.
 
     Examples
     --------
@@ -131,13 +177,19 @@ def simulate(
         where = int(np.argmin(np.isfinite(speed)))
         raise DriveError(f"a drive must be finite, got {speed[where]} at sample {where}")
     path = parameters if isinstance(parameters, ParameterPath) else ParameterPath.constant(parameters)
+    path = replace(path, parameters=tuple(plant.complete(given) for given in path.parameters))
     rows = np.ascontiguousarray(path.sample(sample_time * np.arange(len(speed))))
     substeps = max(1, round(plant.substeps * sample_time / 1e-4))
-    run = compile_trajectory(plant.name, plant.step, len(plant.states))
-    states = run(np.zeros(len(plant.states)), speed, rows, sample_time, substeps)
+    run = compile_trajectory(plant.name, plant.step, len(plant.states), plant.parameter_class)
+    states = run(plant.start(rows[0]), speed, rows, sample_time, substeps)
     if not np.all(np.isfinite(states)):
         when = sample_time * int(np.argmax(~np.isfinite(states).all(axis=1)))
         raise HydrostateError(f"the {plant.name} plant stopped being finite at {when:.4f} s: check its parameters")
+    for reason, broken in plant.breaches(states).items():
+        if np.any(broken):
+            raise HydrostateError(
+                f"the {plant.name} plant stopped at {sample_time * int(np.argmax(broken)):.4f} s: {reason}"
+            )
     metadata = {"plant": plant.name, "parameters": asdict(path.parameters[0])}
     truth = Record(sample_time, {"motor_speed_rad_s": speed, **plant.channels(states, rows)}, metadata)
     if sensors == IDEAL and rng is None:

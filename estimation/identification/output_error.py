@@ -1,15 +1,13 @@
 """Output-error identification: the transfer function whose *simulated* output is closest to the measured."""
 
 import hashlib
-import warnings
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
-from scipy.signal import oaconvolve
 
+from estimation.covariance import least_squares_covariance
 from estimation.identification.criterion import (
     BoolArray,
     Structure,
@@ -20,7 +18,7 @@ from estimation.identification.criterion import (
 )
 from estimation.identification.linear_model import FloatArray, LinearModel
 from estimation.identification.starts import lagged, starting_denominators
-from plant.errors import HydrostateError, LogWarning
+from plant.errors import HydrostateError
 
 SAMPLES_PER_PARAMETER = 5
 """Fewest output samples a free value; below that the covariance formula means nothing."""
@@ -112,7 +110,7 @@ def fit_output_error(
     jacobian = sensitivities(structure, theta, scaled_u)
     jacobian[~used] = 0.0
     residual = np.where(used, scaled_y - predict(structure, theta, scaled_u), 0.0)
-    spread = _covariance(jacobian, residual, int(used.sum()), covariance == "coloured")
+    spread = least_squares_covariance(jacobian, residual, int(used.sum()), coloured=covariance == "coloured")
 
     n_b, n_f = structure.n_numerator, structure.n_denominator
     unscale = np.concatenate([np.full(n_b, y_scale / u_scale), np.ones(n_f), np.full(structure.n_initial, y_scale)])
@@ -280,38 +278,3 @@ def _levenberg_marquardt(
         max_nfev=evaluations,
     )
     return 2.0 * float(found.cost), np.asarray(found.x, dtype=np.float64)
-
-
-def _covariance(jacobian: FloatArray, residual: FloatArray, n_used: int, coloured: bool) -> FloatArray:
-    scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
-    scale[scale == 0.0] = 1.0
-    columns = jacobian / scale
-    triangle = np.linalg.qr(columns, mode="r")
-    n_parameters = columns.shape[1]
-    if np.linalg.matrix_rank(triangle) < n_parameters:
-        warnings.warn(
-            "the coefficients are not separately determined by this record (a pole cancels a zero, or the "
-            "order is too high): the covariance is a lower bound",
-            LogWarning,
-            stacklevel=3,
-        )
-        inverse = np.linalg.pinv(triangle)
-    else:
-        inverse = solve_triangular(triangle, np.eye(n_parameters))
-    bread = inverse @ inverse.T
-    freedom = n_used - n_parameters
-    if coloured:
-        spread = bread @ _coloured_meat(columns, residual, n_used) @ bread * (n_used / freedom)
-    else:
-        spread = bread * float(residual @ residual) / freedom
-    return spread / np.outer(scale, scale)
-
-
-def _coloured_meat(columns: FloatArray, residual: FloatArray, n_used: int) -> FloatArray:
-    """Return ``J'RJ`` with ``R`` the residual's autocovariance, Bartlett window (Newey and West, 1987)."""
-    n_lags = max(1, min(n_used // 10, int(4.0 * n_used**0.5)))
-    spectrum = np.fft.rfft(residual, 2 * residual.size)
-    lags = np.fft.irfft(np.abs(spectrum) ** 2)[: n_lags + 1] / n_used
-    lags = lags * (1.0 - np.arange(n_lags + 1) / (n_lags + 1.0))
-    kernel = np.concatenate([lags[:0:-1], lags])
-    return columns.T @ oaconvolve(columns, kernel[:, None], mode="same", axes=0)

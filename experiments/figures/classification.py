@@ -9,7 +9,7 @@ from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from experiments.figures.style import BLUE, VERMILION, panels
+from experiments.figures.style import BLUE, VERMILION, Margins, panels
 from experiments.words import bank_in_words, in_short, in_words
 
 DARK = 0.25
@@ -39,8 +39,11 @@ def draw_confusions(confusions: Mapping[tuple[str, str], pd.DataFrame], accuracy
     """
     banks = list(dict.fromkeys(accuracy["bank"]))
     variants = list(dict.fromkeys(accuracy["variant"]))
+    margins = Margins(left=1.6, top=0.7, bottom=1.45, down=0.5)
     title = "Class found against true class: counts of runs"
-    figure, axes = panels(title, len(variants), len(banks), 3.6 * len(variants) + 0.6, sharex=True, sharey=True)
+    figure, axes = panels(
+        title, len(variants), len(banks), 3.2 * len(variants) + 1.3, margins, sharex=True, sharey=True
+    )
     right = accuracy.set_index(["bank", "variant"])["accuracy"]
     order = [(bank, variant) for variant in variants for bank in banks]
     for place, (axis, (bank, variant)) in enumerate(zip(axes, order, strict=True)):
@@ -88,7 +91,11 @@ def draw_scores(scores: pd.DataFrame) -> Figure:
         A heatmap with the scores written in, the smallest of each row framed.
     """
     figure, (axis,) = panels(
-        "Score of every model on one run in every condition: the smallest names the class", 1, 1, 5.4
+        "Score of every model on one run in every condition: the smallest names the class",
+        1,
+        1,
+        5.4,
+        Margins(left=2.2, right=-0.3, top=0.4, bottom=1.05),
     )
     values = scores.to_numpy(dtype=float)
     image = axis.imshow(values, cmap=ERRORS, norm=LogNorm(values.min(), values.max()), aspect="auto")

@@ -9,7 +9,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from experiments.figures.style import BLACK, BLUE, SKY, VERMILION, panels
+from experiments.figures.style import BLACK, BLUE, SKY, VERMILION, Margins, panels
 from experiments.words import in_words
 
 GIGA_TENTH = 1e8
@@ -66,7 +66,7 @@ def draw_convergence(shown: Convergence, curves: pd.DataFrame, truth_pa: float) 
         & (curves["drive"] == shown.drive)
         & (curves["pressure_logged"] == shown.pressure_logged)
     ]
-    figure, axes = panels(shown.title, 3, 3, 6.4, sharex=True, sharey=True)
+    figure, axes = panels(shown.title, 3, 3, 6.4, Margins(), sharex=True, sharey=True)
     guesses = sorted(chosen["start_pa"].unique())
     colours = {guess: GUESS_COLOURS(place / max(1, len(guesses) - 1)) for place, guess in enumerate(guesses)}
     first_tick = float(chosen.loc[chosen["time_s"] > 0.0, "time_s"].min())
@@ -75,8 +75,8 @@ def draw_convergence(shown: Convergence, curves: pd.DataFrame, truth_pa: float) 
         _panel(axis, rows, colours, truth_pa)
         axis.set_title(in_words(str(condition)), loc="left")
     _time_axis(axes[0], first_tick, last)
-    figure.supxlabel(f"time [s], logarithmic after the first {1e3 * first_tick:g} ms", fontsize=9)
-    figure.supylabel("effective bulk modulus [1e8 Pa]", fontsize=9)
+    figure.supxlabel(f"time [s], logarithmic after the first {1e3 * first_tick:g} ms", fontsize=9, y=0.01)
+    figure.supylabel("effective bulk modulus [1e8 Pa]", fontsize=9, x=0.005)
     axes[0].annotate(
         f"truth {truth_pa / GIGA_TENTH:.2f}",
         (last, truth_pa / GIGA_TENTH),

@@ -6,7 +6,7 @@ from types import MappingProxyType
 import pandas as pd
 from matplotlib.figure import Figure
 
-from experiments.figures.style import BLUE, ORANGE, condition_rows, panels
+from experiments.figures.style import BESIDE_CONDITIONS, BLUE, ORANGE, condition_rows, panels
 from experiments.published import SCALARS
 
 DEFINED: Mapping[str, Mapping[str, str]] = MappingProxyType(
@@ -32,7 +32,7 @@ def draw_definitions(conditions: pd.DataFrame) -> Figure:
         Velocity on the left, differential pressure on the right, both in percent of normal.
     """
     title = "Steady state at 4 V: what Tables 3 and 4 give, and how section 3 defines the levels"
-    figure, axes = panels(title, 1, 2, 3.9, sharey=True)
+    figure, axes = panels(title, 1, 2, 3.9, BESIDE_CONDITIONS, sharey=True)
     words = {"velocity": "steady velocity", "pressure": "steady differential pressure"}
     for axis, quantity in zip(axes, words, strict=True):
         heights = condition_rows(axis, list(conditions["condition"]))

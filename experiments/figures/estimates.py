@@ -8,10 +8,12 @@ from matplotlib.figure import Figure
 
 from experiments.figures.convergence import GIGA_TENTH
 from experiments.figures.style import (
+    BESIDE_CONDITIONS,
     BLACK,
     BLUE,
     GREY,
     VERMILION,
+    Margins,
     condition_rows,
     panels,
     spread_out,
@@ -39,7 +41,8 @@ def draw_estimates(estimates: pd.DataFrame, truth_pa: float) -> Figure:
     """
     groups = list(by_experiment(estimates))
     count = (len(groups) + 2) // 3
-    figure, axes = panels("Estimates of bulk modulus with 95 % intervals", count, 3, 3.6 * count, sharey=True)
+    margins = Margins(left=2.0, top=0.75, down=0.85)
+    figure, axes = panels("Estimates of bulk modulus with 95 % intervals", count, 3, 3.6 * count, margins, sharey=True)
     conditions = list(dict.fromkeys(estimates["condition"]))
     for axis, (key, rows) in zip(axes, groups, strict=False):
         heights = condition_rows(axis, conditions)
@@ -100,7 +103,9 @@ def draw_forms(estimates: pd.DataFrame, truth_pa: float) -> Figure:
         (sine[sine["form"] == "acceleration"], VERMILION, "published acceleration form"),
         (sine[(sine["form"] == "pressure") & sine["pressure_logged"]], BLUE, "pressure form, dp logged"),
     )
-    figure, (axis,) = panels("Where two filters settle on a plant that sticks, driven by the 10 Hz sine", 1, 1, 3.9)
+    figure, (axis,) = panels(
+        "Where two filters settle on a plant that sticks, driven by the 10 Hz sine", 1, 1, 3.9, BESIDE_CONDITIONS
+    )
     heights = condition_rows(axis, list(dict.fromkeys(sine["condition"])))
     truth = truth_pa / GIGA_TENTH
     for (rows, colour, words), side in zip(shown, ("left", "right"), strict=True):

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
-from experiments.figures.style import BLUE, GREY, ORANGE, VERMILION, condition_rows, panels
+from experiments.figures.style import BESIDE_CONDITIONS, BLUE, GREY, ORANGE, VERMILION, Margins, condition_rows, panels
 
 MILLI = 1e3
 """Millimetres a metre."""
@@ -40,6 +40,7 @@ def draw_bode(responses: pd.DataFrame, conditions: pd.DataFrame) -> Figure:
         2,
         3,
         5.6,
+        Margins(left=0.7, down=0.2),
         sharex=True,
         sharey="row",
     )
@@ -95,7 +96,7 @@ def draw_order(order: pd.DataFrame) -> Figure:
     """
     suggested = int(order["suggested_order"].iloc[0])
     title = f"Singular values of the normal condition: order {suggested} stands above the noise"
-    figure, axes = panels(title, 1, 2, 3.4)
+    figure, axes = panels(title, 1, 2, 3.4, Margins(left=0.8, top=0.6, across=0.85))
     shown = (("hankel", "Hankel matrix of the impulse response"), ("projected", "projected data matrix"))
     for axis, (name, words) in zip(axes, shown, strict=True):
         floor = float(order[f"{name}_floor"].iloc[0])
@@ -138,7 +139,7 @@ def draw_gains(models: pd.DataFrame) -> Figure:
     Figure
         One row a condition.
     """
-    figure, (axis,) = panels("Steady gain from motor speed to velocity", 1, 1, 3.9)
+    figure, (axis,) = panels("Steady gain from motor speed to velocity", 1, 1, 3.9, BESIDE_CONDITIONS)
     heights = condition_rows(axis, list(models["condition"]))
     level = np.array([heights[name] for name in models["condition"]])
     axis.hlines(

@@ -2,6 +2,7 @@
 
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -67,7 +68,33 @@ def styled() -> Generator[None]:
         yield
 
 
-def panels(title: str, rows: int, columns: int, height_inches: float, **options: Any) -> tuple[Figure, list[Axes]]:
+@dataclass(frozen=True)
+class Margins:
+    """Room around and between panels. Fixed, since finding it for every figure takes as long as drawing.
+
+    Parameters
+    ----------
+    left, right, top, bottom : float
+        From the figure's edge to the outer panels [inch].
+    across, down : float
+        Between panels side by side, and one above the other [inch].
+    """
+
+    left: float = 0.6
+    right: float = 0.1
+    top: float = 0.55
+    bottom: float = 0.5
+    across: float = 0.2
+    down: float = 0.3
+
+
+BESIDE_CONDITIONS = Margins(left=2.0, top=0.4)
+"""Room for the conditions' names on the left."""
+
+
+def panels(
+    title: str, rows: int, columns: int, height_inches: float, margins: Margins, **options: Any
+) -> tuple[Figure, list[Axes]]:
     """Return a titled figure and its axes, row by row.
 
     Parameters
@@ -78,6 +105,8 @@ def panels(title: str, rows: int, columns: int, height_inches: float, **options:
         Counts of axes.
     height_inches : float
         Height [inch].
+    margins : Margins
+        Room around the axes.
     **options : Any
         Passed to `matplotlib.figure.Figure.subplots`: shared axes, ratios.
 
@@ -86,9 +115,19 @@ def panels(title: str, rows: int, columns: int, height_inches: float, **options:
     tuple of Figure and list of Axes
         The figure, and its axes in reading order.
     """
-    figure = Figure(figsize=(WIDTH_INCHES, height_inches), layout="constrained")
-    figure.suptitle(title, x=0.01, ha="left")
-    axes = figure.subplots(rows, columns, squeeze=False, **options)
+    figure = Figure(figsize=(WIDTH_INCHES, height_inches))
+    figure.suptitle(title, x=0.01, y=1.0 - 0.08 / height_inches, ha="left", va="top")
+    width = (WIDTH_INCHES - margins.left - margins.right - (columns - 1) * margins.across) / columns
+    height = (height_inches - margins.top - margins.bottom - (rows - 1) * margins.down) / rows
+    placed = {
+        "left": margins.left / WIDTH_INCHES,
+        "right": 1.0 - margins.right / WIDTH_INCHES,
+        "top": 1.0 - margins.top / height_inches,
+        "bottom": margins.bottom / height_inches,
+        "wspace": margins.across / width,
+        "hspace": margins.down / height,
+    }
+    axes = figure.subplots(rows, columns, squeeze=False, gridspec_kw=placed, **options)
     return figure, [axis for row in axes for axis in row]
 
 

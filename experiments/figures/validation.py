@@ -5,7 +5,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.figures.style import BLACK, BLUE, GREY, VERMILION, condition_rows, panels
+from experiments.figures.style import BLACK, BLUE, GREY, VERMILION, Margins, condition_rows, panels
 from experiments.words import in_words
 
 MILLI = 1e3
@@ -39,7 +39,14 @@ def draw_validation_run(runs: pd.DataFrame, condition: str) -> Figure:
     """
     run = runs[runs["condition"] == condition]
     figure, axes = panels(
-        f"The nine steps, {in_words(condition)}", 2, 2, 5.2, width_ratios=[2.1, 1.0], height_ratios=[1.0, 1.9]
+        f"The nine steps, {in_words(condition)}",
+        2,
+        2,
+        5.2,
+        Margins(left=0.75, across=0.7, down=0.5),
+        width_ratios=[2.1, 1.0],
+        height_ratios=[1.0, 1.9],
+        sharex="col",
     )
     drive, drive_near, velocity, velocity_near = axes
     reversal = _reversal(run)
@@ -96,7 +103,15 @@ def draw_rmse(rmse: pd.DataFrame) -> Figure:
     Figure
         Ours on the left, the published ones on the right, one row a condition.
     """
-    figure, axes = panels("Error in velocity on the nine steps, beside Table 5", 1, 2, 3.9, sharex=True, sharey=True)
+    figure, axes = panels(
+        "Error in velocity on the nine steps, beside Table 5",
+        1,
+        2,
+        3.9,
+        Margins(left=2.0, top=0.6),
+        sharex=True,
+        sharey=True,
+    )
     for axis, prefix, title in ((axes[0], "", "ours, simulated"), (axes[1], "published_", "published, measured")):
         heights = condition_rows(axis, list(rmse["condition"]))
         level = [heights[name] for name in rmse["condition"]]
@@ -108,5 +123,5 @@ def draw_rmse(rmse: pd.DataFrame) -> Figure:
         axis.set_title(title, loc="left")
         axis.set_xlabel("root-mean-square error in velocity [mm/s]")
     axes[0].set_xlim(left=0.0)
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="upper right", ncols=2)
     return figure

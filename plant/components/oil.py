@@ -1,0 +1,111 @@
+"""Oil with entrained air, and with vapour where there is too little of it: one closed-form equation of state.
+
+The *amount* of oil is its mass, given as the volume that it would fill at atmospheric pressure [m^3]. A chamber of
+volume V that holds the amount n is filled by liquid, which shrinks linearly with pressure, and by air, which shrinks
+as 1/p (isothermal)::
+
+    V/n = (1 - air) (1 - (p - p_a)/beta) + air (p_a - p_v)/(p - p_v)
+
+Its stiffness is equation 5 of the piezo-stack paper with n = 1 (errata P5) to first order in the air fraction. Vapour
+takes the room that is left, so pressure never falls below that of the vapour, p_v.
+"""
+
+from plant.compiled.functions import Scalar, absolute, sqrt, where
+
+ATMOSPHERE = 101_325.0
+"""Pressure at which the air fraction is stated [Pa], equation 6 of the piezo-stack paper."""
+
+NUCLEI = 1e-9
+"""Air fraction of oil without free air: bubble nuclei, which soften the onset of vapour over about 100 Pa."""
+
+
+def oil_pressure(
+    amount: Scalar, volume: Scalar, bulk_modulus: Scalar, air_fraction: Scalar, vapour_pressure: Scalar
+) -> Scalar:
+    """Return the absolute pressure of an amount of oil in a volume, above that of the vapour at any positive amount.
+
+    Parameters
+    ----------
+    amount : float or Expression
+        Oil, as its volume at atmospheric pressure [m^3], positive.
+    volume : float or Expression
+        Volume of the chamber [m^3], positive.
+    bulk_modulus : float or Expression
+        Bulk modulus beta of the oil without air [Pa].
+    air_fraction : float or Expression
+        Volume of air over that of oil and air, at atmospheric pressure [dimensionless].
+    vapour_pressure : float or Expression
+        Vapour pressure p_v [Pa].
+
+    Returns
+    -------
+    float or Expression
+        Pressure [Pa].
+
+    Examples
+    --------
+    >>> round(float(oil_pressure(1.001, 1.0, 2.07e8, 0.0, 2e3)))
+    308118
+    >>> round(float(oil_pressure(0.9, 1.0, 2.07e8, 0.0, 2e3)), 1)
+    2000.0
+    """
+    air = air_fraction + NUCLEI
+    gas = air * (ATMOSPHERE - vapour_pressure)
+    softness = (1.0 - air) / bulk_modulus
+    squeezed = (1.0 - air) + softness * (ATMOSPHERE - vapour_pressure) - volume / amount
+    root = sqrt(squeezed * squeezed + 4.0 * softness * gas)
+    outer = root + absolute(squeezed)
+    return vapour_pressure + where(squeezed > 0.0, outer / (2.0 * softness), 2.0 * gas / outer)
+
+
+def specific_volume(pressure: Scalar, bulk_modulus: Scalar, air_fraction: Scalar, vapour_pressure: Scalar) -> Scalar:
+    """Return the volume that a unit amount of oil fills: the inverse of `oil_pressure`.
+
+    Parameters
+    ----------
+    pressure : float or Expression
+        Absolute pressure [Pa], above the vapour's.
+    bulk_modulus, air_fraction, vapour_pressure : float or Expression
+        As in `oil_pressure` [Pa, dimensionless, Pa].
+
+    Returns
+    -------
+    float or Expression
+        Volume over amount [dimensionless]; 1 at atmospheric pressure.
+
+    Examples
+    --------
+    >>> round(specific_volume(2.07e6 + 101_325.0, 2.07e8, 0.0, 2e3), 6)
+    0.99
+    """
+    air = air_fraction + NUCLEI
+    liquid = (1.0 - air) * (1.0 - (pressure - ATMOSPHERE) / bulk_modulus)
+    return liquid + air * (ATMOSPHERE - vapour_pressure) / (pressure - vapour_pressure)
+
+
+def effective_bulk_modulus(
+    pressure: Scalar, bulk_modulus: Scalar, air_fraction: Scalar, vapour_pressure: Scalar
+) -> Scalar:
+    """Return the stiffness ``-V dp/dV`` of oil with air, equation 5 of the piezo-stack paper with n = 1.
+
+    Parameters
+    ----------
+    pressure : float or Expression
+        Absolute pressure [Pa], above the vapour's.
+    bulk_modulus, air_fraction, vapour_pressure : float or Expression
+        As in `oil_pressure` [Pa, dimensionless, Pa].
+
+    Returns
+    -------
+    float or Expression
+        Effective bulk modulus [Pa].
+
+    Examples
+    --------
+    >>> round(effective_bulk_modulus(1e6, 1.4e9, 0.01, 2e3) / 1e6)
+    581
+    """
+    air = air_fraction + NUCLEI
+    above = pressure - vapour_pressure
+    slope = (1.0 - air) / bulk_modulus + air * (ATMOSPHERE - vapour_pressure) / (above * above)
+    return specific_volume(pressure, bulk_modulus, air_fraction, vapour_pressure) / slope
