@@ -28,7 +28,7 @@ METHODS: Mapping[str, Method] = MappingProxyType({"ekf": ekf, "filterpy-ekf": fi
 LONGEST_STEP = 2.5e-4
 """Longest step of a process model [s]; slower logs are sub-stepped."""
 
-TRACK_ROWS = 2000
+TRACK_ROWS = 20_000
 """About how many points of the state's history are kept."""
 
 

@@ -41,6 +41,8 @@ MOST_MESSAGES = 3
 
 NOTHING: Result = {
     "bulk_modulus_pa": {"value": None, "std": None, "ci95": None},
+    "leakage_coefficient_m3_s_pa": None,
+    "flow_bias_m3_s": None,
     "nis": {},
     "method": None,
     "form": None,
@@ -60,8 +62,13 @@ commands = typer.Typer()
 def estimate(
     logs: Logs,
     form: Annotated[
-        str, typer.Option(metavar="FORM", help="Process model: pressure (ours) or acceleration (the published one).")
-    ] = "pressure",
+        str,
+        typer.Option(
+            metavar="FORM",
+            help="What is believed: flow (needs position and differential pressure; finds leakage too), pressure "
+            "(a filter), acceleration (the published filter), or auto: flow where the log allows, else pressure.",
+        ),
+    ] = "auto",
     method: Annotated[str, typer.Option(metavar="METHOD", help="Filter: ekf or filterpy-ekf.")] = "ekf",
     condition: ConditionName = None,
     rig: RigFile = None,
@@ -84,16 +91,17 @@ def estimate(
 ) -> None:
     """Estimate effective bulk modulus [Pa] from each log, with a 95 % interval and a verdict.
 
-    Leakage and friction are taken from the rig, or from the condition if one is given. Where drive and sensors
-    hold too little (Cramér-Rao bound over 3 %), the outcome is not_observable and no number is printed. Nothing here
-    is random, so the seed changes nothing.
+    With position and differential pressure logged, leakage and flow bias are found along with it and friction plays no
+    part. Without, leakage and friction are taken from the rig, or from the condition if one is given. Where drive and
+    sensors hold too little (Cramér-Rao bound over 3 %), the outcome is not_observable and no number is printed.
+    Nothing here is random, so the seed changes nothing.
     """
     from estimation.bulk_modulus import estimate_bulk_modulus
     from estimation.eha import FORMS
     from estimation.run import METHODS
     from faults.conditions import find_condition, parameters_for
 
-    require_one_of("--form", form, list(FORMS))
+    require_one_of("--form", form, ["auto", "flow", *FORMS])
     require_one_of("--method", method, list(METHODS))
     require_positive("--start-std", start_std, "Pa")
     if start != 0.0:
@@ -103,31 +111,44 @@ def estimate(
     if condition is not None:
         parameters = parameters_for(find_condition(condition), parameters)
     prepare_output(out)
-    chosen = {"method": method, "form": form, "condition": condition, "rig": bench.name, "seed": seed}
+    chosen = {"condition": condition, "rig": bench.name, "seed": seed}
 
     def work(log: Path) -> Result:
         record = read_log(log, bench.columns, mapping)
         if no_pressure:
             record = record.replace(**{PRESSURE: None})
         found = estimate_bulk_modulus(record, parameters, form=form, method=method, start=start, start_std=start_std)
-        return {**_entries(found), **chosen}
+        return {**_entries(found, method), **chosen}
 
-    if condition is None:
-        note(f"no --condition: leakage and friction are taken to be those of the rig {bench.name!r}, healthy")
     batch = run_logs(logs, work, {**NOTHING, **chosen}, "estimating")
+    if condition is None and any(result["form"] not in (None, "flow") for result in batch.results):
+        note(f"no --condition: leakage and friction were taken to be those of the rig {bench.name!r}, healthy")
     finish(batch, _screen, as_json=as_json, out=out)
 
 
-def _entries(found: "BulkModulusEstimate") -> dict[str, Any]:
+def _entries(found: "BulkModulusEstimate", method: str) -> dict[str, Any]:
     return {
         "outcome": found.outcome.value,
         "bulk_modulus_pa": {"value": found.value, "std": found.std, "ci95": found.interval},
-        "nis": dict(found.estimate.nis),
+        "leakage_coefficient_m3_s_pa": _number(found.others.get("leakage_coefficient")),
+        "flow_bias_m3_s": _number(found.others.get("flow_bias")),
+        "nis": dict(found.nis),
+        "method": "least-squares" if found.form == "flow" else method,
+        "form": found.form,
         "gate": {"passed": found.gate.passed, "reasons": list(found.gate.reasons)},
         "bound_percent": 100.0 * found.bound,
-        "channels": list(found.estimate.channels),
+        "channels": list(found.channels),
         "message": _message(found),
     }
+
+
+def _number(found: tuple[float, float] | None) -> dict[str, Any] | None:
+    from estimation.bulk_modulus import NORMAL_95
+
+    if found is None:
+        return None
+    value, std = found
+    return {"value": value, "std": std, "ci95": [value - NORMAL_95 * std, value + NORMAL_95 * std]}
 
 
 def _message(found: "BulkModulusEstimate") -> str:
@@ -140,7 +161,7 @@ def _message(found: "BulkModulusEstimate") -> str:
             said.append(f"not to be relied on: {clauses(found.gate.reasons)}")
     else:
         said = [OUTCOMES[found.outcome]]
-    return clauses([*said, *_absence(found.estimate.channels, found.estimate.model.name)])
+    return clauses([*said, *_absence(found.channels, found.form)])
 
 
 def _absence(channels: Sequence[str], form: str) -> list[str]:

@@ -81,8 +81,8 @@ def throttled(base: CircuitParameters, a_volts: float, b_volts: float) -> Circui
 
     Examples
     --------
-    >>> throttled(CircuitParameters(), 2.0, 2.5).friction_quadratic
-    4462000.0
+    >>> round(throttled(CircuitParameters(), 2.0, 2.5).friction_quadratic)
+    4462000
     """
     require_volts("throttle B", b_volts)
     leakage, bias = THROTTLE_A.at(a_volts)

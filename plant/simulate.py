@@ -2,12 +2,20 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
+from math import ceil
 from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.circuit import STATES, at_rest, circuit_breaches, circuit_channels, circuit_derivative
+from plant.circuit import (
+    STATES,
+    at_rest,
+    circuit_breaches,
+    circuit_channels,
+    circuit_derivative,
+    circuit_step_rate,
+)
 from plant.circuit_parameters import CircuitParameters, circuit_of
 from plant.components.cylinder import quadratic_friction
 from plant.eha import EhaParameters, lumped_step, reduced_derivative
@@ -27,6 +35,11 @@ def _as_is(parameters: EhaParameters) -> EhaParameters:
 def _from_zero(row: Array) -> Array:
     del row
     return np.zeros(3)
+
+
+def _any_rate(rows: Array) -> float:
+    del rows
+    return 0.0
 
 
 def _never(states: Array) -> Mapping[str, NDArray[np.bool_]]:
@@ -57,6 +70,8 @@ class Plant:
         ``complete(parameters)``, which returns an actuator's parameters as that class.
     start : callable
         ``start(parameter row)``, the state at rest.
+    step_rate : callable
+        ``step_rate(parameter rows)``, the least count of steps a second, where faults can make a plant stiffer.
     breaches : callable
         ``breaches(states)``: by reason, the samples at which the run left what the model describes.
     """
@@ -69,6 +84,7 @@ class Plant:
     parameter_class: type[EhaParameters] = EhaParameters
     complete: Callable[[EhaParameters], EhaParameters] = _as_is
     start: Callable[[Array], Array] = _from_zero
+    step_rate: Callable[[Array], float] = _any_rate
     breaches: Callable[[Array], Mapping[str, NDArray[np.bool_]]] = _never
 
 
@@ -116,6 +132,7 @@ CIRCUIT = Plant(
     CircuitParameters,
     circuit_of,
     lambda row: np.array(at_rest(_circuit_values(row)), dtype=np.float64),
+    lambda rows: circuit_step_rate(_circuit_values(rows)),
     circuit_breaches,
 )
 
@@ -179,7 +196,7 @@ def simulate(
     path = parameters if isinstance(parameters, ParameterPath) else ParameterPath.constant(parameters)
     path = replace(path, parameters=tuple(plant.complete(given) for given in path.parameters))
     rows = np.ascontiguousarray(path.sample(sample_time * np.arange(len(speed))))
-    substeps = max(1, round(plant.substeps * sample_time / 1e-4))
+    substeps = max(1, round(plant.substeps * sample_time / 1e-4), ceil(plant.step_rate(rows) * sample_time))
     run = compile_trajectory(plant.name, plant.step, len(plant.states), plant.parameter_class)
     states = run(plant.start(rows[0]), speed, rows, sample_time, substeps)
     if not np.all(np.isfinite(states)):

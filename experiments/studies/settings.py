@@ -35,7 +35,7 @@ class StudySettings:
 
 
 def quick_settings(seed: int) -> StudySettings:
-    """Return a small study: the same nine conditions and parts, fewer starts and seeds, shorter identification runs.
+    """Return a small study: the same nine conditions and parts, fewer first guesses and seeds, shorter runs.
 
     Parameters
     ----------
@@ -47,4 +47,4 @@ def quick_settings(seed: int) -> StudySettings:
     StudySettings
         The small size.
     """
-    return StudySettings(seed=seed, starts=(0.0, 5e8), identification_duration=8.0, seeds=2)
+    return StudySettings(seed=seed, starts=(0.0, 5e8), duration=5.0, identification_duration=8.0, seeds=2)

@@ -1,0 +1,101 @@
+"""The Cramér-Rao bound says beforehand what a drive and its sensors can tell."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.bounds import at_bulk_modulus, bulk_modulus_bound
+from estimation.bulk_modulus import estimate_bulk_modulus, first_belief
+from estimation.eha import PRESSURE_FORM
+from faults.conditions import CONDITIONS, Condition, parameters_for
+from plant.eha import EhaParameters
+from plant.record import Record
+from plant.sensors import BENCH, Sensors, noise_variances
+from plant.signals import make_drive
+from plant.simulate import LUMPED, simulate
+
+MOTION = ("position_m", "velocity_m_s")
+ALL = (*MOTION, "differential_pressure_pa")
+EVERY_CONDITION = pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
+NO_PROCESS_NOISE = dict.fromkeys(ALL, 0.0)
+
+
+def driven(drive: str, p: EhaParameters, duration: float = 10.0) -> Record:
+    return simulate(LUMPED, make_drive(drive, duration, 1e-3, p, np.random.default_rng(0)), 1e-3, p)
+
+
+def relative_bound(
+    record: Record,
+    p: EhaParameters,
+    channels: tuple[str, ...],
+    sensors: Sensors = BENCH,
+    noise: dict[str, float] | None = None,
+) -> float:
+    prior = first_belief(PRESSURE_FORM, record, p.bulk_modulus, 3e8)
+    variances = dict(noise_variances(sensors))
+    std = bulk_modulus_bound(PRESSURE_FORM, prior, record, p, channels=channels, variances=variances, noise=noise)
+    return std / p.bulk_modulus
+
+
+@EVERY_CONDITION
+def test_steps_with_pressure_tell_bulk_modulus_to_one_percent(condition: Condition) -> None:
+    p = parameters_for(condition)
+    assert relative_bound(driven("steps", p), p, ALL) < 0.01
+
+
+@EVERY_CONDITION
+def test_the_papers_sine_without_pressure_tells_nothing(condition: Condition) -> None:
+    p = parameters_for(condition)
+    assert relative_bound(driven("sine", p), p, MOTION) > 0.03  # errata E13
+
+
+def test_a_longer_log_tells_more_and_a_further_sensor_never_less() -> None:
+    p = EhaParameters()
+    record = driven("steps", p)
+    assert relative_bound(record, p, ALL) < relative_bound(record.slice(0, 3_000), p, ALL)
+    assert relative_bound(record, p, ALL) < relative_bound(record, p, MOTION)
+
+
+def test_a_drive_that_is_nothing_tells_nothing_beyond_the_prior() -> None:
+    p = EhaParameters()
+    still = Record(1e-3, {"motor_speed_rad_s": np.zeros(500), "position_m": np.zeros(500)})
+    assert relative_bound(still, p, MOTION) == pytest.approx(3e8 / p.bulk_modulus, rel=1e-6)
+
+
+def test_the_measured_channels_do_not_enter_the_bound() -> None:
+    p = EhaParameters()
+    record = driven("steps", p, 4.0)
+    spoilt = record.replace(velocity_m_s=np.full(len(record), 7.0), differential_pressure_pa=None)
+    assert relative_bound(record, p, ALL) == relative_bound(spoilt, p, ALL)
+
+
+def test_a_model_whose_own_run_explodes_has_no_bound() -> None:
+    p = EhaParameters()
+    fast = Record(1e-3, {"motor_speed_rad_s": np.full(10, 1e300), "position_m": np.zeros(10)})
+    with np.errstate(all="ignore"):
+        assert relative_bound(fast, p, MOTION) == np.inf
+
+
+def test_only_the_bulk_modulus_changes() -> None:
+    assert at_bulk_modulus(EhaParameters(), 1e8) == EhaParameters(bulk_modulus=1e8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("channels", [ALL, MOTION], ids=["with pressure", "motion alone"])
+@EVERY_CONDITION
+def test_no_estimate_is_better_than_the_bound_without_process_noise(
+    condition: Condition, channels: tuple[str, ...]
+) -> None:
+    p = parameters_for(condition)
+    sensors = replace(BENCH, speed_noise=0.0, position_noise=1e-6, position_quantum=0.0, pressure_quantum=0.0)
+    drive = driven("steps", p)["motor_speed_rad_s"]
+    errors: list[float] = []
+    for seed in range(12):
+        record = simulate(LUMPED, drive, 1e-3, p, sensors=sensors, rng=np.random.default_rng(seed))
+        log = record.replace(**dict.fromkeys(set(ALL) - set(channels)))
+        found = estimate_bulk_modulus(log, p, form="pressure", start=2.2e8)
+        assert found.value is not None
+        errors.append(found.value / p.bulk_modulus - 1.0)
+    bound = relative_bound(driven("steps", p), p, channels, sensors, NO_PROCESS_NOISE)
+    assert np.sqrt(np.mean(np.square(errors))) > bound

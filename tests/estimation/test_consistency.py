@@ -1,0 +1,132 @@
+"""A filter that is right is called so, and one that is fooled is told apart, with a reason."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from estimation.bulk_modulus import Outcome, estimate_bulk_modulus
+from estimation.consistency import consistency_gate, mean_chi_square_bounds, nees
+from estimation.ekf import ekf
+from estimation.gaussian import Gaussian
+from estimation.model import ProcessModel
+from estimation.run import Estimate, run_filter
+from faults.conditions import CONDITIONS, Condition, parameters_for
+from plant.eha import EhaParameters
+from plant.record import Record
+from plant.sensors import BENCH
+from plant.signals import make_drive
+from plant.simulate import LUMPED, simulate
+
+Array = NDArray[np.float64]
+RUNS, SAMPLES, SUBSTEPS = 100, 40, 40
+RIG = EhaParameters()
+VARIANCES = {"position_m": 1e-6, "velocity_m_s": 1e-4}
+PRIOR = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1e-4, 1e-2, 1.0]))
+
+
+def true_run(model: ProcessModel, H: Array, F: Array, rng: np.random.Generator) -> tuple[Record, Array]:
+    """Draw a start from the prior, drive the linear system with its own process noise, and measure it."""
+    state = rng.multivariate_normal(PRIOR.mean, PRIOR.covariance)
+    deviations = np.sqrt(np.array([variable.noise_density for variable in model.states]) * 0.01 / SUBSTEPS)
+    step = np.eye(3) + (F - np.eye(3)) / SUBSTEPS
+    speed = np.sin(0.3 * np.arange(SAMPLES))
+    measured = np.empty((SAMPLES, 2))
+    for k in range(SAMPLES):
+        for j in range(SUBSTEPS if k else 0):
+            ramp = speed[k - 1] + (speed[k] - speed[k - 1]) * (j + 0.5) / SUBSTEPS
+            push = np.array([0.0, 0.02 * 0.01 / SUBSTEPS * ramp, 0.0])
+            state = step @ state + push + deviations * rng.standard_normal(3)
+        measured[k] = H @ state + np.sqrt(list(VARIANCES.values())) * rng.standard_normal(2)
+    channels = dict(zip(VARIANCES, measured.T, strict=True))
+    return Record(0.01, {"motor_speed_rad_s": speed, **channels}), state
+
+
+@pytest.fixture(scope="module")
+def linear_runs(linear: ProcessModel, transition: Array, observation: Array) -> list[tuple[Estimate, Array]]:
+    rng = np.random.default_rng(11)
+    runs = [true_run(linear, observation, transition, rng) for _ in range(RUNS)]
+    return [(run_filter(ekf, linear, PRIOR, log, RIG, variances=VARIANCES), state) for log, state in runs]
+
+
+def test_nees_of_a_linear_system_lies_in_its_chi_square_band(linear_runs: list[tuple[Estimate, Array]]) -> None:
+    errors = np.array([estimate.belief.mean - state for estimate, state in linear_runs])
+    covariances = np.array([estimate.belief.covariance for estimate, _ in linear_runs])
+    low, high = mean_chi_square_bounds(3, RUNS, 0.99)
+    assert low < np.mean(nees(errors, covariances)) < high
+    assert np.mean(nees(2.0 * errors, covariances)) > high
+
+
+def test_nis_of_a_linear_system_lies_in_its_chi_square_band(linear_runs: list[tuple[Estimate, Array]]) -> None:
+    total = np.mean([sum(estimate.nis.values()) for estimate, _ in linear_runs])
+    low, high = mean_chi_square_bounds(2, RUNS * SAMPLES, 0.99)
+    assert low < total < high
+
+
+def test_the_band_narrows_with_the_count_and_holds_what_it_says() -> None:
+    narrow, wide = mean_chi_square_bounds(2, 1_000), mean_chi_square_bounds(2, 10)
+    assert wide[0] < narrow[0] < 2.0 < narrow[1] < wide[1]
+    draws = np.mean(np.random.default_rng(0).chisquare(2, (4_000, 10)), axis=1)
+    assert np.mean((draws > wide[0]) & (draws < wide[1])) == pytest.approx(0.95, abs=0.015)
+
+
+def bench_log(parameters: EhaParameters, drive: str = "steps") -> Record:
+    rng = np.random.default_rng(3)
+    speed = make_drive(drive, 10.0, 1e-3, parameters, rng)
+    return simulate(LUMPED, speed, 1e-3, parameters, sensors=BENCH, rng=rng)
+
+
+@pytest.mark.parametrize("drive", ["steps", "sine", "prbs"])
+@pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
+def test_the_gate_passes_on_clean_simulations(condition: Condition, drive: str) -> None:
+    parameters = parameters_for(condition)
+    found = estimate_bulk_modulus(bench_log(parameters, drive), parameters, form="pressure")
+    assert found.outcome is Outcome.OK
+    assert found.gate.reasons == ()
+    assert found.gate.passed
+
+
+def frozen_pressure(record: Record) -> Record:
+    pressure = record["differential_pressure_pa"].copy()
+    pressure[len(pressure) // 3 :] = pressure[len(pressure) // 3]
+    return record.replace(differential_pressure_pa=pressure)
+
+
+def position_in_millimetres(record: Record) -> Record:
+    return record.replace(position_m=1e3 * record["position_m"])
+
+
+@pytest.mark.parametrize("name", ["normal", "minor_leakage", "major_leakage_major_friction"])
+@pytest.mark.parametrize(
+    ("spoil", "channel"),
+    [(frozen_pressure, "differential_pressure_pa"), (position_in_millimetres, "position_m")],
+    ids=["frozen sensor", "unit error of 1000"],
+)
+def test_the_gate_fails_with_a_reason_that_names_the_channel(
+    spoil: Callable[[Record], Record], channel: str, name: str
+) -> None:
+    parameters = parameters_for(CONDITIONS[name])
+    found = estimate_bulk_modulus(spoil(bench_log(parameters)), parameters, form="pressure")
+    assert not found.gate.passed
+    assert any(f"the residuals of {channel} are" in reason for reason in found.gate.reasons)
+
+
+def estimate_with(track: Array, linear: ProcessModel, nis: float = 1.0) -> Estimate:
+    mean = np.column_stack([track, track, track])
+    return Estimate(
+        linear, ("position_m",), np.arange(len(track)), mean, np.full_like(mean, 1e-6), PRIOR,
+        {"position_m": nis}, 0.0, np.empty((0, 1)), np.empty((0, 1)),
+    )  # fmt: skip
+
+
+def test_a_drift_larger_than_its_deviation_allows_is_unsettled(linear: ProcessModel) -> None:
+    still, drifting = np.full(100, 2.0), np.linspace(1.0, 2.0, 100)
+    assert consistency_gate(estimate_with(still, linear), "position_m").passed
+    (reason,) = consistency_gate(estimate_with(drifting, linear), "position_m").reasons
+    assert reason.startswith("position_m still moved by 0.202 over the last fifth")
+
+
+@pytest.mark.parametrize(("nis", "passes"), [(1.0, True), (1.99, True), (2.01, False)])
+def test_residuals_of_twice_the_expected_variance_are_too_many(nis: float, passes: bool, linear: ProcessModel) -> None:
+    assert consistency_gate(estimate_with(np.full(100, 2.0), linear, nis), "position_m").passed is passes
