@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from experiments import cli_conditions, cli_diagnose, cli_estimate, cli_identify, cli_simulate
-from experiments.cli_options import SEED, Json, Seed
-from experiments.cli_streams import HydrostateGroup, emit
-from experiments.json_output import json_text
+from experiments.command import conditions, diagnose, estimate, identify, simulate
+from experiments.command.json_output import json_text
+from experiments.command.options import SEED, Json, Seed
+from experiments.command.streams import HydrostateGroup, emit
 
 EPILOG = """
 Exit codes: 0 all done, not_observable included; 1 some logs failed or diverged, each named on standard error, or an
@@ -67,7 +67,7 @@ def study(
     """
     from rich.console import Console
 
-    from experiments.study_command import study_command
+    from experiments.command.study import study_command
 
     begin = perf_counter()
     report = study_command(out, seed, quick, Console(stderr=True))
@@ -77,9 +77,9 @@ def study(
         emit(str(report))
 
 
-for module in (cli_simulate, cli_estimate, cli_identify, cli_diagnose, cli_conditions):
+for module in (simulate, estimate, identify, diagnose, conditions):
     app.add_typer(module.commands)
-app.add_typer(cli_conditions.rig_commands, name="rig")
+app.add_typer(conditions.rig_commands, name="rig")
 
 
 def main() -> None:

@@ -14,7 +14,7 @@ import pandas as pd
 
 from experiments.figures import FIGURES, draw
 from experiments.figures.style import styled
-from experiments.report import render_report
+from experiments.report.page import render_report
 from experiments.study import StudyResult
 from plant.errors import HydrostateError
 

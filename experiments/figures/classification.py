@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from experiments.figures.style import BLUE, VERMILION, Margins, panels
-from experiments.words import bank_in_words, in_short, in_words
+from experiments.report.words import bank_in_words, in_short, in_words
 
 DARK = 0.25
 """Share of the colour scale below which white ink is read better."""

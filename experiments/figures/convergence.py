@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
 from experiments.figures.style import BLACK, BLUE, SKY, VERMILION, Margins, panels
-from experiments.words import in_words
+from experiments.report.words import in_words
 
 GIGA_TENTH = 1e8
 """Bulk modulus is drawn in units of this many pascal, as in Figure 11."""

@@ -18,7 +18,7 @@ from experiments.figures.style import (
     panels,
     spread_out,
 )
-from experiments.findings import by_experiment, experiment_in_words
+from experiments.report.findings import by_experiment, experiment_in_words
 
 NARROW = 0.035
 """Half-width of the axis of estimates, as a fraction of the truth."""

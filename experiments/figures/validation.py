@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.figures.style import BLACK, BLUE, GREY, VERMILION, Margins, condition_rows, panels
-from experiments.words import in_words
+from experiments.report.words import in_words
 
 MILLI = 1e3
 """Millimetres a metre."""

@@ -88,7 +88,7 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
             ["estimate", "a.csv", "--sart", "1"],
             "hydrostate estimate: No such option: --sart (Possible options: --start",
         ),
-        (["estimate", "a.csv", "--form", "force"], "--form must be one of acceleration, pressure, got 'force'"),
+        (["estimate", "a.csv", "--form", "force"], "--form must be one of acceleration, auto, flow, pressure, got 'force'"),
         (["estimate", "a.csv", "--method", "ukf9"], "--method must be one of ekf, filterpy-ekf, got 'ukf9'"),
         (["estimate", "a.csv", "--condition", "bad"], "condition must be one of normal, minor_leakage"),
         (["diagnose", "a.csv", "--condition", "bad"], "condition must be one of normal, minor_leakage"),
@@ -103,7 +103,7 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
         (["identify", "a.csv", "--order", "0"], "Invalid value for '--order'"),
         (["simulate"], "hydrostate simulate: Missing option '--out' / '-o'."),
         (["simulate", "-o", "a.xls"], "--out must end in .csv"),
-        (["simulate", "-o", "a.csv", "--plant", "toy"], "--plant must be one of reduced, lumped, got 'toy'"),
+        (["simulate", "-o", "a.csv", "--plant", "toy"], "--plant must be one of circuit, lumped, reduced, got 'toy'"),
         (["simulate", "-o", "a.csv", "--drive", "walk"], "--drive must be one of sine"),
         (["simulate", "-o", "a.csv", "--duration", "inf"], "--duration must be positive and finite, got inf s"),
         (["simulate", "-o", "a.csv", "--leakage-severity", "9"], "leakage severity must be between 0 and 5, got 9.0"),
@@ -186,7 +186,7 @@ def test_study_ends_with_the_reports_path(as_json: bool, tmp_path: Path, monkeyp
         asked.append((out, seed, quick))
         return out / "report.html"
 
-    monkeypatch.setitem(sys.modules, "experiments.study_command", SimpleNamespace(study_command=command))
+    monkeypatch.setitem(sys.modules, "experiments.command.study", SimpleNamespace(study_command=command))
     done = invoke("study", "--quick", "--out", tmp_path, "--seed", 7, *(["--json"] if as_json else []))
     assert done.exit_code == 0
     assert asked == [(tmp_path, 7, True)]

@@ -16,7 +16,7 @@ from experiments.figures.convergence import draw_convergence
 from experiments.figures.estimates import draw_estimates, draw_forms
 from experiments.figures.identification import draw_order
 from experiments.figures.style import spread_out, styled
-from experiments.findings import PRESSURE_SINE
+from experiments.report.findings import PRESSURE_SINE
 from experiments.study import StudyResult
 from faults.conditions import CONDITIONS
 

@@ -34,7 +34,7 @@ def test_default_parameters_are_those_of_tables_2_to_4() -> None:
     leakage = load("leakage").set_index("leakage").loc["none"]
     friction = load("friction").set_index("friction").loc["none"]
     by_name = {name: printed[name] for name in printed.index if name in EhaParameters.__dataclass_fields__}
-    assert len(by_name) == 6
+    assert len(by_name) == 7
     from_tables = replace(
         EhaParameters(),
         **by_name,

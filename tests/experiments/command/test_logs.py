@@ -8,7 +8,7 @@ from typer.testing import CliRunner, Result
 import plant.record_files
 from estimation.bulk_modulus import OUTCOMES
 from experiments.cli import app
-from experiments.cli_logs import Batch, read_log
+from experiments.command.logs import Batch, read_log
 from plant.errors import LogError, LogWarning
 from plant.record import Record
 from plant.record_files import read_record, write_record

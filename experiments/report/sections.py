@@ -7,8 +7,8 @@ from typing import Any
 import pandas as pd
 from markupsafe import Markup
 
-from experiments.errata import linked
-from experiments.findings import (
+from experiments.report.errata import linked
+from experiments.report.findings import (
     ExperimentKey,
     Recovery,
     by_experiment,
@@ -16,9 +16,9 @@ from experiments.findings import (
     experiment_in_words,
     recoveries,
 )
+from experiments.report.tables import MINUS, MISSING, Cell, Column, exact, fixed, html_table, number, pretty_unit
+from experiments.report.words import bank_in_words, in_words
 from experiments.study import StudyResult
-from experiments.tables import MINUS, MISSING, Cell, Column, exact, fixed, html_table, number, pretty_unit
-from experiments.words import bank_in_words, in_words
 
 MILLI, KILO_PASCAL, TENTH_GIGA_PASCAL = 1e3, 1e-3, 1e-8
 """From m to mm, from Pa to kPa, from Pa to 1e8 Pa."""

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from estimation.bulk_modulus import Outcome
-from experiments.words import in_words
+from experiments.report.words import in_words
 
 
 class ExperimentKey(NamedTuple):

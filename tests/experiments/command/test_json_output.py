@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from estimation.bulk_modulus import Outcome
-from experiments.json_output import csv_text, json_text, plain, prepare_output, write_results
+from experiments.command.json_output import csv_text, json_text, plain, prepare_output, write_results
 from plant.errors import HydrostateError
 
 

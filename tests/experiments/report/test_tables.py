@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from experiments.tables import TIMES, Cell, Column, exact, fixed, html_table, number, pretty_unit
+from experiments.report.tables import TIMES, Cell, Column, exact, fixed, html_table, number, pretty_unit
 
 
 @pytest.mark.parametrize(

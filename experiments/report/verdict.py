@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from experiments.findings import (
+from experiments.report.findings import (
     POSITION_SINE,
     POSITION_STEPS,
     PRESSURE_SINE,
@@ -14,8 +14,8 @@ from experiments.findings import (
     class_accuracies,
     recoveries,
 )
+from experiments.report.words import TRANSFER_FUNCTIONS, WITH_PRESSURE, WITHOUT_PRESSURE
 from experiments.study import StudyResult
-from experiments.words import TRANSFER_FUNCTIONS, WITH_PRESSURE, WITHOUT_PRESSURE
 
 
 def verdict(result: StudyResult) -> tuple[str, str, str]:

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from experiments.errata import ERRATA
 from experiments.figures import FIGURES
-from experiments.findings import recoveries
+from experiments.report.errata import ERRATA
+from experiments.report.findings import recoveries
+from experiments.report.tables import exact, number
+from experiments.report.verdict import verdict
 from experiments.study import StudyResult
-from experiments.tables import exact, number
-from experiments.verdict import verdict
 
 SECTIONS = (
     "verdict",

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from experiments.cli_logs import Batch, finish
-from experiments.cli_options import SEED, Json, Out, RigFile, Seed, load_rig
-from experiments.cli_streams import emit, table
-from experiments.json_output import Result, prepare_output
+from experiments.command.json_output import Result, prepare_output
+from experiments.command.logs import Batch, finish
+from experiments.command.options import SEED, Json, Out, RigFile, Seed, load_rig
+from experiments.command.streams import emit, table
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.cli_logs import finish, read_log, run_logs
-from experiments.cli_options import (
+from experiments.command.json_output import Result, prepare_output
+from experiments.command.logs import finish, read_log, run_logs
+from experiments.command.options import (
     SEED,
     Columns,
     Json,
@@ -19,8 +20,7 @@ from experiments.cli_options import (
     load_rig,
     require_positive,
 )
-from experiments.cli_streams import short_names, table
-from experiments.json_output import Result, prepare_output
+from experiments.command.streams import short_names, table
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.cli_logs import finish, read_log, run_logs
-from experiments.cli_options import (
+from experiments.command.json_output import Result, prepare_output
+from experiments.command.logs import finish, read_log, run_logs
+from experiments.command.options import (
     PRESSURE,
     SEED,
     Columns,
@@ -20,8 +21,7 @@ from experiments.cli_options import (
     load_columns,
     load_rig,
 )
-from experiments.cli_streams import clauses, note, short_names, table
-from experiments.json_output import Result, prepare_output
+from experiments.command.streams import clauses, note, short_names, table
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

@@ -3,9 +3,9 @@
 import re
 from pathlib import Path
 
-from experiments.errata import ERRATA, linked, linked_errata
+from experiments.report.errata import ERRATA, linked, linked_errata
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_every_erratum_of_the_documents_has_its_line() -> None:

@@ -9,9 +9,9 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from experiments.errata import linked, linked_errata
 from experiments.figures import FIGURES
-from experiments.findings import (
+from experiments.report.errata import linked, linked_errata
+from experiments.report.findings import (
     POSITION_SINE,
     POSITION_STEPS,
     PRESSURE_SINE,
@@ -21,11 +21,11 @@ from experiments.findings import (
     class_accuracies,
     recoveries,
 )
-from experiments.report_tables import report_tables
+from experiments.report.sections import report_tables
+from experiments.report.tables import exact, number
+from experiments.report.verdict import verdict
 from experiments.studies.settings import quick_settings
 from experiments.study import StudyResult
-from experiments.tables import exact, number
-from experiments.verdict import verdict
 from plant.sensors import BENCH
 
 KEY_FIGURE = "convergence_pressure_form"
@@ -48,7 +48,7 @@ def render_report(result: StudyResult, figures: Mapping[str, bytes]) -> str:
         The page; it loads nothing.
     """
     environment = Environment(
-        loader=PackageLoader("experiments", "templates"),
+        loader=PackageLoader("experiments.report", "templates"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import typer
 
-from experiments.cli_streams import INTERRUPTED, SOME_FAILED, USAGE, emit, note, progress, rendered, unexpected
-from experiments.json_output import Result, json_text, write_results
+from experiments.command.json_output import Result, json_text, write_results
+from experiments.command.streams import INTERRUPTED, SOME_FAILED, USAGE, emit, note, progress, rendered, unexpected
 from plant.errors import HydrostateError, LogError, LogWarning
 
 if TYPE_CHECKING:

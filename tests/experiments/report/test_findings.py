@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 
-from experiments.findings import POSITION_SINE, PRESSURE_SINE, PRESSURE_STEPS, class_accuracies, recoveries
+from experiments.report.findings import POSITION_SINE, PRESSURE_SINE, PRESSURE_STEPS, class_accuracies, recoveries
+from experiments.report.verdict import verdict
 from experiments.study import StudyResult
-from experiments.verdict import verdict
 
 
 def _estimates(errors: dict[str, list[float | None]], outcome: str = "ok") -> pd.DataFrame:

@@ -108,16 +108,25 @@ def test_estimate_comes_back_from_every_format(steps: dict[str, Path]) -> None:
         assert modulus["value"] == pytest.approx(found[0]["bulk_modulus_pa"]["value"], rel=1e-6)
 
 
-def test_estimate_keeps_its_contract(steps: dict[str, Path]) -> None:
-    (one,) = results("estimate", steps[".csv"], "--condition", "minor_friction")
+@pytest.mark.parametrize(
+    ("options", "method", "form", "channels"),
+    [
+        ((), "least-squares", "flow", {"position_m", PRESSURE}),
+        (("--form", "pressure"), "ekf", "pressure", {"position_m", "velocity_m_s", PRESSURE}),
+    ],
+)
+def test_estimate_keeps_its_contract(
+    steps: dict[str, Path], options: tuple[str, ...], method: str, form: str, channels: set[str]
+) -> None:
+    (one,) = results("estimate", steps[".csv"], "--condition", "minor_friction", *options)
     assert set(one) >= {"file", "outcome", "bulk_modulus_pa", "nis", "method", "form", "gate", "bound_percent"}
     assert set(one) >= {"condition", "channels", "warnings", "message"}
     assert one["outcome"] in OUTCOME_WORDS
     assert set(one["bulk_modulus_pa"]) == {"value", "std", "ci95"}
     assert set(one["gate"]) == {"passed", "reasons"}
     assert one["gate"] == {"passed": True, "reasons": []}
-    assert set(one["nis"]) == set(one["channels"]) == {"position_m", "velocity_m_s", PRESSURE}
-    assert (one["method"], one["form"], one["condition"]) == ("ekf", "pressure", "minor_friction")
+    assert set(one["nis"]) <= set(one["channels"]) == channels
+    assert (one["method"], one["form"], one["condition"]) == (method, form, "minor_friction")
     assert 0.0 < one["bound_percent"] < 3.0
 
 
@@ -285,3 +294,12 @@ def test_an_actuator_that_is_not_the_papers_comes_back_through_its_rig_file(fold
     (asked,) = results("diagnose", folder / "theirs.csv", "--columns", columns, "--columns", f"{PRESSURE}=DP_BAR:bar")
     assert asked["channels"] == ["velocity_m_s", PRESSURE]
     assert any("none of the nine fits" in warning for warning in asked["warnings"])
+
+
+def test_the_flow_form_needs_no_condition_and_finds_the_leakage(steps: dict[str, Path]) -> None:
+    (one,) = results("estimate", steps[".csv"])
+    low, high = one["leakage_coefficient_m3_s_pa"]["ci95"]
+    assert one["bulk_modulus_pa"]["value"] == pytest.approx(TRUTH, rel=0.005)
+    assert one["leakage_coefficient_m3_s_pa"]["value"] == pytest.approx(4.784e-12, rel=0.03)
+    assert low < one["leakage_coefficient_m3_s_pa"]["value"] < high
+    assert one["flow_bias_m3_s"]["value"] == pytest.approx(2.413e-6, rel=0.05)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.cli_options import (
+from experiments.command.json_output import json_text
+from experiments.command.options import (
     PRESSURE,
     SEED,
     ConditionName,
@@ -19,8 +20,7 @@ from experiments.cli_options import (
     require_one_of,
     require_positive,
 )
-from experiments.cli_streams import emit, note
-from experiments.json_output import json_text
+from experiments.command.streams import emit, note
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:

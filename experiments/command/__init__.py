@@ -1,0 +1,1 @@
+"""The verbs of the command `hydrostate`, one a file, and what they share."""
