@@ -276,14 +276,15 @@ def _verdict(estimate: Estimate, finite: bool, bound: float) -> tuple[Outcome, G
 
 
 def _settled(filtered: Callable[[float], Estimate], guess: float) -> Estimate:
-    """Filter from the first guess; where the gate objects, again from where that ended, and keep the likelier.
+    """Filter from the first guess; where it was far too low or the gate objects, again from where that ended.
 
     A first guess far below the truth predicts no motion at all, and the filter may then spend its prior on the wrong
-    side. The second pass begins near the answer with the same wide prior.
+    side, unnoticed by the gate. The second pass begins near the answer with the same wide prior; the likelier is kept.
     """
     first = filtered(guess)
     value, _ = first.settled(BULK_MODULUS)
-    if not np.isfinite(value) or consistency_gate(first, BULK_MODULUS).passed:
+    near = guess >= 0.5 * value and consistency_gate(first, BULK_MODULUS).passed
+    if near or not np.isfinite(value):
         return first
     second = filtered(max(value, 0.0))
     return second if second.log_likelihood > first.log_likelihood else first

@@ -310,9 +310,10 @@ class _Problem:
 def _log_std(model: GreyBoxModel, slope: Array, errors: Array, count: int) -> Mapping[str, float]:
     """Return standard deviations; an unknown that hardly moves the prediction is left out and called undetermined."""
     felt = np.sqrt(np.einsum("ij,ij->j", slope, slope)) > LEAST_EFFECT
-    covariance = least_squares_covariance(slope[:, felt], errors, count, coloured=True)
     stds = np.full(len(model.unknowns), np.inf)
-    stds[felt] = np.sqrt(np.diag(covariance))
+    if np.any(felt):
+        covariance = least_squares_covariance(slope[:, felt], errors, count, coloured=True)
+        stds[felt] = np.sqrt(np.diag(covariance))
     return dict(zip(model.unknowns, map(float, stds), strict=True))
 
 

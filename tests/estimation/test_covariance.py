@@ -1,0 +1,47 @@
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from estimation.covariance import least_squares_covariance
+from plant.errors import LogWarning
+
+
+def spread_of_estimates(colour: float, runs: int = 300) -> tuple[float, float, float]:
+    """Return the slope's true deviation over many fits, and what white and coloured formulas said on average."""
+    n = 600
+    columns = np.column_stack([np.ones(n), np.sin(np.arange(n) * 0.01)])
+    found, white, coloured = [], [], []
+    for seed in range(runs):
+        noise = lfilter([1.0], [1.0, -colour], np.random.default_rng(seed).standard_normal(n))
+        solution = np.linalg.lstsq(columns, noise, rcond=None)[0]
+        residual = noise - columns @ solution
+        found.append(solution[1])
+        white.append(least_squares_covariance(columns, residual, n, coloured=False)[1, 1])
+        coloured.append(least_squares_covariance(columns, residual, n, coloured=True)[1, 1])
+    return float(np.std(found)), float(np.sqrt(np.mean(white))), float(np.sqrt(np.mean(coloured)))
+
+
+def test_white_noise_is_judged_alike_by_both() -> None:
+    true, white, coloured = spread_of_estimates(0.0)
+    assert white == pytest.approx(true, rel=0.12)
+    assert coloured == pytest.approx(true, rel=0.15)
+
+
+def test_coloured_noise_needs_the_sandwich() -> None:
+    true, white, coloured = spread_of_estimates(0.8)
+    assert white < 0.5 * true
+    assert coloured == pytest.approx(true, rel=0.25)
+
+
+def test_scaling_a_column_scales_its_variance() -> None:
+    rng = np.random.default_rng(1)
+    columns, residual = rng.standard_normal((50, 2)), rng.standard_normal(50)
+    plain = least_squares_covariance(columns, residual, 50, coloured=False)
+    scaled = least_squares_covariance(columns * [1.0, 1e9], residual, 50, coloured=False)
+    np.testing.assert_allclose(scaled, plain / np.outer([1.0, 1e9], [1.0, 1e9]), rtol=1e-9)
+
+
+def test_parameters_that_cannot_be_told_apart_are_warned_of() -> None:
+    column = np.random.default_rng(2).standard_normal(40)
+    with pytest.warns(LogWarning, match="not separately determined"):
+        least_squares_covariance(np.column_stack([column, column]), column, 40, coloured=False)
