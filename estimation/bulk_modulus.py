@@ -159,8 +159,8 @@ def estimate_bulk_modulus(
 ) -> BulkModulusEstimate:
     """Estimate effective bulk modulus from a log.
 
-    With position and ``differential_pressure_pa`` logged, the flow form fits it with leakage and flow bias, and friction
-    plays no part (`estimation.flow`). Without, a filter takes leakage and friction as known and the estimate
+    With position and ``differential_pressure_pa`` logged, the flow form fits it with leakage and flow bias, and
+    friction plays no part (`estimation.flow`). Without, a filter takes leakage and friction as known and the estimate
     rests on how the piston starts, stops and rings; where it sticks there is nothing to rest on, and the outcome says
     so instead of printing a number (errata E13).
 

@@ -5,15 +5,18 @@ is overridden here, the Jacobian is set before each `predict`, and one update ta
 """
 
 import math
+import warnings
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
+from scipy.linalg import LinAlgWarning
 
 from estimation.filter import FilterProblem, Trace, empty_trace
 from estimation.kernels import compile_step
+from estimation.model import ProcessModel
 from plant.integrate import PARAMETER_NAMES
 
 Array = NDArray[np.float64]
@@ -41,34 +44,53 @@ def filterpy_ekf(problem: FilterProblem) -> Trace:
     Returns
     -------
     Trace
-        Its result. The joint innovations are given as the sequential ones that they are equal to, channel by channel;
-        where a sample is missing, residual and variance are NaN.
+        Its result, NaN from where it diverges. The joint innovations are given as the sequential ones that they are
+        equal to, channel by channel; where a sample is missing, residual and variance are NaN.
     """
     trace = empty_trace(problem)
-    H = _observation_matrix(problem)
-    lower, upper = (np.array([getattr(s, end) / s.scale for s in problem.model.states]) for end in ("lower", "upper"))
+    for values in (trace.track, trace.track_variance, trace.residuals, trace.residual_variances):
+        values.fill(np.nan)
+    H, bounds = _observation_matrix(problem), _bounds(problem.model)
     kalman = _ModelFilter(dim_x=problem.model.width, dim_z=len(problem.channels))
     kalman.x, kalman.P = problem.mean.copy(), problem.covariance.copy()
     kalman.Q = np.diag(problem.noise) * problem.sample_time / problem.substeps
-    log_likelihood = 0.0
-    for k, y in enumerate(problem.measured):
-        if k:
-            _predict(kalman, problem, k)
-        present = np.isfinite(y)
-        residual, variance = np.full_like(y, np.nan), np.full_like(y, np.nan)
-        if np.any(present):
-            residual[present], variance[present] = _update(kalman, y[present], H[present], problem.variances[present])
-            kalman.x = np.clip(kalman.x, lower, upper)
-            ratio = residual[present] ** 2 / variance[present]
-            trace.nis[present] += ratio
-            trace.count[present] += 1.0
-            log_likelihood -= 0.5 * float(np.sum(ratio + np.log(2.0 * math.pi * variance[present])))
-        if problem.keep_innovations:
-            trace.residuals[k], trace.residual_variances[k] = residual, variance
-        if k % problem.every == 0:
-            trace.track[k // problem.every] = kalman.x
-            trace.track_variance[k // problem.every] = np.diag(kalman.P)
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", LinAlgWarning)  # a covariance is ill-conditioned long before it is of no use
+        try:
+            log_likelihood = sum(_sample(kalman, problem, trace, H, bounds, k) for k in range(len(problem.measured)))
+        except (np.linalg.LinAlgError, ValueError):  # what numpy and scipy raise of a covariance that is none any more
+            lost = np.full_like(problem.mean, np.nan)
+            return replace(trace, mean=lost, covariance=np.outer(lost, lost), log_likelihood=math.nan)
     return replace(trace, mean=kalman.x, covariance=kalman.P, log_likelihood=log_likelihood)
+
+
+def _sample(
+    kalman: _ModelFilter, problem: FilterProblem, trace: Trace, H: Array, bounds: tuple[Array, Array], k: int
+) -> float:
+    """Predict to sample k and update with it; return its log-likelihood."""
+    if k:
+        _predict(kalman, problem, k)
+    log_likelihood = 0.0
+    y = problem.measured[k]
+    present = np.isfinite(y)
+    if np.any(present):
+        residual, variance = _update(kalman, y[present], H[present], problem.variances[present])
+        kalman.x = np.clip(kalman.x, *bounds)
+        ratio = residual**2 / variance
+        trace.nis[present] += ratio
+        trace.count[present] += 1.0
+        log_likelihood = -0.5 * float(np.sum(ratio + np.log(2.0 * math.pi * variance)))
+        if problem.keep_innovations:
+            trace.residuals[k, present], trace.residual_variances[k, present] = residual, variance
+    if k % problem.every == 0:
+        trace.track[k // problem.every] = kalman.x
+        trace.track_variance[k // problem.every] = np.diag(kalman.P)
+    return log_likelihood
+
+
+def _bounds(model: ProcessModel) -> tuple[Array, Array]:
+    lower = np.array([state.lower / state.scale for state in model.states])
+    return lower, np.array([state.upper / state.scale for state in model.states])
 
 
 def _observation_matrix(problem: FilterProblem) -> Array:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from estimation.model import ProcessModel
 from plant.compiled.expression import ZERO, Expression, as_expression, jacobian, select, symbol, unary
-from plant.compiled.functions import maximum, minimum
+from plant.compiled.functions import where
 from plant.compiled.kernel_file import load_kernel
 from plant.compiled.source import statements
 from plant.integrate import PARAMETER_NAMES, parameter_symbols
@@ -68,10 +68,12 @@ def scaled_step(model: ProcessModel) -> tuple[list[Expression], list[list[Expres
 
 
 def _bounded(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]:
+    """Hold the mean to its physical bounds; what is not a number stays so, for a diverged filter must show."""
     held: list[Expression] = []
     for z, state in zip(mean, model.states, strict=True):
-        low = z if state.lower == -float("inf") else maximum(z, state.lower / state.scale)
-        held.append(low if state.upper == float("inf") else minimum(low, state.upper / state.scale))
+        lower, upper = state.lower / state.scale, state.upper / state.scale
+        low = z if state.lower == -float("inf") else where(z < lower, lower, z)
+        held.append(low if state.upper == float("inf") else where(low > upper, upper, low))
     return held
 
 

@@ -41,6 +41,9 @@ STATES = (
 )
 """The states; oil as its volume at atmospheric pressure, presliding as a fraction of the breakaway deflection."""
 
+TYPICAL = np.array([100.0, 1.0, 1e-2, 1e-2, 1e-5, 1e-5, 1e-5])
+"""How much each state changes in a run [its SI unit], for the tolerances of adaptive solvers."""
+
 
 class Pressures(NamedTuple):
     """Absolute pressures in chambers A and B and in the accumulator [Pa]."""

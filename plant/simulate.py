@@ -128,7 +128,7 @@ CIRCUIT = Plant(
     STATES,
     ros2_step(circuit_derivative),
     lambda states, rows: circuit_channels(states, _circuit_values(rows)),
-    4,
+    2,
     CircuitParameters,
     circuit_of,
     lambda row: np.array(at_rest(_circuit_values(row)), dtype=np.float64),

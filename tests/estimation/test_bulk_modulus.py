@@ -160,7 +160,7 @@ def foreign_logs(folder: Path) -> list[tuple[Record, Condition, float]]:
     ]
 
 
-@pytest.mark.parametrize("form", ["pressure", "auto"])
+@pytest.mark.parametrize("form", ["pressure", pytest.param("auto", marks=pytest.mark.slow)])
 def test_all_18_foreign_logs_give_bulk_modulus_within_ten_percent(form: str, shared: Path) -> None:
     logs = foreign_logs(shared)
     assert len(logs) == 18

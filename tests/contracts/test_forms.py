@@ -1,0 +1,121 @@
+"""What every process model of `FORMS` and every filter of `METHODS` promises."""
+
+import numpy as np
+import pytest
+
+from estimation.bulk_modulus import first_belief
+from estimation.eha import BULK_MODULUS, FORMS
+from estimation.filter import Method
+from estimation.kernels import compile_step
+from estimation.model import ProcessModel
+from estimation.run import METHODS, Estimate, run_filter
+from faults.conditions import CONDITIONS, Condition, parameters_for
+from plant.eha import EhaParameters
+from plant.integrate import parameter_row
+from plant.record import CHANNELS, Record
+from plant.sensors import BENCH
+from plant.signals import sine
+from plant.simulate import LUMPED, simulate
+
+EVERY_FORM = pytest.mark.parametrize("model", FORMS.values(), ids=FORMS)
+EVERY_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+RIG = EhaParameters()
+
+
+def bench_log(parameters: EhaParameters = RIG) -> Record:
+    drive = sine(0.2, 1e-4, parameters.rated_speed, 5.0)
+    return simulate(LUMPED, drive, 1e-4, parameters, sensors=BENCH, rng=np.random.default_rng(0))
+
+
+def filtered(method: Method, model: ProcessModel, record: Record, parameters: EhaParameters = RIG) -> Estimate:
+    return run_filter(method, model, first_belief(model, record, 2e8, 3e8), record, parameters)
+
+
+def test_forms_are_registered_under_their_names() -> None:
+    assert [model.name for model in FORMS.values()] == list(FORMS)
+
+
+@EVERY_FORM
+def test_its_states_are_named_with_their_units_and_scaled_to_order_one(model: ProcessModel) -> None:
+    assert len({state.name for state in model.states}) == model.width
+    for state in model.states:
+        assert state.scale > 0.0
+        assert state.noise_density >= 0.0
+        assert state.lower < state.upper
+        assert CHANNELS.get(state.name, state.unit) == state.unit
+
+
+@EVERY_FORM
+def test_it_holds_bulk_modulus_constant_and_physical(model: ProcessModel) -> None:
+    state = model.states[model.index(BULK_MODULUS)]
+    assert state.lower == 0.0
+    assert state.upper > 2.07e9
+    values = np.array([0.1 * variable.scale for variable in model.states])
+    moved = model.step(tuple(values), (10.0, 12.0), RIG, 1e-4)
+    assert moved[model.index(BULK_MODULUS)] == values[model.index(BULK_MODULUS)]
+
+
+@EVERY_FORM
+def test_it_predicts_motion_linearly_in_its_state(model: ProcessModel) -> None:
+    rng = np.random.default_rng(1)
+    scale = np.array([state.scale for state in model.states])
+    a, b = scale * rng.normal(size=(2, model.width))
+    at_a, at_b, at_sum = (model.observe(tuple(state), RIG) for state in (a, b, a + b))
+    assert {"position_m", "velocity_m_s"} <= set(at_a) <= set(CHANNELS)
+    for channel, value in at_sum.items():
+        assert value == pytest.approx(at_a[channel] + at_b[channel], rel=1e-12)
+
+
+@EVERY_FORM
+def test_the_compiled_step_holds_the_bounds(model: ProcessModel) -> None:
+    scale = np.array([state.scale for state in model.states])
+    state = np.zeros(model.width)
+    state[model.index(BULK_MODULUS)] = -1.0
+    moved, _ = compile_step(model).step(state, 0.0, 0.0, parameter_row(RIG), 1e-4)
+    assert moved[model.index(BULK_MODULUS)] == 0.0
+    assert np.all(np.isfinite(moved * scale))
+
+
+@EVERY_FORM
+@EVERY_METHOD
+@pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
+def test_the_covariance_stays_symmetric_and_positive(method: Method, model: ProcessModel, condition: Condition) -> None:
+    parameters = parameters_for(condition)
+    estimate = filtered(method, model, bench_log(parameters), parameters)
+    covariance = estimate.belief.covariance
+    assert np.all(estimate.variance > 0.0)
+    correlation = covariance / np.outer(estimate.belief.std, estimate.belief.std)
+    np.testing.assert_allclose(correlation, correlation.T, atol=1e-12)
+    assert np.min(np.linalg.eigvalsh(correlation)) > -1e-9
+
+
+@EVERY_FORM
+@EVERY_METHOD
+def test_a_log_with_nothing_measured_leaves_bulk_modulus_as_believed(method: Method, model: ProcessModel) -> None:
+    record = bench_log()
+    channels = {name: np.full(len(record), np.nan) for name in ("position_m", "velocity_m_s")}
+    estimate = filtered(method, model, record.replace(**channels, differential_pressure_pa=None))
+    mean, std = estimate.track(BULK_MODULUS)
+    assert mean[-1] == pytest.approx(2e8)
+    assert std[-1] == pytest.approx(3e8)
+    assert estimate.log_likelihood == 0.0
+
+
+@EVERY_METHOD
+def test_a_filter_that_diverges_returns_that_and_raises_nothing(method: Method) -> None:
+    parameters = parameters_for(CONDITIONS["major_friction"])
+    drive = sine(0.5, 1e-3, parameters.rated_speed, 2.0)
+    record = simulate(LUMPED, drive, 1e-3, parameters, sensors=BENCH, rng=np.random.default_rng(0))
+    estimate = filtered(method, FORMS["acceleration"], record, parameters)  # explicit Euler, four times too long a step
+    assert not np.isfinite(estimate.settled(BULK_MODULUS)[0])
+
+
+@EVERY_FORM
+@EVERY_METHOD
+def test_it_gives_the_same_answer_twice_and_leaves_its_prior_alone(method: Method, model: ProcessModel) -> None:
+    record = bench_log()
+    prior = first_belief(model, record, 2e8, 3e8)
+    first, again = (run_filter(method, model, prior, record, RIG) for _ in range(2))
+    np.testing.assert_array_equal(first.mean, again.mean)
+    np.testing.assert_array_equal(first.belief.covariance, again.belief.covariance)
+    np.testing.assert_array_equal(prior.covariance, first_belief(model, record, 2e8, 3e8).covariance)
