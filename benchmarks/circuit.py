@@ -1,7 +1,8 @@
-"""The circuit plant: nine conditions at 10 kHz by the compiled fixed step, beside scipy's stiff solvers at equal error.
+"""The circuit plant: nine conditions at 10 kHz by a compiled fixed step, beside scipy's stiff solvers at equal error.
 
-Both run in this process on the same drives; scipy gets compiled rates and the analytic Jacobian, and each of its solvers
-the loosest tolerance of a ladder whose error does not exceed ours. Errors are relative RMS against LSODA at 1e-10.
+Both run in this process on the same drives; scipy gets compiled rates and the analytic Jacobian, and each of its
+solvers the loosest tolerance of a ladder whose error does not exceed ours. Errors are relative RMS against LSODA at
+1e-10.
 """
 
 import argparse
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from faults.conditions import CONDITIONS, parameters_for
 from plant.circuit import TYPICAL, circuit_derivative
-from plant.circuit_parameters import CircuitParameters
+from plant.circuit_parameters import CircuitParameters, circuit_of
 from plant.integrate import compile_trajectory, parameter_row
 from plant.reference_solver import Method, reference_trajectory
 from plant.signals import DRIVES, make_drive
@@ -77,8 +78,7 @@ def compare(conditions: list[str], seconds: float) -> pd.DataFrame:
     rows: list[dict[str, object]] = []
     for drive in DRIVES:
         for name in conditions:
-            p = parameters_for(CONDITIONS[name], CircuitParameters())
-            assert isinstance(p, CircuitParameters)
+            p = circuit_of(parameters_for(CONDITIONS[name], CircuitParameters()))
             speed = make_drive(drive, seconds, SAMPLE_TIME, p, np.random.default_rng(1))
             truth = adaptive(p, speed, "LSODA", 1e-10)
             fixed_step(p, speed[:2])
@@ -102,9 +102,8 @@ def compare(conditions: list[str], seconds: float) -> pd.DataFrame:
 
 def nine_conditions(drive: str) -> float:
     """Return the time of nine conditions, 10 s each at 10 kHz, once compiled [s]."""
-    actuators = [parameters_for(condition, CircuitParameters()) for condition in CONDITIONS.values()]
+    circuits = [circuit_of(parameters_for(condition, CircuitParameters())) for condition in CONDITIONS.values()]
     speed = make_drive(drive, 10.0, SAMPLE_TIME, CircuitParameters(), np.random.default_rng(1))
-    circuits = [p for p in actuators if isinstance(p, CircuitParameters)]
     fixed_step(circuits[0], speed[:2])
     return sum(timed(lambda q=p: fixed_step(q, speed))[0] for p in circuits)
 

@@ -88,6 +88,8 @@ class BulkModulusEstimate:
         What was estimated along with it: value and standard deviation in SI, by parameter name.
     estimate : Estimate or None
         The filtered log, where a filter was used.
+    first_pass : Estimate or None
+        The pass that began at the first guess; the same one unless a second, begun where it ended, was likelier.
     """
 
     outcome: Outcome
@@ -100,6 +102,7 @@ class BulkModulusEstimate:
     nis: Mapping[str, float]
     others: Mapping[str, tuple[float, float]]
     estimate: Estimate | None
+    first_pass: Estimate | None
 
     @property
     def interval(self) -> tuple[float, float] | None:
@@ -221,6 +224,7 @@ def _flow_estimate(fit: FlowFit) -> BulkModulusEstimate:
         nis={"differential_pressure_pa": fit.chi_square},
         others={name: found for name, found in fit.parameters.items() if known and name in REPORTED},
         estimate=None,
+        first_pass=None,
     )
 
 
@@ -245,7 +249,7 @@ def _filter_estimate(
         std = bulk_modulus_bound(model, prior, record, actuator, channels=channels, variances=variances, noise=noise)
         return std / bulk_modulus
 
-    estimate = _settled(filtered, guess)
+    estimate, first = _settled(filtered, guess)
     value, std = estimate.settled(BULK_MODULUS)
     nominal = parameters.bulk_modulus
     finite = bool(np.isfinite(value) and np.isfinite(std))
@@ -263,6 +267,7 @@ def _filter_estimate(
         nis=estimate.nis,
         others={},
         estimate=estimate,
+        first_pass=first,
     )
 
 
@@ -275,19 +280,20 @@ def _verdict(estimate: Estimate, finite: bool, bound: float) -> tuple[Outcome, G
     return (Outcome.OK if describes(estimate, BULK_MODULUS) else Outcome.MISMATCH), gate
 
 
-def _settled(filtered: Callable[[float], Estimate], guess: float) -> Estimate:
+def _settled(filtered: Callable[[float], Estimate], guess: float) -> tuple[Estimate, Estimate]:
     """Filter from the first guess; where it was far too low or the gate objects, again from where that ended.
 
     A first guess far below the truth predicts no motion at all, and the filter may then spend its prior on the wrong
-    side, unnoticed by the gate. The second pass begins near the answer with the same wide prior; the likelier is kept.
+    side, unnoticed by the gate. The second pass begins near the answer with the same wide prior; the likelier is
+    returned, and with it the first pass.
     """
     first = filtered(guess)
     value, _ = first.settled(BULK_MODULUS)
     near = guess >= 0.5 * value and consistency_gate(first, BULK_MODULUS).passed
     if near or not np.isfinite(value):
-        return first
+        return first, first
     second = filtered(max(value, 0.0))
-    return second if second.log_likelihood > first.log_likelihood else first
+    return (second if second.log_likelihood > first.log_likelihood else first), first
 
 
 def _chosen(registry: Mapping[str, T], name: str, what: str) -> T:

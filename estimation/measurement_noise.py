@@ -58,7 +58,7 @@ def _variance(channel: str, values: Array) -> float:
     if not len(bends):
         return smallest
     deviation = NORMAL_MAD * float(np.median(np.abs(bends - np.median(bends)))) / np.sqrt(6.0)
-    return max(deviation**2, smallest)
+    return float(max(deviation**2, smallest))
 
 
 def _quantum(values: Array) -> float:

@@ -128,7 +128,7 @@ CIRCUIT = Plant(
     STATES,
     ros2_step(circuit_derivative),
     lambda states, rows: circuit_channels(states, _circuit_values(rows)),
-    2,
+    3,
     CircuitParameters,
     circuit_of,
     lambda row: np.array(at_rest(_circuit_values(row)), dtype=np.float64),
@@ -208,9 +208,29 @@ def simulate(
                 f"the {plant.name} plant stopped at {sample_time * int(np.argmax(broken)):.4f} s: {reason}"
             )
     metadata = {"plant": plant.name, "parameters": asdict(path.parameters[0])}
-    truth = Record(sample_time, {"motor_speed_rad_s": speed, **plant.channels(states, rows)}, metadata)
+    channels = {"motor_speed_rad_s": speed, **plant.channels(states, rows)}
+    if len(channels) > len(LOGGED):
+        channels["motor_voltage_v"] = speed / path.parameters[0].motor_speed_per_volt
+    truth = Record(sample_time, channels, metadata)
     if sensors == IDEAL and rng is None:
         return truth.replace(**{f"true_{name}": truth[name] for name in truth}) if keep_truth else truth
     if rng is None:
         raise HydrostateError("simulate() needs rng for sensors with noise, got None")
-    return measure(truth, sensors, rng, keep_truth=keep_truth)
+    record = measure(truth, sensors, rng, keep_truth=keep_truth)
+    return record.replace(**_measured_beside(truth, sensors, rng))
+
+
+LOGGED = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa")
+"""What every plant has, and `plant.sensors.measure` measures."""
+
+
+def _measured_beside(truth: Record, sensors: Sensors, rng: np.random.Generator) -> Mapping[str, Array]:
+    """Return what is logged beyond `LOGGED`: the voltage as commanded, and each chamber's transducer."""
+    beside = {name: truth[name] for name in truth if name == "motor_voltage_v"}
+    chambers = [name for name in truth if name in ("pressure_a_pa", "pressure_b_pa")]
+    if sensors.pressure:
+        for name, stream in zip(chambers, rng.spawn(len(chambers)), strict=True):
+            noisy = truth[name] + sensors.pressure_noise * stream.standard_normal(len(truth))
+            quantum = sensors.pressure_quantum
+            beside[name] = quantum * np.round(noisy / quantum) if quantum > 0.0 else noisy
+    return beside

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import settings
+from threadpoolctl import threadpool_limits
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -16,6 +17,13 @@ os.environ.setdefault("HYDROSTATE_CACHE", str(ROOT / ".pytest_cache" / "hydrosta
 
 settings.register_profile("ci", derandomize=True, deadline=None, max_examples=50, print_blob=False)
 settings.load_profile("ci")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _one_thread_for_linear_algebra() -> Iterator[None]:
+    """Small matrices on busy cores: the library's own threads only get in each other's way."""
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
 
 
 @pytest.fixture(autouse=True)

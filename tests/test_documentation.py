@@ -201,7 +201,7 @@ def _function_offences(page: Page, node: Function, name: str, owner: ast.ClassDe
     if docstring is None:
         yield page.offence(node, name, "has no docstring")
         return
-    command = page.path.startswith("experiments/cli") and bool(decorators & {"command", "callback"})
+    command = page.path.startswith(("experiments/cli.py", "experiments/command/")) and bool(decorators & {"command", "callback"})
     if command or (owner is not None and "Protocol" in _bases(owner) and _is_stub(node)):
         return
     yield from _argument_offences(page, node, name, _arguments(node, method=owner is not None))

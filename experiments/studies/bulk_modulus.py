@@ -143,11 +143,11 @@ def _row(
 
 
 def _curve(experiment: Experiment, condition: str, start: float, found: BulkModulusEstimate) -> pd.DataFrame:
-    if found.estimate is None:
+    if found.first_pass is None:
         return pd.DataFrame()
-    mean, std = found.estimate.track(BULK_MODULUS)
+    mean, std = found.first_pass.track(BULK_MODULUS)
     every = max(1, len(mean) // TRACK_POINTS)
-    time = found.estimate.time
+    time = found.first_pass.time
     early = np.unique(np.concatenate([np.geomspace(1, len(mean), 60).astype(int) - 1, np.arange(0, len(mean), every)]))
     return pd.DataFrame(
         {

@@ -48,7 +48,7 @@ def case(condition: str, name: str, seconds: float, **changes: float) -> tuple[C
 @pytest.mark.parametrize("name", ["sine", "prbs"])
 def test_ten_kilohertz_is_within_1e_4_of_the_stiff_solver(condition: str, name: str) -> None:
     p, speed = case(condition, name, 0.4)
-    assert error(fixed_step(p, speed, CIRCUIT.substeps), reference(p, speed), p) < 3e-5
+    assert error(fixed_step(p, speed, CIRCUIT.substeps), reference(p, speed), p) < 5e-5
 
 
 @pytest.mark.slow
@@ -56,13 +56,13 @@ def test_ten_kilohertz_is_within_1e_4_of_the_stiff_solver(condition: str, name: 
 @pytest.mark.parametrize("name", DRIVES)
 def test_ten_kilohertz_is_within_1e_4_of_the_stiff_solver_everywhere(condition: str, name: str) -> None:
     p, speed = case(condition, name, 4.0)
-    assert error(fixed_step(p, speed, CIRCUIT.substeps), reference(p, speed, tolerance=1e-9), p) < 3e-5
+    assert error(fixed_step(p, speed, CIRCUIT.substeps), reference(p, speed, tolerance=1e-9), p) < 5e-5
 
 
 @pytest.mark.parametrize("air", [0.02, 0.2])
 def test_air_costs_no_accuracy(air: float) -> None:
     p, speed = case("minor_leakage", "prbs", 0.4, air_fraction=air)
-    assert error(fixed_step(p, speed, CIRCUIT.substeps), reference(p, speed), p) < 3e-5
+    assert error(fixed_step(p, speed, CIRCUIT.substeps), reference(p, speed), p) < 5e-5
 
 
 def test_cavitation_costs_little_accuracy() -> None:
