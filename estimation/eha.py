@@ -109,6 +109,7 @@ ACCELERATION_FORM = ProcessModel(
     ),
     acceleration_step,
     _observe_motion,
+    longest_step=1e-4,
 )
 
 PRESSURE_FORM = ProcessModel(
@@ -121,6 +122,7 @@ PRESSURE_FORM = ProcessModel(
     ),
     pressure_step,
     _observe_motion_and_pressure,
+    longest_step=2.5e-4,
 )
 
 FORMS: Mapping[str, ProcessModel] = {model.name: model for model in (ACCELERATION_FORM, PRESSURE_FORM)}

@@ -11,7 +11,6 @@ from estimation.flow import FLOW_FORM, RELIEVING_FLOW_FORM
 from estimation.greybox import GreyBoxFit, fit_greybox
 from estimation.identification.preprocess import bridged
 from estimation.measurement_noise import measurement_variances
-from estimation.run import LONGEST_STEP
 from plant.eha import EhaParameters
 from plant.errors import LogError
 from plant.integrate import parameter_row
@@ -31,6 +30,9 @@ MAKEUP_TRIED = (1e-9, 1e-13)
 
 LEAD_START = 1e-5
 """First guess of the motor's lead on the straight line between samples [s]."""
+
+LONGEST_STEP = 2.5e-4
+"""Longest step of the chamber balance [s]; slower logs are sub-stepped."""
 
 NEAR_RELIEF = 0.97
 """Share of the relief setting above which the valve is taken to open [fraction]."""

@@ -52,24 +52,3 @@ class Gaussian:
     def std(self) -> Array:
         """Standard deviations, shape (n,)."""
         return np.sqrt(np.diag(self.covariance))
-
-
-@dataclass(frozen=True, eq=False)
-class Innovation:
-    """What one update saw: measured minus predicted, and the variance that the belief gave it.
-
-    Parameters
-    ----------
-    residual : ndarray, shape (m,)
-        Measured minus predicted, one channel at a time; NaN where the sample is missing.
-    variance : ndarray, shape (m,)
-        Its predicted variance, given the channels before it.
-    """
-
-    residual: Array
-    variance: Array
-
-    @property
-    def nis(self) -> float:
-        """Normalised innovation squared: chi-square with as many degrees of freedom as channels present."""
-        return float(np.nansum(self.residual**2 / self.variance))

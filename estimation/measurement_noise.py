@@ -57,7 +57,7 @@ def _variance(channel: str, values: Array) -> float:
     smallest = max(SMALLEST_VARIANCE.get(channel, 0.0), _quantum(values) ** 2 / 12.0)
     if not len(bends):
         return smallest
-    deviation = NORMAL_MAD * float(np.median(np.abs(bends - np.median(bends)))) / np.sqrt(6.0)
+    deviation = NORMAL_MAD * float(np.median(np.abs(bends - np.median(bends)))) / 6.0**0.5
     return float(max(deviation**2, smallest))
 
 

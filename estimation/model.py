@@ -6,7 +6,7 @@ every filter follow from that (`estimation.eha` has two examples).
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import inf
+from math import ceil, inf
 from typing import Any
 
 from plant.compiled.functions import Scalar
@@ -54,12 +54,30 @@ class ProcessModel:
         ``step(state, (speed at start, speed at end), parameters, h)`` in SI.
     observe : callable
         ``observe(state, parameters)``, which returns the predicted value [SI] of each channel that it can predict.
+    longest_step : float
+        Longest step that the model takes well; slower logs are sub-stepped [s].
     """
 
     name: str
     states: tuple[StateVariable, ...]
     step: StepFunction
     observe: Callable[[Any, Any], Mapping[str, Scalar]]
+    longest_step: float
+
+    def substeps(self, sample_time: float) -> int:
+        """Return how many steps of the model a sample needs.
+
+        Parameters
+        ----------
+        sample_time : float
+            Seconds between samples [s].
+
+        Returns
+        -------
+        int
+            At least 1.
+        """
+        return max(1, ceil(sample_time / self.longest_step - 1e-9))
 
     @property
     def width(self) -> int:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import ceil
 from types import MappingProxyType
 
 import numpy as np
@@ -24,9 +23,6 @@ Array = NDArray[np.float64]
 
 METHODS: Mapping[str, Method] = MappingProxyType({"ekf": ekf, "filterpy-ekf": filterpy_ekf})
 """The filters, by name."""
-
-LONGEST_STEP = 2.5e-4
-"""Longest step of a process model [s]; slower logs are sub-stepped."""
 
 TRACK_ROWS = 20_000
 """About how many points of the state's history are kept."""
@@ -166,7 +162,7 @@ def run_filter(
         noise=density / scale**2,
         variances=np.array([spread[channel] for channel in used]),
         sample_time=record.sample_time,
-        substeps=max(1, ceil(record.sample_time / LONGEST_STEP - 1e-9)),
+        substeps=model.substeps(record.sample_time),
         every=max(1, len(record) // TRACK_ROWS),
         keep_innovations=keep_innovations,
     )

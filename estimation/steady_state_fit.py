@@ -72,9 +72,9 @@ class Coefficient:
     Parameters
     ----------
     value, std : float
-        Estimate and standard deviation [the coefficient's SI unit].
+        Estimate and standard deviation [SI].
     low, high : float
-        Ends of its 95 % interval [the same].
+        Ends of its 95 % interval [SI].
     """
 
     value: float
@@ -88,7 +88,7 @@ class Coefficient:
         Parameters
         ----------
         truth : float
-            The value [the coefficient's SI unit].
+            The value [SI].
 
         Returns
         -------

@@ -1,16 +1,15 @@
 """Banks of models, one a condition: the lumped mathematical model, and the identified transfer functions."""
 
 from collections.abc import Mapping
-from math import ceil
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.eha import PRESSURE_FORM
 from estimation.identification.from_record import identify_record
 from estimation.identification.linear_model import LinearModel
 from estimation.identification.preprocess import bridged
-from estimation.run import LONGEST_STEP
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.eha import EhaParameters
 from plant.integrate import compile_trajectory, parameter_row
@@ -62,7 +61,7 @@ def predict_run(record: Record, parameters: EhaParameters) -> Mapping[str, Array
     run = compile_trajectory(LUMPED.name, LUMPED.step, len(LUMPED.states))
     rows = parameter_row(parameters)[None]
     speed = bridged(record["motor_speed_rad_s"])
-    substeps = max(1, ceil(record.sample_time / LONGEST_STEP - 1e-9))
+    substeps = PRESSURE_FORM.substeps(record.sample_time)
     states = run(np.zeros(len(LUMPED.states)), speed, rows, record.sample_time, substeps)
     return LUMPED.channels(states, rows)
 

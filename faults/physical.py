@@ -59,8 +59,9 @@ def throttled(base: CircuitParameters, a_volts: float, b_volts: float) -> Circui
     """Return the circuit with its throttles at other voltages; it was healthy, A shut and B open.
 
     At Table 1's voltages the paper's rig becomes Tables 3 and 4. Throttle A adds a leakage path and its bias, B an
-    orifice's load on the coupled cylinder (a_1); a_2 and a_3 belong to the seals, and run linearly with B's voltage
-    between Table 4's rows and stay at the last. Another rig keeps its own values and has the paper's valves added.
+    orifice's load on the coupled cylinder (a_1); a_2 and a_3 belong to the seals, run linearly with that load between
+    Table 4's rows, so that friction rises at every speed, and stay at the last. Another rig keeps its own values and
+    has the paper's valves added.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ def throttled(base: CircuitParameters, a_volts: float, b_volts: float) -> Circui
     load, open_load = (
         orifice_friction(OIL_DENSITY, PAPER_RIG.piston_area, THROTTLE_B.at(volts)) for volts in (b_volts, 0.0)
     )
-    linear, coulomb = _seals(b_volts)
+    linear, coulomb = _seals(load - open_load)
     return replace(
         base,
         leakage_coefficient=base.leakage_coefficient + (leakage - PAPER_RIG.leakage_coefficient),
@@ -191,11 +192,12 @@ def drifted_relief(base: CircuitParameters, factor: float) -> CircuitParameters:
     return replace(base, relief_pressure=factor * base.relief_pressure)
 
 
-def _seals(b_volts: float) -> tuple[float, float]:
-    """Return what throttle B's voltage goes with in a_2 and a_3, over the healthy values."""
+def _seals(load: float) -> tuple[float, float]:
+    """Return what goes with throttle B's load in a_2 and a_3, over the healthy values, between Table 4's rows."""
     levels = [FRICTION_TABLE[level] for level in LEVELS]
+    loads = [level.friction_quadratic - levels[0].friction_quadratic for level in levels]
     linear, coulomb = (
-        float(np.interp(b_volts, VOLTS_B, [getattr(level, name) - getattr(levels[0], name) for level in levels]))
+        float(np.interp(load, loads, [getattr(level, name) - getattr(levels[0], name) for level in levels]))
         for name in ("friction_linear", "friction_coulomb")
     )
     return linear, coulomb

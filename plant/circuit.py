@@ -46,7 +46,15 @@ TYPICAL = np.array([100.0, 1.0, 1e-2, 1e-2, 1e-5, 1e-5, 1e-5])
 
 
 class Pressures(NamedTuple):
-    """Absolute pressures in chambers A and B and in the accumulator [Pa]."""
+    """Absolute pressures.
+
+    Parameters
+    ----------
+    a, b : float, ndarray or Expression
+        In chambers A and B [Pa].
+    supply : float, ndarray or Expression
+        In the accumulator [Pa].
+    """
 
     a: Scalar
     b: Scalar
@@ -54,7 +62,15 @@ class Pressures(NamedTuple):
 
 
 class OilFlows(NamedTuple):
-    """Net oil into chambers A and B and into the accumulator [m^3/s at atmospheric pressure]; they sum to zero."""
+    """Net flows of oil, as its volume at atmospheric pressure; they sum to zero.
+
+    Parameters
+    ----------
+    a, b : float or Expression
+        Into chambers A and B [m^3/s].
+    supply : float or Expression
+        Into the accumulator [m^3/s].
+    """
 
     a: Scalar
     b: Scalar
@@ -88,7 +104,7 @@ def circuit_pressures(position: Scalar, oil: tuple[Scalar, Scalar, Scalar], p: C
     position : float, ndarray or Expression
         Piston position [m].
     oil : tuple of float, ndarray or Expression
-        Oil in chamber A, in chamber B, in the accumulator [m^3 at atmospheric pressure].
+        Oil in chamber A, in chamber B, in the accumulator, as its volume at atmospheric pressure [m^3].
     p : CircuitParameters or namespace of Expression
         The circuit.
 
@@ -123,7 +139,7 @@ def circuit_flows(speed: Scalar, densities: tuple[Scalar, Scalar], pressures: Pr
     Returns
     -------
     OilFlows
-        Net oil into each [m^3/s at atmospheric pressure].
+        Net oil into each, as its volume at atmospheric pressure [m^3/s].
     """
     density_a, density_b = densities
     dp = pressures.a - pressures.b
@@ -157,7 +173,8 @@ def circuit_derivative(state: CircuitState, command: Scalar, p: CircuitValues) -
     Parameters
     ----------
     state : tuple of float or Expression
-        As named in `STATES`.
+        As named in `STATES`: motor speed [rad/s], presliding [dimensionless], position [m], velocity [m/s], and the
+        oil in chamber A, chamber B and accumulator [m^3].
     command : float or Expression
         Motor speed asked for [rad/s].
     p : CircuitParameters or namespace of Expression

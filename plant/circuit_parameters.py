@@ -57,8 +57,8 @@ class CircuitParameters(EhaParameters):
     ] = 1e-3
     throttle_rated_flow: Annotated[float, SI("m^3/s", "rated flow of a throttle, fully open", "section 3")] = 2.57e-3
     throttle_rated_pressure: Annotated[
-        float, SI("Pa", "pressure drop at the rated flow", "judged: 100 psi, the paper gives none")
-    ] = 6.895e5
+        float, SI("Pa", "pressure drop at the rated flow", "judged: 50 psi, the paper gives none")
+    ] = 3.4475e5
     motor_lag: Annotated[float, SI("s", "time constant of the motor's speed", "judged: the paper gives none")] = 2e-3
     presliding_displacement: Annotated[
         float, SI("m", "deflection at which the seals break loose", "judged: the paper gives none")
@@ -203,7 +203,8 @@ def circuit_of(p: EhaParameters) -> CircuitParameters:
         return p
     paper = CircuitParameters()
     share = min(1.0, p.leakage_coefficient / paper.leakage_coefficient)
-    size = max(1.0, p.chamber_volume / paper.chamber_volume * paper.bulk_modulus / p.bulk_modulus)
+    compliance = p.chamber_volume / p.bulk_modulus * paper.bulk_modulus / paper.chamber_volume
+    size = max(1.0, compliance * max(1.0, p.relief_pressure / paper.relief_pressure))
     return CircuitParameters(
         **asdict(p),
         pump_crossport_leakage=share * paper.pump_crossport_leakage,

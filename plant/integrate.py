@@ -1,15 +1,15 @@
-"""Fixed-step schemes, compiled from a plant's readable functions, and scipy's solvers beside them.
+"""Fixed-step schemes, compiled from a plant's readable functions.
 
 ``ros2`` is a two-stage, second-order, L-stable Rosenbrock method with the analytic Jacobian; ``rk4`` the classical
-explicit one; ``own`` is a plant's own step (the lumped plant's closed-form implicit one). ``scipy`` hands the same
-derivative and its Jacobian to LSODA, as the reference in tests.
+explicit one; a plant may bring a step of its own (the lumped plant's closed-form implicit one). Scipy's solvers, as
+the reference, stand in `plant.reference_solver`.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, fields
 from functools import cache
 from types import SimpleNamespace
-from typing import Any, Literal, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +27,6 @@ Derivative: TypeAlias = Callable[[Any, Scalar, Any], State]
 StepFunction: TypeAlias = Callable[[Any, tuple[Scalar, Scalar], Any, Scalar], State]
 """``step(state, (speed at start, speed at end), parameters, step size)``."""
 
-Scheme: TypeAlias = Literal["own", "ros2", "rk4"]
-
 Trajectory: TypeAlias = Callable[
     [NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float, int], NDArray[np.float64]
 ]
@@ -39,7 +37,18 @@ PARAMETER_NAMES = tuple(field.name for field in fields(EhaParameters))
 
 
 def parameter_symbols(parameter_class: type[EhaParameters] = EhaParameters) -> SimpleNamespace:
-    """Return a namespace with one symbol for each parameter of the actuator."""
+    """Return a namespace with one symbol for each parameter of the actuator.
+
+    Parameters
+    ----------
+    parameter_class : type
+        `EhaParameters`, or a class that adds to it.
+
+    Returns
+    -------
+    namespace
+        Symbols by parameter name.
+    """
     return SimpleNamespace(**{field.name: symbol(field.name) for field in fields(parameter_class)})
 
 
@@ -226,124 +235,3 @@ def compile_trajectory(
         step=statements(outputs, " " * 12),
     )
     return load_kernel(name, source).run
-
-
-def scipy_trajectory(
-    derivative: Derivative,
-    initial: NDArray[np.float64],
-    speed: NDArray[np.float64],
-    parameters: EhaParameters,
-    sample_time: float,
-    *,
-    relative_tolerance: float = 1e-8,
-) -> NDArray[np.float64]:
-    """Integrate with scipy's LSODA and the analytic Jacobian; slow, and the reference in tests.
-
-    Finite-difference Jacobians across ``sign(v)`` give grossly wrong runs from rest, so none are used.
-
-    Parameters
-    ----------
-    derivative : callable
-        ``derivative(state, speed, parameters)``.
-    initial : ndarray, shape (states,)
-        Initial state in SI.
-    speed : ndarray, shape (n,)
-        Motor speed at the samples [rad/s], linear between.
-    parameters : EhaParameters
-        The actuator.
-    sample_time : float
-        Seconds between samples [s].
-    relative_tolerance : float
-        Local error, relative [dimensionless]; the absolute one is this times
-        1 cm, 1 cm/s and 1 m/s^2.
-
-    Returns
-    -------
-    ndarray, shape (n, states)
-        States at the samples.
-
-    Raises
-    ------
-    RuntimeError
-        If the solver gives up.
-    """
-    from scipy.integrate import solve_ivp
-
-    width = len(initial)
-    time = sample_time * np.arange(len(speed))
-    slopes = compile_slopes(derivative, width)
-    row = parameter_row(parameters)
-
-    def rate(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.array(derivative(tuple(x), float(np.interp(t, time, speed)), parameters), dtype=np.float64)
-
-    def slope(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return slopes(x, float(np.interp(t, time, speed)), row)
-
-    scale = np.array([1e-2, 1e-2, 1.0])[:width]
-    solution = solve_ivp(
-        rate,
-        (0.0, float(time[-1])),
-        initial,
-        method="LSODA",
-        t_eval=time,
-        jac=slope,
-        rtol=relative_tolerance,
-        atol=relative_tolerance * scale,
-        max_step=10.0 * sample_time,
-    )
-    if not solution.success:
-        raise RuntimeError(f"scipy's LSODA stopped: {solution.message}")
-    return solution.y.T
-
-
-_SLOPES = '''"""Generated: Jacobian of {name}."""
-
-import math
-
-import numba
-import numpy as np
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def slopes(state, u, parameters):
-    matrix = np.zeros(({width}, {width}))
-{load}
-{body}
-{store}
-    return matrix
-'''
-
-
-@cache
-def compile_slopes(
-    derivative: Derivative, width: int
-) -> Callable[[NDArray[np.float64], float, NDArray[np.float64]], NDArray[np.float64]]:
-    """Generate the analytic Jacobian of a derivative by its state.
-
-    Parameters
-    ----------
-    derivative : callable
-        ``derivative(state, speed, parameters)``.
-    width : int
-        Count of states.
-
-    Returns
-    -------
-    callable
-        ``slopes(state (states,), speed [rad/s], parameter row (parameters,))``, shape (states, states).
-    """
-    state = tuple(symbol(f"x{i}") for i in range(width))
-    rates = derivative(state, symbol("u"), parameter_symbols())
-    rows = jacobian(rates, state)
-    outputs = {f"j{i}{j}": rows[i][j] for i in range(width) for j in range(width) if rows[i][j] is not ZERO}
-    load = [f"    x{i} = state[{i}]" for i in range(width)]
-    load += [f"    {name} = parameters[{i}]" for i, name in enumerate(PARAMETER_NAMES)]
-    source = _SLOPES.format(
-        name=derivative.__name__,
-        width=width,
-        load="\n".join(load),
-        body=statements(outputs, " " * 4),
-        store="\n".join(f"    matrix[{name[1]}, {name[2]}] = {name}" for name in outputs),
-    )
-    return load_kernel(f"slopes_{derivative.__name__}", source).slopes

@@ -62,8 +62,8 @@ def orifice_constant(flow: Scalar, drop: Scalar) -> Scalar:
 def orifice_friction(density: Scalar, piston_area: Scalar, effective_area: Scalar) -> Scalar:
     """Return the quadratic friction that an orifice between the chambers of a coupled cylinder adds.
 
-    The piston pushes ``A v`` through the orifice, which takes the pressure ``rho (A v / (C_d A_o))^2 / 2`` on the area A:
-    the increment of a_1 in equation 5.10 is ``rho A^3 / (2 (C_d A_o)^2)``.
+    The piston pushes ``A v`` through the orifice, which takes the pressure ``rho (A v / (C_d A_o))^2 / 2``, and feels
+    it on the area A: the increment of a_1 in equation 5.10 is ``rho A^3 / (2 (C_d A_o)^2)``.
 
     Parameters
     ----------

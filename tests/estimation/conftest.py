@@ -35,6 +35,7 @@ LINEAR = ProcessModel(
     ),
     _step,
     _observe,
+    2.5e-4,
 )
 
 

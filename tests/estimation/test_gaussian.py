@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.gaussian import Gaussian, Innovation
+from estimation.gaussian import Gaussian
 from plant.errors import HydrostateError
 
 
@@ -34,7 +34,3 @@ def test_a_belief_cannot_be_changed_by_itself_or_by_its_maker() -> None:
 def test_what_is_no_belief_is_refused(mean: np.ndarray, covariance: np.ndarray, message: str) -> None:
     with pytest.raises(HydrostateError, match=message):
         Gaussian(mean, covariance)
-
-
-def test_the_nis_counts_the_channels_that_are_present() -> None:
-    assert Innovation(np.array([2.0, np.nan, 3.0]), np.array([4.0, 1.0, 9.0])).nis == 2.0

@@ -131,7 +131,7 @@ def _observe(state: tuple[Scalar, ...], p: EhaValues) -> Mapping[str, Scalar]:
 
 
 def test_a_filter_that_diverges_says_so_in_its_track() -> None:
-    model = ProcessModel("explosive", (StateVariable("position_m", "m", 1.0, 0.0),), _explode, _observe)
+    model = ProcessModel("explosive", (StateVariable("position_m", "m", 1.0, 0.0),), _explode, _observe, 2.5e-4)
     record = Record(1e-3, {"motor_speed_rad_s": np.zeros(50), "position_m": np.full(50, np.nan)})
     prior = Gaussian(np.ones(1), np.eye(1))
     estimate = run_filter(ekf, model, prior, record, RIG, variances={"position_m": 1.0})

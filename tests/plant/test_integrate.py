@@ -15,15 +15,14 @@ from plant.eha import EhaParameters, lumped_step, reduced_derivative
 from plant.integrate import (
     PARAMETER_NAMES,
     Trajectory,
-    compile_slopes,
     compile_trajectory,
     parameter_row,
     parameter_symbols,
     rk4_step,
     ros2_step,
-    scipy_trajectory,
     solve_linear,
 )
+from plant.reference_solver import compile_model, reference_trajectory
 from plant.simulate import LUMPED, REDUCED
 
 Array = NDArray[np.float64]
@@ -105,7 +104,8 @@ def test_ros2_agrees_with_lsoda_while_nothing_reverses(reduced: Trajectory, cond
     p = parameters_for(condition)
     row = parameter_row(p)[None]
     sliding = reduced(np.array([0.0, 0.02, 0.0]), np.full(501, p.rated_speed), row, MILLISECOND, 80)[-1]
-    wanted = scipy_trajectory(reduced_derivative, sliding, swaying(p), p, MILLISECOND)
+    size = np.array([1e-2, 1e-2, 1.0])
+    wanted = reference_trajectory(reduced_derivative, sliding, swaying(p), p, MILLISECOND, scale=size)
     assert np.all(relative_rms(reduced(sliding, swaying(p), row, MILLISECOND, 80), wanted) < 1e-4)
 
 
@@ -123,7 +123,7 @@ def test_l_stability_damps_what_explicit_steps_blow_up(reduced: Trajectory, expl
 @EVERY_CONDITION
 def test_the_analytic_slopes_are_the_numerical_ones(condition: Condition) -> None:
     p = parameters_for(condition)
-    slopes = compile_slopes(reduced_derivative, 3)
+    _, slopes = compile_model(reduced_derivative, 3, EhaParameters)
     for state in ((0.1, 0.03, 1.0), (-0.1, -0.01, 3.0)):
         x = np.array(state)
         numerical = np.empty((3, 3))
