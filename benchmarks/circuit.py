@@ -111,7 +111,7 @@ def nine_conditions(drive: str) -> float:
 def main(arguments: list[str]) -> int:
     """Print the times and ratios; return how many of the two targets are missed."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=2.0, help="length of each compared run")
+    parser.add_argument("--seconds", type=float, default=1.0, help="length of each compared run [s]")
     parser.add_argument("--all", action="store_true", help="compare in all nine conditions, not in three")
     options = parser.parse_args(arguments)
     nine = {drive: nine_conditions(drive) for drive in DRIVES}

@@ -32,6 +32,9 @@ OUTLIER = 3.0
 LEAST_EFFECT = 1.0
 """An unknown whose logarithm moves the whole prediction by less, in standard deviations of one sample, is not felt."""
 
+SCREENED_SAMPLES = 200_000
+"""A longer log is screened on its beginning."""
+
 SCREENING = 12
 """Evaluations of the model that every start is given."""
 
@@ -237,22 +240,24 @@ def fit_greybox(
     GreyBoxFit
         The best fit.
     """
-    problem = _Problem(model, drives, measured, parameters, sample_time, variance, substeps)
-    screened = [problem.solve(np.log([start[name] for name in model.unknowns]), SCREENING) for start in starts]
+
+    def part(stop: int | None) -> _Problem:
+        return _Problem(model, drives[:stop], measured[:stop], parameters, sample_time, variance, substeps)
+
+    beginning, whole = part(SCREENED_SAMPLES), part(None)
+    screened = [beginning.solve(np.log([start[name] for name in model.unknowns]), SCREENING) for start in starts]
     finalists = sorted(screened, key=lambda solution: float(solution.cost))[:FINALISTS]
-    finished = [problem.solve(solution.x, MOST_EVALUATIONS) for solution in finalists]
+    finished = [whole.solve(solution.x, MOST_EVALUATIONS) for solution in finalists]
     theta = np.asarray(min(finished, key=lambda solution: float(solution.cost)).x, dtype=np.float64)
-    predicted, sensitivity = problem.run(theta, drives, parameters, sample_time, substeps)
-    present, deviation = np.isfinite(measured), float(np.sqrt(variance))
-    errors = np.where(present, (measured - predicted) / deviation, 0.0)
-    slope = np.where(present[:, None], sensitivity / deviation, 0.0)
-    count = int(present.sum())
+    predicted, _ = whole.run(theta, drives, parameters, sample_time, substeps)
+    residual = measured - predicted
+    errors = residual[np.isfinite(residual)] / float(np.sqrt(variance))
     return GreyBoxFit(
         values={name: float(np.exp(value)) for name, value in zip(model.unknowns, theta, strict=True)},
-        log_std=_log_std(model, slope, errors, count),
-        chi_square=float(errors @ errors) / count,
+        log_std=_log_std(model, *whole.predict(tuple(theta))),
+        chi_square=float(np.mean(errors**2)),
         autocorrelation=float(errors[1:] @ errors[:-1] / (errors @ errors)),
-        residual=measured - predicted,
+        residual=residual,
     )
 
 
@@ -307,12 +312,12 @@ class _Problem:
         )
 
 
-def _log_std(model: GreyBoxModel, slope: Array, errors: Array, count: int) -> Mapping[str, float]:
+def _log_std(model: GreyBoxModel, errors: Array, slope: Array) -> Mapping[str, float]:
     """Return standard deviations; an unknown that hardly moves the prediction is left out and called undetermined."""
     felt = np.sqrt(np.einsum("ij,ij->j", slope, slope)) > LEAST_EFFECT
     stds = np.full(len(model.unknowns), np.inf)
     if np.any(felt):
-        covariance = least_squares_covariance(slope[:, felt], errors, count, coloured=True)
+        covariance = least_squares_covariance(slope[:, felt], errors, len(errors), coloured=True)
         stds[felt] = np.sqrt(np.diag(covariance))
     return dict(zip(model.unknowns, map(float, stds), strict=True))
 
