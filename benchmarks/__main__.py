@@ -3,7 +3,7 @@
 import importlib
 import sys
 
-NAMES = ("bulk_modulus", "classification", "foreign_logs", "filter_speed")
+NAMES = ("bulk_modulus", "classification", "foreign_logs", "filter_speed", "circuit")
 """Every benchmark, in the order of `make benchmark`."""
 
 

@@ -87,7 +87,11 @@ IDEAL = Sensors(
 )
 """Sensors that change nothing. Their variances are zero, which a filter cannot use."""
 
-SENSORS: Mapping[str, Sensors] = MappingProxyType({"bench": BENCH, "paper": PAPER, "ideal": IDEAL})
+RIG = Sensors(velocity_from_position=True)
+"""The paper's rig, section 2: an optical encoder whose position is differentiated, and pressure transducers; noise as on
+the reference bench, since the paper gives none."""
+
+SENSORS: Mapping[str, Sensors] = MappingProxyType({"bench": BENCH, "rig": RIG, "paper": PAPER, "ideal": IDEAL})
 """The sensor sets by name."""
 
 

@@ -186,10 +186,7 @@ def import_cycles(sources: Sequence[Source]) -> list[str]:
         TopologicalSorter(edges).prepare()
     except CycleError as error:
         cycle: list[str] = error.args[1][::-1]
-        steps = [
-            f"{known[module].path}:{edges[module][target]} imports {target}"
-            for module, target in pairwise(cycle)
-        ]
+        steps = [f"{known[module].path}:{edges[module][target]} imports {target}" for module, target in pairwise(cycle)]
         return [f"an import cycle: {', '.join(steps)}"]
     return []
 
@@ -283,9 +280,7 @@ def test_cycle_guard_fires_with_every_step() -> None:
         assert step in offence
 
 
-@pytest.mark.parametrize(
-    "deferred", ["def f():\n    import plant.b", "if TYPE_CHECKING:\n    import plant.b"]
-)
+@pytest.mark.parametrize("deferred", ["def f():\n    import plant.b", "if TYPE_CHECKING:\n    import plant.b"])
 def test_cycle_guard_allows_imports_that_wait(deferred: str) -> None:
     assert import_cycles([Source("plant/a.py", deferred), Source("plant/b.py", "import plant.a")]) == []
 

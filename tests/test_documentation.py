@@ -201,7 +201,8 @@ def _function_offences(page: Page, node: Function, name: str, owner: ast.ClassDe
     if docstring is None:
         yield page.offence(node, name, "has no docstring")
         return
-    command = page.path.startswith(("experiments/cli.py", "experiments/command/")) and bool(decorators & {"command", "callback"})
+    inside = page.path.startswith(("experiments/cli.py", "experiments/command/"))
+    command = inside and bool(decorators & {"command", "callback"})
     if command or (owner is not None and "Protocol" in _bases(owner) and _is_stub(node)):
         return
     yield from _argument_offences(page, node, name, _arguments(node, method=owner is not None))
@@ -293,9 +294,7 @@ def test_rule_fires_with_file_and_line(text: str, problem: str) -> None:
         ("*x: float, **y: float", "*x, **y : float", "Times [s].", None),
     ],
 )
-def test_numbers_say_their_unit_or_shape(
-    signature: str, entry: str, description: str, problem: str | None
-) -> None:
+def test_numbers_say_their_unit_or_shape(signature: str, entry: str, description: str, problem: str | None) -> None:
     aliases = '"""A."""\nSpeed: TypeAlias = float | int\nTrack = NDArray[np.float64]\n'
     function = DESCRIBED.format(signature=signature, entry=entry, description=description)
     (page,) = pages({"plant/a.py": aliases + function})

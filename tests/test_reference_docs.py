@@ -21,9 +21,7 @@ LAYERS = ("plant", "estimation", "faults", "experiments")
 TEXTS = {".py", ".html", ".j2", ".md"}
 
 PHYSICS = ("plant/components/", "plant/eha", "plant/piezo", "plant/diaphragm")
-SOURCE = re.compile(
-    r"\b(?:equations?\s+\(?\d|tables?\s+\d|sections?\s+\d|errata\s+E\d|sources?:\s+\w)", re.IGNORECASE
-)
+SOURCE = re.compile(r"\b(?:equations?\s+\(?\d|tables?\s+\d|sections?\s+\d|errata\s+E\d|sources?:\s+\w)", re.IGNORECASE)
 
 ERRATUM = r"E\d+(?:\s*(?:,|and|to)\s*(?:and\s+)?E\d+)*"
 CITATION = re.compile(rf"\berrata[\s#]+({ERRATUM})")
@@ -41,9 +39,7 @@ class Cited:
 
 def read_texts(*folders: str) -> dict[str, str]:
     """Return the text of every source, template and page below these folders, by path."""
-    paths = [
-        path for folder in folders for path in sorted((ROOT / folder).rglob("*")) if path.suffix in TEXTS
-    ]
+    paths = [path for folder in folders for path in sorted((ROOT / folder).rglob("*")) if path.suffix in TEXTS]
     return {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in paths}
 
 

@@ -41,7 +41,10 @@ def simulate(
         ),
     ],
     plant: Annotated[
-        str, typer.Option(metavar="PLANT", help="lumped (5.8 to 5.10, it sticks) or reduced (5.14).")
+        str,
+        typer.Option(
+            metavar="PLANT", help="lumped (5.8 to 5.10, it sticks), reduced (5.14), or circuit (the whole rig)."
+        ),
     ] = "lumped",
     condition: ConditionName = None,
     leakage_severity: Annotated[

@@ -88,7 +88,10 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
             ["estimate", "a.csv", "--sart", "1"],
             "hydrostate estimate: No such option: --sart (Possible options: --start",
         ),
-        (["estimate", "a.csv", "--form", "force"], "--form must be one of auto, flow, acceleration, pressure, got 'force'"),
+        (
+            ["estimate", "a.csv", "--form", "force"],
+            "--form must be one of auto, flow, acceleration, pressure, got 'force'",
+        ),
         (["estimate", "a.csv", "--method", "ukf9"], "--method must be one of ekf, filterpy-ekf, got 'ukf9'"),
         (["estimate", "a.csv", "--condition", "bad"], "condition must be one of normal, minor_leakage"),
         (["diagnose", "a.csv", "--condition", "bad"], "condition must be one of normal, minor_leakage"),

@@ -89,9 +89,7 @@ def test_the_papers_rig_without_change_is_the_level_none() -> None:
 
 @pytest.mark.parametrize("condition", CONDITIONS.values(), ids=lambda c: c.name)
 def test_on_the_papers_rig_every_condition_is_exactly_the_tables(condition: Condition) -> None:
-    wanted = replace(
-        RIG, **asdict(LEAKAGE_TABLE[condition.leakage]), **asdict(FRICTION_TABLE[condition.friction])
-    )
+    wanted = replace(RIG, **asdict(LEAKAGE_TABLE[condition.leakage]), **asdict(FRICTION_TABLE[condition.friction]))
     assert parameters_for(condition) == wanted
 
 
@@ -137,9 +135,7 @@ def test_at_the_highest_leakage_severity_the_rig_still_moves_and_a_little_beyond
     def lost_before_moving(p: EhaParameters) -> float:
         return p.flow_bias + p.leakage_coefficient * p.friction_coulomb / p.piston_area
 
-    one_less, highest = (
-        lost_before_moving(severity(s, 0.0)) for s in (HIGHEST_SEVERITY - 1.0, HIGHEST_SEVERITY)
-    )
+    one_less, highest = (lost_before_moving(severity(s, 0.0)) for s in (HIGHEST_SEVERITY - 1.0, HIGHEST_SEVERITY))
     assert highest < rated_flow(RIG)
     assert highest + 0.6 * (highest - one_less) > rated_flow(RIG)
 
@@ -153,9 +149,7 @@ def test_severity_runs_linearly_between_the_levels_and_beyond() -> None:
 
 @given(a=SEVERITIES)
 def test_a_rig_without_any_leakage_or_coulomb_friction_can_be_made_faulty(a: float) -> None:
-    ideal = EhaParameters(
-        leakage_coefficient=0.0, flow_bias=0.0, friction_coulomb=0.0, friction_quadratic=0.0
-    )
+    ideal = EhaParameters(leakage_coefficient=0.0, flow_bias=0.0, friction_coulomb=0.0, friction_quadratic=0.0)
     faulty = severity(a, a, ideal)
     worse = severity(a + 0.5, a + 0.5, ideal) if a < 4.5 else faulty
     assert 0.0 <= faulty.leakage_coefficient <= worse.leakage_coefficient

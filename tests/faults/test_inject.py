@@ -72,10 +72,7 @@ def test_spread_stays_within_its_widths_and_leaves_geometry_and_pump(seed: int, 
 def test_spread_fills_its_widths_independently() -> None:
     rng = np.random.default_rng(1)
     ratios = np.array(
-        [
-            [getattr(p, n) / getattr(RIG, n) for n in HALF_WIDTHS]
-            for p in (spread(RIG, rng) for _ in range(2000))
-        ]
+        [[getattr(p, n) / getattr(RIG, n) for n in HALF_WIDTHS] for p in (spread(RIG, rng) for _ in range(2000))]
     )
     deviations = np.array(list(HALF_WIDTHS.values())) / np.sqrt(3.0)
     np.testing.assert_allclose(ratios.std(axis=0), deviations, rtol=0.05)
