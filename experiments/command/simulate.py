@@ -63,7 +63,9 @@ def simulate(
     sample_time: Annotated[float, typer.Option(metavar="S", help="Time between samples [s].")] = 1e-4,
     sensors: Annotated[
         str,
-        typer.Option(metavar="SENSORS", help="bench, rig (velocity from the encoder), paper (no differential pressure) or ideal."),
+        typer.Option(
+            metavar="SENSORS", help="bench, rig (velocity from the encoder), paper (no differential pressure) or ideal."
+        ),
     ] = "bench",
     rig: RigFile = None,
     seed: Seed = SEED,

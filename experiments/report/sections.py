@@ -87,6 +87,8 @@ def _conditions(frame: pd.DataFrame) -> Markup:
     exactly: Callable[[float], Cell] = lambda value: Cell(exact(value), "number")  # noqa: E731 - a shared cell writer
     columns = (
         CONDITION,
+        Column("throttle_a_v", "throttle A", "V", words=exactly),
+        Column("throttle_b_v", "throttle B", "V", words=exactly),
         Column("leakage_coefficient_m3_s_pa", "leakage", "m³/(s Pa)", words=exactly),
         Column("flow_bias_m3_s", "flow bias", "m³/s", words=exactly),
         Column("friction_quadratic_n_s2_m2", "friction a₁", "N s²/m²", words=exactly),
@@ -156,7 +158,7 @@ def _estimate(rows: pd.DataFrame, key: ExperimentKey) -> Cell:
         bound = float(rows["bound_percent"].min())
         outcome = str(rows["outcome"].iloc[0]).replace("_", " ")
         return Cell(f"{outcome} (bound {number(bound, 2)} %)" if math.isfinite(bound) else outcome, "none")
-    digits = 4 if key.form == "pressure" or key.plant == "reduced" else 2
+    digits = 4 if key.form in {"pressure", "flow"} or key.plant == "reduced" else 2
     low, high = (number(TENTH_GIGA_PASCAL * value, digits) for value in (values.min(), values.max()))
     worst = number(float(rows["error_percent"].astype(float).abs().max()), 2)
     spread = low if low == high else f"{low} to {high}"
