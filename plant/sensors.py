@@ -88,8 +88,8 @@ IDEAL = Sensors(
 """Sensors that change nothing. Their variances are zero, which a filter cannot use."""
 
 RIG = Sensors(velocity_from_position=True)
-"""The paper's rig, section 2: an optical encoder, its position differentiated, and pressure transducers; noise as on the
-reference bench, since the paper gives none."""
+"""The paper's rig, section 2: an optical encoder, its position differentiated, and pressure transducers; noise as on
+the reference bench, since the paper gives none."""
 
 SENSORS: Mapping[str, Sensors] = MappingProxyType({"bench": BENCH, "rig": RIG, "paper": PAPER, "ideal": IDEAL})
 """The sensor sets by name."""
