@@ -1,7 +1,7 @@
 """How well could anyone do? The posterior Cramér-Rao bound along a drive."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields
 
 import numpy as np
 
@@ -78,7 +78,7 @@ def bulk_modulus_bound(
 
 
 def at_bulk_modulus(parameters: EhaParameters, bulk_modulus: float) -> EhaParameters:
-    """Return the actuator with another bulk modulus.
+    """Return what a process model knows of the actuator, at another bulk modulus.
 
     Parameters
     ----------
@@ -90,6 +90,7 @@ def at_bulk_modulus(parameters: EhaParameters, bulk_modulus: float) -> EhaParame
     Returns
     -------
     EhaParameters
-        The changed copy.
+        A copy of the parameters that every actuator has; a circuit's further ones play no part in a bound.
     """
-    return replace(parameters, bulk_modulus=bulk_modulus)
+    known = {field.name: getattr(parameters, field.name) for field in fields(EhaParameters)}
+    return EhaParameters(**{**known, "bulk_modulus": bulk_modulus})

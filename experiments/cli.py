@@ -1,4 +1,4 @@
-"""The command ``hydrostate``: study, simulate, estimate, identify, diagnose, conditions, rig."""
+"""The command ``hydrostate``: study, circuit, simulate, estimate, identify, diagnose, conditions, rig."""
 
 from importlib.metadata import version
 from pathlib import Path
@@ -75,6 +75,31 @@ def study(
         emit(json_text([{"outcome": "ok", "report": str(report), "seconds": perf_counter() - begin}]))
     else:
         emit(str(report))
+
+
+@app.command(epilog="Example: hydrostate circuit --out results/circuit --seed 2024")
+def circuit(
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the tables.")] = Path(
+        "results/circuit"
+    ),
+    seed: Seed = SEED,
+    as_json: Json = False,
+) -> None:
+    """Repeat the paper's experiments (Figures 3 to 11, section 4) on the circuit plant; write them as tables.
+
+    The circuit plant has two chambers, make-up, relief, throttles, presliding friction and motor lag, which no filter
+    here assumes. Takes about a minute. The last line of standard output is the manifest's path.
+    """
+    from rich.console import Console
+
+    from experiments.command.circuit import circuit_command
+
+    begin = perf_counter()
+    manifest = circuit_command(out, seed, Console(stderr=True))
+    if as_json:
+        emit(json_text([{"outcome": "ok", "manifest": str(manifest), "seconds": perf_counter() - begin}]))
+    else:
+        emit(str(manifest))
 
 
 for module in (simulate, estimate, identify, diagnose, conditions):

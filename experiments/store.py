@@ -3,7 +3,7 @@
 import json
 import os
 import shutil
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -50,16 +50,52 @@ def write_study(result: StudyResult, folder: Path) -> Path:
     HydrostateError
         If the folder holds anything that no study wrote, or cannot be written.
     """
+    _write_whole(folder, lambda temporary: _fill(temporary, result))
+    return folder / "report.html"
+
+
+def write_tables(tables: Mapping[str, pd.DataFrame], manifest: Mapping[str, Any], folder: Path) -> Path:
+    """Write a study that is tables alone, as one folder, replacing an earlier study's.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        What was found, by name.
+    manifest : Mapping[str, Any]
+        What it takes to run it again; its ``study`` names it.
+    folder : Path
+        The folder; new, empty, or an earlier study's result.
+
+    Returns
+    -------
+    Path
+        The manifest, ``manifest.json``.
+
+    Raises
+    ------
+    HydrostateError
+        If the folder holds anything that no study wrote, or cannot be written.
+    """
+
+    def fill(temporary: Path) -> None:
+        (temporary / "tables").mkdir(parents=True)
+        _write_frames(temporary / "tables", tables)
+        _write_manifest(temporary, manifest)
+
+    _write_whole(folder, fill)
+    return folder / "manifest.json"
+
+
+def _write_whole(folder: Path, fill: Callable[[Path], None]) -> None:
     target = check_target(folder)
     temporary = target.with_name(f".{target.name}.{token_hex(4)}.tmp")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with _removed_on_failure(temporary):
-            _fill(temporary, result)
+            fill(temporary)
             _swap(temporary, target)
     except OSError as error:
         raise _unwritable(folder, error) from error
-    return folder / "report.html"
 
 
 def check_target(folder: Path) -> Path:
@@ -155,8 +191,12 @@ def _fill(folder: Path, result: StudyResult) -> None:
     _write_json(folder / "transfer_functions.json", {name: model.to_dict() for name, model in result.library.items()})
     report = render_report(result, _write_figures(folder / "figures", result))
     (folder / "report.html").write_text(report, encoding="utf-8")
+    _write_manifest(folder, result.manifest)
+
+
+def _write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
     files = [path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()]
-    _write_json(folder / "manifest.json", {**result.manifest, "files": sorted([*files, "manifest.json"])})
+    _write_json(folder / "manifest.json", {**manifest, "files": sorted([*files, "manifest.json"])})
 
 
 def _write_frames(folder: Path, frames: Mapping[str, pd.DataFrame], float_format: str | None = None) -> None:
