@@ -104,8 +104,8 @@ def bulk_modulus_study(
 
 
 def _starts(experiment: Experiment, settings: StudySettings) -> tuple[float, ...]:
-    """Return the first guesses; the flow form tries starts of its own beside one, so the extremes are enough."""
-    return (settings.starts[0], settings.starts[-1]) if experiment.form == "flow" else settings.starts
+    """Return the first guesses; the flow form tries starts of its own beside one, so the lowest is enough."""
+    return settings.starts[:1] if experiment.form == "flow" else settings.starts
 
 
 def _run(experiment: Experiment, condition: str, parameters: EhaParameters, settings: StudySettings) -> Record:

@@ -47,4 +47,4 @@ def quick_settings(seed: int) -> StudySettings:
     StudySettings
         The small size.
     """
-    return StudySettings(seed=seed, starts=(0.0, 5e8), duration=5.0, identification_duration=8.0, seeds=2)
+    return StudySettings(seed=seed, starts=(0.0, 5e8), duration=4.0, identification_duration=8.0, seeds=2)
