@@ -58,7 +58,9 @@ def study(
         "results/nine-conditions"
     ),
     seed: Seed = SEED,
-    quick: Annotated[bool, typer.Option("--quick", help="A smaller study, in under 20 s once kernels are compiled.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A smaller study, in under 20 s once kernels are compiled.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Simulate, estimate, identify and diagnose the nine conditions; write a report beside the published results.
