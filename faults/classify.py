@@ -21,9 +21,6 @@ from plant.sensors import differentiated
 
 Array = NDArray[np.float64]
 
-SCORED = ("velocity_m_s", "differential_pressure_pa")
-"""Channels whose error counts. Position is left out: it drifts with every error in velocity."""
-
 POSITION_WINDOW = 0.01
 """Window over which position is differentiated where velocity was not logged [s]; two samples of a slower log."""
 
@@ -74,7 +71,8 @@ def score_mathematical(record: Record, bank: Mapping[str, EhaParameters], *, pre
 
     Where one channel counts, the score is its RMSE in SI. Where velocity and differential pressure both count, each
     RMSE is divided by the channel's own root mean square in the log and the score is the root mean square of the
-    two [dimensionless]: friction shows in pressure, leakage in velocity.
+    two [dimensionless]: friction shows in pressure, leakage in velocity. Position does not count: it
+    drifts with every error in velocity.
 
     Parameters
     ----------

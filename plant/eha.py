@@ -57,7 +57,7 @@ class EhaParameters:
     motor_speed_per_volt: Annotated[
         float, SI("rad/(s V)", "motor speed a volt of command", "section 7: 4 V is 1200 rpm, errata E1")
     ] = 31.41592653589793
-    motor_speed_limit: Annotated[float, SI("rad/s", "highest motor speed", "section 5: 8 V input mean")] = 251.4
+    motor_speed_limit: Annotated[float, SI("rad/s", "highest motor speed", "section 4: 8 V input mean")] = 251.4
     stroke: Annotated[float, SI("m", "full stroke of the piston", "judged: the paper gives none")] = 0.25
 
     def __post_init__(self) -> None:
