@@ -1,12 +1,16 @@
-"""Scipy's stiff solvers on a compiled model with its analytic Jacobian: the peer of the fixed-step kernels.
+"""Stiff solvers of scipy and SUNDIALS on a compiled model with its analytic Jacobian: the peers of our kernels.
 
-Finite-difference Jacobians across ``sign(v)`` give grossly wrong runs from rest, so none are used.
+Finite-difference Jacobians across ``sign(v)`` give grossly wrong runs from rest, so none are used. A solver stops at
+the drive's corners or takes no step longer than ten samples, lest it miss one.
 """
 
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from functools import cache
-from typing import Literal, TypeAlias
+from importlib import import_module
+from itertools import pairwise
+from types import ModuleType
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +19,16 @@ from plant.compiled.expression import ZERO, jacobian, symbol
 from plant.compiled.kernel_file import load_kernel
 from plant.compiled.source import statements
 from plant.eha import EhaParameters
+from plant.errors import HydrostateError
 from plant.integrate import Derivative, parameter_row, parameter_symbols
 
 Array: TypeAlias = NDArray[np.float64]
 
-Method: TypeAlias = Literal["LSODA", "Radau", "BDF"]
+Method: TypeAlias = Literal["LSODA", "Radau", "BDF", "odeint", "CVODE"]
+"""Scipy's ``solve_ivp`` by its three stiff methods, its ``odeint`` (LSODA without its overhead), SUNDIALS' CVODE."""
+
+CORNER = 1e-2
+"""Bend of the drive, relative to its largest value, at which a solver may be told to stop."""
 
 _MODEL = '''"""Generated: rates of {name} and their Jacobian."""
 
@@ -45,10 +54,33 @@ def slopes(state, u, parameters):
 {slope_body}
 {slope_store}
     return matrix
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def rates_at(t, state, speed, piece, sample_time, parameters):
+    place = t / sample_time
+    k = min(max(int(place), piece[0]), piece[1] - 1)
+    return rates(state, speed[k] + (place - k) * (speed[k + 1] - speed[k]), parameters)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def slopes_at(t, state, speed, piece, sample_time, parameters):
+    place = t / sample_time
+    k = min(max(int(place), piece[0]), piece[1] - 1)
+    return slopes(state, speed[k] + (place - k) * (speed[k + 1] - speed[k]), parameters)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def fill_rates(t, state, result, held):
+    result[:] = rates_at(t, state, held[0], held[1], held[2], held[3])
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def fill_slopes(t, state, rates, result, held):
+    result[:] = slopes_at(t, state, held[0], held[1], held[2], held[3])
 '''
 
 
-@cache
 def compile_model(
     derivative: Derivative, width: int, parameter_class: type[EhaParameters]
 ) -> tuple[Callable[[Array, float, Array], Array], Callable[[Array, float, Array], Array]]:
@@ -69,6 +101,12 @@ def compile_model(
         ``rates(state (states,), speed [rad/s], parameter row)``, shape (states,), and ``slopes`` of the same, shape
         (states, states).
     """
+    module = _compiled(derivative, width, parameter_class)
+    return module.rates, module.slopes
+
+
+@cache
+def _compiled(derivative: Derivative, width: int, parameter_class: type[EhaParameters]) -> ModuleType:
     state = tuple(symbol(f"x{i}") for i in range(width))
     found = derivative(state, symbol("u"), parameter_symbols(parameter_class))
     rows = jacobian(found, state)
@@ -85,8 +123,27 @@ def compile_model(
         slope_body=statements(slopes, " " * 4),
         slope_store="\n".join(f"    matrix[{name[1:].replace('_', ', ')}] = {name}" for name in slopes),
     )
-    module = load_kernel(f"model_{derivative.__name__}", source)
-    return module.rates, module.slopes
+    return load_kernel(f"model_{derivative.__name__}", source)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """A run for a stiff solver; while it works on one piece of the drive it sees that piece's line go on forever."""
+
+    model: ModuleType
+    initial: Array
+    speed: Array
+    row: Array
+    sample_time: float
+    relative: float
+    absolute: Array
+    longest: float
+    corners: tuple[int, ...]
+    piece: NDArray[np.int64]
+
+    @property
+    def held(self) -> tuple[Array, NDArray[np.int64], float, Array]:
+        return self.speed, self.piece, self.sample_time, self.row
 
 
 def reference_trajectory(
@@ -99,8 +156,9 @@ def reference_trajectory(
     scale: Array,
     relative_tolerance: float = 1e-8,
     method: Method = "LSODA",
+    stop_at_corners: bool = False,
 ) -> Array:
-    """Integrate with one of scipy's stiff solvers.
+    """Integrate with a stiff solver of scipy or SUNDIALS.
 
     Parameters
     ----------
@@ -118,8 +176,10 @@ def reference_trajectory(
         How much each state changes [SI]; the absolute tolerance is the relative one times this.
     relative_tolerance : float
         Local error, relative [dimensionless].
-    method : {"LSODA", "Radau", "BDF"}
-        Which solver.
+    method : {"LSODA", "Radau", "BDF", "odeint", "CVODE"}
+        Which solver; CVODE needs the package scikit-sundae.
+    stop_at_corners : bool
+        Whether the solver stops and starts anew where the drive bends sharply, instead of taking short steps only.
 
     Returns
     -------
@@ -130,29 +190,113 @@ def reference_trajectory(
     ------
     RuntimeError
         If the solver gives up.
+    HydrostateError
+        If CVODE is asked for and not installed.
     """
+    bends = np.abs(np.diff(speed, 2)) > CORNER * np.max(np.abs(speed))
+    problem = _Problem(
+        _compiled(derivative, len(initial), type(parameters)),
+        initial,
+        np.ascontiguousarray(speed, dtype=np.float64),
+        parameter_row(parameters),
+        sample_time,
+        relative_tolerance,
+        relative_tolerance * scale,
+        np.inf if stop_at_corners else 10.0 * sample_time,
+        tuple((1 + np.flatnonzero(bends)).tolist()) if stop_at_corners else (),
+        np.array([0, len(speed) - 1]),
+    )
+    if method == "odeint":
+        return _by_odeint(problem)
+    return _by_pieces(problem, _cvode_pieces(problem) if method == "CVODE" else _ivp_pieces(problem, method))
+
+
+Pieces: TypeAlias = Callable[[Array, Array], Array]
+"""``solve(times, state at the first)``: the states at the times."""
+
+
+def _by_pieces(problem: _Problem, solve: Pieces) -> Array:
+    states = np.empty((len(problem.speed), len(problem.initial)))
+    states[0] = problem.initial
+    for first, last in pairwise((0, *problem.corners, len(problem.speed) - 1)):
+        problem.piece[:] = first, last
+        times = np.arange(first, last + 1, dtype=np.float64) * problem.sample_time
+        states[first : last + 1] = solve(times, states[first])
+    return states
+
+
+def _ivp_pieces(problem: _Problem, method: Literal["LSODA", "Radau", "BDF"]) -> Pieces:
     from scipy.integrate import solve_ivp
 
-    rates, slopes = compile_model(derivative, len(initial), type(parameters))
-    row = parameter_row(parameters)
-    last = len(speed) - 2
+    rates, slopes, held = problem.model.rates_at, problem.model.slopes_at, problem.held
 
-    def speed_at(t: float) -> float:
-        place = t / sample_time
-        k = min(int(place), last)
-        return float(speed[k] + (place - k) * (speed[k + 1] - speed[k]))
+    def solve(times: Array, state: Array) -> Array:
+        solution = solve_ivp(
+            lambda t, x: rates(t, x, *held),
+            (float(times[0]), float(times[-1])),
+            state,
+            method=method,
+            t_eval=times,
+            jac=lambda t, x: slopes(t, x, *held),
+            rtol=problem.relative,
+            atol=problem.absolute,
+            max_step=problem.longest,
+        )
+        if not solution.success:
+            raise RuntimeError(f"scipy's {method} stopped: {solution.message}")
+        return solution.y.T
 
-    solution = solve_ivp(
-        lambda t, x: rates(x, speed_at(t), row),
-        (0.0, sample_time * (len(speed) - 1)),
-        initial,
-        method=method,
-        t_eval=sample_time * np.arange(len(speed)),
-        jac=lambda t, x: slopes(x, speed_at(t), row),
-        rtol=relative_tolerance,
-        atol=relative_tolerance * scale,
-        max_step=10.0 * sample_time,
+    return solve
+
+
+def _by_odeint(problem: _Problem) -> Array:
+    from scipy import integrate
+
+    odeint: Any = integrate.odeint  # the stubs take no array of tolerances
+    times = problem.sample_time * np.arange(len(problem.speed))
+    states, notes = odeint(
+        problem.model.rates_at,
+        problem.initial,
+        times,
+        args=problem.held,
+        Dfun=problem.model.slopes_at,
+        rtol=problem.relative,
+        atol=problem.absolute,
+        tcrit=times[list(problem.corners)],
+        hmax=0.0 if problem.corners or np.isinf(problem.longest) else problem.longest,
+        mxstep=_MOST_STEPS,
+        tfirst=True,
+        full_output=True,
     )
-    if not solution.success:
-        raise RuntimeError(f"scipy's {method} stopped: {solution.message}")
-    return solution.y.T
+    if notes["message"] != "Integration successful.":
+        raise RuntimeError(f"scipy's odeint stopped: {notes['message']}")
+    return states
+
+
+def _cvode_pieces(problem: _Problem) -> Pieces:
+    try:
+        cvode = import_module("sksundae.cvode")
+    except ModuleNotFoundError as error:
+        raise HydrostateError("CVODE needs the package scikit-sundae, which is not installed") from error
+    solver = cvode.CVODE(
+        problem.model.fill_rates,
+        jacfn=problem.model.fill_slopes,
+        userdata=problem.held,
+        rtol=problem.relative,
+        atol=problem.absolute,
+        max_num_steps=_MOST_STEPS,
+        max_step=0.0 if np.isinf(problem.longest) else problem.longest,
+    )
+
+    def solve(times: Array, state: Array) -> Array:
+        asked = times if len(times) > 2 else np.array([times[0], 0.5 * (times[0] + times[1]), times[1]])
+        solution = solver.solve(asked, state)
+        if not solution.success:
+            raise RuntimeError(f"CVODE stopped: {solution.message}")
+        return solution.y if len(times) > 2 else solution.y[::2]
+
+    return solve
+
+
+_MOST_STEPS = 100_000
+"""Steps between two samples after which a solver gives up."""

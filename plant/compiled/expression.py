@@ -261,14 +261,28 @@ def ordered(outputs: Iterable[Expression]) -> list[Expression]:
     return order
 
 
-def _local_derivatives(item: Expression) -> Sequence[Expression]:
-    """Return the derivative of a node with respect to each argument; signs and choices are held constant."""
+def local_derivatives(item: Expression) -> Sequence[Expression]:
+    """Return the derivative of a node with respect to each argument; signs and choices are held constant.
+
+    Parameters
+    ----------
+    item : Expression
+        An operation.
+
+    Returns
+    -------
+    sequence of Expression
+        One derivative an argument.
+
+    Raises
+    ------
+    NotImplementedError
+        If the operation has none yet.
+    """
     a = item.arguments[0]
     match item.operation:
-        case "+":
-            return ONE, ONE
-        case "-":
-            return ONE, -ONE
+        case "+" | "-":
+            return ONE, ONE if item.operation == "+" else -ONE
         case "*":
             return item.arguments[1], a
         case "/":
@@ -276,17 +290,17 @@ def _local_derivatives(item: Expression) -> Sequence[Expression]:
             return ONE / b, -(item / b)
         case "abs":
             return (unary("sign", a),)
-        case "sign":
-            return (ZERO,)
         case "sqrt":
             return (0.5 / item,)
         case "exp":
             return (item,)
+        case "log":
+            return (ONE / a,)
         case "tanh":
             return (ONE - item * item,)
         case "where":
             return ZERO, select(a, ONE, ZERO), select(a, ZERO, ONE)
-        case "<" | "<=" | ">" | ">=" | "present":
+        case "sign" | "<" | "<=" | ">" | ">=" | "present":
             return tuple(ZERO for _ in item.arguments)
         case _:
             raise NotImplementedError(f"operation {item.operation!r} has no derivative yet")
@@ -308,7 +322,7 @@ def jacobian(outputs: Sequence[Expression], inputs: Sequence[Expression]) -> lis
         ``result[i][j]`` is the derivative of output i by input j; `ZERO` where it vanishes structurally.
     """
     order = ordered(outputs)
-    locals_of = {id(item): _local_derivatives(item) for item in order if item.arguments}
+    locals_of = {id(item): local_derivatives(item) for item in order if item.arguments}
     columns: list[dict[int, Expression]] = []
     for variable in inputs:
         tangent: dict[int, Expression] = {id(variable): ONE}

@@ -51,6 +51,22 @@ def exp(x: Scalar) -> Scalar:
     return _apply("exp", x)
 
 
+def log(x: Scalar) -> Scalar:
+    """Return the natural logarithm.
+
+    Parameters
+    ----------
+    x : float, ndarray of shape (runs,), or Expression
+        Positive, dimensionless.
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Its logarithm.
+    """
+    return _apply("log", x)
+
+
 def tanh(x: Scalar) -> Scalar:
     """Return the hyperbolic tangent.
 

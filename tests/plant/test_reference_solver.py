@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant.circuit import TYPICAL, circuit_derivative
+from plant.circuit import circuit_derivative, circuit_scales
 from plant.circuit_parameters import CircuitParameters
 from plant.integrate import parameter_row
 from plant.reference_solver import Method, compile_model, reference_trajectory
@@ -14,6 +14,7 @@ from plant.simulate import CIRCUIT
 
 PAPER = CircuitParameters()
 ROW = parameter_row(PAPER)
+SCALES = circuit_scales(PAPER)
 START = CIRCUIT.start(ROW)
 DRIVE = sine(0.02, 1e-4, PAPER.rated_speed, 50.0)
 
@@ -22,11 +23,11 @@ DRIVE = sine(0.02, 1e-4, PAPER.rated_speed, 50.0)
 def test_the_solvers_agree(method: Method) -> None:
     one, other = (
         reference_trajectory(
-            circuit_derivative, START, DRIVE, PAPER, 1e-4, scale=TYPICAL, relative_tolerance=1e-9, method=which
+            circuit_derivative, START, DRIVE, PAPER, 1e-4, scale=SCALES, relative_tolerance=1e-9, method=which
         )
         for which in ("LSODA", method)
     )
-    assert np.max(np.abs(one - other) / TYPICAL) < 1e-5
+    assert np.max(np.abs(one - other) / SCALES) < 1e-5
 
 
 def test_the_compiled_rates_are_the_plain_functions() -> None:
@@ -42,7 +43,7 @@ def test_the_analytic_slopes_are_the_numerical_ones() -> None:
     found = slopes(state, 60.0, ROW)
     for j in range(7):
         step = np.zeros(7)
-        step[j] = 1e-5 * TYPICAL[j]
+        step[j] = 1e-5 * SCALES[j]
         numerical = (rates(state + step, 60.0, ROW) - rates(state - step, 60.0, ROW)) / (2.0 * step[j])
         np.testing.assert_allclose(found[:, j], numerical, rtol=1e-5, atol=1e-5 * float(np.max(np.abs(numerical))))
 
@@ -51,4 +52,4 @@ def test_a_solver_that_gives_up_says_so() -> None:
     hopeless = replace(PAPER, end_stop_stiffness=1e300, stroke=1e-6)
     drive = np.full(200, PAPER.rated_speed)
     with np.errstate(all="ignore"), pytest.raises(RuntimeError, match="scipy's Radau stopped"):
-        reference_trajectory(circuit_derivative, START, drive, hopeless, 1e-4, scale=TYPICAL, method="Radau")
+        reference_trajectory(circuit_derivative, START, drive, hopeless, 1e-4, scale=SCALES, method="Radau")

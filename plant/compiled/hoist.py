@@ -1,0 +1,77 @@
+"""Splits a graph into what is the same at every step, computed once, and what is not."""
+
+from collections.abc import Collection, Mapping, Sequence, Set
+
+from plant.compiled.expression import Expression, ordered, symbol
+
+
+def hoisted(
+    outputs: Mapping[str, Expression], varying: Set[str], prefix: str
+) -> tuple[dict[str, Expression], dict[str, Expression]]:
+    """Move every largest sub-expression of unvarying symbols out of the outputs.
+
+    Parameters
+    ----------
+    outputs : Mapping[str, Expression]
+        What is computed at every step, by the variable that receives it.
+    varying : set of str
+        Symbols whose value changes from step to step.
+    prefix : str
+        Beginning of the new symbols' names; a number follows.
+
+    Returns
+    -------
+    tuple of dict[str, Expression]
+        The constants by their new names, to be computed once, and the outputs in terms of them.
+
+    Examples
+    --------
+    >>> a, b, x = symbol("a"), symbol("b"), symbol("x")
+    >>> constants, rest = hoisted({"y": x * (a / b) + a}, {"x"}, "c")
+    >>> [c.operation for c in constants.values()], rest["y"].operation
+    (['/', 'symbol'], '+')
+    """
+    order = ordered(outputs.values())
+    symbols = {str(item.value) for item in order if item.operation == "symbol"}
+    settled = settled_nodes(order, symbols - varying)
+    constants: dict[str, Expression] = {}
+    rewritten: dict[int, Expression] = {}
+
+    def needed(item: Expression) -> Expression:
+        """Return what stands for an operand of a varying node, or for an output."""
+        if id(item) not in rewritten:
+            if item.operation == "constant":
+                rewritten[id(item)] = item
+            else:
+                name = f"{prefix}{len(constants)}"
+                constants[name] = item
+                rewritten[id(item)] = symbol(name)
+        return rewritten[id(item)]
+
+    for item in order:
+        if id(item) not in settled:
+            moved = tuple(needed(argument) for argument in item.arguments)
+            rewritten[id(item)] = item if not moved else Expression(item.operation, moved, item.value)
+    return constants, {name: needed(value) for name, value in outputs.items()}
+
+
+def settled_nodes(order: Sequence[Expression], fixed: Collection[str]) -> set[int]:
+    """Return the ids of the nodes that depend on some fixed symbols and on constants alone.
+
+    Parameters
+    ----------
+    order : sequence of Expression
+        Nodes, operands before results.
+    fixed : collection of str
+        Names of the symbols.
+
+    Returns
+    -------
+    set of int
+        Their ids.
+    """
+    settled: set[int] = set()
+    for item in order:
+        if item.value in fixed if item.operation == "symbol" else all(id(a) in settled for a in item.arguments):
+            settled.add(id(item))
+    return settled

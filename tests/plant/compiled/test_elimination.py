@@ -1,0 +1,82 @@
+"""Elimination finds the Jacobian that differentiation forward finds, with fewer operations."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from plant.circuit import circuit_derivative
+from plant.circuit_parameters import CircuitParameters
+from plant.compiled.elimination import eliminated_jacobian
+from plant.compiled.expression import ZERO, Expression, jacobian, ordered, symbol
+from plant.compiled.functions import absolute, maximum, sqrt, where
+from plant.compiled.simplify import share_reciprocals
+from plant.compiled.source import statements
+from plant.eha import reduced_derivative
+from plant.integrate import parameter_symbols
+
+X, Y, U = symbol("x"), symbol("y"), symbol("u")
+
+
+def values(outputs: Mapping[str, Expression], **inputs: float) -> dict[str, float]:
+    exec(statements(outputs, ""), {"math": math}, inputs)  # noqa: S102  # the text is what is under test
+    return {name: inputs[name] for name in outputs}
+
+
+def both(outputs: list[Expression], inputs: list[Expression]) -> tuple[dict[str, Expression], dict[str, Expression]]:
+    one, other = (
+        {f"j{i}_{j}": slope for i, row in enumerate(rows) for j, slope in enumerate(row)}
+        for rows in (eliminated_jacobian(outputs, inputs), jacobian(outputs, inputs))
+    )
+    return one, other
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.7, -1.2), (-0.3, 0.4), (2.0, 3.0)])
+def test_it_is_the_jacobian(x: float, y: float) -> None:
+    shared = maximum(X * Y, -0.5) / (1.0 + absolute(X))
+    outputs = [shared * shared - Y, where(X > Y, sqrt(1.0 + shared * shared), -shared), X, X * 0.0 + 1.0]
+    found, wanted = both([o + ZERO for o in outputs], [X, Y, U])
+    assert values(found, x=x, y=y) == pytest.approx(values(wanted, x=x, y=y), rel=1e-13)
+
+
+def test_what_does_not_depend_vanishes() -> None:
+    rows = eliminated_jacobian([X * X, 2.0 * Y], [X, Y, U])
+    assert [[slope is ZERO for slope in row] for row in rows] == [[False, True, True], [True, False, True]]
+
+
+def test_what_was_not_chosen_is_never_multiplied_by_zero() -> None:
+    ((slope,),) = eliminated_jacobian([where(X > 1.0, 1.0 / X, 0.0) * Y], [X])
+    assert slope.operation == "where"
+    assert slope.arguments[2] is ZERO
+    assert values({"s": slope}, x=2.0, y=3.0)["s"] == -0.75
+
+
+def test_it_needs_fewer_products_on_the_circuit() -> None:
+    state = x0, x1, x2, x3, x4, x5, x6 = [symbol(f"x{i}") for i in range(7)]
+    rates = list(circuit_derivative((x0, x1, x2, x3, x4, x5, x6), U, parameter_symbols(CircuitParameters)))
+    counts = [sum(item.operation == "*" for item in ordered(one.values())) for one in both(rates, [*state, U])]
+    assert counts[0] < 0.7 * counts[1]
+
+
+def test_it_is_the_jacobian_of_the_reduced_plant() -> None:
+    state = x, v, a = [symbol(f"x{i}") for i in range(3)]
+    p = parameter_symbols()
+    found, wanted = both(list(reduced_derivative((x, v, a), U, p)), [*state, U])
+    rng = np.random.default_rng(1)
+    inputs = {
+        name: float(value)
+        for name, value in zip([*vars(p), "x0", "x1", "x2", "u"], rng.uniform(0.5, 2.0, 60), strict=False)
+    }
+    assert values(found, **inputs) == pytest.approx(values(wanted, **inputs), rel=1e-12)
+
+
+def test_shared_reciprocals_change_the_last_digits_only() -> None:
+    outputs = {"a": X / Y, "b": (X + 1.0) / Y, "c": X / (Y * Y), "d": Y / 3.0}
+    found = values(share_reciprocals(outputs, ()), x=0.7, y=1.3)
+    assert found == pytest.approx(values(outputs, x=0.7, y=1.3), rel=1e-15)
+    counts = [
+        sum(item.operation == "/" for item in ordered(one.values()))
+        for one in (share_reciprocals(outputs, ()), outputs)
+    ]
+    assert counts == [3, 4]
