@@ -1,14 +1,24 @@
 """From a log to a linear model in one verb."""
 
 import warnings
+from collections.abc import Sequence
 
 import numpy as np
 
+from estimation.identification.choose import STRUCTURES, StructureName, choose_model
+from estimation.identification.fitted import CovarianceKind
 from estimation.identification.linear_model import FloatArray, LinearModel
 from estimation.identification.output_error import fit_output_error
 from estimation.identification.preprocess import bridged, resample, zero_phase_filter
+from estimation.identification.residual_tests import DEFAULT_LAGS, feedback_test
 from plant.errors import LogError, LogWarning
 from plant.record import Record
+
+FEEDBACK = 1e-6
+"""p-value below which data are said to come from a closed loop; a linear model's errors must not look like one."""
+
+FEEDBACK_SAMPLES = 20_000
+"""Samples that are asked, from the beginning."""
 
 
 def identify_record(
@@ -21,6 +31,10 @@ def identify_record(
     n_denominator: int = 2,
     delay: int = 0,
     filter_cutoff_hz: float | None = None,
+    structure: StructureName | None = "output-error",
+    orders: Sequence[int] | None = None,
+    estimate_dead_time: bool = False,
+    covariance: CovarianceKind | None = None,
 ) -> LinearModel:
     """Identify a record's transfer function, by default in the form of Table 6 of the EHA paper.
 
@@ -40,6 +54,14 @@ def identify_record(
     filter_cutoff_hz : float, optional
         Zero-phase low-pass of input and output before the fit [Hz]; the covariance then allows for the
         coloured residual. None does not filter.
+    structure : str or None
+        What to fit; None compares ARX, ARMAX, output error and Box-Jenkins on data held back.
+    orders : sequence of int, optional
+        Orders that are compared by BIC instead of `n_denominator`; the numerator follows.
+    estimate_dead_time : bool
+        Whether the delay is estimated instead of given.
+    covariance : {"white", "coloured", "auto"}, optional
+        As `fit_output_error`; white unless told, or filtered.
 
     Returns
     -------
@@ -56,7 +78,7 @@ def identify_record(
     Warns
     -----
     LogWarning
-        If the output is differentiated from position, or input samples are bridged.
+        If the output is differentiated from position, input samples are bridged, or the input was fed back.
     """
     measured = _output(record, output)
     driven = _without_gaps(record[input], input)
@@ -64,17 +86,54 @@ def identify_record(
     y = resample(measured, record.sample_time, sample_time)
     if filter_cutoff_hz is not None:
         u, y = zero_phase_filter(u, y, sample_time, cutoff_hz=filter_cutoff_hz)
-    return fit_output_error(
+    # a filter that looks ahead makes outputs follow future inputs, as feedback does
+    untouched = filter_cutoff_hz is None and u.size == len(record) and output in record
+    default: CovarianceKind = "white" if filter_cutoff_hz is None else "coloured"
+    if structure == "output-error" and orders is None and not estimate_dead_time:
+        model = fit_output_error(
+            u,
+            y,
+            sample_time,
+            n_numerator=n_numerator,
+            n_denominator=n_denominator,
+            delay=delay,
+            covariance=covariance or default,
+            input_name=input,
+            output_name=output,
+        )
+        if untouched:
+            _warn_of_feedback(model, u, y)
+        return model
+    model = choose_model(
         u,
         y,
         sample_time,
-        n_numerator=n_numerator,
-        n_denominator=n_denominator,
-        delay=delay,
-        covariance="white" if filter_cutoff_hz is None else "coloured",
+        orders=(n_denominator,) if orders is None else orders,
+        delay=None if estimate_dead_time else delay,
+        structures=STRUCTURES if structure is None else (structure,),
+        n_numerator=n_numerator if orders is None else None,
+        covariance=covariance or default,
         input_name=input,
         output_name=output,
-    )
+    ).model
+    if untouched:
+        _warn_of_feedback(model, u, y)
+    return model
+
+
+def _warn_of_feedback(model: LinearModel, u: FloatArray, y: FloatArray) -> None:
+    part = slice(0, FEEDBACK_SAMPLES)
+    if not model.is_stable or u[part].size < 8 * DEFAULT_LAGS:
+        return
+    residual = y[part] - model.simulate(u[part], initial=model.initial_state)
+    found = feedback_test(residual, u[part])
+    if found.p_value < FEEDBACK:
+        warnings.warn(
+            f"input {model.input_name!r} follows the noise of {model.output_name!r} (p = {found.p_value:.1g}): the "
+            "data seem to come from a closed loop, where output error is biased; fit ARMAX or Box-Jenkins",
+            LogWarning,
+            stacklevel=3,
+        )
 
 
 def _output(record: Record, name: str) -> FloatArray:

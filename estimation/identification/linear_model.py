@@ -1,19 +1,25 @@
-"""`LinearModel`: an identified discrete transfer function with everything needed to believe it, or not."""
+"""`LinearModel`: an identified transfer function with everything needed to believe it, or not."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import overload
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
-from scipy.signal import freqz, lfilter
+from scipy.signal import lfilter
 
+from estimation.identification.bandwidth import bandwidth, bandwidth_std
+from estimation.identification.held_input import held_input_model
+from estimation.identification.model_export import Exportable
+from estimation.identification.uncertainty import (
+    Cancellation,
+    ResponseBand,
+    cancellations,
+    complex_std,
+    response_band,
+    root_gradients,
+    sorted_roots,
+)
 from plant.errors import HydrostateError
-
-if TYPE_CHECKING:
-    import control
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -29,9 +35,16 @@ def _nothing() -> FloatArray:
     return np.empty(0)
 
 
+def _one() -> FloatArray:
+    return np.ones(1)
+
+
 @dataclass(frozen=True, eq=False)
-class LinearModel:
-    """The transfer function ``y = B(q) / F(q) u`` in powers of the delay operator, with its uncertainty.
+class LinearModel(Exportable):
+    """The transfer function ``y = B/F u + C/D e`` with its uncertainty.
+
+    In discrete time the polynomials are in powers of the delay operator; in continuous time (`continuous`) in
+    descending powers of s, and dead time is `dead_time` instead of leading zeros.
 
     Parameters
     ----------
@@ -40,29 +53,40 @@ class LinearModel:
     denominator : ndarray, shape (n_denominator + 1,)
         ``f``: monic, coefficients of ``q^0, q^-1, ...``.
     sample_time : float
-        Seconds between samples [s].
+        Seconds between samples [s]; of the data, if the model is in continuous time.
     input_name, output_name : str
         Channel names, which carry the units (``motor_speed_rad_s``).
     delay : int
         Dead time in samples.
     covariance : ndarray, shape (p, p), p = n_numerator + n_denominator
-        Of ``[b[delay:], f[1:]]``; NaN, as by default, where it is not known (a published model).
+        Of ``[b[delay:], f[1:]]``, the one that deviations are taken from; NaN by default: not known.
     initial_state : ndarray, shape (max(len(numerator), len(denominator)) - 1,)
-        State at the first sample of the data that the model was fitted to, in the output's unit, as
-        `scipy.signal.lfilter` takes it; zero by default.
+        State at the first sample of the (first) fitted record, in the output's unit, as `scipy.signal.lfilter` takes
+        it; zero by default.
     fit_percent, rmse, residual_std : float
-        Normalised fit, root-mean-square residual, and residual deviation with the degrees of freedom counted
-        [output unit]; NaN where nothing was fitted.
+        Fit of the simulated output, root-mean-square residual (one step ahead, where C or D is fitted), and residual
+        deviation with the degrees of freedom counted [output unit]; NaN where nothing was fitted.
     n_samples : int
         Output samples used.
     data_hash : str
         SHA-256 of the data used; empty where nothing was fitted.
+    covariance_white, covariance_robust : ndarray, shape (p, p)
+        As `covariance`: for a white residual, and robust where it is coloured.
+    structure : str
+        How the model was fitted: ``"output-error"``, ``"ARX"``, ...; empty where it was not.
+    noise_numerator, noise_denominator : ndarray, shapes (n_c + 1,) and (n_d + 1,)
+        ``C`` and ``D``, monic; 1 by default.
+    continuous : bool
+        Whether the polynomials are in s.
+    dead_time : float
+        Of a model in continuous time [s].
+    dead_time_std : float
+        Its standard deviation [s]; NaN where it was not fitted.
 
     Raises
     ------
     HydrostateError
-        If the sample time is not positive, the denominator is not monic, a coefficient is not finite, or
-        shapes disagree.
+        If the sample time is not positive, a polynomial not monic or not finite, or shapes disagree.
 
     Examples
     --------
@@ -86,6 +110,14 @@ class LinearModel:
     residual_std: float = float("nan")
     n_samples: int = 0
     data_hash: str = ""
+    covariance_white: FloatArray = field(default_factory=_nothing)
+    covariance_robust: FloatArray = field(default_factory=_nothing)
+    structure: str = ""
+    noise_numerator: FloatArray = field(default_factory=_one)
+    noise_denominator: FloatArray = field(default_factory=_one)
+    continuous: bool = False
+    dead_time: float = 0.0
+    dead_time_std: float = float("nan")
 
     def __post_init__(self) -> None:
         b, f = _frozen(self.numerator), _frozen(self.denominator)
@@ -98,50 +130,75 @@ class LinearModel:
         if not 0 <= self.delay < b.size or b[: self.delay].any():
             raise HydrostateError(f"numerator must begin with {self.delay} zeros for the delay, got {b.tolist()}")
         p, n_states = b.size - self.delay + f.size - 1, max(b.size, f.size) - 1
-        covariance = _frozen(np.full((p, p), np.nan) if np.size(self.covariance) == 0 else self.covariance)
         state = _frozen(np.zeros(n_states) if np.size(self.initial_state) == 0 else self.initial_state)
-        if covariance.shape != (p, p):
-            raise HydrostateError(f"covariance must have shape {(p, p)}, got {covariance.shape}")
         if state.shape != (n_states,):
             raise HydrostateError(f"initial_state must have shape {(n_states,)}, got {state.shape}")
-        checked = {"numerator": b, "denominator": f, "covariance": covariance, "initial_state": state}
+        checked = {"numerator": b, "denominator": f, "initial_state": state}
+        for name in ("covariance", "covariance_white", "covariance_robust"):
+            given = getattr(self, name)
+            value = _frozen(np.full((p, p), np.nan) if np.size(given) == 0 else given)
+            if value.shape != (p, p):
+                raise HydrostateError(f"{name} must have shape {(p, p)}, got {value.shape}")
+            checked[name] = value
+        for name in ("noise_numerator", "noise_denominator"):
+            checked[name] = _frozen(getattr(self, name))
+            if checked[name].ndim != 1 or checked[name].size < 1 or checked[name][0] != 1.0:
+                raise HydrostateError(f"{name} must be monic (begin with 1), got {checked[name].tolist()}")
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
     @property
+    def free_numerator(self) -> FloatArray:
+        """Numerator behind its dead time, shape (n_numerator,)."""
+        return self.numerator[self.delay :]
+
+    @property
     def poles(self) -> ComplexArray:
-        """Roots of the denominator in z, slowest first, shape (n_denominator,); dead-time poles left out."""
-        roots = np.roots(self.denominator).astype(np.complex128)
-        return roots[np.argsort(-np.abs(roots), kind="stable")]
+        """Roots of the denominator in z (or s), largest modulus first, shape (n_denominator,); dead time left out."""
+        return sorted_roots(self.denominator)
 
     @property
     def zeros(self) -> ComplexArray:
-        """Roots of the numerator in z, largest first, shape (n_numerator - 1,) at most."""
-        roots = np.roots(self.numerator[self.delay :]).astype(np.complex128)
-        return roots[np.argsort(-np.abs(roots), kind="stable")]
+        """Roots of the numerator in z (or s), largest first, shape (n_numerator - 1,) at most."""
+        return sorted_roots(self.free_numerator)
+
+    @property
+    def pole_std(self) -> ComplexArray:
+        """Standard deviations of the poles' real and imaginary parts, as one complex number each."""
+        n_b = self.free_numerator.size
+        gradients = root_gradients(self.denominator, self.poles)[:, 1:]
+        return complex_std(gradients, self.covariance[n_b:, n_b:])
+
+    @property
+    def zero_std(self) -> ComplexArray:
+        """Standard deviations of the zeros' real and imaginary parts, as one complex number each."""
+        n_b = self.free_numerator.size
+        return complex_std(root_gradients(self.free_numerator, self.zeros), self.covariance[:n_b, :n_b])
+
+    @property
+    def cancellations(self) -> tuple[Cancellation, ...]:
+        """Poles that a zero cancels, as far as the data can tell; intervals then need `dc_gain_interval`."""
+        return cancellations(self.free_numerator, self.denominator, self.covariance, 0.0 if self.continuous else 1.0)
 
     @property
     def is_stable(self) -> bool:
-        """Whether every pole lies inside the unit circle."""
-        return bool((np.abs(self.poles) < 1.0).all())
+        """Whether every pole lies inside the unit circle, or left of the imaginary axis."""
+        return bool(((self.poles.real < 0.0) if self.continuous else (np.abs(self.poles) < 1.0)).all())
 
     @property
     def dc_gain(self) -> float:
-        """Steady-state gain ``B(1) / F(1)`` [output unit per input unit]."""
+        """Steady-state gain [output unit per input unit]."""
+        if self.continuous:
+            return float(self.numerator[-1] / self.denominator[-1])
         return float(self.numerator.sum() / self.denominator.sum())
 
     @property
     def dc_gain_std(self) -> float:
         """Standard deviation of `dc_gain`, first order in the covariance (delta method).
 
-        Too small where a pole nearly cancels a zero, since the gain is then far from linear in the
-        coefficients.
+        Too small where a pole nearly cancels a zero: see `cancellations` and `dc_gain_interval`.
         """
-        f_at_one = self.denominator.sum()
-        n_b = self.numerator.size - self.delay
-        gradient = np.full(self.covariance.shape[0], 1.0 / f_at_one)
-        gradient[n_b:] = -self.dc_gain / f_at_one
-        return float(np.sqrt(gradient @ self.covariance @ gradient))
+        return float(self.frequency_response([0.0], ci=0.95).gain_std[0])
 
     @property
     def coefficient_std(self) -> FloatArray:
@@ -151,22 +208,15 @@ class LinearModel:
     @property
     def bandwidth_hz(self) -> float | None:
         """Lowest frequency at which the gain is 3 dB below `dc_gain` [Hz]; None if it never is."""
-        wanted = abs(self.dc_gain) / np.sqrt(2.0)
-        nyquist = 0.5 / self.sample_time
-        grid = nyquist * np.concatenate([np.logspace(-5.0, -2.0, 300), np.linspace(0.01, 1.0, 2000)[1:]])
-        below = np.flatnonzero(np.abs(self.frequency_response(grid)) < wanted)
-        if below.size == 0:
-            return None
-        if below[0] == 0:
-            return float(grid[0])
+        return bandwidth(self)
 
-        def excess(frequency: float) -> float:
-            return float(np.abs(self.frequency_response(np.array([frequency]))[0]) - wanted)
+    @property
+    def bandwidth_std_hz(self) -> float | None:
+        """Standard deviation of `bandwidth_hz` [Hz], first order in the covariance; None where there is none."""
+        return bandwidth_std(self)
 
-        return float(brentq(excess, float(grid[below[0] - 1]), float(grid[below[0]])))
-
-    def frequency_response(self, frequency_hz: ArrayLike) -> ComplexArray:
-        """Return the response at given frequencies.
+    def response_gradient(self, frequency_hz: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """Return the response, and its derivative by the coefficients.
 
         Parameters
         ----------
@@ -175,11 +225,50 @@ class LinearModel:
 
         Returns
         -------
-        ndarray of complex, shape (k,)
-            ``B / F`` on the unit circle [output unit per input unit].
+        response : ndarray of complex, shape (k,)
+            ``B / F`` [output unit per input unit].
+        gradient : ndarray of complex, shape (k, p)
+            By ``[b[delay:], f[1:]]``.
         """
-        omega = 2.0 * np.pi * np.asarray(frequency_hz, dtype=np.float64) * self.sample_time
-        return np.asarray(freqz(self.numerator, self.denominator, worN=omega)[1], dtype=np.complex128)
+        omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+        n_b, n_f = self.free_numerator.size, self.denominator.size - 1
+        if self.continuous:
+            top = (1j * omega)[:, None] ** np.arange(n_b - 1, -1, -1) * np.exp(-1j * omega * self.dead_time)[:, None]
+            bottom = (1j * omega)[:, None] ** np.arange(n_f, -1, -1)
+        else:
+            shift = np.exp(-1j * omega * self.sample_time)[:, None]
+            top, bottom = shift ** (self.delay + np.arange(n_b)), shift ** np.arange(n_f + 1)
+        below = bottom @ self.denominator
+        response = np.asarray((top @ self.free_numerator) / below, dtype=np.complex128)
+        gradient = np.concatenate([top / below[:, None], -(response / below)[:, None] * bottom[:, 1:]], axis=1)
+        return response, np.asarray(gradient, dtype=np.complex128)
+
+    @overload
+    def frequency_response(self, frequency_hz: ArrayLike) -> ComplexArray: ...
+
+    @overload
+    def frequency_response(self, frequency_hz: ArrayLike, ci: float) -> ResponseBand: ...
+
+    def frequency_response(self, frequency_hz: ArrayLike, ci: float | None = None) -> "ComplexArray | ResponseBand":
+        """Return the response at given frequencies.
+
+        Parameters
+        ----------
+        frequency_hz : array_like, shape (k,)
+            Frequencies [Hz].
+        ci : float, optional
+            Probability of a band around gain and phase; none unless told.
+
+        Returns
+        -------
+        ndarray of complex, shape (k,), or ResponseBand
+            ``B / F`` on the unit circle, or imaginary axis [output unit per input unit].
+        """
+        response, gradient = self.response_gradient(frequency_hz)
+        if ci is None:
+            return response
+        frequencies = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+        return response_band(frequencies, response, gradient, self.covariance, ci)
 
     def simulate(self, u: ArrayLike, initial: ArrayLike | None = None) -> FloatArray:
         """Return the model's output for an input.
@@ -187,10 +276,10 @@ class LinearModel:
         Parameters
         ----------
         u : array_like, shape (n,)
-            Input on the model's sample time.
+            Input on the model's sample time; held between samples, if the model is in continuous time.
         initial : array_like, shape (len(initial_state),), or None
-            State before the first sample; None is rest. ``model.initial_state`` reproduces the fitted run,
-            and `estimation.identification.validate.estimate_initial_state` finds the one of another log.
+            State before the first sample; None is rest. ``model.initial_state`` reproduces the fitted run, and
+            `estimate_initial_state` finds the one of another log.
 
         Returns
         -------
@@ -198,117 +287,63 @@ class LinearModel:
             Output [output unit].
         """
         values = np.asarray(u, dtype=np.float64)
+        if self.continuous:
+            return self.discretised().simulate(values)
         state = np.zeros_like(self.initial_state) if initial is None else np.asarray(initial, dtype=np.float64)
         return np.asarray(lfilter(self.numerator, self.denominator, values, zi=state)[0], dtype=np.float64)
 
-    def to_control(self) -> "control.TransferFunction":
-        """Return the model as a python-control object, with sample time and signal names."""
-        import control  # slow to import, and few callers need it
-
-        length = max(self.numerator.size, self.denominator.size)
-        numerator = np.pad(self.numerator, (0, length - self.numerator.size))
-        denominator = np.pad(self.denominator, (0, length - self.denominator.size))
-        return control.TransferFunction(
-            numerator, denominator, self.sample_time, inputs=[self.input_name], outputs=[self.output_name]
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return JSON values at full precision, None for a number not known; `from_dict` is the inverse."""
-        return {
-            "numerator": self.numerator.tolist(),
-            "denominator": self.denominator.tolist(),
-            "sample_time_s": self.sample_time,
-            "input": self.input_name,
-            "output": self.output_name,
-            "delay_samples": self.delay,
-            "fit_percent": _or_none(self.fit_percent),
-            "covariance": [[_or_none(value) for value in row] for row in self.covariance.tolist()],
-            "initial_state": self.initial_state.tolist(),
-            "rmse": _or_none(self.rmse),
-            "residual_std": _or_none(self.residual_std),
-            "n_samples": self.n_samples,
-            "data_hash": self.data_hash,
-        }
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> "LinearModel":
-        """Return the model that `to_dict` wrote.
+    def predict(self, u: ArrayLike, y: ArrayLike) -> FloatArray:
+        """Return the one-step-ahead prediction of the output by the noise model, from rest.
 
         Parameters
         ----------
-        values : Mapping[str, Any]
-            As `to_dict` returns, or as read back from JSON.
+        u : array_like, shape (n,)
+            Input.
+        y : array_like, shape (n,)
+            Measured output; where missing (NaN), the simulated one stands for it.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output [output unit]; that of `simulate` where C = D.
+        """
+        simulated = self.simulate(u)
+        noise = np.asarray(y, dtype=np.float64) - simulated
+        noise = np.where(np.isfinite(noise), noise, 0.0)
+        innovation = np.asarray(lfilter(self.noise_denominator, self.noise_numerator, noise), dtype=np.float64)
+        return simulated + noise - innovation
+
+    def discretised(self, sample_time: float | None = None) -> "LinearModel":
+        """Return a model in continuous time as one in discrete time, its input held between samples.
+
+        Parameters
+        ----------
+        sample_time : float, optional
+            Seconds between samples [s]; that of the data unless told.
 
         Returns
         -------
         LinearModel
-            Equal in every bit.
-
-        Raises
-        ------
-        HydrostateError
-            If an entry is missing, or one is not usable.
+            Without covariance; dead time of a fraction of a sample is exact.
         """
-        try:
-            return cls(
-                numerator=_frozen(values["numerator"]),
-                denominator=_frozen(values["denominator"]),
-                sample_time=values["sample_time_s"],
-                input_name=values["input"],
-                output_name=values["output"],
-                delay=values["delay_samples"],
-                covariance=np.array(values["covariance"], dtype=np.float64),
-                initial_state=_frozen(values["initial_state"]),
-                fit_percent=_or_nan(values["fit_percent"]),
-                rmse=_or_nan(values["rmse"]),
-                residual_std=_or_nan(values["residual_std"]),
-                n_samples=values["n_samples"],
-                data_hash=values["data_hash"],
-            )
-        except KeyError as error:
-            raise HydrostateError(f"entry {error} of a linear model is wanted, got {', '.join(values)}") from error
+        T = self.sample_time if sample_time is None else sample_time
+        if not self.continuous:
+            raise HydrostateError("discretised() is for a model in continuous time, got one in discrete time")
+        b, f, delay = held_input_model(self.numerator, self.denominator, self.dead_time, T)
+        return LinearModel(b, f, T, self.input_name, self.output_name, delay=delay)
 
+    def step(self, duration: float) -> tuple[FloatArray, FloatArray]:
+        """Return the response to a unit step.
 
-def _or_none(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+        Parameters
+        ----------
+        duration : float
+            Length [s].
 
-
-def _or_nan(value: float | None) -> float:
-    return float("nan") if value is None else value
-
-
-def model_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
-    """Return one row a model: coefficients, poles, gain with its deviation, bandwidth, and quality of fit.
-
-    Parameters
-    ----------
-    models : Mapping[str, LinearModel]
-        Models by name, e.g. of a condition.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Indexed by name; ``b0, b1, ..., f1, ...``, ``pole_1, ...`` (complex), ``dc_gain``, ``dc_gain_std``,
-        ``bandwidth_hz``, ``fit_percent``, ``rmse``, ``residual_std``, ``n_samples``, ``sample_time_s``,
-        ``input``, ``output``. NaN where a model has no such entry.
-    """
-    return pd.DataFrame.from_dict({name: _row(model) for name, model in models.items()}, orient="index")
-
-
-def _row(model: LinearModel) -> dict[str, Any]:
-    row: dict[str, Any] = {f"b{k}": value for k, value in enumerate(model.numerator.tolist())}
-    row |= {f"f{k}": value for k, value in enumerate(model.denominator.tolist()) if k > 0}
-    row |= {f"pole_{k + 1}": complex(pole) for k, pole in enumerate(model.poles)}
-    bandwidth = model.bandwidth_hz
-    return row | {
-        "dc_gain": model.dc_gain,
-        "dc_gain_std": model.dc_gain_std,
-        "bandwidth_hz": float("nan") if bandwidth is None else bandwidth,
-        "fit_percent": model.fit_percent,
-        "rmse": model.rmse,
-        "residual_std": model.residual_std,
-        "n_samples": model.n_samples,
-        "sample_time_s": model.sample_time,
-        "input": model.input_name,
-        "output": model.output_name,
-    }
+        Returns
+        -------
+        tuple of ndarray, shape (n,)
+            Time from 0 [s], and output [output unit per input unit].
+        """
+        n = max(1, round(duration / self.sample_time)) + 1
+        return self.sample_time * np.arange(n, dtype=np.float64), self.simulate(np.ones(n))

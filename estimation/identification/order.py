@@ -1,5 +1,6 @@
 """Which order a linear model needs: singular values against the noise, and information criteria."""
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,10 +9,13 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike
 from scipy.linalg import lstsq, svdvals
 
+from estimation.identification.experiments import Signals, listed
+from estimation.identification.fitted import NoEffectError
+from estimation.identification.lags import lagged
 from estimation.identification.linear_model import FloatArray
 from estimation.identification.output_error import fit_output_error
-from estimation.identification.starts import lagged
-from plant.errors import HydrostateError
+from estimation.identification.validate import validate
+from plant.errors import HydrostateError, LogWarning
 
 SURROGATES = 19
 """Noise-only records behind a floor; the largest of 19 is exceeded by one more in 5 % of cases."""
@@ -136,13 +140,19 @@ def order_test(
 
 
 def order_table(
-    u: ArrayLike, y: ArrayLike, sample_time: float, *, orders: tuple[int, ...] = (1, 2, 3, 4), delay: int = 0
+    u: Signals,
+    y: Signals,
+    sample_time: float,
+    *,
+    orders: tuple[int, ...] = (1, 2, 3, 4),
+    delay: int = 0,
+    cross_validate: bool = False,
 ) -> pd.DataFrame:
     """Return the information criteria of output-error fits over orders.
 
     Parameters
     ----------
-    u, y : array_like, shape (n,)
+    u, y : array_like of shape (n,), or a sequence of them
         Input and output, as `fit_output_error` takes them.
     sample_time : float
         Seconds between samples [s].
@@ -150,12 +160,16 @@ def order_table(
         Denominator coefficients; the numerator has one more, or as many behind a delay.
     delay : int
         Dead time [samples].
+    cross_validate : bool
+        Whether each order is fitted to the first two thirds, too, and run free on the last.
 
     Returns
     -------
     pandas.DataFrame
-        Indexed by order: ``n_parameters``, ``fit_percent``, ``rmse``, ``aic`` and ``bic`` (smaller is better;
-        AIC over-fits more often), ``slowest_pole`` (largest modulus).
+        Indexed by order, one that explains nothing left out: ``n_parameters``,
+        ``fit_percent``, ``rmse``, ``aic``, ``aicc``, ``bic`` and ``fpe`` (smaller
+        is better; AIC and FPE over-fit more often), ``cross_validation`` (fit on what was held back [%], or NaN),
+        ``slowest_pole`` (largest modulus), ``cancellations`` (poles that a zero nearly cancels).
 
     Raises
     ------
@@ -165,7 +179,14 @@ def order_table(
     rows: dict[int, dict[str, float]] = {}
     for order in orders:
         n_numerator = order + (1 if delay == 0 else 0)
-        model = fit_output_error(u, y, sample_time, n_numerator=n_numerator, n_denominator=order, delay=delay)
+        with warnings.catch_warnings():  # the table says how often poles are cancelled
+            warnings.simplefilter("ignore", LogWarning)
+            try:
+                model = fit_output_error(u, y, sample_time, n_numerator=n_numerator, n_denominator=order, delay=delay)
+            except NoEffectError:
+                if order == orders[-1] and not rows:
+                    raise
+                continue
         n, p = model.n_samples, n_numerator + order + model.initial_state.size
         deviance = n * float(np.log(model.rmse**2))
         rows[order] = {
@@ -173,10 +194,23 @@ def order_table(
             "fit_percent": model.fit_percent,
             "rmse": model.rmse,
             "aic": deviance + 2.0 * p,
+            "aicc": deviance + 2.0 * p * n / max(n - p - 1, 1),
             "bic": deviance + float(np.log(n)) * p,
+            "fpe": model.rmse**2 * (n + p) / (n - p),
+            "cross_validation": _held_out(u, y, sample_time, n_numerator, order, delay) if cross_validate else np.nan,
             "slowest_pole": float(np.abs(model.poles[0])),
+            "cancellations": len(model.cancellations),
         }
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("order")
+
+
+def _held_out(u: Signals, y: Signals, sample_time: float, n_numerator: int, order: int, delay: int) -> float:
+    inputs, outputs = listed(u)[0], listed(y)[0]
+    cut = 2 * inputs.size // 3
+    model = fit_output_error(
+        inputs[:cut], outputs[:cut], sample_time, n_numerator=n_numerator, n_denominator=order, delay=delay
+    )
+    return validate(model, inputs[cut:], outputs[cut:]).fit_percent
 
 
 def _require_record(u: FloatArray, y: FloatArray, n_wanted: int) -> None:

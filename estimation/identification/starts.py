@@ -8,13 +8,14 @@ instrumental variables (SRIV) from both, and a search over pole positions
 """
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import hankel, lstsq
 from scipy.signal import lfilter
 
 from estimation.identification.criterion import Structure, polynomial, stabilised
+from estimation.identification.experiments import Experiments
+from estimation.identification.lags import lagged
 from estimation.identification.linear_model import FloatArray
-from estimation.identification.pole_search import search_poles
+from estimation.identification.pole_search import banded_spectra, refine, reflected, search_poles
 
 HIGH_ORDER = 30
 """Most coefficients on either side of the high-order ARX model."""
@@ -22,55 +23,49 @@ HIGH_ORDER = 30
 IMPULSE_SAMPLES = 400
 """Most samples of the impulse response that is reduced to a low order."""
 
+TWINS = 1e-6
+"""Denominators closer than this are one start."""
+
 SRIV_ITERATIONS = 4
 """Refinements by instrumental variables; more did not change the basin in trials."""
 
 
-def starting_denominators(structure: Structure, u: FloatArray, y: FloatArray) -> list[FloatArray]:
-    """Return candidate denominators, stable and monic.
+def starting_values(structure: Structure, data: Experiments, count: int) -> list[FloatArray]:
+    """Return candidate numerators and denominators, stable, the most promising first.
 
     Parameters
     ----------
     structure : Structure
         The model's structure.
-    u, y : ndarray, shape (n,)
-        Input and output of order one, no gaps.
+    data : Experiments
+        Input and output of order one.
+    count : int
+        Candidates wanted at most.
 
     Returns
     -------
-    list of ndarray, shape (n_denominator + 1,)
-        Candidates, in no order.
+    list of ndarray, shape (n_numerator + n_denominator,)
+        Numerator, and denominator behind its 1.
     """
+    pairs = data.bridged()
+    u, y = max(pairs, key=lambda pair: pair[0].size)
     crude = [
         least_squares_arx(structure.n_numerator, structure.n_denominator, structure.delay, u, y)[1],
         reduced_high_order_arx(structure.n_denominator, u, y),
     ]
-    stable = [stabilised(denominator, u.size) for denominator in crude]
-    refined = [refine_by_instruments(structure, denominator, u, y) for denominator in stable]
-    return refined + search_poles(structure, u, y)
+    spectra = banded_spectra(pairs)
+    found = search_poles(structure, spectra, u.size)
+    others = refine(structure, reflected(crude), spectra)
+    costs, thetas = (np.concatenate(both) for both in zip(found, others, strict=True))
+    return _without_twins(thetas[np.argsort(costs, kind="stable")])[:count]
 
 
-def lagged(x: FloatArray, first: int, count: int) -> FloatArray:
-    """Return ``x[t - first - k]`` for k < count as columns, zero before the record.
-
-    Parameters
-    ----------
-    x : ndarray, shape (n,)
-        A signal.
-    first : int
-        Smallest lag, in samples.
-    count : int
-        Number of lags.
-
-    Returns
-    -------
-    ndarray, shape (n, count)
-        One lag a column.
-    """
-    if count == 0:
-        return np.empty((x.size, 0))
-    padded = np.concatenate([np.zeros(first + count - 1), x])
-    return sliding_window_view(padded, count)[: x.size, ::-1]
+def _without_twins(ranked: FloatArray) -> list[FloatArray]:
+    kept: list[FloatArray] = []
+    for row in ranked:
+        if all(np.abs(row - other).max() > TWINS * (1.0 + np.abs(row).max()) for other in kept):
+            kept.append(row)
+    return kept
 
 
 def least_squares_arx(

@@ -4,49 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import chi2
 
 from estimation.identification.criterion import Structure, profile, sensitivities
 from estimation.identification.linear_model import FloatArray, LinearModel
-from estimation.identification.starts import lagged
+from estimation.identification.residual_tests import DEFAULT_LAGS, ResidualTest, cross_correlation_test, ljung_box
 from plant.errors import HydrostateError
-
-DEFAULT_LAGS = 25
-"""Lags that the residual tests look at."""
-
-
-@dataclass(frozen=True)
-class ResidualTest:
-    """A chi-square test of a residual.
-
-    Parameters
-    ----------
-    statistic : float
-        The test statistic [dimensionless].
-    degrees_of_freedom : int
-        Of its chi-square distribution under the null hypothesis.
-    p_value : float
-        Probability of a statistic at least this large if the model is right.
-    """
-
-    statistic: float
-    degrees_of_freedom: int
-    p_value: float
-
-    def passed(self, level: float = 0.05) -> bool:
-        """Return whether the model survives.
-
-        Parameters
-        ----------
-        level : float
-            Significance level [probability].
-
-        Returns
-        -------
-        bool
-            True where the statistic is no surprise.
-        """
-        return self.p_value >= level
 
 
 @dataclass(frozen=True)
@@ -117,99 +79,6 @@ def rmse(y: ArrayLike, simulated: ArrayLike) -> float:
     """
     measured, model = _together(y, simulated)
     return float(np.sqrt(np.mean((measured - model) ** 2)))
-
-
-def ljung_box(residual: ArrayLike, *, n_lags: int = DEFAULT_LAGS, n_parameters: int = 0) -> ResidualTest:
-    """Test whether a residual is white (Ljung and Box, 1978).
-
-    Parameters
-    ----------
-    residual : array_like, shape (n,)
-        NaN where missing.
-    n_lags : int
-        Lags counted.
-    n_parameters : int
-        Parameters of a *noise* model fitted to it; none for output error.
-
-    Returns
-    -------
-    ResidualTest
-        A small p-value says that the residual is coloured: the fit may stand, its white-noise covariance not.
-
-    Raises
-    ------
-    HydrostateError
-        If there are not more samples than lags, or not more lags than parameters.
-    """
-    values = np.asarray(residual, dtype=np.float64)
-    known = np.isfinite(values)
-    n = int(known.sum())
-    if n <= n_lags or n_lags <= n_parameters:
-        raise HydrostateError(
-            f"a whiteness test needs n_parameters < n_lags < samples, got {n_parameters}, {n_lags} and {n}"
-        )
-    centred = np.where(known, values - values[known].mean(), 0.0)
-    weight = known.astype(np.float64)
-    variance = float(centred @ centred) / n
-    lags = np.arange(1, n_lags + 1)
-    pairs = np.maximum([weight[k:] @ weight[:-k] for k in lags], 1.0)
-    correlation = np.array([centred[k:] @ centred[:-k] for k in lags]) / (pairs * variance)
-    # with every sample there, pairs is n - k and this is n (n + 2) sum(r_k^2 / (n - k)), r_k divided by n
-    statistic = float((n + 2.0) / n * np.sum(pairs * correlation**2))
-    return _chi_square(statistic, n_lags - n_parameters)
-
-
-def cross_correlation_test(
-    residual: ArrayLike,
-    u: ArrayLike,
-    *,
-    n_lags: int = DEFAULT_LAGS,
-    jacobian: ArrayLike | None = None,
-) -> ResidualTest:
-    """Test whether past inputs are left in a residual.
-
-    The residual is projected on the lagged inputs, from which what the fit could already absorb (the columns
-    of `jacobian`) has been removed; without that step the usual statistic rejects a right model too often.
-
-    Parameters
-    ----------
-    residual : array_like, shape (n,)
-        White if the model is right; NaN where missing.
-    u : array_like, shape (n,)
-        Input, no gaps.
-    n_lags : int
-        Lags 0 to ``n_lags`` are counted.
-    jacobian : array_like, shape (n, p), optional
-        Sensitivities of the model's output, if the model was fitted to these data.
-
-    Returns
-    -------
-    ResidualTest
-        A small p-value says that a better model exists: another order, delay, or a nonlinearity.
-
-    Raises
-    ------
-    HydrostateError
-        If the arrays do not match, or there are too few samples.
-    """
-    values, inputs = np.asarray(residual, dtype=np.float64), np.asarray(u, dtype=np.float64)
-    if values.shape != inputs.shape:
-        raise HydrostateError(f"residual and input must match, got shapes {values.shape} and {inputs.shape}")
-    known = np.isfinite(values)
-    known[:n_lags] = False
-    absorbed = np.ones((values.size, 1)) if jacobian is None else np.asarray(jacobian, dtype=np.float64)
-    columns = _without(absorbed[known], _unit(lagged(inputs, 0, n_lags + 1)[known]))
-    left, strength, _ = np.linalg.svd(columns, full_matrices=False)
-    rank = int(np.count_nonzero(strength > max(columns.shape) * np.finfo(float).eps * 1e2 * strength[0]))
-    freedom = int(known.sum()) - absorbed.shape[1]
-    if freedom <= rank:
-        raise HydrostateError(f"a cross-correlation test over {n_lags} lags needs more samples, got {known.sum()}")
-    remaining = values[known]
-    if jacobian is None:
-        remaining = remaining - remaining.mean()
-    variance = float(remaining @ remaining) / freedom
-    statistic = float(np.sum((left[:, :rank].T @ remaining) ** 2)) / variance
-    return _chi_square(statistic, rank)
 
 
 def estimate_initial_state(model: LinearModel, u: ArrayLike, y: ArrayLike) -> FloatArray:
@@ -286,17 +155,3 @@ def _together(y: ArrayLike, simulated: ArrayLike) -> tuple[FloatArray, FloatArra
     if not known.any():
         raise HydrostateError("at least one measured sample is wanted, got none")
     return measured[known], model[known]
-
-
-def _unit(columns: FloatArray) -> FloatArray:
-    scale = np.linalg.norm(columns, axis=0)
-    return columns / np.where(scale > 0.0, scale, 1.0)
-
-
-def _without(absorbed: FloatArray, columns: FloatArray) -> FloatArray:
-    basis = np.linalg.qr(_unit(absorbed))[0]
-    return columns - basis @ (basis.T @ columns)
-
-
-def _chi_square(statistic: float, freedom: int) -> ResidualTest:
-    return ResidualTest(statistic, freedom, float(chi2.sf(statistic, freedom)))

@@ -225,6 +225,7 @@ def hair_dryer() -> np.ndarray:
     return pd.read_csv(path).to_numpy()[:300]
 
 
+@pytest.mark.filterwarnings("ignore:the pole .* nearly cancel")  # of the third order, and rightly
 @pytest.mark.parametrize(("form", "wanted"), [((2, 2, 3), 88.77), ((3, 3, 3), 89.35)])
 def test_the_hair_dryer_is_fitted_as_well_as_by_the_peers(
     form: tuple[int, int, int], wanted: float, hair_dryer: np.ndarray

@@ -2,31 +2,45 @@ import numpy as np
 
 from estimation.identification import LinearModel
 from estimation.identification.criterion import Structure
-from estimation.identification.pole_search import search_poles
+from estimation.identification.pole_search import banded_spectra, reflected, search_poles
 
 
-def test_the_best_candidate_is_near_the_true_poles(plant_30hz: LinearModel) -> None:
+def found(structure: Structure, u: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return search_poles(structure, banded_spectra([(u, y / y.std())]), u.size)
+
+
+def poles_of(theta: np.ndarray, n_numerator: int) -> np.ndarray:
+    return np.sort_complex(np.roots(np.concatenate([[1.0], theta[n_numerator:]])))
+
+
+def test_the_best_candidate_has_nearly_the_true_poles(plant_30hz: LinearModel) -> None:
     rng = np.random.default_rng(3)
     u = np.repeat(rng.choice([-1.0, 1.0], 1_000), 5)
-    y = plant_30hz.simulate(u)
-    best = np.sort_complex(np.roots(search_poles(Structure(2, 2, 1), u, y / y.std())[0]))
-    wanted = np.sort_complex(plant_30hz.poles)
-    assert np.abs(best - wanted).max() < 0.35 * np.abs(1.0 - wanted).max()
+    costs, thetas = found(Structure(2, 2, 1), u, plant_30hz.simulate(u))
+    assert (np.diff(costs) > 0.0).all()
+    np.testing.assert_allclose(poles_of(thetas[0], 2), np.sort_complex(plant_30hz.poles), atol=0.01)
 
 
 def test_a_slow_pole_that_a_zero_nearly_cancels_gets_a_start(table6: dict[str, LinearModel]) -> None:
     """Minor leakage of Table 6: pole 0.9884, zero 0.9882."""
     rng = np.random.default_rng(4)
     u = np.repeat(rng.choice([-1.0, 1.0], 400), 50)
-    y = table6["minor_leakage"].simulate(u)
-    starts = search_poles(Structure(3, 2), u, y / y.std())
-    slowest = [np.abs(np.roots(start)).max() for start in starts]
+    _, thetas = found(Structure(3, 2), u, table6["minor_leakage"].simulate(u))
+    slowest = [np.abs(poles_of(theta, 3)).max() for theta in thetas]
     assert any(0.97 < radius < 0.995 for radius in slowest)
 
 
-def test_candidates_differ_from_each_other(plant_30hz: LinearModel) -> None:
+def test_two_records_say_more_than_one(plant_30hz: LinearModel) -> None:
     rng = np.random.default_rng(5)
-    u = rng.standard_normal(3_000)
-    starts = search_poles(Structure(3, 3, 1), u, plant_30hz.simulate(u))
-    rounded = {tuple(start.round(9)) for start in starts[:4]}
-    assert len(rounded) == 4
+    signals = [rng.standard_normal(n) for n in (700, 1_100)]
+    spectra = banded_spectra([(u, plant_30hz.simulate(u)) for u in signals])
+    alone = banded_spectra([(signals[0], plant_30hz.simulate(signals[0]))])
+    assert spectra.power.sum() > 2.0 * alone.power.sum()
+    assert spectra.omega[0] == 0.0
+    assert (np.diff(spectra.omega) > 0.0).all()
+
+
+def test_unstable_roots_are_reflected_into_the_unit_circle() -> None:
+    rows = reflected([np.poly([1.25, 0.5]), np.poly([0.3, -0.2])])
+    np.testing.assert_allclose(np.sort(np.roots([1.0, *rows[0]])), [0.5, 0.8])
+    np.testing.assert_allclose(rows[1], np.poly([0.3, -0.2])[1:])

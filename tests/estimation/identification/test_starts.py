@@ -2,12 +2,13 @@ import numpy as np
 
 from estimation.identification import LinearModel
 from estimation.identification.criterion import Structure, is_stable
+from estimation.identification.experiments import Experiments
+from estimation.identification.lags import lagged
 from estimation.identification.starts import (
-    lagged,
     least_squares_arx,
     reduced_high_order_arx,
     refine_by_instruments,
-    starting_denominators,
+    starting_values,
 )
 
 
@@ -47,7 +48,10 @@ def test_a_reduced_long_model_has_the_plant_s_poles(plant_30hz: LinearModel) -> 
 
 def test_every_start_is_stable_and_of_the_order_wanted(plant_30hz: LinearModel) -> None:
     u, y = noisy_record(plant_30hz, 1.0)
+    data = Experiments(u, y, np.ones(u.size, dtype=bool), np.array([0, u.size]))
     for order in (1, 2, 3, 4):
-        starts = starting_denominators(Structure(order, order, 1), u, y)
-        assert len(starts) > 3
-        assert all(start.shape == (order + 1,) and is_stable(start) for start in starts)
+        starts = starting_values(Structure(order, order, 1), data, 12)
+        assert 0 < len(starts) <= 12
+        for start in starts:
+            assert start.shape == (2 * order,)
+            assert is_stable(np.concatenate([[1.0], start[order:]]))

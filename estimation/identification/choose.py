@@ -1,0 +1,225 @@
+"""Order, delay and structure chosen from the data, and the table that the choice rests on."""
+
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from estimation.identification.arx import fit_arx
+from estimation.identification.dead_time import estimate_delay
+from estimation.identification.experiments import Signals, listed
+from estimation.identification.fitted import CovarianceKind
+from estimation.identification.instrumental import fit_instrumental
+from estimation.identification.linear_model import FloatArray, LinearModel
+from estimation.identification.order import order_table
+from estimation.identification.output_error import fit_output_error
+from estimation.identification.prediction_error import fit_armax, fit_box_jenkins
+from estimation.identification.validate import fit_percent, validate
+from plant.errors import HydrostateError, LogWarning
+
+StructureName: TypeAlias = Literal["ARX", "ARMAX", "output-error", "Box-Jenkins", "SRIV"]
+
+STRUCTURES: tuple[StructureName, ...] = ("ARX", "ARMAX", "output-error", "Box-Jenkins")
+"""The four of section 4."""
+
+HELD_BACK = 1.0 / 3.0
+"""Share of the record that structures are compared on, and not fitted to."""
+
+NOISE_ORDER = 2
+"""Most coefficients of C and of D."""
+
+LEAST = 200
+"""A shorter record is compared on itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A model with what its order and structure were chosen by.
+
+    Parameters
+    ----------
+    model : LinearModel
+        Fitted to the whole record.
+    orders : pandas.DataFrame
+        As `order_table`; empty where the order was given.
+    structures : pandas.DataFrame
+        Indexed by structure: ``fit_percent`` of the free run and ``one_step_percent`` on the part held back,
+        ``whiteness`` and ``cross_correlation`` p-values on the part fitted.
+    """
+
+    model: LinearModel
+    orders: pd.DataFrame
+    structures: pd.DataFrame
+
+
+def choose_model(
+    u: ArrayLike,
+    y: ArrayLike,
+    sample_time: float,
+    *,
+    orders: Sequence[int] = (1, 2, 3, 4),
+    delay: int | None = 0,
+    structures: Sequence[StructureName] = STRUCTURES,
+    n_numerator: int | None = None,
+    covariance: CovarianceKind = "auto",
+    input_name: str = "input",
+    output_name: str = "output",
+) -> Choice:
+    """Fit every structure at the order that BIC prefers, and return the one that best runs free on data held back.
+
+    Orders at which a zero nearly cancels a pole are passed over, if there are others.
+
+    Parameters
+    ----------
+    u, y : array_like, shape (n,)
+        Input, no gaps; output, NaN where missing.
+    sample_time : float
+        Seconds between samples [s].
+    orders : sequence of int
+        Orders compared; one is taken as given.
+    delay : int or None
+        Dead time [samples]; None estimates it.
+    structures : sequence of str
+        Structures compared.
+    n_numerator : int, optional
+        Numerator coefficients; one more than the order, or as many behind a delay, unless told.
+    covariance : {"white", "coloured", "auto"}
+        As `fit_output_error`.
+    input_name, output_name : str
+        Channel names.
+
+    Returns
+    -------
+    Choice
+        Model and tables.
+
+    Raises
+    ------
+    HydrostateError
+        If a structure is not known, or as the fits.
+    """
+    unknown = [name for name in structures if name not in _FITS]
+    if unknown or not structures or not orders:
+        raise HydrostateError(
+            f"structures must be among {', '.join(_FITS)}, and an order given, got {unknown}, {orders}"
+        )
+    inputs, outputs = np.asarray(u, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    lag = estimate_delay(inputs, outputs) if delay is None else delay
+    table = pd.DataFrame()
+    order = orders[0]
+    if len(orders) > 1:
+        table = order_table(inputs, outputs, sample_time, orders=tuple(orders), delay=lag)
+        # a pole that a zero nearly cancels is there for a nonlinearity or drift, not for the order
+        clean = table[table["cancellations"] == 0]
+        kept = table if clean.empty else clean
+        order = int(kept.index[int(np.argmin(kept["bic"]))])
+    n_b = (order + (1 if lag == 0 else 0)) if n_numerator is None else n_numerator
+    form = {"n_numerator": n_b, "n_denominator": order, "delay": lag, "covariance": covariance}
+    form |= {"input_name": input_name, "output_name": output_name}
+    compared = (
+        compare_structures(inputs, outputs, sample_time, form, structures) if len(structures) > 1 else pd.DataFrame()
+    )
+    best = str(compared["fit_percent"].idxmax()) if len(structures) > 1 else structures[0]
+    return Choice(_FITS[best](inputs, outputs, sample_time, form), table, compared)
+
+
+def compare_structures(
+    u: Signals, y: Signals, sample_time: float, form: dict[str, Any], structures: Sequence[str]
+) -> pd.DataFrame:
+    """Return how structures of one size do on the last third of a record, or of the experiments, fitted to the rest.
+
+    Parameters
+    ----------
+    u, y : ndarray, shape (n,)
+        Input and output.
+    sample_time : float
+        Seconds between samples [s].
+    form : dict
+        Sizes and names, as the fits take them.
+    structures : sequence of str
+        What to compare.
+
+    Returns
+    -------
+    pandas.DataFrame
+        As `Choice.structures`.
+    """
+    fitted, kept = split_record(u, y)
+    rows: dict[str, dict[str, float]] = {}
+    for name in structures:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", LogWarning)
+            model = _FITS[name](*fitted, sample_time, form)
+        if not model.is_stable:
+            rows[name] = {"fit_percent": float("-inf"), "one_step_percent": float("nan")}
+            continue
+        found = [validate(model, one_u, one_y) for one_u, one_y in zip(*kept, strict=True)]
+        own = validate(model, fitted[0][0], fitted[1][0], fitted=name == "output-error")
+        ahead = [fit_percent(one_y, model.predict(one_u, one_y)) for one_u, one_y in zip(*kept, strict=True)]
+        rows[name] = {
+            "fit_percent": float(np.mean([one.fit_percent for one in found])),
+            "one_step_percent": float(np.mean(ahead)),
+            "whiteness": own.whiteness.p_value,
+            "cross_correlation": own.cross_correlation.p_value,
+        }
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("structure")
+
+
+def split_record(
+    u: Signals, y: Signals
+) -> tuple[tuple[list[FloatArray], list[FloatArray]], tuple[list[FloatArray], list[FloatArray]]]:
+    """Return what is fitted and what is held back: the last third of a record, or of the experiments.
+
+    Parameters
+    ----------
+    u, y : array_like of shape (n,), or a sequence of them
+        Input and output. A record shorter than `LEAST` samples is compared on itself.
+
+    Returns
+    -------
+    tuple of tuple of list of ndarray
+        Inputs and outputs fitted, inputs and outputs held back.
+    """
+    inputs, outputs = listed(u), listed(y)
+    if len(inputs) > 2:
+        cut = len(inputs) - max(1, round(HELD_BACK * len(inputs)))
+        return (inputs[:cut], outputs[:cut]), (inputs[cut:], outputs[cut:])
+    n = inputs[0].size
+    if n < LEAST:
+        return (inputs, outputs), (inputs, outputs)
+    cut = int(n * (1.0 - HELD_BACK))
+    return ([inputs[0][:cut]], [outputs[0][:cut]]), ([inputs[0][cut:]], [outputs[0][cut:]])
+
+
+def _arx(u: Signals, y: Signals, sample_time: float, form: dict[str, Any]) -> LinearModel:
+    return fit_arx(u, y, sample_time, **form)
+
+
+def _armax(u: Signals, y: Signals, sample_time: float, form: dict[str, Any]) -> LinearModel:
+    return fit_armax(u, y, sample_time, n_c=min(form["n_denominator"], NOISE_ORDER), **form)
+
+
+def _output_error(u: Signals, y: Signals, sample_time: float, form: dict[str, Any]) -> LinearModel:
+    return fit_output_error(u, y, sample_time, **form)
+
+
+def _box_jenkins(u: Signals, y: Signals, sample_time: float, form: dict[str, Any]) -> LinearModel:
+    noise = min(form["n_denominator"], NOISE_ORDER)
+    return fit_box_jenkins(u, y, sample_time, n_c=noise, n_d=noise, **form)
+
+
+def _instrumental(u: Signals, y: Signals, sample_time: float, form: dict[str, Any]) -> LinearModel:
+    return fit_instrumental(u, y, sample_time, **form)
+
+
+_FITS: dict[str, Callable[[Signals, Signals, float, dict[str, Any]], LinearModel]] = {
+    "ARX": _arx,
+    "ARMAX": _armax,
+    "output-error": _output_error,
+    "Box-Jenkins": _box_jenkins,
+    "SRIV": _instrumental,
+}

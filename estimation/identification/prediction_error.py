@@ -1,0 +1,316 @@
+"""ARMAX and Box-Jenkins models: least squares of the one-step prediction, by Levenberg-Marquardt."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.identification.criterion import Structure
+from estimation.identification.descent import solve_damped, stable
+from estimation.identification.experiments import Experiments, Signals, experiments_from
+from estimation.identification.fitted import CovarianceKind, fitted_model, scaled
+from estimation.identification.linear_model import FloatArray, LinearModel
+from estimation.identification.noise_model import noise_start
+from estimation.identification.one_step import prediction_errors
+from estimation.identification.output_error import SAMPLES_PER_PARAMETER, jacobian_and_residual, minimise
+from estimation.identification.starts import least_squares_arx
+from plant.errors import HydrostateError
+
+MOST_STEPS = 100
+"""Evaluations from each start."""
+
+TOLERANCE = 1e-10
+"""Share of the cost that a further step may promise at the end."""
+
+
+@dataclass(frozen=True)
+class NoiseStructure:
+    """Orders of ``y = B/F u + C/D e``.
+
+    Parameters
+    ----------
+    system : Structure
+        Of ``B/F``.
+    n_c, n_d : int
+        Coefficients of C and D behind their 1.
+    tied : bool
+        Whether ``D = F``.
+    """
+
+    system: Structure
+    n_c: int
+    n_d: int
+    tied: bool
+
+    @property
+    def n_main(self) -> int:
+        """Values beside the initial states."""
+        return self.system.n_numerator + self.system.n_denominator + self.n_c + self.n_d
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """As `prediction_errors` takes them."""
+        s = self.system
+        return np.array([s.n_numerator, s.n_denominator, self.n_c, self.n_d, s.delay, s.n_initial])
+
+    def acceptable(self, theta: FloatArray) -> bool:
+        """Return whether the predictor is stable: C always, and F and D unless tied, when they cancel out of it.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (p,)
+            All values.
+
+        Returns
+        -------
+        bool
+            False, too, where a value is not finite.
+        """
+        n_b, n_f = self.system.n_numerator, self.system.n_denominator
+        f, c = theta[n_b : n_b + n_f], theta[n_b + n_f : n_b + n_f + self.n_c]
+        d = theta[n_b + n_f + self.n_c : self.n_main]
+        return bool(np.isfinite(theta).all() and stable(c) and (self.tied or (stable(f) and stable(d))))
+
+
+def fit_armax(
+    u: Signals,
+    y: Signals,
+    sample_time: float,
+    *,
+    n_numerator: int,
+    n_denominator: int,
+    n_c: int,
+    delay: int = 0,
+    covariance: CovarianceKind = "white",
+    input_name: str = "input",
+    output_name: str = "output",
+) -> LinearModel:
+    """Fit ``F y = B u + C e`` by least squares of the one-step prediction.
+
+    Parameters
+    ----------
+    u, y : array_like, shape (n,), or a list of them
+        Input, no gaps; output, NaN where missing: predicted there.
+    sample_time : float
+        Seconds between samples [s].
+    n_numerator, n_denominator, n_c : int
+        Free coefficients of B, F and C.
+    delay : int
+        Dead time [samples].
+    covariance : {"white", "coloured", "auto"}
+        As `fit_output_error`.
+    input_name, output_name : str
+        Channel names.
+
+    Returns
+    -------
+    LinearModel
+        ``structure="ARMAX"``, D = F.
+
+    Raises
+    ------
+    HydrostateError
+        As `fit_output_error`.
+    """
+    form = noise_structure(n_numerator, n_denominator, delay, n_c, 0, tied=True)
+    data = checked_data(u, y, form, input_name, output_name)
+    return _fit(form, data, sample_time, covariance, (input_name, output_name), "ARMAX")
+
+
+def fit_box_jenkins(
+    u: Signals,
+    y: Signals,
+    sample_time: float,
+    *,
+    n_numerator: int,
+    n_denominator: int,
+    n_c: int,
+    n_d: int,
+    delay: int = 0,
+    covariance: CovarianceKind = "white",
+    input_name: str = "input",
+    output_name: str = "output",
+) -> LinearModel:
+    """Fit ``y = B/F u + C/D e`` by least squares of the one-step prediction (Box and Jenkins, 1970).
+
+    Parameters
+    ----------
+    u, y : array_like, shape (n,), or a list of them
+        Input, no gaps; output, NaN where missing: predicted there.
+    sample_time : float
+        Seconds between samples [s].
+    n_numerator, n_denominator, n_c, n_d : int
+        Free coefficients of B, F, C and D.
+    delay : int
+        Dead time [samples].
+    covariance : {"white", "coloured", "auto"}
+        As `fit_output_error`.
+    input_name, output_name : str
+        Channel names.
+
+    Returns
+    -------
+    LinearModel
+        ``structure="Box-Jenkins"``.
+
+    Raises
+    ------
+    HydrostateError
+        As `fit_output_error`.
+    """
+    form = noise_structure(n_numerator, n_denominator, delay, n_c, n_d, tied=False)
+    data = checked_data(u, y, form, input_name, output_name)
+    return _fit(form, data, sample_time, covariance, (input_name, output_name), "Box-Jenkins")
+
+
+def noise_structure(n_b: int, n_f: int, delay: int, n_c: int, n_d: int, *, tied: bool) -> NoiseStructure:
+    """Return checked orders.
+
+    Parameters
+    ----------
+    n_b, n_f, delay, n_c, n_d : int
+        Coefficients of B, F, C and D, and dead time [samples].
+    tied : bool
+        Whether ``D = F``.
+
+    Returns
+    -------
+    NoiseStructure
+        The orders.
+
+    Raises
+    ------
+    HydrostateError
+        If one is too small.
+    """
+    if min(n_b, n_f) < 1 or min(delay, n_c, n_d) < 0:
+        raise HydrostateError(
+            "n_numerator and n_denominator must be at least 1, delay, n_c and n_d at least 0, "
+            f"got {n_b}, {n_f}, {delay}, {n_c} and {n_d}"
+        )
+    return NoiseStructure(Structure(n_b, n_f, delay), n_c, n_d, tied)
+
+
+def checked_data(u: Signals, y: Signals, form: NoiseStructure, input_name: str, output_name: str) -> Experiments:
+    """Return checked data for a fit of given orders.
+
+    Parameters
+    ----------
+    u, y : array_like of shape (n,), or a sequence of them
+        Input and output.
+    form : NoiseStructure
+        The orders.
+    input_name, output_name : str
+        For messages.
+
+    Returns
+    -------
+    Experiments
+        The data.
+
+    Raises
+    ------
+    HydrostateError
+        As `experiments_from`.
+    """
+    return experiments_from(
+        u,
+        y,
+        input_name=input_name,
+        output_name=output_name,
+        n_excited=form.system.n_numerator + form.system.n_denominator,
+        n_wanted=SAMPLES_PER_PARAMETER * (form.n_main + form.system.n_initial),
+    )
+
+
+def _fit(
+    form: NoiseStructure,
+    given: Experiments,
+    sample_time: float,
+    covariance: CovarianceKind,
+    names: tuple[str, str],
+    structure: str,
+) -> LinearModel:
+    data, *scales = scaled(given)
+    found = [_descend(form, start, data) for start in _starts(form, data)]
+    _, theta, error, jacobian = min(found, key=lambda one: one[0])
+    n_b, n_f = form.system.n_numerator, form.system.n_denominator
+    f = theta[n_b : n_b + n_f]
+    c = np.concatenate([[1.0], theta[n_b + n_f : n_b + n_f + form.n_c]])
+    d = np.concatenate([[1.0], f if form.tied else theta[n_b + n_f + form.n_c : form.n_main]])
+    state = theta[form.n_main : form.n_main + form.system.n_states]
+    return fitted_model(
+        (theta[:n_b], f, state),
+        jacobian,
+        error,
+        data,
+        (scales[0], scales[1]),
+        sample_time=sample_time,
+        delay=form.system.delay,
+        covariance=covariance,
+        names=names,
+        structure=structure,
+        noise=(c, d),
+    )
+
+
+def _starts(form: NoiseStructure, data: Experiments) -> list[FloatArray]:
+    """Return starts: the output-error model with the noise that it leaves, with none, and from ARX."""
+    system = form.system
+    n_b, n_f = system.n_numerator, system.n_denominator
+    output_error = minimise(system, data)
+    _, residual = jacobian_and_residual(system, output_error, data)
+    longest = max(data.slices, key=lambda part: part.stop - part.start)
+    main, initial = output_error[: n_b + n_f], output_error[n_b + n_f :]
+    pairs = data.bridged()
+    u, y = max(pairs, key=lambda pair: pair[0].size)
+    arx_b, arx_f = least_squares_arx(n_b, n_f, system.delay, u, y)
+    arx = np.concatenate([arx_b[system.delay :], arx_f[1:]])
+    starts: list[FloatArray] = []
+    for values, rest in ((main, initial), (arx, np.zeros_like(initial))):
+        noises = [(np.zeros(form.n_c), np.zeros(form.n_d))]
+        if values is main and form.n_c + form.n_d:
+            f = np.concatenate([[1.0], main[n_b:]])
+            v = residual[longest]
+            guess = noise_start(np.convolve(v, f)[: v.size] if form.tied else v, form.n_c, form.n_d)
+            noises.append((guess[0][1:], guess[1][1:]))
+        for c, d in noises:
+            start = np.concatenate([values, c, d, rest])
+            if form.acceptable(start):
+                starts.append(start)
+    return starts
+
+
+def _descend(
+    form: NoiseStructure, start: FloatArray, data: Experiments
+) -> tuple[float, FloatArray, FloatArray, FloatArray]:
+    """Return cost, values, prediction errors and Jacobian of the minimum that one start leads to."""
+    n, p = data.u.size, start.size
+
+    def evaluated(theta: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        error, jacobian = np.zeros(n), np.zeros((n, p))
+        cost = prediction_errors(theta, form.sizes, form.tied, data.u, data.y, data.used, data.bounds, error, jacobian)
+        return cost, error, jacobian
+
+    theta = start.copy()
+    cost, error, jacobian = evaluated(theta)
+    damping, step, factor = 1e-3, np.zeros(p), np.zeros((p, p))
+    gram, gradient = jacobian.T @ jacobian, -(jacobian.T @ error)
+    for _ in range(MOST_STEPS):
+        if not solve_damped(gram, gradient, damping, step, factor):
+            damping = max(10.0 * damping, 1e-10)
+            continue
+        promised = -float(gradient @ step) + damping * float(np.diag(gram) @ step**2)
+        trial = theta + step
+        new = evaluated(trial) if form.acceptable(trial) else (np.inf, error, jacobian)
+        if new[0] < cost:
+            done = promised <= TOLERANCE * cost and damping <= 1e-2
+            damping = max(0.1 * damping, 1e-14) if cost - new[0] > 0.5 * promised else 3.0 * damping
+            theta, (cost, error, jacobian) = trial, new
+            gram, gradient = jacobian.T @ jacobian, -(jacobian.T @ error)
+            if done:
+                break
+        elif promised <= TOLERANCE * cost or damping > 1e12:
+            break
+        else:
+            damping = max(10.0 * damping, 1e-8)
+    return cost, theta, error, jacobian
