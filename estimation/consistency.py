@@ -1,6 +1,8 @@
 """Can an estimate be believed? NEES and NIS with their chi-square bounds, and the gate that every estimate passes.
 
-Source of the tests: Bar-Shalom, Li and Kirubarajan (2001), section 5.4.
+Source of the tests: Bar-Shalom, Li and Kirubarajan (2001), section 5.4. The gate asks three questions: are innovations
+as large as predicted (NIS), are they without structure where the drive is (`estimation.whiteness`), and does the
+estimate move from stretch to stretch no more than its own shrinking interval allows.
 """
 
 from dataclasses import dataclass
@@ -10,6 +12,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from estimation.run import Estimate
+from estimation.whiteness import SETTLING, Whiteness, whiteness
+from plant.record import Record
 
 Array = NDArray[np.float64]
 
@@ -22,6 +26,13 @@ MISMATCH_NIS = 100.0
 LARGEST_DRIFT = 0.03
 """Relative change of the estimate over the last fifths of a run above which it is called unsettled [fraction]."""
 
+LARGEST_WANDER = 9.0
+"""Mean square of the estimate's moves over what its interval allows, above which they are called too large: an interval
+three times too narrow [dimensionless]."""
+
+STRETCHES = 20
+"""Stretches of a log between which an estimate's moves are judged."""
+
 
 @dataclass(frozen=True)
 class Gate:
@@ -33,10 +44,18 @@ class Gate:
         Whether the estimate and its interval can be believed.
     reasons : tuple of str
         One sentence for each thing that speaks against it.
+    inflation : float
+        Factor by which the standard deviation has to grow for the structure that is left in the innovations
+        [dimensionless]; 1 where there is none. It is an estimate of magnitude: right within a factor of about two on
+        plants that the model does not describe, where it turns errors of 5 to 400 standard deviations into 0.1 to 3.
+    whiteness : tuple of Whiteness
+        The innovations of each channel; empty where they were not kept.
     """
 
     passed: bool
     reasons: tuple[str, ...]
+    inflation: float = 1.0
+    whiteness: tuple[Whiteness, ...] = ()
 
 
 def nees(errors: Array, covariances: Array) -> Array:
@@ -90,25 +109,63 @@ def mean_chi_square_bounds(degrees: int, count: int, confidence: float = 0.95) -
     return low, high
 
 
-def consistency_gate(estimate: Estimate, state: str) -> Gate:
+def consistency_gate(estimate: Estimate, state: str, record: Record | None = None) -> Gate:
     """Judge whether an estimate of a state can be believed.
 
     Parameters
     ----------
     estimate : Estimate
-        The filtered log.
+        The filtered log; with its innovations kept, their structure counts too.
     state : str
-        The state in question.
+        The state in question, constant in time.
+    record : Record, optional
+        The log that was filtered; without it innovations are judged by their size alone.
 
     Returns
     -------
     Gate
         Passed, or the reasons against it.
     """
+    channels = () if record is None else whiteness(estimate, record)
+    moves = wander(estimate, state)
     reasons = [_overconfidence(channel, nis) for channel, nis in estimate.nis.items() if nis > LARGEST_NIS]
+    reasons += [_structure(channel) for channel in channels if channel.exceeded]
+    if moves > LARGEST_WANDER:
+        reasons.append(
+            f"{state} moved between stretches of the log {moves**0.5:.0f} times as far as its interval allows: "
+            "they disagree about it, and the interval is too narrow"
+        )
     reasons += _unsettled(estimate, state)
     reasons += _at_a_bound(estimate, state)
-    return Gate(not reasons, tuple(reasons))
+    structure = sum(channel.excess for channel in channels if channel.exceeded)
+    return Gate(not reasons, tuple(reasons), max(1.0, moves + structure) ** 0.5, channels)
+
+
+def wander(estimate: Estimate, state: str) -> float:
+    """Return how far a constant state moves between stretches of a log, squared, over what its variance allows.
+
+    The estimate of a constant is a martingale under its own model: each stretch moves it with the variance by which
+    the stretch reduces its own. Only what comes after settling counts.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        The filtered log.
+    state : str
+        A state that is constant in time.
+
+    Returns
+    -------
+    float
+        Sum of the squared moves over the reduction of the variance [dimensionless]: 1 on average where the filter is
+        consistent, 0 where the variance was not reduced.
+    """
+    mean, std = estimate.track(state)
+    marks = np.linspace(SETTLING * (len(mean) - 1), len(mean) - 1, STRETCHES + 1).astype(int)
+    reduced = float(std[marks[0]] ** 2 - std[marks[-1]] ** 2)
+    if not reduced > 1e-9 * float(std[marks[0]]) ** 2:
+        return 0.0
+    return float(np.sum(np.diff(mean[marks]) ** 2)) / reduced
 
 
 def describes(estimate: Estimate, state: str) -> bool:
@@ -133,6 +190,18 @@ def _overconfidence(channel: str, nis: float) -> str:
     return (
         f"the residuals of {channel} are {nis**0.5:.1f} times larger than the filter expects (NIS {nis:.1f}, "
         "1 is expected): model and log disagree, and the interval is too narrow"
+    )
+
+
+def _structure(found: Whiteness) -> str:
+    cause = (
+        "where the drive is: the model does not answer it as the log does"
+        if found.driven
+        else "beside the drive: a friction, a valve or a pick-up that the model does not know"
+    )
+    return (
+        f"the residuals of {found.channel} hold {found.excess:.3g} times the power of white noise near "
+        f"{found.frequency:.3g} Hz, {cause}, and the interval is up to {found.excess**0.5:.2g} times too narrow"
     )
 
 

@@ -4,10 +4,30 @@ Equations: predict and update as in Gadsden (2011), whose notation the EHA paper
 diagonal, so processing one channel at a time equals the joint update and inverts nothing.
 """
 
-from dataclasses import replace
+from functools import cache, partial
 
-from estimation.filter import FilterProblem, Trace, empty_trace
-from estimation.kernels import compile_ekf
+from estimation.algebra import EKF, Rule, predict_expressions, update_expressions
+from estimation.compiled import run_rule
+from estimation.filter import FilterProblem, Trace
+
+
+@cache
+def ekf_rule(robust: str) -> Rule:
+    """Return the extended Kalman filter with outliers counting as wanted.
+
+    Parameters
+    ----------
+    robust : str
+        See `estimation.algebra.inflation`.
+
+    Returns
+    -------
+    Rule
+        The filter.
+    """
+    if robust == "none":
+        return EKF
+    return Rule(f"ekf_{robust.replace('-', '_')}", predict_expressions, partial(update_expressions, robust=robust))
 
 
 def ekf(problem: FilterProblem) -> Trace:
@@ -23,22 +43,4 @@ def ekf(problem: FilterProblem) -> Trace:
     Trace
         Its result.
     """
-    trace = empty_trace(problem)
-    run = compile_ekf(problem.model, problem.channels)
-    nis, count, log_likelihood = run(
-        trace.mean,
-        trace.covariance,
-        problem.speed,
-        problem.measured,
-        problem.parameters,
-        problem.noise,
-        problem.variances,
-        problem.sample_time,
-        problem.substeps,
-        problem.every,
-        trace.track,
-        trace.track_variance,
-        trace.residuals,
-        trace.residual_variances,
-    )
-    return replace(trace, nis=nis, count=count, log_likelihood=log_likelihood)
+    return run_rule(ekf_rule(problem.robust), problem)

@@ -4,8 +4,8 @@ A method is a function ``method(problem) -> Trace``. To add one, write such a fu
 a line in `estimation.run.METHODS`; nothing else changes.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -30,8 +30,8 @@ class FilterProblem:
         Prior mean, scaled.
     covariance : ndarray, shape (n, n)
         Prior covariance, scaled.
-    speed : ndarray, shape (samples,)
-        Motor speed [rad/s], no sample missing.
+    drives : ndarray, shape (samples, drives)
+        Channels that drive the model, in SI, no sample missing.
     measured : ndarray, shape (samples, channels)
         Measurements in SI; NaN is missing.
     parameters : ndarray, shape (parameters,)
@@ -48,13 +48,18 @@ class FilterProblem:
         The track keeps every so many samples.
     keep_innovations : bool
         Whether every residual is kept.
+    robust : str
+        How innovations that are too large to be noise count, see `estimation.algebra.inflation`.
+    settings : Mapping[str, float]
+        What a method lets its user set, by name; its defaults hold for what is not here
+        [each in its own unit].
     """
 
     model: ProcessModel
     channels: tuple[str, ...]
     mean: Array
     covariance: Array
-    speed: Array
+    drives: Array
     measured: Array
     parameters: Array
     noise: Array
@@ -63,6 +68,8 @@ class FilterProblem:
     substeps: int
     every: int
     keep_innovations: bool
+    robust: str = "none"
+    settings: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 @dataclass(frozen=True, eq=False)

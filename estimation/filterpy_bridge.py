@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgWarning
 
 from estimation.filter import FilterProblem, Trace, empty_trace
-from estimation.kernels import compile_step
+from estimation.linearised import compile_step
 from estimation.model import ProcessModel
+from plant.errors import HydrostateError
 from plant.integrate import PARAMETER_NAMES
 
 Array = NDArray[np.float64]
@@ -46,7 +47,14 @@ def filterpy_ekf(problem: FilterProblem) -> Trace:
     Trace
         Its result, NaN from where it diverges. The joint innovations are given as the sequential ones that they are
         equal to, channel by channel; where a sample is missing, residual and variance are NaN.
+
+    Raises
+    ------
+    HydrostateError
+        If a robust update is asked for.
     """
+    if problem.robust != "none":
+        raise HydrostateError(f"filterpy's filter has no robust update, got robust {problem.robust!r}")
     trace = empty_trace(problem)
     for values in (trace.track, trace.track_variance, trace.residuals, trace.residual_variances):
         values.fill(np.nan)
@@ -89,8 +97,8 @@ def _sample(
 
 
 def _bounds(model: ProcessModel) -> tuple[Array, Array]:
-    lower = np.array([state.lower / state.scale for state in model.states])
-    return lower, np.array([state.upper / state.scale for state in model.states])
+    lower, upper = zip(*(state.scaled_bounds for state in model.states), strict=True)
+    return np.array(lower), np.array(upper)
 
 
 def _observation_matrix(problem: FilterProblem) -> Array:
@@ -109,9 +117,9 @@ def _observation_matrix(problem: FilterProblem) -> Array:
 def _predict(kalman: _ModelFilter, problem: FilterProblem, k: int) -> None:
     step = compile_step(problem.model).step
     h = problem.sample_time / problem.substeps
-    slope = (problem.speed[k] - problem.speed[k - 1]) / problem.substeps
+    slope = (problem.drives[k] - problem.drives[k - 1]) / problem.substeps
     for j in range(problem.substeps):
-        start = problem.speed[k - 1] + j * slope
+        start = problem.drives[k - 1] + j * slope
         kalman.moved, kalman.F = step(kalman.x, start, start + slope, problem.parameters, h)
         kalman.predict()
 

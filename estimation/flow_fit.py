@@ -1,20 +1,25 @@
-"""`fit_flow(record, parameters) -> FlowFit`: bulk modulus, leakage and flow bias of a log, by the flow form."""
+"""`fit_flow(record, parameters, ...) -> FormFit`: bulk modulus, leakage and flow bias of a log, by the flow form."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import rank_filter
 
-from estimation.flow import FLOW_FORM, RELIEVING_FLOW_FORM
-from estimation.greybox import GreyBoxFit, fit_greybox
+from estimation.flow import FLOW_FORM, MASS_FLOW_FORM, relieving
+from estimation.form_fit import LONGEST_STEP, FormFit, weighed
+from estimation.greybox_fit import GreyBoxFit, Search, fit_greybox
+from estimation.greybox_problem import GreyBoxLog, OutputNoise, Problem
 from estimation.identification.preprocess import bridged
 from estimation.measurement_noise import measurement_variances
 from plant.eha import EhaParameters
 from plant.errors import LogError
 from plant.integrate import parameter_row
 from plant.record import Record
+
+Array = NDArray[np.float64]
 
 FLOW_CHANNELS = ("position_m", "differential_pressure_pa")
 """Channels that the flow form needs beside motor speed."""
@@ -31,8 +36,14 @@ MAKEUP_TRIED = (1e-9, 1e-13)
 LEAD_START = 1e-5
 """First guess of the motor's lead on the straight line between samples [s]."""
 
-LONGEST_STEP = 2.5e-4
-"""Longest step of the chamber balance [s]; slower logs are sub-stepped."""
+OPENING_START = 1e3
+"""First guess of the drop at which a make-up check valve is half open [Pa]."""
+
+DRAIN_START = 0.05
+"""First guess of the pump's case drain, as a share of the healthy leakage [fraction]."""
+
+SCREENED_SECONDS = 4.0
+"""Starts are compared on the beginning of the log: it tells a wrong valley from a right one [s]."""
 
 NEAR_RELIEF = 0.97
 """Share of the relief setting above which the valve is taken to open [fraction]."""
@@ -43,34 +54,41 @@ LARGEST_CHI_SQUARE = 1.2
 LARGEST_AUTOCORRELATION = 0.1
 """Correlation of neighbouring residuals above which the same is said [dimensionless]."""
 
+LEAST_LEAKAGE = 1e-3
+"""Least first guess of a leakage, as a share of the rated pump flow [fraction]; a logarithm cannot start at zero."""
 
-@dataclass(frozen=True, eq=False)
-class FlowFit:
-    """What the pressure balance of a log says.
+HAMPEL_WINDOW = 7
+"""Samples of the running median that a gross outlier stands out from; a signal that only rises or only falls is its own
+median, so a step of the drive is none."""
 
-    Parameters
-    ----------
-    parameters : Mapping[str, tuple of float]
-        Value and standard deviation in SI, by parameter name.
-    bound : float
-        Relative standard deviation of bulk modulus [fraction].
-    chi_square : float
-        Mean squared residual over the sensor's variance [dimensionless].
-    reasons : tuple of str
-        What speaks against the fit, one sentence each.
-    residual : ndarray, shape (n,)
-        Differential pressure, measured less predicted [Pa].
-    """
+GROSS = 10.0
+"""How far beyond the channel's usual distance from its running median a gross outlier is [dimensionless]."""
 
-    parameters: Mapping[str, tuple[float, float]]
-    bound: float
-    chi_square: float
-    reasons: tuple[str, ...]
-    residual: NDArray[np.float64]
+BENDS = 3.0
+"""By how many spreads of the window's middle samples it is farther away still: a peak is none [dimensionless]."""
+
+USUAL = 95.0
+"""Share of the samples that are taken to be no outliers [percent]."""
+
+LONG_GAP = 5
+"""Missing speeds in a row after which nothing is concluded from the speeds at the gap's ends [samples]."""
+
+FELT_GAP = 0.1
+"""A gap in speed matters where what it leaves open moves pressure by this share of its noise or more [fraction]."""
+
+REFILLS = 3
+"""How often the flow within gaps is found from the pressure after them."""
 
 
-def fit_flow(record: Record, parameters: EhaParameters, bulk_modulus: float) -> FlowFit:
-    """Fit the flow form to a log.
+def fit_flow(
+    record: Record,
+    parameters: EhaParameters,
+    bulk_modulus: float,
+    uncertainties: Mapping[str, float] | None = None,
+) -> FormFit:
+    """Fit the flow form to a log, balanced by volume and by mass, and weigh the two.
+
+    Gross outliers are taken out, and what the pump delivered while its speed is missing follows from the pressure.
 
     Parameters
     ----------
@@ -80,10 +98,12 @@ def fit_flow(record: Record, parameters: EhaParameters, bulk_modulus: float) -> 
         Geometry and pump are taken from it; leakage and flow bias are first guesses.
     bulk_modulus : float
         First guess of effective bulk modulus [Pa].
+    uncertainties : Mapping[str, float], optional
+        Relative standard deviation of the actuator's parameters [fraction]; none by default.
 
     Returns
     -------
-    FlowFit
+    FormFit
         The best of several starts.
 
     Raises
@@ -94,25 +114,147 @@ def fit_flow(record: Record, parameters: EhaParameters, bulk_modulus: float) -> 
     lacking = [channel for channel in FLOW_CHANNELS if channel not in record]
     if lacking:
         raise LogError(f"the flow form needs {' and '.join(FLOW_CHANNELS)}, the record lacks {', '.join(lacking)}")
+    noise = measurement_variances(record, (*FLOW_FORM.drives, *FLOW_FORM.outputs))
+    record = record.replace(**{name: without_outliers(record[name], v**0.5) for name, v in noise.items()})
     pressure = record["differential_pressure_pa"]
     relieved = float(np.nanmax(np.abs(pressure))) > NEAR_RELIEF * parameters.relief_pressure
-    fit = fit_greybox(
-        RELIEVING_FLOW_FORM if relieved else FLOW_FORM,
-        np.column_stack([bridged(record[channel]) for channel in FLOW_FORM.drives]),
-        pressure,
-        parameter_row(parameters),
-        record.sample_time,
-        starts=_starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus)),
-        variance=measurement_variances(record, ["differential_pressure_pa"])["differential_pressure_pa"],
-        substeps=max(1, ceil(record.sample_time / LONGEST_STEP - 1e-9)),
+    forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM)]
+    log = _log(record, parameters, uncertainties or {})
+    starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
+    search = Search(screened=ceil(SCREENED_SECONDS / record.sample_time))
+    ceilings = {"speed_lead": record.sample_time}
+    gaps = speed_gaps(record, parameters)
+    by_volume = fit_greybox(forms[0], log, starts=starts, search=search, ceilings=ceilings)
+    for number in range(REFILLS if len(gaps) else 0):
+        log = refilled(log, by_volume, gaps)
+        # a fit to a gap's wrong flow may lie in a wrong valley, so all starts are tried again when that is nearly right
+        tried = [by_volume.values, *(starts if number == REFILLS - 2 else [])]
+        by_volume = fit_greybox(forms[0], log, starts=tried, search=search, ceilings=ceilings)
+    by_mass = fit_greybox(forms[1], log, starts=[_restarted(by_volume, starts)], ceilings=ceilings)
+    best = min((by_volume, by_mass), key=lambda fit: fit.cost)
+    found, rig_std = weighed((by_volume, by_mass))
+    value, std = found["bulk_modulus"]
+    return FormFit(found, rig_std, std / value, best.chi_square[0], _objections(best), best.residual[:, 0])
+
+
+def without_outliers(values: Array, noise: float = 0.0) -> Array:
+    """Return a channel without its gross outliers, which become missing samples (Hampel 1974).
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        A channel [any unit]; NaN where missing.
+    noise : float
+        Standard deviation of its noise [the channel's unit].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        The channel, NaN where it stood out.
+
+    Examples
+    --------
+    >>> step = np.repeat([0.0, 1.0], 10)
+    >>> step[4] = 30.0
+    >>> np.flatnonzero(np.isnan(without_outliers(step))).tolist()
+    [4]
+    """
+    present = np.flatnonzero(np.isfinite(values))
+    seen = values[present]
+    middle = HAMPEL_WINDOW // 2
+    below, median, above = (rank_filter(seen, middle + k, size=HAMPEL_WINDOW, mode="nearest") for k in (-1, 0, 1))
+    distance = np.abs(seen - median)
+    usual = float(np.percentile(distance, USUAL)) if len(seen) else 0.0
+    kept = values.copy()
+    kept[present[distance > GROSS * (usual + noise) + BENDS * (above - below)]] = np.nan
+    return kept
+
+
+def speed_gaps(record: Record, parameters: EhaParameters) -> Array:
+    """Return where missing motor speeds leave the pumped volume open by more than the pressure can overlook.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    parameters : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    ndarray, shape (gaps, n)
+        For each such gap, one in it and zero elsewhere [dimensionless].
+    """
+    speed = record["motor_speed_rad_s"]
+    bounds = np.flatnonzero(np.diff(np.isnan(speed).astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    noise = measurement_variances(record, ("differential_pressure_pa",))["differential_pressure_pa"] ** 0.5
+    stiffness = parameters.bulk_modulus / parameters.chamber_volume * parameters.pump_displacement
+    bumps: list[Array] = []
+    for first, after in bounds:
+        length = after - first
+        if first < 2 or after > len(speed) - 2:
+            continue
+        # a straight line is right where the speed goes on as it did before the gap and does after it
+        slopes = np.nan_to_num([speed[first - 1] - speed[first - 2], speed[after + 1] - speed[after]])
+        sudden = abs(speed[after] - speed[first - 1] - np.mean(slopes) * (length + 1))
+        felt = 0.5 * stiffness * sudden * length * record.sample_time > FELT_GAP * noise
+        if felt or length >= LONG_GAP:
+            bumps.append(np.zeros(len(speed)))
+            bumps[-1][first:after] = 1.0
+    return np.array(bumps)
+
+
+def refilled(log: GreyBoxLog, fit: GreyBoxFit, bumps: Array) -> GreyBoxLog:
+    """Return the log with the speed in its gaps such that the pressure after them is explained.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, gaps bridged.
+    fit : GreyBoxFit
+        A fit to it.
+    bumps : ndarray, shape (gaps, n)
+        The gaps, of `speed_gaps` [dimensionless].
+
+    Returns
+    -------
+    GreyBoxLog
+        The log, its speed changed by a Gauss-Newton step of the gaps' mean speeds beside the unknowns.
+    """
+    problem = Problem(fit.model, log)
+    errors, slopes = problem.predict(tuple(fit.theta))
+    predicted, _ = problem.run(fit.theta)
+    unit = np.zeros_like(log.drives)
+    responses: list[Array] = []
+    for bump in bumps:
+        unit[:, 0] = bump
+        responses.append(problem.flat(problem.run(fit.theta, drives=log.drives + unit)[0] - predicted))
+    columns = np.column_stack([slopes, *responses])
+    size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+    step = np.linalg.lstsq(columns / size, -errors, rcond=None)[0] / size
+    drives = log.drives.copy()
+    drives[:, 0] += step[slopes.shape[1] :] @ bumps
+    return replace(log, drives=drives)
+
+
+def _log(record: Record, parameters: EhaParameters, uncertainties: Mapping[str, float]) -> GreyBoxLog:
+    channels = (*FLOW_FORM.drives, *FLOW_FORM.outputs)
+    variances = measurement_variances(record, channels)
+    return GreyBoxLog(
+        drives=np.column_stack([bridged(record[channel]) for channel in FLOW_FORM.drives]),
+        measured=record["differential_pressure_pa"][:, None],
+        parameters=parameter_row(parameters),
+        sample_time=record.sample_time,
+        steps=np.full(len(record), max(1, ceil(record.sample_time / LONGEST_STEP - 1e-9))),
+        noise=(OutputNoise(variances["differential_pressure_pa"]),),
+        drive_std=tuple(variances[channel] ** 0.5 for channel in FLOW_FORM.drives),
+        uncertainties=uncertainties,
     )
-    return FlowFit(
-        parameters={name: (value, value * fit.log_std[name]) for name, value in fit.values.items()},
-        bound=fit.log_std["bulk_modulus"],
-        chi_square=fit.chi_square,
-        reasons=_objections(fit),
-        residual=fit.residual,
-    )
+
+
+def _restarted(fit: GreyBoxFit, starts: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Return what was found; what vanished has no slope to come back on, so it begins at its first guess again."""
+    return dict(fit.values) | {name: starts[0][name] for name in ("case_leakage", "makeup_opening", "speed_lead")}
 
 
 def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
@@ -125,6 +267,8 @@ def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
             "leakage_coefficient": worse * leakage,
             "flow_bias": biased * bias,
             "makeup_conductance": makeup,
+            "makeup_opening": OPENING_START,
+            "case_leakage": DRAIN_START * leakage,
             "speed_lead": LEAD_START,
             "relief_pressure": p.relief_pressure,
             "relief_conductance": p.relief_conductance,
@@ -135,20 +279,16 @@ def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
     ]
 
 
-LEAST_LEAKAGE = 1e-3
-"""Least first guess of a leakage, as a share of the rated pump flow [fraction]; a logarithm cannot start at zero."""
-
-
 def _objections(fit: GreyBoxFit) -> tuple[str, ...]:
     reasons: list[str] = []
-    if fit.chi_square > LARGEST_CHI_SQUARE:
+    if fit.chi_square[0] > LARGEST_CHI_SQUARE:
         reasons.append(
-            f"the pressure residuals are {fit.chi_square**0.5:.1f} times larger than the sensor's noise: "
+            f"the pressure residuals are {fit.chi_square[0] ** 0.5:.1f} times larger than the sensor's noise: "
             "the log does something that the flow balance does not know"
         )
-    if abs(fit.autocorrelation) > LARGEST_AUTOCORRELATION:
+    if abs(fit.autocorrelation[0]) > LARGEST_AUTOCORRELATION:
         reasons.append(
-            f"neighbouring pressure residuals are correlated by {fit.autocorrelation:.2f}: "
+            f"neighbouring pressure residuals are correlated by {fit.autocorrelation[0]:.2f}: "
             "the log does something that the flow balance does not know"
         )
     return tuple(reasons)

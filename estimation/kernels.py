@@ -1,146 +1,31 @@
-"""Filters as straight-line kernels: covariance algebra unrolled over the model's structure and compiled.
+"""Compiled filters: a rule on a model for a set of channels, as straight lines that run for one filter or for 32 lanes.
 
-The predict and the update of an extended Kalman filter are written here once, as loops over expressions. Structural
-zeros and ones of the Jacobian vanish, symmetric covariances are stored once, and measurements are processed one
-channel at a time, so no matrix is inverted and no absolute jitter is needed.
+One filter keeps its state in variables. Lanes keep theirs in one flat buffer with constant offsets, which the compiler
+turns into vector instructions. Both call the same two inlined functions, in plain IEEE arithmetic, nothing reassociated
+or contracted: a filter gives the same bits alone and in a batch.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from types import ModuleType
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.algebra import Outputs, Rule
+from estimation.layout import Halves, halves_of, layout
 from estimation.model import ProcessModel
-from plant.compiled.expression import ZERO, Expression, as_expression, jacobian, select, symbol, unary
-from plant.compiled.functions import where
 from plant.compiled.kernel_file import load_kernel
-from plant.compiled.source import statements
-from plant.integrate import PARAMETER_NAMES, parameter_symbols
+from plant.compiled.source import assignments, symbols_in
 
-Array: TypeAlias = NDArray[np.float64]
+Array = NDArray[np.float64]
 
-Covariance: TypeAlias = dict[tuple[int, int], Expression]
-"""Upper triangle: ``P[i, j]`` with i <= j."""
+LANES = 32
+"""Filters side by side: as many as keep a vector unit busy; fewer leave it waiting, more do not help."""
 
+FLUSH = 16
+"""Samples between logarithms of the running product of innovation variances: it cannot overflow that fast."""
 
-def _entry(P: Covariance, i: int, j: int) -> Expression:
-    return P[min(i, j), max(i, j)]
-
-
-def _total(terms: Sequence[Expression]) -> Expression:
-    result: Expression = ZERO
-    for term in terms:
-        result = result + term
-    return result
-
-
-def _state_symbols(model: ProcessModel) -> tuple[list[Expression], Covariance]:
-    n = model.width
-    mean = [symbol(f"z{i}") for i in range(n)]
-    return mean, {(i, j): symbol(f"P{i}{j}") for i in range(n) for j in range(i, n)}
-
-
-def scaled_step(model: ProcessModel) -> tuple[list[Expression], list[list[Expression]]]:
-    """Trace the model's step in the filter's scaled units.
-
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
-
-    Returns
-    -------
-    tuple of (list of Expression, list of list of Expression)
-        The state one step later, and its Jacobian by the state.
-    """
-    mean, _ = _state_symbols(model)
-    physical = tuple(z * state.scale for z, state in zip(mean, model.states, strict=True))
-    speeds = (symbol("u_start"), symbol("u_end"))
-    moved = model.step(physical, speeds, parameter_symbols(), symbol("h"))
-    scaled = [
-        z if new is old else as_expression(new) / state.scale
-        for z, old, new, state in zip(mean, physical, moved, model.states, strict=True)
-    ]
-    return scaled, jacobian(scaled, mean)
-
-
-def _bounded(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]:
-    """Hold the mean to its physical bounds; what is not a number stays so, for a diverged filter must show."""
-    held: list[Expression] = []
-    for z, state in zip(mean, model.states, strict=True):
-        lower, upper = state.lower / state.scale, state.upper / state.scale
-        low = z if state.lower == -float("inf") else where(z < lower, lower, z)
-        held.append(low if state.upper == float("inf") else where(low > upper, upper, low))
-    return held
-
-
-def predict_expressions(model: ProcessModel) -> dict[str, Expression]:
-    """Return the predict step: mean through the model, ``P = F P F' + Q h``.
-
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
-
-    Returns
-    -------
-    dict[str, Expression]
-        New value of each mean ``z`` and covariance ``P`` symbol.
-    """
-    n = model.width
-    _, P = _state_symbols(model)
-    mean, F = scaled_step(model)
-    FP = [[_total([F[i][k] * _entry(P, k, j) for k in range(n)]) for j in range(n)] for i in range(n)]
-    outputs = {f"z{i}": z for i, z in enumerate(_bounded(model, mean))}
-    for i in range(n):
-        for j in range(i, n):
-            spread = _total([FP[i][k] * F[j][k] for k in range(n)])
-            outputs[f"P{i}{j}"] = spread + symbol(f"q{i}") * symbol("h") if i == j else spread
-    return outputs
-
-
-def update_expressions(model: ProcessModel, channels: Sequence[str]) -> dict[str, Expression]:
-    """Return the update by each channel in turn; a missing sample (NaN) changes nothing.
-
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
-    channels : sequence of str
-        Measured channels, in the order of processing.
-
-    Returns
-    -------
-    dict[str, Expression]
-        New value of each mean and covariance symbol, residuals ``e`` and their variances ``s``.
-    """
-    n = model.width
-    mean, covariance = _state_symbols(model)
-    outputs: dict[str, Expression] = {}
-    prior = list(mean)
-    physical = tuple(z * state.scale for z, state in zip(prior, model.states, strict=True))
-    predicted = model.observe(physical, parameter_symbols())
-    rows = jacobian([as_expression(predicted[channel]) for channel in channels], prior)
-    for c, channel in enumerate(channels):
-        y, r, H = symbol(f"y{c}"), symbol(f"r{c}"), rows[c]
-        present = unary("present", y)
-        moved = _total([H[i] * (mean[i] - prior[i]) for i in range(n)])
-        residual = y - (predicted[channel] + moved)
-        PH = [_total([_entry(covariance, i, j) * H[j] for j in range(n)]) for i in range(n)]
-        variance = _total([H[i] * PH[i] for i in range(n)]) + r
-        weight = select(present, 1.0 / variance, ZERO)
-        step = weight * select(present, residual, ZERO)
-        covariance = {(i, j): entry - PH[i] * PH[j] * weight for (i, j), entry in covariance.items()}
-        mean = [z + PH[i] * step for i, z in enumerate(mean)]
-        outputs[f"e{c}"], outputs[f"s{c}"] = residual, variance
-    outputs |= {f"z{i}": z for i, z in enumerate(_bounded(model, mean))}
-    return outputs | {f"P{i}{j}": value for (i, j), value in covariance.items()}
-
-
-_RUN = '''"""Generated: extended Kalman filter on the {name} form."""
+_PARTS = """# Generated: {name}.
 
 import math
 
@@ -148,53 +33,133 @@ import numba
 import numpy as np
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def run(
-    mean, covariance, speed, measured, parameters, noise, variances, sample_time, substeps, every,
-    track, track_variance, residuals, residual_variances,
-):
-    n = speed.shape[0]
+@numba.njit(forceinline=True, error_model="numpy")
+def prepare({prepare_takes}):
+{prepare}
+
+
+@numba.njit(forceinline=True, error_model="numpy")
+def predict({predict_takes}):
+{predict}
+
+
+@numba.njit(forceinline=True, error_model="numpy")
+def update({update_takes}):
+{update}
+
+
+"""
+
+_ONE = """@numba.njit(cache=True, nogil=True, error_model="numpy")
+def run(state, rows, drives, measured, substeps, every, track, track_variance, residuals, residual_variances):
+    n = measured.shape[0]
     keep = residuals.shape[0] == n
+    logs = np.zeros({channels})
 {load}
-    h = sample_time / substeps
-    nis = np.zeros({channels})
-    count = np.zeros({channels})
-    log_likelihood = 0.0
+    {prepare_gives} = prepare({prepare_takes})
     for k in range(n):
         if k > 0:
-            slope = (speed[k] - speed[k - 1]) / substeps
-            for j in range(substeps):
-                u_start = speed[k - 1] + j * slope
-                u_end = u_start + slope
-{predict}
-{measure}
-{update}
-{score}
+{drive}
+            for i in range(substeps):
+                j = float(i)
+                {predict_gives} = predict({predict_takes})
+{sample}
+        {update_gives} = update({update_takes})
         if k % every == 0:
-            row = k // every
 {store}
-{finish}
-    return nis, count, log_likelihood
-'''
-
-_SCORE = """        if y{c} == y{c}:
-            nis[{c}] += e{c} * e{c} / s{c}
-            count[{c}] += 1.0
-            log_likelihood -= 0.5 * (e{c} * e{c} / s{c} + math.log(2.0 * math.pi * s{c}))
         if keep:
-            residuals[k, {c}] = e{c}
-            residual_variances[k, {c}] = s{c}"""
+{keep}
+        if k % {flush} == {flush} - 1:
+{flushed}
+{finish}
+    return logs
+"""
+
+_LANES = """@numba.njit(cache=True, nogil=True, error_model="numpy")
+def prepare_all(rows, constants):
+    for l in range({lanes}):
+{prepare_load}
+        {prepare_slots} = prepare({prepare_takes})
 
 
-def _lines(template: str, count: int, indent: int) -> str:
-    return "\n".join(" " * indent + template.format(i=i) for i in range(count))
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def predict_all(state, constants, before, after, j):
+    for l in range({lanes}):
+{predict_load}
+        {predict_slots} = predict({predict_takes})
 
 
-def ekf_source(model: ProcessModel, channels: tuple[str, ...]) -> str:
-    """Write the scalar kernel of the extended Kalman filter.
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def update_all(state, constants, sample):
+    for l in range({lanes}):
+{update_load}
+        {update_slots} = update({update_takes})
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def both_all(state, constants, before, after, j, sample):
+    for l in range({lanes}):
+{both_load}
+        {predict_gives} = predict({predict_takes})
+        {update_slots} = update({update_takes})
+{both_store}
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def run(state, rows, drives, measured, begin, substeps, every, track, track_variance, logs):
+    constants = np.empty({kept} * {lanes})
+    prepare_all(rows, constants)
+    for i in range(measured.shape[0]):
+        k = begin + i
+        if k == 0:
+            update_all(state, constants, measured[0])
+        elif i == 0:
+            continue
+        else:
+            for j in range(substeps - 1):
+                predict_all(state, constants, drives[i - 1], drives[i], float(j))
+            both_all(state, constants, drives[i - 1], drives[i], float(substeps - 1), measured[i])
+        if k % every == 0:
+            for l in range({lanes}):
+{store}
+        if k % {flush} == {flush} - 1:
+            for l in range({lanes}):
+{flushed}
+"""
+
+
+def _block(lines: Sequence[str], indent: int) -> str:
+    return "\n".join(" " * indent + line for line in lines or ["pass"])
+
+
+def _takes(outputs: Outputs) -> list[str]:
+    return sorted(symbols_in(list(outputs.values())))
+
+
+def _tuple(names: Sequence[str]) -> str:
+    return "".join(f"{name}, " for name in names).rstrip()
+
+
+def _parts(halves: Halves) -> dict[str, str]:
+    """Return, for each of the three functions, its body, what it takes and what it gives."""
+    texts: dict[str, str] = {}
+    functions = {"prepare": halves.constants, "predict": halves.predict, "update": halves.update}
+    for name, outputs in functions.items():
+        lines, results = assignments(outputs, {}, "t", "")
+        given = _tuple([results[output] for output in outputs])
+        texts[name] = _block([*lines, f"return ({given})" if outputs else "return ()"], 4)
+        texts[f"{name}_takes"] = ", ".join(_takes(outputs))
+        texts[f"{name}_gives"] = f"({_tuple(list(outputs))})"
+    return texts
+
+
+def one_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> str:
+    """Write the kernel that runs one filter.
 
     Parameters
     ----------
+    rule : Rule
+        The filter.
     model : ProcessModel
         The model.
     channels : tuple of str
@@ -205,33 +170,103 @@ def ekf_source(model: ProcessModel, channels: tuple[str, ...]) -> str:
     str
         Source of a module with ``run``.
     """
-    n, m = model.width, len(channels)
-    pairs = [(i, j) for i in range(n) for j in range(i, n)]
-    load = [f"    z{i} = mean[{i}]" for i in range(n)]
-    load += [f"    P{i}{j} = covariance[{i}, {j}]" for i, j in pairs]
-    load += [f"    {name} = parameters[{i}]" for i, name in enumerate(PARAMETER_NAMES)]
-    load += [f"    q{i} = noise[{i}]" for i in range(n)] + [f"    r{c} = variances[{c}]" for c in range(m)]
-    finish = [f"    mean[{i}] = z{i}" for i in range(n)]
-    finish += [f"    covariance[{i}, {j}] = covariance[{j}, {i}] = P{i}{j}" for i, j in pairs]
-    return _RUN.format(
-        name=model.name,
-        channels=m,
-        load="\n".join(load),
-        predict=statements(predict_expressions(model), " " * 16),
-        measure=_lines("y{i} = measured[k, {i}]", m, 8),
-        update=statements(update_expressions(model, channels), " " * 8),
-        score="\n".join(_SCORE.format(c=c) for c in range(m)),
-        store=_lines("track[row, {i}] = z{i}", n, 12) + "\n" + _lines("track_variance[row, {i}] = P{i}{i}", n, 12),
-        finish="\n".join(finish),
+    halves, places = halves_of(rule, model, channels), layout(rule, model, channels)
+    n, m, d = range(model.width), range(len(channels)), range(len(model.drives))
+    used = _takes(halves.constants)
+    load = [f"{name} = rows[{i}]" for i, name in enumerate(places.rows) if name in used]
+    load += [f"{name} = state[{i}]" for i, name in enumerate(places.carried)]
+    store = [f"track[k // every, {i}] = z{i}" for i in n] + [f"track_variance[k // every, {i}] = P{i}_{i}" for i in n]
+    kept = [f"residuals[k, {c}] = e{c}" for c in m] + [f"residual_variances[k, {c}] = s{c}" for c in m]
+    flushed = [f"logs[{c}] += math.log(product{c})" for c in m] + [f"product{c} = 1.0" for c in m]
+    return (_PARTS + _ONE).format(
+        name=f"{rule.name} on the {model.name} form",
+        channels=len(channels),
+        flush=FLUSH,
+        load=_block(load, 4),
+        drive=_block([f"{x}{i} = drives[k{at}, {i}]" for i in d for x, at in (("a", " - 1"), ("b", ""))], 12),
+        sample=_block([f"y{c} = measured[k, {c}]" for c in m], 8),
+        store=_block(store, 12),
+        keep=_block(kept, 12),
+        flushed=_block(flushed, 12),
+        finish=_block([f"state[{i}] = {name}" for i, name in enumerate(places.carried)], 4),
+        **_parts(halves),
     )
 
 
-@cache
-def compile_ekf(model: ProcessModel, channels: tuple[str, ...]) -> Callable[..., tuple[Array, Array, float]]:
-    """Generate and load the extended Kalman filter of a model for a set of channels.
+def lanes_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> str:
+    """Write the kernel that runs 32 filters side by side, over one stretch of their logs at a time.
+
+    The stretch that begins after the first sample repeats the last one before it.
 
     Parameters
     ----------
+    rule : Rule
+        The filter.
+    model : ProcessModel
+        The model.
+    channels : tuple of str
+        Measured channels.
+
+    Returns
+    -------
+    str
+        Source of a module with ``run``.
+    """
+    halves, places = halves_of(rule, model, channels), layout(rule, model, channels)
+    n, m, d = range(model.width), range(len(channels)), range(len(model.drives))
+    state = {name: f"state[{i * LANES} + l]" for i, name in enumerate(places.carried)}
+    constants = {name: f"constants[{i * LANES} + l]" for i, name in enumerate(halves.constants)}
+    sources = {**state, **constants, **{f"y{c}": f"sample[{c}, l]" for c in m}}
+    sources |= {f"{x}{i}": f"{array}[{i}, l]" for i in d for x, array in (("a", "before"), ("b", "after"))}
+    rows = {name: f"rows[{i * LANES} + l]" for i, name in enumerate(places.rows)}
+    both = {**halves.update, **halves.predict}
+    unchanged = [name for name in halves.predict if name not in halves.update]
+    return (_PARTS + _LANES).format(
+        name=f"{rule.name} on the {model.name} form, {LANES} side by side",
+        lanes=LANES,
+        kept=len(constants),
+        channels=len(channels),
+        flush=FLUSH,
+        prepare_load=_loads(halves.constants, rows),
+        prepare_slots=f"({_tuple(list(constants.values()))})",
+        predict_load=_loads(halves.predict, sources),
+        predict_slots=f"({_slots(halves.predict, state)})",
+        update_load=_loads(halves.update, sources),
+        update_slots=f"({_slots(halves.update, state)})",
+        both_load=_loads(both, sources, [*_takes(halves.predict), *_takes(halves.update)]),
+        both_store=_block([f"{state[name]} = {name}" for name in unchanged], 8),
+        store=_block(
+            [f"track[k // every, {i}, l] = {state[f'z{i}']}" for i in n]
+            + [f"track_variance[k // every, {i}, l] = {state[f'P{i}_{i}']}" for i in n],
+            16,
+        ),
+        flushed=_block(
+            [f"logs[{c}, l] += math.log({state[f'product{c}']})" for c in m]
+            + [f"{state[f'product{c}']} = 1.0" for c in m],
+            16,
+        ),
+        **_parts(halves),
+    )
+
+
+def _loads(outputs: Outputs, sources: Mapping[str, str], names: Sequence[str] | None = None) -> str:
+    taken = dict.fromkeys(names if names is not None else _takes(outputs))
+    return _block([f"{name} = {sources[name]}" for name in taken if name in sources], 8)
+
+
+def _slots(outputs: Outputs, state: Mapping[str, str]) -> str:
+    """Return where a function's results go; what is not carried goes to a variable that nobody reads."""
+    return _tuple([state.get(name, name) for name in outputs])
+
+
+@cache
+def compile_filter(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> Callable[..., Array]:
+    """Generate and load the kernel that runs one filter.
+
+    Parameters
+    ----------
+    rule : Rule
+        The filter.
     model : ProcessModel
         The model.
     channels : tuple of str
@@ -240,59 +275,27 @@ def compile_ekf(model: ProcessModel, channels: tuple[str, ...]) -> Callable[...,
     Returns
     -------
     callable
-        The kernel's ``run``; see `estimation.ekf` for its arguments.
+        The kernel's ``run``; `estimation.compiled` calls it.
     """
-    return load_kernel(f"ekf_{model.name}", ekf_source(model, channels)).run
-
-
-_LINEARISED = '''"""Generated: one step of the {name} form, and its Jacobian, in scaled units."""
-
-import math
-
-import numba
-import numpy as np
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def step(mean, u_start, u_end, parameters, h):
-    moved = np.zeros({width})
-    slopes = np.zeros(({width}, {width}))
-{load}
-{body}
-{store}
-    return moved, slopes
-'''
+    return load_kernel(f"{rule.name}_{model.name}", one_source(rule, model, channels)).run
 
 
 @cache
-def compile_step(model: ProcessModel) -> ModuleType:
-    """Generate one step of a model with its analytic Jacobian, for filters that work on arrays.
+def compile_lanes(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> Callable[..., Array]:
+    """Generate and load the kernel that runs 32 filters side by side.
 
     Parameters
     ----------
+    rule : Rule
+        The filter.
     model : ProcessModel
         The model.
+    channels : tuple of str
+        Measured channels.
 
     Returns
     -------
-    ModuleType
-        ``step(mean (n,), speed at start, speed at end, parameter row, h)``, which returns the new mean and the
-        Jacobian, both in the filter's scaled units.
+    callable
+        The kernel's ``run``; `estimation.batch` calls it.
     """
-    n = model.width
-    mean, F = scaled_step(model)
-    outputs: Mapping[str, Expression] = {f"m{i}": z for i, z in enumerate(_bounded(model, mean))} | {
-        f"f{i}{j}": F[i][j] for i in range(n) for j in range(n) if F[i][j] is not ZERO
-    }
-    load = [f"    z{i} = mean[{i}]" for i in range(n)]
-    load += [f"    {name} = parameters[{i}]" for i, name in enumerate(PARAMETER_NAMES)]
-    store = [f"    moved[{name[1]}] = {name}" for name in outputs if name[0] == "m"]
-    store += [f"    slopes[{name[1]}, {name[2]}] = {name}" for name in outputs if name[0] == "f"]
-    source = _LINEARISED.format(
-        name=model.name,
-        width=n,
-        load="\n".join(load),
-        body=statements(outputs, " " * 4),
-        store="\n".join(store),
-    )
-    return load_kernel(f"step_{model.name}", source)
+    return load_kernel(f"{rule.name}_{model.name}_lanes", lanes_source(rule, model, channels)).run

@@ -67,3 +67,41 @@ def _quantum(values: Array) -> float:
     moved = steps[steps > 0.0]
     held = np.count_nonzero(steps == 0.0)
     return float(np.min(moved)) if held > len(moved) > 0 else 0.0
+
+
+QUANTISED = 2.0
+"""White noise up to this many quanta is taken for the quantisation itself [dimensionless]."""
+
+
+def position_variance(position: Array) -> float:
+    """Return a position sensor's own variance, without the floor that a filter is given.
+
+    An encoder's steps are all multiples of its quantum, and where that is the larger part of the noise, one twelfth of
+    its square is the variance.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n,)
+        Position [m]; NaN where missing.
+
+    Returns
+    -------
+    float
+        Variance [m^2].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> walked = np.round(np.linspace(0.0, 1e-3, 5000) / 1e-6) * 1e-6
+    >>> round(position_variance(walked) * 12e12, 3)
+    1.0
+    """
+    steps = np.abs(np.diff(position))
+    moved = steps[steps > 0.0]
+    bends = np.diff(position, n=2)
+    bends = bends[np.isfinite(bends)]
+    if not len(moved) or not len(bends):
+        return SMALLEST_VARIANCE["position_m"]
+    deviation = NORMAL_MAD * float(np.median(np.abs(bends - np.median(bends)))) / 6.0**0.5
+    quantum = float(np.min(moved))
+    return float(quantum**2 / 12.0 if deviation < QUANTISED * quantum else deviation**2)

@@ -6,11 +6,18 @@ every filter follow from that (`estimation.eha` has two examples).
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import ceil, inf
+from math import ceil, inf, log
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.gaussian import Gaussian
 from plant.compiled.functions import Scalar
-from plant.integrate import StepFunction
+from plant.eha import EhaParameters
+from plant.errors import HydrostateError
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -30,6 +37,9 @@ class StateVariable:
         Random-walk intensity of the process noise [state's unit squared a second].
     lower, upper : float
         Physical bounds that the estimate is held to [in the state's unit].
+    logarithmic : bool
+        Whether the filter works on the logarithm of the state over its scale: the state then stays positive, a factor
+        is as near as its inverse, and the noise density is that of the logarithm [1/s].
     """
 
     name: str
@@ -38,6 +48,15 @@ class StateVariable:
     noise_density: float
     lower: float = -inf
     upper: float = inf
+    logarithmic: bool = False
+
+    @property
+    def scaled_bounds(self) -> tuple[float, float]:
+        """Physical bounds in the filter's units [dimensionless]."""
+        if not self.logarithmic:
+            return self.lower / self.scale, self.upper / self.scale
+        low = log(self.lower / self.scale) if self.lower > 0.0 else -inf
+        return low, log(self.upper / self.scale) if self.upper < inf else inf
 
 
 @dataclass(frozen=True)
@@ -51,18 +70,24 @@ class ProcessModel:
     states : tuple of StateVariable
         The states, in the order of the step's tuple.
     step : callable
-        ``step(state, (speed at start, speed at end), parameters, h)`` in SI.
+        ``step(state, (speed at start, speed at end), parameters, h)`` in SI; with several drives, one such pair each.
     observe : callable
         ``observe(state, parameters)``, which returns the predicted value [SI] of each channel that it can predict.
     longest_step : float
         Longest step that the model takes well; slower logs are sub-stepped [s].
+    drives : tuple of str
+        Channels that drive the model; linear between samples.
+    parameters : type
+        Frozen dataclass of floats that `step` and `observe` read.
     """
 
     name: str
     states: tuple[StateVariable, ...]
-    step: StepFunction
+    step: Callable[[Any, Any, Any, Scalar], tuple[Scalar, ...]]
     observe: Callable[[Any, Any], Mapping[str, Scalar]]
     longest_step: float
+    drives: tuple[str, ...] = ("motor_speed_rad_s",)
+    parameters: type[Any] = EhaParameters
 
     def substeps(self, sample_time: float) -> int:
         """Return how many steps of the model a sample needs.
@@ -83,6 +108,54 @@ class ProcessModel:
     def width(self) -> int:
         """Count of states."""
         return len(self.states)
+
+    def to_filter(self, belief: Gaussian) -> Gaussian:
+        """Return a belief in the filter's units.
+
+        Parameters
+        ----------
+        belief : Gaussian
+            In SI; a logarithmic state's deviation is taken relative to its mean.
+
+        Returns
+        -------
+        Gaussian
+            The same, scaled.
+
+        Raises
+        ------
+        HydrostateError
+            If a logarithmic state's mean is not positive.
+        """
+        mean = belief.mean.copy()
+        slope = np.array([state.scale for state in self.states])
+        for i, state in enumerate(self.states):
+            if state.logarithmic:
+                if mean[i] <= 0.0:
+                    raise HydrostateError(f"the first guess of {state.name} must be positive, got {mean[i]}")
+                slope[i], mean[i] = mean[i], log(mean[i] / state.scale)
+            else:
+                mean[i] /= state.scale
+        return Gaussian(mean, belief.covariance / np.outer(slope, slope))
+
+    def to_si(self, mean: Array) -> tuple[Array, Array]:
+        """Return states in SI, and by how much each moves with the filter's number.
+
+        Parameters
+        ----------
+        mean : ndarray, shape (..., n)
+            States in the filter's units [dimensionless].
+
+        Returns
+        -------
+        tuple of ndarray, each shape (..., n)
+            The states, and the slopes that turn the filter's standard deviations into SI.
+        """
+        scale = np.array([state.scale for state in self.states])
+        rising = np.array([state.logarithmic for state in self.states])
+        with np.errstate(over="ignore", invalid="ignore"):  # a filter that diverges overflows, and must show it
+            grown = scale * np.exp(np.where(rising, mean, 0.0))
+            return np.where(rising, grown, scale * mean), grown
 
     def index(self, name: str) -> int:
         """Return the position of a state.

@@ -1,28 +1,49 @@
 """`run_filter(method, model, prior, record, parameters) -> Estimate`: one verb over methods and models."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.ckf import ckf
 from estimation.ekf import ekf
 from estimation.filter import FilterProblem, Method, Trace
 from estimation.filterpy_bridge import filterpy_ekf
 from estimation.gaussian import Gaussian
 from estimation.identification.preprocess import bridged
+from estimation.iekf import iekf
 from estimation.measurement_noise import measurement_variances
 from estimation.model import ProcessModel
+from estimation.sif import sif
+from estimation.smoother import smoother
+from estimation.svsf import svsf
+from estimation.ukf import ukf
+from plant.compiled.expression import symbol
 from plant.eha import EhaParameters
-from plant.errors import LogError
-from plant.integrate import parameter_row
+from plant.errors import HydrostateError, LogError
+from plant.integrate import parameter_row, parameter_symbols
 from plant.record import Record
 
 Array = NDArray[np.float64]
 
-METHODS: Mapping[str, Method] = MappingProxyType({"ekf": ekf, "filterpy-ekf": filterpy_ekf})
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        "ekf": ekf,
+        "iekf": iekf,
+        "ukf": ukf,
+        "ckf": ckf,
+        "svsf": svsf,
+        "sif": sif,
+        "smoother": smoother,
+        "filterpy-ekf": filterpy_ekf,
+    }
+)
 """The filters, by name."""
+
+ROBUST = ("none", "huber", "student-t")
+"""How gross outliers may count."""
 
 TRACK_ROWS = 20_000
 """About how many points of the state's history are kept."""
@@ -42,8 +63,8 @@ class Estimate:
         Times of the track [s].
     mean, variance : ndarray, shape (rows, n)
         Mean and variance of every state along the track.
-    belief : Gaussian
-        Belief after the last sample.
+    belief : Gaussian or None
+        Belief after the last sample; None where the filter diverged.
     nis : Mapping[str, float]
         Mean normalised innovation squared of each channel [dimensionless]; 1 where the filter believes what the log
         shows, NaN where the channel was never present.
@@ -58,7 +79,7 @@ class Estimate:
     time: Array
     mean: Array
     variance: Array
-    belief: Gaussian
+    belief: Gaussian | None
     nis: Mapping[str, float]
     log_likelihood: float
     residuals: Array
@@ -111,6 +132,8 @@ def run_filter(
     variances: Mapping[str, float] | None = None,
     noise: Mapping[str, float] | None = None,
     keep_innovations: bool = False,
+    robust: str = "none",
+    settings: Mapping[str, float] | None = None,
 ) -> Estimate:
     """Filter a record.
 
@@ -123,7 +146,7 @@ def run_filter(
     prior : Gaussian
         Belief before the first sample, in SI.
     record : Record
-        The log; ``motor_speed_rad_s`` drives the model.
+        The log; it holds the channels that drive the model.
     parameters : EhaParameters
         The actuator's known parameters.
     channels : tuple of str, optional
@@ -134,6 +157,10 @@ def run_filter(
         Process-noise densities [SI squared a second] that replace the model's, by state name.
     keep_innovations : bool
         Whether every innovation is kept.
+    robust : str
+        How gross outliers count: one of `ROBUST`.
+    settings : Mapping[str, float], optional
+        What the method lets its user set [each in its own unit].
 
     Returns
     -------
@@ -145,28 +172,115 @@ def run_filter(
     LogError
         If no channel that the model predicts is in the record.
     """
+    problem = filter_problem(model, prior, record, parameters, channels=channels, variances=variances, noise=noise)
+    require_known("robust", robust, ROBUST)
+    problem = replace(problem, keep_innovations=keep_innovations, robust=robust, settings=dict(settings or {}))
+    return in_si(problem, method(problem), record.start_time)
+
+
+def require_known(what: str, name: str, known: Sequence[str]) -> None:
+    """Refuse a name that is not among those known.
+
+    Parameters
+    ----------
+    what : str
+        What is named.
+    name : str
+        The name.
+    known : sequence of str
+        Those that there are.
+
+    Raises
+    ------
+    HydrostateError
+        If the name is not among them.
+    """
+    if name not in known:
+        raise HydrostateError(f"{what} must be one of {', '.join(known)}, got {name!r}")
+
+
+def filter_problem(
+    model: ProcessModel,
+    prior: Gaussian,
+    record: Record,
+    parameters: EhaParameters,
+    *,
+    channels: tuple[str, ...] | None = None,
+    variances: Mapping[str, float] | None = None,
+    noise: Mapping[str, float] | None = None,
+) -> FilterProblem:
+    """Put a record in the form that a method takes.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The process model.
+    prior : Gaussian
+        Belief before the first sample, in SI.
+    record : Record
+        The log.
+    parameters : EhaParameters
+        The actuator's known parameters.
+    channels : tuple of str, optional
+        Channels to use, as in `run_filter`.
+    variances : Mapping[str, float], optional
+        Measurement variances [SI squared].
+    noise : Mapping[str, float], optional
+        Process-noise densities [SI squared a second]; of a logarithmic state, those of the logarithm [1/s].
+
+    Returns
+    -------
+    FilterProblem
+        The task, in the filter's units.
+
+    Raises
+    ------
+    LogError
+        If the record lacks a drive, or has no channel that the model predicts.
+    """
+    missing = [drive for drive in model.drives if drive not in record]
+    if missing:
+        raise LogError(f"the {model.name} form needs {', '.join(model.drives)}, the record lacks {', '.join(missing)}")
     used = channels if channels is not None else available_channels(model, record)
     if not used:
-        raise LogError(f"the {model.name} form needs position_m or velocity_m_s, the record has {', '.join(record)}")
+        wanted = " or ".join(predicted_channels(model))
+        raise LogError(f"the {model.name} form needs {wanted}, the record has {', '.join(record)}")
     spread = variances if variances is not None else measurement_variances(record, used)
-    scale = np.array([state.scale for state in model.states])
     density = np.array([(noise or {}).get(state.name, state.noise_density) for state in model.states])
-    problem = FilterProblem(
+    squared = np.array([1.0 if state.logarithmic else state.scale**2 for state in model.states])
+    scaled = model.to_filter(prior)
+    return FilterProblem(
         model=model,
         channels=used,
-        mean=prior.mean / scale,
-        covariance=prior.covariance / np.outer(scale, scale),
-        speed=bridged(record["motor_speed_rad_s"]),
+        mean=scaled.mean,
+        covariance=scaled.covariance,
+        drives=np.column_stack([bridged(record[drive]) for drive in model.drives]),
         measured=np.column_stack([record[channel] for channel in used]),
         parameters=parameter_row(parameters),
-        noise=density / scale**2,
+        noise=density / squared,
         variances=np.array([spread[channel] for channel in used]),
         sample_time=record.sample_time,
         substeps=model.substeps(record.sample_time),
         every=max(1, len(record) // TRACK_ROWS),
-        keep_innovations=keep_innovations,
+        keep_innovations=False,
     )
-    return _in_si(problem, method(problem), record.start_time)
+
+
+def predicted_channels(model: ProcessModel) -> tuple[str, ...]:
+    """Return the channels that a model predicts.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The process model.
+
+    Returns
+    -------
+    tuple of str
+        Channel names, in the model's order.
+    """
+    state = tuple(symbol(f"z{i}") for i in range(model.width))
+    return tuple(model.observe(state, parameter_symbols(model.parameters)))
 
 
 def available_channels(model: ProcessModel, record: Record) -> tuple[str, ...]:
@@ -184,34 +298,50 @@ def available_channels(model: ProcessModel, record: Record) -> tuple[str, ...]:
     tuple of str
         Channel names, in the model's order.
     """
-    predicted = model.observe(tuple(0.0 for _ in model.states), None)
-    return tuple(channel for channel in predicted if channel in record)
+    return tuple(channel for channel in predicted_channels(model) if channel in record)
 
 
-def _in_si(problem: FilterProblem, trace: Trace, start_time: float) -> Estimate:
-    scale = np.array([state.scale for state in problem.model.states])
+def in_si(problem: FilterProblem, trace: Trace, start_time: float) -> Estimate:
+    """Return what a method found, in SI.
+
+    Parameters
+    ----------
+    problem : FilterProblem
+        The task.
+    trace : Trace
+        The method's result, in the filter's units.
+    start_time : float
+        Time of the first sample [s].
+
+    Returns
+    -------
+    Estimate
+        The filtered log.
+    """
     rows = np.arange(len(trace.track), dtype=np.float64)
     means = {
         channel: float(total / count) if count else float("nan")
         for channel, total, count in zip(problem.channels, trace.nis, trace.count, strict=True)
     }
-    finite = bool(np.all(np.isfinite(trace.mean)) and np.all(np.isfinite(trace.covariance)))
-    final = np.maximum(np.diag(trace.covariance), 0.0)
-    covariance = trace.covariance + np.diag(final - np.diag(trace.covariance))
-    belief = (
-        Gaussian(trace.mean * scale, covariance * np.outer(scale, scale))
-        if finite
-        else Gaussian(problem.mean * scale, problem.covariance * np.outer(scale, scale))
-    )
+    mean, slope = problem.model.to_si(trace.track)
     return Estimate(
         model=problem.model,
         channels=problem.channels,
         time=start_time + problem.sample_time * problem.every * rows,
-        mean=trace.track * scale,
-        variance=np.maximum(trace.track_variance, 0.0) * scale**2,
-        belief=belief,
+        mean=mean,
+        variance=np.maximum(trace.track_variance, 0.0) * slope**2,
+        belief=_final_belief(problem.model, trace),
         nis=MappingProxyType(means),
         log_likelihood=trace.log_likelihood,
         residuals=trace.residuals,
         residual_variances=trace.residual_variances,
     )
+
+
+def _final_belief(model: ProcessModel, trace: Trace) -> Gaussian | None:
+    mean, slope = model.to_si(trace.mean)
+    covariance = trace.covariance * np.outer(slope, slope)
+    if not (np.all(np.isfinite(mean)) and np.all(np.isfinite(covariance))):
+        return None
+    rounding = np.maximum(np.diag(covariance), 0.0) - np.diag(covariance)
+    return Gaussian(mean, covariance + np.diag(rounding))

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from estimation.bulk_modulus import first_belief
 from estimation.eha import BULK_MODULUS, FORMS
 from estimation.filter import Method
-from estimation.kernels import compile_step
+from estimation.first_belief import first_belief
+from estimation.linearised import compile_step
 from estimation.model import ProcessModel
 from estimation.run import METHODS, Estimate, run_filter
 from faults.conditions import CONDITIONS, Condition, parameters_for
@@ -71,7 +71,7 @@ def test_the_compiled_step_holds_the_bounds(model: ProcessModel) -> None:
     scale = np.array([state.scale for state in model.states])
     state = np.zeros(model.width)
     state[model.index(BULK_MODULUS)] = -1.0
-    moved, _ = compile_step(model).step(state, 0.0, 0.0, parameter_row(RIG), 1e-4)
+    moved, _ = compile_step(model).step(state, np.zeros(1), np.zeros(1), parameter_row(RIG), 1e-4)
     assert moved[model.index(BULK_MODULUS)] == 0.0
     assert np.all(np.isfinite(moved * scale))
 

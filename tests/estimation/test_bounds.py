@@ -5,11 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.bounds import at_bulk_modulus, bulk_modulus_bound
-from estimation.bulk_modulus import estimate_bulk_modulus, first_belief
-from estimation.eha import PRESSURE_FORM
+from estimation.augment import augmented, augmented_prior
+from estimation.bounds import at_bulk_modulus, bulk_modulus_bound, posterior_bound
+from estimation.bulk_modulus import estimate_bulk_modulus
+from estimation.eha import BULK_MODULUS, PRESSURE_FORM
+from estimation.ekf import ekf
+from estimation.first_belief import first_belief
+from estimation.gaussian import Gaussian
+from estimation.model import ProcessModel
+from estimation.run import run_filter
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.eha import EhaParameters
+from plant.errors import HydrostateError, LogError
 from plant.record import Record
 from plant.sensors import BENCH, Sensors, noise_variances
 from plant.signals import make_drive
@@ -75,6 +82,66 @@ def test_a_model_whose_own_run_explodes_has_no_bound() -> None:
     fast = Record(1e-3, {"motor_speed_rad_s": np.full(10, 1e300), "position_m": np.zeros(10)})
     with np.errstate(all="ignore"):
         assert relative_bound(fast, p, MOTION) == np.inf
+
+
+def test_on_a_linear_model_the_bound_is_the_kalman_filters_own_covariance(linear: ProcessModel) -> None:
+    rng = np.random.default_rng(0)
+    names = ("motor_speed_rad_s", "position_m", "velocity_m_s")
+    record = Record(1e-4, dict(zip(names, rng.standard_normal((3, 300)), strict=True)))
+    prior = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1e-4, 1e-2, 1.0]))
+    variances = {"position_m": 1e-6, "velocity_m_s": 1e-4}
+    bound = posterior_bound(linear, prior, record, EhaParameters(), variances=variances)
+    filtered = run_filter(ekf, linear, prior, record, EhaParameters(), variances=variances)
+    assert bound.belief is not None
+    assert filtered.belief is not None
+    np.testing.assert_allclose(bound.belief.covariance, filtered.belief.covariance, rtol=1e-9)
+    np.testing.assert_allclose(bound.track("force_n"), filtered.track("force_n")[1], rtol=1e-9)
+    np.testing.assert_allclose(bound.time, filtered.time)
+
+
+def test_every_state_has_a_bound_and_a_parameter_that_is_a_state_too() -> None:
+    p = EhaParameters()
+    record, variances = driven("steps", p), dict(noise_variances(BENCH))
+    variances = {channel: variances[channel] for channel in ALL}
+    prior = first_belief(PRESSURE_FORM, record, p.bulk_modulus, 3e8)
+    model = augmented(PRESSURE_FORM, ["leakage_coefficient", "friction_coulomb"])
+    alone = posterior_bound(PRESSURE_FORM, prior, record, p, variances=variances)
+    unsure, sure = (
+        posterior_bound(model, augmented_prior(model, prior, p, spread), record, p, variances=variances)
+        for spread in (1.0, 1e-9)
+    )
+    assert unsure.track("leakage_coefficient")[-1] < 0.1 * p.leakage_coefficient
+    assert unsure.track(BULK_MODULUS)[-1] > alone.track(BULK_MODULUS)[-1]
+    np.testing.assert_allclose(sure.track(BULK_MODULUS), alone.track(BULK_MODULUS), rtol=1e-4)
+
+
+def test_bounds_of_constants_fall_along_the_run() -> None:
+    p = EhaParameters()
+    record, variances = driven("prbs", p), {"position_m": 1e-12, "velocity_m_s": 1e-6}
+    prior = first_belief(PRESSURE_FORM, record, p.bulk_modulus, 3e8)
+    track = posterior_bound(PRESSURE_FORM, prior, record, p, variances=variances).track(BULK_MODULUS)
+    assert np.all(np.diff(track) <= 1e-9 * track[0])
+    assert track[-1] < 0.03 * track[0]
+
+
+def test_a_channel_of_infinite_variance_is_one_that_is_not_logged() -> None:
+    p = EhaParameters()
+    record, prior = driven("steps", p, 4.0), first_belief(PRESSURE_FORM, driven("steps", p, 4.0), p.bulk_modulus, 3e8)
+    motion = {"position_m": 1e-12, "velocity_m_s": 1e-6}
+    without = posterior_bound(PRESSURE_FORM, prior, record, p, variances=motion)
+    infinite = posterior_bound(
+        PRESSURE_FORM, prior, record, p, variances={**motion, "differential_pressure_pa": np.inf}
+    )
+    np.testing.assert_allclose(infinite.std, without.std, rtol=1e-9)
+
+
+def test_a_bound_needs_its_drive_and_sensors_with_noise() -> None:
+    p, still = EhaParameters(), Record(1e-3, {"position_m": np.zeros(5)})
+    prior = first_belief(PRESSURE_FORM, still, p.bulk_modulus, 3e8)
+    with pytest.raises(LogError, match="driven by motor_speed_rad_s, the record has position_m"):
+        posterior_bound(PRESSURE_FORM, prior, still, p, variances={"position_m": 1e-12})
+    with pytest.raises(HydrostateError, match=r"the variance of position_m must be positive, got 0\.0"):
+        posterior_bound(PRESSURE_FORM, prior, driven("steps", p, 1.0), p, variances={"position_m": 0.0})
 
 
 def test_only_the_bulk_modulus_changes() -> None:

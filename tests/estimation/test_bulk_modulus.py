@@ -7,14 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from estimation.bulk_modulus import (
-    OUTCOMES,
-    BulkModulusEstimate,
-    Outcome,
-    estimate_bulk_modulus,
-    first_belief,
-)
+from estimation.bulk_modulus import OUTCOMES, BulkModulusEstimate, Outcome, estimate_bulk_modulus
 from estimation.eha import PRESSURE_FORM
+from estimation.first_belief import first_belief
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.eha import EhaParameters
 from plant.errors import HydrostateError, LogError
@@ -125,7 +120,7 @@ def test_a_log_without_motion_is_refused() -> None:
     ("options", "message"),
     [
         ({"form": "viscous"}, "form must be one of acceleration, pressure.*, got 'viscous'"),
-        ({"method": "ukf9", "form": "pressure"}, "method must be one of ekf, filterpy-ekf.*, got 'ukf9'"),
+        ({"method": "ukf9", "form": "pressure"}, "method must be one of ekf, .*filterpy-ekf.*, got 'ukf9'"),
         ({"start": -1.0}, "first guess must be 0 Pa or more"),
         ({"start": float("nan")}, "first guess must be 0 Pa or more"),
         ({"start_std": 0.0}, "its deviation positive"),
@@ -158,6 +153,28 @@ def foreign_logs(folder: Path) -> list[tuple[Record, Condition, float]]:
             truth["file"], truth["leakage"], truth["friction"], truth["bulk_modulus_pa"], strict=True
         )
     ]
+
+
+@pytest.mark.slow
+def test_without_pressure_the_motion_form_is_chosen(shared: Path) -> None:
+    log, _, truth = foreign_logs(shared)[2]
+    answer = estimate_bulk_modulus(without_pressure(log), EhaParameters())
+    assert (answer.form, answer.outcome, answer.gate.passed) == ("motion", Outcome.OK, True)
+    assert answer.value == pytest.approx(truth, rel=0.02)
+    assert set(answer.others) == {"leakage_coefficient", "flow_bias"}
+
+
+@pytest.mark.parametrize("form", ["flow", "pressure"])
+def test_what_is_not_known_of_the_chamber_volume_is_not_known_of_bulk_modulus(form: str) -> None:
+    log = bench_log("lumped", "steps", "normal")
+    exact, vague = (
+        estimate_bulk_modulus(log, EhaParameters(), form=form, uncertainties=given)
+        for given in ({}, {"chamber_volume": 0.05})
+    )
+    assert exact.rig_std == 0.0
+    assert vague.value == exact.value
+    assert vague.rig_std == pytest.approx(0.05 * TRUTH, rel=0.05)
+    assert vague.std == pytest.approx(np.hypot(exact.std, vague.rig_std), rel=1e-9)
 
 
 @pytest.mark.parametrize("form", ["pressure", pytest.param("auto", marks=pytest.mark.slow)])

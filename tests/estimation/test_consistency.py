@@ -7,8 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from estimation.bulk_modulus import Outcome, estimate_bulk_modulus
-from estimation.consistency import consistency_gate, mean_chi_square_bounds, nees
+from estimation.consistency import Gate, consistency_gate, mean_chi_square_bounds, nees, wander
+from estimation.eha import BULK_MODULUS, FORMS, PRESSURE_FORM
 from estimation.ekf import ekf
+from estimation.first_belief import PRESSURE_NOISE_LOGGED, first_belief
 from estimation.gaussian import Gaussian
 from estimation.model import ProcessModel
 from estimation.run import Estimate, run_filter
@@ -17,7 +19,7 @@ from plant.eha import EhaParameters
 from plant.record import Record
 from plant.sensors import BENCH
 from plant.signals import make_drive
-from plant.simulate import LUMPED, simulate
+from plant.simulate import CIRCUIT, LUMPED, REDUCED, Plant, simulate
 
 Array = NDArray[np.float64]
 RUNS, SAMPLES, SUBSTEPS = 100, 40, 40
@@ -130,3 +132,112 @@ def test_a_drift_larger_than_its_deviation_allows_is_unsettled(linear: ProcessMo
 @pytest.mark.parametrize(("nis", "passes"), [(1.0, True), (1.99, True), (2.01, False)])
 def test_residuals_of_twice_the_expected_variance_are_too_many(nis: float, passes: bool, linear: ProcessModel) -> None:
     assert consistency_gate(estimate_with(np.full(100, 2.0), linear, nis), "position_m").passed is passes
+
+
+def judged(
+    plant: Plant,
+    form: str,
+    drive: str,
+    condition: str,
+    *,
+    pressure: bool = True,
+    sample_time: float = 1e-3,
+    seed: int = 5,
+) -> tuple[Gate, float]:
+    """Return the gate on a filtered log, and the estimate's error in standard deviations."""
+    parameters, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(seed)
+    speed = make_drive(drive, 10.0, sample_time, parameters, rng)
+    log = simulate(plant, speed, sample_time, parameters, sensors=BENCH, rng=rng)
+    kept = ("motor_speed_rad_s", "position_m", "velocity_m_s") + (("differential_pressure_pa",) if pressure else ())
+    record = log.replace(**dict.fromkeys(set(log) - set(kept)))
+    model = FORMS[form]
+    noise = {"differential_pressure_pa": PRESSURE_NOISE_LOGGED} if pressure and form == "pressure" else {}
+    prior = first_belief(model, record, 2e8, 3e8)
+    estimate = run_filter(ekf, model, prior, record, parameters, noise=noise, keep_innovations=True)
+    value, std = estimate.settled(BULK_MODULUS)
+    return consistency_gate(estimate, BULK_MODULUS, record), (value - parameters.bulk_modulus) / std
+
+
+@pytest.mark.parametrize(("drive", "pressure"), [("steps", True), ("steps", False), ("prbs", True), ("sine", True)])
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_innovations_of_the_filters_own_plant_give_no_cause(condition: str, drive: str, pressure: bool) -> None:
+    gate, deviations = judged(LUMPED, "pressure", drive, condition, pressure=pressure)
+    assert gate.reasons == ()
+    assert gate.inflation < 2.0
+    assert abs(deviations) < 3.0
+
+
+@pytest.mark.parametrize("pressure", [True, False], ids=["with pressure", "motion alone"])
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_the_gate_objects_to_the_lumped_model_of_a_circuit(condition: str, pressure: bool) -> None:
+    gate, deviations = judged(CIRCUIT, "pressure", "steps", condition, pressure=pressure)
+    assert not gate.passed
+    assert abs(deviations) > 15.0
+    assert abs(deviations) < 3.0 * gate.inflation  # the inflated interval is of the error's magnitude
+    assert any("times the power of white noise" in reason for reason in gate.reasons)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("condition", ["normal", "minor_friction", "major_leakage", "major_leakage_minor_friction"])
+def test_the_gate_sees_the_step_error_of_the_acceleration_form_where_nis_does_not(condition: str) -> None:
+    gate, deviations = judged(REDUCED, "acceleration", "sine", condition, sample_time=1e-4)
+    assert abs(deviations) > 5.0
+    assert not gate.passed
+    assert abs(deviations) < 3.0 * gate.inflation
+    assert not any("NIS" in reason for reason in gate.reasons)
+
+
+OWN_NOISE = {"position_m": 1e-13, "velocity_m_s": 1e-7, "differential_pressure_pa": 3e4}
+"""As the noise of measured speed makes it: so little that a stuck piston is not shaken loose."""
+
+
+def own_runs(runs: int, samples: int, rng: np.random.Generator) -> list[Record]:
+    """Draw logs from the pressure form itself, its process and sensor noise included."""
+    parameters, h, substeps = EhaParameters(), 2.5e-4, 4
+    speed = make_drive("prbs", samples * h * substeps, h * substeps, parameters, np.random.default_rng(0))
+    deviations = np.array([[(OWN_NOISE.get(state.name, 0.0) * h) ** 0.5] for state in PRESSURE_FORM.states])
+    state = np.array([[0.0], [0.0], [0.0], [parameters.bulk_modulus]]) * np.ones(runs)
+    measured = np.empty((samples, 3, runs))
+    for k in range(samples):
+        for j in range(substeps if k else 0):
+            start, end = (speed[k - 1] + (speed[k] - speed[k - 1]) * (j + i) / substeps for i in (0, 1))
+            moved = np.array(PRESSURE_FORM.step(tuple(state), (start, end), parameters, h))
+            state = moved + deviations * rng.standard_normal((4, runs))
+        measured[k] = state[:3] + np.array([[1e-6], [1e-3], [5e3]]) * rng.standard_normal((3, runs))
+    names = ("position_m", "velocity_m_s", "differential_pressure_pa")
+    return [
+        Record(h * substeps, {"motor_speed_rad_s": speed, **dict(zip(names, measured[..., run].T, strict=True))})
+        for run in range(runs)
+    ]
+
+
+@pytest.mark.slow
+def test_data_of_the_model_itself_are_objected_to_at_most_twice_in_a_hundred() -> None:
+    variances = {"position_m": 1e-12, "velocity_m_s": 1e-6, "differential_pressure_pa": 2.5e7}
+    objections = 0
+    squares: list[float] = []
+    for record in own_runs(100, 4_000, np.random.default_rng(1)):
+        prior = first_belief(PRESSURE_FORM, record, 2e8, 3e8)
+        estimate = run_filter(
+            ekf, PRESSURE_FORM, prior, record, RIG, variances=variances, noise=OWN_NOISE, keep_innovations=True
+        )
+        objections += not consistency_gate(estimate, BULK_MODULUS, record).passed
+        squares.append(wander(estimate, BULK_MODULUS))
+    assert objections <= 2
+    assert 0.5 < np.mean(squares) < 1.5
+
+
+def test_a_constant_that_moves_as_its_variance_shrinks_wanders_once(linear: ProcessModel) -> None:
+    rng = np.random.default_rng(2)
+    variance = np.linspace(4.0, 1.0, 1001)
+    moves = np.concatenate([[0.0], np.sqrt(-np.diff(variance)) * rng.standard_normal(1000)])
+    mean = np.column_stack([np.cumsum(moves), 5.0 * np.cumsum(moves), np.zeros(1001)])
+    estimate = Estimate(
+        linear, ("position_m",), np.arange(1001.0), mean, np.column_stack([variance] * 3), PRIOR, {}, 0.0,
+        np.empty((0, 1)), np.empty((0, 1)),
+    )  # fmt: skip
+    assert 0.4 < wander(estimate, "position_m") < 1.8
+    assert wander(estimate, "velocity_m_s") == pytest.approx(25.0 * wander(estimate, "position_m"))
+    assert wander(estimate, "force_n") == 0.0
+    reasons = consistency_gate(estimate, "velocity_m_s").reasons
+    assert any("moved between stretches of the log" in reason for reason in reasons)

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from estimation.eha import ACCELERATION_FORM, PRESSURE_FORM, acceleration_step, pressure_step, with_bulk_modulus
-from estimation.kernels import compile_step
+from estimation.linearised import compile_step
 from estimation.model import ProcessModel
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.eha import EhaParameters, lumped_step, reduced_derivative
 from plant.integrate import parameter_row
 
 SPEEDS = (100.0, 102.0)
+DRIVES = tuple(np.array([speed]) for speed in SPEEDS)
 POINTS = {
     "sliding": {"velocity_m_s": 0.03, "acceleration_m_s2": 0.5, "differential_pressure_pa": 1e6},
     "sliding back": {"velocity_m_s": -0.02, "acceleration_m_s2": 2.0, "differential_pressure_pa": -2e6},
@@ -48,7 +49,7 @@ def test_the_analytic_jacobian_is_the_numerical_one(condition: Condition, model:
     p, step = parameters_for(condition), 1e-4
     state = state_of(model, point)
     scale = np.array([variable.scale for variable in model.states])
-    moved, slopes = compile_step(model).step(state / scale, *SPEEDS, parameter_row(p), step)
+    moved, slopes = compile_step(model).step(state / scale, *DRIVES, parameter_row(p), step)
     wanted = numerical_jacobian(model, state, p, step)
     np.testing.assert_allclose(slopes, wanted, rtol=1e-6, atol=1e-8 * np.max(np.abs(wanted)))
     direct = np.array(model.step(tuple(state), SPEEDS, p, step))
@@ -93,7 +94,7 @@ def test_while_it_sticks_motion_says_nothing_of_bulk_modulus() -> None:
     p = EhaParameters()
     scale = np.array([variable.scale for variable in PRESSURE_FORM.states])
     state = state_of(PRESSURE_FORM, "stuck") / scale
-    _, slopes = compile_step(PRESSURE_FORM).step(state, *SPEEDS, parameter_row(p), 1e-4)
+    _, slopes = compile_step(PRESSURE_FORM).step(state, *DRIVES, parameter_row(p), 1e-4)
     assert slopes[0, 3] == slopes[1, 3] == 0.0  # errata E13
     assert slopes[2, 3] > 0.0
 

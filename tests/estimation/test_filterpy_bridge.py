@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from estimation.bulk_modulus import first_belief
 from estimation.eha import FORMS
 from estimation.ekf import ekf
 from estimation.filterpy_bridge import filterpy_ekf
+from estimation.first_belief import first_belief
 from estimation.gaussian import Gaussian
 from estimation.measurement_noise import measurement_variances
 from estimation.model import ProcessModel

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from estimation.algebra import EKF, predict_expressions, scaled_step, update_expressions
 from estimation.eha import ACCELERATION_FORM, FORMS, PRESSURE_FORM
 from estimation.ekf import ekf
 from estimation.gaussian import Gaussian
-from estimation.kernels import compile_ekf, ekf_source, predict_expressions, scaled_step, update_expressions
+from estimation.kernels import compile_filter, one_source
 from estimation.model import ProcessModel
 from estimation.run import run_filter
 from plant.compiled.expression import ONE, ZERO, ordered
@@ -24,7 +25,7 @@ def test_bulk_modulus_is_a_constant_row_that_costs_nothing() -> None:
 @pytest.mark.parametrize("model", FORMS.values(), ids=FORMS)
 def test_predict_and_update_give_every_mean_and_the_upper_triangle(model: ProcessModel) -> None:
     n = model.width
-    wanted = {f"z{i}" for i in range(n)} | {f"P{i}{j}" for i in range(n) for j in range(i, n)}
+    wanted = {f"z{i}" for i in range(n)} | {f"P{i}_{j}" for i in range(n) for j in range(i, n)}
     assert set(predict_expressions(model)) == wanted
     assert set(update_expressions(model, ("position_m",))) == wanted | {"e0", "s0"}
 
@@ -36,14 +37,14 @@ def test_no_update_divides_more_often_than_it_has_channels() -> None:
 
 
 def test_a_kernel_is_straight_lines_within_samples_and_sub_steps() -> None:
-    source = ekf_source(ACCELERATION_FORM, ("position_m", "velocity_m_s"))
+    source = one_source(EKF, ACCELERATION_FORM, ("position_m", "velocity_m_s"))
     assert source.count("for ") == 2
     assert "np.linalg" not in source
 
 
 def test_the_same_model_and_channels_are_compiled_once() -> None:
     channels = ("position_m", "velocity_m_s")
-    assert compile_ekf(PRESSURE_FORM, channels) is compile_ekf(PRESSURE_FORM, channels)
+    assert compile_filter(EKF, PRESSURE_FORM, channels) is compile_filter(EKF, PRESSURE_FORM, channels)
 
 
 def test_the_order_of_channels_does_not_change_the_belief(linear: ProcessModel) -> None:

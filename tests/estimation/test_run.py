@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.bulk_modulus import first_belief
 from estimation.eha import ACCELERATION_FORM, FORMS, PRESSURE_FORM
 from estimation.ekf import ekf
 from estimation.filter import Method
+from estimation.first_belief import first_belief
 from estimation.gaussian import Gaussian
 from estimation.model import ProcessModel, StateVariable
 from estimation.run import METHODS, Estimate, available_channels, run_filter
@@ -44,7 +44,10 @@ def test_a_model_predicts_the_channels_that_it_can_and_the_log_has(record: Recor
 
 def test_a_log_without_anything_that_the_model_predicts_is_refused_by_name(record: Record) -> None:
     bare = record.replace(position_m=None, velocity_m_s=None, differential_pressure_pa=None)
-    with pytest.raises(LogError, match="pressure form needs position_m or velocity_m_s, the record has motor_speed"):
+    with pytest.raises(
+        LogError,
+        match="pressure form needs position_m or velocity_m_s or differential_pressure_pa, the record has motor",
+    ):
         filtered(bare)
 
 

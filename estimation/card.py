@@ -1,0 +1,189 @@
+"""The identifiability card: what a drive and its sensors would tell, in numbers and in sentences."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+PRESSURE = "differential_pressure_pa"
+"""The channel without which a stuck piston says nothing."""
+
+OBSERVABLE = 0.03
+"""Relative standard deviation above which a parameter is called not observable (errata E13) [fraction]."""
+
+INSEPARABLE = 0.95
+"""Correlation of two estimates from which they are said to be hard to tell apart [dimensionless]."""
+
+
+MOST_PAIRS = 3
+"""Of so many pairs of parameters that are hard to tell apart a card speaks."""
+
+
+@dataclass(frozen=True, eq=False)
+class Card:
+    """What a drive and its sensors would tell.
+
+    Parameters
+    ----------
+    channels : tuple of str
+        Channels measured.
+    unknowns : tuple of str
+        Parameters asked for.
+    relative_std : Mapping[str, float]
+        Least relative standard deviation of each [fraction]; 1 is nothing learnt.
+    known_exactly : Mapping[str, float]
+        The same if the rig file's uncertain parameters were known exactly [fraction].
+    correlation : ndarray, shape (unknowns, unknowns)
+        Correlation of the estimates.
+    friction_force : float
+        Least relative standard deviation of the friction force at the speed that the piston reached [fraction].
+    weakest : Mapping[str, float]
+        Weights of the combination of logarithms that is known worst [dimensionless].
+    weakest_std : float
+        Its standard deviation [fraction].
+    stuck : float
+        Share of the run during which the piston sticks [fraction].
+    uncertainties : Mapping[str, float]
+        Relative standard deviations of what was taken as known [fraction].
+    """
+
+    channels: tuple[str, ...]
+    unknowns: tuple[str, ...]
+    relative_std: Mapping[str, float]
+    known_exactly: Mapping[str, float]
+    correlation: Array
+    friction_force: float
+    weakest: Mapping[str, float]
+    weakest_std: float
+    stuck: float
+    uncertainties: Mapping[str, float]
+
+    @property
+    def overall(self) -> float:
+        """Geometric mean of the relative standard deviations [fraction], by which drives are ranked."""
+        return float(np.exp(np.mean(np.log([max(std, 1e-12) for std in self.relative_std.values()]))))
+
+
+def rank_drives(cards: Mapping[str, Card], parameter: str | None = None) -> list[str]:
+    """Return drives by how much they tell, the best first.
+
+    Parameters
+    ----------
+    cards : Mapping[str, Card]
+        The card of each drive, by its name.
+    parameter : str, optional
+        The parameter that counts; by default all unknowns alike, by the geometric mean of their bounds.
+
+    Returns
+    -------
+    list[str]
+        Names.
+    """
+    return sorted(
+        cards, key=lambda name: cards[name].overall if parameter is None else cards[name].relative_std[parameter]
+    )
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def percent(value: float) -> str:
+    """Return a fraction as a percentage of two digits.
+
+    Parameters
+    ----------
+    value : float
+        The fraction [dimensionless].
+
+    Returns
+    -------
+    str
+        The percentage with its sign.
+
+    Examples
+    --------
+    >>> percent(0.00042), percent(0.11), percent(0.997), percent(1.02)
+    ('0.042 %', '11 %', 'over 99 %', '102 %')
+    """
+    if 0.99 <= value < 1.0:
+        return "over 99 %"
+    return f"{100.0 * value:.0f} %" if value >= 0.99 else f"{100.0 * value:.2g} %"
+
+
+def sentences(card: Card) -> tuple[str, ...]:
+    """Say what a card means.
+
+    Parameters
+    ----------
+    card : Card
+        The card.
+
+    Returns
+    -------
+    tuple of str
+        Sentences without a full stop.
+    """
+    said: list[str] = []
+    lost = [name for name, std in card.relative_std.items() if std > OBSERVABLE]
+    if lost:
+        named = ", ".join(f"{_words(name)} ({percent(card.relative_std[name])})" for name in lost)
+        said.append(f"not observable from this drive and these sensors, worse than {percent(OBSERVABLE)}: {named}")
+    if card.stuck > 0.5:
+        said.append(
+            f"the piston sticks for {percent(card.stuck)} of the time; while it sticks, position and velocity hold "
+            "nothing about bulk modulus (errata E13)"
+            + (
+                "; differential pressure does"
+                if PRESSURE in card.channels
+                else ": log differential pressure, or drive with larger, slower steps"
+            )
+        )
+    said += _inseparable(card)
+    if len(card.unknowns) > 1 and card.weakest_std > OBSERVABLE:
+        largest = max(abs(weight) for weight in card.weakest.values())
+        terms = [
+            f"{weight:+.2f} {_words(name)}" for name, weight in card.weakest.items() if abs(weight) > 0.2 * largest
+        ]
+        said.append(f"known worst, to {percent(card.weakest_std)}: {' '.join(terms)} (of logarithms)")
+    said += _rig_share(card)
+    return tuple(said)
+
+
+def _inseparable(card: Card) -> list[str]:
+    """Return a sentence on each of the pairs that are hardest to tell apart, where that matters."""
+    pairs: list[tuple[float, str]] = []
+    for i, first in enumerate(card.unknowns):
+        for j, second in enumerate(card.unknowns[:i]):
+            correlation = float(card.correlation[i, j])
+            whole = card.relative_std[first]
+            if abs(correlation) < INSEPARABLE or max(whole, card.relative_std[second]) < 0.1 * OBSERVABLE:
+                continue
+            sure = whole * math.sqrt(max(0.0, 1.0 - correlation**2))
+            said = (
+                f"{_words(second)} and {_words(first)} are hard to tell apart (correlation {correlation:.2f}): with "
+                f"{_words(second)} known, {_words(first)} would be known to {percent(sure)}, not {percent(whole)}"
+            )
+            pairs.append((-abs(correlation), said))
+    return [said for _, said in sorted(pairs)[:MOST_PAIRS]]
+
+
+def _rig_share(card: Card) -> list[str]:
+    if "bulk_modulus" not in card.unknowns:
+        return []
+    rule = "bulk modulus enters only as chamber volume over bulk modulus"
+    if not card.uncertainties:
+        return [
+            f"{rule}: one percent of error in the volume is one percent in bulk modulus, and the rig file gives the "
+            "volume no uncertainty"
+        ]
+    given = ", ".join(f"{_words(name)} {percent(std)}" for name, std in card.uncertainties.items())
+    whole, alone = card.relative_std["bulk_modulus"], card.known_exactly["bulk_modulus"]
+    return [
+        f"{rule}: with what the rig file leaves uncertain ({given}) its bound is {percent(whole)}, "
+        f"without {percent(alone)}"
+    ]

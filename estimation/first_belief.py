@@ -1,0 +1,54 @@
+"""What a filter believes of a log before its first sample, and the noise that it is given by default."""
+
+import numpy as np
+
+from estimation.eha import BULK_MODULUS
+from estimation.gaussian import Gaussian
+from estimation.model import ProcessModel
+from plant.record import Record
+
+PRESSURE_NOISE_LOGGED = 3e8
+"""Process-noise density of differential pressure where it is logged [Pa^2/s]. It stands for the flows that a lumped
+model leaves out (make-up, changing volumes); without the sensor the model's own, small one holds the pressure."""
+
+START_STD = 3e8
+"""Standard deviation of the first guess [Pa]: convergence is driven by it (errata E10)."""
+
+
+def first_belief(model: ProcessModel, record: Record, start: float, start_std: float) -> Gaussian:
+    """Return the belief before the first sample: at the first position, at rest, at the guessed bulk modulus.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The process model.
+    record : Record
+        The log.
+    start : float
+        First guess of effective bulk modulus [Pa].
+    start_std : float
+        Its standard deviation [Pa].
+
+    Returns
+    -------
+    Gaussian
+        The prior.
+    """
+    firsts = {"position_m": _first(record, "position_m"), BULK_MODULUS: start}
+    firsts["differential_pressure_pa"] = _first(record, "differential_pressure_pa")
+    spreads = {
+        "position_m": 1e-5,
+        "velocity_m_s": 1e-3,
+        "acceleration_m_s2": 10.0,
+        "differential_pressure_pa": 1e5,
+        BULK_MODULUS: start_std,
+    }
+    mean = np.array([firsts.get(state.name, 0.0) for state in model.states])
+    return Gaussian(mean, np.diag([spreads[state.name] ** 2 for state in model.states]))
+
+
+def _first(record: Record, channel: str) -> float:
+    if channel not in record:
+        return 0.0
+    present = record[channel][np.isfinite(record[channel])]
+    return float(present[0]) if len(present) else 0.0

@@ -1,0 +1,127 @@
+"""A filter gives the same bits alone and in a batch, whatever its rule and its neighbours."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.algebra import EKF, Rule
+from estimation.batch import filter_batch
+from estimation.ckf import ckf_rule
+from estimation.compiled import run_rule
+from estimation.eha import FORMS
+from estimation.ekf import ekf_rule
+from estimation.filter import FilterProblem, Trace
+from estimation.gaussian import Gaussian
+from estimation.iekf import iekf_rule
+from estimation.model import ProcessModel
+from estimation.run import filter_problem
+from estimation.sif import SIF, SIF_SETTINGS
+from estimation.svsf import SVSF, SVSF_SETTINGS
+from estimation.ukf import UKF_SETTINGS, ukf_rule
+from plant.eha import EhaParameters
+from plant.errors import HydrostateError
+from plant.record import Record
+from plant.sensors import BENCH
+from plant.signals import sine
+from plant.simulate import LUMPED, simulate
+
+RULES: dict[str, tuple[Rule, dict[str, float]]] = {
+    "ekf": (EKF, {}),
+    "ekf-huber": (ekf_rule("huber"), {}),
+    "ekf-student-t": (ekf_rule("student-t"), {}),
+    "iekf": (iekf_rule("none"), {}),
+    "ukf": (ukf_rule("none"), UKF_SETTINGS),
+    "ckf": (ckf_rule("none"), {}),
+    "svsf": (SVSF, SVSF_SETTINGS),
+    "sif": (SIF, SIF_SETTINGS),
+}
+EVERY_RULE = pytest.mark.parametrize(("rule", "settings"), RULES.values(), ids=RULES)
+SAMPLES = 700  # more than a stretch that the batch lays side by side
+
+
+def problems(model: ProcessModel, count: int, samples: int = SAMPLES) -> list[FilterProblem]:
+    """Filters of one log with priors, noise and measurements of their own, one sample in ten missing."""
+    rig = EhaParameters()
+    drive = sine(samples * 1e-4, 1e-4, rig.rated_speed, 5.0)
+    record = simulate(LUMPED, drive, 1e-4, rig, sensors=BENCH, rng=np.random.default_rng(0))
+    start = np.array([0.1 * state.scale for state in model.states])
+    prior = Gaussian(start, np.diag(start**2))
+    base = filter_problem(model, prior, record, rig)
+    rng = np.random.default_rng(1)
+    made: list[FilterProblem] = []
+    for _ in range(count):
+        noise = np.sqrt(base.variances) * rng.normal(size=base.measured.shape)
+        measured = np.where(rng.random(base.measured.shape) < 0.1, np.nan, base.measured + noise)
+        mean = base.mean * rng.uniform(0.5, 2.0, size=base.mean.shape)
+        made.append(replace(base, mean=mean, measured=measured, noise=base.noise * rng.uniform(0.5, 2.0)))
+    return made
+
+
+def assert_same_bits(traces: Sequence[Trace], alone: Sequence[Trace]) -> None:
+    assert len(traces) == len(alone)
+    for one, other in zip(traces, alone, strict=True):
+        for name in ("mean", "covariance", "track", "track_variance", "nis", "count", "log_likelihood"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+
+
+def assert_batch_is_alone(rule: Rule, settings: dict[str, float], tasks: list[FilterProblem], workers: int = 1) -> None:
+    together = list(filter_batch(tasks, rule, settings=settings, workers=workers))
+    assert_same_bits(together, [run_rule(rule, task, settings) for task in tasks])
+    assert np.all(np.isfinite([trace.mean for trace in together]))
+
+
+@EVERY_RULE
+@pytest.mark.parametrize("count", [33, 40])
+def test_every_rule_gives_the_same_bits_alone_and_in_a_batch(
+    linear: ProcessModel, rule: Rule, settings: dict[str, float], count: int
+) -> None:
+    assert_batch_is_alone(rule, settings, problems(linear, count))
+
+
+@pytest.mark.slow
+@EVERY_RULE
+@pytest.mark.parametrize("form", FORMS)
+def test_every_rule_does_so_on_every_form(form: str, rule: Rule, settings: dict[str, float]) -> None:
+    assert_batch_is_alone(rule, settings, problems(FORMS[form], 33))
+
+
+def test_threads_change_no_bit_and_no_order(linear: ProcessModel) -> None:
+    assert_batch_is_alone(SVSF, SVSF_SETTINGS, problems(linear, 100), workers=2)
+
+
+def test_problems_are_drawn_a_block_at_a_time(linear: ProcessModel) -> None:
+    drawn: list[int] = []
+    tasks = problems(linear, 96, samples=20)
+    traces = filter_batch((drawn.append(i) or task for i, task in enumerate(tasks)), EKF)
+    next(traces)
+    assert len(drawn) == 32
+
+
+def test_no_problem_is_no_trace() -> None:
+    assert list(filter_batch([], EKF)) == []
+
+
+def test_filters_of_another_model_or_sampling_are_refused(linear: ProcessModel) -> None:
+    first, second = problems(linear, 2, samples=20)
+    with pytest.raises(HydrostateError, match="must share one model, got linear and pressure"):
+        list(filter_batch([first, replace(second, model=FORMS["pressure"])]))
+    with pytest.raises(HydrostateError, match=r"must agree in sample_time, got 0\.0001 and 0\.001"):
+        list(filter_batch([first, replace(second, sample_time=1e-3)]))
+
+
+def test_logs_of_another_length_are_refused(linear: ProcessModel) -> None:
+    first, second = problems(linear, 2, samples=20)
+    with pytest.raises(HydrostateError, match="one length, got 20 and 19"):
+        list(filter_batch([first, replace(second, measured=second.measured[:-1], drives=second.drives[:-1])]))
+
+
+def test_a_record_is_left_alone(linear: ProcessModel) -> None:
+    rng = np.random.default_rng(0)
+    names = ("motor_speed_rad_s", "position_m", "velocity_m_s")
+    record = Record(1e-3, {name: rng.normal(size=50) for name in names})
+    task = filter_problem(linear, Gaussian(np.zeros(3), np.eye(3)), record, EhaParameters())
+    before = task.measured.copy()
+    list(filter_batch([task] * 40))
+    np.testing.assert_array_equal(task.measured, before)
