@@ -1,4 +1,4 @@
-"""The command ``hydrostate``: study, circuit, simulate, estimate, identify, diagnose, conditions, rig."""
+"""The command ``hydrostate``: study, circuit, simulate, estimate, identify, diagnose, identifiability and others."""
 
 from importlib.metadata import version
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.command import conditions, diagnose, estimate, identify, simulate
+from experiments.command import conditions, diagnose, estimate, identifiability, identify, simulate
 from experiments.command.json_output import json_text
 from experiments.command.options import SEED, Json, Seed
 from experiments.command.streams import HydrostateGroup, emit
@@ -87,10 +87,10 @@ def circuit(
     seed: Seed = SEED,
     as_json: Json = False,
 ) -> None:
-    """Repeat the paper's experiments (Figures 3 to 11, section 4) on the circuit plant; write them as tables.
+    """Repeat the paper's experiments (Figures 3 to 11, section 4) on the circuit plant; write tables, figures, report.
 
     The circuit plant has two chambers, make-up, relief, throttles, presliding friction and motor lag, which no filter
-    here assumes. Takes about a minute. The last line of standard output is the manifest's path.
+    here assumes. Takes one to four minutes. The last line of standard output is the manifest's path.
     """
     from rich.console import Console
 
@@ -104,7 +104,7 @@ def circuit(
         emit(str(manifest))
 
 
-for module in (simulate, estimate, identify, diagnose, conditions):
+for module in (simulate, estimate, identify, diagnose, identifiability, conditions):
     app.add_typer(module.commands)
 app.add_typer(conditions.rig_commands, name="rig")
 

@@ -1,20 +1,35 @@
-"""What `hydrostate circuit` does: the paper's experiments on the circuit plant, as tables in one folder."""
+"""What `hydrostate circuit` does: the paper's experiments on the circuit plant, as a folder with a report."""
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
+from io import BytesIO
 from pathlib import Path
 
 import pandas as pd
 from rich.console import Console
 from rich.progress import track
 
-from experiments.store import check_target, write_tables
+from experiments.figures.circuit import CIRCUIT_FIGURES
+from experiments.figures.style import styled
+from experiments.report.circuit import render_circuit_report
+from experiments.store import PNG_DOTS_PER_INCH, check_target, write_tables
 from experiments.streams import stream
-from experiments.studies.circuit_curves import friction_curve, friction_refit, leakage_curve, leakage_refit
+from experiments.studies.circuit_curves import (
+    FRICTION_SWEEP,
+    LEAKAGE_SWEEP,
+    friction_points,
+    friction_refit,
+    leakage_points,
+    leakage_refit,
+    points_table,
+    throttle_curve,
+)
 from experiments.studies.circuit_experiments import (
+    AMPLITUDE_INPUTS,
+    MEAN_INPUTS,
     bulk_modulus_on_circuit,
-    etfe_over_amplitudes,
-    etfe_over_means,
+    frequency_responses,
     order_study,
     validation_input,
 )
@@ -40,13 +55,15 @@ def circuit_studies(rig: CircuitParameters, seed: int) -> Mapping[str, Callable[
     """
     settings = StudySettings(seed=seed)
     return {
-        "figure 3 velocity against leakage throttle": lambda: leakage_curve(rig),
-        "figure 4 pressure against friction throttle": lambda: friction_curve(rig),
+        "figure 3 velocity against leakage throttle": lambda: throttle_curve(rig, LEAKAGE_SWEEP),
+        "figure 4 pressure against friction throttle": lambda: throttle_curve(rig, FRICTION_SWEEP),
         "section 4 first tests": lambda: first_tests(rig, seed),
-        "figure 5 frequency response over input means": lambda: etfe_over_means(rig, seed),
-        "figure 6 frequency response over input amplitudes": lambda: etfe_over_amplitudes(rig, seed),
+        "figure 5 frequency response over input means": lambda: frequency_responses(rig, seed, MEAN_INPUTS),
+        "figure 6 frequency response over input amplitudes": lambda: frequency_responses(rig, seed, AMPLITUDE_INPUTS),
         "figure 7 singular values": lambda: order_study(rig, seed),
+        "figure 8 leakage points": lambda: points_table(rig, stream(seed, "leakage refit"), leakage_points),
         "figure 8 leakage flow refitted": lambda: leakage_refit(rig, stream(seed, "leakage refit")),
+        "figure 9 friction points": lambda: points_table(rig, stream(seed, "friction refit"), friction_points),
         "figure 9 friction refitted": lambda: friction_refit(rig, stream(seed, "friction refit")),
         "figure 10 validation input": lambda: validation_input(rig, settings),
         "figure 11 bulk modulus": lambda: bulk_modulus_on_circuit(rig, settings),
@@ -54,7 +71,7 @@ def circuit_studies(rig: CircuitParameters, seed: int) -> Mapping[str, Callable[
 
 
 def circuit_command(out: Path, seed: int, console: Console) -> Path:
-    """Run the circuit studies and write their tables.
+    """Run the circuit studies and write their tables, figures and report.
 
     Parameters
     ----------
@@ -68,7 +85,7 @@ def circuit_command(out: Path, seed: int, console: Console) -> Path:
     Returns
     -------
     Path
-        The manifest.
+        The manifest, ``manifest.json``; the report stands beside it as ``report.html``.
 
     Raises
     ------
@@ -80,4 +97,44 @@ def circuit_command(out: Path, seed: int, console: Console) -> Path:
     studies = circuit_studies(rig, seed)
     tables = {name: run() for name, run in track(studies.items(), "experiments on the circuit", console=console)}
     manifest = {"study": "circuit", "settings": {"seed": seed}, "parameters": asdict(rig)}
-    return write_tables(tables, manifest, out)
+    written = write_tables(tables, manifest, out)
+    figures = draw_figures(tables)
+    pages = {"report.html": render_circuit_report(tables, figures["svg"], seed).encode()}
+    pages |= {f"figures/{name}.{kind}": image for kind, images in figures.items() for name, image in images.items()}
+    _add_files(written, pages)
+    return written
+
+
+def draw_figures(tables: Mapping[str, pd.DataFrame]) -> Mapping[str, Mapping[str, bytes]]:
+    """Return the circuit's figures as files.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        What the experiments found.
+
+    Returns
+    -------
+    Mapping[str, Mapping[str, bytes]]
+        By kind, ``svg`` and ``png``, then by the names of `CIRCUIT_FIGURES`.
+    """
+    files: dict[str, dict[str, bytes]] = {"svg": {}, "png": {}}
+    with styled():
+        for name, kind in CIRCUIT_FIGURES.items():
+            figure = kind.draw(tables)
+            vector, pixels = BytesIO(), BytesIO()
+            figure.savefig(vector, format="svg", metadata={"Date": None})
+            figure.savefig(pixels, format="png", dpi=PNG_DOTS_PER_INCH)
+            files["svg"][name], files["png"][name] = vector.getvalue(), pixels.getvalue()
+    return files
+
+
+def _add_files(manifest: Path, files: Mapping[str, bytes]) -> None:
+    """Write files beside a manifest that lists them; listed first, so that an unfinished folder is still a study's."""
+    noted = json.loads(manifest.read_text(encoding="utf-8"))
+    noted["files"] = sorted({*noted["files"], *files})
+    manifest.write_text(json.dumps(noted, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    for name, content in files.items():
+        path = manifest.parent / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(content)

@@ -24,6 +24,7 @@ from experiments.command.options import (
     require_positive,
 )
 from experiments.command.streams import clauses, note, short_names, table
+from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -39,10 +40,15 @@ ABSENCE_COSTS = (
 MOST_MESSAGES = 3
 """Up to so many logs, everything that speaks against a result is shown."""
 
+SENSORS = {"position": "position_m", "velocity": "velocity_m_s", "dp": PRESSURE}
+"""Channels by the names of the option."""
+
 NOTHING: Result = {
     "bulk_modulus_pa": {"value": None, "std": None, "ci95": None},
     "leakage_coefficient_m3_s_pa": None,
     "flow_bias_m3_s": None,
+    "states": {},
+    "noise": None,
     "nis": {},
     "method": None,
     "form": None,
@@ -65,11 +71,46 @@ def estimate(
         str,
         typer.Option(
             metavar="FORM",
-            help="What is believed: flow (needs position and differential pressure; finds leakage too), pressure "
-            "(a filter), acceleration (the published filter), or auto: flow where the log allows, else pressure.",
+            help="What is believed: flow (needs position and differential pressure; finds leakage too), motion "
+            "(without pressure; finds leakage and friction too), pressure and acceleration (filters that are told "
+            "leakage and friction; the latter is the published one), or auto: flow or motion where the log allows.",
         ),
     ] = "auto",
-    method: Annotated[str, typer.Option(metavar="METHOD", help="Filter: ekf or filterpy-ekf.")] = "ekf",
+    method: Annotated[
+        str,
+        typer.Option(
+            metavar="METHOD",
+            help="least-squares (flow, motion), or a filter: ekf, iekf, ukf, ckf, svsf, sif, smoother, filterpy-ekf; "
+            "auto: least squares where the form allows.",
+        ),
+    ] = "auto",
+    states: Annotated[
+        str,
+        typer.Option(
+            metavar="NAMES",
+            help="What a filter estimates beside bulk modulus, comma-separated: leakage, friction, air, or parameters "
+            "such as flow_bias.",
+        ),
+    ] = "",
+    sensors: Annotated[
+        str,
+        typer.Option(
+            metavar="NAMES", help="Use these channels alone, comma-separated: position, velocity, dp. All by default."
+        ),
+    ] = "",
+    tune: Annotated[
+        bool, typer.Option("--tune", help="Tune the filter's noise levels to the log by likelihood.")
+    ] = False,
+    smooth: Annotated[
+        bool, typer.Option("--smooth", help="Smooth: what the whole log says of every sample (method smoother).")
+    ] = False,
+    robust: Annotated[
+        str, typer.Option(metavar="HOW", help="How gross outliers count in a filter: none, huber or student-t.")
+    ] = "none",
+    figure: Annotated[
+        Path | None,
+        typer.Option(metavar="PNG", help="Draw the filtered estimate with its 95 % band, innovations and NIS."),
+    ] = None,
     condition: ConditionName = None,
     rig: RigFile = None,
     columns: Columns = None,
@@ -92,17 +133,29 @@ def estimate(
     """Estimate effective bulk modulus [Pa] from each log, with a 95 % interval and a verdict.
 
     With position and differential pressure logged, leakage and flow bias are found along with it and friction plays no
-    part. Without, leakage and friction are taken from the rig, or from the condition if one is given. Where drive and
+    part.
+    Without, leakage and friction are taken from the rig, or from the condition if one is given. Where drive and
     sensors hold too little (Cramér-Rao bound over 3 %), the outcome is not_observable and no number is printed.
     Nothing here is random, so the seed changes nothing.
     """
-    from estimation.bulk_modulus import estimate_bulk_modulus
+    from estimation.augment import AUGMENTABLE
+    from estimation.bulk_modulus import FITTED, LEAST_SQUARES, estimate_bulk_modulus
     from estimation.eha import FORMS
-    from estimation.run import METHODS
+    from estimation.filter_estimate import GROUPS
+    from estimation.run import METHODS, ROBUST
     from faults.conditions import find_condition, parameters_for
 
-    require_one_of("--form", form, ["auto", "flow", *FORMS])
-    require_one_of("--method", method, list(METHODS))
+    require_one_of("--form", form, ["auto", *FITTED, *FORMS])
+    require_one_of("--method", method, ["auto", LEAST_SQUARES, *METHODS])
+    require_one_of("--robust", robust, list(ROBUST))
+    wanted, used = _listed(states), _listed(sensors)
+    for name in used:
+        require_one_of("--sensors", name, list(SENSORS))
+    if smooth and method not in ("auto", "ekf", "smoother"):
+        raise HydrostateError(f"--smooth smooths the ekf, got --method {method}")
+    method = "smoother" if smooth else method
+    for name in wanted:
+        require_one_of("--states", name, [*GROUPS, *AUGMENTABLE])
     require_positive("--start-std", start_std, "Pa")
     if start != 0.0:
         require_positive("--start", start, "Pa")
@@ -115,9 +168,24 @@ def estimate(
 
     def work(log: Path) -> Result:
         record = read_log(log, bench.columns, mapping)
+        unused = {channel for name, channel in SENSORS.items() if used and name not in used}
         if no_pressure:
-            record = record.replace(**{PRESSURE: None})
-        found = estimate_bulk_modulus(record, parameters, form=form, method=method, start=start, start_std=start_std)
+            unused.add(PRESSURE)
+        record = record.replace(**{channel: None for channel in unused if channel in record})
+        found = estimate_bulk_modulus(
+            record,
+            parameters,
+            form=form,
+            method=method,
+            start=start,
+            start_std=start_std,
+            uncertainties=bench.uncertainties,
+            states=wanted,
+            tuned=tune,
+            robust=robust,
+        )
+        if figure is not None:
+            _draw(found, figure, log, len(logs))
         return {**_entries(found, method), **chosen}
 
     batch = run_logs(logs, work, {**NOTHING, **chosen}, "estimating")
@@ -126,14 +194,32 @@ def estimate(
     finish(batch, _screen, as_json=as_json, out=out)
 
 
+def _listed(names: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in names.split(",") if name.strip())
+
+
+def _draw(found: "BulkModulusEstimate", target: Path, log: Path, logs: int) -> None:
+    """Write the figure of a filtered log; with several logs, each one's name goes into the file's."""
+    from experiments.figures.innovations import write_innovations
+
+    path = target if logs == 1 else target.with_name(f"{target.stem}-{log.stem}{target.suffix or '.png'}")
+    if found.estimate is None:
+        note(f"no figure: {log.name} was not filtered; ask for one with --method ekf")
+        return
+    write_innovations(found, log.name, path)
+
+
 def _entries(found: "BulkModulusEstimate", method: str) -> dict[str, Any]:
+    filtered = found.estimate is not None
     return {
         "outcome": found.outcome.value,
         "bulk_modulus_pa": {"value": found.value, "std": found.std, "ci95": found.interval},
         "leakage_coefficient_m3_s_pa": _number(found.others.get("leakage_coefficient")),
         "flow_bias_m3_s": _number(found.others.get("flow_bias")),
         "nis": dict(found.nis),
-        "method": "least-squares" if found.form == "flow" else method,
+        "method": ("ekf" if method == "auto" else method) if filtered else "least-squares",
+        "states": {name: _number(value) for name, value in found.others.items()},
+        "noise": None if found.tuning is None else {**found.tuning.tuned.noise, **found.tuning.tuned.variances},
         "form": found.form,
         "gate": {"passed": found.gate.passed, "reasons": list(found.gate.reasons)},
         "bound_percent": 100.0 * found.bound,

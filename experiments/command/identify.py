@@ -18,19 +18,35 @@ from experiments.command.options import (
     Seed,
     load_columns,
     load_rig,
+    require_one_of,
     require_positive,
 )
 from experiments.command.streams import short_names, table
+from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from estimation.identification.choose import StructureName
     from estimation.identification.linear_model import LinearModel
 
 TABLE_6_TIME = 1e-3
 """Sample time of Table 6 as we read it [s] (errata E14)."""
 
+FORMAT_VERSION = 1
+"""Of a written library: later versions add entries and rename none."""
+
+STRUCTURES = ("output-error", "arx", "armax", "box-jenkins", "auto")
+"""What ``--structure`` takes; auto compares the other four on data held back."""
+
+AUTO = "auto"
+
+HIGHEST_ORDER = 4
+"""``--order auto`` compares orders up to this by BIC."""
+
 NOTHING: Result = {
+    "format_version": FORMAT_VERSION,
+    "structure": None,
     "numerator": None,
     "denominator": None,
     "sample_time_s": None,
@@ -38,6 +54,9 @@ NOTHING: Result = {
     "covariance": None,
     "dc_gain": {"value": None, "std": None},
     "bandwidth_hz": None,
+    "bandwidth_std_hz": None,
+    "poles": None,
+    "zeros": None,
     "delay": {"samples": None, "seconds": None},
 }
 """The entries of a log that could not be used."""
@@ -45,12 +64,18 @@ NOTHING: Result = {
 commands = typer.Typer()
 
 
-@commands.command(epilog="Example: hydrostate identify prbs.csv --order 2 --numerator 3 --sample-time 1e-3 --json")
+@commands.command(epilog="Example: hydrostate identify prbs.csv --structure auto --order auto --out library.json")
 def identify(
     logs: Logs,
-    order: Annotated[int, typer.Option(min=1, metavar="INT", help="Order of the denominator.")] = 2,
-    numerator: Annotated[int, typer.Option(min=1, metavar="INT", help="Coefficients of the numerator.")] = 3,
-    delay: Annotated[int, typer.Option(min=0, metavar="INT", help="Dead time [samples of the model].")] = 0,
+    structure: Annotated[
+        str, typer.Option(metavar="NAME", help=f"{', '.join(STRUCTURES)}; auto takes the best on data held back.")
+    ] = STRUCTURES[0],
+    order: Annotated[str, typer.Option(metavar="INT|auto", help="Order of the denominator; auto asks BIC.")] = "2",
+    numerator: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="INT", help="Coefficients of the numerator; one more than the order unless told."),
+    ] = None,
+    delay: Annotated[str, typer.Option(metavar="INT|auto", help="Dead time [samples of the model].")] = "0",
     sample_time: Annotated[
         float | None,
         typer.Option(metavar="S", help="Of the model [s]; 1e-3 (Table 6), or the log's where that is longer."),
@@ -72,10 +97,16 @@ def identify(
     """Identify the discrete transfer function from motor speed [rad/s] to velocity [m/s] of each log.
 
     An output-error fit with covariance; the defaults are the form of Table 6. Differential pressure is not used, so
-    its absence costs nothing. Nothing here is random, so the seed changes nothing.
+    its absence costs nothing. Nothing here is random, so the seed changes nothing. `--out library.json` writes one
+    entry a log at full precision, which `LinearModel.from_dict` reads.
     """
     from estimation.identification.from_record import identify_record
 
+    require_one_of("--structure", structure, STRUCTURES)
+    wanted_order, wanted_delay = whole_or_auto("--order", order, 1), whole_or_auto("--delay", delay, 0)
+    fixed = 2 if wanted_order is None else wanted_order
+    free = wanted_order is None or wanted_delay is None
+    coefficients = (fixed + (1 if free or not wanted_delay else 0)) if numerator is None else numerator
     require_positive("--sample-time", sample_time, "s")
     require_positive("--filter-hz", filter_hz, "Hz")
     bench, mapping = load_rig(rig), load_columns(columns)
@@ -89,15 +120,53 @@ def identify(
             output=output_channel,
             input=input_channel,
             sample_time=max(TABLE_6_TIME, record.sample_time) if sample_time is None else sample_time,
-            n_numerator=numerator,
-            n_denominator=order,
-            delay=delay,
+            n_numerator=coefficients,
+            n_denominator=fixed,
+            delay=wanted_delay or 0,
             filter_cutoff_hz=filter_hz,
+            structure=_NAMES[structure],
+            orders=range(1, HIGHEST_ORDER + 1) if wanted_order is None else None,
+            estimate_dead_time=wanted_delay is None,
+            covariance="auto" if filter_hz is None else "coloured",
         )
         return {**chosen, **_entries(model)}
 
     batch = run_logs(logs, work, {**NOTHING, **chosen}, "identifying")
     finish(batch, _screen, as_json=as_json, out=out)
+
+
+def whole_or_auto(option: str, text: str, least: int) -> int | None:
+    """Return a whole number, or None for ``auto``.
+
+    Parameters
+    ----------
+    option : str
+        Its name on the command line.
+    text : str
+        What was given.
+    least : int
+        Smallest number allowed.
+
+    Returns
+    -------
+    int or None
+        None where the data are to say.
+
+    Raises
+    ------
+    HydrostateError
+        If it is neither.
+
+    Examples
+    --------
+    >>> whole_or_auto("--order", "3", 1), whole_or_auto("--order", "auto", 1)
+    (3, None)
+    """
+    if text == AUTO:
+        return None
+    if not text.isdecimal() or int(text) < least:
+        raise HydrostateError(f"{option} must be a whole number from {least} on, or auto, got {text!r}")
+    return int(text)
 
 
 def _entries(model: "LinearModel") -> dict[str, Any]:
@@ -109,9 +178,32 @@ def _entries(model: "LinearModel") -> dict[str, Any]:
         **model.to_dict(),
         "dc_gain": {"value": model.dc_gain, "std": model.dc_gain_std},
         "bandwidth_hz": bandwidth,
+        "bandwidth_std_hz": model.bandwidth_std_hz,
+        "poles": _with_std(model.poles, model.pole_std),
+        "zeros": _with_std(model.zeros, model.zero_std),
+        "format_version": FORMAT_VERSION,
         "delay": lag,
-        "message": f"fit {model.fit_percent:.1f} %, gain {model.dc_gain:.4g}, bandwidth {extent}",
+        "message": (
+            f"{model.structure} of order {model.denominator.size - 1}, fit {model.fit_percent:.1f} %, "
+            f"gain {model.dc_gain:.4g}, bandwidth {extent}"
+        ),
     }
+
+
+def _with_std(roots: Any, spreads: Any) -> list[dict[str, float]]:
+    return [
+        {"real": float(r.real), "imag": float(r.imag), "real_std": float(s.real), "imag_std": float(s.imag)}
+        for r, s in zip(roots, spreads, strict=True)
+    ]
+
+
+_NAMES: "dict[str, StructureName | None]" = {
+    "output-error": "output-error",
+    "arx": "ARX",
+    "armax": "ARMAX",
+    "box-jenkins": "Box-Jenkins",
+    AUTO: None,
+}
 
 
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":

@@ -4,8 +4,8 @@ Every point is a run from rest at constant speed until it settles. The cylinder 
 for that; on the rig the same takes several strokes.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -19,7 +19,7 @@ from faults.physical import VOLTS_A, VOLTS_B, throttled
 from plant.circuit_parameters import CircuitParameters
 from plant.record import Record
 from plant.sensors import BENCH, IDEAL, Sensors
-from plant.simulate import CIRCUIT, simulate
+from plant.simulate import CIRCUIT, simulate_each
 
 SAMPLE_TIME = 1e-3
 """Sample time of the steady-state runs [s]."""
@@ -30,21 +30,22 @@ HOLD = 8.0
 LONG_STROKE = 1.2
 """Stroke in which the piston settles at 4 V [m]."""
 
-FIGURE_3_VOLTS = (10.0, 6.0, 4.0, 3.0, 2.5, 2.2, 2.0, 1.9, 1.75, 1.6, 1.5)
-FIGURE_4_VOLTS = (0.0, 1.0, 1.5, 2.0, 2.2, 2.3, 2.4, 2.5, 2.6, 2.8, 3.0)
 FIGURE_8_VOLTS = (0.0, 2.0, 2.2, 2.3, 2.4)
 FIGURE_9_VOLTS = (0.5, 0.7, 1.0, 1.3, 1.6, 1.9, 2.2, 2.5, 2.8, 3.1, 3.5)
 
 
-def steady_run(
-    p: CircuitParameters, speed: float, sensors: Sensors = IDEAL, rng: np.random.Generator | None = None
-) -> Record:
-    """Return a run from rest at constant speed until it has settled.
+def steady_runs(
+    circuits: Sequence[CircuitParameters],
+    speed: float,
+    sensors: Sensors = IDEAL,
+    rng: np.random.Generator | None = None,
+) -> list[Record]:
+    """Return runs from rest at constant speed until each has settled.
 
     Parameters
     ----------
-    p : CircuitParameters
-        The circuit; its stroke is made long enough.
+    circuits : sequence of CircuitParameters
+        The circuits; their strokes are made long enough.
     speed : float
         Motor speed [rad/s].
     sensors : Sensors
@@ -54,52 +55,91 @@ def steady_run(
 
     Returns
     -------
-    Record
-        `HOLD` seconds.
+    list of Record
+        `HOLD` seconds of each.
     """
-    roomy = replace(p, stroke=max(p.stroke, LONG_STROKE))
+    roomy = [replace(p, stroke=max(p.stroke, LONG_STROKE)) for p in circuits]
     drive = np.full(round(HOLD / SAMPLE_TIME), speed)
-    return simulate(CIRCUIT, drive, SAMPLE_TIME, roomy, sensors=sensors, rng=rng)
+    rngs = None if rng is None else [rng] * len(roomy)
+    return simulate_each(CIRCUIT, drive, SAMPLE_TIME, roomy, sensors=sensors, rngs=rngs)
 
 
-def leakage_curve(rig: CircuitParameters, volts: Iterable[float] = FIGURE_3_VOLTS) -> pd.DataFrame:
-    """Return settled velocity against throttle A's voltage at 4 V of motor, throttle B open: Figure 3.
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep of one throttle at 4 V of motor, the other throttle at rest.
+
+    Parameters
+    ----------
+    axis : str
+        Column of the throttle's voltage.
+    quantity : str
+        Channel that settles.
+    volts : tuple of float
+        The throttle's voltages [V].
+    circuit : callable
+        From the healthy circuit and a voltage [V] to the circuit.
+    defined : Mapping[float, float]
+        Published share of normal [%] at the voltages where the paper defines a level (errata E6, E7).
+    """
+
+    axis: str
+    quantity: str
+    volts: tuple[float, ...]
+    circuit: Callable[[CircuitParameters, float], CircuitParameters]
+    defined: Mapping[float, float]
+
+
+def _defined(volts: Sequence[float], scalars: Sequence[str]) -> Mapping[float, float]:
+    shares = [1.0, *(SCALARS[name].si_value for name in scalars)]
+    return MappingProxyType({v: 100.0 * share for v, share in zip(volts, shares, strict=True)})
+
+
+LEAKAGE_SWEEP = Sweep(
+    "throttle_a_v",
+    "velocity_m_s",
+    (10.0, 6.0, 4.0, 3.0, 2.5, 2.2, 2.0, 1.9, 1.75, 1.6, 1.5),
+    lambda rig, volts: throttled(rig, volts, 0.0),
+    _defined(VOLTS_A, ("minor_leakage_velocity", "major_leakage_velocity")),
+)
+"""Figure 3: velocity against throttle A, throttle B open."""
+
+FRICTION_SWEEP = Sweep(
+    "throttle_b_v",
+    "differential_pressure_pa",
+    (0.0, 1.0, 1.5, 2.0, 2.2, 2.3, 2.4, 2.5, 2.6, 2.8, 3.0),
+    lambda rig, volts: throttled(rig, 10.0, volts),
+    _defined(VOLTS_B, ("minor_friction_pressure", "major_friction_pressure")),
+)
+"""Figure 4: differential pressure against throttle B, throttle A shut; it saturates at the relief setting."""
+
+
+def throttle_curve(rig: CircuitParameters, sweep: Sweep) -> pd.DataFrame:
+    """Return what settles over a sweep of one throttle at 4 V of motor: Figures 3 and 4.
 
     Parameters
     ----------
     rig : CircuitParameters
         The healthy circuit.
-    volts : iterable of float
-        Throttle A's voltages [V].
+    sweep : Sweep
+        Which throttle, what settles, and at which voltages.
 
     Returns
     -------
     pandas.DataFrame
-        One row a voltage; the published share of normal where the paper defines a level there (errata E6, E7).
+        One row a voltage; the published share of normal where the paper defines a level there.
     """
-    defined = _defined(VOLTS_A, ("minor_leakage_velocity", "major_leakage_velocity"))
-    return _curve([(v, throttled(rig, v, 0.0)) for v in volts], rig, "throttle_a_v", "velocity_m_s", defined)
-
-
-def friction_curve(rig: CircuitParameters, volts: Iterable[float] = FIGURE_4_VOLTS) -> pd.DataFrame:
-    """Return settled differential pressure against throttle B's voltage at 4 V of motor, throttle A shut: Figure 4.
-
-    Parameters
-    ----------
-    rig : CircuitParameters
-        The healthy circuit.
-    volts : iterable of float
-        Throttle B's voltages [V].
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row a voltage, saturating at the relief setting; the published share of normal where the paper defines a
-        level there (errata E7).
-    """
-    defined = _defined(VOLTS_B, ("minor_friction_pressure", "major_friction_pressure"))
-    pressure = "differential_pressure_pa"
-    return _curve([(v, throttled(rig, 10.0, v)) for v in volts], rig, "throttle_b_v", pressure, defined)
+    circuits = [rig, *(sweep.circuit(rig, volts) for volts in sweep.volts)]
+    settled = round(1.0 / SAMPLE_TIME)
+    runs = steady_runs(circuits, rig.rated_speed)
+    normal, *values = (float(np.mean(run[sweep.quantity][-settled:])) for run in runs)
+    return pd.DataFrame(
+        {
+            sweep.axis: sweep.volts,
+            sweep.quantity: values,
+            "percent_of_normal": [100.0 * value / normal for value in values],
+            "published_percent": [sweep.defined.get(volts, float("nan")) for volts in sweep.volts],
+        }
+    )
 
 
 def leakage_points(
@@ -126,7 +166,7 @@ def leakage_points(
         The points.
     """
     a_volts = VOLTS_A[LEVELS.index(level)]
-    return steady_points(steady_run(throttled(rig, a_volts, v), rig.rated_speed, BENCH, rng) for v in volts)
+    return steady_points(steady_runs([throttled(rig, a_volts, v) for v in volts], rig.rated_speed, BENCH, rng))
 
 
 def friction_points(
@@ -151,7 +191,47 @@ def friction_points(
         The points.
     """
     p = throttled(rig, 10.0, VOLTS_B[LEVELS.index(level)])
-    return steady_points(steady_run(p, v * rig.motor_speed_per_volt, BENCH, rng) for v in volts)
+    runs = (steady_runs([p], v * rig.motor_speed_per_volt, BENCH, rng) for v in volts)
+    return steady_points(run for found in runs for run in found)
+
+
+def points_table(
+    rig: CircuitParameters,
+    rng: np.random.Generator,
+    points: Callable[[CircuitParameters, Level, np.random.Generator], SteadyPoints],
+) -> pd.DataFrame:
+    """Return the steady points that a refit uses: Figures 8 and 9.
+
+    Parameters
+    ----------
+    rig : CircuitParameters
+        The healthy circuit.
+    rng : numpy.random.Generator
+        Source of sensor noise, as that of the refit.
+    points : callable
+        `leakage_points` or `friction_points`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row a point: level, velocity, differential pressure, flow that is lost and force that friction takes.
+    """
+    rows: list[pd.DataFrame] = []
+    for level in LEVELS:
+        found = points(rig, level, rng)
+        lost = rig.pump_displacement * found.speed - rig.piston_area * found.velocity
+        rows.append(
+            pd.DataFrame(
+                {
+                    "level": level,
+                    "velocity_m_s": found.velocity,
+                    "differential_pressure_pa": found.pressure,
+                    "lost_flow_m3_s": lost,
+                    "friction_n": rig.piston_area * found.pressure,
+                }
+            )
+        )
+    return pd.concat(rows, ignore_index=True)
 
 
 def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> pd.DataFrame:
@@ -209,35 +289,6 @@ def friction_refit(rig: CircuitParameters, rng: np.random.Generator) -> pd.DataF
         printed = {name: cell(published, level, column) for name, column in zip(names, columns, strict=True)}
         rows += _refit_rows(level, fit_friction(friction_points(rig, level, rng), p), went_in, printed)
     return pd.DataFrame(rows)
-
-
-def _defined(volts: Sequence[float], scalars: Sequence[str]) -> Mapping[float, float]:
-    shares = [1.0, *(SCALARS[name].si_value for name in scalars)]
-    return MappingProxyType({v: 100.0 * share for v, share in zip(volts, shares, strict=True)})
-
-
-def _curve(
-    circuits: Sequence[tuple[float, CircuitParameters]],
-    rig: CircuitParameters,
-    axis: str,
-    quantity: str,
-    published: Mapping[float, float],
-) -> pd.DataFrame:
-    settled = round(1.0 / SAMPLE_TIME)
-
-    def last_second(p: CircuitParameters) -> float:
-        return float(np.mean(steady_run(p, rig.rated_speed)[quantity][-settled:]))
-
-    normal = last_second(rig)
-    values = [last_second(p) for _, p in circuits]
-    return pd.DataFrame(
-        {
-            axis: [volts for volts, _ in circuits],
-            quantity: values,
-            "percent_of_normal": [100.0 * value / normal for value in values],
-            "published_percent": [published.get(volts, float("nan")) for volts, _ in circuits],
-        }
-    )
 
 
 def _refit_rows(

@@ -30,14 +30,14 @@ from plant.sensors import BENCH
 from plant.signals import make_drive, prbs
 from plant.simulate import CIRCUIT, simulate
 
-MEANS_V = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
-"""Input means of Figure 5 [V]; with `AMPLITUDE_V` on top the last swings to 8 V, the motor's limit."""
-
 AMPLITUDE_V = 1.0
-"""Amplitude around them [V]."""
+"""Amplitude around the means [V]."""
 
-AMPLITUDES_V = (0.5, 1.0, 2.0, 3.0, 4.0)
-"""Input amplitudes of Figure 6 [V], without a mean."""
+MEAN_INPUTS = tuple((float(mean), AMPLITUDE_V) for mean in range(8))
+"""Means and amplitudes of Figure 5 [V]; the last swings to 8 V, the motor's limit."""
+
+AMPLITUDE_INPUTS = tuple((0.0, amplitude) for amplitude in (0.5, 1.0, 2.0, 3.0, 4.0))
+"""Means and amplitudes of Figure 6 [V]."""
 
 HOLD_TIME = 0.02
 """Time between chances to switch [s]; the signal has no power at 50 Hz."""
@@ -47,6 +47,9 @@ HIGHEST_FREQUENCY = 40.0
 
 TEST_TIME = 24.0
 """Least length of a test [s], all passes together."""
+
+LAG_TIME = 0.5
+"""Longest lag of the correlations that responses are taken from [s]."""
 
 CIRCUIT_FORMS = (
     Experiment("circuit", "flow", "steps", True, "The flow balance alone: condition unknown."),
@@ -58,7 +61,6 @@ CIRCUIT_FORMS = (
 _SAMPLE_TIME = 1e-3
 _LONGEST_PASS = 4.0
 _SETTLING = 0.3
-_LAGS = 500
 _STROKE_SHARE = 0.6
 
 
@@ -130,14 +132,10 @@ def prbs_around(
     return Record(_SAMPLE_TIME, kept)
 
 
-def etfe_over_means(
-    rig: CircuitParameters,
-    seed: int,
-    condition: str = "normal",
-    means_v: Iterable[float] = MEANS_V,
-    amplitude_v: float = AMPLITUDE_V,
+def frequency_responses(
+    rig: CircuitParameters, seed: int, inputs: Iterable[tuple[float, float]], condition: str = "normal"
 ) -> pd.DataFrame:
-    """Return empirical frequency responses at several input means: Figure 5.
+    """Return empirical frequency responses to random binary tests of several means and amplitudes: Figures 5 and 6.
 
     Parameters
     ----------
@@ -145,49 +143,38 @@ def etfe_over_means(
         The healthy circuit.
     seed : int
         Seed of the signals and of sensor noise.
+    inputs : iterable of tuple of float
+        Mean and amplitude of each input [V], as `MEAN_INPUTS` and `AMPLITUDE_INPUTS`.
     condition : str
         Condition name.
-    means_v : iterable of float
-        Input means [V].
-    amplitude_v : float
-        Amplitude around them [V].
 
     Returns
     -------
     pandas.DataFrame
         Columns mean_v, amplitude_v, frequency_hz, gain [m/s per rad/s], phase_deg, coherence.
     """
-    return _responses(rig, seed, condition, [(mean, amplitude_v) for mean in means_v])
+    p = in_condition(rig, condition)
 
+    def respond(volts: tuple[float, float]) -> pd.DataFrame:
+        mean, amplitude = volts
+        rng = stream(seed, "circuit response", condition, repr(mean), repr(amplitude))
+        test = prbs_around(p, mean, amplitude, rng)
+        found = etfe(
+            test["motor_speed_rad_s"], test["velocity_m_s"], _SAMPLE_TIME, lag_window=round(LAG_TIME / _SAMPLE_TIME)
+        )
+        inside = (found.frequency_hz > 0.0) & (found.frequency_hz <= HIGHEST_FREQUENCY)
+        return pd.DataFrame(
+            {
+                "mean_v": mean,
+                "amplitude_v": amplitude,
+                "frequency_hz": found.frequency_hz[inside],
+                "gain": np.abs(found.response[inside]),
+                "phase_deg": np.degrees(np.unwrap(np.angle(found.response[inside]))),
+                "coherence": found.coherence[inside],
+            }
+        )
 
-def etfe_over_amplitudes(
-    rig: CircuitParameters,
-    seed: int,
-    condition: str = "normal",
-    amplitudes_v: Iterable[float] = AMPLITUDES_V,
-    mean_v: float = 0.0,
-) -> pd.DataFrame:
-    """Return empirical frequency responses at several input amplitudes: Figure 6.
-
-    Parameters
-    ----------
-    rig : CircuitParameters
-        The healthy circuit.
-    seed : int
-        Seed of the signals and of sensor noise.
-    condition : str
-        Condition name.
-    amplitudes_v : iterable of float
-        Input amplitudes [V].
-    mean_v : float
-        Mean that they are around [V].
-
-    Returns
-    -------
-    pandas.DataFrame
-        As `etfe_over_means`.
-    """
-    return _responses(rig, seed, condition, [(mean_v, amplitude) for amplitude in amplitudes_v])
+    return pd.concat(side_by_side(respond, inputs), ignore_index=True)
 
 
 def low_frequency_gains(responses: pd.DataFrame, by: str) -> pd.Series:
@@ -196,7 +183,7 @@ def low_frequency_gains(responses: pd.DataFrame, by: str) -> pd.Series:
     Parameters
     ----------
     responses : pandas.DataFrame
-        Of `etfe_over_means` or `etfe_over_amplitudes`.
+        Of `frequency_responses`.
     by : str
         ``mean_v`` or ``amplitude_v``.
 
@@ -259,8 +246,8 @@ def bulk_modulus_on_circuit(
 ) -> pd.DataFrame:
     """Estimate bulk modulus on the circuit by three forms, in nine conditions, from every first guess: Figure 11.
 
-    The forms believe the lumped actuator, which has neither make-up nor drain and whose chambers keep their volume;
-    on the circuit they mostly read a few percent low, more than their intervals allow for.
+    The forms believe the lumped actuator. The flow form follows chambers and make-up of its own and finds the truth;
+    the pressure form, whose chambers keep their volume, reads a few percent low.
 
     Parameters
     ----------
@@ -291,31 +278,6 @@ def bulk_modulus_on_circuit(
         return [_estimated(record, known, experiment, name, start) for start in settings.starts]
 
     return pd.DataFrame([row for rows in side_by_side(estimate, product(experiments, conditions)) for row in rows])
-
-
-def _responses(
-    rig: CircuitParameters, seed: int, condition: str, inputs: Iterable[tuple[float, float]]
-) -> pd.DataFrame:
-    p = in_condition(rig, condition)
-
-    def respond(volts: tuple[float, float]) -> pd.DataFrame:
-        mean, amplitude = volts
-        rng = stream(seed, "circuit response", condition, repr(mean), repr(amplitude))
-        test = prbs_around(p, mean, amplitude, rng)
-        found = etfe(test["motor_speed_rad_s"], test["velocity_m_s"], _SAMPLE_TIME, lag_window=_LAGS)
-        inside = (found.frequency_hz > 0.0) & (found.frequency_hz <= HIGHEST_FREQUENCY)
-        return pd.DataFrame(
-            {
-                "mean_v": mean,
-                "amplitude_v": amplitude,
-                "frequency_hz": found.frequency_hz[inside],
-                "gain": np.abs(found.response[inside]),
-                "phase_deg": np.degrees(np.unwrap(np.angle(found.response[inside]))),
-                "coherence": found.coherence[inside],
-            }
-        )
-
-    return pd.concat(side_by_side(respond, inputs), ignore_index=True)
 
 
 def _believed(p: CircuitParameters) -> EhaParameters:

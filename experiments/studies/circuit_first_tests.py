@@ -8,10 +8,11 @@ import pandas as pd
 
 from experiments.published import SCALARS
 from experiments.streams import stream
-from experiments.studies.circuit_curves import steady_run
+from experiments.studies.circuit_curves import steady_runs
 from experiments.studies.circuit_experiments import (
-    etfe_over_amplitudes,
-    etfe_over_means,
+    AMPLITUDE_INPUTS,
+    MEAN_INPUTS,
+    frequency_responses,
     in_condition,
     low_frequency_gains,
 )
@@ -62,16 +63,17 @@ def first_tests(rig: CircuitParameters, seed: int, levels_v: Iterable[float] = L
     rows = [_row("dead time", f"{low:g} V to 4 V", dead_time(rig, low, 4.0, rng), "s") for low in (0.0, 2.0)]
     for volts in levels_v:
         speed = volts * rig.motor_speed_per_volt
-        settled = steady_run(replace(rig, stroke=ROOMY_STROKE), speed, BENCH, rng)["velocity_m_s"][-1000:]
+        (run,) = steady_runs([replace(rig, stroke=ROOMY_STROKE)], speed, BENCH, rng)
+        settled = run["velocity_m_s"][-1000:]
         implied = steady_state(speed, rig)[0] / speed
         rows.append(_row("steady-state gain", f"{volts:g} V", float(np.mean(settled)) / speed, "m/rad", implied))
-    means = etfe_over_means(rig, seed)
+    means = frequency_responses(rig, seed, MEAN_INPUTS)
     for mean in BREAK_MEANS_V:
         found = break_frequency(means[means["mean_v"] == mean])
         rows.append(_row("break frequency", f"mean {mean:g} V", found, "Hz", published=SCALARS["bandwidth"].si_value))
     gains = low_frequency_gains(means, "mean_v")
     rows.append(_row("gain spread", "means from 2 V", _spread(gains[gains.index >= 2.0]), "1"))
-    gains = low_frequency_gains(etfe_over_amplitudes(rig, seed), "amplitude_v")
+    gains = low_frequency_gains(frequency_responses(rig, seed, AMPLITUDE_INPUTS), "amplitude_v")
     rows.append(_row("gain spread", "amplitudes from 2 V", _spread(gains[gains.index >= 2.0]), "1"))
     rows.append(_row("gain spread", "amplitudes from 0.5 V", _spread(gains), "1"))
     for name in ("normal", "minor_leakage", "major_leakage"):
@@ -113,7 +115,7 @@ def break_frequency(response: pd.DataFrame) -> float:
 def dead_zone(p: CircuitParameters, rng: np.random.Generator, highest_v: float = 4.0) -> float:
     """Return the smallest voltage that moves the piston from rest, by halving.
 
-    It moves if, held as long as `experiments.studies.circuit_curves.steady_run` does, the encoder shows several times
+    It moves if, held as long as `experiments.studies.circuit_curves.steady_runs` does, the encoder shows several times
     the deflection at which the seals break loose.
 
     Parameters
@@ -137,8 +139,8 @@ def dead_zone(p: CircuitParameters, rng: np.random.Generator, highest_v: float =
     """
 
     def moves(volts: float) -> bool:
-        position = steady_run(p, volts * p.motor_speed_per_volt, BENCH, rng)["position_m"]
-        return bool(np.max(position) > _MOVED * p.presliding_displacement)
+        (run,) = steady_runs([p], volts * p.motor_speed_per_volt, BENCH, rng)
+        return bool(np.max(run["position_m"]) > _MOVED * p.presliding_displacement)
 
     if not moves(highest_v):
         raise HydrostateError(f"highest_v must move the piston, got {highest_v:g} V, which does not")

@@ -16,7 +16,7 @@ from plant.eha import EhaParameters
 from plant.rig import read_rig
 
 PUBLISHED = Path(__file__).resolve().parents[2] / "experiments" / "published"
-COMMANDS = ("study", "simulate", "estimate", "identify", "diagnose", "conditions")
+COMMANDS = ("study", "simulate", "estimate", "identify", "diagnose", "identifiability", "conditions")
 
 
 def invoke(*arguments: object) -> Result:
@@ -90,9 +90,13 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
         ),
         (
             ["estimate", "a.csv", "--form", "force"],
-            "--form must be one of auto, flow, acceleration, pressure, got 'force'",
+            "--form must be one of auto, flow, motion, acceleration, pressure, got 'force'",
         ),
-        (["estimate", "a.csv", "--method", "ukf9"], "--method must be one of ekf, filterpy-ekf, got 'ukf9'"),
+        (["estimate", "a.csv", "--method", "ukf9"], "filterpy-ekf, got 'ukf9'"),
+        (["estimate", "a.csv", "--states", "mass"], "--states must be one of leakage, friction, air"),
+        (["estimate", "a.csv", "--sensors", "position,force"], "--sensors must be one of position, velocity, dp"),
+        (["estimate", "a.csv", "--robust", "very"], "--robust must be one of none, huber, student-t, got 'very'"),
+        (["estimate", "a.csv", "--smooth", "--method", "ukf"], "--smooth smooths the ekf, got --method ukf"),
         (["estimate", "a.csv", "--condition", "bad"], "condition must be one of normal, minor_leakage"),
         (["diagnose", "a.csv", "--condition", "bad"], "condition must be one of normal, minor_leakage"),
         (["estimate", "a.csv", "--start", "-1"], "--start must be positive and finite, got -1 Pa"),
@@ -103,7 +107,7 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
         (["estimate", "a.csv", "--columns", "position_m=X:furlongs/h"], "position_m=X:furlongs/h"),
         (["diagnose", "a.csv", "--columns", "depth=X"], "channel 'depth' is unknown"),
         (["identify", "a.csv", "--filter-hz", "0"], "--filter-hz must be positive and finite, got 0 Hz"),
-        (["identify", "a.csv", "--order", "0"], "Invalid value for '--order'"),
+        (["identify", "a.csv", "--order", "0"], "--order must be a whole number from 1 on, or auto, got '0'"),
         (["simulate"], "hydrostate simulate: Missing option '--out' / '-o'."),
         (["simulate", "-o", "a.xls"], "--out must end in .csv"),
         (["simulate", "-o", "a.csv", "--plant", "toy"], "--plant must be one of reduced, lumped, circuit, got 'toy'"),

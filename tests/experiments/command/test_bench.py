@@ -40,6 +40,7 @@ def results(*arguments: object) -> list[dict[str, Any]]:
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [0.5e8, 4e8])
 def test_bulk_modulus_of_all_foreign_logs_comes_within_a_tenth(start: float, truth: dict[str, dict[str, str]]) -> None:
     errors: dict[str, float] = {}
@@ -62,6 +63,7 @@ def test_every_foreign_log_gets_its_class(option: tuple[str, ...], truth: dict[s
     assert found == {log: row["name"] for log, row in truth.items()}  # measured: all 18; 15 are asked for
 
 
+@pytest.mark.slow
 def test_estimates_that_the_model_does_not_explain_are_not_called_good(truth: dict[str, dict[str, str]]) -> None:
     for one in results("estimate", *truth, "--no-pressure"):
         off = (

@@ -4,7 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.studies.circuit_curves import friction_curve, friction_refit, leakage_curve, leakage_refit
+from experiments.studies.circuit_curves import (
+    FRICTION_SWEEP,
+    LEAKAGE_SWEEP,
+    friction_refit,
+    leakage_refit,
+    throttle_curve,
+)
 from plant.circuit_parameters import CircuitParameters
 
 RIG = CircuitParameters()
@@ -18,12 +24,12 @@ def assert_near_what_went_in(table: pd.DataFrame) -> None:
 
 @pytest.fixture(scope="module")
 def velocities() -> pd.DataFrame:
-    return leakage_curve(RIG, (10.0, 3.0, 2.0, 1.75, 1.5))
+    return throttle_curve(RIG, LEAKAGE_SWEEP)
 
 
 @pytest.fixture(scope="module")
 def pressures() -> pd.DataFrame:
-    return friction_curve(RIG, (0.0, 1.0, 2.0, 2.3, 2.5, 3.0))
+    return throttle_curve(RIG, FRICTION_SWEEP)
 
 
 def test_the_piston_slows_as_throttle_a_opens(velocities: pd.DataFrame) -> None:

@@ -5,11 +5,13 @@ import pandas as pd
 import pytest
 
 from experiments.studies.circuit_experiments import (
+    AMPLITUDE_INPUTS,
     AMPLITUDE_V,
     CIRCUIT_FORMS,
+    LAG_TIME,
+    TEST_TIME,
     bulk_modulus_on_circuit,
-    etfe_over_amplitudes,
-    etfe_over_means,
+    frequency_responses,
     low_frequency_gains,
     order_study,
     prbs_around,
@@ -19,6 +21,7 @@ from experiments.studies.settings import StudySettings, quick_settings
 from plant.circuit_parameters import CircuitParameters
 from plant.errors import DriveError
 from plant.signals import STEPS
+from plant.steady_state import steady_state
 
 RIG = CircuitParameters()
 SEED = 1
@@ -30,12 +33,12 @@ def spread(gains: pd.Series) -> float:
 
 @pytest.fixture(scope="module")
 def means() -> pd.DataFrame:
-    return etfe_over_means(RIG, SEED, means_v=(0.0, 2.0, 4.0, 7.0))
+    return frequency_responses(RIG, SEED, [(mean, AMPLITUDE_V) for mean in (0.0, 2.0, 4.0, 7.0)])
 
 
 @pytest.fixture(scope="module")
 def amplitudes() -> pd.DataFrame:
-    return etfe_over_amplitudes(RIG, SEED)
+    return frequency_responses(RIG, SEED, AMPLITUDE_INPUTS)
 
 
 @pytest.fixture(scope="module")
@@ -43,10 +46,28 @@ def estimates() -> pd.DataFrame:
     return bulk_modulus_on_circuit(RIG, quick_settings(SEED), ("minor_leakage", "minor_friction"))
 
 
-def test_low_frequency_gains_agree_within_a_seventh_over_means_above_the_dead_zone(means: pd.DataFrame) -> None:
-    gains = low_frequency_gains(means, "mean_v")
-    assert spread(gains[gains.index > 0.0]) < 1.15
-    assert gains[0.0] < gains[2.0] / 3.0
+@pytest.mark.parametrize("mean", [2.0, 4.0])
+def test_around_a_mean_the_low_frequency_gain_is_the_slope_of_the_steady_state(
+    means: pd.DataFrame, mean: float
+) -> None:
+    """A lag lowers the gain by the cosine of its phase; the coherence says how sure an estimate is.
+
+    At 7 V the response falls within the 2 Hz that the estimate averages over.
+    """
+    lowest = means[means["mean_v"] == mean].iloc[0]
+    above, below = (steady_state((mean + side) * RIG.motor_speed_per_volt, RIG)[0] for side in (1.0, -1.0))
+    slope = (above - below) / (2.0 * RIG.motor_speed_per_volt)
+    expected = slope * np.cos(np.radians(lowest["phase_deg"]))
+    windows = TEST_TIME / LAG_TIME
+    deviation = np.sqrt((1.0 - lowest["coherence"]) / (2.0 * lowest["coherence"] * windows))
+    assert abs(lowest["gain"] / expected - 1.0) < 3.0 * deviation
+
+
+def test_at_rest_the_dead_zone_takes_most_of_the_signal(means: pd.DataFrame) -> None:
+    at_rest = means[means["mean_v"] == 0.0].iloc[0]
+    dead = RIG.flow_bias + RIG.leakage_coefficient * RIG.friction_coulomb / RIG.piston_area
+    left = 1.0 - dead / (RIG.pump_displacement * AMPLITUDE_V * RIG.motor_speed_per_volt)
+    assert at_rest["gain"] < left * RIG.pump_displacement / RIG.piston_area
 
 
 def test_the_gain_at_ten_hertz_falls_as_the_mean_rises(means: pd.DataFrame) -> None:
@@ -60,22 +81,22 @@ def test_a_moving_piston_is_explained_by_its_input(means: pd.DataFrame) -> None:
     assert moving["coherence"].min() > 0.9
 
 
-def test_gains_agree_within_a_factor_of_two_from_2_v_of_amplitude_and_fall_apart_below_1_v(
-    amplitudes: pd.DataFrame,
-) -> None:
+def test_the_gain_rises_with_the_amplitude_towards_that_of_the_steady_state(amplitudes: pd.DataFrame) -> None:
     gains = low_frequency_gains(amplitudes, "amplitude_v")
-    assert spread(gains[gains.index >= 2.0]) < 2.0
-    assert gains[0.5] < gains[2.0] / 10.0
+    speeds = gains.index.to_numpy() * RIG.motor_speed_per_volt
+    shares = gains.to_numpy() * speeds / np.array([steady_state(speed, RIG)[0] for speed in speeds])
+    assert np.all(np.diff(shares) > 0.0)
+    assert np.all(shares < 1.0)
 
 
 def test_under_leakage_the_dead_zone_takes_every_amplitude_below_it() -> None:
-    table = etfe_over_amplitudes(RIG, SEED, "minor_leakage", (0.5, 1.0, 4.0))
+    table = frequency_responses(RIG, SEED, [(0.0, v) for v in (0.5, 1.0, 4.0)], "minor_leakage")
     gains = low_frequency_gains(table, "amplitude_v")
     assert (gains[gains.index < 1.2] < gains[4.0] / 50.0).all()
 
 
 def test_around_a_mean_the_amplitude_does_not_matter() -> None:
-    table = etfe_over_amplitudes(RIG, SEED, amplitudes_v=(0.5, 2.0), mean_v=4.0)
+    table = frequency_responses(RIG, SEED, [(4.0, 0.5), (4.0, 2.0)])
     assert spread(low_frequency_gains(table, "amplitude_v")) < 1.1
 
 
@@ -98,7 +119,6 @@ def test_the_circuit_is_second_order_with_minor_higher_dynamics() -> None:
     assert (table["suggested_order"] == 2).all()
     assert values[1] > floor[1]
     assert values[2] < floor[2]
-    assert values[2] < 0.02 * values[0]
 
 
 def test_the_validation_input_is_nine_steps_that_turn_round() -> None:
@@ -110,15 +130,20 @@ def test_the_validation_input_is_nine_steps_that_turn_round() -> None:
     assert np.all((np.abs(steps) >= 2.5) & (np.abs(steps) <= 4.0))
 
 
-@pytest.mark.parametrize(("form", "lowest", "highest"), [("flow", -5.0, 1.0), ("pressure", -7.0, -1.0)])
-def test_the_lumped_forms_agree_from_every_start_and_miss_by_a_few_percent(
-    estimates: pd.DataFrame, form: str, lowest: float, highest: float
-) -> None:
-    found = estimates[estimates["form"] == form]
+def test_the_flow_form_finds_it_from_every_start(estimates: pd.DataFrame) -> None:
+    found = estimates[estimates["form"] == "flow"]
     assert len(found) == 4
     assert (found["outcome"] == "ok").all()
-    assert found["error_percent"].between(lowest, highest).all()
+    assert (found["error_percent"].abs() < 0.5).all()
     assert found.groupby("condition")["value_pa"].agg(spread).max() < 1.001
+
+
+def test_the_pressure_form_says_how_little_it_knows_of_chambers_that_change(estimates: pd.DataFrame) -> None:
+    found = estimates[estimates["form"] == "pressure"]
+    assert len(found) == 4
+    assert (found["outcome"] == "ok").all()
+    assert found["covered"].all()
+    assert (found["error_percent"] < 0.0).all()
 
 
 def test_the_published_form_does_not_find_it_on_the_circuit(estimates: pd.DataFrame) -> None:

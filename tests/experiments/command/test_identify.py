@@ -1,0 +1,68 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from estimation.identification.linear_model import LinearModel
+from experiments.cli import app
+from experiments.command.identify import whole_or_auto
+from plant.errors import HydrostateError
+from plant.record import Record
+from plant.record_files import write_record
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Return two logs of one linear plant of order 2 that answers after three samples."""
+    folder = tmp_path_factory.mktemp("identify")
+    truth = LinearModel([0.0, 0.0, 0.0, 2e-5, 1e-5], [1.0, -1.5, 0.6], 1e-3, "u", "y", delay=3)
+    paths: list[Path] = []
+    for seed in (1, 2):
+        rng = np.random.default_rng(seed)
+        u = 100.0 * np.repeat(rng.choice([-1.0, 1.0], 300), 10)
+        y = truth.simulate(u)
+        channels = {"motor_speed_rad_s": u, "velocity_m_s": y + 0.02 * y.std() * rng.standard_normal(u.size)}
+        paths.append(folder / f"run{seed}.parquet")
+        write_record(Record(1e-3, channels), paths[-1])
+    return paths
+
+
+def test_order_delay_and_structure_are_found_and_the_library_is_written(logs: list[Path], tmp_path: Path) -> None:
+    out = tmp_path / "library.json"
+    arguments = ["--structure", "auto", "--order", "auto", "--delay", "auto", "--out", str(out)]
+    ran = CliRunner().invoke(app, ["identify", *map(str, logs), *arguments])
+    assert ran.exit_code == 0, ran.output
+    library = json.loads(out.read_text())
+    assert [entry["format_version"] for entry in library] == [1, 1]
+    for entry in library:
+        assert (len(entry["denominator"]), entry["delay"]["samples"]) == (3, 3)
+        model = LinearModel.from_dict(entry)
+        assert model.dc_gain == pytest.approx(3e-4, abs=4.0 * model.dc_gain_std)
+        assert entry["structure"] in {"output-error", "Box-Jenkins", "ARMAX"}
+        assert entry["poles"][0]["imag_std"] > 0.0
+
+
+@pytest.mark.parametrize("structure", ["arx", "armax", "box-jenkins"])
+def test_a_structure_can_be_named(structure: str, logs: list[Path]) -> None:
+    arguments = ["--structure", structure, "--delay", "3", "--json"]
+    ran = CliRunner().invoke(app, ["identify", str(logs[0]), *arguments])
+    (entry,) = json.loads(ran.stdout)
+    assert entry["structure"].lower() == structure
+    assert len(entry["noise_denominator"]) == 3
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--order", "0"), ("--order", "two"), ("--delay", "-1"), ("--structure", "oe")]
+)
+def test_what_is_not_known_is_refused_before_any_work(option: str, value: str, logs: list[Path]) -> None:
+    ran = CliRunner().invoke(app, ["identify", str(logs[0]), option, value])
+    assert ran.exit_code == 2
+    assert option in ran.output
+
+
+def test_auto_is_no_number() -> None:
+    assert whole_or_auto("--delay", "auto", 0) is None
+    with pytest.raises(HydrostateError, match="from 1 on, or auto, got '1"):
+        whole_or_auto("--order", "1.5", 1)
