@@ -2,8 +2,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 SEED ?= 2024
+WORKERS ?= 2
 
-.PHONY: study test test-slow lint benchmark clean
+.PHONY: study test test-slow lint benchmark peers clean
 
 # One stamp a kind of install: re-made when the pins or the project's metadata change.
 $(VENV)/.installed: pyproject.toml constraints.txt
@@ -20,10 +21,10 @@ study: $(VENV)/.installed
 	$(BIN)/hydrostate study --out results/nine-conditions --seed $(SEED)
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -q -m "not slow"
+	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m "not slow"
 
 test-slow: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -q -m slow
+	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m slow
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .
@@ -33,5 +34,21 @@ lint: $(VENV)/.installed-dev
 benchmark: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks
 
+# Each peer pins old versions of what the others need, so each has an environment of its own.
+.peers/.installed:
+	for peer in sippy pysib pysid jax-sysid jax; do $(PYTHON) -m venv .peers/$$peer || exit 1; done
+	.peers/sippy/bin/python -m pip install --quiet sippy-unipi==1.0.1
+	.peers/pysib/bin/python -m pip install --quiet pysib==0.2.5
+	.peers/pysid/bin/python -m pip install --quiet pysid==0.1.1 "scipy<1.15" "numpy<2.3" ipython
+	.peers/jax-sysid/bin/python -m pip install --quiet jax-sysid==1.1.0
+	.peers/jax/bin/python -m pip install --quiet jax
+	touch $@
+
+peers: $(VENV)/.installed-dev .peers/.installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
+	$(BIN)/python -m benchmarks identification_peers
+	$(BIN)/python -m benchmarks filter_speed --jax .peers/jax/bin/python
+	$(BIN)/python -m benchmarks circuit
+
 clean:
-	rm -rf $(VENV) results build dist *.egg-info
+	rm -rf $(VENV) .peers results build dist *.egg-info

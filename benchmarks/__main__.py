@@ -3,15 +3,30 @@
 import importlib
 import sys
 
-NAMES = ("bulk_modulus", "classification", "foreign_logs", "filter_speed", "circuit")
-"""Every benchmark, in the order of `make benchmark`."""
+NAMES = (
+    "bulk_modulus",
+    "classification",
+    "foreign_logs",
+    "filter_speed",
+    "many_filters",
+    "robustness",
+    "efficiency",
+    "convergence",
+    "identification",
+    "identification_tests",
+    "circuit",
+)
+"""Every benchmark that needs nothing but the project, in the order of `make benchmark`."""
+
+WITH_PEERS = ("identification_peers",)
+"""Those that need environments of other tools, which `make peers` sets up."""
 
 
 def main() -> int:
     """Run the named benchmark with its own arguments, or every one with its defaults."""
     if len(sys.argv) > 1:
-        if sys.argv[1] not in NAMES:
-            print(f"benchmark must be one of {', '.join(NAMES)}, got {sys.argv[1]!r}", file=sys.stderr)
+        if sys.argv[1] not in (*NAMES, *WITH_PEERS):
+            print(f"benchmark must be one of {', '.join((*NAMES, *WITH_PEERS))}, got {sys.argv[1]!r}", file=sys.stderr)
             return 2
         return int(importlib.import_module(f"benchmarks.{sys.argv[1]}").main(sys.argv[2:]) > 0)
     misses = 0

@@ -1,48 +1,248 @@
-"""Cost of one filter step: the compiled filter and filterpy's, interleaved in one process, CPU time, medians."""
+"""Cost of one filter step: compiled filters, alone and in lanes, beside the same filter in other tools.
 
+Every peer runs in the same run, interleaved with ours, CPU time, medians over the rounds. "Lanes" is the verb, from
+separate logs to separate results; "lanes, kernel" finds the logs side by side already, as the C++ kernel does. filterpy
+is written as its users write it (`benchmarks.peers.filterpy_user`), C++ and JAX as an expert would (`ekf_simd.cpp`,
+`jax_lanes.py`). JAX runs in the environment that ``--jax`` names (a Python that imports jax), since it is no dependency
+of this project.
+"""
+
+import argparse
+import subprocess
+import sys
+import tempfile
 import time
+from collections.abc import Callable, Iterator
+from dataclasses import astuple, replace
+from pathlib import Path
 from statistics import median
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimation.bulk_modulus import first_belief
-from estimation.eha import FORMS
+from benchmarks.peers import cpp_lanes, filterpy_user
+from benchmarks.peers.acceleration_form import coefficients
+from estimation.algebra import EKF
+from estimation.batch import filter_batch
+from estimation.compiled import constant_row
+from estimation.eha import ACCELERATION_FORM, FORMS
 from estimation.ekf import ekf
-from estimation.filter import Method
+from estimation.filter import FilterProblem
 from estimation.filterpy_bridge import filterpy_ekf
-from estimation.run import run_filter
+from estimation.first_belief import first_belief
+from estimation.kernels import LANES, compile_lanes
+from estimation.layout import halves_of, layout
+from estimation.run import filter_problem
+from plant.compiled.expression import ordered
 from plant.eha import EhaParameters
-from plant.record import Record
 from plant.sensors import BENCH
 from plant.signals import make_drive
-from plant.simulate import LUMPED, simulate
+from plant.simulate import REDUCED, simulate
 
-ROUNDS = 5
+Array = NDArray[np.float64]
+
+CHANNELS = ("position_m", "velocity_m_s")
+VARIANCES = {"position_m": 1e-12, "velocity_m_s": 1e-6}
+SAMPLE_TIME = 1e-4
+ROUNDS = 7
+WANTED = {"lanes ns": 13.0, "of C++": 1.6, "filterpy": 3500.0, "JAX": 5.0, "one ns": 35.0, "pressure filterpy": 2000.0}
+FLOPS_A_SECOND = 44.7e9
+"""Peak of one core as measured for the research behind the design; the share of it is an order of magnitude."""
 
 
-def step_cost(method: Method, record: Record, form: str) -> float:
-    """Return CPU nanoseconds a sample of one filter over a record."""
-    p, model = EhaParameters(), FORMS[form]
-    prior = first_belief(model, record, 1e8, 3e8)
-    channels = ("position_m", "velocity_m_s")
-    variances = {"position_m": 1e-12, "velocity_m_s": 1e-6}
+def cost(work: Callable[[], object], steps: int) -> float:
+    """Return CPU nanoseconds a filter-step."""
     begin = time.process_time_ns()
-    run_filter(method, model, prior, record, p, channels=channels, variances=variances)
-    return (time.process_time_ns() - begin) / len(record)
+    work()
+    return (time.process_time_ns() - begin) / steps
+
+
+def problems(form: str, count: int, samples: int) -> list[FilterProblem]:
+    """Return filters with noise of their own on one run of the reduced plant."""
+    p, rng = EhaParameters(), np.random.default_rng(1)
+    drive = make_drive("sine", samples * SAMPLE_TIME, SAMPLE_TIME, p, rng)
+    record = simulate(REDUCED, drive, SAMPLE_TIME, p, sensors=BENCH, rng=rng)
+    first = filter_problem(
+        FORMS[form], first_belief(FORMS[form], record, 1e8, 3e8), record, p, channels=CHANNELS, variances=VARIANCES
+    )
+    noise = np.sqrt([VARIANCES[channel] for channel in CHANNELS])
+    return [
+        replace(
+            first,
+            drives=first.drives.copy(),
+            measured=first.measured + noise * rng.normal(size=first.measured.shape),
+            every=len(first.measured),
+        )
+        for _ in range(count)
+    ]
+
+
+def scaled(problem: FilterProblem) -> tuple[tuple[float, float, float], Array, Array, Array]:
+    """Return steps, process noise, variances and measurements in the scaled units of the peers written by hand."""
+    scale = np.array([state.scale for state in ACCELERATION_FORM.states])
+    T = problem.sample_time
+    steps = (T, T * scale[1] / scale[0], T * scale[2] / scale[1])
+    return steps, problem.noise * T, problem.variances / scale[:2] ** 2, problem.measured / scale[:2]
+
+
+def kernel_work(batch: list[FilterProblem]) -> Callable[[], None]:
+    """Return our kernel's work alone, on logs that lie side by side already, as the C++ kernel's do."""
+    places, first = layout(EKF, batch[0].model, batch[0].channels), batch[0]
+    kernel = compile_lanes(EKF, first.model, first.channels)
+    blocks = [batch[i : i + LANES] for i in range(0, len(batch), LANES)]
+    data: list[tuple[Array, Array]] = []
+    for block in blocks:
+        full = [*block, *[block[0]] * (LANES - len(block))]
+        data.append((_lanes([one.drives for one in full]), _lanes([one.measured for one in full])))
+    start = np.repeat(places.start(first.mean, first.covariance), LANES)
+    rows = np.repeat(constant_row(first, {}), LANES)
+    track, logs = np.empty((1, first.model.width, LANES)), np.zeros((len(first.channels), LANES))
+
+    def work() -> None:
+        for drives, measured in data:
+            kernel(start.copy(), rows, drives, measured, 0, 1, first.every, track, track.copy(), logs)
+
+    return work
+
+
+def cpp_work(batch: list[FilterProblem]) -> tuple[Callable[[], None], Array] | None:
+    """Return the C++ kernel's work on all filters, and where its last block of means ends up."""
+    library = cpp_lanes.build()
+    if library is None:
+        return None
+    steps, noise, variances, _ = scaled(batch[0])
+    blocks = [batch[i : i + LANES] for i in range(0, len(batch), LANES)]
+    data: list[tuple[Array, Array]] = []
+    for block in blocks:
+        full = [*block, *[block[0]] * (LANES - len(block))]
+        data.append((_lanes([one.drives[:, 0] for one in full]), _lanes([scaled(one)[3] for one in full])))
+    first = np.zeros((16, LANES))
+    first[:4], first[4:14] = batch[0].mean[:, None], batch[0].covariance[np.triu_indices(4)][:, None]
+    state = first.copy()
+
+    def work() -> None:
+        for speed, measured in data:
+            state[:] = first
+            cpp_lanes.run(library, steps, coefficients(EhaParameters()), noise, variances, speed, measured, state)
+
+    return work, state
+
+
+def _lanes(arrays: list[Array]) -> Array:
+    return np.ascontiguousarray(np.stack(arrays, axis=-1))
+
+
+def jax_costs(python: str, batch: list[FilterProblem], rounds: int) -> tuple[list[float], Array]:
+    """Return JAX's CPU nanoseconds of every round, and its final means."""
+    steps, noise, variances, _ = scaled(batch[0])
+    with tempfile.TemporaryDirectory() as folder:
+        source, target = Path(folder) / "in.npz", Path(folder) / "out.npy"
+        np.savez(
+            source,
+            steps=[steps[1], steps[2], steps[0]],
+            coefficients=astuple(coefficients(EhaParameters())),
+            noise=noise,
+            variances=variances,
+            mean=_lanes([one.mean for one in batch]),
+            covariance=batch[0].covariance,
+            speed=_lanes([one.drives[:, 0] for one in batch]),
+            measured=_lanes([scaled(one)[3] for one in batch]),
+        )
+        script = str(Path(__file__).parent / "peers" / "jax_lanes.py")
+        done = subprocess.run(  # noqa: S603  the user names the interpreter, the script is ours
+            [python, script, str(source), str(target), str(rounds)], check=True, capture_output=True, text=True
+        )
+        return [float(line) for line in done.stdout.split()], np.load(target)
+
+
+def filterpy_work(problem: FilterProblem) -> Callable[[], None]:
+    """Return filterpy's work on one log."""
+    speed, measured = problem.drives[:, 0], problem.measured
+
+    def work() -> None:
+        kalman = filterpy_user.AccelerationFilter(EhaParameters(), problem.sample_time)
+        unit = np.array([state.scale for state in ACCELERATION_FORM.states])
+        unit[3] = 1.0
+        kalman.x, kalman.P = problem.mean * unit, problem.covariance * np.outer(unit, unit)
+        kalman.Q = np.diag(problem.noise * problem.sample_time * unit**2)
+        kalman.R = np.diag(problem.variances)
+        filterpy_user.run(kalman, speed, measured)
+
+    return work
+
+
+def acceleration_table(count: int, samples: int, jax: str | None) -> Iterator[tuple[str, float]]:
+    """Yield each engine's median cost on the acceleration form; the first is ours in lanes."""
+    batch = problems("acceleration", count, samples)
+    short = replace(batch[0], drives=batch[0].drives[:1000], measured=batch[0].measured[:1000])
+    long = problems("acceleration", 1, 100_000)[0]
+    kernel, cpp, slow = kernel_work(batch), cpp_work(batch), filterpy_work(short)
+    rounds: dict[str, list[float]] = {}
+    for _ in range(ROUNDS + 1):
+        rounds.setdefault("lanes", []).append(cost(lambda: list(filter_batch(batch)), count * samples))
+        rounds.setdefault("lanes, kernel", []).append(cost(kernel, -(-count // LANES) * LANES * samples))
+        if cpp is not None:
+            rounds.setdefault("C++ SIMD", []).append(cost(cpp[0], -(-count // LANES) * LANES * samples))
+        rounds.setdefault("one filter", []).append(cost(lambda: ekf(long), len(long.measured)))
+        rounds.setdefault("filterpy", []).append(cost(slow, 1000))
+        if jax is not None:
+            rounds.setdefault("JAX", []).extend(jax_costs(jax, batch, 1)[0])
+    for name, values in rounds.items():
+        yield name, median(values[1:])
+
+
+def pressure_table(count: int, samples: int) -> Iterator[tuple[str, float]]:
+    """Yield each engine's median cost on the pressure form; filterpy has our compiled step and Jacobian there."""
+    batch = problems("pressure", count, samples)
+    short = replace(batch[0], drives=batch[0].drives[:1000], measured=batch[0].measured[:1000])
+    long = problems("pressure", 1, 100_000)[0]
+    rounds: dict[str, list[float]] = {}
+    for _ in range(ROUNDS + 1):
+        rounds.setdefault("lanes", []).append(cost(lambda: list(filter_batch(batch)), count * samples))
+        rounds.setdefault("one filter", []).append(cost(lambda: ekf(long), len(long.measured)))
+        rounds.setdefault("filterpy", []).append(cost(lambda: filterpy_ekf(short), 1000))
+    for name, values in rounds.items():
+        yield name, median(values[1:])
+
+
+def operations() -> int:
+    """Return the floating-point operations of a filter-step of the acceleration form, constants hoisted."""
+    halves = halves_of(EKF, ACCELERATION_FORM, CHANNELS)
+    outputs = [*halves.predict.values(), *halves.update.values()]
+    return sum(item.operation in "+-*/" for item in ordered(outputs))
 
 
 def main(arguments: list[str]) -> int:
-    """Print the table."""
-    del arguments
-    rng = np.random.default_rng(1)
-    p = EhaParameters()
-    record = simulate(LUMPED, make_drive("steps", 10.0, 1e-4, p, rng), 1e-4, p, sensors=BENCH, rng=rng)
-    short = record.slice(0, 2000)
-    print(f"{'form':14s}{'compiled ns':>14s}{'filterpy ns':>14s}{'ratio':>10s}")
-    for form in FORMS:
-        for method in (ekf, filterpy_ekf):
-            step_cost(method, short, form)
-        pairs = [(step_cost(ekf, record, form), step_cost(filterpy_ekf, short, form)) for _ in range(ROUNDS)]
-        ours, theirs = median(a for a, _ in pairs), median(b for _, b in pairs)
-        print(f"{form:14s}{ours:14.1f}{theirs:14.0f}{theirs / ours:10.0f}")
-    return 0
+    """Print both tables and every ratio; return how many targets are missed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--filters", type=int, default=1000)
+    parser.add_argument("--samples", type=int, default=20_000)
+    parser.add_argument("--jax", help="a Python that imports jax")
+    options = parser.parse_args(arguments)
+    found = dict(acceleration_table(options.filters, options.samples, options.jax))
+    pressure = dict(pressure_table(options.filters, options.samples))
+    print(f"{'engine':14s}{'acceleration ns':>18s}{'pressure ns':>14s}")
+    for name in found:
+        print(f"{name:14s}{found[name]:18.1f}{pressure.get(name, float('nan')):14.1f}")
+    floor = 1e9 * operations() / FLOPS_A_SECOND
+    print(f"{operations()} operations a step: floor {floor:.1f} ns, share of it {100.0 * floor / found['lanes']:.0f} %")
+    measured = {
+        "lanes ns": found["lanes"],
+        "of C++": found["lanes, kernel"] / found["C++ SIMD"] if "C++ SIMD" in found else None,
+        "filterpy": found["filterpy"] / found["lanes"],
+        "JAX": found["JAX"] / found["lanes"] if "JAX" in found else None,
+        "one ns": found["one filter"],
+        "pressure filterpy": pressure["filterpy"] / pressure["lanes"],
+    }
+    missed = 0
+    for name, wanted in WANTED.items():
+        value, most = measured[name], name in ("lanes ns", "of C++", "one ns")
+        if value is None:
+            print(f"{name:20s} not measured: no compiler, or no --jax", file=sys.stderr)
+            continue
+        met = value <= wanted if most else value >= wanted
+        missed += not met
+        print(
+            f"{name:20s}{value:10.2f}  wanted: at {'most' if most else 'least'} {wanted:g}{'' if met else '  MISSED'}"
+        )
+    return missed

@@ -1,0 +1,58 @@
+"""The acceleration form in filterpy as its users write it: NumPy functions for model and Jacobian, one loop."""
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
+from numpy.typing import NDArray
+
+from plant.eha import EhaParameters
+
+Array = NDArray[np.float64]
+
+
+class AccelerationFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy carries no types
+    """filterpy's filter with the nonlinear prediction that it lacks (equations 7.1 to 7.4)."""
+
+    def __init__(self, p: EhaParameters, step: float) -> None:
+        super().__init__(dim_x=4, dim_z=2)
+        self.p, self.step = p, step
+
+    def predict_x(self, u: float = 0.0) -> None:
+        """Move the mean by one step at motor speed u."""
+        self.F, self.x = self.linearised(self.x, u)
+
+    def linearised(self, state: Array, u: float) -> tuple[Array, Array]:
+        """Return the Jacobian and the state one step later; bulk modulus in 1e8 Pa."""
+        p, T = self.p, self.step
+        x, v, a, b = state
+        A, L, M, a1, a2 = p.piston_area, p.leakage_coefficient, p.moving_mass, p.friction_quadratic, p.friction_linear
+        s = np.sign(v)
+        flow = np.sign(u) * max(abs(u) * p.pump_displacement - p.flow_bias, 0.0)
+        friction = (a1 * v * v + p.friction_coulomb) * s + a2 * v
+        gain = A * 1e8 / (M * p.chamber_volume)
+        pull = gain * (flow - A * v - L / A * (friction + M * a))
+        damping = (a2 + 2.0 * a1 * v * s) / M
+        F = np.array(
+            [
+                [1.0, T, 0.0, 0.0],
+                [0.0, 1.0, T, 0.0],
+                [
+                    0.0,
+                    T * (b * gain * (-A - L / A * (a2 + 2.0 * a1 * v * s)) - 2.0 * a1 * s / M * a),
+                    1.0 - T * (b * gain * L * M / A + damping),
+                    T * pull,
+                ],
+                [0.0, 0.0, 0.0, 1.0],
+            ]
+        )
+        return F, np.array([x + T * v, v + T * a, a + T * (b * pull - damping * a), b])
+
+
+H = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
+
+
+def run(kalman: AccelerationFilter, speed: Array, measured: Array) -> None:
+    """Filter a log: speed (n,), position and velocity (n, 2)."""
+    for k in range(len(speed)):
+        if k:
+            kalman.predict(u=speed[k - 1])
+        kalman.update(measured[k], HJacobian=lambda _: H, Hx=lambda x: H @ x)
