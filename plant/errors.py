@@ -19,3 +19,7 @@ class DriveError(HydrostateError):
 
 class LogWarning(UserWarning):
     """A log was accepted, with something the reader should know."""
+
+
+class CovarianceWarning(LogWarning):
+    """A model was fitted whose covariance says too little; what it predicts is not affected."""

@@ -11,7 +11,7 @@ from estimation.identification.covariances import covariances
 from estimation.identification.experiments import Experiments, data_hash
 from estimation.identification.linear_model import FloatArray, LinearModel
 from estimation.identification.residual_tests import ljung_box
-from plant.errors import HydrostateError, LogWarning
+from plant.errors import CovarianceWarning, HydrostateError, LogWarning
 
 CovarianceKind = Literal["white", "coloured", "auto"]
 
@@ -182,7 +182,7 @@ def _warn(model: LinearModel, determined: bool) -> None:
         warnings.warn(
             "the coefficients are not separately determined by this record (a pole cancels a zero, or the "
             "order is too high): the covariance is a lower bound",
-            LogWarning,
+            CovarianceWarning,
             stacklevel=4,
         )
     elif near:
@@ -190,6 +190,6 @@ def _warn(model: LinearModel, determined: bool) -> None:
         warnings.warn(
             f"the pole {pair.pole:.4g} and the zero {pair.zero:.4g} nearly cancel ({pair.deviations:.1f} standard "
             "deviations apart): intervals from the covariance cover too little; use dc_gain_interval, or a lower order",
-            LogWarning,
+            CovarianceWarning,
             stacklevel=4,
         )
