@@ -122,7 +122,7 @@ PRESSURE_FORM = ProcessModel(
     ),
     pressure_step,
     _observe_motion_and_pressure,
-    longest_step=2.5e-4,
+    longest_step=1e-4,
 )
 
 FORMS: Mapping[str, ProcessModel] = {model.name: model for model in (ACCELERATION_FORM, PRESSURE_FORM)}

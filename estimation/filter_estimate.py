@@ -113,6 +113,7 @@ def estimate_by_filter(
             noise=noise,
         )
         variances, noise = found.tuned.variances, found.tuned.noise
+        guess = float(found.prior.mean[model.index(BULK_MODULUS)])
 
     def filtered(first_guess: float) -> Estimate:
         prior = augmented_prior(wide, first_belief(model, record, first_guess, start_std), parameters)

@@ -12,13 +12,14 @@ from types import MappingProxyType
 import numpy as np
 
 from estimation.algebra import EKF
-from estimation.filter import FilterProblem
+from estimation.ekf import ekf
+from estimation.filter import FilterProblem, Trace
 from estimation.gaussian import Gaussian
 from estimation.layout import layout
 from estimation.likelihood import noise_coordinates
 from estimation.model import ProcessModel
 from estimation.run import filter_problem
-from estimation.scoring import Coordinate, maximise
+from estimation.scoring import Coordinate, Maximum, maximise
 from estimation.sensitivity import Sensitivity, innovation_sensitivity
 from plant.eha import EhaParameters
 from plant.record import Record
@@ -39,11 +40,17 @@ PUBLISHED_NOISE: Mapping[str, float] = MappingProxyType(
 PUBLISHED_VARIANCES: Mapping[str, float] = MappingProxyType({"position_m": 1e-12, "velocity_m_s": 1e-4})
 """R of equation 7.7, by channel [SI squared] (errata E11)."""
 
-SCREENED = ((1.0, 1.0), (1e-3, 1.0), (1e3, 1.0), (1.0, 1e-2), (1e-3, 1e-2))
-"""Factors on all process noise and on all sensor noise between which the search's start is chosen."""
+SCREENED = ((1e3, 1.0), (1.0, 1.0), (1e-1, 1.0), (1e-2, 1.0), (1e-3, 1.0), (1.0, 1e-2), (1e-3, 1e-2))
+"""Factors on all process noise and on all sensor noise between which the search's start is chosen, in this order."""
 
 SCREENED_SAMPLES = 20_000
 """Beginning of a longer log on which the starts are compared."""
+
+ROUNDS = 3
+"""How often at most the levels are tuned again, each time from where the constants were found."""
+
+MOVED = 1.0
+"""Move of a constant from one round to the next above which there is another [standard deviations]."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +92,9 @@ class Tuning:
         presumed, so a level near it is one of which the log says nothing.
     converged : bool
         Whether the search came to rest.
+    prior : Gaussian
+        The belief before the first sample from which all three fared as they did [SI]: as wide as the one given, its
+        constants where they were found.
     """
 
     tuned: NoiseSetting
@@ -92,6 +102,7 @@ class Tuning:
     published: NoiseSetting
     spread: Mapping[str, float]
     converged: bool
+    prior: Gaussian
 
 
 def tune(
@@ -106,9 +117,9 @@ def tune(
 ) -> Tuning:
     """Tune a filter's noise levels on a log.
 
-    A state without process noise, such as a constant bulk modulus, stays without. Where differential pressure is not
-    logged, begin from a prior near the answer: a filter that is certain of its motion locks onto a wrong bulk modulus
-    and finds that likely.
+    A state without process noise, such as a constant bulk modulus, stays without. A filter that is certain of its
+    motion and far from the answer locks onto a wrong one and finds that likely, so certainty grows by degrees, and
+    each filter begins where the likeliest before it found the constants.
 
     Parameters
     ----------
@@ -139,33 +150,57 @@ def tune(
     """
     problem = filter_problem(model, prior, record, parameters, channels=channels, variances=variances, noise=noise)
     coordinates = noise_coordinates(problem, record, parameters)
-    found = maximise(problem, _likeliest_start(problem, coordinates))
-    values = {coordinate.name: coordinate.guess for coordinate in found.coordinates}
-    levels = np.array([values.get(f"q{i}", 0.0) for i in range(model.width)])
-    sensors = np.array([values[f"r{c}"] for c in range(len(problem.channels))])
-    tuned = replace(problem, noise=levels, variances=sensors)
+    problem, guesses = _likeliest_start(problem, coordinates)
+    found = maximise(problem, guesses)
+    for _ in range(ROUNDS):
+        again, moved = _continued(problem, ekf(_tuned(problem, found)))
+        if moved <= MOVED:
+            break
+        problem, found = again, maximise(again, found.coordinates)
+    tuned = _tuned(problem, found)
     paper = _published(problem)
     deviations = np.sqrt(np.diag(np.linalg.inv(found.information)))
     shown = {f"q{i}": state.name for i, state in enumerate(model.states)}
     shown |= {f"r{c}": f"sensor {channel}" for c, channel in enumerate(problem.channels)}
+    physical, slope = model.to_si(problem.mean)
     return Tuning(
         tuned=_setting(tuned, found.sensitivity),
         given=_setting(problem, _filtered(problem)),
         published=_setting(paper, _filtered(paper)),
         spread=MappingProxyType({shown[c.name]: float(std) for c, std in zip(coordinates, deviations, strict=True)}),
         converged=found.converged,
+        prior=Gaussian(physical, problem.covariance * np.outer(slope, slope)),
     )
 
 
-def _likeliest_start(problem: FilterProblem, coordinates: Sequence[Coordinate]) -> list[Coordinate]:
-    """Return the coordinates with the guesses, among a few, that explain the beginning of the log best."""
+def _tuned(problem: FilterProblem, found: Maximum) -> FilterProblem:
+    values = {coordinate.name: coordinate.guess for coordinate in found.coordinates}
+    levels = np.array([values.get(f"q{i}", 0.0) for i in range(problem.model.width)])
+    return replace(problem, noise=levels, variances=np.array([values[f"r{c}"] for c in range(len(problem.channels))]))
+
+
+def _continued(problem: FilterProblem, trace: Trace) -> tuple[FilterProblem, float]:
+    """Return the task with its constants where a filter found them, and their greatest move in standard deviations."""
+    constant = problem.noise == 0.0
+    if not constant.any() or not np.all(np.isfinite(trace.mean)):
+        return problem, 0.0
+    std = np.sqrt(np.diag(trace.covariance)[constant])
+    moved = np.abs(trace.mean[constant] - problem.mean[constant]) / np.maximum(std, np.finfo(float).tiny)
+    return replace(problem, mean=np.where(constant, trace.mean, problem.mean)), float(np.max(moved))
+
+
+def _likeliest_start(
+    problem: FilterProblem, coordinates: Sequence[Coordinate]
+) -> tuple[FilterProblem, list[Coordinate]]:
+    """Return the task and the coordinates with the guesses, among a few, that explain the beginning of the log best."""
     short = replace(problem, measured=problem.measured[:SCREENED_SAMPLES], drives=problem.drives[:SCREENED_SAMPLES])
-    likelihoods: list[float] = []
-    for process, sensor in SCREENED:
-        tried = replace(short, noise=process * problem.noise, variances=sensor * problem.variances)
-        likelihoods.append(_filtered(tried).log_likelihood)
-    process, sensor = SCREENED[int(np.argmax(np.nan_to_num(likelihoods, nan=-np.inf)))]
-    return [
+    best, process, sensor = -np.inf, 1.0, 1.0
+    for on_process, on_sensor in SCREENED:
+        trace = ekf(replace(short, noise=on_process * problem.noise, variances=on_sensor * problem.variances))
+        if trace.log_likelihood > best:
+            best, process, sensor = trace.log_likelihood, on_process, on_sensor
+            short, _ = _continued(short, trace)
+    return replace(problem, mean=short.mean), [
         replace(c, guess=max(c.guess * (process if c.name[0] == "q" else sensor), 1.01 * c.floor)) for c in coordinates
     ]
 

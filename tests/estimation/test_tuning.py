@@ -72,8 +72,8 @@ def test_of_what_the_log_does_not_show_it_says_so(tuning: Tuning) -> None:
 
 
 def test_the_tuned_filter_is_what_the_result_says(tuning: Tuning, record: Record) -> None:
-    prior, found = first_belief(PRESSURE_FORM, record, 2e8, 1e8), tuning.tuned
-    again = run_filter(ekf, PRESSURE_FORM, prior, record, RIG, noise=found.noise, variances=found.variances)
+    found = tuning.tuned
+    again = run_filter(ekf, PRESSURE_FORM, tuning.prior, record, RIG, noise=found.noise, variances=found.variances)
     assert again.log_likelihood == pytest.approx(found.log_likelihood, rel=1e-9)
     assert again.nis == pytest.approx(dict(found.nis), rel=1e-9)
     assert again.settled(BULK_MODULUS)[0] == pytest.approx(RIG.bulk_modulus, rel=1e-3)
@@ -87,6 +87,17 @@ def test_long_and_fast_logs_are_tuned_alike(sample_time: float, duration: float)
     chance = (2.0 / len(log)) ** 0.5  # relative deviation of a variance from so many samples
     assert tuning.tuned.variances["velocity_m_s"] == pytest.approx(BENCH.velocity_noise**2, rel=4.0 * chance)
     assert all(nis == pytest.approx(1.0, abs=0.1) for nis in tuning.tuned.nis.values())
+
+
+@pytest.mark.parametrize("first_guess", [1e8, 3e8])
+def test_without_pressure_a_far_first_guess_is_tuned_to_the_same_levels(record: Record, first_guess: float) -> None:
+    """Certainty grows by degrees: at once, such a filter would lock onto a wrong bulk modulus."""
+    prior = first_belief(PRESSURE_FORM, record, first_guess, 3e8)
+    tuning = tune(record, PRESSURE_FORM, prior, RIG, channels=("position_m", "velocity_m_s"))
+    found = tuning.prior.mean[PRESSURE_FORM.index(BULK_MODULUS)]
+    assert found == pytest.approx(RIG.bulk_modulus, rel=1e-3)
+    assert tuning.tuned.variances["velocity_m_s"] == pytest.approx(BENCH.velocity_noise**2, rel=0.05)
+    assert tuning.tuned.noise["velocity_m_s"] < 1e-3 * PRESSURE_FORM.states[1].noise_density
 
 
 def test_a_coordinate_stays_above_its_floor_and_is_linear_where_it_is_told() -> None:
