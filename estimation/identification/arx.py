@@ -5,11 +5,10 @@ from scipy.signal import lfilter
 
 from estimation.identification.criterion import Structure, profile
 from estimation.identification.descent import stable
-from estimation.identification.experiments import Experiments, Signals
+from estimation.identification.experiments import Experiments, Signals, experiments_for
 from estimation.identification.fitted import CovarianceKind, fitted_model, scaled
 from estimation.identification.lags import lagged
 from estimation.identification.linear_model import FloatArray, LinearModel
-from estimation.identification.prediction_error import NoiseStructure, checked_data, noise_structure
 
 
 def fit_arx(
@@ -60,9 +59,8 @@ def fit_arx(
     >>> fit_arx(u, y, 0.01, n_numerator=2, n_denominator=1).denominator.round(6).tolist()
     [1.0, -0.7]
     """
-    form = noise_structure(n_numerator, n_denominator, delay, 0, 0, tied=True)
-    given = checked_data(u, y, form, input_name, output_name)
-    data, *scales = scaled(given)
+    form = Structure(n_numerator, n_denominator, delay)
+    data, *scales = scaled(experiments_for(u, y, form, input_name=input_name, output_name=output_name))
     rows, target, kept = [], [], np.zeros(data.u.size, dtype=bool)
     begin = max(n_denominator, delay + n_numerator - 1)
     for part in data.slices:
@@ -95,14 +93,14 @@ def fit_arx(
     )
 
 
-def _state_of(form: NoiseStructure, b: FloatArray, f: FloatArray, data: Experiments) -> FloatArray:
+def _state_of(form: Structure, b: FloatArray, f: FloatArray, data: Experiments) -> FloatArray:
     """Return the initial state with which a stable model simulates the first experiment best."""
     if not stable(f):
-        return np.zeros(form.system.n_states)
+        return np.zeros(form.n_states)
     part = data.slices[0]
-    only = Structure(1, f.size, form.system.n_states)
-    numerator = np.concatenate([np.zeros(form.system.delay), b])
+    only = Structure(1, f.size, form.n_states)
+    numerator = np.concatenate([np.zeros(form.delay), b])
     missing = data.y[part] - np.asarray(lfilter(numerator, np.concatenate([[1.0], f]), data.u[part]))
     used = data.used[part]
     theta = profile(only, np.concatenate([[1.0], f]), np.zeros(missing.size), np.where(used, missing, 0.0), used)[1]
-    return theta[1 + f.size : 1 + f.size + form.system.n_states]
+    return theta[1 + f.size : 1 + f.size + form.n_states]

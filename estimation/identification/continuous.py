@@ -6,16 +6,17 @@ from scipy.optimize import least_squares
 from estimation.identification.covariances import covariances
 from estimation.identification.criterion import Structure
 from estimation.identification.descent import stable
-from estimation.identification.experiments import Experiments, Signals, data_hash, experiments_from
+from estimation.identification.experiments import (
+    SAMPLES_PER_PARAMETER,
+    Experiments,
+    Signals,
+    data_hash,
+    experiments_from,
+)
 from estimation.identification.fitted import scaled
 from estimation.identification.held_input import held_input_model
 from estimation.identification.linear_model import FloatArray, LinearModel
-from estimation.identification.output_error import (
-    SAMPLES_PER_PARAMETER,
-    descend_from,
-    jacobian_and_residual,
-    minimise,
-)
+from estimation.identification.output_error import descend_from, jacobian_and_residual, minimise
 from plant.errors import HydrostateError
 
 DIFFERENCE = 1e-6

@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.identification.criterion import Structure
-from estimation.identification.experiments import Experiments, experiments_from
+from estimation.identification.experiments import Experiments, experiments_for
 from estimation.identification.fitted import scaled
-from estimation.identification.output_error import SAMPLES_PER_PARAMETER, descend_from
+from estimation.identification.output_error import descend_from
 from estimation.identification.pole_search import banded_spectra, search_poles
 from plant.errors import HydrostateError
 
@@ -48,15 +48,7 @@ def estimate_delay(u: ArrayLike, y: ArrayLike, *, n_numerator: int = 2, n_denomi
     if most < 0:
         raise HydrostateError(f"most must be at least 0, got {most}")
     form = Structure(n_numerator, n_denominator, most)
-    given = experiments_from(
-        u,
-        y,
-        input_name="input",
-        output_name="output",
-        n_excited=n_numerator + n_denominator,
-        n_wanted=SAMPLES_PER_PARAMETER * form.n_parameters,
-    )
-    data, _, _ = scaled(given)
+    data, _, _ = scaled(experiments_for(u, y, form, input_name="input", output_name="output"))
     data = Experiments(data.u, data.y, data.used & (np.arange(data.u.size) >= form.n_states), data.bounds)
     spectra = banded_spectra(data.bridged())
     coarse = [

@@ -8,6 +8,7 @@ from typing import TypeAlias, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimation.identification.criterion import Structure
 from estimation.identification.linear_model import FloatArray
 from plant.errors import HydrostateError
 
@@ -17,8 +18,8 @@ IntArray = NDArray[np.int64]
 Signals: TypeAlias = ArrayLike | Sequence[ArrayLike]
 """One signal, or a list of signals, one an experiment."""
 
-UNIFORM = 1e-3
-"""Share of a sample time by which stamps may stray from a uniform clock; logs round their stamps."""
+SAMPLES_PER_PARAMETER = 5
+"""Fewest output samples a free value; below that the covariance formula means nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,46 +119,46 @@ def experiments_from(
     return Experiments(np.concatenate(inputs), np.where(used, together, 0.0), used, bounds)
 
 
-def uniform_sample_time(time: ArrayLike) -> float:
-    """Return the sample time of a uniform clock, and refuse another.
+def experiments_for(
+    u: Signals, y: Signals, form: Structure, *, input_name: str, output_name: str, n_c: int = 0, n_d: int = 0
+) -> Experiments:
+    """Return checked experiments, long and lively enough for a fit of given orders.
 
     Parameters
     ----------
-    time : array_like, shape (n,)
-        Time stamps [s].
+    u, y : array_like of shape (n,), or a sequence of them
+        Input, no gaps; output, NaN where missing.
+    form : Structure
+        Orders of ``B/F``.
+    input_name, output_name : str
+        For messages.
+    n_c, n_d : int
+        Coefficients of the noise model behind their 1.
 
     Returns
     -------
-    float
-        Seconds between samples [s].
+    Experiments
+        One after the other.
 
     Raises
     ------
     HydrostateError
-        If there are fewer than two stamps, or they do not rise evenly.
-
-    Examples
-    --------
-    >>> round(uniform_sample_time([0.0, 0.1, 0.2]), 12)
-    0.1
+        If an order is too small, or as `experiments_from`.
     """
-    stamps = np.asarray(time, dtype=np.float64)
-    if stamps.ndim != 1 or stamps.size < 2 or not np.isfinite(stamps).all():
-        raise HydrostateError("a clock needs two finite time stamps or more, in one dimension")
-    sample_time = float((stamps[-1] - stamps[0]) / (stamps.size - 1))
-    steps = np.diff(stamps)
-    if not sample_time > 0.0 or np.abs(steps - sample_time).max() > 0.5 * sample_time + UNIFORM * sample_time:
-        worst = float(steps[np.argmax(np.abs(steps - sample_time))])
+    n_b, n_f = form.n_numerator, form.n_denominator
+    if min(n_b, n_f) < 1 or min(form.delay, n_c, n_d) < 0:
         raise HydrostateError(
-            f"time must be uniform, {sample_time:g} s a sample on average, got a step of {worst:g} s: resample first"
+            "n_numerator and n_denominator must be at least 1, delay, n_c and n_d at least 0, "
+            f"got {n_b}, {n_f}, {form.delay}, {n_c} and {n_d}"
         )
-    stray = float(np.abs(stamps - (stamps[0] + sample_time * np.arange(stamps.size))).max())
-    if stray > 0.5 * sample_time:
-        raise HydrostateError(
-            f"time must be uniform, {sample_time:g} s a sample on average, got stamps that stray by {stray:g} s: "
-            "resample first"
-        )
-    return sample_time
+    return experiments_from(
+        u,
+        y,
+        input_name=input_name,
+        output_name=output_name,
+        n_excited=n_b + n_f,
+        n_wanted=SAMPLES_PER_PARAMETER * (form.n_parameters + n_c + n_d),
+    )
 
 
 def data_hash(data: Experiments, sample_time: float) -> str:

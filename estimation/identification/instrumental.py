@@ -4,12 +4,12 @@ import numpy as np
 from scipy.signal import lfilter
 
 from estimation.identification.criterion import Structure, profile, stabilised
-from estimation.identification.experiments import Experiments, Signals, experiments_from
+from estimation.identification.experiments import Experiments, Signals, experiments_for
 from estimation.identification.fitted import CovarianceKind, fitted_model, scaled
 from estimation.identification.lags import lagged
 from estimation.identification.linear_model import FloatArray, LinearModel
 from estimation.identification.noise_model import noise_start
-from estimation.identification.output_error import SAMPLES_PER_PARAMETER, jacobian_and_residual
+from estimation.identification.output_error import jacobian_and_residual
 from estimation.identification.starts import least_squares_arx, reduced_high_order_arx
 from plant.errors import HydrostateError
 
@@ -66,20 +66,8 @@ def fit_instrumental(
     HydrostateError
         As `fit_output_error`, or if an output is missing.
     """
-    if min(n_numerator, n_denominator) < 1 or min(delay, n_c, n_d) < 0:
-        raise HydrostateError(
-            "n_numerator and n_denominator must be at least 1, delay, n_c and n_d at least 0, "
-            f"got {n_numerator}, {n_denominator}, {delay}, {n_c} and {n_d}"
-        )
     form = Structure(n_numerator, n_denominator, delay)
-    given = experiments_from(
-        u,
-        y,
-        input_name=input_name,
-        output_name=output_name,
-        n_excited=n_numerator + n_denominator,
-        n_wanted=SAMPLES_PER_PARAMETER * (form.n_parameters + n_c + n_d),
-    )
+    given = experiments_for(u, y, form, input_name=input_name, output_name=output_name, n_c=n_c, n_d=n_d)
     if not given.used.all():
         raise HydrostateError(
             f"instrumental variables need every sample of {output_name!r}, got {int((~given.used).sum())} missing: "

@@ -4,14 +4,10 @@ import numpy as np
 
 from estimation.identification.criterion import Structure, predict, sensitivities
 from estimation.identification.descent import descend
-from estimation.identification.experiments import Experiments, Signals, experiments_from
+from estimation.identification.experiments import Experiments, Signals, experiments_for
 from estimation.identification.fitted import CovarianceKind, fitted_model, scaled
 from estimation.identification.linear_model import FloatArray, LinearModel
 from estimation.identification.starts import starting_values
-from plant.errors import HydrostateError
-
-SAMPLES_PER_PARAMETER = 5
-"""Fewest output samples a free value; below that the covariance formula means nothing."""
 
 SCREENING_SAMPLES = 50_000
 """A longer record is screened on its liveliest section of about this length, and fitted whole afterwards."""
@@ -101,15 +97,8 @@ def fit_output_error(
     >>> fit_output_error(u, y, 0.01, n_numerator=2, n_denominator=1).denominator.round(6).tolist()
     [1.0, -0.7]
     """
-    structure = _checked_structure(n_numerator, n_denominator, delay, estimate_initial_state)
-    data = experiments_from(
-        u,
-        y,
-        input_name=input_name,
-        output_name=output_name,
-        n_excited=structure.n_numerator + structure.n_denominator,
-        n_wanted=SAMPLES_PER_PARAMETER * structure.n_parameters,
-    )
+    structure = Structure(n_numerator, n_denominator, delay, estimate_initial_state)
+    data = experiments_for(u, y, structure, input_name=input_name, output_name=output_name)
     data, *scales = scaled(data)
     theta = minimise(structure, data)
     jacobian, residual = jacobian_and_residual(structure, theta, data)
@@ -126,15 +115,6 @@ def fit_output_error(
         names=(input_name, output_name),
         structure="output-error",
     )
-
-
-def _checked_structure(n_numerator: int, n_denominator: int, delay: int, initial: bool) -> Structure:
-    if n_numerator < 1 or n_denominator < 1 or delay < 0:
-        raise HydrostateError(
-            "n_numerator and n_denominator must be at least 1 and delay at least 0, "
-            f"got {n_numerator}, {n_denominator} and {delay}"
-        )
-    return Structure(n_numerator, n_denominator, delay, initial)
 
 
 def minimise(structure: Structure, data: Experiments) -> FloatArray:

@@ -6,14 +6,13 @@ import numpy as np
 
 from estimation.identification.criterion import Structure
 from estimation.identification.descent import solve_damped, stable
-from estimation.identification.experiments import Experiments, Signals, experiments_from
+from estimation.identification.experiments import Experiments, Signals, experiments_for
 from estimation.identification.fitted import CovarianceKind, fitted_model, scaled
 from estimation.identification.linear_model import FloatArray, LinearModel
 from estimation.identification.noise_model import noise_start
 from estimation.identification.one_step import prediction_errors
-from estimation.identification.output_error import SAMPLES_PER_PARAMETER, jacobian_and_residual, minimise
+from estimation.identification.output_error import jacobian_and_residual, minimise
 from estimation.identification.starts import least_squares_arx
-from plant.errors import HydrostateError
 
 MOST_STEPS = 100
 """Evaluations from each start."""
@@ -111,9 +110,8 @@ def fit_armax(
     HydrostateError
         As `fit_output_error`.
     """
-    form = noise_structure(n_numerator, n_denominator, delay, n_c, 0, tied=True)
-    data = checked_data(u, y, form, input_name, output_name)
-    return _fit(form, data, sample_time, covariance, (input_name, output_name), "ARMAX")
+    form = NoiseStructure(Structure(n_numerator, n_denominator, delay), n_c, 0, tied=True)
+    return _fit(form, u, y, sample_time, covariance, (input_name, output_name), "ARMAX")
 
 
 def fit_box_jenkins(
@@ -157,79 +155,20 @@ def fit_box_jenkins(
     HydrostateError
         As `fit_output_error`.
     """
-    form = noise_structure(n_numerator, n_denominator, delay, n_c, n_d, tied=False)
-    data = checked_data(u, y, form, input_name, output_name)
-    return _fit(form, data, sample_time, covariance, (input_name, output_name), "Box-Jenkins")
-
-
-def noise_structure(n_b: int, n_f: int, delay: int, n_c: int, n_d: int, *, tied: bool) -> NoiseStructure:
-    """Return checked orders.
-
-    Parameters
-    ----------
-    n_b, n_f, delay, n_c, n_d : int
-        Coefficients of B, F, C and D, and dead time [samples].
-    tied : bool
-        Whether ``D = F``.
-
-    Returns
-    -------
-    NoiseStructure
-        The orders.
-
-    Raises
-    ------
-    HydrostateError
-        If one is too small.
-    """
-    if min(n_b, n_f) < 1 or min(delay, n_c, n_d) < 0:
-        raise HydrostateError(
-            "n_numerator and n_denominator must be at least 1, delay, n_c and n_d at least 0, "
-            f"got {n_b}, {n_f}, {delay}, {n_c} and {n_d}"
-        )
-    return NoiseStructure(Structure(n_b, n_f, delay), n_c, n_d, tied)
-
-
-def checked_data(u: Signals, y: Signals, form: NoiseStructure, input_name: str, output_name: str) -> Experiments:
-    """Return checked data for a fit of given orders.
-
-    Parameters
-    ----------
-    u, y : array_like of shape (n,), or a sequence of them
-        Input and output.
-    form : NoiseStructure
-        The orders.
-    input_name, output_name : str
-        For messages.
-
-    Returns
-    -------
-    Experiments
-        The data.
-
-    Raises
-    ------
-    HydrostateError
-        As `experiments_from`.
-    """
-    return experiments_from(
-        u,
-        y,
-        input_name=input_name,
-        output_name=output_name,
-        n_excited=form.system.n_numerator + form.system.n_denominator,
-        n_wanted=SAMPLES_PER_PARAMETER * (form.n_main + form.system.n_initial),
-    )
+    form = NoiseStructure(Structure(n_numerator, n_denominator, delay), n_c, n_d, tied=False)
+    return _fit(form, u, y, sample_time, covariance, (input_name, output_name), "Box-Jenkins")
 
 
 def _fit(
     form: NoiseStructure,
-    given: Experiments,
+    u: Signals,
+    y: Signals,
     sample_time: float,
     covariance: CovarianceKind,
     names: tuple[str, str],
     structure: str,
 ) -> LinearModel:
+    given = experiments_for(u, y, form.system, input_name=names[0], output_name=names[1], n_c=form.n_c, n_d=form.n_d)
     data, *scales = scaled(given)
     found = [_descend(form, start, data) for start in _starts(form, data)]
     _, theta, error, jacobian = min(found, key=lambda one: one[0])

@@ -1,10 +1,9 @@
 """Where an output-error fit begins: at several denominators, since one start often ends in a local minimum.
 
 From a random stable start Levenberg-Marquardt reaches the global minimum of a Table 6 model in 64 to 96 % of
-runs; the fourth of them at high noise has two basins side by side. The starts here are of four kinds:
-least-squares ARX, a high-order ARX model reduced through the Hankel matrix of its impulse response, refined
-instrumental variables (SRIV) from both, and a search over pole positions
-(`estimation.identification.pole_search`).
+runs; the fourth of them at high noise has two basins side by side. The starts here are of three kinds:
+least-squares ARX and a high-order ARX model reduced through the Hankel matrix of its impulse response, both refined on
+banded spectra, and a search over pole positions (`estimation.identification.pole_search`).
 """
 
 import numpy as np
@@ -25,9 +24,6 @@ IMPULSE_SAMPLES = 400
 
 TWINS = 1e-6
 """Denominators closer than this are one start."""
-
-SRIV_ITERATIONS = 4
-"""Refinements by instrumental variables; more did not change the basin in trials."""
 
 
 def starting_values(structure: Structure, data: Experiments, count: int) -> list[FloatArray]:
@@ -122,42 +118,3 @@ def reduced_high_order_arx(n_denominator: int, u: FloatArray, y: FloatArray) -> 
     left = np.linalg.svd(hankel(response[:half], response[half - 1 :]))[0][:, :n_denominator]
     shift = lstsq(left[:-1], left[1:])[0]
     return polynomial(np.linalg.eigvals(shift).astype(np.complex128))
-
-
-def refine_by_instruments(structure: Structure, denominator: FloatArray, u: FloatArray, y: FloatArray) -> FloatArray:
-    """Return the denominator refined by simplified refined instrumental variables (Young, 1976).
-
-    Each pass filters input and output by the present ``1/F`` and takes the noise-free simulated output as the
-    instrument, which removes the bias of ARX under output noise.
-
-    Parameters
-    ----------
-    structure : Structure
-        The model's structure.
-    denominator : ndarray, shape (n_denominator + 1,)
-        Where to begin; monic, stable.
-    u, y : ndarray, shape (n,)
-        Input and output, no gaps.
-
-    Returns
-    -------
-    ndarray, shape (n_denominator + 1,)
-        Monic, stable.
-    """
-    n_f = structure.n_denominator
-    begin = structure.n_states
-    f = denominator
-    numerator_columns = lagged(np.asarray(lfilter([1.0], f, u)), structure.delay, structure.n_numerator)
-    target = np.asarray(lfilter([1.0], f, y))
-    gram = numerator_columns.T @ numerator_columns
-    b = lstsq(gram, numerator_columns.T @ y)[0]
-    for _ in range(SRIV_ITERATIONS):
-        clean = lfilter([1.0], f, numerator_columns @ b)
-        instruments = np.concatenate([-lagged(np.asarray(clean), 1, n_f), numerator_columns], axis=1)[begin:]
-        regressors = np.concatenate([-lagged(target, 1, n_f), numerator_columns], axis=1)[begin:]
-        values = lstsq(instruments.T @ regressors, instruments.T @ target[begin:])[0]
-        f = stabilised(np.concatenate([[1.0], values[:n_f]]), u.size)
-        b = values[n_f:]
-        numerator_columns = lagged(np.asarray(lfilter([1.0], f, u)), structure.delay, structure.n_numerator)
-        target = np.asarray(lfilter([1.0], f, y))
-    return f

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from estimation.identification import LinearModel, fit_output_error
-from estimation.identification.experiments import experiments_from, uniform_sample_time
+from estimation.identification.experiments import experiments_from
 from plant.errors import HydrostateError
 
 NAMES = {"input_name": "u", "output_name": "y", "n_excited": 2, "n_wanted": 10}
@@ -42,25 +42,6 @@ def test_an_experiment_without_any_output_is_refused() -> None:
     u = np.arange(40.0) % 7
     with pytest.raises(HydrostateError, match="every experiment needs samples"):
         experiments_from([u, u], [u, np.full(40, np.nan)], **NAMES)
-
-
-@pytest.mark.parametrize(
-    ("time", "message"),
-    [
-        ([0.0, 0.1, 0.2, 0.35, 0.36], "step of"),
-        ([0.0, 0.1, 0.1 + 1e-12, 0.2, 0.3], "uniform"),
-        ([0.0, float("nan"), 0.2], "finite"),
-        ([0.0], "two finite"),
-        (list(np.cumsum(np.linspace(0.08, 0.12, 50))), "stray"),
-    ],
-)
-def test_a_clock_that_is_not_uniform_is_refused(time: list[float], message: str) -> None:
-    with pytest.raises(HydrostateError, match=message):
-        uniform_sample_time(time)
-
-
-def test_stamps_that_are_rounded_are_a_uniform_clock() -> None:
-    assert uniform_sample_time(np.round(1e-3 * np.arange(1000) / 0.997, 4)) == pytest.approx(1e-3 / 0.997, rel=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(4))

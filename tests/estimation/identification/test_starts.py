@@ -4,12 +4,7 @@ from estimation.identification import LinearModel
 from estimation.identification.criterion import Structure, is_stable
 from estimation.identification.experiments import Experiments
 from estimation.identification.lags import lagged
-from estimation.identification.starts import (
-    least_squares_arx,
-    reduced_high_order_arx,
-    refine_by_instruments,
-    starting_values,
-)
+from estimation.identification.starts import least_squares_arx, reduced_high_order_arx, starting_values
 
 
 def noisy_record(model: LinearModel, share: float) -> tuple[np.ndarray, np.ndarray]:
@@ -29,15 +24,6 @@ def test_arx_is_exact_without_noise(plant_30hz: LinearModel) -> None:
     b, f = least_squares_arx(2, 2, 1, u, plant_30hz.simulate(u))
     np.testing.assert_allclose(b, plant_30hz.numerator, atol=1e-9)
     np.testing.assert_allclose(f, plant_30hz.denominator, rtol=1e-9)
-
-
-def test_instruments_remove_the_bias_of_arx(plant_30hz: LinearModel) -> None:
-    u, y = noisy_record(plant_30hz, 0.2)
-    structure = Structure(2, 2, 1)
-    biased = least_squares_arx(2, 2, 1, u, y)[1]
-    refined = refine_by_instruments(structure, biased, u, y)
-    error = np.abs(refined - plant_30hz.denominator).max()
-    assert error < 0.1 * np.abs(biased - plant_30hz.denominator).max()
 
 
 def test_a_reduced_long_model_has_the_plant_s_poles(plant_30hz: LinearModel) -> None:
