@@ -8,18 +8,17 @@ from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from secrets import token_hex
+from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
 
 from experiments.figures import FIGURES, draw
 from experiments.figures.style import styled
+from experiments.figures.tables import PNG_DOTS_PER_INCH
 from experiments.report.page import render_report
 from experiments.study import StudyResult
 from plant.errors import HydrostateError
-
-PNG_DOTS_PER_INCH = 150
-"""Resolution of the PNG figures; 1500 pixels wide."""
 
 SERIES_FORMAT = "%.9g"
 """Digits of the curves; tables keep all."""
@@ -54,8 +53,13 @@ def write_study(result: StudyResult, folder: Path) -> Path:
     return folder / "report.html"
 
 
-def write_tables(tables: Mapping[str, pd.DataFrame], manifest: Mapping[str, Any], folder: Path) -> Path:
-    """Write a study that is tables alone, as one folder, replacing an earlier study's.
+def write_tables(
+    tables: Mapping[str, pd.DataFrame],
+    manifest: Mapping[str, Any],
+    folder: Path,
+    files: Mapping[str, bytes] = MappingProxyType({}),
+) -> Path:
+    """Write a study's tables, and what was made of them, as one folder, replacing an earlier study's.
 
     Parameters
     ----------
@@ -65,6 +69,8 @@ def write_tables(tables: Mapping[str, pd.DataFrame], manifest: Mapping[str, Any]
         What it takes to run it again; its ``study`` names it.
     folder : Path
         The folder; new, empty, or an earlier study's result.
+    files : Mapping[str, bytes]
+        Report, figures and others, by their path within the folder.
 
     Returns
     -------
@@ -80,6 +86,10 @@ def write_tables(tables: Mapping[str, pd.DataFrame], manifest: Mapping[str, Any]
     def fill(temporary: Path) -> None:
         (temporary / "tables").mkdir(parents=True)
         _write_frames(temporary / "tables", tables)
+        for name, content in files.items():
+            path = temporary / name
+            path.parent.mkdir(exist_ok=True)
+            path.write_bytes(content)
         _write_manifest(temporary, manifest)
 
     _write_whole(folder, fill)

@@ -1,9 +1,7 @@
 """What `hydrostate circuit` does: the paper's experiments on the circuit plant, as a folder with a report."""
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from io import BytesIO
 from pathlib import Path
 
 import pandas as pd
@@ -11,9 +9,9 @@ from rich.console import Console
 from rich.progress import track
 
 from experiments.figures.circuit import CIRCUIT_FIGURES
-from experiments.figures.style import styled
+from experiments.figures.tables import figure_files
 from experiments.report.circuit import render_circuit_report
-from experiments.store import PNG_DOTS_PER_INCH, check_target, write_tables
+from experiments.store import check_target, write_tables
 from experiments.streams import stream
 from experiments.studies.circuit_curves import (
     FRICTION_SWEEP,
@@ -97,44 +95,7 @@ def circuit_command(out: Path, seed: int, console: Console) -> Path:
     studies = circuit_studies(rig, seed)
     tables = {name: run() for name, run in track(studies.items(), "experiments on the circuit", console=console)}
     manifest = {"study": "circuit", "settings": {"seed": seed}, "parameters": asdict(rig)}
-    written = write_tables(tables, manifest, out)
-    figures = draw_figures(tables)
-    pages = {"report.html": render_circuit_report(tables, figures["svg"], seed).encode()}
-    pages |= {f"figures/{name}.{kind}": image for kind, images in figures.items() for name, image in images.items()}
-    _add_files(written, pages)
-    return written
-
-
-def draw_figures(tables: Mapping[str, pd.DataFrame]) -> Mapping[str, Mapping[str, bytes]]:
-    """Return the circuit's figures as files.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        What the experiments found.
-
-    Returns
-    -------
-    Mapping[str, Mapping[str, bytes]]
-        By kind, ``svg`` and ``png``, then by the names of `CIRCUIT_FIGURES`.
-    """
-    files: dict[str, dict[str, bytes]] = {"svg": {}, "png": {}}
-    with styled():
-        for name, kind in CIRCUIT_FIGURES.items():
-            figure = kind.draw(tables)
-            vector, pixels = BytesIO(), BytesIO()
-            figure.savefig(vector, format="svg", metadata={"Date": None})
-            figure.savefig(pixels, format="png", dpi=PNG_DOTS_PER_INCH)
-            files["svg"][name], files["png"][name] = vector.getvalue(), pixels.getvalue()
-    return files
-
-
-def _add_files(manifest: Path, files: Mapping[str, bytes]) -> None:
-    """Write files beside a manifest that lists them; listed first, so that an unfinished folder is still a study's."""
-    noted = json.loads(manifest.read_text(encoding="utf-8"))
-    noted["files"] = sorted({*noted["files"], *files})
-    manifest.write_text(json.dumps(noted, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    for name, content in files.items():
-        path = manifest.parent / name
-        path.parent.mkdir(exist_ok=True)
-        path.write_bytes(content)
+    figures = figure_files(CIRCUIT_FIGURES, tables)
+    files = {"report.html": render_circuit_report(tables, figures["svg"], seed).encode()}
+    files |= {f"figures/{name}.{kind}": image for kind, images in figures.items() for name, image in images.items()}
+    return write_tables(tables, manifest, out, files)

@@ -4,7 +4,6 @@ The tables go by the names that `hydrostate circuit` writes them under.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 
 import matplotlib as mpl
@@ -16,34 +15,14 @@ from matplotlib.figure import Figure
 from experiments.figures.circuit_estimates import draw_bulk_modulus
 from experiments.figures.identification import LEVEL_COLOURS, LEVEL_WORDS, draw_order
 from experiments.figures.style import BLACK, BLUE, GREY, ORANGE, Margins, panels
+from experiments.figures.tables import TableFigure, Tables
 from experiments.published import SCALARS
-
-Tables = Mapping[str, pd.DataFrame]
 
 MILLI, MEGA = 1e3, 1e-6
 LITRES_A_MINUTE = 6e4
 """Litres a minute in a cubic metre a second."""
 
 MARKERS = MappingProxyType({"none": "o", "minor": "s", "major": "^"})
-
-
-@dataclass(frozen=True)
-class CircuitFigure:
-    """One of the circuit's figures.
-
-    Parameters
-    ----------
-    heading : str
-        What the paper's figure shows.
-    caption : str
-        What to look at.
-    draw : callable
-        From the tables to the figure.
-    """
-
-    heading: str
-    caption: str
-    draw: Callable[[Tables], Figure]
 
 
 def draw_throttles(tables: Tables) -> Figure:
@@ -255,40 +234,40 @@ def draw_validation_input(tables: Tables) -> Figure:
     return figure
 
 
-CIRCUIT_FIGURES: Mapping[str, CircuitFigure] = MappingProxyType(
+CIRCUIT_FIGURES: Mapping[str, TableFigure] = MappingProxyType(
     {
-        "figures_3_and_4": CircuitFigure(
+        "figures_3_and_4": TableFigure(
             "Figures 3 and 4: the throttles",
             "Diamonds are the published definitions of minor and major. The tables that the circuit is calibrated by "
             "contradict them (errata E7); pressure saturates at the relief valve, as the paper's does.",
             draw_throttles,
         ),
-        "figures_5_and_6": CircuitFigure(
+        "figures_5_and_6": TableFigure(
             "Figures 5 and 6: frequency responses",
             "Moving, the actuator is linear in the mean; at rest, below 1 V, dead zone and seals take the signal. "
             "Phase is left out where coherence is low. The paper prints curves and no numbers but the bandwidth.",
             draw_responses,
         ),
-        "figure_7": CircuitFigure(
+        "figure_7": TableFigure(
             "Figure 7: model order",
             "Filled values stand above what noise alone would give. At 1 V around 2 V the impulse response (left) "
             "drowns in the encoder's noise, the projected data (right) do not. The paper reads second order "
             "with minor higher dynamics from its own.",
             draw_singular_values,
         ),
-        "figures_8_and_9": CircuitFigure(
+        "figures_8_and_9": TableFigure(
             "Figures 8 and 9: leakage and friction",
             "Points as the rig's sensors would give them; lines, the laws refitted from them by equations 5.7, 5.8 and "
             "5.11. Dotted: Tables 3 and 4. In the steady state the drain counts whole (errata E17).",
             draw_refits,
         ),
-        "figure_10": CircuitFigure(
+        "figure_10": TableFigure(
             "Figure 10: validation input",
             "Random magnitudes between the dashed lines, of alternating direction, so that the piston stays in its "
             "stroke.",
             draw_validation_input,
         ),
-        "figure_11": CircuitFigure(
+        "figure_11": TableFigure(
             "Figure 11: bulk modulus",
             "One dot a first guess, with its 95 % interval; dashed, the truth, 2.07e8 Pa, which is also what the paper "
             "reports. All forms believe the lumped actuator. The third panel is the published method (errata E9, E13). "

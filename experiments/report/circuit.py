@@ -1,14 +1,12 @@
 """The circuit's report: one HTML file that needs nothing beside it."""
 
-from base64 import b64encode
 from collections.abc import Callable, Mapping
 
 import pandas as pd
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from experiments.figures.circuit import CIRCUIT_FIGURES
-from experiments.report.errata import linked, linked_errata
+from experiments.report.sectioned import Section, render_sections
 from experiments.report.tables import MISSING, Cell, Column, html_table, number
 
 TABLES_OF: Mapping[str, tuple[str, ...]] = {
@@ -16,6 +14,14 @@ TABLES_OF: Mapping[str, tuple[str, ...]] = {
     "figures_8_and_9": ("figure 8 leakage flow refitted", "figure 9 friction refitted"),
 }
 """Which tables stand under which figure."""
+
+INTRODUCTION = (
+    "The circuit plant is the whole actuator of the paper's Figures 1 and 2: two chambers, gear pump, accumulator, "
+    "check valves, relief valve, two throttles and seals that give before they slide. No filter here assumes it. "
+    "Below, the experiments of Figures 3 to 11 are repeated on it, seen through the rig's sensors, each beside its published "
+    "counterpart where one is printed."
+)
+"""The page's first paragraph."""
 
 
 def render_circuit_report(tables: Mapping[str, pd.DataFrame], figures: Mapping[str, bytes], seed: int) -> str:
@@ -35,26 +41,6 @@ def render_circuit_report(tables: Mapping[str, pd.DataFrame], figures: Mapping[s
     str
         The page; it loads nothing.
     """
-    environment = Environment(
-        loader=PackageLoader("experiments.report", "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"linked": linked}
-    sections = [
-        {
-            "name": name,
-            "heading": kind.heading,
-            "image": Markup('<img alt="{}" src="data:image/svg+xml;base64,{}">').format(
-                kind.heading, b64encode(figures[name]).decode("ascii")
-            ),
-            "caption": linked(kind.caption),
-            "tables": [_TABLES[table](tables[table]) for table in TABLES_OF.get(name, ())],
-        }
-        for name, kind in CIRCUIT_FIGURES.items()
-    ]
     first = html_table(
         tables["section 4 first tests"],
         (
@@ -67,11 +53,22 @@ def render_circuit_report(tables: Mapping[str, pd.DataFrame], figures: Mapping[s
         ),
         "Section 4's first tests, as a user of the rig would run them.",
     )
-    page = environment.get_template("circuit.html").render(sections=sections, first_tests=first, seed=seed)
-    errata = Markup("").join(
-        Markup('<dt id="{}">{}</dt><dd>{}</dd>').format(key, key, words) for key, words in linked_errata(page).items()
+    sections = [
+        Section("first-tests", "First tests", tables=(first,)),
+        *(
+            Section(
+                name,
+                kind.heading,
+                figure=figures[name],
+                caption=kind.caption,
+                tables=[_TABLES[table](tables[table]) for table in TABLES_OF.get(name, ())],
+            )
+            for name, kind in CIRCUIT_FIGURES.items()
+        ),
+    ]
+    return render_sections(
+        "The paper's experiments on the circuit plant", f"circuit plant, seed {seed}", INTRODUCTION, sections
     )
-    return page.replace("<!-- errata -->", str(errata))
 
 
 def _percent_table(

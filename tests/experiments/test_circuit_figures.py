@@ -8,9 +8,10 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from experiments.command.circuit import circuit_studies, draw_figures
+from experiments.command.circuit import circuit_studies
 from experiments.figures.circuit import CIRCUIT_FIGURES
 from experiments.figures.style import styled
+from experiments.figures.tables import figure_files
 from experiments.report.circuit import render_circuit_report
 from plant.circuit_parameters import CircuitParameters
 
@@ -99,7 +100,7 @@ def test_what_is_not_observable_is_said(drawn: Mapping[str, Figure]) -> None:
 
 
 def test_the_page_needs_nothing_beside_it_and_shows_every_figure(tables: Mapping[str, pd.DataFrame]) -> None:
-    figures = draw_figures(tables)
+    figures = figure_files(CIRCUIT_FIGURES, tables)
     page = render_circuit_report(tables, figures["svg"], 7)
     assert page.count("data:image/svg+xml;base64,") == len(CIRCUIT_FIGURES)
     assert not re.search(r"""(src|href)=["'](?!data:|#)""", page)
