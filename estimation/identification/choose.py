@@ -124,7 +124,7 @@ def choose_model(
         compare_structures(inputs, outputs, sample_time, form, structures) if len(structures) > 1 else pd.DataFrame()
     )
     best = str(compared["fit_percent"].idxmax()) if len(structures) > 1 else structures[0]
-    return Choice(_FITS[best](inputs, outputs, sample_time, form), table, compared)
+    return Choice(fit_structure(best, inputs, outputs, sample_time, form), table, compared)
 
 
 def compare_structures(
@@ -153,7 +153,7 @@ def compare_structures(
     for name in structures:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", LogWarning)
-            model = _FITS[name](*fitted, sample_time, form)
+            model = fit_structure(name, *fitted, sample_time, form)
         if not model.is_stable:
             rows[name] = {"fit_percent": float("-inf"), "one_step_percent": float("nan")}
             continue
@@ -195,31 +195,36 @@ def split_record(
     return ([inputs[0][:cut]], [outputs[0][:cut]]), ([inputs[0][cut:]], [outputs[0][cut:]])
 
 
-def _arx(u: Signals, y: Signals, sample_time: float, form: dict[str, Any]) -> LinearModel:
-    return fit_arx(u, y, sample_time, **form)
+def fit_structure(name: str, u: Signals, y: Signals, sample_time: float, form: dict[str, Any]) -> LinearModel:
+    """Fit a structure by its name.
 
+    Parameters
+    ----------
+    name : str
+        One of `STRUCTURES`, or SRIV.
+    u, y : array_like of shape (n,), or a sequence of them
+        Input and output.
+    sample_time : float
+        Seconds between samples [s].
+    form : dict
+        Sizes and names, as the fits take them; a noise model has as many coefficients as F, `NOISE_ORDER` at most.
 
-def _armax(u: Signals, y: Signals, sample_time: float, form: dict[str, Any]) -> LinearModel:
-    return fit_armax(u, y, sample_time, n_c=min(form["n_denominator"], NOISE_ORDER), **form)
-
-
-def _output_error(u: Signals, y: Signals, sample_time: float, form: dict[str, Any]) -> LinearModel:
-    return fit_output_error(u, y, sample_time, **form)
-
-
-def _box_jenkins(u: Signals, y: Signals, sample_time: float, form: dict[str, Any]) -> LinearModel:
+    Returns
+    -------
+    LinearModel
+        The model.
+    """
     noise = min(form["n_denominator"], NOISE_ORDER)
-    return fit_box_jenkins(u, y, sample_time, n_c=noise, n_d=noise, **form)
+    return _FITS[name](u, y, sample_time, **form, **dict.fromkeys(_NOISE.get(name, ()), noise))
 
 
-def _instrumental(u: Signals, y: Signals, sample_time: float, form: dict[str, Any]) -> LinearModel:
-    return fit_instrumental(u, y, sample_time, **form)
-
-
-_FITS: dict[str, Callable[[Signals, Signals, float, dict[str, Any]], LinearModel]] = {
-    "ARX": _arx,
-    "ARMAX": _armax,
-    "output-error": _output_error,
-    "Box-Jenkins": _box_jenkins,
-    "SRIV": _instrumental,
+_FITS: dict[str, Callable[..., LinearModel]] = {
+    "ARX": fit_arx,
+    "ARMAX": fit_armax,
+    "output-error": fit_output_error,
+    "Box-Jenkins": fit_box_jenkins,
+    "SRIV": fit_instrumental,
 }
+
+_NOISE = {"ARMAX": ("n_c",), "Box-Jenkins": ("n_c", "n_d")}
+"""Sizes of a noise model that a structure takes."""

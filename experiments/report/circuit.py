@@ -18,8 +18,8 @@ TABLES_OF: Mapping[str, tuple[str, ...]] = {
 INTRODUCTION = (
     "The circuit plant is the whole actuator of the paper's Figures 1 and 2: two chambers, gear pump, accumulator, "
     "check valves, relief valve, two throttles and seals that give before they slide. No filter here assumes it. "
-    "Below, the experiments of Figures 3 to 11 are repeated on it, seen through the rig's sensors, each beside its published "
-    "counterpart where one is printed."
+    "Below, the experiments of Figures 3 to 11 are repeated on it, seen through the rig's sensors, each beside its "
+    "published counterpart where one is printed."
 )
 """The page's first paragraph."""
 

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from estimation.identification.linear_model import LinearModel
@@ -21,7 +20,6 @@ from estimation.identification.output_error import fit_output_error
 from experiments.streams import stream
 from experiments.studies.printed_transfer_functions import known, pair, pairs, printed_model
 from faults.conditions import CONDITIONS, find_condition, parameters_for
-from plant.atomic import replacing
 from plant.circuit_parameters import CircuitParameters, circuit_of
 from plant.errors import HydrostateError, LogWarning
 from plant.record import Record
@@ -205,22 +203,40 @@ def described(model: LinearModel) -> dict[str, Any]:
     }
 
 
-def write_library(library: Mapping[str, Any], path: Path) -> None:
-    """Write a library; a reader sees the old file or the whole new one.
+def library_text(library: Mapping[str, Any]) -> str:
+    """Return a library as the text of its file.
 
     Parameters
     ----------
     library : Mapping
         As `build_library` returns it.
-    path : Path
-        The file.
+
+    Returns
+    -------
+    str
+        JSON.
     """
-    with replacing(path) as temporary:
-        temporary.write((json.dumps(library, indent=1, allow_nan=False) + "\n").encode())
+    return json.dumps(library, indent=1, allow_nan=False) + "\n"
+
+
+def library_models(library: Mapping[str, Any]) -> dict[str, LinearModel]:
+    """Return the models of a library by condition, equal in every bit to those that went in.
+
+    Parameters
+    ----------
+    library : Mapping
+        As `build_library` returns it.
+
+    Returns
+    -------
+    dict[str, LinearModel]
+        Motor speed [rad/s] to velocity [m/s].
+    """
+    return {name: LinearModel.from_dict(entry["model"]) for name, entry in library["conditions"].items()}
 
 
 def read_library(path: Path | None = None) -> dict[str, LinearModel]:
-    """Return the models of a library by condition, equal in every bit to those written.
+    """Return the models of a library's file.
 
     Parameters
     ----------
@@ -230,7 +246,7 @@ def read_library(path: Path | None = None) -> dict[str, LinearModel]:
     Returns
     -------
     dict[str, LinearModel]
-        Motor speed [rad/s] to velocity [m/s].
+        As `library_models`.
 
     Raises
     ------
@@ -244,53 +260,7 @@ def read_library(path: Path | None = None) -> dict[str, LinearModel]:
         raise HydrostateError(f"library {source} cannot be read: {error}") from error
     if not isinstance(library, dict) or library.get("format") != FORMAT or library.get("version", 0) > VERSION:
         raise HydrostateError(f"library {source} must say format {FORMAT!r} and version {VERSION} or earlier")
-    return {name: LinearModel.from_dict(entry["model"]) for name, entry in library["conditions"].items()}
-
-
-def library_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
-    """Return the library beside Table 6, condition by condition.
-
-    Parameters
-    ----------
-    models : Mapping[str, LinearModel]
-        By condition.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Gain with standard deviation, the interval of the printed gain, natural frequencies and bandwidth of both, and
-        the share of the gain that acts at once (``jump_ratio``).
-    """
-    rows: list[dict[str, object]] = []
-    for name, model in models.items():
-        printed = printed_model(name)
-        published = LinearModel(
-            np.array(printed["numerator"]),
-            np.array(printed["denominator"]),
-            SAMPLE_TIME,
-            "motor_speed_rad_s",
-            "velocity_m_s",
-        )
-        rows.append(
-            {
-                "condition": name,
-                "dc_gain": model.dc_gain,
-                "dc_gain_std": model.dc_gain_std,
-                "published_gain_low": printed["dc_gain"]["interval"][0],
-                "published_gain_high": printed["dc_gain"]["interval"][1],
-                "slowest_hz": _frequencies(model).min(),
-                "published_slowest_hz": _frequencies(published).min(),
-                "bandwidth_hz": model.bandwidth_hz,
-                "bandwidth_std_hz": model.bandwidth_std_hz,
-                "published_bandwidth_hz": published.bandwidth_hz,
-                "jump_ratio": model.numerator[0] / model.dc_gain,
-                "published_jump_ratio": published.numerator[0] / published.dc_gain,
-                "fit_percent": model.fit_percent,
-                "cancellations": len(model.cancellations),
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def _frequencies(model: LinearModel) -> np.ndarray:
-    return np.abs(np.log(model.poles.astype(np.complex128))) / (2.0 * np.pi * model.sample_time)
+    try:
+        return library_models(library)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise HydrostateError(f"library {source} must hold conditions with a model each, got {error!r}") from error

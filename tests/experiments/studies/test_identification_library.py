@@ -2,18 +2,14 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from experiments.studies.identification_library import (
-    FORMAT,
-    build_library,
-    circuit_passes,
-    library_table,
-    read_library,
-    write_library,
-)
-from experiments.studies.identification_structures import clock_table
+from estimation.identification.input_design import Limits
+from estimation.identification.order import order_table
+from experiments.streams import stream
+from experiments.studies.identification_library import FORMAT, build_library, circuit_passes, library_text, read_library
+from experiments.studies.identification_structures import MADE_FOR, clock_table
+from experiments.studies.library_tables import library_table, root_table
 from experiments.studies.printed_transfer_functions import printed_model
 from faults.conditions import CONDITIONS
 from plant.circuit_parameters import CircuitParameters
@@ -56,13 +52,20 @@ def test_the_printed_digits_leave_the_normal_gain_open() -> None:
 def test_a_written_library_is_read_back_in_every_bit(tmp_path: Path) -> None:
     models = read_library()
     entries = {name: {"model": model.to_dict()} for name, model in models.items()}
-    write_library({"format": FORMAT, "version": 1, "conditions": entries}, tmp_path / "library.json")
+    (tmp_path / "library.json").write_text(library_text({"format": FORMAT, "version": 1, "conditions": entries}))
     again = read_library(tmp_path / "library.json")
     assert all(again[name].to_dict() == model.to_dict() for name, model in models.items())
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", json.dumps({"format": "other"}), json.dumps({"format": FORMAT, "version": 9})]
+    "text",
+    [
+        "",
+        "[]",
+        json.dumps({"format": "other"}),
+        json.dumps({"format": FORMAT, "version": 9}),
+        json.dumps({"format": FORMAT}),
+    ],
 )
 def test_another_file_is_no_library(text: str, tmp_path: Path) -> None:
     (tmp_path / "file.json").write_text(text)
@@ -79,9 +82,26 @@ def test_passes_have_no_mean_and_alternate_without_changing_sign() -> None:
 
 
 def test_a_literal_five_hertz_clock_is_the_worst_at_25_hz() -> None:
-    table = clock_table(read_library()["major_leakage"], 1e-3, 1)
-    assert isinstance(table, pd.DataFrame)
+    table = clock_table(read_library()["major_leakage"], Limits(125.66), 1)
     assert table["at_25_hz"].idxmax() == "200 ms"
+    assert table.loc[MADE_FOR, "at_25_hz"] < 1.1 * table["at_25_hz"].min()
+
+
+def test_roots_of_both_stand_side_by_side_with_what_they_may_be_off_by() -> None:
+    roots = root_table(read_library())
+    printed = roots[
+        (roots["condition"] == "minor_friction") & (roots["source"] == "Table 6") & (roots["kind"] == "pole")
+    ]
+    np.testing.assert_allclose(printed["real"], 0.8735)
+    assert (roots["real_spread"] > 0.0).all()
+    assert set(roots["condition"]) == set(CONDITIONS)
+
+
+def test_a_higher_order_never_fits_several_short_experiments_worse() -> None:
+    condition = "major_leakage_major_friction"
+    u, y = circuit_passes(CircuitParameters(), condition, stream(2024, "order", condition), duration=20.0)
+    table = order_table(u, y, 1e-3)
+    assert (np.diff(table["rmse"]) <= 1e-6 * table["rmse"].iloc[0]).all()
 
 
 @pytest.mark.slow
