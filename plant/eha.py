@@ -227,12 +227,10 @@ def _implicit_stage(
     base: tuple[Scalar, Scalar, Scalar], speed: Scalar, p: EhaValues, h: Scalar
 ) -> tuple[Scalar, Scalar, Scalar]:
     """Solve ``y = base + h f(y)`` of the lumped model, with the relief valve shut, then open if the answer says so."""
-    shut = _stage_with_relief(base, speed, p, h, 0.0, 0.0)
-    over = sign(shut[2]) * p.relief_conductance * p.relief_pressure
-    relieved = _stage_with_relief(base, speed, p, h, p.relief_conductance, over)
-    opens = absolute(shut[2]) > p.relief_pressure
-    x, v, dp = (where(opens, b, a) for a, b in zip(shut, relieved, strict=True))
-    return x, v, dp
+    _, _, shut = _stage_with_relief(base, speed, p, h, 0.0, 0.0)
+    opens = absolute(shut) > p.relief_pressure
+    conductance = where(opens, p.relief_conductance, 0.0)
+    return _stage_with_relief(base, speed, p, h, conductance, sign(shut) * conductance * p.relief_pressure)
 
 
 def _stage_with_relief(
