@@ -100,4 +100,4 @@ def _coloured_meat(columns: FloatArray, residual: FloatArray, n_used: int, wante
     lags = np.fft.irfft(np.abs(spectrum) ** 2)[: n_lags + 1] / n_used
     lags = lags * (1.0 - np.arange(n_lags + 1) / (n_lags + 1.0))
     kernel = np.concatenate([lags[:0:-1], lags])
-    return columns.T @ oaconvolve(columns, kernel[:, None], mode="same", axes=0)
+    return np.column_stack([columns.T @ oaconvolve(column, kernel, mode="same") for column in columns.T])

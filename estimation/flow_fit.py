@@ -115,7 +115,8 @@ def fit_flow(
     if lacking:
         raise LogError(f"the flow form needs {' and '.join(FLOW_CHANNELS)}, the record lacks {', '.join(lacking)}")
     noise = measurement_variances(record, (*FLOW_FORM.drives, *FLOW_FORM.outputs))
-    record = record.replace(**{name: without_outliers(record[name], v**0.5) for name, v in noise.items()})
+    sound = {name: without_outliers(record[name], variance**0.5) for name, variance in noise.items()}
+    record = Record(record.sample_time, sound, start_time=record.start_time)
     pressure = record["differential_pressure_pa"]
     relieved = float(np.nanmax(np.abs(pressure))) > NEAR_RELIEF * parameters.relief_pressure
     forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM)]
@@ -134,7 +135,7 @@ def fit_flow(
     best = min((by_volume, by_mass), key=lambda fit: fit.cost)
     found, rig_std = weighed((by_volume, by_mass))
     value, std = found["bulk_modulus"]
-    return FormFit(found, rig_std, std / value, best.chi_square[0], _objections(best), best.residual[:, 0])
+    return FormFit(found, rig_std, std / value, best.chi_square[0], _objections(best))
 
 
 def without_outliers(values: Array, noise: float = 0.0) -> Array:
@@ -159,14 +160,18 @@ def without_outliers(values: Array, noise: float = 0.0) -> Array:
     >>> np.flatnonzero(np.isnan(without_outliers(step))).tolist()
     [4]
     """
-    present = np.flatnonzero(np.isfinite(values))
-    seen = values[present]
+    seen = values[np.isfinite(values)]
     middle = HAMPEL_WINDOW // 2
-    below, median, above = (rank_filter(seen, middle + k, size=HAMPEL_WINDOW, mode="nearest") for k in (-1, 0, 1))
-    distance = np.abs(seen - median)
+    below, distance, spread = (rank_filter(seen, middle + k, size=HAMPEL_WINDOW, mode="nearest") for k in (-1, 0, 1))
+    spread -= below  # in place: a long log's channel is large
+    distance -= seen
+    np.abs(distance, out=distance)
     usual = float(np.percentile(distance, USUAL)) if len(seen) else 0.0
+    spread *= BENDS
+    spread += GROSS * (usual + noise)
+    seen[distance > spread] = np.nan
     kept = values.copy()
-    kept[present[distance > GROSS * (usual + noise) + BENDS * (above - below)]] = np.nan
+    kept[np.isfinite(values)] = seen
     return kept
 
 
@@ -228,7 +233,7 @@ def refilled(log: GreyBoxLog, fit: GreyBoxFit, bumps: Array) -> GreyBoxLog:
     responses: list[Array] = []
     for bump in bumps:
         unit[:, 0] = bump
-        responses.append(problem.flat(problem.run(fit.theta, drives=log.drives + unit)[0] - predicted))
+        responses.append(problem.normalised(problem.run(fit.theta, drives=log.drives + unit)[0] - predicted))
     columns = np.column_stack([slopes, *responses])
     size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
     step = np.linalg.lstsq(columns / size, -errors, rcond=None)[0] / size

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.greybox_fit import GreyBoxFit
 
@@ -28,8 +27,6 @@ class FormFit:
         Mean squared residual over the sensor's variance [dimensionless].
     reasons : tuple of str
         What speaks against the fit, one sentence each.
-    residual : ndarray, shape (n,)
-        Measured less predicted, in SI.
     """
 
     parameters: Mapping[str, tuple[float, float]]
@@ -37,7 +34,6 @@ class FormFit:
     bound: float
     chi_square: float
     reasons: tuple[str, ...]
-    residual: NDArray[np.float64]
 
 
 def weighed(fits: Sequence[GreyBoxFit]) -> tuple[Mapping[str, tuple[float, float]], Mapping[str, float]]:

@@ -20,9 +20,10 @@ from plant.compiled.source import statements
 from plant.integrate import PARAMETER_NAMES, parameter_symbols, ros2_step
 
 Array = NDArray[np.float64]
-Prediction: TypeAlias = Callable[[Array, Array, Array, float, NDArray[np.int64]], tuple[Array, Array]]
-"""``run(theta (unknowns,), drives (n, channels), parameter row, sample time [s], steps (n,) up to each sample)``,
-which returns the prediction, shape (n, outputs), and its derivatives by theta, shape (n, outputs, unknowns)."""
+Prediction: TypeAlias = Callable[[Array, Array, Array, Array, float, NDArray[np.int64], int], tuple[Array, Array]]
+"""``run(theta (unknowns,), drives (n, channels), measured (n, outputs), parameter row, sample time [s], steps (n,) up
+to each sample, samples a block)``, which returns what the prediction exceeds the measured by, a mean over those samples
+of each block that are present, shape (blocks, outputs), and its derivatives by theta, (blocks, outputs, unknowns)."""
 
 
 @dataclass(frozen=True)
@@ -109,10 +110,12 @@ import numpy as np
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={{"reassoc", "contract", "nsz"}})
-def run(theta, drives, parameters, sample_time, substeps):
+def run(theta, drives, measured, parameters, sample_time, substeps, block):
     n = drives.shape[0]
-    predicted = np.empty((n, {outputs}))
-    sensitivity = np.empty((n, {outputs}, {unknowns}))
+    blocks = (n + block - 1) // block
+    excess = np.zeros((blocks, {outputs}))
+    slopes = np.zeros((blocks, {outputs}, {unknowns}))
+    present = np.zeros({outputs})
     share = 0.0
 {load}
 {begin}
@@ -124,8 +127,15 @@ def run(theta, drives, parameters, sample_time, substeps):
                 f_end = (j + 1.0) / substeps[k]
 {between}
 {step}
+        b = k // block
 {observe}
-    return predicted, sensitivity
+        if (k + 1) % block == 0 or k == n - 1:
+            for i in range({outputs}):
+                if present[i] > 1.0:
+                    excess[b, i] /= present[i]
+                    slopes[b, i] /= present[i]
+                present[i] = 0.0
+    return excess, slopes
 '''
 
 
@@ -206,7 +216,12 @@ def _sensitivities(
 def _observation(outputs: Sequence[Expression], state: Sequence[Expression], theta: Sequence[Expression]) -> str:
     slopes = _sensitivities(outputs, state, theta)
     named = {f"y{i}": output for i, output in enumerate(outputs)} | {f"d{name}": s for name, s in slopes.items()}
-    store = [f"        predicted[k, {i}] = y{i}" for i in range(len(outputs))] + [
-        f"        sensitivity[k, {i}, {j}] = ds{i}_{j}" for i in range(len(outputs)) for j in range(len(theta))
-    ]
-    return "\n".join([statements(named, " " * 8), *store])
+    lines = [statements(named, " " * 8)]
+    for i in range(len(outputs)):
+        lines += [
+            f"        if measured[k, {i}] == measured[k, {i}]:",
+            f"            present[{i}] += 1.0",
+            f"            excess[b, {i}] += y{i} - measured[k, {i}]",
+            *(f"            slopes[b, {i}, {j}] += ds{i}_{j}" for j in range(len(theta))),
+        ]
+    return "\n".join(lines)

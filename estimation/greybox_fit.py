@@ -24,6 +24,9 @@ LEAST_EFFECT = 1.0
 SCREENED_SAMPLES = 200_000
 """A longer log is screened on its beginning."""
 
+LENGTHENED = 8
+"""Factor between the beginnings of a long log on which a fit is brought near."""
+
 DRIVE_DRAWS = 16
 """Realisations of the driving channels' noise; their spread is known to 18 %, of a part that is seldom the larger."""
 
@@ -55,8 +58,6 @@ class GreyBoxFit:
         Of neighbouring normalised residuals; 0 where the model explains the log [dimensionless].
     normalised : ndarray, shape (blocks, outputs)
         Measured less predicted, block by block, whitened and over its standard deviation; zero where missing.
-    residual : ndarray, shape (n, outputs)
-        Measured less predicted, in SI; NaN where the sample is missing.
     """
 
     model: GreyBoxModel
@@ -68,7 +69,6 @@ class GreyBoxFit:
     chi_square: tuple[float, ...]
     autocorrelation: tuple[float, ...]
     normalised: Array
-    residual: Array
 
 
 @dataclass(frozen=True)
@@ -127,12 +127,16 @@ def fit_greybox(
     """
     guesses = [model.theta(start) for start in starts]
     bounds = search_bounds(model, guesses, ceilings or {})
-    whole = Problem(model, log)
-    short = len(log.measured) <= search.screened
-    beginning = whole if short else Problem(model, log.beginning(search.screened))
     if len(guesses) > 1:
+        beginning = Problem(model, log.beginning(search.screened))
         screened = [beginning.solve(guess, search.screening, bounds) for guess in guesses]
         guesses = [best.x for best in sorted(screened, key=_cost)[: search.finalists]]
+    length = LENGTHENED * search.screened
+    while length < len(log.measured):  # the way is made on ever longer beginnings, so that the whole takes few steps
+        part = Problem(model, log.beginning(length))
+        guesses = [min((part.solve(guess, search.evaluations, bounds) for guess in guesses), key=_cost).x]
+        length *= LENGTHENED
+    whole = Problem(model, log)
     best = min((whole.solve(guess, search.evaluations, bounds) for guess in guesses), key=_cost)
     return concluded(whole, np.asarray(best.x, dtype=np.float64), _cost(best))
 
@@ -158,7 +162,7 @@ def concluded(problem: Problem, theta: Array, cost: float) -> GreyBoxFit:
     GreyBoxFit
         The fit.
     """
-    model, log = problem.model, problem.log
+    model = problem.model
     errors, slope = problem.predict(tuple(theta))
     felt = np.sqrt(np.einsum("ij,ij->j", slope, slope)) > LEAST_EFFECT
     noise, rig = np.full(len(theta), np.inf), np.zeros(len(theta))
@@ -175,7 +179,6 @@ def concluded(problem: Problem, theta: Array, cost: float) -> GreyBoxFit:
     sizes = dict(model.linear)
     values = model.values(theta)
     unit = np.array([sizes.get(name, values[name]) for name in model.unknowns])
-    predicted, _ = problem.run(theta)
     normalised = -errors.reshape(problem.counts.T.shape).T
     squares = np.einsum("ij,ij->j", normalised, normalised)
     neighbours = np.einsum("ij,ij->j", normalised[1:], normalised[:-1])
@@ -190,13 +193,12 @@ def concluded(problem: Problem, theta: Array, cost: float) -> GreyBoxFit:
         chi_square=tuple(map(float, squares / seen)),
         autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),
         normalised=normalised,
-        residual=log.measured - predicted,
     )
 
 
 def _response(problem: Problem, change: Array, gain: Array) -> Array:
     """Return by how much the estimate moves, to first order, if the prediction changes."""
-    return -gain @ problem.flat(change)
+    return -gain @ problem.normalised(change)
 
 
 def _drive_variance(problem: Problem, theta: Array, gain: Array) -> Array:
@@ -206,11 +208,13 @@ def _drive_variance(problem: Problem, theta: Array, gain: Array) -> Array:
         return np.zeros(len(gain))
     rng = np.random.default_rng(0)  # the same draws for every log, so that a result can be repeated
     predicted, _ = problem.run(theta)
-    shifts = [
-        _response(problem, problem.run(theta, drives=problem.log.drives + noise)[0] - predicted, gain)
-        for noise in (spread * rng.standard_normal(problem.log.drives.shape) for _ in range(DRIVE_DRAWS))
-    ]
-    return np.mean(np.square(shifts), axis=0)
+    shaken, squares = np.empty_like(problem.log.drives), np.zeros(len(gain))
+    for _ in range(DRIVE_DRAWS):
+        rng.standard_normal(out=shaken)
+        shaken *= spread
+        shaken += problem.log.drives
+        squares += _response(problem, problem.run(theta, drives=shaken)[0] - predicted, gain) ** 2
+    return squares / DRIVE_DRAWS
 
 
 def _rig_variance(problem: Problem, theta: Array, gain: Array) -> Array:

@@ -21,6 +21,9 @@ OUTLIER = 3.0
 BLOCK = 1e-3
 """Length over which residuals are averaged before they are squared [s]."""
 
+RUNAWAY = 1e6
+"""Largest normalised residual or slope [dimensionless]."""
+
 UPWARD, DOWNWARD = np.log(1e3), 70.0
 """How far the logarithm of an unknown may leave its starts: three decades up; down until it is as good as absent."""
 
@@ -153,27 +156,23 @@ class Problem:
     def __init__(self, model: GreyBoxModel, log: GreyBoxLog) -> None:
         self.model, self.log = model, log
         self._run = compile_prediction(model)
-        block = max(1, round(BLOCK / log.sample_time))
-        self._edges = np.arange(0, len(log.measured), block)
-        self._present = np.isfinite(log.measured)
-        self._filled = np.where(self._present, log.measured, 0.0)
-        self.counts = np.add.reduceat(self._present.astype(np.float64), self._edges, axis=0)
+        self._block = max(1, round(BLOCK / log.sample_time))
+        edges = np.arange(0, len(log.measured), self._block)
+        self.counts = np.add.reduceat(np.isfinite(log.measured), edges, axis=0, dtype=np.float64)
         self._weights = [
-            block_weights(counts, noise.variance, noise.walk * block * log.sample_time)
+            block_weights(counts, noise.variance, noise.walk * self._block * log.sample_time)
             for counts, noise in zip(self.counts.T, log.noise, strict=True)
         ]
 
         @lru_cache(maxsize=2)
         def predict(theta: tuple[float, ...]) -> tuple[Array, Array]:
-            predicted, sensitivity = self.run(np.array(theta))
-            errors = self.normalised(predicted - self._filled)
-            slopes = self.normalised(sensitivity.reshape(len(predicted), -1)).reshape(*errors.shape, -1)
-            return _finite(errors).T.ravel(), _finite(slopes).swapaxes(0, 1).reshape(errors.size, -1)
+            excess, slopes = self.run(np.array(theta))
+            return self.normalised(excess), self.normalised(slopes)
 
         self.predict = predict
 
     def run(self, theta: Array, drives: Array | None = None, parameters: Array | None = None) -> tuple[Array, Array]:
-        """Return the prediction and its slopes.
+        """Return what the prediction exceeds the measured outputs by, and its slopes.
 
         Parameters
         ----------
@@ -187,41 +186,38 @@ class Problem:
         Returns
         -------
         tuple of ndarray
-            Shapes (n, outputs) and (n, outputs, unknowns), in SI.
+            Means over blocks, zero where one is missing [SI], shapes (blocks, outputs), (blocks, outputs, unknowns).
         """
         log = self.log
         return self._run(
             theta,
             log.drives if drives is None else drives,
+            log.measured,
             log.parameters if parameters is None else parameters,
             log.sample_time,
             log.steps,
+            self._block,
         )
 
-    def normalised(self, values: Array) -> Array:
-        """Return block means, whitened and over their standard deviations.
+    def normalised(self, means: Array) -> Array:
+        """Return block means, whitened and over their standard deviations, one output after the other.
 
         Parameters
         ----------
-        values : ndarray, shape (n, outputs * columns)
-            In SI; each output's columns stand together.
+        means : ndarray, shape (blocks, outputs) or (blocks, outputs, columns)
+            In SI.
 
         Returns
         -------
-        ndarray, shape (blocks, outputs * columns)
-            Normalised; zero where the block is missing [dimensionless].
+        ndarray, shape (outputs * blocks,) or (outputs * blocks, columns)
+            Normalised; zero where the block is missing, and a runaway held to a size that an optimiser can step back
+            from [dimensionless].
         """
-        outputs = self._present.shape[1]
-        each = values.reshape(len(values), outputs, -1)
-        columns: list[Array] = []
-        for i, weights in enumerate(self._weights):
-            kept = np.where(self._present[:, i, None], each[:, i], 0.0)
-            with np.errstate(
-                over="ignore", invalid="ignore"
-            ):  # a try that runs away is stepped back from, see `_finite`
-                means = np.add.reduceat(kept, self._edges, axis=0) / np.maximum(self.counts[:, i, None], 1.0)
-                columns.append(whitened(means, weights))
-        return np.stack(columns, axis=1).reshape(len(self._edges), -1)
+        white = np.concatenate(
+            [whitened(means[:, i].reshape(len(means), -1), weights) for i, weights in enumerate(self._weights)]
+        )
+        np.nan_to_num(white, copy=False, nan=RUNAWAY, posinf=RUNAWAY, neginf=-RUNAWAY)
+        return np.clip(white, -RUNAWAY, RUNAWAY, out=white).reshape(-1, *means.shape[2:])
 
     def solve(self, start: Array, evaluations: int, bounds: tuple[Array, Array], scale: str | float = "jac") -> Any:
         """Return scipy's solution from a start in fitted coordinates, with outliers counted linearly.
@@ -248,30 +244,10 @@ class Problem:
         return least_squares(
             lambda theta: self.predict(tuple(theta))[0],
             start,
-            jac=lambda theta: self.predict(tuple(theta))[1],
+            jac=lambda theta: self.predict(tuple(theta))[1],  # pyright: ignore[reportArgumentType]  # nor a callable
             loss="huber",
             f_scale=OUTLIER,
             x_scale=scale,  # pyright: ignore[reportArgumentType]  # the stubs lack scipy's "jac"
             max_nfev=evaluations,
             bounds=bounds,
         )
-
-    def flat(self, values: Array) -> Array:
-        """Return a change of the prediction as a change of the residual.
-
-        Parameters
-        ----------
-        values : ndarray, shape (n, outputs)
-            The change in SI.
-
-        Returns
-        -------
-        ndarray, shape (blocks * outputs,)
-            Normalised [dimensionless].
-        """
-        return _finite(self.normalised(values)).T.ravel()
-
-
-def _finite(values: Array) -> Array:
-    """Return the values with runaways held to a size that an optimiser can step back from."""
-    return np.clip(np.nan_to_num(values, nan=1e6, posinf=1e6, neginf=-1e6), -1e6, 1e6)
