@@ -5,20 +5,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimation.identification.choose import STRUCTURES, StructureName, choose_model
+from estimation.identification.choose import STRUCTURES, Choice, StructureName, choose_model
 from estimation.identification.fitted import CovarianceKind
 from estimation.identification.linear_model import FloatArray, LinearModel
-from estimation.identification.output_error import fit_output_error
 from estimation.identification.preprocess import bridged, resample, zero_phase_filter
 from estimation.identification.residual_tests import DEFAULT_LAGS, feedback_test
+from estimation.identification.sticking import rest_shares, rests
 from plant.errors import LogError, LogWarning
 from plant.record import Record
 
 FEEDBACK = 1e-6
 """p-value below which data are said to come from a closed loop; a linear model's errors must not look like one."""
 
-FEEDBACK_SAMPLES = 20_000
-"""Samples that are asked, from the beginning."""
+FEEDBACK_SAMPLES, RESTING_SAMPLES = 20_000, 100_000
+"""Samples that are asked for feedback, and for rests, from the beginning."""
 
 
 def identify_record(
@@ -78,33 +78,14 @@ def identify_record(
     Warns
     -----
     LogWarning
-        If the output is differentiated from position, input samples are bridged, or the input was fed back.
+        If the output is differentiated from position, input samples are bridged, the input was fed back, or the
+        order was to be chosen for a piston that sticks.
     """
-    measured = _output(record, output)
-    driven = _without_gaps(record[input], input)
-    u = resample(driven, record.sample_time, sample_time)
-    y = resample(measured, record.sample_time, sample_time)
-    if filter_cutoff_hz is not None:
-        u, y = zero_phase_filter(u, y, sample_time, cutoff_hz=filter_cutoff_hz)
-    # a filter that looks ahead makes outputs follow future inputs, as feedback does
-    untouched = filter_cutoff_hz is None and u.size == len(record) and output in record
+    u, y = record_signals(
+        record, output=output, input=input, sample_time=sample_time, filter_cutoff_hz=filter_cutoff_hz
+    )
     default: CovarianceKind = "white" if filter_cutoff_hz is None else "coloured"
-    if structure == "output-error" and orders is None and not estimate_dead_time:
-        model = fit_output_error(
-            u,
-            y,
-            sample_time,
-            n_numerator=n_numerator,
-            n_denominator=n_denominator,
-            delay=delay,
-            covariance=covariance or default,
-            input_name=input,
-            output_name=output,
-        )
-        if untouched:
-            _warn_of_feedback(model, u, y)
-        return model
-    model = choose_model(
+    choice = choose_model(
         u,
         y,
         sample_time,
@@ -115,10 +96,71 @@ def identify_record(
         covariance=covariance or default,
         input_name=input,
         output_name=output,
-    ).model
-    if untouched:
-        _warn_of_feedback(model, u, y)
-    return model
+    )
+    # a filter that looks ahead makes outputs follow future inputs, as feedback does
+    if filter_cutoff_hz is None and u.size == len(record) and output in record:
+        _warn_of_feedback(choice.model, u, y)
+    if len(choice.orders) > 1 and output == "velocity_m_s":
+        _warn_of_rest(choice, u, y)
+    return choice.model
+
+
+def record_signals(
+    record: Record,
+    *,
+    output: str = "velocity_m_s",
+    input: str = "motor_speed_rad_s",  # noqa: A002 - the word that the command and its JSON use
+    sample_time: float = 1e-3,
+    filter_cutoff_hz: float | None = None,
+) -> tuple[FloatArray, FloatArray]:
+    """Return input and output of a record as `identify_record` fits them.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    output, input : str
+        Channel names.
+    sample_time : float
+        Of the model [s].
+    filter_cutoff_hz : float, optional
+        Zero-phase low-pass of both [Hz].
+
+    Returns
+    -------
+    tuple of ndarray, shape (n,)
+        Input without gaps, and output, NaN where missing [in the channels' units].
+
+    Raises
+    ------
+    LogError
+        If a channel is missing.
+
+    Warns
+    -----
+    LogWarning
+        If the output is differentiated from position, or input samples are bridged.
+    """
+    measured = _output(record, output)
+    driven = _without_gaps(record[input], input)
+    u = resample(driven, record.sample_time, sample_time)
+    y = resample(measured, record.sample_time, sample_time)
+    return (u, y) if filter_cutoff_hz is None else zero_phase_filter(u, y, sample_time, cutoff_hz=filter_cutoff_hz)
+
+
+def _warn_of_rest(choice: Choice, u: FloatArray, y: FloatArray) -> None:
+    model, part = choice.model, slice(0, RESTING_SAMPLES)
+    measured, linear = rest_shares(u[part], y[part], model.sample_time)
+    if rests(measured, linear):
+        fits = ", ".join(f"{fit:.1f} % ({order})" for order, fit in choice.orders["fit_percent"].items())
+        warnings.warn(
+            f"{model.output_name!r} rests in {measured:.0%} of the samples in which {model.input_name!r} drives it, a "
+            f"second-order model in {linear:.0%}: it sticks, and further poles imitate the wait, so order "
+            f"{model.denominator.size - 1} is not the plant's. The fits by order are {fits}: give the order, or drive "
+            "the piston around a mean that keeps it moving",
+            LogWarning,
+            stacklevel=3,
+        )
 
 
 def _warn_of_feedback(model: LinearModel, u: FloatArray, y: FloatArray) -> None:

@@ -183,6 +183,38 @@ def feedback_test(residual: ArrayLike, u: ArrayLike, *, n_lags: int = DEFAULT_LA
     return cross_correlation_test(white[::-1], inputs[::-1], n_lags=n_lags, jacobian=before[::-1])
 
 
+def correlations(residual: ArrayLike, other: ArrayLike, lags: ArrayLike) -> FloatArray:
+    """Return the correlation of a residual with another signal, or itself, some samples earlier.
+
+    Parameters
+    ----------
+    residual, other : array_like, shape (n,)
+        Both NaN where missing.
+    lags : array_like of int, shape (k,)
+        How many samples earlier the other is taken; later, where negative.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        From -1 to 1 [dimensionless].
+
+    Examples
+    --------
+    >>> pulse = np.zeros(100)
+    >>> pulse[50] = 1.0
+    >>> correlations(np.roll(pulse, 3), pulse, [0, 3]).round(2).tolist()
+    [-0.01, 1.0]
+    """
+    first, second = (np.asarray(values, dtype=np.float64) for values in (residual, other))
+    first, second = (np.where(np.isfinite(one), one - np.nanmean(one), 0.0) for one in (first, second))
+    size = float(np.linalg.norm(first) * np.linalg.norm(second))
+    n = first.size
+    products = [
+        first[max(k, 0) : n + min(k, 0)] @ second[max(-k, 0) : n - max(k, 0)] for k in np.asarray(lags).tolist()
+    ]
+    return np.array(products) / size
+
+
 def _unit(columns: FloatArray) -> FloatArray:
     scale = np.linalg.norm(columns, axis=0)
     return columns / np.where(scale > 0.0, scale, 1.0)

@@ -18,6 +18,7 @@ from experiments.command.options import (
     Out,
     RigFile,
     Seed,
+    figure_path,
     load_columns,
     load_rig,
     require_one_of,
@@ -184,8 +185,9 @@ def estimate(
             tuned=tune,
             robust=robust,
         )
-        if figure is not None:
-            _draw(found, figure, log, len(logs))
+        path = figure_path(figure, log, len(logs))
+        if path is not None:
+            _draw(found, path, log)
         return {**_entries(found, method), **chosen}
 
     batch = run_logs(logs, work, {**NOTHING, **chosen}, "estimating")
@@ -198,11 +200,10 @@ def _listed(names: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in names.split(",") if name.strip())
 
 
-def _draw(found: "BulkModulusEstimate", target: Path, log: Path, logs: int) -> None:
-    """Write the figure of a filtered log; with several logs, each one's name goes into the file's."""
+def _draw(found: "BulkModulusEstimate", path: Path, log: Path) -> None:
+    """Write the figure of a filtered log."""
     from experiments.figures.innovations import write_innovations
 
-    path = target if logs == 1 else target.with_name(f"{target.stem}-{log.stem}{target.suffix or '.png'}")
     if found.estimate is None:
         note(f"no figure: {log.name} was not filtered; ask for one with --method ekf")
         return

@@ -16,6 +16,7 @@ from experiments.command.options import (
     Out,
     RigFile,
     Seed,
+    figure_path,
     load_columns,
     load_rig,
     require_one_of,
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from estimation.identification.choose import StructureName
-    from estimation.identification.linear_model import LinearModel
+    from estimation.identification.linear_model import FloatArray, LinearModel
 
 TABLE_6_TIME = 1e-3
 """Sample time of Table 6 as we read it [s] (errata E14)."""
@@ -44,6 +45,12 @@ AUTO = "auto"
 HIGHEST_ORDER = 4
 """``--order auto`` compares orders up to this by BIC."""
 
+NORMAL_95 = 1.96
+"""Deviations either way that hold 95 %."""
+
+MOST_PROFILED, MOST_TESTED = 100_000, 50_000
+"""Longest log whose gain is profiled where a pole is nearly cancelled, and samples that residual tests are given."""
+
 NOTHING: Result = {
     "format_version": FORMAT_VERSION,
     "structure": None,
@@ -52,12 +59,13 @@ NOTHING: Result = {
     "sample_time_s": None,
     "fit_percent": None,
     "covariance": None,
-    "dc_gain": {"value": None, "std": None},
+    "dc_gain": {"value": None, "std": None, "ci95": None},
     "bandwidth_hz": None,
     "bandwidth_std_hz": None,
     "poles": None,
     "zeros": None,
     "delay": {"samples": None, "seconds": None},
+    "validation": {"whiteness_p": None, "cross_correlation_p": None},
 }
 """The entries of a log that could not be used."""
 
@@ -88,6 +96,10 @@ def identify(
     ] = None,
     input_channel: Annotated[str, typer.Option("--input", metavar="CHANNEL", help="Input.")] = "motor_speed_rad_s",
     output_channel: Annotated[str, typer.Option("--output", metavar="CHANNEL", help="Output.")] = "velocity_m_s",
+    figure: Annotated[
+        Path | None,
+        typer.Option(metavar="PNG", help="Draw measured beside simulated, the residual, its correlations, the gain."),
+    ] = None,
     rig: RigFile = None,
     columns: Columns = None,
     out: Out = None,
@@ -100,7 +112,7 @@ def identify(
     its absence costs nothing. Nothing here is random, so the seed changes nothing. `--out library.json` writes one
     entry a log at full precision, which `LinearModel.from_dict` reads.
     """
-    from estimation.identification.from_record import identify_record
+    from estimation.identification.from_record import identify_record, record_signals
 
     require_one_of("--structure", structure, STRUCTURES)
     wanted_order, wanted_delay = whole_or_auto("--order", order, 1), whole_or_auto("--delay", delay, 0)
@@ -115,21 +127,25 @@ def identify(
 
     def work(log: Path) -> Result:
         record = read_log(log, bench.columns, mapping)
+        taken: dict[str, Any] = {
+            "output": output_channel,
+            "input": input_channel,
+            "sample_time": max(TABLE_6_TIME, record.sample_time) if sample_time is None else sample_time,
+            "filter_cutoff_hz": filter_hz,
+        }
         model = identify_record(
             record,
-            output=output_channel,
-            input=input_channel,
-            sample_time=max(TABLE_6_TIME, record.sample_time) if sample_time is None else sample_time,
+            **taken,
             n_numerator=coefficients,
             n_denominator=fixed,
             delay=wanted_delay or 0,
-            filter_cutoff_hz=filter_hz,
             structure=_NAMES[structure],
             orders=range(1, HIGHEST_ORDER + 1) if wanted_order is None else None,
             estimate_dead_time=wanted_delay is None,
             covariance="auto" if filter_hz is None else "coloured",
         )
-        return {**chosen, **_entries(model)}
+        u, y = record_signals(record, **taken)
+        return {**chosen, **_entries(model), **_judged(model, u, y, log, figure_path(figure, log, len(logs)))}
 
     batch = run_logs(logs, work, {**NOTHING, **chosen}, "identifying")
     finish(batch, _screen, as_json=as_json, out=out)
@@ -176,7 +192,6 @@ def _entries(model: "LinearModel") -> dict[str, Any]:
     return {
         "outcome": "ok",
         **model.to_dict(),
-        "dc_gain": {"value": model.dc_gain, "std": model.dc_gain_std},
         "bandwidth_hz": bandwidth,
         "bandwidth_std_hz": model.bandwidth_std_hz,
         "poles": _with_std(model.poles, model.pole_std),
@@ -188,6 +203,29 @@ def _entries(model: "LinearModel") -> dict[str, Any]:
             f"gain {model.dc_gain:.4g}, bandwidth {extent}"
         ),
     }
+
+
+def _judged(model: "LinearModel", u: "FloatArray", y: "FloatArray", log: Path, figure: Path | None) -> dict[str, Any]:
+    """Return what the data say of the model: tests of its residual, and the gain's interval; draw both if wanted."""
+    from estimation.identification.profile_interval import dc_gain_interval
+    from estimation.identification.validate import validate
+
+    gain, std = model.dc_gain, model.dc_gain_std
+    fitted = model.structure == "output-error"
+    interval = (gain - NORMAL_95 * std, gain + NORMAL_95 * std)
+    if fitted and model.cancellations and u.size <= MOST_PROFILED:
+        interval = dc_gain_interval(model, u, y)
+    entries: dict[str, Any] = {"dc_gain": {"value": gain, "std": std, "ci95": interval}}
+    if not model.is_stable:
+        return entries | {"validation": NOTHING["validation"]}
+    part = slice(0, MOST_TESTED)
+    found = validate(model, u[part], y[part], fitted=fitted)
+    if figure is not None:
+        from experiments.figures.identified import write_identified
+
+        write_identified(model, u, y, found, log.name, figure)
+    tests = {"whiteness_p": found.whiteness.p_value, "cross_correlation_p": found.cross_correlation.p_value}
+    return entries | {"validation": tests}
 
 
 def _with_std(roots: Any, spreads: Any) -> list[dict[str, float]]:

@@ -157,3 +157,30 @@ def require_one_of(option: str, value: str, known: Sequence[str]) -> None:
     """
     if value not in known:
         raise HydrostateError(f"{option} must be one of {', '.join(known)}, got {value!r}")
+
+
+def figure_path(target: Path | None, log: Path, logs: int) -> Path | None:
+    """Return where the figure of a log goes; with several logs, each one's name goes into the file's.
+
+    Parameters
+    ----------
+    target : Path or None
+        As given to ``--figure``.
+    log : Path
+        The log.
+    logs : int
+        How many there are.
+
+    Returns
+    -------
+    Path or None
+        None where no figure is wanted.
+
+    Examples
+    --------
+    >>> figure_path(Path("fit.png"), Path("logs/run1.csv"), 2)
+    PosixPath('fit-run1.png')
+    """
+    if target is None or logs == 1:
+        return target
+    return target.with_name(f"{target.stem}-{log.stem}{target.suffix or '.png'}")

@@ -8,9 +8,13 @@ from typer.testing import CliRunner
 from estimation.identification.linear_model import LinearModel
 from experiments.cli import app
 from experiments.command.identify import whole_or_auto
+from plant.eha import EhaParameters
 from plant.errors import HydrostateError
 from plant.record import Record
 from plant.record_files import write_record
+from plant.sensors import BENCH
+from plant.signals import prbs
+from plant.simulate import LUMPED, simulate
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +46,28 @@ def test_order_delay_and_structure_are_found_and_the_library_is_written(logs: li
         assert model.dc_gain == pytest.approx(3e-4, abs=4.0 * model.dc_gain_std)
         assert entry["structure"] in {"output-error", "Box-Jenkins", "ARMAX"}
         assert entry["poles"][0]["imag_std"] > 0.0
+
+
+def test_the_residual_is_tested_and_drawn(logs: list[Path], tmp_path: Path) -> None:
+    arguments = ["--delay", "3", "--numerator", "2", "--figure", str(tmp_path / "fit.png"), "--json"]
+    ran = CliRunner().invoke(app, ["identify", *map(str, logs), *arguments])
+    for entry in json.loads(ran.stdout):
+        low, high = entry["dc_gain"]["ci95"]
+        assert low < 3e-4 < high
+        assert min(entry["validation"].values()) > 1e-3  # the model is the truth's
+    for log in logs:
+        assert (tmp_path / f"fit-{log.stem}.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_an_order_chosen_for_a_piston_that_sticks_warns_and_for_a_linear_plant_not(
+    logs: list[Path], tmp_path: Path
+) -> None:
+    rng, p = np.random.default_rng(4), EhaParameters()
+    record = simulate(LUMPED, prbs(10.0, 1e-4, p.rated_speed, 0.2, rng), 1e-4, p, sensors=BENCH, rng=rng)
+    write_record(record, tmp_path / "sticks.parquet")
+    for log, sticks in ((tmp_path / "sticks.parquet", True), (logs[0], False)):
+        (entry,) = json.loads(CliRunner().invoke(app, ["identify", str(log), "--order", "auto", "--json"]).stdout)
+        assert any("it sticks" in said for said in entry["warnings"]) == sticks
 
 
 @pytest.mark.parametrize("structure", ["arx", "armax", "box-jenkins"])
