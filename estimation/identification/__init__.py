@@ -7,6 +7,7 @@ from estimation.identification.continuous import fit_continuous
 from estimation.identification.dead_time import estimate_delay
 from estimation.identification.etfe import FrequencyResponse, etfe, etfe_welch
 from estimation.identification.from_record import identify_record
+from estimation.identification.input_design import Limits, multisine_for, prbs_for, rank_inputs
 from estimation.identification.instrumental import fit_instrumental
 from estimation.identification.linear_model import LinearModel
 from estimation.identification.model_table import model_table
@@ -22,6 +23,7 @@ __all__ = [
     "STRUCTURES",
     "Choice",
     "FrequencyResponse",
+    "Limits",
     "LinearModel",
     "OrderTest",
     "SubspaceFit",
@@ -44,8 +46,11 @@ __all__ = [
     "identify_record",
     "markov_parameters",
     "model_table",
+    "multisine_for",
     "order_table",
     "order_test",
+    "prbs_for",
+    "rank_inputs",
     "resample",
     "validate",
     "zero_phase_filter",

@@ -46,11 +46,6 @@ class OrderTest:
     projected_noise_floor: float
     suggested_order: int
 
-    @property
-    def hankel_order(self) -> int:
-        """Hankel singular values above their floor; a slowly switching input hides small ones."""
-        return int(np.count_nonzero(self.hankel_singular_values > self.hankel_noise_floor))
-
 
 def markov_parameters(u: ArrayLike, y: ArrayLike, n_lags: int) -> FloatArray:
     """Return the impulse response by least squares, ``y_t = sum_k g_k u_(t-k)``.

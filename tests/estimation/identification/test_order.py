@@ -28,7 +28,7 @@ def test_hankel_values_show_the_order_where_the_input_is_rich(plant_30hz: Linear
     u = rng.standard_normal(10_000)
     y = plant_30hz.simulate(u)
     found = order_test(u, y + 0.02 * y.std() * rng.standard_normal(u.size))
-    assert found.hankel_order == 2
+    assert (found.hankel_singular_values > found.hankel_noise_floor).sum() == 2
     assert found.suggested_order == 2
 
 
@@ -45,7 +45,7 @@ def test_noise_alone_has_no_order() -> None:
     rng = np.random.default_rng(10)
     found = order_test(rng.standard_normal(5_000), rng.standard_normal(5_000))
     assert found.suggested_order == 0
-    assert found.hankel_order == 0
+    assert (found.hankel_singular_values > found.hankel_noise_floor).sum() == 0
 
 
 def test_the_impulse_response_comes_back(plant_30hz: LinearModel) -> None:
