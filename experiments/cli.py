@@ -1,4 +1,4 @@
-"""The command ``hydrostate``: study, circuit, simulate, estimate, identify, diagnose, identifiability and others."""
+"""The command ``hydrostate``: study, circuit, simulate, estimate, identify, library, diagnose and others."""
 
 from importlib.metadata import version
 from pathlib import Path
