@@ -64,6 +64,7 @@ def test_the_gradient_of_the_likelihood_is_exact(model: ProcessModel) -> None:
         assert gradient[k] == pytest.approx(central(likelihood, 2e-5), rel=1e-5, abs=1e-4), MOVED[k]
 
 
+@pytest.mark.slow
 def test_the_gradient_by_the_prior_is_exact() -> None:
     problem = task(PRESSURE_FORM)
     belief = np.zeros((len(belief_names(4)), 2))

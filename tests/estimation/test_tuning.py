@@ -89,6 +89,7 @@ def test_long_and_fast_logs_are_tuned_alike(sample_time: float, duration: float)
     assert all(nis == pytest.approx(1.0, abs=0.1) for nis in tuning.tuned.nis.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first_guess", [1e8, 3e8])
 def test_without_pressure_a_far_first_guess_is_tuned_to_the_same_levels(record: Record, first_guess: float) -> None:
     """Certainty grows by degrees: at once, such a filter would lock onto a wrong bulk modulus."""
