@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from estimation.model import ProcessModel
+from estimation.model import OPENING, ProcessModel
 from estimation.robust import inflation
 from plant.compiled.expression import ZERO, Expression, as_expression, jacobian, select, symbol, unary
 from plant.compiled.functions import exp, log, where
@@ -247,20 +247,26 @@ def scaled_step(model: ProcessModel) -> tuple[list[Expression], list[list[Expres
     return stepped, jacobian(stepped, mean)
 
 
-def process_noise(i: int) -> Expression:
+def process_noise(model: ProcessModel, i: int) -> Expression:
     """Return the variance that one step adds to a state.
 
     Parameters
     ----------
+    model : ProcessModel
+        The model.
     i : int
         Index of the state.
 
     Returns
     -------
     Expression
-        Density times step.
+        Density times step, and the step's share of what a gap in the log opens.
     """
-    return symbol(f"q{i}") * symbol("h")
+    variance = symbol(f"q{i}") * symbol("h")
+    opening = OPENING + model.states[i].name
+    if opening not in model.drives:
+        return variance
+    return variance + symbol(f"b{model.drives.index(opening)}") * symbol("share")
 
 
 def predict_expressions(model: ProcessModel) -> Outputs:
@@ -284,7 +290,7 @@ def predict_expressions(model: ProcessModel) -> Outputs:
     for i in range(n):
         for j in range(i, n):
             spread = total([FP[i][k] * F[j][k] for k in range(n)])
-            outputs[f"P{i}_{j}"] = spread + process_noise(i) if i == j else spread
+            outputs[f"P{i}_{j}"] = spread + process_noise(model, i) if i == j else spread
     return outputs
 
 

@@ -1,5 +1,6 @@
 """`estimate_bulk_modulus(record, parameters)`: a number, an interval, a verdict; or a sentence instead of a number."""
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TypeVar
@@ -13,15 +14,16 @@ from estimation.bulk_modulus_estimate import OUTCOMES as OUTCOMES
 from estimation.consistency import MISMATCH_NIS, Gate
 from estimation.eha import FORMS
 from estimation.filter_estimate import FilterOptions, estimate_by_filter, estimate_by_flow_filter
-from estimation.first_belief import START_STD, first_belief
+from estimation.first_belief import START_STD, first_belief, first_load
 from estimation.flow_fit import FLOW_CHANNELS, REPORTED, fit_flow
 from estimation.form_fit import FormFit
 from estimation.measurement_noise import measurement_variances
 from estimation.motion_fit import MOTION_CHANNELS, fit_motion
-from estimation.run import available_channels
-from estimation.sensor_check import sensor_objections
+from estimation.outliers import without_gross_outliers
+from estimation.run import available_channels, predicted_channels
+from estimation.sensor_check import PRESSURE, sensor_objections, without_saturated
 from plant.eha import EhaParameters
-from plant.errors import HydrostateError
+from plant.errors import HydrostateError, LogWarning
 from plant.record import Record
 
 T = TypeVar("T")
@@ -62,7 +64,8 @@ def estimate_bulk_modulus(
         errata E9), or ``"auto"``: flow or motion where their channels are logged, else pressure.
     method : str
         ``"least-squares"`` for the forms that can be fitted, flow and motion; a filter of `estimation.run.METHODS`; or
-        ``"auto"``: least squares where the form allows and nothing is asked for that only a filter does, else ``ekf``.
+        ``"auto"``: least squares where the form allows, the log begins at rest, and nothing is asked for that only a
+        filter does, else ``ekf``.
     start : float, optional
         First guess [Pa].
     start_std : float
@@ -94,10 +97,13 @@ def estimate_bulk_modulus(
     known = uncertainties or {}
     options = FilterOptions("ekf" if method in ("auto", LEAST_SQUARES) else method, states, tuned, robust)
     filtering = method not in ("auto", LEAST_SQUARES) or options != FilterOptions()
-    if form == "auto":
+    automatic = form == "auto"
+    if automatic:
         form = "pressure" if filtering else _automatic(record)
-        if form == "motion" and (bound := rigid_bound(record, parameters)) > LARGEST_BOUND:
-            return _doubting_sensors(_unseen(bound), record, parameters)
+    record = _believable(record, parameters, form)
+    if automatic and form == "motion" and (bound := rigid_bound(record, parameters)) > LARGEST_BOUND:
+        return _doubting_sensors(_unseen(bound), record, parameters)
+    filtering |= form == "flow" and method == "auto" and first_load(record) != 0.0  # a fit begins at rest
     if form in FITTED and not filtering:
         fit, channels = FITTED[form]
         found = _fitted(fit(record, parameters, guess, known), form, channels)
@@ -111,6 +117,16 @@ def estimate_bulk_modulus(
         model = _chosen(FORMS, form, "form")
         found = _with_rig(estimate_by_filter(record, parameters, model, guess, start_std, options), known)
     return _doubting_sensors(found, record, parameters)
+
+
+def _believable(record: Record, parameters: EhaParameters, form: str) -> Record:
+    """Return the log without gross outliers and clipped pressures of what a form uses; warn of what was left out."""
+    used = FITTED[form][1] if form in FITTED else predicted_channels(_chosen(FORMS, form, "form"))
+    record, outliers = without_gross_outliers(record, ("motor_speed_rad_s", *used))
+    record, clipped = without_saturated(record, parameters) if PRESSURE in used else (record, ())
+    for sentence in (*outliers, *clipped):
+        warnings.warn(sentence, LogWarning, stacklevel=3)
+    return record
 
 
 def _doubting_sensors(found: BulkModulusEstimate, record: Record, parameters: EhaParameters) -> BulkModulusEstimate:

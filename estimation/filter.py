@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.model import ProcessModel
+from estimation.model import OPENING, ProcessModel
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ class FilterProblem:
     covariance : ndarray, shape (n, n)
         Prior covariance, scaled.
     drives : ndarray, shape (samples, drives)
-        Channels that drive the model, in SI, no sample missing.
+        Channels that drive the model, in SI, no sample missing; and what gaps in them open (`estimation.bridging`).
     measured : ndarray, shape (samples, channels)
         Measurements in SI; NaN is missing.
     parameters : ndarray, shape (parameters,)
@@ -70,6 +70,15 @@ class FilterProblem:
     keep_innovations: bool
     robust: str = "none"
     settings: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    @property
+    def opened(self) -> Array:
+        """Variance that each sample adds to each state beside the process noise, shape (samples, n), scaled."""
+        added = np.zeros((len(self.drives), self.model.width))
+        for i, state in enumerate(self.model.states):
+            if OPENING + state.name in self.model.drives:
+                added[:, i] = self.drives[:, self.model.drives.index(OPENING + state.name)]
+        return added
 
 
 @dataclass(frozen=True, eq=False)

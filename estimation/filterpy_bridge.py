@@ -27,6 +27,7 @@ class _ModelFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy carr
     """filterpy's filter with the prediction of the mean taken from outside."""
 
     moved: Array
+    opened: Array
 
     def predict_x(self, u: object = 0) -> None:
         """Set the mean to where the model moved it."""
@@ -60,8 +61,7 @@ def filterpy_ekf(problem: FilterProblem) -> Trace:
         values.fill(np.nan)
     H, bounds = _observation_matrix(problem), _bounds(problem.model)
     kalman = _ModelFilter(dim_x=problem.model.width, dim_z=len(problem.channels))
-    kalman.x, kalman.P = problem.mean.copy(), problem.covariance.copy()
-    kalman.Q = np.diag(problem.noise) * problem.sample_time / problem.substeps
+    kalman.x, kalman.P, kalman.opened = problem.mean.copy(), problem.covariance.copy(), problem.opened
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", LinAlgWarning)  # a covariance is ill-conditioned long before it is of no use
         try:
@@ -117,6 +117,7 @@ def _observation_matrix(problem: FilterProblem) -> Array:
 def _predict(kalman: _ModelFilter, problem: FilterProblem, k: int) -> None:
     step = compile_step(problem.model).step
     h = problem.sample_time / problem.substeps
+    kalman.Q = np.diag(problem.noise) * h + np.diag(kalman.opened[k]) / problem.substeps
     slope = (problem.drives[k] - problem.drives[k - 1]) / problem.substeps
     for j in range(problem.substeps):
         start = problem.drives[k - 1] + j * slope

@@ -4,6 +4,7 @@ import numpy as np
 
 from estimation.eha import BULK_MODULUS
 from estimation.gaussian import Gaussian
+from estimation.measurement_noise import measurement_variances
 from estimation.model import ProcessModel
 from plant.record import Record
 
@@ -13,6 +14,10 @@ model leaves out (make-up, changing volumes); without the sensor the model's own
 
 START_STD = 3e8
 """Standard deviation of the first guess [Pa]: convergence is driven by it (errata E10)."""
+
+
+AT_REST = 3e4
+"""Differential pressure of an actuator that is taken to be at rest, at most, beside five deviations of noise [Pa]."""
 
 
 def first_belief(model: ProcessModel, record: Record, start: float, start_std: float) -> Gaussian:
@@ -45,6 +50,29 @@ def first_belief(model: ProcessModel, record: Record, start: float, start_std: f
     }
     mean = np.array([firsts.get(state.name, 0.0) for state in model.states])
     return Gaussian(mean, np.diag([spreads[state.name] ** 2 for state in model.states]))
+
+
+def first_load(record: Record) -> float:
+    """Return the differential pressure that a log begins with, zero where that is little enough for rest.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with differential pressure.
+
+    Returns
+    -------
+    float
+        Pressure in chamber A less that in chamber B at the first sample that has it [Pa].
+
+    Examples
+    --------
+    >>> first_load(Record(1e-3, {"differential_pressure_pa": np.array([np.nan, -4e5, -5e5, -6e5])}))
+    -400000.0
+    """
+    channel = "differential_pressure_pa"
+    first, noise = _first(record, channel), measurement_variances(record, (channel,))[channel] ** 0.5
+    return first if abs(first) > AT_REST + 5.0 * noise else 0.0
 
 
 def _first(record: Record, channel: str) -> float:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from estimation.batch import filter_batch
 from estimation.eha import BULK_MODULUS
 from estimation.filter import FilterProblem, Trace
+from estimation.first_belief import first_load
 from estimation.flow import flow_rates
 from estimation.gaussian import Gaussian
 from estimation.model import ProcessModel, StateVariable
@@ -46,6 +47,10 @@ GUESS_STD = 0.3
 
 PRESSURE_STD = 1e4
 """Standard deviation of the chamber pressures before the first sample, at rest [Pa]."""
+
+LOAD_STD = 0.3
+"""Standard deviation of the chamber pressures before the first sample of a log that begins under load, where the lower
+one need not be that of the inner circuit [fraction of the load]."""
 
 SECONDARY_STD: Mapping[str, float] = {"makeup_conductance": 0.1, "speed_lead": 1.0}
 """Relative deviations of what is estimated along with them [fraction]."""
@@ -126,7 +131,7 @@ def filter_flow(record: Record, parameters: EhaParameters, noise: Mapping[str, f
     Parameters
     ----------
     record : Record
-        The log, with motor speed, position and differential pressure; it begins at rest.
+        The log, with motor speed, position and differential pressure.
     parameters : EhaParameters
         Geometry and pump are taken from it, and the first guesses' size.
     noise : Mapping[str, float], optional
@@ -143,19 +148,21 @@ def filter_flow(record: Record, parameters: EhaParameters, noise: Mapping[str, f
     LogError
         If a channel is missing.
     """
-    first = filter_problem(FLOW_FILTER, _prior(parameters, 1.0, 1.0, 1.0, MAKEUPS[0]), record, parameters, noise=noise)
+    load = first_load(record) if "differential_pressure_pa" in record else 0.0
+    anywhere = _prior(parameters, load, 1.0, 1.0, 1.0, MAKEUPS[0])
+    first = filter_problem(FLOW_FILTER, anywhere, record, parameters, noise=noise)
     problems: list[FilterProblem] = []
     for guess in product(MODULI, LEAKAGES, BIASES, MAKEUPS):
-        prior = FLOW_FILTER.to_filter(_prior(parameters, *guess))
+        prior = FLOW_FILTER.to_filter(_prior(parameters, load, *guess))
         problems.append(replace(first, mean=prior.mean, covariance=prior.covariance))
     return in_si(first, mixture(list(filter_batch(problems))), record.start_time)
 
 
-def _prior(p: EhaParameters, modulus: float, leakage: float, bias: float, makeup: float) -> Gaussian:
+def _prior(p: EhaParameters, load: float, modulus: float, leakage: float, bias: float, makeup: float) -> Gaussian:
     healthy = EhaParameters()
     means = {
-        "pressure_a_pa": p.accumulator_pressure,
-        "pressure_b_pa": p.accumulator_pressure,
+        "pressure_a_pa": p.accumulator_pressure + max(load, 0.0),
+        "pressure_b_pa": p.accumulator_pressure + max(-load, 0.0),
         BULK_MODULUS: modulus * p.bulk_modulus,
         "leakage_coefficient": leakage * max(p.leakage_coefficient, LEAST * healthy.leakage_coefficient),
         "flow_bias": bias * max(p.flow_bias, LEAST * healthy.flow_bias),
@@ -163,7 +170,7 @@ def _prior(p: EhaParameters, modulus: float, leakage: float, bias: float, makeup
         "speed_lead": 1e-5,
     }
     stds = [
-        PRESSURE_STD
+        float(np.hypot(PRESSURE_STD, LOAD_STD * load))
         if state.unit == "Pa" and not state.logarithmic
         else SECONDARY_STD.get(state.name, GUESS_STD) * value
         for state, value in zip(STATES, means.values(), strict=True)

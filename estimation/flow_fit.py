@@ -6,7 +6,6 @@ from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import rank_filter
 
 from estimation.flow import FLOW_FORM, MASS_FLOW_FORM, relieving
 from estimation.form_fit import LONGEST_STEP, FormFit, weighed
@@ -14,6 +13,7 @@ from estimation.greybox_fit import GreyBoxFit, Search, fit_greybox
 from estimation.greybox_problem import GreyBoxLog, OutputNoise, Problem
 from estimation.identification.preprocess import bridged
 from estimation.measurement_noise import measurement_variances
+from estimation.outliers import without_outliers
 from plant.eha import EhaParameters
 from plant.errors import LogError
 from plant.integrate import parameter_row
@@ -56,19 +56,6 @@ LARGEST_AUTOCORRELATION = 0.1
 
 LEAST_LEAKAGE = 1e-3
 """Least first guess of a leakage, as a share of the rated pump flow [fraction]; a logarithm cannot start at zero."""
-
-HAMPEL_WINDOW = 7
-"""Samples of the running median that a gross outlier stands out from; a signal that only rises or only falls is its own
-median, so a step of the drive is none."""
-
-GROSS = 10.0
-"""How far beyond the channel's usual distance from its running median a gross outlier is [dimensionless]."""
-
-BENDS = 3.0
-"""By how many spreads of the window's middle samples it is farther away still: a peak is none [dimensionless]."""
-
-USUAL = 95.0
-"""Share of the samples that are taken to be no outliers [percent]."""
 
 LONG_GAP = 5
 """Missing speeds in a row after which nothing is concluded from the speeds at the gap's ends [samples]."""
@@ -138,43 +125,6 @@ def fit_flow(
     return FormFit(found, rig_std, std / value, best.chi_square[0], _objections(best))
 
 
-def without_outliers(values: Array, noise: float = 0.0) -> Array:
-    """Return a channel without its gross outliers, which become missing samples (Hampel 1974).
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        A channel [any unit]; NaN where missing.
-    noise : float
-        Standard deviation of its noise [the channel's unit].
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        The channel, NaN where it stood out.
-
-    Examples
-    --------
-    >>> step = np.repeat([0.0, 1.0], 10)
-    >>> step[4] = 30.0
-    >>> np.flatnonzero(np.isnan(without_outliers(step))).tolist()
-    [4]
-    """
-    seen = values[np.isfinite(values)]
-    middle = HAMPEL_WINDOW // 2
-    below, distance, spread = (rank_filter(seen, middle + k, size=HAMPEL_WINDOW, mode="nearest") for k in (-1, 0, 1))
-    spread -= below  # in place: a long log's channel is large
-    distance -= seen
-    np.abs(distance, out=distance)
-    usual = float(np.percentile(distance, USUAL)) if len(seen) else 0.0
-    spread *= BENDS
-    spread += GROSS * (usual + noise)
-    seen[distance > spread] = np.nan
-    kept = values.copy()
-    kept[np.isfinite(values)] = seen
-    return kept
-
-
 def speed_gaps(record: Record, parameters: EhaParameters) -> Array:
     """Return where missing motor speeds leave the pumped volume open by more than the pressure can overlook.
 
@@ -194,6 +144,7 @@ def speed_gaps(record: Record, parameters: EhaParameters) -> Array:
     bounds = np.flatnonzero(np.diff(np.isnan(speed).astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
     noise = measurement_variances(record, ("differential_pressure_pa",))["differential_pressure_pa"] ** 0.5
     stiffness = parameters.bulk_modulus / parameters.chamber_volume * parameters.pump_displacement
+    usual = float(np.median(np.diff(np.flatnonzero(np.isfinite(speed)))))  # more than 1 for a slow sensor
     bumps: list[Array] = []
     for first, after in bounds:
         length = after - first
@@ -203,7 +154,7 @@ def speed_gaps(record: Record, parameters: EhaParameters) -> Array:
         slopes = np.nan_to_num([speed[first - 1] - speed[first - 2], speed[after + 1] - speed[after]])
         sudden = abs(speed[after] - speed[first - 1] - np.mean(slopes) * (length + 1))
         felt = 0.5 * stiffness * sudden * length * record.sample_time > FELT_GAP * noise
-        if felt or length >= LONG_GAP:
+        if felt or length >= LONG_GAP * usual:
             bumps.append(np.zeros(len(speed)))
             bumps[-1][first:after] = 1.0
     return np.array(bumps)

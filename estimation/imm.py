@@ -189,7 +189,8 @@ def _run(
     log_probability: Array,
     start_time: float,
 ) -> MultipleModelEstimate:
-    kinds = tuple(dict.fromkeys((mode.rule, mode.model) for mode in modes))
+    each = [(mode.rule, problem.model) for mode, problem in zip(modes, problems, strict=True)]
+    kinds = tuple(dict.fromkeys(each))
     kernel = compile_imm(kinds, first.channels)
     rows = [constant_row(problem, dict(mode.settings)) for mode, problem in zip(modes, problems, strict=True)]
     packed = np.concatenate([first.mean, first.covariance[np.triu_indices(first.model.width)]])
@@ -199,7 +200,7 @@ def _run(
     log_likelihood = kernel.run(
         states,
         _padded(rows),
-        np.array([kinds.index((mode.rule, mode.model)) for mode in modes]),
+        np.array([kinds.index(kind) for kind in each]),
         transitions,
         log_probability,
         first.drives,

@@ -19,6 +19,10 @@ from plant.errors import HydrostateError
 
 Array = NDArray[np.float64]
 
+OPENING = "opening_"
+"""What a drive is called, before a state's name, that holds the variance that a sample adds to the state beside the
+process noise, in the filter's units [dimensionless]: see `estimation.bridging`."""
+
 
 @dataclass(frozen=True)
 class StateVariable:

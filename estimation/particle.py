@@ -41,9 +41,9 @@ def run(
     logs, weights, seen = np.empty(size), np.empty(size), np.empty((size, channels))
     deviations = np.empty({width})
     log_likelihood = 0.0
-    spread(rows, deviations)
     for k in range(n):
         if k > 0:
+            spread(rows, drives[k], deviations)
             for i in range(size):
                 for j in range(substeps):
                     move(particles[i], rows, drives[k - 1], drives[k], float(j))
@@ -132,13 +132,15 @@ def compile_particles(model: ProcessModel, channels: tuple[str, ...]) -> Callabl
     reads = {**state, **rows, **data_places(model, channels)}
     stepped = {f"z{i}": z for i, z in enumerate(bounded(model, moved(model, mean)))}
     predicted = {f"p{c}": value for c, value in enumerate(observed(model, mean, channels))}
-    noise = {f"d{i}": unary("sqrt", process_noise(i)) for i in range(model.width)}
+    noise = {f"d{i}": unary("sqrt", process_noise(model, i)) for i in range(model.width)}
     source = HEADER.format(title=f"particles on the {model.name} form")
     source += function_source("move", "state, rows, before, after, j", reads, stepped, state)
     source += function_source(
         "observe", "state, rows, seen", reads, predicted, {n: f"seen[{n[1:]}]" for n in predicted}
     )
-    source += function_source("spread", "rows, deviations", rows, noise, {n: f"deviations[{n[1:]}]" for n in noise})
+    source += function_source(
+        "spread", "rows, after, deviations", reads, noise, {n: f"deviations[{n[1:]}]" for n in noise}
+    )
     return load_kernel(f"particles_{model.name}", source + _LOOP.format(width=model.width)).run
 
 

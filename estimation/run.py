@@ -7,12 +7,12 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.bridging import with_gaps_open
 from estimation.ckf import ckf
 from estimation.ekf import ekf
 from estimation.filter import FilterProblem, Method, Trace
 from estimation.filterpy_bridge import filterpy_ekf
 from estimation.gaussian import Gaussian
-from estimation.identification.preprocess import bridged
 from estimation.iekf import iekf
 from estimation.measurement_noise import measurement_variances
 from estimation.model import ProcessModel
@@ -249,13 +249,14 @@ def filter_problem(
     density = np.array([(noise or {}).get(state.name, state.noise_density) for state in model.states])
     squared = np.array([1.0 if state.logarithmic else state.scale**2 for state in model.states])
     scaled = model.to_filter(prior)
+    model, drives, comparable = with_gaps_open(model, record, parameters)
     return FilterProblem(
         model=model,
         channels=used,
         mean=scaled.mean,
         covariance=scaled.covariance,
-        drives=np.column_stack([bridged(record[drive]) for drive in model.drives]),
-        measured=np.column_stack([record[channel] for channel in used]),
+        drives=drives,
+        measured=np.where(comparable[:, None], np.column_stack([record[channel] for channel in used]), np.nan),
         parameters=parameter_row(parameters),
         noise=density / squared,
         variances=np.array([spread[channel] for channel in used]),

@@ -234,7 +234,7 @@ def sigma_predict(model: ProcessModel, spread_of: SpreadOf) -> Outputs:
     for i in range(n):
         for j in range(i, n):
             value = covariance_of(found, i, j, spread)
-            outputs[f"P{i}_{j}"] = value + process_noise(i) if i == j else value
+            outputs[f"P{i}_{j}"] = value + process_noise(model, i) if i == j else value
     return outputs
 
 

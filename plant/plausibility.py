@@ -131,9 +131,10 @@ def _above_noise(values: Values) -> bool:
     """Tell a signal from sensor noise: white noise, or its derivative, has large second differences."""
     if _span(values) == 0.0:
         return False
-    scaled = values / np.nanmax(np.abs(values))
-    noise = float(np.nanmean(np.diff(scaled, 2) ** 2)) / 6.0
-    return float(np.nanvar(scaled)) > 4.0 * noise
+    present = values[np.isfinite(values)]
+    scaled = present / np.max(np.abs(present))
+    noise = float(np.mean(np.diff(scaled, 2) ** 2)) / 6.0
+    return float(np.var(scaled)) > 4.0 * noise
 
 
 def _displaced(sample_time: float, channels: Mapping[str, Values], source: str) -> list[str]:
@@ -167,7 +168,9 @@ def _pumped(sample_time: float, channels: Mapping[str, Values], source: str) -> 
 
 
 def _integrated(sample_time: float, rate: Values) -> Values:
-    return np.cumsum(np.where(np.isfinite(rate), rate, 0.0)) * sample_time
+    present = np.flatnonzero(np.isfinite(rate))
+    whole = rate if len(present) == len(rate) else np.interp(np.arange(len(rate)), present, rate[present])
+    return np.cumsum(whole) * sample_time
 
 
 def _gain(output: Values, cause: Values, alike: float) -> float | None:

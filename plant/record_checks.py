@@ -155,7 +155,10 @@ def _uniform(columns: Channels, source: str, clock: Clock | None, notes: list[st
     channels = {name: values for name, values in columns.items() if name != TIME}
     if clock is not None and _agrees(time, clock):
         return Checked(clock.sample_time, clock.start_time, channels)
-    ticks = _ticks(time, source)
+    try:
+        ticks = _ticks(time, source)
+    except LogError as uneven:
+        return _merged(time, channels, source, notes, uneven)
     sample_time = float((time[-1] - time[0]) / ticks.sum())
     jitter = float(np.abs(np.diff(time) / sample_time - ticks).max())
     slots = np.concatenate(([0.0], np.cumsum(ticks)))
@@ -164,6 +167,33 @@ def _uniform(columns: Channels, source: str, clock: Clock | None, notes: list[st
         even = time[0] + sample_time * slots
         channels = {name: _resampled(even, time, values) for name, values in channels.items()}
     return Checked(sample_time, float(time[0]), _spread(channels, slots.astype(np.int64)))
+
+
+def _merged(time: Values, channels: Channels, source: str, notes: list[str], uneven: LogError) -> Checked:
+    """Put channels that were logged at times of their own on the clock of the fastest; else the rows are uneven.
+
+    A slower channel's sample goes to the nearest tick, as interpolated there between the channel's own samples.
+    """
+    there = {name: np.isfinite(values) for name, values in channels.items()}
+    fastest = max(there, key=lambda name: int(there[name].sum()))
+    own = time[there[fastest]]
+    if len(own) == len(time) or len(own) < FEWEST_SAMPLES or np.diff(time).min() < 0.0:
+        raise uneven
+    try:
+        on_clock = _uniform({TIME: own, fastest: channels[fastest][there[fastest]]}, source, None, notes)
+    except LogError:
+        raise uneven from None
+    even = on_clock.start_time + on_clock.sample_time * np.arange(len(on_clock.channels[fastest]))
+    out = dict(on_clock.channels)
+    for name, values in channels.items():
+        if name != fastest and there[name].any():
+            when = time[there[name]]
+            slots = np.rint((when - even[0]) / on_clock.sample_time).astype(np.int64)
+            slots = slots[(slots >= 0) & (slots < len(even))]
+            out[name] = np.full(len(even), np.nan)
+            out[name][slots] = np.interp(even[slots], when, values[there[name]])
+    notes.append(f"{source}: channels have times of their own; put on the {on_clock.sample_time:.6g} s of {fastest}")
+    return Checked(on_clock.sample_time, on_clock.start_time, out)
 
 
 def _ticks(time: Values, source: str) -> Values:
@@ -228,6 +258,15 @@ def _derived(channels: Channels) -> Channels:
     return {**channels, wanted: channels[a] - channels[b]}
 
 
+def _slower(values: Values) -> int:
+    """Return every how many samples a channel is logged, where it is slower than the clock but steady; 1 for others."""
+    present = np.flatnonzero(np.isfinite(values))
+    if len(present) < FEWEST_SAMPLES:
+        return 1
+    usual = float(np.median(np.diff(present)))
+    return round(usual) if len(present) >= (1.0 - MOST_MISSING) * (len(values) / usual - 1.0) else 1
+
+
 def _masked(channels: Channels, required: Collection[str], source: str, notes: list[str]) -> Channels:
     kept = dict(channels)
     for name, values in channels.items():
@@ -236,6 +275,9 @@ def _masked(channels: Channels, required: Collection[str], source: str, notes: l
             continue
         if count <= MOST_MISSING * total:
             notes.append(f"{source}: {name} is missing in {_share(count, total)}; they are masked")
+            continue
+        if (rows := _slower(values)) > 1:
+            notes.append(f"{source}: {name} is logged every {rows} samples of the clock")
             continue
         del kept[name]
         if not all(any(other in kept for other in _alternatives(wanted)) for wanted in required):

@@ -1,5 +1,6 @@
 """Bulk modulus comes back from simulated and from foreign logs, or the outcome says why it cannot."""
 
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
@@ -12,9 +13,10 @@ from estimation.eha import PRESSURE_FORM
 from estimation.first_belief import first_belief
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.eha import EhaParameters
-from plant.errors import HydrostateError, LogError
+from plant.errors import HydrostateError, LogError, LogWarning
 from plant.record import Record
 from plant.record_files import read_record
+from plant.sensor_faults import SensorFault, with_fault
 from plant.sensors import BENCH
 from plant.signals import make_drive
 from plant.simulate import PLANTS, simulate
@@ -203,3 +205,126 @@ def test_every_start_and_seed_of_the_study_converges(name: str, seed: int) -> No
         log = bench_log.__wrapped__("lumped", drive, name, seed)
         assert largest_error(log, name, "pressure", WIDE_STARTS) < 0.01
     assert largest_error(without_pressure(log), name, "pressure", WIDE_STARTS) < 0.03
+
+
+PRESSURE = "differential_pressure_pa"
+
+
+def clipped(record: Record, share: float) -> Record:
+    """The log of a pressure sensor whose range ends at a share of the largest pressure."""
+    limit = 500.0 * round(share * float(np.max(np.abs(record[PRESSURE]))) / 500.0)
+    return with_fault(record, SensorFault(channel=PRESSURE, kind="saturation", size=limit))
+
+
+def sampled(sample_time: float, condition: str = "minor_leakage", duration: float = 5.0) -> Record:
+    p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(21)
+    speed = make_drive("prbs", duration, sample_time, p, rng)
+    return simulate(PLANTS["lumped"], speed, sample_time, p, sensors=BENCH, rng=rng)
+
+
+def covers(answer: BulkModulusEstimate, truth: float) -> bool:
+    low, high = answer.interval or (np.inf, -np.inf)
+    return low < truth < high
+
+
+@pytest.mark.parametrize("method", ["least-squares", "ekf"])
+def test_a_clipped_pressure_leaves_bulk_modulus_within_its_interval(method: str) -> None:
+    log = sampled(1e-3)
+    with pytest.warns(LogWarning, match=f"{PRESSURE} is at the end of its range, .* Pa, in [3-7]. % of its samples"):
+        answer = estimate_bulk_modulus(clipped(log, 0.7), EhaParameters(), form="flow", method=method)
+    assert covers(answer, TRUTH)
+    assert answer.gate.passed
+    assert answer.value == pytest.approx(TRUTH, rel=0.01)
+
+
+def test_a_clipped_pressure_of_the_foreign_bench_leaves_bulk_modulus_within_its_interval(shared: Path) -> None:
+    log, _, truth = foreign_logs(shared)[10]
+    with pytest.warns(LogWarning, match="is at the end of its range"):
+        answer = estimate_bulk_modulus(clipped(log, 0.7), EhaParameters())
+    assert covers(answer, truth)
+    assert answer.value == pytest.approx(truth, rel=0.005)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.9, 0.7, 0.5])
+def test_clipped_logs_of_the_foreign_bench_cover_as_sound_ones_do(share: float, shared: Path) -> None:
+    covered: list[bool] = []
+    for log, _, truth in foreign_logs(shared)[::2]:
+        with pytest.warns(LogWarning, match="is at the end of its range"):
+            answer = estimate_bulk_modulus(clipped(log, share), EhaParameters())
+        assert answer.value == pytest.approx(truth, rel=0.02)
+        covered.append(covers(answer, truth))
+    assert sum(covered) >= 7
+
+
+def every_tenth(record: Record, channel: str, first: int) -> Record:
+    slow = np.full(len(record), np.nan)
+    slow[first::10] = record[channel][first::10]
+    return record.replace(**{channel: slow})
+
+
+ASYNCHRONOUS: Mapping[str, tuple[float, tuple[str, ...]]] = {
+    "500 Hz": (2e-3, ()),
+    "2 kHz": (5e-4, ()),
+    "20 kHz": (5e-5, ()),
+    "pressure at 1 of 10 kHz": (1e-4, (PRESSURE,)),
+    "pressure and encoder at 1 of 10 kHz, at different times": (1e-4, (PRESSURE, "position_m")),
+}
+"""Sample time, and channels that are logged every tenth row."""
+
+
+def asynchronous(rate: str, duration: float = 5.0) -> Record:
+    sample_time, slow = ASYNCHRONOUS[rate]
+    record = sampled(sample_time, duration=duration)
+    for first, channel in enumerate(slow, 3):
+        record = every_tenth(record, channel, first)
+    return record
+
+
+@pytest.mark.parametrize("rate", ASYNCHRONOUS)
+def test_the_pressure_form_takes_any_rate_and_channels_of_several(rate: str) -> None:
+    answer = estimate_bulk_modulus(asynchronous(rate), parameters_for(CONDITIONS["minor_leakage"]), form="pressure")
+    assert covers(answer, TRUTH)
+    assert answer.value == pytest.approx(TRUTH, rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["least-squares", "ekf"])
+@pytest.mark.parametrize("rate", ASYNCHRONOUS)
+def test_the_flow_form_takes_any_rate_and_channels_of_several(rate: str, method: str) -> None:
+    answer = estimate_bulk_modulus(asynchronous(rate, 10.0), EhaParameters(), form="flow", method=method, start=3e8)
+    assert covers(answer, TRUTH)
+    assert answer.value == pytest.approx(TRUTH, rel=0.01)
+    assert answer.gate.passed
+
+
+@pytest.mark.parametrize("form", ["pressure", pytest.param("flow", marks=pytest.mark.slow)])
+def test_a_slow_speed_sensor_does_not_bias_a_filter(form: str) -> None:
+    log = every_tenth(every_tenth(sampled(1e-4, duration=10.0), PRESSURE, 3), "motor_speed_rad_s", 7)
+    known = parameters_for(CONDITIONS["minor_leakage"]) if form == "pressure" else EhaParameters()
+    answer = estimate_bulk_modulus(log, known, form=form, method="ekf")
+    assert answer.value == pytest.approx(TRUTH, rel=0.005)
+    assert covers(answer, TRUTH)
+    assert answer.gate.passed
+
+
+@pytest.mark.parametrize("first", [2130, pytest.param(3337, marks=pytest.mark.slow)])
+def test_a_log_that_begins_under_load_gives_its_bulk_modulus(first: int, shared: Path) -> None:
+    log, _, truth = foreign_logs(shared)[10]
+    assert abs(log[PRESSURE][first]) > 1e5
+    answer = estimate_bulk_modulus(log.slice(first), EhaParameters())
+    assert (answer.form, answer.estimate is not None) == ("flow", True)
+    assert answer.value == pytest.approx(truth, rel=0.005)
+
+
+def test_gross_outliers_and_drop_outs_of_speed_leave_a_filter_as_good_as_on_a_sound_log() -> None:
+    log, rng = sampled(1e-3, "normal", 10.0), np.random.default_rng(4)
+    speed = log["motor_speed_rad_s"].copy()
+    speed[rng.choice(len(log), len(log) // 100, replace=False)] += 20.0 * np.std(speed)
+    speed[4000:4100] = np.nan
+    with pytest.warns(LogWarning, match=r"motor_speed_rad_s stands out grossly in \d+ of 10000 samples"):
+        broken = found(log.replace(motor_speed_rad_s=speed), "normal", "pressure", 3e8)
+    sound = found(log, "normal", "pressure", 3e8)
+    assert broken.gate.passed
+    assert abs(broken.value - TRUTH) < max(2.0 * abs(sound.value - TRUTH), 1e-3 * TRUTH)
+    assert broken.std < 1.5 * sound.std

@@ -4,8 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from estimation.flow_fit import fit_flow, speed_gaps, without_outliers
-from estimation.measurement_noise import measurement_variances
+from estimation.flow_fit import fit_flow, speed_gaps
 from faults.conditions import CONDITIONS, parameters_for
 from plant.circuit_parameters import circuit_of
 from plant.eha import EhaParameters
@@ -94,23 +93,6 @@ def test_fast_and_slow_logs_with_gaps_give_their_bulk_modulus(sample_time: float
     record = simulate(LUMPED, make_drive("steps", 5.0, sample_time, p, rng), sample_time, p, sensors=BENCH, rng=rng)
     fit = fit_flow(drop_samples(record, 0.01, rng), HEALTHY, 3e8)
     assert fit.parameters["bulk_modulus"][0] == pytest.approx(p.bulk_modulus, rel=0.02)
-
-
-@pytest.mark.parametrize("drive", ["steps", "prbs", "sine"])
-@pytest.mark.parametrize("condition", CONDITIONS)
-def test_a_sound_log_has_no_outliers(condition: str, drive: str) -> None:
-    record = log(condition, 15, drive)
-    noise = measurement_variances(record, ("motor_speed_rad_s", "position_m", "differential_pressure_pa"))
-    for channel, variance in noise.items():
-        assert np.array_equal(without_outliers(record[channel], variance**0.5), record[channel]), channel
-
-
-def test_outliers_are_taken_out_and_steps_are_not() -> None:
-    record = log("normal", 16, "prbs")
-    speed = record["motor_speed_rad_s"].copy()
-    hit = np.random.default_rng(16).choice(len(speed), len(speed) // 100, replace=False)
-    speed[hit] += 20.0 * np.std(speed)
-    assert set(np.flatnonzero(np.isnan(without_outliers(speed)))) == set(hit)
 
 
 def test_a_gap_in_speed_matters_at_a_reversal_and_not_between() -> None:

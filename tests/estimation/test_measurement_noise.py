@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimation.measurement_noise import SMALLEST_VARIANCE, measurement_variances
+from estimation.measurement_noise import SMALLEST_VARIANCE, measurement_variances, position_variance
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.record import Record
 from plant.sensors import BENCH, drop_samples, noise_variances
@@ -65,3 +65,13 @@ def test_a_coarse_quantum_counts_although_most_samples_repeat() -> None:
 
 def test_a_noiseless_ramp_is_not_taken_for_quantised() -> None:
     assert variance_of("position_m", 4e-5 * np.arange(1_000)) == SMALLEST_VARIANCE["position_m"]
+
+
+def test_a_slow_sensor_has_the_noise_of_the_samples_that_it_has() -> None:
+    noise = np.random.default_rng(2).normal(0.0, 5e3, 2_000)
+    slow = np.full(20_000, np.nan)
+    slow[7::10] = noise
+    assert variance_of("differential_pressure_pa", slow) == variance_of("differential_pressure_pa", noise)
+    steps = np.round(np.linspace(0.0, 1e-3, 2_000) / 1e-6) * 1e-6
+    slow[7::10] = steps
+    assert position_variance(slow) == position_variance(steps)

@@ -26,7 +26,9 @@ def task(linear: ProcessModel, samples: int = 40) -> FilterProblem:
         for name, size in (("position_m", 0.05), ("velocity_m_s", 0.3))
     }
     model = replace(linear, name="coarse", longest_step=0.005)
-    record = Record(0.01, {"motor_speed_rad_s": rng.normal(size=samples), **channels})
+    speed = rng.normal(0.0, 1e3, samples)
+    speed[samples // 2 : samples // 2 + 3] = np.nan
+    record = Record(0.01, {"motor_speed_rad_s": speed, **channels})
     prior = Gaussian(np.array([0.0, 0.0, 0.5]), np.diag([1e-3, 1e-2, 1.0]))
     problem = filter_problem(
         model,

@@ -1,5 +1,6 @@
 """A sensor that has stopped telling the truth is named; a sound log, however coarse or still, is not accused."""
 
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -56,20 +57,81 @@ def test_a_pressure_sensor_that_shows_nothing_is_named() -> None:
     assert "noise and nothing else" in dead
 
 
-def test_samples_at_the_end_of_a_sensors_range_are_taken_out() -> None:
-    log = run()
-    limit = 0.6 * float(np.max(np.abs(log[PRESSURE])))
-    clipped = with_fault(log, SensorFault(channel=PRESSURE, kind="saturation", size=limit))
-    cleaned, lost = without_saturated(clipped, [PRESSURE])
-    beyond = np.abs(log[PRESSURE]) > limit
-    assert lost[PRESSURE] == np.count_nonzero(np.isnan(cleaned[PRESSURE])) >= np.count_nonzero(beyond)
-    assert float(np.nanmax(np.abs(cleaned[PRESSURE]))) < limit
+def clipped(record: Record, share: float) -> tuple[Record, float]:
+    limit = 500.0 * round(share * float(np.max(np.abs(record[PRESSURE]))) / 500.0)
+    return with_fault(record, SensorFault(channel=PRESSURE, kind="saturation", size=limit)), limit
+
+
+@pytest.mark.parametrize("share", [0.9, 0.6])
+@pytest.mark.parametrize("drive", ["steps", "prbs"])
+@pytest.mark.parametrize("condition", ["normal", "major_friction", "major_leakage"])
+def test_samples_at_the_end_of_a_sensors_range_are_taken_out(condition: str, drive: str, share: float) -> None:
+    record, limit = clipped(run(drive, condition), share)
+    cleaned, (said,) = without_saturated(record, RIG_PARAMETERS)
+    at_the_end = np.abs(record[PRESSURE]) == limit
+    reached = np.max(np.abs(cleaned[PRESSURE][np.isfinite(cleaned[PRESSURE])]))
+    assert np.all(np.isnan(cleaned[PRESSURE][at_the_end]))
+    assert reached < limit
+    assert said.startswith(f"{PRESSURE} is at the end of its range")
+    assert f"in {100.0 * np.mean(at_the_end):.2g} % of its samples" in said
+
+
+def test_of_a_pressure_that_hovers_at_the_end_no_half_of_the_noise_is_kept() -> None:
+    noise = np.random.default_rng(1).normal(0.0, 5e3, 6000)
+    hovering = np.where(np.arange(6000) % 2000 < 1000, 0.0, 4.95e5) + 500.0 * np.round(noise / 500.0)
+    log = Record(1e-3, {PRESSURE: np.minimum(hovering, 5e5)})
+    kept = without_saturated(log, RIG_PARAMETERS)[0][PRESSURE]
+    assert np.count_nonzero(np.isfinite(kept[hovering > 4e5])) < 100
+    assert np.all(np.isfinite(kept[hovering < 4e5]))
+
+
+@pytest.mark.parametrize("quantum", [500.0, 1e4])
+@pytest.mark.parametrize("noise", [5e3, 0.0])
+def test_a_relief_valves_plateau_is_no_end_of_a_range(noise: float, quantum: float) -> None:
+    p, rng = replace(parameters_for(CONDITIONS["major_friction"]), relief_pressure=1.5e6), np.random.default_rng(3)
+    sensors = replace(BENCH, pressure_noise=noise, pressure_quantum=quantum)
+    log = simulate(LUMPED, make_drive("steps", 6.0, 1e-3, p, rng), 1e-3, p, sensors=sensors, rng=rng)
+    assert np.mean(np.abs(log[PRESSURE]) > 0.99 * p.relief_pressure) > 0.1
+    assert without_saturated(log, p) == (log, ())
 
 
 def test_a_sound_pressure_loses_nothing() -> None:
-    for drive in ("sine", "steps", "prbs"):
-        log = run(drive)
-        assert without_saturated(log, [PRESSURE]) == (log, {})
+    for drive, sensors in product(("sine", "steps", "prbs"), (BENCH, IDEAL, replace(BENCH, pressure_quantum=2e4))):
+        log = run(drive, sensors=sensors)
+        assert without_saturated(log, RIG_PARAMETERS) == (log, ())
+
+
+def test_a_chambers_sensor_that_clips_takes_the_difference_with_it() -> None:
+    log = run()
+    low = np.random.default_rng(1).normal(2.758e5, 5e3, len(log))
+    chambers = {
+        "pressure_a_pa": np.maximum(log[PRESSURE], 0.0) + low,
+        "pressure_b_pa": low - np.minimum(log[PRESSURE], 0.0),
+    }
+    limit = 0.7 * np.max(chambers["pressure_a_pa"])
+    chambers["pressure_a_pa"] = np.minimum(chambers["pressure_a_pa"], limit)
+    derived = log.replace(**chambers, **{PRESSURE: chambers["pressure_a_pa"] - chambers["pressure_b_pa"]})
+    cleaned, (said,) = without_saturated(derived, RIG_PARAMETERS)
+    assert said.startswith("pressure_a_pa")
+    assert np.all(np.isnan(cleaned[PRESSURE][chambers["pressure_a_pa"] == limit]))
+    sensor_of_its_own = without_saturated(log.replace(**chambers), RIG_PARAMETERS)[0]
+    assert np.array_equal(sensor_of_its_own[PRESSURE], log[PRESSURE])
+
+
+@pytest.mark.parametrize("channel", ["position_m", PRESSURE])
+def test_a_slow_sensor_that_froze_is_named_and_a_sound_one_is_not(channel: str) -> None:
+    log, every_tenth = run(sample_time=1e-4), np.arange(60_000) % 10 == 3
+    for record, accused in ((log, 0), (with_fault(log, SensorFault(channel=channel, kind="freeze", start=3.0)), 1)):
+        slow = record.replace(**{name: np.where(every_tenth, record[name], np.nan) for name in (channel,)})
+        assert len(sensor_objections(slow, RIG_PARAMETERS)) == accused
+
+
+def test_an_encoder_is_not_accused_where_the_pressure_that_held_the_piston_was_clipped() -> None:
+    log, stuck = run(), slice(2000, 4000)
+    channels = {name: log[name].copy() for name in ("motor_speed_rad_s", "position_m", PRESSURE)}
+    for name, value in zip(channels, (10.0, 0.1, np.nan), strict=True):
+        channels[name][stuck] = value
+    assert sensor_objections(log.replace(**channels, velocity_m_s=None), RIG_PARAMETERS) == ()
 
 
 def test_a_missing_sample_ends_a_hold() -> None:

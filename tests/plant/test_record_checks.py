@@ -116,6 +116,54 @@ def test_more_than_five_percent_left_out_is_refused() -> None:
         trusted(log, source="a.csv")
 
 
+def every_tenth(values: Values, first: int) -> Values:
+    slow = np.full(len(values), np.nan)
+    slow[first::10] = values[first::10]
+    return slow
+
+
+def test_a_channel_that_is_logged_every_tenth_row_is_kept_with_a_note() -> None:
+    checked = check(motor_speed_rad_s=every_tenth(SPEED, 0), differential_pressure_pa=every_tenth(1e6 * VELOCITY, 3))
+    assert checked.notes == (
+        "a.csv: motor_speed_rad_s is logged every 10 samples of the clock",
+        "a.csv: differential_pressure_pa is logged every 10 samples of the clock",
+    )
+    assert np.count_nonzero(np.isfinite(checked.channels["differential_pressure_pa"])) == N // 10
+
+
+def test_a_channel_of_which_nine_tenths_are_lost_at_random_is_left_out() -> None:
+    lost = np.where(np.random.default_rng(1).random(N) < 0.9, np.nan, 1e5)
+    checked = check(differential_pressure_pa=lost)
+    assert "differential_pressure_pa" not in checked.channels
+    assert "the channel is left out" in checked.notes[0]
+
+
+def test_channels_with_times_of_their_own_are_put_on_the_clock_of_the_fastest() -> None:
+    when = TIME[5::10] + 3.7e-4
+    rows = np.argsort(np.concatenate([TIME, when]), kind="stable")
+    none, nothing = np.full(len(when), np.nan), np.full(N, np.nan)
+    ramp = 1e5 + 1e6 * when
+    log = {
+        "time_s": np.concatenate([TIME, when]),
+        "motor_speed_rad_s": np.concatenate([SPEED, none]),
+        "velocity_m_s": np.concatenate([VELOCITY, none]),
+        "differential_pressure_pa": np.concatenate([nothing, ramp]),
+    }
+    checked = trusted({name: values[rows] for name, values in log.items()}, source="a.csv")
+    pressure = checked.channels["differential_pressure_pa"]
+    np.testing.assert_array_equal(checked.channels["velocity_m_s"], VELOCITY)
+    assert np.flatnonzero(np.isfinite(pressure)).tolist() == list(range(5, N, 10))
+    np.testing.assert_allclose(pressure[15:-10:10], 1e5 + 1e6 * TIME[15:-10:10], rtol=1e-12)
+    assert checked.notes[0] == ("a.csv: channels have times of their own; put on the 0.001 s of motor_speed_rad_s")
+
+
+def test_uneven_times_of_whole_rows_are_refused_though_a_sample_is_missing() -> None:
+    time = TIME.copy()
+    time[500:] += 4e-4
+    with pytest.raises(LogError, match="must be uniform within 1 %"):
+        check(time, motor_speed_rad_s=with_gaps(SPEED, 3), velocity_m_s=with_gaps(VELOCITY, 7))
+
+
 @pytest.mark.parametrize("count", [0, 1, 9])
 def test_fewer_than_ten_samples_are_refused(count: int) -> None:
     part = {"time_s": TIME, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY}

@@ -122,6 +122,27 @@ def test_a_warning_is_printed_with_the_log_and_kept_in_the_result(good: Path, tm
     assert f"{tmp_path / 'gappy.csv'}: warning: {sentence}" in done.stderr.splitlines()
 
 
+def test_what_a_pressure_sensor_could_not_show_is_named_and_the_estimate_stands(good: Path, tmp_path: Path) -> None:
+    record = read_record(good)
+    pressure = record["differential_pressure_pa"]
+    limit = 0.7 * np.max(np.abs(pressure))
+    logs = {
+        "is at the end of its range": np.clip(pressure, -limit, limit),
+        "is logged every 4 samples of the clock": np.where(np.arange(len(record)) % 4 == 1, pressure, np.nan),
+        "stands out grossly in 2 of 4000 samples": np.where(np.isin(np.arange(len(record)), (9, 99)), 1e8, pressure),
+    }
+    for name, values in zip("abc", logs.values(), strict=True):
+        write_record(record.replace(differential_pressure_pa=values), tmp_path / f"{name}.csv")
+    done = invoke("estimate", *(tmp_path / f"{name}.csv" for name in "abc"), "--json")
+    for sentence, one in zip(logs, json.loads(done.stdout), strict=True):
+        low, high = one["bulk_modulus_pa"]["ci95"]
+        assert low < 2.07e8 < high
+        assert one["gate"]["passed"]
+        (warned,) = one["warnings"]
+        assert warned.startswith("differential_pressure_pa")
+        assert sentence in warned
+
+
 @pytest.mark.parametrize(
     ("outcomes", "total", "code"),
     [
