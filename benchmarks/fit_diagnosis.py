@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from experiments.studies.identification_library import read_library
-from faults.class_fit import Actuator
 from faults.circuit_runs import coordinates_of
+from faults.class_fit import Actuator
 from faults.conditions import CONDITIONS
 from faults.evidence import EVIDENCES, weigh
 from faults.population import TRAINING, draw_logs

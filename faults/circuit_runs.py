@@ -7,15 +7,15 @@ Eight circuits run side by side in one kernel, so a Gauss-Newton step with all i
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.identification.preprocess import bridged
 from estimation.measurement_noise import measurement_variances, position_variance
-from plant.adaptive import controlled_run
-from plant.circuit import chamber_volumes
-from plant.circuit_parameters import CircuitParameters, circuit_of
+from plant.adaptive import ErrorControl, controlled_run
+from plant.circuit_parameters import CircuitParameters
 from plant.components.oil import oil_pressure
 from plant.eha import EhaParameters
 from plant.errors import LogError
@@ -43,6 +43,8 @@ RATE = 1e-3
 
 TOLERANCE, DRIVE_TOLERANCE = 1e-4, 2e-3
 """Errors allowed in the runs [dimensionless], see `plant.adaptive.controlled_run`: far below what is compared."""
+
+_CONTROL = cast("ErrorControl", CIRCUIT.control)
 
 _COLUMN = {field.name: i for i, field in enumerate(fields(CircuitParameters))}
 
@@ -80,6 +82,11 @@ class Blocks:
         return np.column_stack([self.velocity] if self.pressure is None else [self.velocity, self.pressure])
 
     @property
+    def travel(self) -> float:
+        """How far the piston moves to and fro [m]."""
+        return float(np.ptp(np.cumsum(np.nan_to_num(self.velocity)))) * self.block * self.sample_time
+
+    @property
     def first(self) -> int:
         """First block that counts."""
         return round(SETTLING / (self.block * self.sample_time))
@@ -109,7 +116,9 @@ def blocks_of(record: Record) -> Blocks:
     block = max(2, round(BLOCK / sample_time))
     count = (len(record) // pooled - 1) // block
     if count * block * sample_time < 2.0 * SETTLING or count < 8:
-        raise LogError(f"a diagnosis needs a log of 8 blocks of {block * sample_time:g} s or more, got {record.duration:g} s")
+        raise LogError(
+            f"a diagnosis needs a log of 8 blocks of {block * sample_time:g} s or more, got {record.duration:g} s"
+        )
     whole = {name: _pooled(record[name], pooled)[: count * block + 1] for name in record if name in _NEEDED}
     if "position_m" in whole and np.any(np.isfinite(whole["position_m"])):
         velocity = np.diff(bridged(whole["position_m"])[::block]) / (block * sample_time)
@@ -225,11 +234,17 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
     ndarray, shape (m, n, outputs)
         Mean velocity [m/s] over each block, and mean pressure [Pa] where it is logged.
     """
-    assert CIRCUIT.control is not None
     starts = np.array([CIRCUIT.start(row) for row in rows])
     runs = controlled_run(
-        CIRCUIT.name, CIRCUIT.control, starts, blocks.speed, rows[None], blocks.sample_time, CIRCUIT.parameter_class,
-        tolerance=TOLERANCE, drive_tolerance=DRIVE_TOLERANCE,
+        CIRCUIT.name,
+        _CONTROL,
+        starts,
+        blocks.speed,
+        rows[None],
+        blocks.sample_time,
+        CIRCUIT.parameter_class,
+        tolerance=TOLERANCE,
+        drive_tolerance=DRIVE_TOLERANCE,
     )
     return np.array([_outputs(blocks, states, row) for states, row in zip(runs, rows, strict=True)])
 

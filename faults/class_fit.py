@@ -1,13 +1,7 @@
-"""How well does each condition explain a log? A circuit is fitted to it, and laid beside the conditions' regions.
-
-The fit begins at the nearest conditions, with a prior so weak that the log decides wherever it can. In a condition
-leakage, flow bias, friction and bulk modulus differ from the nominal ones as actuators of one kind do, a Gaussian region;
-integrating the likelihood over it in closed form (Laplace's method: MacKay, Information Theory, 2003, chapter 27) scores
-the condition. What a log says nothing of, as friction beyond what a stuck piston is pushed with, counts for none.
-"""
+"""A circuit fitted to a log, with a prior so weak that the log decides wherever it can."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,10 +35,6 @@ LEAST_SCALE = 1e-3
 LASTING = 30.0
 """Blocks over which a model's error lasts [dimensionless]: 0.3 s, a few reversals."""
 
-STRUCTURAL = 100.0
-"""By how much a residual that no sensor makes widens what is believed [dimensionless], in variance: it lasts, and it is
-not what the derivatives say that it is."""
-
 KNOWN = 1e-3
 """Standard deviation of the logarithm of what is known [dimensionless]: the pump's displacement."""
 
@@ -56,9 +46,6 @@ def _prior(each: Sequence[float], rubbing_alike: float) -> Array:
     covariance[np.ix_(rubbing, rubbing)] += rubbing_alike**2
     return covariance
 
-
-PRESSURE_SCALE = np.array([-1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
-"""Direction in which all pressures scale and no motion changes [dimensionless]."""
 
 WITHIN = _prior((0.12, 0.12, 0.12, 0.10, 0.08, 0.2, KNOWN), 0.08)
 """How actuators in one condition differ: covariance of the logarithms, shape (7, 7) [dimensionless]."""
@@ -135,73 +122,6 @@ class PointFit:
     scales: Array
     fitted: Array
     slopes: Array
-
-
-@dataclass(frozen=True, eq=False)
-class ClassFits:
-    """What the circuit model says about a log.
-
-    Parameters
-    ----------
-    best : PointFit
-        The circuit that fits best.
-    information : ndarray, shape (7, 7)
-        What is believed to be known of its coordinates: inverse covariance without a prior.
-    nominal : ndarray, shape (9,)
-        Misfit of each condition's nominal circuit [dimensionless].
-    nominal_scales : ndarray, shape (9, outputs)
-        Root mean square of what it leaves [m/s, Pa].
-    scores : ndarray, shape (9,)
-        How well each condition's region holds the fitted circuits: log-likelihoods [dimensionless].
-    """
-
-    best: PointFit
-    information: Array
-    nominal: Array
-    nominal_scales: Array
-    scores: Array
-
-    @property
-    def covariance(self) -> Array:
-        """Covariance of the coordinates under the weak prior, shape (7, 7) [dimensionless]."""
-        return np.linalg.inv(self.information + np.linalg.inv(WEAK))
-
-
-def fit_classes(blocks: Blocks, actuator: Actuator) -> ClassFits:
-    """Fit circuits to a log from the nearest conditions and weigh all nine.
-
-    Parameters
-    ----------
-    blocks : Blocks
-        The log.
-    actuator : Actuator
-        The healthy actuator.
-
-    Returns
-    -------
-    ClassFits
-        The best circuit, and the conditions' scores.
-    """
-    runs = nominal_runs(blocks, actuator)
-    nominal = np.array([misfit(blocks, run) for run in runs])
-    order = np.argsort(nominal)[:STARTS]
-    near = [int(i) for i in order if nominal[i] <= nominal[order[0]] + len(blocks.velocity)]
-    fits = [fit_freely(blocks, actuator, list(CONDITIONS)[i]) for i in near or [int(order[0])]]
-    known = [believed_information(fit, blocks) for fit in fits]
-    scores = [
-        region_scores(fit, information, actuator) - misfit(blocks, fit.fitted) / LASTING
-        for fit, information in zip(fits, known, strict=True)
-    ]
-    least, held = int(np.argmin([fit.cost for fit in fits])), np.max(scores, axis=0)
-    best = fits[least] if blocks.pressure is not None else _scaled(fits[least], actuator.conditions[np.argmax(held)])
-    return ClassFits(best, known[least], nominal, np.array([scales_of(blocks, run) for run in runs]), held)
-
-
-def _scaled(fit: PointFit, centre: Array) -> PointFit:
-    """Return a fit without pressure at the scale that is the most likely within a condition."""
-    pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
-    shift = float(pull @ (centre - fit.coordinates)) / float(pull @ PRESSURE_SCALE)
-    return replace(fit, coordinates=fit.coordinates + shift * PRESSURE_SCALE)
 
 
 def nominal_runs(blocks: Blocks, actuator: Actuator) -> Array:
@@ -281,7 +201,7 @@ def fit_freely(blocks: Blocks, actuator: Actuator, condition: str) -> PointFit:
         The best circuit.
     """
     centre = actuator.conditions[list(CONDITIONS).index(condition)]
-    pull = LASTING * np.linalg.inv(WEAK)
+    pull = np.asarray(LASTING * np.linalg.inv(WEAK), dtype=np.float64)
     best, step, reach = _at(blocks, actuator, centre, centre, pull), np.zeros(len(centre)), 0.0
     for _ in range(ROUNDS):  # a step that gains nothing is taken a third as long
         if reach == 0.0:
@@ -317,52 +237,3 @@ def _step(blocks: Blocks, fit: PointFit, centre: Array, pull: Array) -> Array:
     slope = np.einsum("ink,nk->i", fit.slopes[:, blocks.first :], left) - pull @ (fit.coordinates - centre)
     step = np.linalg.solve(fit.information + pull, slope)
     return step * min(1.0, FARTHEST / float(np.max(np.abs(step))))
-
-
-def believed_information(fit: PointFit, blocks: Blocks) -> Array:
-    """Return what a fit may be believed to know: residuals beyond the sensors' noise are a model error that lasts.
-
-    Without pressure nothing is believed of `PRESSURE_SCALE`: motion is the same at twice the pressure, with half the
-    leakage and twice the friction and bulk modulus, but for the inertia, which is less than a model's error.
-
-    Parameters
-    ----------
-    fit : PointFit
-        The fit.
-    blocks : Blocks
-        Its log.
-
-    Returns
-    -------
-    ndarray, shape (7, 7)
-        Inverse covariance of the coordinates, without a prior.
-    """
-    unexplained = float(np.max(1.0 - (blocks.noise / fit.scales) ** 2))
-    believed = fit.information / (1.0 + STRUCTURAL * max(unexplained, 0.0))
-    if blocks.pressure is not None:
-        return believed
-    along = believed @ PRESSURE_SCALE
-    curvature = float(PRESSURE_SCALE @ along)
-    return believed - np.outer(along, along) / curvature if curvature > 0.0 else believed
-
-
-def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Array:
-    """Return how well each condition's region holds a fitted circuit: the log of the likelihood over the region.
-
-    Parameters
-    ----------
-    fit : PointFit
-        The circuit.
-    information : ndarray, shape (7, 7)
-        Inverse covariance of its coordinates; directions of which a log says nothing do not count.
-    actuator : Actuator
-        The healthy actuator.
-
-    Returns
-    -------
-    ndarray, shape (9,)
-        Log-likelihoods [dimensionless] up to a constant.
-    """
-    off = fit.coordinates - actuator.conditions
-    weight = information @ np.linalg.inv(np.eye(len(information)) + WITHIN @ information)
-    return -0.5 * np.einsum("ci,ij,cj->c", off, weight, off)

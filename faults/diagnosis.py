@@ -7,7 +7,8 @@ import numpy as np
 
 from estimation.identification.linear_model import LinearModel
 from faults.calibration import Calibration, shipped_calibration
-from faults.class_fit import Actuator, region_scores
+from faults.class_fit import Actuator
+from faults.class_regions import region_scores
 from faults.evidence import Scoreboard, weigh
 from faults.out_of_model import reasons_against
 from faults.severity import Severity, severities, what_is_not_told

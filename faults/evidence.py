@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from estimation.identification.linear_model import LinearModel
 from faults.calibration import Calibration
-from faults.circuit_runs import Blocks, blocks_of
-from faults.class_fit import Actuator, ClassFits, fit_classes
+from faults.circuit_runs import COORDINATES, Blocks, blocks_of
+from faults.class_fit import Actuator
+from faults.class_regions import ClassFits, fit_classes, is_stuck
 from faults.classify import score_transfer_functions
 from faults.conditions import CONDITIONS
 from faults.innovation_bank import innovation_scores
@@ -22,6 +23,9 @@ EVIDENCES = ("transfer_functions", "models", "innovations", "parameters")
 
 FARTHEST = 30.0
 """Log-odds beyond which an evidence says no more [dimensionless]: no model is sure of more."""
+
+YIELDS = 1.2
+"""By how much the breakaway force may differ between actuators of one kind [dimensionless]."""
 
 SAMPLES = 20.0
 """How many independent samples a root-mean-square error counts as [dimensionless]; the weights scale it."""
@@ -112,7 +116,20 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
     if library is not None:
         table = score_transfer_functions(record, library).by_condition
         found["transfer_functions"] = -SAMPLES * np.log([table[name] for name in CONDITIONS])
+    if is_stuck(blocks, actuator):
+        found = {name: _friction_left_open(scores, blocks, actuator) for name, scores in found.items()}
     return Scoreboard({name: bounded(found[name]) for name in EVIDENCES if name in found}, blocks, fits)
+
+
+def _friction_left_open(scores: Array, blocks: Blocks, actuator: Actuator) -> Array:
+    """Score the friction levels that would hold the piston alike: a stuck piston tells none from the other."""
+    reached = (
+        0.0 if blocks.pressure is None else actuator.circuit.piston_area * float(np.nanmax(np.abs(blocks.pressure)))
+    )
+    holding = np.exp(actuator.conditions[:, COORDINATES.index("friction_rest")]) * YIELDS > reached
+    leakage = np.array([condition.leakage for condition in CONDITIONS.values()])
+    alike = [np.max(scores[holding & (leakage == level)], initial=-np.inf) for level in leakage]
+    return np.where(holding, alike, scores)
 
 
 def bounded(scores: Array) -> Array:

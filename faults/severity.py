@@ -7,11 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import NDArray
 
-from faults.class_fit import WEAK, Actuator, ClassFits
 from faults.circuit_runs import COORDINATES, parameter_rows
-from plant.components.oil import ATMOSPHERE
-from plant.components.cylinder import quadratic_friction
+from faults.class_fit import WEAK, Actuator
+from faults.class_regions import ClassFits
 from plant.circuit_parameters import CircuitParameters
+from plant.components.cylinder import quadratic_friction
+from plant.components.oil import ATMOSPHERE
 from plant.steady_state import steady_state
 
 Array = NDArray[np.float64]
@@ -72,8 +73,8 @@ UNITS: Mapping[str, str] = {
     "entrained_air": "%",
 }
 """The severities: leakage flow and bias at rated pressure (the relief setting); velocity lost and pressure rise in the
-steady state at rated speed, relative to the healthy actuator; friction at its rated velocity over the healthy; effective
-bulk modulus; the air at atmospheric pressure that would make the oil so soft."""
+steady state at rated speed, relative to the healthy actuator; friction at its rated velocity over the healthy; bulk
+modulus; the air at atmospheric pressure that would make the oil so soft."""
 
 
 def severities_at(point: Array, actuator: Actuator) -> Mapping[str, float]:
@@ -97,9 +98,7 @@ def severities_at(point: Array, actuator: Actuator) -> Mapping[str, float]:
     velocity, pressure = steady_state(healthy.rated_speed, p)
     sound_velocity, sound_pressure = steady_state(healthy.rated_speed, healthy)
     rubbing, sound = (
-        float(
-            quadratic_friction(actuator.rated, 1.0, q.friction_quadratic, q.friction_linear, q.friction_coulomb)
-        )
+        float(quadratic_friction(actuator.rated, 1.0, q.friction_quadratic, q.friction_linear, q.friction_coulomb))
         for q in (p, healthy)
     )
     softness = 1.0 / p.bulk_modulus - 1.0 / healthy.bulk_modulus
@@ -135,10 +134,11 @@ def severities(
     rng = np.random.default_rng(0)
     centre = fits.best.coordinates
     drawn = rng.multivariate_normal(centre, fits.covariance, DRAWS, method="cholesky")
-    table = [severities_at(point, actuator) for point in drawn]
+    with np.errstate(all="ignore"):  # friction that falls faster than leakage holds has no steady state
+        table = [severities_at(point, actuator) for point in drawn]
     found: dict[str, Severity] = {}
     for name, value in severities_at(centre, actuator).items():
-        low, high = (float(end) for end in np.percentile([row[name] for row in table], (2.5, 97.5)))
+        low, high = (float(end) for end in np.nanpercentile([row[name] for row in table], (2.5, 97.5)))
         stretch = 1.0 if widths is None else widths.get(name, 1.0)
         ends = value - stretch * (value - low), value + stretch * (high - value)
         found[name] = Severity(value, UNITS[name], ends)

@@ -99,10 +99,10 @@ def diagnose(
 ) -> None:
     """Say what is wrong: which of nine conditions, how probable, how bad, or that it is none of them.
 
-    A circuit is fitted to each log and laid beside the nine conditions of leakage and friction; nine models and nine
-    filters speak beside it. The probabilities were calibrated on simulated logs. Severities come with 95 % intervals. In
-    the table of scores a model's error is in velocity [m/s], or relative to the signals [dimensionless] where
-    differential pressure counts too. The seed draws the tests behind the transfer functions.
+    A circuit is fitted to each log and laid beside the nine conditions of leakage and friction; nine models and
+    nine filters speak beside it. The probabilities were calibrated on simulated logs. Severities come with 95 %
+    intervals. In the table of scores a model's error is in velocity [m/s], or relative to the signals [dimensionless]
+    where differential pressure counts too. The seed draws the tests behind the transfer functions.
     """
     from faults.bank import mathematical_bank
     from faults.conditions import find_condition
@@ -119,14 +119,14 @@ def diagnose(
         record = read_log(log, bench.columns, mapping)
         if no_pressure:
             record = record.replace(**{PRESSURE: None})
-        result = {**_diagnosed(record, bank, linear, condition), **chosen}
+        result: dict[str, Any] = {**_diagnosed(record, bank, linear, condition), **chosen}
         if actuator is None or result["outcome"] != "ok":
             return result
         found = _verdict_on(record, actuator)
         if isinstance(found, str):
             return {**result, "warnings": [*result["warnings"], found]}
         if report is not None:
-            _write_report(figure_path(report.with_suffix(".html"), log, len(logs)), log, result, found)
+            _write_report(figure_path(report.with_suffix(".html"), log, len(logs)) or report, log, result, found)
         return _with_verdict(result, found)
 
     batch = run_logs(logs, work, {**NOTHING, **chosen}, "diagnosing")
@@ -166,12 +166,11 @@ def _with_verdict(result: dict[str, Any], found: "Diagnosis") -> dict[str, Any]:
     return {**entries, "runner_up": ranked[1], "message": clauses(said)}
 
 
-def _write_report(path: Path | None, log: Path, result: dict[str, Any], found: "Diagnosis") -> None:
+def _write_report(path: Path, log: Path, result: dict[str, Any], found: "Diagnosis") -> None:
     from experiments.report.diagnosis import diagnosis_page
     from plant.atomic import replacing
     from plant.errors import HydrostateError
 
-    assert path is not None
     page = diagnosis_page(_with_verdict({"file": str(log), **result}, found), found)
     try:
         with replacing(path) as file:

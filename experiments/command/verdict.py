@@ -155,7 +155,7 @@ def believed(result: Mapping[str, Any]) -> str:
     """
     if result["unknown"]:
         return "no: " + "; ".join(result["reasons"])
-    return "; ".join(["yes: a circuit in or between the nine conditions follows the log", *result["not_told"]])
+    return "; ".join(["yes: a circuit in one of the nine conditions follows the log", *result["not_told"]])
 
 
 def next_step(result: Mapping[str, Any]) -> str:

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from faults.diagnosis import Diagnosis
 
 ASSUMED = (
-    "The rig file's geometry, pump and relief setting are taken as true; the piston starts at rest in mid-stroke; leakage, "
-    "flow bias, friction and bulk modulus are constant over the log. Probabilities hold if the actuator is in one of the "
-    "nine conditions, each as likely as the next before the log; they were calibrated on simulated logs of the whole "
-    "circuit. Intervals are 95 %."
+    "The rig file's geometry, pump and relief setting are taken as true; the piston starts at rest in mid-stroke; "
+    "leakage, flow bias, friction and bulk modulus are constant over the log. Probabilities hold if the actuator is in "
+    "one of the nine conditions, each as likely as the next before the log; they were calibrated on simulated logs of the "
+    "whole circuit. Intervals are 95 %."
 )
 
 CHANNELS = (("velocity", "mm/s", 1e3), ("differential pressure", "bar", 1e-5))
@@ -60,7 +60,9 @@ def _severities(result: Mapping[str, Any]) -> Any:
     rows = [(SHOWN[name], amount(one)) for name, one in result["severity"].items()]
     frame = pd.DataFrame(rows, columns=["what", "value"])
     columns = [Column("what", "what", words=str), Column("value", "estimate and 95 % interval", words=str)]
-    return html_table(frame, columns, "Severities; rated pressure is the relief setting, rated speed that of the rig file.")
+    return html_table(
+        frame, columns, "Severities; rated pressure is the relief setting, rated speed that of the rig file."
+    )
 
 
 def _svg(figure: tuple[Figure, str]) -> tuple[bytes, str]:
@@ -101,4 +103,7 @@ def _draw_fit(found: "Diagnosis") -> tuple[Figure, str]:
             axes[2 * i + 1].plot(time, measured - scale * fit.fitted[:, i], color=GREY, lw=0.7)
             axes[2 * i + 1].set_ylabel(f"left\n[{unit}]")
         axes[-1].set_xlabel("time [s]")
-    return figure, "Measured velocity and pressure, the circuit that fits best, and the residuals on a scale of their own."
+    return (
+        figure,
+        "Measured velocity and pressure, the circuit that fits best, and the residuals on a scale of their own.",
+    )
