@@ -1,5 +1,6 @@
 """A diagnosis in words: five lines for a terminal, entries for a program."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -93,7 +94,7 @@ def headline(result: Mapping[str, Any]) -> str:
     """
     ranked = sorted(result["probabilities"].items(), key=lambda item: -item[1])
     (best, first), (second, other) = ranked[:2]
-    named = f"{_said(best)} {_percent(first)}, then {_said(second)} {_percent(other)}"
+    named = f"{_said(best)}, probability {_percent(first)}; next {_said(second)}, {_percent(other)}"
     if result["unknown"]:
         return f"UNKNOWN, in none of the nine conditions; the nearest: {named}"
     return named
@@ -133,11 +134,12 @@ def amount(one: Mapping[str, Any]) -> str:
     Examples
     --------
     >>> amount({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8]})
-    '207 MPa (205 to 209)'
+    '207.0 MPa (205.0 to 209.0)'
     """
     scale, unit = (1e-6, "MPa") if one["unit"] == "Pa" else (1.0, one["unit"])
     value, low, high = (scale * float(number) for number in (one["value"], *one["ci95"]))
-    return f"{_short(value)} {unit} ({_short(low)} to {_short(high)})"
+    decimals = min(max(1 - math.floor(math.log10(high - low)), 0), 4) if high > low else 2
+    return f"{value:.{decimals}f} {unit} ({low:.{decimals}f} to {high:.{decimals}f})"
 
 
 def believed(result: Mapping[str, Any]) -> str:
@@ -192,7 +194,3 @@ def _percent(probability: float) -> str:
     if probability > 0.999:
         return "> 99.9 %"
     return "< 0.1 %" if probability < 0.001 else f"{100.0 * probability:.1f} %"
-
-
-def _short(value: float) -> str:
-    return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.3g}"

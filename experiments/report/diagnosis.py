@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 ASSUMED = (
     "The rig file's geometry, pump and relief setting are taken as true; the piston starts at rest in mid-stroke; "
     "leakage, flow bias, friction and bulk modulus are constant over the log. Probabilities hold if the actuator is in "
-    "one of the nine conditions, each as likely as the next before the log; they were calibrated on simulated logs of the "
-    "whole circuit. Intervals are 95 %."
+    "one of the nine conditions, each as likely as the next before the log; they were calibrated on simulated logs of "
+    "the whole circuit. Intervals are 95 %."
 )
 
 CHANNELS = (("velocity", "mm/s", 1e3), ("differential pressure", "bar", 1e-5))
@@ -42,10 +42,15 @@ def diagnosis_page(result: Mapping[str, Any], found: "Diagnosis") -> str:
         HTML that loads nothing.
     """
     sections = [
-        Section("probabilities", "Which condition", (believed(result),), *_svg(_draw_probabilities(found))),
+        Section(
+            "probabilities",
+            "Which condition",
+            (f"To be believed? {believed(result)}.",),
+            *_svg(_draw_probabilities(found)),
+        ),
         Section("severity", "How bad", tuple(result["not_told"]), tables=[_severities(result)]),
         Section("fit", "Measured and fitted", (), *_svg(_draw_fit(found))),
-        Section("next", "What to measure next", (next_step(result),)),
+        Section("next", "What to measure next", (f"{next_step(result)}.",)),
         Section("assumed", "What was assumed", (ASSUMED,)),
     ]
     return render_sections(headline(result), f"diagnosis of {result['file']}", _introduction(result), sections)
