@@ -41,7 +41,7 @@ class Severity:
     unit : str
         The unit.
     ci95 : tuple of float
-        Ends of its 95 % interval.
+        Ends of its 95 % interval [in its unit].
     """
 
     value: float
