@@ -74,6 +74,49 @@ def share_reciprocals(outputs: Mapping[str, Expression], fixed: Collection[str])
     return {name: new[id(output)] for name, output in outputs.items()}
 
 
+def share_ratios(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
+    """Let a ratio and its reverse take one division, by the product of the two; neither may be zero.
+
+    Parameters
+    ----------
+    outputs : Mapping[str, Expression]
+        What is computed, by name.
+
+    Returns
+    -------
+    dict[str, Expression]
+        The same values to rounding, by the same names.
+
+    Examples
+    --------
+    >>> from plant.compiled.expression import symbol
+    >>> from plant.compiled.source import statements
+    >>> x, y = symbol("x"), symbol("y")
+    >>> print(statements(share_ratios({"a": x / y, "b": y / x}), ""))
+    t0_ = x * y
+    t1_ = 1.0 / t0_
+    t2_ = x * t1_
+    t3_ = x * t2_
+    t4_ = y * t1_
+    t5_ = y * t4_
+    a, b = t3_, t5_
+    """
+    order = ordered(outputs.values())
+    places = {id(item): place for place, item in enumerate(order)}
+    pairs = {tuple(map(id, item.arguments)): item.arguments for item in order if item.operation == "/"}
+    partner = {divisor: above for (number, divisor), (above, _) in pairs.items() if (divisor, number) in pairs}
+    new: dict[int, Expression] = {}
+    for item in order:
+        arguments = [new[id(argument)] for argument in item.arguments]
+        if item.operation == "/" and id(item.arguments[1]) in partner:
+            pair = item.arguments[1], partner[id(item.arguments[1])]
+            first, second = (new[id(one)] for one in sorted(pair, key=lambda one: places[id(one)]))
+            new[id(item)] = arguments[0] * (new[id(pair[1])] * (ONE / (first * second)))
+        else:
+            new[id(item)] = node(item.operation, *arguments, value=item.value)
+    return {name: new[id(output)] for name, output in outputs.items()}
+
+
 def fused(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
     """Round a sum with a product once, where the product serves nothing else: ``fma``, as `source` spells it.
 

@@ -11,7 +11,7 @@ from plant.compiled import vector
 from plant.compiled.expression import ONE, ZERO, Expression, ordered, symbol
 from plant.compiled.functions import absolute, sign, sqrt, where
 from plant.compiled.gather import gathered
-from plant.compiled.simplify import fused, simplified
+from plant.compiled.simplify import fused, share_ratios, simplified
 from plant.compiled.source import lines_source, symbols_in
 
 X, Y, K, M = symbol("x"), symbol("y"), symbol("k"), symbol("m")
@@ -83,3 +83,10 @@ def test_a_fused_sum_is_rounded_once() -> None:
     found = values(fused({"a": X * Y - ONE}), x=1.0 + e, y=1.0 - e)
     assert found == {"a": -(e * e)}
     assert values({"a": X * Y - ONE}, x=1.0 + e, y=1.0 - e) == {"a": 0.0}
+
+
+def test_a_ratio_and_its_reverse_take_one_division() -> None:
+    outputs = {"ratio": X / (K + Y), "reverse": (K + Y) / X, "other": K / X}
+    shared = share_ratios(outputs)
+    assert count(shared, "/") == 1
+    assert values(shared, **INPUTS) == pytest.approx(values(outputs, **INPUTS), rel=1e-14)
