@@ -48,20 +48,22 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     actuator = Actuator.of(EhaParameters())
     checks: list[Check] = []
+
+    def printed(found: list[Check]) -> list[Check]:
+        print("\n".join(str(check) for check in found), flush=True)
+        return found
+
     for pressure, wanted in ((True, 98.0), (False, 94.0)):
         began = time.process_time()
         judged = list(judge(draw_logs(range(TEST, TEST + options.seeds)), actuator, pressure=pressure))
         print(f"\n{len(judged)} logs {which(pressure)}, {(time.process_time() - began) / len(judged):.3f} CPU s each")
         print(confusions(judged).to_string())
-        checks += population_checks(judged, which(pressure), wanted)
-    checks += limit_checks(actuator, seeds=max(2, options.seeds // 4), draws=options.draws)
-    checks += unknown_checks(actuator, seeds=max(1, options.seeds // 25))
-    checks += foreign_checks(actuator)
-    checks += stuck_checks(actuator)
-    checks += speed_checks(actuator)
-    print()
-    for check in checks:
-        print(check)
+        checks += printed(population_checks(judged, which(pressure), wanted))
+    checks += printed(limit_checks(actuator, seeds=max(2, options.seeds // 4), draws=options.draws))
+    checks += printed(unknown_checks(actuator, seeds=max(1, options.seeds // 25)))
+    checks += printed(foreign_checks(actuator))
+    checks += printed(stuck_checks(actuator))
+    checks += printed(speed_checks(actuator))
     short = sum(not check.met for check in checks)
     print(f"{short} of {len(checks)} fall short")
     return short
