@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.covariance import least_squares_covariance
+from estimation.covariance import automatic_lags, least_squares_covariance
 from plant.errors import LogWarning
 
 
@@ -16,8 +16,8 @@ def spread_of_estimates(colour: float, runs: int = 300) -> tuple[float, float, f
         solution = np.linalg.lstsq(columns, noise, rcond=None)[0]
         residual = noise - columns @ solution
         found.append(solution[1])
-        white.append(least_squares_covariance(columns, residual, n, coloured=False)[1, 1])
-        coloured.append(least_squares_covariance(columns, residual, n, coloured=True)[1, 1])
+        for said, lags in ((white, 0), (coloured, automatic_lags(residual))):
+            said.append(least_squares_covariance(columns, residual, n, lags)[1][1, 1])
     return float(np.std(found)), float(np.sqrt(np.mean(white))), float(np.sqrt(np.mean(coloured)))
 
 
@@ -33,15 +33,15 @@ def test_coloured_noise_needs_the_sandwich() -> None:
     assert coloured == pytest.approx(true, rel=0.25)
 
 
-def test_scaling_a_column_scales_its_variance() -> None:
+def test_the_bread_is_the_inverse_of_the_normal_equations_however_columns_are_scaled() -> None:
     rng = np.random.default_rng(1)
-    columns, residual = rng.standard_normal((50, 2)), rng.standard_normal(50)
-    plain = least_squares_covariance(columns, residual, 50, coloured=False)
-    scaled = least_squares_covariance(columns * [1.0, 1e9], residual, 50, coloured=False)
-    np.testing.assert_allclose(scaled, plain / np.outer([1.0, 1e9], [1.0, 1e9]), rtol=1e-9)
+    columns, residual = rng.standard_normal((250_000, 2)) * [1.0, 1e9], rng.standard_normal(250_000)
+    bread, spread = least_squares_covariance(columns, residual, len(residual), 0)
+    np.testing.assert_allclose(bread, np.linalg.inv(columns.T @ columns), rtol=1e-9)
+    np.testing.assert_allclose(spread, bread * (residual @ residual) / (len(residual) - 2), rtol=1e-9)
 
 
 def test_parameters_that_cannot_be_told_apart_are_warned_of() -> None:
     column = np.random.default_rng(2).standard_normal(40)
     with pytest.warns(LogWarning, match="not separately determined"):
-        least_squares_covariance(np.column_stack([column, column]), column, 40, coloured=False)
+        least_squares_covariance(np.column_stack([column, column]), column, 40, 0)
