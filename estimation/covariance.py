@@ -44,9 +44,9 @@ def automatic_lags(residual: FloatArray) -> int:
 
 
 def least_squares_covariance(
-    jacobian: FloatArray, residual: FloatArray, n_used: int, lags: int
+    jacobian: FloatArray, residual: FloatArray, n_used: int, lags: int, prior: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return ``(J'J)^-1`` and the sandwich ``(J'J)^-1 J'RJ (J'J)^-1`` of a residual with autocovariance R.
+    """Return ``B = (J'J + P)^-1`` and the sandwich ``B (J'RJ + P) B`` of a residual with autocovariance R.
 
     R is estimated with a Bartlett window (Newey and West 1987).
 
@@ -60,23 +60,24 @@ def least_squares_covariance(
         Samples that are not missing.
     lags : int
         Span of the autocovariance [samples], 0 for white; see `automatic_lags`.
+    prior : ndarray, shape (p,)
+        Diagonal of P: one over the variance of each parameter before the fit, zero where nothing is known.
 
     Returns
     -------
     tuple of ndarray, shape (p, p)
-        Inverse of the normal equations' matrix, and covariance of the parameters.
+        The inverse, and the covariance of the parameters.
 
     Warns
     -----
     LogWarning
         If the parameters are not separately determined; the covariance is then a lower bound.
     """
-    scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
+    scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian) + prior)
     scale[scale == 0.0] = 1.0
     n_parameters = jacobian.shape[1]
-    triangle = (
-        np.linalg.qr(np.concatenate([np.linalg.qr(part, mode="r") for part in _parts(jacobian)]), mode="r") / scale
-    )
+    triangles = [np.linalg.qr(part, mode="r") for part in _parts(jacobian)]
+    triangle = np.linalg.qr(np.concatenate([*triangles, np.diag(np.sqrt(prior))]), mode="r") / scale
     if np.linalg.matrix_rank(triangle) < n_parameters:
         warnings.warn(
             "the coefficients are not separately determined by this record (a pole cancels a zero, or the "
@@ -89,7 +90,7 @@ def least_squares_covariance(
         inverse = solve_triangular(triangle, np.eye(n_parameters))
     bread = inverse @ inverse.T / np.outer(scale, scale)
     meat = _meat(jacobian, _autocovariance(residual, n_used, min(lags, n_used // 10)))
-    return bread, bread @ meat @ bread * (n_used / (n_used - n_parameters))
+    return bread, bread @ (meat * (n_used / (n_used - n_parameters)) + np.diag(prior)) @ bread
 
 
 def _parts(jacobian: FloatArray) -> list[FloatArray]:

@@ -166,7 +166,7 @@ FLOW_FORM = GreyBoxModel(
     initial=_at_rest,
     rates=flow_rates,
     observe=_differential,
-    linear=(("case_leakage", 1e-13), ("speed_lead", 1e-5)),
+    linear=(("speed_lead", 1e-5),),
     jump=(0.5, -0.5),
 )
 """The flow form with its unknowns, balanced by volume; friction is none of them."""

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from estimation.flow import FLOW_FORM, MASS_FLOW_FORM, relieving
 from estimation.form_fit import LONGEST_STEP, FormFit, weighed
-from estimation.greybox_fit import GreyBoxFit, Search, concluded, searched
-from estimation.greybox_problem import GreyBoxLog, OutputNoise, Problem
+from estimation.greybox_descent import descend
+from estimation.greybox_fit import GreyBoxFit, Search, concluded, roughly
+from estimation.greybox_problem import GreyBoxLog, OutputNoise, Problem, search_bounds
 from estimation.identification.preprocess import bridged
 from estimation.measurement_noise import measurement_variances
 from estimation.outliers import without_outliers
@@ -43,6 +44,10 @@ LEAST_OPENING, LARGEST_OPENING = 1e2, 1e6
 
 DRAIN_START = 0.05
 """First guess of the pump's case drain, as a share of the healthy leakage [fraction]."""
+
+PRESUMED_STD = 1.5
+"""Standard deviation of the logarithms of the last two about their first guesses, before the log is seen: where the
+make-up valves never open, no log tells a drain from leakage, and any drain would do [dimensionless]."""
 
 SCREENED_SECONDS = 4.0
 """Starts are compared on the beginning of the log: it tells a wrong valley from a right one [s]."""
@@ -114,18 +119,17 @@ def fit_flow(
     search = Search(screened=ceil(SCREENED_SECONDS / record.sample_time))
     limits = {
         "speed_lead": (0.0, record.sample_time),
-        "case_leakage": (0.0, np.inf),
         "makeup_opening": (LEAST_OPENING, LARGEST_OPENING),
     }
-    by_volume, by_mass = (Problem(form, log) for form in forms)
-    first = searched(by_volume, starts, search, limits)
-    second = searched(by_mass, [by_volume.model.values(first.theta)], search, limits)
-    least = min(first.cost, second.cost)
-    fits = [
-        concluded(problem, point)
-        for problem, point in ((by_volume, first), (by_mass, second))
-        if point.cost < least + UNLIKELY
-    ]
+    guesses = [forms[0].theta(start) for start in starts]
+    bounds = search_bounds(forms[0], guesses, limits)
+    fits: list[GreyBoxFit] = []
+    for form in forms:
+        problem = Problem(form, log)
+        near = roughly(problem, guesses, search, bounds)
+        if not fits or near.cost < fits[0].cost + 2.0 * UNLIKELY:  # which leaves room for the error of long model steps
+            fits.append(concluded(problem, descend(problem.at, near.theta, search.evaluations, bounds)))
+        guesses = [fits[0].theta]
     best = min(fits, key=lambda fit: fit.cost)
     found, rig_std = weighed(fits)
     value, std = found["bulk_modulus"]
@@ -175,11 +179,19 @@ def _log(record: Record, parameters: EhaParameters, uncertainties: Mapping[str, 
         drive_std=tuple(variances[channel] ** 0.5 for channel in FLOW_FORM.drives),
         uncertainties=uncertainties,
         gaps=speed_gaps(record, parameters),
+        presumed={
+            "case_leakage": (DRAIN_START * _usual_leakage(parameters), PRESUMED_STD),
+            "makeup_opening": (OPENING_START, PRESUMED_STD),
+        },
     )
 
 
+def _usual_leakage(p: EhaParameters) -> float:
+    return max(p.leakage_coefficient, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed / p.relief_pressure)
+
+
 def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
-    leakage = max(p.leakage_coefficient, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed / p.relief_pressure)
+    leakage = _usual_leakage(p)
     bias = max(p.flow_bias, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed)
     moduli = sorted({bulk_modulus, p.bulk_modulus})
     return [

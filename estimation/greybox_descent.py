@@ -18,8 +18,8 @@ REACH = 30.0
 RIDGE = 1e-6
 """Added to the curvature: an unknown that is not felt stays where it is [dimensionless]."""
 
-LEAST_GAIN = 1e-4
-"""Half the sum of squares that a further step must promise: less moves no unknown by a fiftieth of its deviation."""
+LEAST_GAIN = 1e-3
+"""Half the sum of squares that a further step must promise: less moves no unknown by a twentieth of its deviation."""
 
 POOR, GOOD = 0.25, 0.75
 """Shares of a step's promise below which the radius shrinks to that part of it, and above which it grows."""
@@ -47,7 +47,13 @@ class Point:
     gram: Array
 
 
-def descend(at: Callable[[Array], Point], start: Array, evaluations: int, bounds: tuple[Array, Array]) -> Point:
+def descend(
+    at: Callable[[Array], Point],
+    start: Array,
+    evaluations: int,
+    bounds: tuple[Array, Array],
+    least_gain: float = LEAST_GAIN,
+) -> Point:
     """Return the least cost downhill from a start: Gauss-Newton steps within a trust region and bounds.
 
     The radius is of the coordinates themselves, mostly logarithms, not of their effects: several unknowns may then move
@@ -63,11 +69,13 @@ def descend(at: Callable[[Array], Point], start: Array, evaluations: int, bounds
         How often the cost may be evaluated [evaluations].
     bounds : tuple of ndarray, shape (unknowns,)
         Lowest and highest coordinates [dimensionless].
+    least_gain : float
+        Cost that a further step must promise [dimensionless].
 
     Returns
     -------
     Point
-        The best point; further steps promise less than `LEAST_GAIN`, unless the evaluations were used up.
+        The best point; further steps promise less than the least gain, unless the evaluations were used up.
 
     Examples
     --------
@@ -84,7 +92,7 @@ def descend(at: Callable[[Array], Point], start: Array, evaluations: int, bounds
         curvature = best.gram + np.diag(np.abs(best.gradient) / REACH)
         step = _step(best, curvature, radius, bounds)
         promised = float(-best.gradient @ step - 0.5 * step @ curvature @ step)
-        if promised < LEAST_GAIN:
+        if promised < least_gain:
             break
         tried = at(best.theta + step)
         gain, length = (best.cost - tried.cost) / promised, float(np.linalg.norm(step))

@@ -27,6 +27,12 @@ SCREENED_SAMPLES = 200_000
 LENGTHENED = 8
 """Factor between the beginnings of a long log on which a fit is brought near."""
 
+NEAR_ENOUGH = 0.01
+"""Half the sum of squares that a further step must promise while model steps are long [dimensionless]."""
+
+EXPLAINED = 1.2
+"""Mean squared normalised residual up to which no other finalist is tried [dimensionless]."""
+
 DRIVE_DRAWS = 16
 """Realisations of the driving channels' noise; their spread is known to 18 %, of a part that is seldom the larger."""
 
@@ -122,47 +128,54 @@ def fit_greybox(
     GreyBoxFit
         The best fit.
     """
-    problem = Problem(model, log)
-    return concluded(problem, searched(problem, starts, search, limits or {}))
+    problem, guesses = Problem(model, log), [model.theta(start) for start in starts]
+    bounds = search_bounds(model, guesses, limits or {})
+    near = roughly(problem, guesses, search, bounds)
+    return concluded(problem, descend(problem.at, near.theta, search.evaluations, bounds))
 
 
-def searched(
-    problem: Problem, starts: Sequence[Mapping[str, float]], search: Search, limits: Mapping[str, tuple[float, float]]
-) -> Point:
-    """Return the least cost that is found from several starts.
+def roughly(problem: Problem, guesses: Sequence[Array], search: Search, bounds: tuple[Array, Array]) -> Point:
+    """Return the least cost that is found from several starts, with one model step a sample.
 
     Parameters
     ----------
     problem : Problem
         Model and log.
-    starts : sequence of Mapping[str, float]
-        First guesses of the unknowns in SI.
+    guesses : sequence of ndarray, shape (unknowns,)
+        The starts [dimensionless].
     search : Search
         How they are brought to the optimum.
-    limits : Mapping[str, tuple of float]
-        Least and largest value of an unknown, where physics gives them [SI].
+    bounds : tuple of ndarray, shape (unknowns,)
+        Lowest and highest coordinates [dimensionless].
 
     Returns
     -------
     Point
-        The best point.
+        The best point, with its cost at those model steps.
     """
-    model, rough = problem.model, problem.log.coarsened()
-    guesses = [model.theta(start) for start in starts]
-    bounds = search_bounds(model, guesses, limits)
+    log = problem.log.coarsened()
+    whole = Problem(problem.model, log)
 
-    def descended(points: Sequence[Array], samples: int, evaluations: int) -> list[Array]:
-        part = Problem(model, rough.beginning(samples))
-        found = sorted((descend(part.at, theta, evaluations, bounds) for theta in points), key=lambda p: p.cost)
-        return [point.theta for point in found]
+    def descended(guess: Array, samples: int, evaluations: int) -> Point:
+        part = Problem(problem.model, log.beginning(samples)) if samples < len(log.measured) else whole
+        return descend(part.at, guess, evaluations, bounds, NEAR_ENOUGH)
 
     if len(guesses) > 1:
-        guesses = descended(guesses, search.screened, search.screening)[: search.finalists]
-    length, whole = LENGTHENED * search.screened, len(rough.measured)
-    while length < whole:  # the way is made on ever longer beginnings, so that the whole takes few steps
-        guesses = descended(guesses, length, search.evaluations)[:1]
-        length *= LENGTHENED
-    return descend(problem.at, descended(guesses, whole, search.evaluations)[0], search.evaluations, bounds)
+        screened = [descended(guess, search.screened, search.screening) for guess in guesses]
+        guesses = [point.theta for point in sorted(screened, key=_cost)[: search.finalists]]
+    points: list[Point] = []
+    for guess in guesses:
+        length = LENGTHENED * search.screened
+        while length < len(log.measured):  # on ever longer beginnings, so that the whole takes few steps
+            guess, length = descended(guess, length, search.evaluations).theta, LENGTHENED * length
+        points.append(descended(guess, len(log.measured), search.evaluations))
+        if 2.0 * points[-1].cost < EXPLAINED * np.count_nonzero(whole.residuals(points[-1].theta)):
+            break
+    return min(points, key=_cost)
+
+
+def _cost(point: Point) -> float:
+    return point.cost
 
 
 def concluded(problem: Problem, point: Point) -> GreyBoxFit:
@@ -188,7 +201,9 @@ def concluded(problem: Problem, point: Point) -> GreyBoxFit:
     if len(felt) and used > len(theta):
         if len(felt) < len(theta):
             slopes = slopes[:, felt]
-        bread, spread = least_squares_covariance(slopes, errors.ravel(), used, automatic_lags(errors.ravel()))
+        bread, spread = least_squares_covariance(
+            slopes, errors.ravel(), used, automatic_lags(errors.ravel()), problem.prior[felt]
+        )
 
         def response(shift: Array) -> Array:
             return bread @ (slopes.T @ shift.ravel())

@@ -69,6 +69,8 @@ class GreyBoxLog:
     gaps : ndarray, shape (gaps, 3)
         First and last sample on which a gap in the drives acts, and the variance that it adds to the state from one
         sample to the next, in units of `GreyBoxModel.jump`; in order of time, none overlapping.
+    presumed : Mapping[str, tuple of float]
+        What is known of positive unknowns before the log is seen: value [SI] and standard deviation of its logarithm.
     """
 
     drives: Array
@@ -80,6 +82,7 @@ class GreyBoxLog:
     drive_std: tuple[float, ...] = ()
     uncertainties: Mapping[str, float] = field(default_factory=_nothing)
     gaps: Array = field(default_factory=lambda: np.empty((0, 3)))
+    presumed: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
 
     def beginning(self, samples: int) -> "GreyBoxLog":
         """Return the log's first part.
@@ -164,12 +167,20 @@ class Problem:
         The model.
     log : GreyBoxLog
         The log.
+
+    Attributes
+    ----------
+    prior : ndarray, shape (unknowns,)
+        One over the variance of each coordinate before the log is seen; zero where nothing is known [dimensionless].
     """
 
     def __init__(self, model: GreyBoxModel, log: GreyBoxLog) -> None:
         self.model, self.log = model, log
         self._kernel = compile_kernel(model)
         self._block = max(1, round(BLOCK / log.sample_time))
+        presumed = [log.presumed.get(name, (1.0, np.inf)) for name in model.unknowns]
+        self._presumed = np.array([np.log(value) for value, _ in presumed])
+        self.prior = np.array([deviation**-2.0 for _, deviation in presumed])
 
     def at(self, theta: Array) -> Point:
         """Return the misfit at a point.
@@ -185,7 +196,9 @@ class Problem:
             Cost and normal equations; nothing as long as the log is stored.
         """
         cost, gradient, gram = self._run(theta, np.empty((0, 0)), np.empty((0, 0, 0)))
-        return Point(theta, cost, gradient, gram + np.tril(gram, -1).T)
+        away = theta - self._presumed
+        cost += 0.5 * float(self.prior @ away**2)
+        return Point(theta, cost, gradient + self.prior * away, gram + np.tril(gram, -1).T + np.diag(self.prior))
 
     def residuals(self, theta: Array, drives: Array | None = None, parameters: Array | None = None) -> Array:
         """Return the normalised residuals, predicted less measured.
