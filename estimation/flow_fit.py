@@ -45,7 +45,7 @@ LEAST_OPENING, LARGEST_OPENING = 1e2, 1e6
 DRAIN_START = 0.05
 """First guess of the pump's case drain, as a share of the healthy leakage [fraction]."""
 
-PRESUMED_STD = 1.5
+PRESUMED_STD = 1.0
 """Standard deviation of the logarithms of the last two about their first guesses, before the log is seen: where the
 make-up valves never open, no log tells a drain from leakage, and any drain would do [dimensionless]."""
 
@@ -162,7 +162,8 @@ def speed_gaps(record: Record, parameters: EhaParameters) -> Array:
     stiffness = parameters.bulk_modulus / parameters.chamber_volume * parameters.pump_displacement
     open_by = 0.5 * stiffness * sudden * length * record.sample_time
     noise = measurement_variances(record, ("differential_pressure_pa",))["differential_pressure_pa"] ** 0.5
-    return np.column_stack([first, behind, open_by**2 / (length + 1)])[open_by > FELT_GAP * noise]
+    gaps = np.array([first, behind, open_by**2 / (length + 1)], dtype=np.float64)
+    return np.ascontiguousarray(gaps[:, open_by > FELT_GAP * noise].T)
 
 
 def _log(record: Record, parameters: EhaParameters, uncertainties: Mapping[str, float]) -> GreyBoxLog:

@@ -5,7 +5,6 @@ from scipy.signal import lfilter
 from estimation.covariance import automatic_lags, least_squares_covariance
 from plant.errors import LogWarning
 
-
 NOTHING = np.zeros(2)
 """Nothing is known of two parameters before the fit."""
 
