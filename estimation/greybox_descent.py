@@ -34,7 +34,7 @@ class Point:
     theta : ndarray, shape (unknowns,)
         Fitted coordinates [dimensionless].
     cost : float
-        Half the sum of squared normalised residuals, outliers counted linearly, and what is known beforehand.
+        Half the sum of squared normalised residuals, outliers counted linearly, and the prior's part [dimensionless].
     gradient : ndarray, shape (unknowns,)
         Of the cost.
     gram : ndarray, shape (unknowns, unknowns)
