@@ -135,9 +135,12 @@ def severities(
     centre = fits.best.coordinates
     drawn = rng.multivariate_normal(centre, fits.covariance, DRAWS, method="cholesky")
     with np.errstate(all="ignore"):  # friction that falls faster than leakage holds has no steady state
-        table = [severities_at(point, actuator) for point in drawn]
+        table, best = [severities_at(point, actuator) for point in drawn], severities_at(centre, actuator)
     found: dict[str, Severity] = {}
-    for name, value in severities_at(centre, actuator).items():
+    for name, value in best.items():
+        if not np.isfinite(value):
+            found[name] = Severity(value, UNITS[name], (float("nan"), float("nan")))
+            continue
         low, high = (float(end) for end in np.nanpercentile([row[name] for row in table], (2.5, 97.5)))
         stretch = 1.0 if widths is None else widths.get(name, 1.0)
         ends = value - stretch * (value - low), value + stretch * (high - value)

@@ -136,6 +136,8 @@ def amount(one: Mapping[str, Any]) -> str:
     >>> amount({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8]})
     '207.0 MPa (205.0 to 209.0)'
     """
+    if not all(math.isfinite(number) for number in (one["value"], *one["ci95"])):
+        return "not determined"
     scale, unit = (1e-6, "MPa") if one["unit"] == "Pa" else (1.0, one["unit"])
     value, low, high = (scale * float(number) for number in (one["value"], *one["ci95"]))
     decimals = min(max(1 - math.floor(math.log10(high - low)), 0), 4) if high > low else 2
