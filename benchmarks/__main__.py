@@ -15,6 +15,8 @@ NAMES = (
     "identification",
     "identification_tests",
     "circuit",
+    "batch_scale",
+    "archive",
 )
 """Every benchmark that needs nothing but the project, in the order of `make benchmark`."""
 
