@@ -1,8 +1,8 @@
-"""A study of 100,000 EKF runs of 10,000 steps, kept in a store: cost over the bare kernels, memory, cost a case by size.
+"""A study of 100,000 EKF runs of 10,000 steps, kept in a store: cost over the bare kernels, memory, cost by size.
 
 Simulation is shared by ten first guesses. The bare run does the same simulation, noise and filters in a loop, with no
-keys, rows, tasks or store, on both workers at once as the study. Workers have loaded the project before: some 3 s of CPU
-each, once a study. CPU time counts all processes; wall time is printed beside it. Needs Linux's /proc.
+keys, rows, tasks or store, on both workers at once as the study. Workers have loaded the project before: some 3 s of
+CPU each, once a study. CPU time counts all processes; wall time is printed beside it. Needs Linux's /proc.
 """
 
 import argparse
@@ -173,8 +173,9 @@ def dispatch(executor: Executor, width: int, tasks: int) -> float:
 def extrapolate(per_task: float, writing: float, cores: int) -> None:
     """Print how long many machines would take if nothing but the measured overhead held them up."""
     print(f"\nExtrapolation, not measured: {NIGHT_CASES:,} cases on machines of {cores} cores.")
-    print(f"Held up by one scheduler that takes {1e3 * per_task:.2f} ms a task, and one writer, {1e3 * writing:.2f} ms a part;")
-    print("cases of a task: as many as take 2 s, at most 2048. Networks, stragglers and shared disks are left out.")
+    held = f"one scheduler, {1e3 * per_task:.2f} ms a task, and one writer, {1e3 * writing:.2f} ms a part"
+    print(f"Held up by {held} (both measured).")
+    print("A task is as many cases as take 2 s, at most 2048. Networks, stragglers and shared disks are left out.")
     print(f"{'a case takes':>14} " + " ".join(f"{f'{count} machine' + 's' * (count > 1):>22}" for count in MACHINES))
     for seconds in CASE_SECONDS:
         tasks = NIGHT_CASES / min(2048.0, 2.0 / seconds)
@@ -220,8 +221,8 @@ def main(arguments: list[str]) -> int:
     print(f"bare: {1e6 * kernel:.0f} us CPU a case (each of {', '.join(f'{1e6 * one:.0f}' for one in bares)})")
     print(f"overhead over the bare run: {100.0 * overhead:.0f} % (wanted: under {100.0 * WANTED_OVERHEAD:.0f} %)")
     print(f"cost a case, dearest over cheapest size: {ratio:.2f} (wanted: within {WANTED_RATIO})")
-    print(f"memory in the first and last quarter: {early / 1e6:.0f} and {late / 1e6:.0f} MB; peak {memory.peak / 1e6:.0f} MB")
-    print(f"(wanted: flat, under {WANTED_BYTES / 1e6:.0f} MB)")
+    print(f"memory in the first and last quarter: {early / 1e6:.0f} and {late / 1e6:.0f} MB")
+    print(f"memory at its peak: {memory.peak / 1e6:.0f} MB (wanted: flat, under {WANTED_BYTES / 1e6:.0f} MB)")
     extrapolate(max(per_task, _dask_dispatch()), _writing(), options.workers)
     return int(overhead >= WANTED_OVERHEAD) + int(ratio > WANTED_RATIO) + int(memory.peak >= WANTED_BYTES)
 

@@ -28,6 +28,9 @@ class Folder(ABC):
         The place, as the user gave it.
     """
 
+    locks = False
+    """Whether the place grants the right to write to one process alone."""
+
     def __init__(self, name: str) -> None:
         self.name = name
 
@@ -109,6 +112,11 @@ class Folder(ABC):
     def writer(self) -> Generator[None]:
         """Hold the right to write, where the place can grant it to one process alone.
 
+        Yields
+        ------
+        None
+            While it is held.
+
         Raises
         ------
         HydrostateError
@@ -117,7 +125,7 @@ class Folder(ABC):
         yield
 
 
-class LocalFolder(Folder):
+class _LocalFolder(Folder):
     """A folder on a disk.
 
     Parameters
@@ -126,33 +134,35 @@ class LocalFolder(Folder):
         The folder; made when it is first written to.
     """
 
+    locks = True
+
     def __init__(self, path: Path) -> None:
         super().__init__(str(path))
         self.path = path
 
-    def read(self, file: str) -> bytes:  # noqa: D102 -- said by Folder
+    def read(self, file: str) -> bytes:
         return (self.path / file).read_bytes()
 
-    def write(self, file: str, content: bytes) -> None:  # noqa: D102 -- said by Folder
+    def write(self, file: str, content: bytes) -> None:
         target = self.path / file
         target.parent.mkdir(parents=True, exist_ok=True)
         with replacing(target) as temporary:
             temporary.write(content)
 
-    def files(self, below: str = "") -> list[str]:  # noqa: D102 -- said by Folder
+    def files(self, below: str = "") -> list[str]:
         place = self.path / below
         return sorted(one.name for one in place.iterdir() if one.is_file()) if place.is_dir() else []
 
-    def move(self, file: str, to: str) -> None:  # noqa: D102 -- said by Folder
+    def move(self, file: str, to: str) -> None:
         (self.path / to).parent.mkdir(parents=True, exist_ok=True)
         with suppress(FileNotFoundError):
             (self.path / file).replace(self.path / to)
 
-    def remove(self, file: str) -> None:  # noqa: D102 -- said by Folder
+    def remove(self, file: str) -> None:
         (self.path / file).unlink(missing_ok=True)
 
     @contextmanager
-    def writer(self) -> Generator[None]:  # noqa: D102 -- said by Folder
+    def writer(self) -> Generator[None]:
         self.path.mkdir(parents=True, exist_ok=True)
         with (self.path / LOCK).open("a+b") as file:
             try:
@@ -176,7 +186,7 @@ def _lock(number: int) -> None:
     fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-class RemoteFolder(Folder):
+class _RemoteFolder(Folder):
     """A place that fsspec reaches. No lock can be had there: two writers write the same parts under the same names.
 
     Parameters
@@ -206,18 +216,18 @@ class RemoteFolder(Folder):
     def _path(self, file: str) -> str:
         return f"{self._root.rstrip('/')}/{file}"
 
-    def read(self, file: str) -> bytes:  # noqa: D102 -- said by Folder
+    def read(self, file: str) -> bytes:
         self._system.invalidate_cache()
         content: Any = self._system.cat_file(self._path(file))
         return bytes(content)
 
-    def write(self, file: str, content: bytes) -> None:  # noqa: D102 -- said by Folder
+    def write(self, file: str, content: bytes) -> None:
         temporary = f"{file}.{token_hex(4)}{TEMPORARY}"
         self._system.makedirs(self._path(file).rsplit("/", 1)[0], exist_ok=True)
         self._system.pipe_file(self._path(temporary), content)
         self._system.mv(self._path(temporary), self._path(file))
 
-    def files(self, below: str = "") -> list[str]:  # noqa: D102 -- said by Folder
+    def files(self, below: str = "") -> list[str]:
         self._system.invalidate_cache()
         try:
             found: Any = self._system.ls(self._path(below).rstrip("/"), detail=True)
@@ -225,12 +235,12 @@ class RemoteFolder(Folder):
             return []
         return sorted(str(one["name"]).rsplit("/", 1)[-1] for one in found if one["type"] == "file")
 
-    def move(self, file: str, to: str) -> None:  # noqa: D102 -- said by Folder
+    def move(self, file: str, to: str) -> None:
         self._system.makedirs(self._path(to).rsplit("/", 1)[0], exist_ok=True)
         with suppress(FileNotFoundError):
             self._system.mv(self._path(file), self._path(to))
 
-    def remove(self, file: str) -> None:  # noqa: D102 -- said by Folder
+    def remove(self, file: str) -> None:
         with suppress(FileNotFoundError):
             self._system.rm_file(self._path(file))
 
@@ -259,5 +269,5 @@ def open_folder(place: str | Path) -> Folder:
     'results/night'
     """
     if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://", str(place)):
-        return RemoteFolder(str(place))
-    return LocalFolder(Path(place))
+        return _RemoteFolder(str(place))
+    return _LocalFolder(Path(place))

@@ -21,7 +21,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from experiments.batch.folder import LOCK, TEMPORARY, Folder, LocalFolder, open_folder
+from experiments.batch.folder import LOCK, TEMPORARY, Folder, open_folder
 from experiments.batch.rows import SCHEMA
 from experiments.store import DESKTOP_FILES
 from plant.errors import HydrostateError
@@ -53,6 +53,11 @@ class PartStore:
     def writing(self) -> Generator[None]:
         """Hold the right to write; leftovers of a writer that was killed are removed first.
 
+        Yields
+        ------
+        None
+            While it is held.
+
         Raises
         ------
         HydrostateError
@@ -72,7 +77,7 @@ class PartStore:
 
     def _tidy(self) -> None:
         """Remove what a writer left that was killed; where no lock can be had, another may be at it."""
-        if isinstance(self.folder, LocalFolder):
+        if self.folder.locks:
             for below in ("", f"{PARTS}/"):
                 for name in self.folder.files(below):
                     if name.endswith(TEMPORARY):

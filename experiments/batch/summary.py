@@ -7,7 +7,7 @@ import pandas as pd
 import pyarrow as pa
 
 from faults.conditions import CONDITIONS
-from faults.scores import accuracy, confusion_matrix
+from faults.scores import confusion_matrix
 
 METHOD = ["plant", "drive", "sensors", "verb", "form", "method", "pressure"]
 """What tells one way of doing it from another."""
@@ -122,7 +122,13 @@ def bulk_modulus_table(frame: pd.DataFrame) -> pd.DataFrame:
             "covered_percent": 100.0 * float(covered.mean()) if len(error) else None,
         }
         rows.append({**dict(zip([*METHOD, "condition"], keys, strict=True)), **entries})
-    return pd.DataFrame(rows)
+    return _by_way(rows)
+
+
+def _by_way(rows: list[dict[str, object]]) -> pd.DataFrame:
+    """Return rows with each way of doing it in one block, in the order of first appearance."""
+    first: dict[tuple[object, ...], int] = {}
+    return pd.DataFrame(sorted(rows, key=lambda row: first.setdefault(tuple(row[name] for name in METHOD), len(first))))
 
 
 def _spread(error: np.ndarray) -> Sequence[float | None]:
@@ -151,7 +157,7 @@ def diagnosis_table(frame: pd.DataFrame) -> pd.DataFrame:
         entries = {"cases": len(group), "right": int(right.sum()), "right_percent": 100.0 * float(right.mean())}
         entries["median_margin"] = float(group["margin"].median())
         rows.append({**dict(zip([*METHOD, "condition"], keys, strict=True)), **entries})
-    return pd.DataFrame(rows)
+    return _by_way(rows)
 
 
 def confusion_table(frame: pd.DataFrame) -> pd.DataFrame:
@@ -172,23 +178,6 @@ def confusion_table(frame: pd.DataFrame) -> pd.DataFrame:
     if not len(known):
         return pd.DataFrame()
     return confusion_matrix(known["condition"].tolist(), known["found_condition"].tolist())
-
-
-def overall_accuracy(frame: pd.DataFrame) -> float | None:
-    """Return the share of classes that are right.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        From `frame_of`.
-
-    Returns
-    -------
-    float or None
-        Between 0 and 1 [fraction]; a case without a class is wrong. None where no class is known.
-    """
-    known, table = _classified(frame), confusion_table(frame)
-    return accuracy(table) * int(table.to_numpy().sum()) / len(known) if len(table) else None
 
 
 def _classified(frame: pd.DataFrame) -> pd.DataFrame:

@@ -34,7 +34,7 @@ def compare(
 
     names = [Path(place.rstrip("/")).name for place in (first, second)]
     if names[0] == names[1]:
-        names = [first, second]
+        names = ["A", "B"]
     frames = [frame_of(open_store(place).rows()) for place in (first, second)]
     found = compare_studies(*frames, seed=seed)
     if out is not None:

@@ -1,6 +1,5 @@
 """One small study, and how tests run it: 24 filters on 8 series of 500 samples, in lanes."""
 
-from collections.abc import Callable, Collection
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -44,7 +43,7 @@ def run_into(
     with store.writing():
         done, _ = store.done(again=again)
         store.describe(manifest_of(plan, "small.toml"), plan.keys)
-        options.setdefault("on_part", lambda count, part: None)
+        options.setdefault("on_part", lambda *_: None)
         return run_batch(plan, store, done, opener, stop=stop or Event(), **options)
 
 
@@ -64,5 +63,3 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> pa.Table:
     store = open_store(tmp_path_factory.mktemp("stores") / "reference")
     run_into(store, small_plan())
     return store.rows()
-
-

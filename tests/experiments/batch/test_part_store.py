@@ -40,7 +40,9 @@ def _places(reference: pa.Table, rows: pa.Table) -> list[int]:
 
 
 @pytest.mark.parametrize("damage", ["cut", "flipped", "empty", "rubbish"])
-def test_a_damaged_part_is_set_aside_and_its_cases_run_again(store: PartStore, reference: pa.Table, damage: str) -> None:
+def test_a_damaged_part_is_set_aside_and_its_cases_run_again(
+    store: PartStore, reference: pa.Table, damage: str
+) -> None:
     run_into(store, small_plan())
     victim = parts(store)[0]
     content = bytearray(victim.read_bytes())
@@ -62,7 +64,7 @@ def test_a_full_disk_is_a_sentence_and_what_is_kept_stays(
 ) -> None:
     written = [0]
 
-    def full(number: int) -> None:
+    def full(_: int) -> None:
         written[0] += 1
         if written[0] > 4:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

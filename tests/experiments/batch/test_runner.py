@@ -34,7 +34,7 @@ def test_a_changed_study_runs_only_what_changed_and_a_study_changed_back_nothing
 
 def test_an_interrupted_study_keeps_what_was_in_flight_and_goes_on(tmp_path: Path, reference: pa.Table) -> None:
     store, stop = open_store(tmp_path / "store"), Event()
-    tally = run_into(store, small_plan(), stop=stop, on_part=lambda count, part: stop.set())
+    tally = run_into(store, small_plan(), stop=stop, on_part=lambda *_: stop.set())
     assert (tally.stopped, tally.done) == ("interrupted", len(store.rows()))
     assert 0 < tally.done < 24
     assert run_into(store, small_plan()).done == 24 - tally.done
@@ -89,5 +89,7 @@ def test_a_case_that_ends_its_worker_is_found_and_costs_no_other(tmp_path: Path,
     rows = store.rows().to_pylist()
     assert (tally.done, tally.failed) == (24, 1)
     assert [row["reason"] for row in rows if row["outcome"] == "failed"] == [WORKER_ENDED]
-    assert [row for row in rows if row["key"] != deadly] == [row for row in reference.to_pylist() if row["key"] != deadly]
+    assert [row for row in rows if row["key"] != deadly] == [
+        row for row in reference.to_pylist() if row["key"] != deadly
+    ]
     assert rows_in_parts(store) == 24

@@ -29,7 +29,10 @@ def changed(**changes: Any) -> dict[str, Any]:
         (changed(duration_s=1e-4), "runs[0] must be at least 10 samples long"),
         (changed(severities=[[9.0, 0.0]]), "runs[0].severities[0][0] must be less than or equal to 5, got 9.0"),
         (changed(methods=[{**FILTER, "verb": "filtr"}]), "runs[0].methods[0].verb must be 'filter', 'estimate' or"),
-        (changed(methods=[{**FILTER, "form": "flow"}]), "runs[0].methods[0].form must be one of acceleration, pressure"),
+        (
+            changed(methods=[{**FILTER, "form": "flow"}]),
+            "runs[0].methods[0].form must be one of acceleration, pressure",
+        ),
         (changed(methods=[{"verb": "filter", "form": "pressure"}]), "runs[0].methods[0].method must be one of ekf, "),
         ({"runs": GOOD["runs"]}, "name is wanted, and not there"),
         ({"name": "a"}, "the file must have at least one [[runs]] or [[logs]], got none"),

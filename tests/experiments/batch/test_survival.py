@@ -55,8 +55,12 @@ def study_file(folder: Path, runs: dict[str, Any]) -> Path:
 
 @pytest.fixture
 def driver() -> Generator["subprocess.Popen[str]"]:
-    with subprocess.Popen(
-        [sys.executable, "-c", DRIVER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    with subprocess.Popen(  # noqa: S603 -- our own words
+        [sys.executable, "-c", DRIVER],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
     ) as process:
         yield process
         process.kill()
@@ -91,7 +95,8 @@ def test_a_batch_killed_at_twenty_random_moments_ends_as_if_undisturbed(
         if number % 2:  # at any moment, from the beginning on; else while parts are written
             time.sleep(moments.uniform(0.02, 0.4))
         else:
-            _wait_for(lambda: len(list(parts.glob("*.parquet"))) > len(kept))
+            before = len(kept)
+            _wait_for(lambda before=before: len(list(parts.glob("*.parquet"))) > before)
             time.sleep(moments.uniform(0.0, 0.1))
         os.kill(child, signal.SIGKILL)
         struck += os.WTERMSIG(end(driver)) == signal.SIGKILL
@@ -121,7 +126,8 @@ def test_a_killed_batch_leaves_no_workers_behind(tmp_path: Path) -> None:
 def _children(parent: int) -> list[int]:
     if not Path("/proc/self/stat").exists():
         pytest.skip("needs /proc")
-    stats = (path.read_text().rsplit(")", 1)[1].split() + [path.parent.name] for path in Path("/proc").glob("[0-9]*/stat"))
+    found = Path("/proc").glob("[0-9]*/stat")
+    stats = ([*path.read_text().rsplit(")", 1)[1].split(), path.parent.name] for path in found)
     return [int(stat[-1]) for stat in stats if int(stat[1]) == parent]
 
 
@@ -135,8 +141,8 @@ def _wait_for(condition: Any, seconds: float = 60.0) -> None:
 def test_ctrl_c_finishes_what_is_in_flight_and_says_how_to_go_on(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "experiments.cli", "batch", study_file(tmp_path, {**LONGER, "seeds": 4000})]
     store = open_store(tmp_path / "store")
-    with subprocess.Popen(
-        [*command, "--workers", "2", "--out", store.name],  # noqa: S603 -- our own command
+    with subprocess.Popen(  # noqa: S603 -- our own command
+        [*command, "--workers", "2", "--out", store.name],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
