@@ -72,7 +72,7 @@ def main(arguments: list[str]) -> int:
     """Print how the archive went and how fast logs are read; return how many targets are missed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--logs", type=int, default=1000)
-    parser.add_argument("--duration", type=float, default=4.0)
+    parser.add_argument("--duration", type=float, default=2.0)
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as place:

@@ -91,7 +91,7 @@ def reduced(study: Study, **changes: Any) -> Study:
 
 @pytest.mark.slow
 def test_the_study_of_the_paper_runs_at_reduced_size(tmp_path: Path) -> None:
-    conditions = ("normal", "minor_leakage", "major_leakage_major_friction")
+    conditions = ("normal", "major_leakage_major_friction")
     study = reduced(read_study("eha-paper"), conditions=conditions, duration_s=2.0, sample_time_s=5e-4)
     plan, store = plan_study(study, tmp_path), open_store(tmp_path / "store")
     assert run_into(store, plan).failed == 0
