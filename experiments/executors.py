@@ -117,6 +117,10 @@ def open_executor(workers: int = 1, cluster: str | None = None) -> Generator[tup
     executor = process_pool(workers)
     try:
         yield executor, workers
+    except KeyboardInterrupt:  # the user will not wait for what is in flight
+        for process in multiprocessing.active_children():
+            process.terminate()
+        raise
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
 

@@ -10,7 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from experiments.batch.series import Log, Series, Simulated, Work
+from experiments.batch.series import Log, Series, Simulated, Work, content_of
 from experiments.batch.study_file import Logs, Method, Runs, Study, StudyError
 from faults.conditions import CONDITIONS, LEVELS
 from plant.rig import Rig, read_rig
@@ -216,17 +216,8 @@ def _logs(logs: Logs, place: int, folder: Path) -> Iterator[Log]:
     for name in found:
         path = Path(name)
         relative = path.relative_to(folder) if path.is_relative_to(folder) else path
-        content, size = _read_hash(path)
-        yield Log(relative.as_posix(), str(path.resolve()), content, size, tuple(sorted(logs.columns.items())))
-
-
-def _read_hash(path: Path) -> tuple[str, int]:
-    """Return a file's hash and length; a file that cannot be read becomes a failed case, not the end of the study."""
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()[:32], path.stat().st_size
-    except OSError:
-        return "", 0
+        columns = tuple(sorted(logs.columns.items()))
+        yield Log(relative.as_posix(), str(path.resolve()), content_of(path), path.stat().st_size, columns)
 
 
 def _content(series: Series) -> list[Any]:

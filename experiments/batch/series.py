@@ -1,7 +1,11 @@
 """What a case is made of: a series, simulated or logged, and what is done with it."""
 
+import hashlib
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeAlias
+
+from plant.record_files import sidecar
 
 BYTES_A_SAMPLE = 50
 """About how much of a log's file a sample takes [byte]."""
@@ -52,7 +56,7 @@ class Log:
     path : str
         Where it is.
     content : str
-        Hash of its bytes; empty where it cannot be read.
+        Hash of its bytes, see `content_of`.
     size : int
         Its length [byte].
     columns : tuple of pairs of str
@@ -99,3 +103,27 @@ class Work:
     told: str
     start_pa: float | None
     start_std_pa: float
+
+
+def content_of(path: Path) -> str:
+    """Return a hash of a log's bytes, and of the notes that stand beside a CSV.
+
+    Parameters
+    ----------
+    path : Path
+        The log.
+
+    Returns
+    -------
+    str
+        32 hexadecimal digits; empty where it cannot be read, which becomes a failed case and not the end of a study.
+    """
+    digest = hashlib.sha256()
+    try:
+        for part in (path, sidecar(path)):
+            if part == path or part.is_file():
+                with part.open("rb") as file:
+                    digest.update(hashlib.file_digest(file, "sha256").digest())
+    except OSError:
+        return ""
+    return digest.hexdigest()[:32]

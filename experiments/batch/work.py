@@ -28,13 +28,13 @@ from estimation.run import METHODS, available_channels, filter_problem
 from experiments.batch.cases import Task
 from experiments.batch.diagnosis import diagnosed
 from experiments.batch.rows import NIS, Row, as_table, case_row, failed, in_words
-from experiments.batch.series import Log, Series, Simulated, Work
+from experiments.batch.series import Log, Series, Simulated, Work, content_of
 from experiments.command.logs import read_log
 from experiments.streams import stream
 from faults.bank import mathematical_bank
 from faults.conditions import severity
 from plant.eha import EhaParameters
-from plant.errors import HydrostateError, LogWarning
+from plant.errors import HydrostateError, LogError, LogWarning
 from plant.record import Record
 from plant.rig import Rig
 from plant.sensors import SENSORS, measure, noise_variances
@@ -155,6 +155,8 @@ def _prepared(series: Series, rig: Rig) -> _Prepared:
     if isinstance(series, Log):
         with _one_at_a_time, _caught() as said:
             record = read_log(Path(series.path), rig.columns, dict(series.columns))
+        if content_of(Path(series.path)) != series.content:
+            raise LogError(f"{series.path}: was changed after the study began; run the same command again")
         known = record.metadata.get("condition")
         entries: Row = {"duration_s": record.duration, "sample_time_s": record.sample_time}
         entries |= {"condition": known} if isinstance(known, str) else {}

@@ -44,13 +44,16 @@ def test_severities_stand_where_conditions_would() -> None:
 
 
 def test_a_logs_key_follows_its_content_not_its_folder(tmp_path: Path) -> None:
-    def keys(folder: str, text: str) -> list[str]:
+    def keys(folder: str, text: str, notes: str = "") -> list[str]:
         (tmp_path / folder).mkdir(exist_ok=True)
         (tmp_path / folder / "run.csv").write_text(text, encoding="utf-8")
+        if notes:
+            (tmp_path / folder / "run.csv.json").write_text(notes, encoding="utf-8")
         study = parse_study({"name": "logs", "logs": [{"glob": "*.csv", "methods": [DIAGNOSE]}]}, "logs.toml")
         return plan_study(study, tmp_path / folder).keys
 
-    assert keys("here", "a") == keys("there", "a") != keys("here", "b")
+    assert keys("here", "a") == keys("there", "a")
+    assert len({*keys("here", "a"), *keys("here", "b"), *keys("here", "b", "{}")}) == 3
 
 
 def test_a_glob_without_a_file_is_an_error(tmp_path: Path) -> None:

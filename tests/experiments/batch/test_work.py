@@ -75,6 +75,16 @@ def test_a_log_that_cannot_be_read_is_a_row_and_the_others_are_diagnosed(tmp_pat
     assert "there is no such file" in rows[3]["reason"]
 
 
+def test_a_log_that_changes_after_the_study_began_is_not_taken_for_what_it_was(tmp_path: Path) -> None:
+    text = "time_s,motor_speed_rad_s,velocity_m_s\n" + "".join(f"{0.001 * k:.3f},1,0\n" for k in range(50))
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    logs = [{"glob": "*.csv", "methods": [{"verb": "diagnose"}]}]
+    plan = plan_study(parse_study({"name": "logs", "logs": logs}, "logs.toml"), tmp_path)
+    (tmp_path / "a.csv").write_text(text.replace("1,0", "2,0"), encoding="utf-8")
+    ((_, reason),) = run_task(Task(plan.rig, plan.cases)).failures
+    assert "was changed after the study began" in reason
+
+
 def test_drives_that_are_drawn_once_hold_nothing_random() -> None:
     for name, drive in DRIVES.items():
         one, other = (drive(1.0, 1e-3, EhaParameters(), np.random.default_rng(seed)) for seed in (1, 2))
