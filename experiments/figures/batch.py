@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from experiments.figures.classification import draw_confusion
 from experiments.figures.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Margins, panels, spread_out
@@ -115,6 +116,7 @@ def draw_classes(table: pd.DataFrame) -> Figure:
     axis.barh(level, table["logs"], color=BLUE, height=0.6)
     axis.set_yticks(level, [in_words(name) for name in table["class"]])
     axis.grid(visible=False, axis="y")
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.set_xlabel("logs")
     for place, count in zip(level, table["logs"], strict=True):
         axis.annotate(str(count), (count, place), (4, 0), textcoords="offset points", va="center", fontsize=8.5)
