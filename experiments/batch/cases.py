@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass, fields
-from functools import cached_property
+from functools import cache, cached_property
 from glob import glob, has_magic
 from importlib.metadata import version
 from pathlib import Path
@@ -79,12 +79,12 @@ class Plan:
     @property
     def seconds(self) -> float:
         """About how long all cases take on one core [s]."""
-        return sum(_seconds(one, works) for series, works in self.blocks for one in series)
+        return sum(_seconds(sum(map(_steps, series)), len(series), works) for series, works in self.blocks)
 
     @cached_property
     def cases(self) -> tuple[tuple[Series, tuple[tuple[str, Work], ...]], ...]:
         """Every series with its cases, a key and a work each, in the study's order."""
-        common = _hash(None, [RESULTS_VERSION, version("hydrostate"), _numbers(self.rig)])
+        common = _hash(None, [RESULTS_VERSION, package_version("hydrostate"), _numbers(self.rig)])
         out: list[tuple[Series, tuple[tuple[str, Work], ...]]] = []
         for series, works in self.blocks:
             encoded = [_bytes(asdict(work)) for work in works]
@@ -93,7 +93,7 @@ class Plan:
                 out.append((one, tuple(zip((_key(begun, text) for text in encoded), works, strict=True))))
         return tuple(out)
 
-    @property
+    @cached_property
     def keys(self) -> list[str]:
         """The keys of all cases, in the study's order; a case that is named twice counts once."""
         return list(dict.fromkeys(key for _, cases in self.cases for key, _ in cases))
@@ -123,7 +123,7 @@ class Plan:
             if not left:
                 continue
             gathered.append((one, left))
-            spent += _seconds(one, [work for _, work in left])
+            spent += _seconds(_steps(one), 1, [work for _, work in left])
             count += len(left)
             if spent >= budget or count >= MOST_CASES:
                 yield Task(self.rig, tuple(gathered))
@@ -160,6 +160,23 @@ def plan_study(study: Study, folder: Path) -> Plan:
         (tuple(_logs(one, place, folder)), _works(one.methods, one.starts_pa)) for place, one in enumerate(study.logs)
     ]
     return Plan(study, rig, (*simulated, *logs))
+
+
+@cache
+def package_version(name: str) -> str:
+    """Return the version of an installed package; looking it up takes milliseconds.
+
+    Parameters
+    ----------
+    name : str
+        The package.
+
+    Returns
+    -------
+    str
+        Its version.
+    """
+    return version(name)
 
 
 def config_hash(study: Study, rig: Rig) -> str:
@@ -231,11 +248,17 @@ def _numbers(rig: Rig) -> list[Any]:
     return [asdict(rig.parameters), dict(rig.uncertainties), dict(rig.columns)]
 
 
-def _seconds(series: Series, works: Collection[Work]) -> float:
-    fine = 1e-4
-    steps = series.samples * (max(1.0, series.sample_time_s / fine) if isinstance(series, Simulated) else 1.0)
+def _steps(series: Series) -> float:
+    """Return about how many tenths of a millisecond a series is worth, a sample at the least."""
+    if isinstance(series, Simulated):
+        return series.samples * max(1.0, series.sample_time_s / 1e-4)
+    return float(series.samples)
+
+
+def _seconds(steps: float, series: int, works: Collection[Work]) -> float:
+    """Return about what so many series of so many steps together cost on one core."""
     each = [COSTS[work.verb] for work in works]
-    return SERIES_COST * steps + sum(alone + steps * step for alone, step in each)
+    return steps * (SERIES_COST + sum(step for _, step in each)) + series * sum(alone for alone, _ in each)
 
 
 def _bytes(content: object) -> bytes:

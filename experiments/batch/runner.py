@@ -8,12 +8,11 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
-from importlib.metadata import version
 from pathlib import Path
 from threading import Event
 from typing import Any
 
-from experiments.batch.cases import Plan, Task, config_hash
+from experiments.batch.cases import Plan, Task, config_hash, package_version
 from experiments.batch.part_store import PartStore
 from experiments.batch.work import Part, lost_task, run_task
 from plant.errors import HydrostateError
@@ -209,7 +208,7 @@ def manifest_of(plan: Plan, source: str) -> Mapping[str, Any]:
         "rig": plan.rig.name,
         "python": platform.python_version(),
         "machine": platform.machine(),
-        "versions": {name: version(name) for name in packages},
+        "versions": {name: package_version(name) for name in packages},
         "commit": _commit(),
     }
 
