@@ -16,6 +16,8 @@ NAMES = (
     "identification_tests",
     "circuit",
     "diagnosis",
+    "batch_scale",
+    "archive",
 )
 """Every benchmark that needs nothing but the project, in the order of `make benchmark`."""
 
