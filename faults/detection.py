@@ -11,13 +11,12 @@ power of their number, and extrapolated. With scale and count uncertain, the exp
 of k peaks is ``k (1 + h / (k s))^-k`` (a Pareto predictive law), which is set to what the user asked for.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import exp, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
+from faults.detection_events import Alarm, Change, Event, Ready, change_time
 from faults.detection_kernel import (
     CLOCK,
     FEATURES,
@@ -29,8 +28,9 @@ from faults.detection_kernel import (
     SCORE,
     watch_kernel,
 )
+from faults.detection_samples import watched_samples
 from plant.eha import EhaParameters
-from plant.errors import HydrostateError, LogError
+from plant.errors import HydrostateError
 from plant.record import Record
 
 Array = NDArray[np.float64]
@@ -71,81 +71,11 @@ LEAST_LEARNING = 60.0
 AFTER = 2.0
 """Running after an alarm from which the change of the gains is told [s]."""
 
-LIKELY = 1.92
-"""Drop of the log-likelihood at the ends of a 95 % interval: half the quantile of chi-square with one degree."""
-
 BUILD_UP = 3
 """Blocks before the first one that shows a change in which it may have come: some drive must make it felt."""
 
 BALANCES = ("flow", "force")
 """The balances with differential pressure."""
-
-
-@dataclass(frozen=True)
-class Ready:
-    """Enough has been learnt: alarms can come from here on.
-
-    Parameters
-    ----------
-    time : float
-        When [s].
-    thresholds : tuple of float
-        Of the balances [standard deviations].
-    """
-
-    time: float
-    thresholds: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Alarm:
-    """A balance no longer holds.
-
-    Parameters
-    ----------
-    time : float
-        When it was raised [s].
-    balance : str
-        ``flow``, ``force`` or ``motion``.
-    since : float
-        When the change most likely came [s].
-    interval : tuple of float
-        95 % interval of that [s].
-    score, threshold : float
-        The CUSUM and what it passed [standard deviations].
-    """
-
-    time: float
-    balance: str
-    since: float
-    interval: tuple[float, float]
-    score: float
-    threshold: float
-
-
-@dataclass(frozen=True)
-class Change:
-    """What changed with an alarm, from some running after it.
-
-    Parameters
-    ----------
-    time : float
-        When this was told [s].
-    alarm : Alarm
-        The alarm.
-    velocity : float
-        Change of the piston's velocity at a motor speed [fraction].
-    pressure : float or None
-        Change of differential pressure at a velocity [fraction]; None where pressure is not logged.
-    """
-
-    time: float
-    alarm: Alarm
-    velocity: float
-    pressure: float | None
-
-
-Event = Ready | Alarm | Change
 
 
 class Watch:
@@ -235,7 +165,7 @@ class Watch:
 
     @property
     def thresholds(self) -> tuple[float, ...]:
-        """Thresholds of the balances [standard deviations]; infinite while they are learnt."""
+        """Thresholds of the balances [dimensionless]; infinite while they are learnt."""
         return tuple(float(value) for value in self._score[:, 5])
 
     def take(self, samples: Array) -> list[Event]:
@@ -342,96 +272,6 @@ class Watch:
         velocity = float(after[0] / after[1] / (before[0] / before[1]) - 1.0)
         resisted = float(after[2] / after[3] / (before[2] / before[3]) - 1.0) if len(self.balances) == 2 else None
         return [Change(self.time, alarm, velocity, resisted)]
-
-
-def change_time(scores: Array) -> tuple[int, tuple[int, int]]:
-    """Return how many blocks ago the scores' mean rose, by the generalised likelihood ratio.
-
-    Scores before the change have mean 0 and deviation 1; after it the mean is unknown (Willsky and Jones, IEEE
-    Transactions on Automatic Control 21, 1976, page 108).
-
-    Parameters
-    ----------
-    scores : ndarray, shape (n,)
-        Standardised scores of the blocks, the newest first, the last of them raised.
-
-    Returns
-    -------
-    tuple
-        Blocks since the change, and the least and most of a 95 % interval.
-
-    Examples
-    --------
-    >>> change_time(np.array([3.9, 4.2, 4.0, 0.2, -0.1, 0.3]))
-    (3, (3, 3))
-    """
-    length = np.arange(1, len(scores) + 1)
-    ratio = 0.5 * np.maximum(np.cumsum(scores), 0.0) ** 2 / length
-    likely = np.flatnonzero(ratio >= ratio.max() - LIKELY) + 1
-    return int(ratio.argmax()) + 1, (int(likely[0]), int(likely[-1]))
-
-
-def watched_samples(channels: Mapping[str, Array], sample_time: float, travelled: float = 0.0) -> tuple[Array, bool]:
-    """Return a log, or a piece of one, as samples for `Watch.take`.
-
-    Parameters
-    ----------
-    channels : Mapping[str, ndarray, shape (n,)]
-        Channels in SI: motor speed, and position or velocity; differential pressure, or both pressures, if logged.
-    sample_time : float
-        Time between samples [s].
-    travelled : float
-        Position before a piece that has velocity alone [m].
-
-    Returns
-    -------
-    samples : ndarray, shape (n, 3)
-        Motor speed [rad/s], position [m], differential pressure [Pa].
-    pressure : bool
-        Whether differential pressure is logged.
-
-    Raises
-    ------
-    LogError
-        If a channel is missing.
-    """
-    missing = missing_channels(list(channels))
-    if missing:
-        raise LogError(missing)
-    speed = channels["motor_speed_rad_s"]
-    pressure, difference = True, np.zeros(len(speed))
-    if "differential_pressure_pa" in channels:
-        difference = channels["differential_pressure_pa"]
-    elif "pressure_a_pa" in channels and "pressure_b_pa" in channels:
-        difference = channels["pressure_a_pa"] - channels["pressure_b_pa"]
-    else:
-        pressure = False
-    if "position_m" in channels:
-        position = channels["position_m"]
-    else:
-        velocity = channels["velocity_m_s"]
-        position = travelled + np.cumsum(np.nan_to_num(velocity)) * sample_time
-        position[np.isnan(velocity)] = np.nan
-    return np.column_stack([speed, position, difference]), pressure
-
-
-def missing_channels(channels: Sequence[str]) -> str:
-    """Return what a watch lacks, as a sentence; empty where nothing is missing.
-
-    Parameters
-    ----------
-    channels : sequence of str
-        Channels there are.
-
-    Returns
-    -------
-    str
-        The sentence.
-    """
-    motion = any(name in channels for name in ("position_m", "velocity_m_s"))
-    if "motor_speed_rad_s" in channels and motion:
-        return ""
-    return f"a watch needs motor_speed_rad_s, and position_m or velocity_m_s, the log has {', '.join(channels)}"
 
 
 def watch_record(

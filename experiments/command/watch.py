@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from faults.detection import Alarm, Change, Event, Watch
+    from faults.detection import Watch
+    from faults.detection_events import Alarm, Change, Event
     from plant.record import Record
     from plant.rig import Rig
 
@@ -98,7 +99,8 @@ class _Asked:
 
     def watch(self, sample_time: float, pressure: bool, start: float) -> "Watch":
         """Return the watch, with the healthy log learnt."""
-        from faults.detection import Alarm, Watch
+        from faults.detection import Watch
+        from faults.detection_events import Alarm
 
         made = Watch(
             self.bench.parameters,
@@ -158,7 +160,7 @@ class _Told:
         self._line("ready", time, thresholds=named, message="alarms can come from here on")
 
     def events(self, events: "Sequence[Event]") -> None:
-        from faults.detection import Alarm, Ready
+        from faults.detection_events import Alarm, Ready
 
         for event in events:
             if isinstance(event, Ready):
@@ -251,7 +253,7 @@ def _stream(told: _Told, lines: Iterable[str], asked: _Asked) -> None:
 def _samples(
     channels: "Mapping[str, NDArray[np.float64]]", sample_time: float, source: str, travelled: float = 0.0
 ) -> "tuple[NDArray[np.float64], bool]":
-    from faults.detection import watched_samples
+    from faults.detection_samples import watched_samples
 
     try:
         return watched_samples(channels, sample_time, travelled)

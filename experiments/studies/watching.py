@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from experiments.streams import stream
 from faults.conditions import find_condition, parameters_for
-from faults.detection import Alarm, Watch
+from faults.detection import Watch
+from faults.detection_events import Alarm
 from plant.adaptive import controlled_run
 from plant.circuit_parameters import CircuitParameters
 from plant.errors import HydrostateError

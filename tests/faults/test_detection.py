@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 
-from faults.detection import Alarm, Change, Ready, Watch, change_time, watch_record, watched_samples
+from faults.detection import Watch, watch_record
+from faults.detection_events import Alarm, Change, Ready
 from faults.detection_kernel import watch_kernel
 from plant.eha import EhaParameters
-from plant.errors import HydrostateError, LogError
+from plant.errors import HydrostateError
 from plant.record import Record
 
 P = EhaParameters()
@@ -89,19 +90,6 @@ def test_a_log_is_watched_like_its_samples(leaking: np.ndarray) -> None:
     assert watch_record(record, P, learning=60.0) == Watch(P, T, learning=60.0).take(leaking)
 
 
-def test_velocity_stands_in_for_position_and_two_pressures_for_their_difference() -> None:
-    channels = {
-        "motor_speed_rad_s": np.ones(3),
-        "velocity_m_s": np.array([1.0, np.nan, 2.0]),
-        "pressure_a_pa": np.full(3, 5.0),
-        "pressure_b_pa": np.full(3, 2.0),
-    }
-    samples, pressure = watched_samples(channels, 0.5, travelled=1.0)
-    assert pressure
-    np.testing.assert_array_equal(samples[:, 1], [1.5, np.nan, 2.5])
-    np.testing.assert_array_equal(samples[:, 2], 3.0)
-
-
 def test_the_threshold_of_exponential_peaks_is_passed_at_the_rate_asked_for() -> None:
     rng, kernel, width = np.random.default_rng(1), watch_kernel(), 0.02
     passed = []
@@ -124,13 +112,6 @@ def test_the_threshold_is_higher_the_less_has_been_learnt() -> None:
     assert levels[400] > levels[40000] + 0.2
 
 
-def test_the_change_time_is_the_start_of_the_raised_scores() -> None:
-    scores = np.concatenate([np.full(12, 3.0), np.zeros(40)])
-    found, (least, most) = change_time(scores)
-    assert found == 12
-    assert least <= 12 <= most
-
-
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -145,8 +126,3 @@ def test_what_cannot_be_watched_is_refused(changes: dict[str, float], said: str)
     given = {"sample_time": T, **changes}
     with pytest.raises(HydrostateError, match=said):
         Watch(P, **given)
-
-
-def test_a_log_without_motion_is_refused() -> None:
-    with pytest.raises(LogError, match="position_m or velocity_m_s"):
-        watched_samples({"motor_speed_rad_s": np.zeros(3)}, T)
