@@ -16,6 +16,7 @@ NAMES = (
     "identification_tests",
     "circuit",
     "detection",
+    "real_rig",
 )
 """Every benchmark that needs nothing but the project, in the order of `make benchmark`."""
 
