@@ -91,7 +91,7 @@ class CircuitStream:
     def __init__(self, seed: int, condition: str = "normal") -> None:
         self._rng = stream(seed, "watching")
         self.condition = condition
-        self.warmer, self._target, self._time = 0.0, 0.0, 0.0
+        self.warmer, self._target, self._time, self._command = 0.0, 0.0, 0.0, 0.0
         self._state: Array | None = None
 
     def run(self, seconds: float) -> Array:
@@ -116,17 +116,18 @@ class CircuitStream:
         self._warm(seconds)
         after = parameter_row(at_oil_temperature(base, self.warmer))
         count = round(seconds / SAMPLE_TIME)
-        share = np.arange(count)[:, None] / count
+        share = np.arange(count + 1)[:, None] / count
         rows = before * (1.0 - share) + after * share
-        drive = self._drive(count, base)
+        drive = np.concatenate([[self._command], self._drive(count, base)])
         start = np.array([CIRCUIT.start(rows[0])]) if self._state is None else self._state
         if CIRCUIT.control is None:
             raise HydrostateError("the circuit must have steps of controlled error")
         (states,) = controlled_run(
             CIRCUIT.name, CIRCUIT.control, start, drive, rows[:, None], SAMPLE_TIME, CIRCUIT.parameter_class
         )
-        self._state = states[-1:].copy()
-        record = measure(Record(SAMPLE_TIME, dict(CIRCUIT.channels(states, rows))), RIG, self._rng)
+        self._state, self._command = states[-1:].copy(), float(drive[-1])
+        seen = CIRCUIT.channels(states[1:], rows[1:])  # the first sample was the last of the piece before
+        record = measure(Record(SAMPLE_TIME, dict(seen)), RIG, self._rng)
         names = ("motor_speed_rad_s", "position_m", "differential_pressure_pa")
         return np.column_stack([record[name] for name in names])
 
