@@ -7,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from experiments.command import conditions, diagnose, estimate, identifiability, identify, library, simulate, watch
+from experiments.command import (
+    conditions,
+    diagnose,
+    estimate,
+    identifiability,
+    identify,
+    isolability,
+    library,
+    simulate,
+    watch,
+)
 from experiments.command.json_output import json_text
 from experiments.command.options import SEED, Json, Seed
 from experiments.command.streams import HydrostateGroup, emit
@@ -104,7 +114,7 @@ def circuit(
         emit(str(manifest))
 
 
-for module in (simulate, estimate, identify, library, diagnose, watch, identifiability, conditions):
+for module in (simulate, estimate, identify, library, diagnose, watch, identifiability, isolability, conditions):
     app.add_typer(module.commands)
 app.add_typer(conditions.rig_commands, name="rig")
 
