@@ -267,11 +267,11 @@ class Watch:
         span = RECENT - 1 - (now - changed)
         before = self._gains[np.arange(changed - min(span, changed), changed) % RECENT].sum(axis=0)
         after = self._gains[np.arange(changed + 1, now) % RECENT].sum(axis=0)
-        if min(before[1], before[3], after[1], after[3]) <= 0.0:
-            return []
-        velocity = float(after[0] / after[1] / (before[0] / before[1]) - 1.0)
-        resisted = float(after[2] / after[3] / (before[2] / before[3]) - 1.0) if len(self.balances) == 2 else None
-        return [Change(self.time, alarm, velocity, resisted)]
+        if len(self.balances) < len(BALANCES) or min(before[1], before[3], after[1], after[3]) <= 0.0:
+            return [Change(self.time, alarm, None, None)]
+        lost = float(before[0] / before[1]), float(after[0] / after[1])
+        resisted = float(after[2] / after[3] / (before[2] / before[3]) - 1.0)
+        return [Change(self.time, alarm, lost, resisted)]
 
 
 def watch_record(

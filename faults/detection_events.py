@@ -63,15 +63,16 @@ class Change:
         When this was told [s].
     alarm : Alarm
         The alarm.
-    velocity : float
-        Change of the piston's velocity at a motor speed [fraction].
+    lost : tuple of float, or None
+        Flow lost before and after, as a share of what the pump delivers, weighed with pressure, so that oil that is
+        only squeezed comes back [fraction]; None where pressure is not logged.
     pressure : float or None
         Change of differential pressure at a velocity [fraction]; None where pressure is not logged.
     """
 
     time: float
     alarm: Alarm
-    velocity: float
+    lost: tuple[float, float] | None
     pressure: float | None
 
 

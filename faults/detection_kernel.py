@@ -27,7 +27,7 @@ FEATURES = 8
 """Regressors of a balance."""
 
 GAINS = 4
-"""Sums of a block from which gains follow: of v w, w w, p v and v v."""
+"""Sums of a block from which gains follow: of (w - v) p, w p, p v and v v."""
 
 _KERNEL = '''"""Generated: the watch over flow and force balances."""
 
@@ -143,8 +143,8 @@ def advance(
                         for j in range(i + 1):
                             information[c, i, j] = fade * information[c, i, j] + f[c, i] * f[c, j]
                 place = int(clock[0]) % recent
-                gains[place, 0] += v * w
-                gains[place, 1] += w * w
+                gains[place, 0] += (w - v) * p
+                gains[place, 1] += w * p
                 gains[place, 2] += p * v
                 gains[place, 3] += v * v
             lags[1], lags[0], lags[2] = v1, v, w

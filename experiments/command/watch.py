@@ -67,7 +67,7 @@ def watch(
     """Say when something changes inside the actuator: one JSON object a line, as it happens.
 
     Events: start; ready, learning is over; alarm, with since_s and its 95 % interval; change, two seconds later, by how
-    much velocity and pressure changed; end. It learns what the actuator does while it is healthy and follows slow
+    much lost flow and pressure changed; end. It learns what the actuator does while it is healthy and follows slow
     drift, as of the oil's temperature, so it tells sudden changes; use diagnose for what has always been wrong.
     """
     asked = _Asked(load_rig(rig), load_columns(columns), false_alarms, learning, healthy, no_pressure)
@@ -170,8 +170,9 @@ class _Told:
                 said = f"the {event.balance} balance has changed since {event.since:.2f} s"
                 self._line("alarm", event.time, **_alarm(event), message=said)
             else:
+                lost = dict(zip(("before", "after"), event.lost or (None, None), strict=True))
                 about = {
-                    "velocity_change_percent": 100.0 * event.velocity,
+                    "lost_flow_percent": {when: None if one is None else 100.0 * one for when, one in lost.items()},
                     "pressure_change_percent": None if event.pressure is None else 100.0 * event.pressure,
                 }
                 self._line("change", event.time, **_alarm(event.alarm), **about, message=_reading(event))
@@ -205,10 +206,13 @@ def _alarm(alarm: "Alarm") -> dict[str, Any]:
 
 
 def _reading(event: "Change") -> str:
-    said = [f"velocity at the same motor speed {100.0 * event.velocity:+.0f} %"]
-    if event.pressure is not None:
-        said.append(f"differential pressure at the same velocity {100.0 * event.pressure:+.0f} %")
-    return "; ".join(said)
+    if event.lost is None or event.pressure is None:
+        return f"without {PRESSURE} it cannot be said what has changed"
+    before, after = (f"{100.0 * one:.0f} %" for one in event.lost)
+    return (
+        f"flow lost: {before} of what the pump delivers before, {after} after; "
+        f"differential pressure at the same velocity {100.0 * event.pressure:+.0f} %"
+    )
 
 
 def _file(told: _Told, path: Path, asked: _Asked) -> None:

@@ -44,7 +44,8 @@ def test_an_abrupt_leak_is_found_within_half_a_second_and_dated(leaking: np.ndar
     assert ready.time == pytest.approx(60.0)
     assert 90.0 < alarm.time < 90.5
     assert alarm.interval[0] <= 90.0 <= alarm.interval[1]
-    assert change.velocity == pytest.approx(0.65 / 0.9 - 1.0, abs=0.05)
+    assert change.lost is not None
+    assert change.lost[1] - change.lost[0] > 0.15
 
 
 @pytest.mark.parametrize("most", [1, 7, 25000])

@@ -47,7 +47,8 @@ def test_a_stream_and_its_log_give_the_same_events_one_json_object_a_line(log: P
     alarm = streamed[2]
     assert alarm["since_ci95_s"][0] <= 90.0 <= alarm["since_ci95_s"][1]
     assert 90.0 < alarm["time_s"] < 90.6
-    assert streamed[3]["velocity_change_percent"] == pytest.approx(-33.3, abs=2.0)
+    assert streamed[3]["lost_flow_percent"] == pytest.approx({"before": 10.0, "after": 40.0}, abs=1.0)
+    assert streamed[3]["pressure_change_percent"] == pytest.approx(0.0, abs=1.0)
     _, read, _ = _run(str(log), "--learning", "60")
     assert [one.get("since_s") for one in read] == [one.get("since_s") for one in streamed]
 
