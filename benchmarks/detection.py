@@ -1,7 +1,8 @@
 """Detection in time on the circuit: delay after an abrupt fault, false alarms at a set rate, time a sample.
 
 A watch learns healthy running of one seed; faults and false alarms are judged on drive and noise of others. ``--hours``
-sets the healthy running that is judged (30 is the acceptance), ``--seeds`` the faults a condition.
+sets the healthy running that is judged (30 is the acceptance), ``--seeds`` the faults a condition, ``--streams`` the
+hours that are watched after two minutes.
 """
 
 import argparse
@@ -11,7 +12,8 @@ from time import process_time
 import numpy as np
 
 from experiments.studies.watching import PIECE, SAMPLE_TIME, CircuitStream, detect_fault, false_alarms, learnt
-from faults.detection import Watch
+from faults.detection import LEARNING, Watch
+from faults.detection_events import Alarm
 from faults.detection_scores import alarm_rate, median_delay
 from plant.circuit_parameters import CircuitParameters
 
@@ -55,6 +57,24 @@ def alarms(hours: float) -> int:
     return int(not right)
 
 
+def cold(streams: int) -> None:
+    """Print the false alarms of streams of an hour that are watched after two minutes; no target is set."""
+    counts, hours = {True: 0, False: 0}, streams * (1.0 - LEARNING / 3600.0)
+    for seed in range(SEED + 2, SEED + 2 + streams):
+        running = CircuitStream(seed)
+        watches = {logged: Watch(CircuitParameters(), SAMPLE_TIME, pressure=logged) for logged in counts}
+        for _ in range(round(3600.0 / PIECE)):
+            samples = running.run(PIECE)
+            for logged, watch in watches.items():
+                counts[logged] += sum(isinstance(event, Alarm) for event in watch.take(samples))
+    for logged, count in counts.items():
+        rate, (low, high) = alarm_rate(count, hours)
+        print(
+            f"the same, {LEARNING:g} s learnt, {'with' if logged else 'without'} pressure: {count} in {hours:.1f} h, "
+            f"{rate:.2f} an hour (95 % {low:.2f} to {high:.2f})"
+        )
+
+
 def speed() -> int:
     """Print the CPU time a sample at 10 kHz, of a second at a time; return whether a core does not keep up."""
     samples = np.repeat(CircuitStream(SEED).run(PIECE), round(SAMPLE_TIME / FAST), axis=0)
@@ -75,5 +95,9 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=30.0)
     parser.add_argument("--seeds", type=int, default=100)
+    parser.add_argument("--streams", type=int, default=10)
     options = parser.parse_args(arguments)
-    return delays(options.seeds) + alarms(options.hours) + speed()
+    misses = delays(options.seeds) + alarms(options.hours) + speed()
+    if options.streams:
+        cold(options.streams)
+    return misses
