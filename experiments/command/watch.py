@@ -56,7 +56,7 @@ def watch(
     ] = 120.0,
     healthy: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="A healthy log to learn first; an hour of one makes the rate exact."),
+        typer.Option(metavar="FILE", help="A healthy log to learn first; an hour of one holds the rate best."),
     ] = None,
     rig: RigFile = None,
     columns: Columns = None,
