@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from estimation.identifiability import SENSED
-from estimation.whitening import block_weights, whitened
 from faults.bank import mathematical_bank, predict_run
 from plant.eha import EhaParameters
 from plant.errors import HydrostateError
@@ -209,9 +208,9 @@ def condition_distances(
 
     The noiseless run of one condition is explained as well as another's model can, its bulk modulus, leakage, bias and
     friction moved within `SPREAD` (linearised); half the weighted sum of what is left and of the moves is the
-    Kullback-Leibler distance. Noise is that of the sensors, that of motor speed a random walk in position, and what the
-    model leaves out (`MODEL_ERROR`): without the last, an encoder of a micrometre would tell any two conditions apart
-    in a millisecond.
+    Kullback-Leibler distance. Noise is that of the sensors and what the model leaves out (`MODEL_ERROR`): without the
+    latter, an encoder of a micrometre would tell any two conditions apart in a millisecond. Motor speed's own noise
+    moves the position by micrometres and is left out beside it.
 
     Parameters
     ----------
@@ -241,20 +240,13 @@ def condition_distances(
         if channel not in SENSED or not noise.get(channel, 0.0) > 0.0:
             raise HydrostateError(f"a channel must be one of {', '.join(SENSED)} and have noise, got {channel!r}")
     drive = Record(sample_time, {"motor_speed_rad_s": speed})
-    walk = (parameters.pump_displacement / parameters.piston_area * sensors.speed_noise * sample_time) ** 2
-    healthy, every = predict_run(drive, parameters), np.ones(len(speed))
-    weights = {
-        name: block_weights(
-            every,
-            noise[name] + MODEL_ERROR**2 * float(np.var(healthy[name])) * max(1.0, LASTING / sample_time),
-            walk if name == "position_m" else 0.0,
-        )
-        for name in channels
-    }
+    healthy = predict_run(drive, parameters)
+    lasting = MODEL_ERROR**2 * max(1.0, LASTING / sample_time)
+    sizes = {name: (noise[name] + lasting * float(np.var(healthy[name]))) ** 0.5 for name in channels}
 
     def seen(model: EhaParameters) -> Array:
         run = predict_run(drive, model)
-        return np.concatenate([whitened(run[name][:, None], weights[name])[:, 0] for name in channels])
+        return np.concatenate([run[name] / size for name, size in sizes.items()])
 
     bank = mathematical_bank(parameters)
     runs = {name: seen(model) for name, model in bank.items()}
@@ -271,6 +263,6 @@ def condition_distances(
 
 
 def _slope(seen: Callable[[EhaParameters], Array], model: EhaParameters, run: Array, moved: str) -> Array:
-    """Return by how much the whitened channels change for one standard deviation of a parameter."""
+    """Return by how much the weighed channels change for one standard deviation of a parameter."""
     changed = replace(model, **{moved: getattr(model, moved) * (1.0 + STEP)})
     return (seen(changed) - run) * (SPREAD[moved] / STEP)
