@@ -15,6 +15,8 @@ NAMES = (
     "identification",
     "identification_tests",
     "circuit",
+    "detection",
+    "real_rig",
     "diagnosis",
     "batch_scale",
     "archive",

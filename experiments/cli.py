@@ -15,8 +15,10 @@ from experiments.command import (
     estimate,
     identifiability,
     identify,
+    isolability,
     library,
     simulate,
+    watch,
 )
 from experiments.command.json_output import json_text
 from experiments.command.options import SEED, Json, Seed
@@ -114,7 +116,20 @@ def circuit(
         emit(str(manifest))
 
 
-for module in (simulate, estimate, identify, library, diagnose, identifiability, conditions, batch, compare):
+VERBS = (
+    simulate,
+    estimate,
+    identify,
+    library,
+    diagnose,
+    watch,
+    identifiability,
+    isolability,
+    conditions,
+    batch,
+    compare,
+)
+for module in VERBS:
     app.add_typer(module.commands)
 app.add_typer(conditions.rig_commands, name="rig")
 

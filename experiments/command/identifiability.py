@@ -68,7 +68,7 @@ def identifiability(
     from plant.sensors import SENSORS
     from plant.signals import DRIVES
 
-    channels = _channels(sensors)
+    channels = sensed_channels(sensors)
     require_one_of("--noise", noise, [name for name in SENSORS if name != "ideal"])
     require_one_of("--drive", drive, list(DRIVES))
     require_positive("--seconds", seconds, "s")
@@ -95,8 +95,24 @@ def identifiability(
     finish(Batch(results, len(results)), _ranking if ranked else _screen, as_json=as_json, out=out)
 
 
-def _channels(listed: str) -> dict[str, str]:
-    """Return the channels of ``--sensors``, in their usual order."""
+def sensed_channels(listed: str) -> dict[str, str]:
+    """Return the channels of ``--sensors``, in their usual order.
+
+    Parameters
+    ----------
+    listed : str
+        Names in `CHANNELS`, by commas.
+
+    Returns
+    -------
+    dict[str, str]
+        Channel by name.
+
+    Raises
+    ------
+    HydrostateError
+        If a name is unknown or comes twice.
+    """
     given = [name.strip() for name in listed.split(",")]
     for i, name in enumerate(given):
         require_one_of("--sensors", name, list(CHANNELS))

@@ -5,7 +5,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import typer
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from plant.record import Record
+
+T = TypeVar("T")
 
 ABSENT = re.compile(r"column .* is wanted for (\w+), the log has")
 """How `plant.columns` says that a mapped column is not in a log."""
@@ -181,12 +183,42 @@ def read_log(path: Path, rig_columns: Mapping[str, str], columns: Mapping[str, s
     """
     from plant.record_files import read_record
 
+    return with_rig_columns(lambda mapping: read_record(path, columns=mapping), rig_columns, columns)
+
+
+def with_rig_columns(
+    read: Callable[[Mapping[str, str]], T], rig_columns: Mapping[str, str], columns: Mapping[str, str]
+) -> T:
+    """Read by a rig's columns and the command line's, leaving out those of the rig's that are not there.
+
+    Parameters
+    ----------
+    read : callable
+        Reads by a mapping of channels to foreign columns.
+    rig_columns, columns : Mapping[str, str]
+        Foreign column by channel, from the rig file and from the command line.
+
+    Returns
+    -------
+    object
+        What `read` returned.
+
+    Raises
+    ------
+    LogError
+        If a column of the command line's is absent, or for any other reason of `read`'s.
+
+    Warns
+    -----
+    LogWarning
+        If a column of the rig's is absent.
+    """
     absent: list[str] = []
     try:
         while True:
             kept = {channel: name for channel, name in rig_columns.items() if channel not in absent}
             try:
-                return read_record(path, columns={**kept, **columns})
+                return read({**kept, **columns})
             except LogError as error:
                 missed = ABSENT.search(str(error))
                 if missed is None or missed[1] not in kept or missed[1] in columns:

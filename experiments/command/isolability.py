@@ -1,0 +1,185 @@
+"""`hydrostate isolability`: which faults an experiment could tell apart, before it is made."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from experiments.command.identifiability import MOST_SAMPLES, sensed_channels
+from experiments.command.json_output import Result, prepare_output
+from experiments.command.logs import Batch, finish
+from experiments.command.options import (
+    SEED,
+    Json,
+    Out,
+    RigFile,
+    Seed,
+    load_rig,
+    require_one_of,
+    require_positive,
+)
+from experiments.command.streams import note, table
+from plant.errors import DriveError, HydrostateError
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from faults.isolability import Distances
+    from plant.rig import Rig
+
+commands = typer.Typer()
+
+
+@commands.command(epilog="Example: hydrostate isolability --sensors position,velocity --drive prbs --seconds 10")
+def isolability(
+    sensors: Annotated[
+        str, typer.Option(metavar="LIST", help="Sensors beside motor speed, by commas: position, velocity, dp.")
+    ] = "position,velocity,dp",
+    noise: Annotated[str, typer.Option(metavar="NOISE", help="Noise of the sensors: bench, rig or paper.")] = "bench",
+    drive: Annotated[
+        str, typer.Option(metavar="DRIVE", help="Drive: sine, prbs, steps, chirp or multisine, at the paper's 4 V.")
+    ] = "steps",
+    seconds: Annotated[float, typer.Option(metavar="S", help="Length of the experiment [s].")] = 10.0,
+    rate: Annotated[float, typer.Option(metavar="HZ", help="Samples a second [Hz].")] = 1000.0,
+    ranked: Annotated[bool, typer.Option("--rank", help="Rank all drives, the one that tells most first.")] = False,
+    rig: RigFile = None,
+    out: Out = None,
+    seed: Seed = SEED,
+    as_json: Json = False,
+) -> None:
+    """Say which faults an experiment could tell apart, before it is made.
+
+    By structure: which faults break the same balances for these sensors, whatever their course. By Kullback-Leibler
+    distance a second between the nine conditions under the drive, each a class of actuators. The seed is that of random
+    drives.
+    """
+    from plant.sensors import SENSORS
+    from plant.signals import DRIVES
+
+    channels = sensed_channels(sensors)
+    require_one_of("--noise", noise, [name for name in SENSORS if name != "ideal"])
+    require_one_of("--drive", drive, list(DRIVES))
+    require_positive("--seconds", seconds, "s")
+    require_positive("--rate", rate, "Hz")
+    if not 2.0 <= seconds * rate <= MOST_SAMPLES:
+        raise HydrostateError(f"--seconds times --rate must be 2 to {MOST_SAMPLES} samples, got {seconds * rate:g}")
+    bench = load_rig(rig)
+    prepare_output(out)
+    about = {"rig": bench.name, "sensors": list(channels), "noise": noise}
+    about |= {"seconds": seconds, "rate_hz": rate, "seed": seed}
+    found: dict[str, Distances] = {}
+    for name in DRIVES if ranked else [drive]:
+        try:
+            found[name] = _distances(name, bench, channels, about)
+        except DriveError as error:
+            if not ranked:
+                raise
+            note(f"{name} is left out: {error}")
+    if not found:
+        raise HydrostateError("no drive is within this actuator's limits")
+    results = _results(found, channels, about)
+    finish(Batch(results, len(results)), _ranking if ranked else _screen, as_json=as_json, out=out)
+
+
+def _distances(drive: str, bench: "Rig", channels: Mapping[str, str], about: Mapping[str, Any]) -> "Distances":
+    import numpy as np
+
+    from faults.isolability import condition_distances
+    from plant.sensors import SENSORS
+    from plant.signals import make_drive
+
+    T = 1.0 / about["rate_hz"]
+    speed = make_drive(drive, about["seconds"], T, bench.parameters, np.random.default_rng(about["seed"]))
+    return condition_distances(bench.parameters, speed, T, tuple(channels.values()), SENSORS[about["noise"]])
+
+
+def _results(
+    found: "Mapping[str, Distances]", channels: Mapping[str, str], about: Mapping[str, Any]
+) -> tuple[Result, ...]:
+    from faults.isolability import structural_isolability, wrong_verdicts
+
+    structure = structural_isolability(tuple(channels.values()))
+    results: list[Result] = []
+    for place, name in enumerate(sorted(found, key=lambda one: -found[one].least)):
+        distances = found[name]
+        nearest = {
+            condition: {
+                "rival": distances.conditions[int(row.argmin())],
+                "nats_per_second": float(row.min()) / distances.seconds,
+                "wrong_verdicts_percent": 100.0 * wrong_verdicts(float(row.min())),
+            }
+            for condition, row in zip(distances.conditions, distances.mutual, strict=True)
+        }
+        results.append(
+            {
+                "drive": name,
+                "rank": place + 1,
+                "outcome": "ok",
+                "not_told_from": {
+                    fault: None if rivals is None else list(rivals) for fault, rivals in structure.items()
+                },
+                "conditions": list(distances.conditions),
+                "nats_per_second": distances.nats / distances.seconds,
+                "nearest": nearest,
+                "hardest_pair": list(distances.hardest),
+                "hardest_nats_per_second": distances.least / distances.seconds,
+                **about,
+                "message": _verdict(distances),
+            }
+        )
+    return tuple(results)
+
+
+def _verdict(distances: "Distances") -> str:
+    from faults.isolability import ERROR, wrong_verdicts
+
+    pairs = [
+        (one, other)
+        for i, one in enumerate(distances.conditions)
+        for j, other in enumerate(distances.conditions[:i])
+        if wrong_verdicts(float(distances.mutual[i, j])) > ERROR
+    ]
+    first, second = distances.hardest
+    if not pairs:
+        return f"all conditions can be told apart; the hardest pair is {first} and {second}"
+    total = len(distances.conditions) * (len(distances.conditions) - 1) // 2
+    return (
+        f"{len(pairs)} of {total} pairs cannot be told apart with fewer than {100.0 * ERROR:g} % wrong, "
+        f"{first} and {second} least of all"
+    )
+
+
+def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
+    for result in results:
+        structure = table("fault", "cannot be told from, whatever its course", title=_title(result, "structure"))
+        for fault, rivals in result["not_told_from"].items():
+            structure.add_row(fault, "not detectable" if rivals is None else ", ".join(rivals) or "told from all")
+        yield structure
+        shown = table(
+            "condition",
+            "nearest rival",
+            "distance [nats/s]",
+            "least wrong verdicts [%]",
+            title=_title(result, result["drive"]),
+        )
+        for condition, near in result["nearest"].items():
+            wrong = near["wrong_verdicts_percent"]
+            said = "under 0.01" if wrong < 0.01 else f"{wrong:.2g}"
+            shown.add_row(condition, near["rival"], f"{near['nats_per_second']:.3g}", said)
+        yield shown
+        yield str(result["message"])
+
+
+def _ranking(results: Sequence[Result]) -> "Iterable[RenderableType]":
+    shown = table("drive", "hardest pair", "distance [nats/s]", title=_title(results[0], "drives"))
+    for result in results:
+        shown.add_row(result["drive"], " and ".join(result["hardest_pair"]), f"{result['hardest_nats_per_second']:.3g}")
+    yield shown
+    yield f"{results[0]['drive']} tells most: {results[0]['message']}"
+
+
+def _title(result: Result, what: str) -> str:
+    return (
+        f"{what}, {result['seconds']:g} s at {result['rate_hz']:g} Hz, {', '.join(result['sensors'])}, "
+        f"rig {result['rig']}"
+    )

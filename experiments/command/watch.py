@@ -1,0 +1,284 @@
+"""`hydrostate watch -`: events of a stream as they come, one JSON object a line."""
+
+import json
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import typer
+
+from experiments.command.json_output import plain
+from experiments.command.logs import read_log, with_rig_columns
+from experiments.command.options import PRESSURE, Columns, RigFile, load_columns, load_rig
+from experiments.command.streams import emit, note
+from plant.errors import HydrostateError, LogError, LogWarning
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from faults.detection import Watch
+    from faults.detection_events import Alarm, Change, Event
+    from plant.record import Record
+    from plant.rig import Rig
+
+T = TypeVar("T")
+
+STANDARD_INPUT = "standard input"
+"""What messages call the stream."""
+
+SAME_RATE = 0.01
+"""By how much the rates of a healthy log and of what is watched may differ [fraction]."""
+
+commands = typer.Typer()
+
+
+@commands.command(epilog="Example: tail -n +1 -f bench.csv | hydrostate watch - --false-alarms 1")
+def watch(
+    log: Annotated[
+        str,
+        typer.Argument(
+            metavar="LOG",
+            help="A log, or - for rows of CSV on standard input: a header, then time_s, motor_speed_rad_s, and "
+            "position_m or velocity_m_s; differential_pressure_pa is optional. Another unit stands in the name.",
+            show_default=False,
+        ),
+    ],
+    false_alarms: Annotated[
+        float, typer.Option(metavar="RATE", help="False alarms an hour of healthy, moving operation [1/h].")
+    ] = 1.0,
+    learning: Annotated[
+        float, typer.Option(metavar="S", help="Healthy running to learn before alarms can come [s], 60 at least.")
+    ] = 120.0,
+    healthy: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A healthy log to learn first; an hour of one holds the rate best."),
+    ] = None,
+    rig: RigFile = None,
+    columns: Columns = None,
+    no_pressure: Annotated[
+        bool, typer.Option("--no-pressure", help="Use motion alone, even if differential pressure is logged.")
+    ] = False,
+) -> None:
+    """Say when something changes inside the actuator: one JSON object a line, as it happens.
+
+    Events: start; ready, learning is over; alarm, with since_s and its 95 % interval; change, two seconds later, by how
+    much lost flow and pressure changed; end. It learns what the actuator does while it is healthy and follows slow
+    drift, as of the oil's temperature, so it tells sudden changes; use diagnose for what has always been wrong.
+    """
+    asked = _Asked(load_rig(rig), load_columns(columns), false_alarms, learning, healthy, no_pressure)
+    told = _Told()
+    try:
+        if log == "-":
+            _stream(told, sys.stdin, asked)
+        else:
+            _file(told, Path(log), asked)
+    except HydrostateError as error:
+        told.end("failed", str(error))
+        raise
+    except KeyboardInterrupt:
+        told.end("interrupted", "interrupted")
+        raise
+    told.end("ok", "")
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """The command line."""
+
+    bench: "Rig"
+    columns: Mapping[str, str]
+    false_alarms: float
+    learning: float
+    healthy: Path | None
+    no_pressure: bool
+
+    def watch(self, sample_time: float, pressure: bool, start: float) -> "Watch":
+        """Return the watch, with the healthy log learnt."""
+        from faults.detection import Watch
+        from faults.detection_events import Alarm
+
+        made = Watch(
+            self.bench.parameters,
+            sample_time,
+            pressure=pressure and not self.no_pressure,
+            false_alarms=self.false_alarms,
+            learning=self.learning,
+            start=start,
+        )
+        if self.healthy is not None:
+            record = _read(self.healthy, self)
+            if abs(record.sample_time / sample_time - 1.0) > SAME_RATE:
+                raise LogError(
+                    f"{self.healthy}: the healthy log must have the rate of what is watched, {1.0 / sample_time:g} Hz, "
+                    f"got {1.0 / record.sample_time:g} Hz"
+                )
+            samples, logged = _samples(_channels(record), record.sample_time, str(self.healthy))
+            if "motion" not in made.balances and not logged:
+                raise LogError(f"{self.healthy}: the healthy log must have {PRESSURE}, as what is watched has")
+            alarms = sum(isinstance(event, Alarm) for event in made.take(samples))
+            if alarms:
+                note(f"{self.healthy}: warning: {alarms} alarms while this was learnt as healthy")
+            made.interrupt()
+            made.clock_reads(start)
+        return made
+
+
+class _Told:
+    """What has been said so far, for the last line."""
+
+    def __init__(self) -> None:
+        self.watch: Watch | None = None
+        self.began = 0.0
+        self.alarms = 0
+
+    def start(self, source: str, watch: "Watch", asked: _Asked) -> None:
+        self.watch, self.began = watch, watch.last
+        self._line(
+            "start",
+            self.began,
+            file=source,
+            rig=asked.bench.name,
+            rate_hz=round(1.0 / watch.sample_time, 6),
+            balances=list(watch.balances),
+            false_alarms_per_hour=asked.false_alarms,
+            message="learning what is normal" if len(watch.balances) == 2 else f"learning, without {PRESSURE}",
+        )
+        if self._armed:
+            self._ready(self.began, watch.thresholds)
+
+    @property
+    def _armed(self) -> bool:
+        return self.watch is not None and any(value < float("inf") for value in self.watch.thresholds)
+
+    def _ready(self, time: float, thresholds: Sequence[float]) -> None:
+        named = dict(zip(self.watch.balances, thresholds, strict=True)) if self.watch else {}
+        self._line("ready", time, thresholds=named, message="alarms can come from here on")
+
+    def events(self, events: "Sequence[Event]") -> None:
+        from faults.detection_events import Alarm, Ready
+
+        for event in events:
+            if isinstance(event, Ready):
+                self._ready(event.time, event.thresholds)
+            elif isinstance(event, Alarm):
+                self.alarms += 1
+                said = f"the {event.balance} balance has changed since {event.since:.2f} s"
+                self._line("alarm", event.time, **_alarm(event), message=said)
+            else:
+                lost = dict(zip(("before", "after"), event.lost or (None, None), strict=True))
+                about = {
+                    "lost_flow_percent": {when: None if one is None else 100.0 * one for when, one in lost.items()},
+                    "pressure_change_percent": None if event.pressure is None else 100.0 * event.pressure,
+                }
+                self._line("change", event.time, **_alarm(event.alarm), **about, message=_reading(event))
+
+    def end(self, outcome: str, message: str) -> None:
+        if self.watch is not None:
+            seconds = self.watch.last - self.began
+            message = message or f"{self.alarms} alarms in {seconds:.1f} s"
+            if outcome == "ok" and not self._armed:
+                message += "; the stream ended before enough was learnt, so no alarm could come"
+        time = None if self.watch is None else self.watch.last
+        self._line("end", time, outcome=outcome, alarms=self.alarms, message=message)
+
+    def _line(self, event: str, time: float | None, **entries: Any) -> None:
+        emit(json.dumps(plain({"event": event, "time_s": _rounded(time), **entries}), allow_nan=False))
+
+
+def _rounded(time: float | None) -> float | None:
+    """Return a time to the microsecond, as far as any logger's clock goes [s]."""
+    return None if time is None else round(time, 6)
+
+
+def _alarm(alarm: "Alarm") -> dict[str, Any]:
+    return {
+        "balance": alarm.balance,
+        "since_s": _rounded(alarm.since),
+        "since_ci95_s": [_rounded(end) for end in alarm.interval],
+        "score": alarm.score,
+        "threshold": alarm.threshold,
+    }
+
+
+def _reading(event: "Change") -> str:
+    if event.lost is None or event.pressure is None:
+        return f"without {PRESSURE} it cannot be said what has changed"
+    before, after = (f"{100.0 * one:.0f} %" for one in event.lost)
+    return (
+        f"flow lost: {before} of what the pump delivers before, {after} after; "
+        f"differential pressure at the same velocity {100.0 * event.pressure:+.0f} %"
+    )
+
+
+def _file(told: _Told, path: Path, asked: _Asked) -> None:
+    record = _read(path, asked)
+    samples, pressure = _samples(_channels(record), record.sample_time, str(path))
+    watch = asked.watch(record.sample_time, pressure, record.start_time)
+    told.start(str(path), watch, asked)
+    told.events(watch.take(samples))
+
+
+def _stream(told: _Told, lines: Iterable[str], asked: _Asked) -> None:
+    import numpy as np
+
+    from plant.csv_stream import CsvStream
+
+    rest = iter(lines)
+    header = next((line for line in rest if line.strip()), "")
+
+    def opened(mapping: Mapping[str, str]) -> CsvStream:
+        return CsvStream(chain([header], rest), mapping, source=STANDARD_INPUT)
+
+    stream = _noted(STANDARD_INPUT, lambda: with_rig_columns(opened, asked.bench.columns, asked.columns))
+    T = stream.sample_time
+    _, pressure = _samples(dict.fromkeys(stream.channels, np.empty(0)), T, STANDARD_INPUT)
+    watch = asked.watch(T, pressure, stream.start_time)
+    told.start(STANDARD_INPUT, watch, asked)
+    travelled = 0.0
+    for last, rows, gap in stream.samples(watch.block):
+        channels = dict(zip(stream.channels, rows.T, strict=True))
+        samples, _ = _samples(channels, T, STANDARD_INPUT, travelled)
+        if "position_m" not in channels:
+            travelled += float(np.nansum(channels["velocity_m_s"])) * T
+        if gap:
+            watch.interrupt()
+            note(f"{STANDARD_INPUT}: warning: rows are missing before {last:g} s, so what is normal is learnt again")
+        watch.clock_reads(last - (len(rows) - 1) * T)
+        told.events(watch.take(samples))
+    if stream.cut:
+        note(f"{STANDARD_INPUT}: warning: the last row is cut short and left out")
+
+
+def _samples(
+    channels: "Mapping[str, NDArray[np.float64]]", sample_time: float, source: str, travelled: float = 0.0
+) -> "tuple[NDArray[np.float64], bool]":
+    from faults.detection_samples import watched_samples
+
+    try:
+        return watched_samples(channels, sample_time, travelled)
+    except LogError as error:
+        raise LogError(f"{source}: {error}") from error
+
+
+def _channels(record: "Record") -> "dict[str, NDArray[np.float64]]":
+    return {name: record[name] for name in record}
+
+
+def _read(path: Path, asked: _Asked) -> "Record":
+    return _noted(str(path), lambda: read_log(path, asked.bench.columns, asked.columns))
+
+
+def _noted(source: str, read: Callable[[], T]) -> T:
+    """Return what is read; what the reader should know of it goes to standard error."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("always", LogWarning)
+        found = read()
+    for said in dict.fromkeys(str(one.message).removeprefix(f"{source}: ") for one in caught):
+        note(f"{source}: warning: {said}")
+    return found

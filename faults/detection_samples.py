@@ -1,0 +1,73 @@
+"""A log, or a piece of a stream, as the samples that a watch takes."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.errors import LogError
+
+Array = NDArray[np.float64]
+
+
+def watched_samples(channels: Mapping[str, Array], sample_time: float, travelled: float = 0.0) -> tuple[Array, bool]:
+    """Return a log, or a piece of one, as samples for `Watch.take`.
+
+    Parameters
+    ----------
+    channels : Mapping[str, ndarray, shape (n,)]
+        Channels in SI: motor speed, and position or velocity; differential pressure, or both pressures, if logged.
+    sample_time : float
+        Time between samples [s].
+    travelled : float
+        Position before a piece that has velocity alone [m].
+
+    Returns
+    -------
+    samples : ndarray, shape (n, 3)
+        Motor speed [rad/s], position [m], differential pressure [Pa].
+    pressure : bool
+        Whether differential pressure is logged.
+
+    Raises
+    ------
+    LogError
+        If a channel is missing.
+    """
+    missing = missing_channels(list(channels))
+    if missing:
+        raise LogError(missing)
+    speed = channels["motor_speed_rad_s"]
+    pressure, difference = True, np.zeros(len(speed))
+    if "differential_pressure_pa" in channels:
+        difference = channels["differential_pressure_pa"]
+    elif "pressure_a_pa" in channels and "pressure_b_pa" in channels:
+        difference = channels["pressure_a_pa"] - channels["pressure_b_pa"]
+    else:
+        pressure = False
+    if "position_m" in channels:
+        position = channels["position_m"]
+    else:
+        velocity = channels["velocity_m_s"]
+        position = travelled + np.cumsum(np.nan_to_num(velocity)) * sample_time
+        position[np.isnan(velocity)] = np.nan
+    return np.column_stack([speed, position, difference]), pressure
+
+
+def missing_channels(channels: Sequence[str]) -> str:
+    """Return what a watch lacks, as a sentence; empty where nothing is missing.
+
+    Parameters
+    ----------
+    channels : sequence of str
+        Channels there are.
+
+    Returns
+    -------
+    str
+        The sentence.
+    """
+    motion = any(name in channels for name in ("position_m", "velocity_m_s"))
+    if "motor_speed_rad_s" in channels and motion:
+        return ""
+    return f"a watch needs motor_speed_rad_s, and position_m or velocity_m_s, the log has {', '.join(channels)}"

@@ -1,0 +1,50 @@
+import json
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from experiments.cli import app
+
+QUICK = ("--seconds", "3", "--rate", "500")
+
+
+def _run(*arguments: str) -> Result:
+    return CliRunner().invoke(app, ["isolability", *QUICK, *arguments])
+
+
+def test_the_card_shows_structure_and_nearest_rivals() -> None:
+    done = _run()
+    assert done.exit_code == 0
+    assert "told from all" in done.stdout
+    assert "distance [nats/s]" in done.stdout
+    assert "all conditions can be told apart" in done.stdout
+
+
+def test_json_holds_all_pairs() -> None:
+    (found,) = json.loads(_run("--drive", "sine", "--sensors", "position,velocity", "--json").stdout)
+    assert len(found["nats_per_second"]) == len(found["conditions"]) == 9
+    assert "friction" in found["not_told_from"]["leakage"]
+    assert found["nearest"]["minor_leakage"]["wrong_verdicts_percent"] == pytest.approx(50.0)
+    assert "cannot be told apart" in found["message"]
+
+
+def test_drives_are_ranked_by_their_hardest_pair() -> None:
+    ranked = json.loads(_run("--rank", "--json").stdout)
+    least = [one["hardest_nats_per_second"] for one in ranked]
+    assert least == sorted(least, reverse=True)
+    assert ranked[-1]["drive"] == "sine"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--sensors", "smell"), "--sensors must be one of"),
+        (("--noise", "loud"), "--noise must be one of"),
+        (("--drive", "kick"), "--drive must be one of"),
+        (("--seconds", "-1"), "--seconds must be positive"),
+    ],
+)
+def test_what_is_not_known_is_refused(arguments: tuple[str, ...], said: str) -> None:
+    done = _run(*arguments)
+    assert done.exit_code == 2
+    assert said in done.stderr

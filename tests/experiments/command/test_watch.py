@@ -1,0 +1,129 @@
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from experiments.cli import app
+from plant.eha import EhaParameters
+from plant.record import Record
+from plant.record_files import write_record
+
+P = EhaParameters()
+T = 5e-3
+
+
+def _record(leak_from: float, seconds: float = 100.0, seed: int = 0) -> Record:
+    rng = np.random.default_rng(seed)
+    count = round(seconds / T)
+    speed = P.rated_speed * np.repeat(rng.choice((-1.0, 1.0), count // 10 + 1), 10)[:count]
+    share = np.where(T * np.arange(count) < leak_from, 0.9, 0.6)
+    velocity = share * P.pump_displacement * speed / P.piston_area
+    pressure = 1e7 * velocity + 5e3 * rng.standard_normal(count)
+    position = np.cumsum(velocity) * T + 1e-6 * rng.standard_normal(count)
+    noisy = speed + 0.05 * rng.standard_normal(count)
+    return Record(T, {"motor_speed_rad_s": noisy, "position_m": position, "differential_pressure_pa": pressure})
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("watch") / "run.csv"
+    write_record(_record(leak_from=90.0), path)
+    return path
+
+
+def _run(*arguments: str, given: str | None = None) -> tuple[int, list[dict[str, Any]], str]:
+    result = CliRunner().invoke(app, ["watch", *arguments], input=given)
+    return result.exit_code, [json.loads(line) for line in result.stdout.splitlines()], result.stderr
+
+
+def test_a_stream_and_its_log_give_the_same_events_one_json_object_a_line(log: Path) -> None:
+    code, streamed, _ = _run("-", "--learning", "60", given=log.read_text())
+    assert code == 0
+    assert [one["event"] for one in streamed] == ["start", "ready", "alarm", "change", "end"]
+    alarm = streamed[2]
+    assert alarm["since_ci95_s"][0] <= 90.0 <= alarm["since_ci95_s"][1]
+    assert 90.0 < alarm["time_s"] < 90.6
+    assert streamed[3]["lost_flow_percent"] == pytest.approx({"before": 10.0, "after": 40.0}, abs=1.0)
+    assert streamed[3]["pressure_change_percent"] == pytest.approx(0.0, abs=1.0)
+    _, read, _ = _run(str(log), "--learning", "60")
+    assert [one.get("since_s") for one in read] == [one.get("since_s") for one in streamed]
+
+
+def test_a_healthy_log_is_learnt_first(log: Path, tmp_path: Path) -> None:
+    healthy = tmp_path / "healthy.csv"
+    write_record(_record(leak_from=np.inf, seed=1), healthy)
+    code, events, _ = _run(str(log), "--learning", "60", "--healthy", str(healthy))
+    assert code == 0
+    assert [one["event"] for one in events] == ["start", "ready", "alarm", "change", "end"]
+    assert events[1]["time_s"] == 0.0
+
+
+def test_foreign_columns_and_units_are_read_from_a_stream(log: Path) -> None:
+    lines = log.read_text().replace("position_m", "POS").replace("motor_speed_rad_s", "W")
+    columns = ("--columns", "position_m=POS:m,motor_speed_rad_s=W:rad/s")
+    code, events, _ = _run("-", "--learning", "60", *columns, given=lines)
+    assert code == 0
+    assert [one["event"] for one in events][2] == "alarm"
+
+
+def test_a_stream_too_short_to_learn_from_says_so(log: Path) -> None:
+    code, events, _ = _run("-", given="".join(log.read_text().splitlines(keepends=True)[:3000]))
+    assert code == 0
+    assert "before enough was learnt" in events[-1]["message"]
+
+
+def test_a_broken_row_ends_the_watch_with_a_sentence(log: Path) -> None:
+    lines = log.read_text().splitlines(keepends=True)
+    code, events, said = _run("-", given="".join([*lines[:3001], lines[3001].replace(",", ",x", 1), *lines[3002:]]))
+    assert code == 2
+    assert events[-1]["outcome"] == "failed"
+    assert "in row 3001" in said
+    assert "Traceback" not in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--false-alarms", "0"), "false alarms must be over 0"),
+        (("--learning", "1"), "learning must take at least 60 s"),
+        (("--healthy", "nowhere.csv"), "nowhere.csv"),
+    ],
+)
+def test_options_that_cannot_be_used_are_refused(log: Path, arguments: tuple[str, ...], said: str) -> None:
+    code, _, error = _run(str(log), *arguments)
+    assert code == 2
+    assert said in error
+
+
+def test_a_healthy_log_of_another_rate_is_refused(log: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.csv"
+    write_record(Record(2 * T, dict(_channels(_record(leak_from=np.inf, seconds=10.0)))), other)
+    code, _, error = _run(str(log), "--healthy", str(other))
+    assert code == 2
+    assert "the rate of what is watched, 200 Hz, got 100 Hz" in error
+
+
+def _channels(record: Record) -> dict[str, np.ndarray]:
+    return {name: record[name] for name in record}
+
+
+def test_a_stream_on_standard_input_is_read_as_it_comes(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[int] = []
+
+    class Growing(io.StringIO):
+        def __next__(self) -> str:
+            seen.append(len(printed))
+            return super().__next__()
+
+    printed: list[str] = []
+    monkeypatch.setattr("experiments.command.watch.emit", lambda line: printed.append(line))
+    monkeypatch.setattr("sys.stdin", Growing(log.read_text()))
+    from experiments.command.watch import watch
+
+    watch("-", learning=60.0)
+    alarm = next(k for k, line in enumerate(printed) if '"alarm"' in line)
+    assert alarm + 1 in seen
