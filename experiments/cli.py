@@ -116,11 +116,13 @@ def piezo_stack(
     power_limit: Annotated[
         float, typer.Option(metavar="W", help="Largest power of the stack at the best operating points [W].")
     ] = 30.0,
+    seed: Seed = SEED,
     as_json: Json = False,
 ) -> None:
     """Repeat the flow experiments of the piezo-stack paper (Figures 10 to 14); maps, limits and best operating points.
 
-    Nothing here is random. Takes about a minute. The last line of standard output is the manifest's path.
+    Also what identifies the stack's hysteresis, and what does not. Takes about a minute.
+    The last line of standard output is the manifest's path.
     """
     from rich.console import Console
 
@@ -129,7 +131,7 @@ def piezo_stack(
     require_positive("--voltage-limit", voltage_limit, "V")
     require_positive("--power-limit", power_limit, "W")
     begin = perf_counter()
-    manifest = stack_study_command(out, quick, voltage_limit, power_limit, Console(stderr=True))
+    manifest = stack_study_command(out, quick, voltage_limit, power_limit, seed, Console(stderr=True))
     if as_json:
         emit(json_text([{"outcome": "ok", "manifest": str(manifest), "seconds": perf_counter() - begin}]))
     else:

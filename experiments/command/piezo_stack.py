@@ -25,11 +25,14 @@ from experiments.studies.piezo_stack import (
     stack_loops,
     sweep,
 )
+from experiments.studies.piezo_stack_hysteresis import hysteresis_table
 from experiments.studies.piezo_stack_quoted import quoted_numbers
 from plant.piezo_stack_parameters import PiezoStackParameters
 
 
-def stack_study_command(out: Path, quick: bool, voltage_limit: float, power_limit: float, console: Console) -> Path:
+def stack_study_command(
+    out: Path, quick: bool, voltage_limit: float, power_limit: float, seed: int, console: Console
+) -> Path:
     """Run the flow study and write its tables, figures and report.
 
     Parameters
@@ -42,6 +45,8 @@ def stack_study_command(out: Path, quick: bool, voltage_limit: float, power_limi
         Largest swing of the best operating points [V].
     power_limit : float
         Largest power of the stack at the best operating points [W].
+    seed : int
+        Seed of the sensor noise.
     console : rich.console.Console
         Where progress goes.
 
@@ -68,8 +73,9 @@ def stack_study_command(out: Path, quick: bool, voltage_limit: float, power_limi
     tables["pump cycle"] = pump_cycle(p, OperatingPoint(50.0, HIGH_VOLTAGE, HIGH_BIAS, 20.0))
     tables["what limits the flow"] = sensitivities(p)
     tables["best operating points"] = best_points(tables["design map"], voltage_limit, power_limit)
+    tables["hysteresis parameters"] = hysteresis_table(p, seed)
     tables["quoted numbers"] = quoted_numbers(tables)
-    settings = {"quick": quick, "voltage_limit_v": voltage_limit, "power_limit_w": power_limit}
+    settings = {"quick": quick, "voltage_limit_v": voltage_limit, "power_limit_w": power_limit, "seed": seed}
     figures = figure_files(STACK_FIGURES, tables)
     files = {"report.html": render_stack_report(tables, figures["svg"], p).encode()}
     files |= {f"figures/{name}.{kind}": image for kind, images in figures.items() for name, image in images.items()}
