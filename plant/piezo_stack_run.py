@@ -13,7 +13,7 @@ from plant.components.piezo_stack import stack_force
 from plant.drive_limits import require_frequency, sample_count
 from plant.errors import DriveError, HydrostateError, RigError
 from plant.integrate import compile_trajectory
-from plant.piezo_stack import STATES, at_bias, stack_pressures, stack_step
+from plant.piezo_stack import STATES, StackValues, at_bias, stack_pressures, stack_step
 from plant.piezo_stack_parameters import LONGEST_STEP, PiezoStackParameters
 from plant.record import Record
 from plant.units import SI
@@ -146,24 +146,24 @@ def checked_voltage(voltage: Array) -> Array:
     return drive
 
 
-def stack_row(parameters: PiezoStackParameters) -> Array:
+def stack_row(parameters: StackValues) -> Array:
     """Return the parameters as an array, in the order of their fields (errata P17).
 
     Parameters
     ----------
-    parameters : PiezoStackParameters
-        The actuator.
+    parameters : PiezoStackParameters or namespace
+        The actuator; a namespace of the same names may hold what no actuator has, such as a negative leakage.
 
     Returns
     -------
     ndarray, shape (parameters,)
         Their values in SI.
     """
-    return np.array([getattr(parameters, field.name) for field in fields(parameters)], dtype=np.float64)
+    return np.array([getattr(parameters, field.name) for field in fields(PiezoStackParameters)], dtype=np.float64)
 
 
 def run_stack(
-    parameters: PiezoStackParameters,
+    parameters: StackValues,
     voltage: Array,
     sample_time: float,
     *,
@@ -174,8 +174,8 @@ def run_stack(
 
     Parameters
     ----------
-    parameters : PiezoStackParameters
-        The actuator.
+    parameters : PiezoStackParameters or namespace
+        The actuator; a namespace of the same names may hold what no actuator has, such as a negative leakage.
     voltage : ndarray, shape (n,)
         Drive at the samples [V], linear between.
     sample_time : float
@@ -205,15 +205,15 @@ def run_stack(
     return states
 
 
-def stack_channels(states: Array, parameters: PiezoStackParameters) -> Mapping[str, Array]:
+def stack_channels(states: Array, parameters: StackValues) -> Mapping[str, Array]:
     """Return what the bench's sensors see: displacement, force below the stack (equation 2), rod, chamber pressure.
 
     Parameters
     ----------
     states : ndarray, shape (n, 19)
         As named in `plant.piezo_stack.STATES`.
-    parameters : PiezoStackParameters
-        The actuator.
+    parameters : PiezoStackParameters or namespace
+        The actuator; a namespace of the same names may hold what no actuator has, such as a negative leakage.
 
     Returns
     -------

@@ -12,11 +12,13 @@ from experiments.command.json_output import json_text
 from experiments.command.options import (
     PRESSURE,
     SEED,
+    STACK,
     ConditionName,
     Json,
     RigFile,
     Seed,
     load_rig,
+    refuse_given,
     require_one_of,
     require_positive,
 )
@@ -26,9 +28,6 @@ from plant.errors import HydrostateError
 if TYPE_CHECKING:
     from plant.eha import EhaParameters
     from plant.record import Record
-
-STACK = "piezo-stack"
-"""The plant with a drive, sensors and faults of its own."""
 
 _DURATION, _SAMPLE_TIME = 10.0, 1e-4
 
@@ -105,7 +104,7 @@ def simulate(
     """
     import numpy as np
 
-    from experiments.command.simulate_stack import refuse_given, simulated_stack
+    from experiments.command.simulate_stack import simulated_stack
     from plant.record_files import write_record
     from plant.sensors import SENSORS
     from plant.signals import DRIVES, make_drive

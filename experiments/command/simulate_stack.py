@@ -19,26 +19,6 @@ DEFAULTS: Mapping[str, float] = {"--frequency": 275.0, "--voltage": 140.0, "--bi
 """What options are where they are not given: frequency [Hz], voltage [V], pressure [Pa], load [kg]."""
 
 
-def refuse_given(options: Mapping[str, Any], why: str) -> None:
-    """Refuse options that do not go with the plant.
-
-    Parameters
-    ----------
-    options : Mapping[str, Any]
-        By name, None where not given.
-    why : str
-        What is wrong with them.
-
-    Raises
-    ------
-    HydrostateError
-        If one is given.
-    """
-    given = [name for name, value in options.items() if value is not None]
-    if given:
-        raise HydrostateError(f"{', '.join(given)} {why}")
-
-
 def simulated_stack(
     options: Mapping[str, Any],
     condition: str | None,

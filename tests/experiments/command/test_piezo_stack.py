@@ -53,3 +53,36 @@ def test_the_study_writes_its_report_with_every_figure(tmp_path: Path) -> None:
     assert page.count("<figure") == len(STACK_FIGURES)
     quoted = pd.read_csv(tmp_path / "stack" / "tables" / "quoted_numbers.csv")
     assert quoted.loc[quoted["claim"] == "no-load maximum, 140 V, 1.0 MPa", "holds"].item()
+
+
+def _logged(folder: Path, fault: str) -> Path:
+    out = folder / f"{fault}.csv"
+    words = ["simulate", "--plant", "piezo-stack", "--load", "10", "--duration", "0.05", "--fault", fault]
+    assert RUN.invoke(app, [*words, "--out", str(out)]).exit_code == 0
+    return out
+
+
+def test_a_log_is_diagnosed_and_estimated(tmp_path: Path) -> None:
+    log = _logged(tmp_path, "major_leakage")
+    words = ["--plant", "piezo-stack", "--load", "10", "--json", str(log)]
+    (said,) = json.loads(RUN.invoke(app, ["diagnose", *words]).stdout)
+    assert (said["outcome"], said["condition"], said["findings"]) == ("ok", "major_leakage", [])
+    (said,) = json.loads(RUN.invoke(app, ["estimate", *words]).stdout)
+    low, high = said["quantities"]["crossport_leakage"]["ci95"]
+    assert low < 2e-11 < high
+
+
+def test_a_log_of_another_load_is_a_mismatch_without_numbers(tmp_path: Path) -> None:
+    log = _logged(tmp_path, "normal")
+    (said,) = json.loads(RUN.invoke(app, ["estimate", "--plant", "piezo-stack", "--json", str(log)]).stdout)
+    assert said["outcome"] == "mismatch"
+    assert {entry["value"] for entry in said["quantities"].values()} == {None}
+
+
+def test_what_is_no_log_of_the_plant_is_refused(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time_s,position_m\n" + "".join(f"{k * 1e-3},0\n" for k in range(20)), encoding="utf-8")
+    done = RUN.invoke(app, ["diagnose", "--plant", "piezo-stack", str(log)])
+    assert done.exit_code == 2
+    assert "drive_voltage_v" in done.stderr
+    assert "--load needs --plant" in RUN.invoke(app, ["estimate", "--load", "3", str(log)]).stderr
