@@ -15,6 +15,7 @@ NAMES = (
     "identification",
     "identification_tests",
     "circuit",
+    "piezo_stack",
 )
 """Every benchmark that needs nothing but the project, in the order of `make benchmark`."""
 

@@ -1,6 +1,6 @@
 """What `hydrostate piezo-stack` does: the piezo-stack actuator's flow study, as a folder with a report."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pandas as pd
@@ -25,6 +25,7 @@ from experiments.studies.piezo_stack import (
     stack_loops,
     sweep,
 )
+from experiments.studies.piezo_stack_card import identifiability_card
 from experiments.studies.piezo_stack_hysteresis import hysteresis_table
 from experiments.studies.piezo_stack_quoted import quoted_numbers
 from plant.piezo_stack_parameters import PiezoStackParameters
@@ -74,6 +75,7 @@ def stack_study_command(
     tables["what limits the flow"] = sensitivities(p)
     tables["best operating points"] = best_points(tables["design map"], voltage_limit, power_limit)
     tables["hysteresis parameters"] = hysteresis_table(p, seed)
+    tables["identifiability"] = identifiability_card(replace(p, load_mass=10.0))
     tables["quoted numbers"] = quoted_numbers(tables)
     settings = {"quick": quick, "voltage_limit_v": voltage_limit, "power_limit_w": power_limit, "seed": seed}
     figures = figure_files(STACK_FIGURES, tables)

@@ -74,6 +74,18 @@ def render_stack_report(
             tables=(_hysteresis(tables["hysteresis parameters"]),),
         ),
         Section(
+            "identifiability",
+            "Identifiability: what the sensors tell",
+            (
+                "Standard deviations that no estimate from 0.1 s at 20 kHz and 10 kg can beat, all quantities unknown "
+                "together. The stack is the pressure sensor: its displacement tells nearly all that is told. The "
+                "cylinder's position alone tells the air, and of leaks and friction forty to a hundred times less than "
+                "the stack. All this takes the model for granted: another line or reed misleads friction and leaks "
+                "first, so calibrate on a healthy run.",
+            ),
+            tables=(_card(tables["identifiability"]),),
+        ),
+        Section(
             "parameters",
             "Parameters: where each comes from",
             ("Another set would fit the quoted numbers as well (errata P17).",),
@@ -117,6 +129,15 @@ def _hysteresis(frame: pd.DataFrame) -> Markup:
         Column("covered", "covers", words=lambda yes: Cell("yes", "good") if yes else Cell("no", "bad")),
     )
     return html_table(frame.assign(interval=low + " to " + high), columns, "Parameters of equation 1 in SI units.")
+
+
+def _card(frame: pd.DataFrame) -> Markup:
+    columns = (
+        Column("frequency_hz", "drive", "Hz"),
+        Column("sensors", "sensors"),
+        *(Column(name, name.replace("_", " "), "%", digits=2) for name in frame.columns[2:].tolist()),
+    )
+    return html_table(frame, columns, "Leaks and friction in percent of a minor fault, the others of themselves.")
 
 
 def _parameter_table(parameters: PiezoStackParameters) -> Markup:
