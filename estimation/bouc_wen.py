@@ -48,8 +48,6 @@ class HysteresisFit:
         Standard deviations by parameter name [SI].
     error : float
         Root mean square of the residuals [m].
-    relative_error : float
-        The same over the stroke [dimensionless].
     evaluations : int
         Simulations that it took.
     condition : float
@@ -59,7 +57,6 @@ class HysteresisFit:
     values: Mapping[str, float]
     deviations: Mapping[str, float]
     error: float
-    relative_error: float
     evaluations: int
     condition: float
 
@@ -98,7 +95,8 @@ def fit_stack_loop(voltage: Array, displacement: Array, *, from_rest: bool = Tru
     Returns
     -------
     HysteresisFit
-        ``free_stroke_a_volt``, the five of `SHAPE`, and the displacement's ``offset``.
+        ``free_stroke_a_volt``, the five of `SHAPE`, the displacement's ``offset``, and ``lag``, what the
+        stack's lag takes from the displacement a volt a sample [m/V]: a nanometre that would bias the rest.
 
     Raises
     ------
@@ -115,13 +113,14 @@ def fit_stack_loop(voltage: Array, displacement: Array, *, from_rest: bool = Tru
     def simulate(theta: Array) -> tuple[Array, Array]:
         row[[columns.index(name) for name in SHAPE]] = theta[1:6]
         states = run(np.zeros(6), drive, row[None], 1.0, 1)[-len(u) :]
-        slopes = np.column_stack([u, -states[:, 1:], np.ones(len(u))])
-        return theta[0] * u - states[:, 0] + theta[6], slopes
+        slopes = np.column_stack([u, -states[:, 1:], np.ones(len(u)), -rate])
+        return theta[0] * u - states[:, 0] + theta[6] - theta[7] * rate, slopes
 
+    rate = np.gradient(u)
     stroke = float(np.ptp(x) / np.ptp(u))
-    start = np.array([1.2 * stroke, 0.2 * stroke, 1.0 / np.ptp(u), 0.0, 0.0, 0.0, float(x.min())])
-    scale = np.array([stroke, stroke, *[1.0 / np.ptp(u)] * 4, float(np.ptp(x))])
-    fit = _fitted(simulate, x, start, scale, ("free_stroke_a_volt", *SHAPE, "offset"))
+    start = np.array([1.2 * stroke, 0.2 * stroke, 1.0 / np.ptp(u), 0.0, 0.0, 0.0, float(x.min()), 0.0])
+    scale = np.array([stroke, stroke, *[1.0 / np.ptp(u)] * 4, float(np.ptp(x)), stroke])
+    fit = _fitted(simulate, x, start, scale, ("free_stroke_a_volt", *SHAPE, "offset", "lag"))
     if fit.condition > _WORST_CONDITION:
         raise LogError("the loop cannot tell the hysteresis' parameters apart, wanted two cycles or more from rest")
     return fit
@@ -299,7 +298,6 @@ def _fitted(
         MappingProxyType(dict(zip(names, (scale * solution.x).tolist(), strict=True))),
         MappingProxyType(dict(zip(names, deviations.tolist(), strict=True))),
         error,
-        error / float(np.ptp(measured)),
         int(solution.nfev),
         float(np.linalg.cond(slopes / np.linalg.norm(slopes, axis=0))),
     )

@@ -151,10 +151,16 @@ def estimate_stack(
         If an unknown is not known, or no first guess is made of them.
     """
     runs, measured = _prepared(record, healthy, tuple(unknowns), channels, sensors)
-    start = _best_start(runs, measured, starts)
+    guesses = _ordered_starts(runs, measured, starts)
 
-    theta, residuals, slopes = _descended(runs, measured, start)
-    spread = max(1.0, float(residuals @ residuals) / (len(measured) - len(start)))
+    theta, residuals, slopes = _descended(runs, measured, guesses[0])
+    for guess in guesses[1:_MOST_GUESSES]:
+        if _spread(residuals, theta) < _UNEXPLAINED:
+            break
+        other = _descended(runs, measured, guess)
+        if float(other[1] @ other[1]) < float(residuals @ residuals):
+            theta, residuals, slopes = other
+    spread = max(1.0, _spread(residuals, theta))
     return _concluded(runs, theta, residuals, spread * covariance(slopes))
 
 
@@ -215,12 +221,6 @@ def stack_bounds(
     }
 
 
-_HOPELESS = 1e6
-_MOST_STEPS = 30
-_NEAR = 3.0
-_DONE = 0.1
-
-
 def _descended(runs: _Runs, measured: Array, start: Array) -> tuple[Array, Array, Array]:
     """Descend by Levenberg and Marquardt in coarse runs, then by Gauss and Newton in exact ones.
 
@@ -245,37 +245,48 @@ def _descended(runs: _Runs, measured: Array, start: Array) -> tuple[Array, Array
     return theta, residuals, slopes
 
 
-_SHORTENED = (1.0, 0.5, 0.2)
-
-
-_MOST_EXACT = 6
-
-
 def _coarsely_descended(runs: _Runs, measured: Array, start: Array) -> Array:
-    theta, damping = start, 1e-3
+    """Descend by Levenberg and Marquardt; while it goes fast, slopes are carried along by Broyden's update."""
+    theta, damping, fresh = start, 1e-3, True
     residuals = runs.scaled(theta, COARSE_STEP) - measured
     slopes = runs.slopes(theta, COARSE_STEP)
     for _ in range(_MOST_STEPS):
         normal = slopes.T @ slopes
         own = np.diag(np.diag(normal) + 1e-12)
         change = np.linalg.solve(normal + damping * own, -slopes.T @ residuals)
-        if _share(change, covariance(slopes)) < _NEAR or damping > _STUCK:
+        if (fresh and _share(change, covariance(slopes)) < _NEAR) or damping > _STUCK:
             break
         tried = runs.scaled(theta + change, COARSE_STEP) - measured
-        if float(tried @ tried) >= float(residuals @ residuals):
+        gain = float(tried @ tried) / float(residuals @ residuals)
+        if gain < 1.0:
+            if gain < _FAST:
+                missed = tried - residuals - slopes @ change
+                slopes = slopes + np.outer(missed, change) / float(change @ change)
+            theta, residuals, damping = theta + change, tried, 0.1 * damping
+        elif fresh:
             damping *= 10.0
             continue
-        theta, residuals, damping = theta + change, tried, 0.1 * damping
-        slopes = runs.slopes(theta, COARSE_STEP)
+        fresh = gain >= _FAST
+        if fresh:
+            slopes = runs.slopes(theta, COARSE_STEP)
     return theta
-
-
-_STUCK = 1e6
 
 
 def _share(change: NDArray[Any], known: Array) -> float:
     """Return the largest change over its standard deviation."""
     return float(np.max(np.abs(change) / np.sqrt(np.diag(known))))
+
+
+_HOPELESS = 1e6
+_MOST_STEPS = 30
+_NEAR = 3.0
+_DONE = 0.1
+_SHORTENED = (1.0, 0.5, 0.2)
+_MOST_EXACT = 6
+_FAST = 0.7
+_STUCK = 1e6
+_UNEXPLAINED = 1.1
+_MOST_GUESSES = 4
 
 
 def _prepared(
@@ -301,18 +312,18 @@ def _prepared(
     return runs, np.concatenate([record[name] / deviation for name, deviation in noise.items()])
 
 
-def _best_start(runs: _Runs, measured: Array, starts: Sequence[Mapping[str, float]]) -> Array:
-    best, least = None, np.inf
-    for start in starts:
-        if not set(start) <= set(runs.names):
-            continue
-        theta = np.array([start.get(name, 0.0) for name in runs.names])
-        error = float(np.sum((runs.scaled(theta, COARSE_STEP) - measured) ** 2))
-        if error < least:
-            best, least = theta, error
-    if best is None:
+def _spread(residuals: Array, theta: Array) -> float:
+    return float(residuals @ residuals) / (len(residuals) - len(theta))
+
+
+def _ordered_starts(runs: _Runs, measured: Array, starts: Sequence[Mapping[str, float]]) -> list[Array]:
+    """Return the first guesses that are made of the unknowns, the one that fits best first."""
+    guesses = [
+        np.array([start.get(name, 0.0) for name in runs.names]) for start in starts if set(start) <= set(runs.names)
+    ]
+    if not guesses:
         raise HydrostateError("no first guess is made of the unknowns alone")
-    return best
+    return sorted(guesses, key=lambda theta: float(np.sum((runs.scaled(theta, COARSE_STEP) - measured) ** 2)))
 
 
 def _concluded(runs: _Runs, theta: Array, residuals: Array, scaled: Array) -> StackEstimate:

@@ -1,6 +1,5 @@
 """The stack alone, free to move: what the displacement experiment of the piezo-stack paper drives (equation 2)."""
 
-from collections.abc import Sequence
 from math import ceil, pi, sqrt
 from typing import Any, TypeAlias
 
@@ -140,24 +139,3 @@ def loop_width(voltage: Array, displacement: Array) -> float:
     rising = float(np.interp(middle, voltage[: top + 1], displacement[: top + 1]))
     falling = float(np.interp(middle, voltage[top:][::-1], displacement[top:][::-1]))
     return (falling - rising) / float(np.ptp(displacement))
-
-
-def loop_table(parameters: PiezoStackParameters, frequencies: Sequence[float], peak_to_peak: float) -> list[Array]:
-    """Return stroke and width of loops over frequency (equation 2).
-
-    Parameters
-    ----------
-    parameters : PiezoStackParameters
-        The stack.
-    frequencies : sequence of float
-        Frequencies [Hz].
-    peak_to_peak : float
-        Swing of the drive [V].
-
-    Returns
-    -------
-    list of ndarray, shape (3,)
-        Frequency [Hz], stroke [m], width over stroke, a row a frequency.
-    """
-    loops = [(frequency, *stack_loop(parameters, frequency, peak_to_peak)) for frequency in frequencies]
-    return [np.array([f, float(np.ptp(x)), loop_width(u, x)]) for f, u, x in loops]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from experiments.command.options import require_one_of
+from experiments.command.streams import note
 from faults.piezo_stack import stack_with_fault
 from plant.errors import HydrostateError
 from plant.piezo_stack_flow import FLOW_TIME, mean_flow
@@ -69,6 +70,11 @@ def simulated_stack(
         rng=np.random.default_rng(seed),
     )
     made_of = {"fault": fault, "frequency_hz": frequency, "voltage_v": swing, "load_kg": load, "seed": seed}
+    if (
+        float(record["position_m"].max())
+        > healthy.cylinder_length - healthy.cylinder_start - 2.0 * healthy.end_clearance
+    ):
+        note(f"the rod reaches its end stop within {record.duration:g} s: the flow is that of a rod that stands")
     flow = mean_flow(record["position_m"], between, frequency, healthy.cylinder_area) / LITRE_PER_MINUTE
     said = {"plant": NAME, **made_of, "sensors": sensors, "flow_l_min": round(flow, 4)}
     return record.annotate(**made_of), said

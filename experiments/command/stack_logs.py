@@ -39,7 +39,7 @@ NOTHING: Result = {
 }
 """The entries of a log that could not be used."""
 
-NO_STIMULUS = 0.30
+MOST_DEVIATION = 0.30
 """Standard deviation over the healthy value, or over a minor fault's, above which no number is given."""
 
 SMALLEST_FAULT: Mapping[str, float] = {"chamber_leakage": 5e-12, "crossport_leakage": 5e-12, "coulomb_friction": 100.0}
@@ -183,7 +183,7 @@ def _quantities(found: StackEstimate, healthy: PiezoStackParameters) -> dict[str
     entries: dict[str, dict[str, Any]] = {}
     for name, value in found.values.items():
         size = 1.0 if name == "polarisation" else SMALLEST_FAULT.get(name) or getattr(healthy, name) or 1e-4
-        told = found.deviations[name] < NO_STIMULUS * size
+        told = found.deviations[name] < MOST_DEVIATION * size
         entries[name] = {
             "value": value if told else None,
             "unit": UNITS[name],

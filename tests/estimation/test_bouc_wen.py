@@ -56,6 +56,7 @@ def test_every_parameter_comes_back_from_one_noisy_loop(loop: tuple[np.ndarray, 
     assert fit.error == pytest.approx(2e-8, rel=0.05)
 
 
+@pytest.mark.slow
 def test_intervals_cover_as_often_as_they_say(loop: tuple[np.ndarray, np.ndarray]) -> None:
     voltage, displacement = loop
     covered = 0
