@@ -23,17 +23,18 @@ from numpy.typing import NDArray
 from benchmarks.peers import cpp_lanes, filterpy_user
 from benchmarks.peers.acceleration_form import coefficients
 from estimation.algebra import EKF
-from estimation.batch import filter_batch
+from estimation.batch import aligned, filter_batch
 from estimation.compiled import constant_row
 from estimation.eha import ACCELERATION_FORM, FORMS
 from estimation.ekf import ekf
 from estimation.filter import FilterProblem
 from estimation.filterpy_bridge import filterpy_ekf
 from estimation.first_belief import first_belief
-from estimation.kernels import LANES, compile_lanes
+from estimation.kernels import LANES, compile_kernel
 from estimation.layout import halves_of, layout
 from estimation.run import filter_problem
 from plant.compiled.expression import ordered
+from plant.compiled.simplify import FUSED
 from plant.eha import EhaParameters
 from plant.sensors import BENCH
 from plant.signals import make_drive
@@ -88,21 +89,24 @@ def scaled(problem: FilterProblem) -> tuple[tuple[float, float, float], Array, A
 def kernel_work(batch: list[FilterProblem]) -> Callable[[], None]:
     """Return our kernel's work alone, on logs that lie side by side already, as the C++ kernel's do."""
     places, first = layout(EKF, batch[0].model, batch[0].channels), batch[0]
-    kernel = compile_lanes(EKF, first.model, first.channels)
+    kernel = compile_kernel(EKF, first.model, first.channels, LANES)
     blocks = [batch[i : i + LANES] for i in range(0, len(batch), LANES)]
     data: list[tuple[Array, Array]] = []
     for block in blocks:
         full = [*block, *[block[0]] * (LANES - len(block))]
         data.append((_lanes([one.drives for one in full]), _lanes([one.measured for one in full])))
-    start = np.repeat(places.start(first.mean, first.covariance), LANES)
-    rows = np.repeat(constant_row(first, {}), LANES)
+    begin = np.concatenate([places.start(first.mean, first.covariance), constant_row(first, {})])
+    works = [aligned(len(kernel.SLOTS), LANES) for _ in blocks]
     track, logs = np.empty((1, first.model.width, LANES)), np.zeros((len(first.channels), LANES))
+    count, nothing = len(first.measured), np.empty((0, 0))
 
-    def work() -> None:
-        for drives, measured in data:
-            kernel(start.copy(), rows, drives, measured, 0, 1, first.every, track, track.copy(), logs)
+    def run() -> None:
+        for work, (drives, measured) in zip(works, data, strict=True):
+            work[: len(begin)] = begin[:, None]
+            where = (drives.ctypes.data, measured.ctypes.data, 0, 0, count, first.substeps, first.every)
+            kernel.steps(work.ravel(), *where, track, track, logs, nothing, nothing)
 
-    return work
+    return run
 
 
 def cpp_work(batch: list[FilterProblem]) -> tuple[Callable[[], None], Array] | None:
@@ -209,7 +213,7 @@ def operations() -> int:
     """Return the floating-point operations of a filter-step of the acceleration form, constants hoisted."""
     halves = halves_of(EKF, ACCELERATION_FORM, CHANNELS)
     outputs = [*halves.predict.values(), *halves.update.values()]
-    return sum(item.operation in "+-*/" for item in ordered(outputs))
+    return sum(2 if item.operation in FUSED else item.operation in "+-*/" for item in ordered(outputs))
 
 
 def main(arguments: list[str]) -> int:

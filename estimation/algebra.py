@@ -11,13 +11,15 @@ from typing import TypeAlias
 
 from estimation.model import OPENING, ProcessModel
 from estimation.robust import inflation
-from plant.compiled.expression import ZERO, Expression, as_expression, jacobian, select, symbol, unary
+from plant.compiled.elimination import eliminated_jacobian
+from plant.compiled.expression import ONE, ZERO, Expression, as_expression, jacobian, select, symbol, unary
 from plant.compiled.functions import exp, log, where
 from plant.integrate import parameter_symbols
 
 Covariance: TypeAlias = dict[tuple[int, int], Expression]
 """Upper triangle: ``P[i, j]`` with i <= j."""
 
+Mean: TypeAlias = Sequence[Expression]
 Outputs: TypeAlias = dict[str, Expression]
 """New values by the name of the symbol that they replace, and whatever else a rule returns by name."""
 
@@ -79,10 +81,7 @@ def total(terms: Sequence[Expression]) -> Expression:
     Expression
         The sum.
     """
-    result: Expression = ZERO
-    for term in terms:
-        result = result + term
-    return result
+    return sum(terms, ZERO)
 
 
 def belief_symbols(model: ProcessModel) -> tuple[list[Expression], Covariance]:
@@ -244,7 +243,7 @@ def scaled_step(model: ProcessModel) -> tuple[list[Expression], list[list[Expres
     """
     mean, _ = belief_symbols(model)
     stepped = moved(model, mean)
-    return stepped, jacobian(stepped, mean)
+    return stepped, eliminated_jacobian(stepped, mean)
 
 
 def process_noise(model: ProcessModel, i: int) -> Expression:
@@ -286,7 +285,9 @@ def predict_expressions(model: ProcessModel) -> Outputs:
     _, P = belief_symbols(model)
     mean, F = scaled_step(model)
     FP = [[total([F[i][k] * entry(P, k, j) for k in range(n)]) for j in range(n)] for i in range(n)]
-    outputs = {f"z{i}": z for i, z in enumerate(bounded(model, mean))}
+    held = bounded(model, mean)
+    # what has not moved is within its bounds: the update before saw to that
+    outputs = {f"z{i}": z if z.operation == "symbol" else held[i] for i, z in enumerate(mean)}
     for i in range(n):
         for j in range(i, n):
             spread = total([FP[i][k] * F[j][k] for k in range(n)])
@@ -311,28 +312,38 @@ def update_expressions(model: ProcessModel, channels: Sequence[str], robust: str
     dict[str, Expression]
         New value of each mean and covariance symbol, innovations ``e`` and their variances ``s``.
     """
-    n = model.width
-    mean, covariance = belief_symbols(model)
-    outputs: Outputs = {}
-    prior = list(mean)
-    predicted = observed(model, prior, channels)
-    rows = jacobian(predicted, prior)
-    for c in range(len(channels)):
-        y, r, H = symbol(f"y{c}"), symbol(f"r{c}"), rows[c]
-        present = unary("present", y)
-        residual = y - (predicted[c] + total([H[i] * (mean[i] - prior[i]) for i in range(n)]))
+    prior, covariance = belief_symbols(model)
+    n, mean, outputs = model.width, prior, Outputs()
+    for c, row in enumerate(jacobian(observed(model, prior, channels), prior)):
+        unit = _unit(row)
+        H = [ONE if slope is unit else slope for slope in row]
+        present, noise = unary("present", symbol(f"y{c}")), symbol(f"r{c}") / unit**2
+        residual = symbol(f"y{c}") / unit - _linearised(model, prior, mean, channels, c) / unit
         PH = [total([entry(covariance, i, j) * H[j] for j in range(n)]) for i in range(n)]
         spread = total([H[i] * PH[i] for i in range(n)])
-        variance = spread + r
-        if robust != "none":
-            variance = spread + r * inflation(robust, residual * residual / variance)
-        weight = select(present, 1.0 / variance, ZERO)
-        step = weight * select(present, residual, ZERO)
-        covariance = {(i, j): value - PH[i] * PH[j] * weight for (i, j), value in covariance.items()}
-        mean = [z + PH[i] * step for i, z in enumerate(mean)]
-        outputs[f"e{c}"], outputs[f"s{c}"] = residual, variance
+        variance = spread + noise * inflation(robust, residual * residual / (spread + noise))
+        weight, clean = select(present, 1.0 / variance, ZERO), select(present, residual, ZERO)
+        gain = [value * weight for value in PH]
+        covariance = {(i, j): value - gain[i] * PH[j] for (i, j), value in covariance.items()}
+        mean = [z + gain[i] * clean for i, z in enumerate(mean)]
+        outputs[f"e{c}"], outputs[f"s{c}"] = unit * residual, unit**2 * variance
     outputs |= {f"z{i}": z for i, z in enumerate(bounded(model, mean))}
     return outputs | {f"P{i}_{j}": value for (i, j), value in covariance.items()}
+
+
+def _unit(row: Sequence[Expression]) -> Expression:
+    """Return what a channel shows of one unit of a state, if it shows that state alone; an update then counts in it."""
+    seen = [slope for slope in row if slope is not ZERO]
+    return seen[0] if len(seen) == 1 and seen[0].operation == "constant" else ONE
+
+
+def _linearised(model: ProcessModel, prior: Mean, mean: Mean, channels: Sequence[str], c: int) -> Expression:
+    """Return what the model, linearised about the prior, predicts of a channel from another mean."""
+    predicted = observed(model, prior, channels)[c]
+    row = jacobian([predicted], prior)[0]
+    if all(slope.operation == "constant" for slope in row):  # it is linear
+        return observed(model, mean, channels)[c]
+    return predicted + total([slope * (new - old) for slope, new, old in zip(row, mean, prior, strict=True)])
 
 
 EKF = Rule("ekf", predict_expressions, update_expressions)

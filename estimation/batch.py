@@ -4,6 +4,7 @@ Every filter has its own prior, parameters, noise and measurements; what they sh
 sampling. A filter gives the same bits here and alone (`estimation.compiled.run_rule`).
 """
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
@@ -12,16 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.algebra import EKF, Rule
-from estimation.compiled import constant_row, read_off, run_rule
+from estimation.compiled import constant_rows, read_off, run_rule
 from estimation.filter import FilterProblem, Trace
-from estimation.kernels import LANES, compile_lanes
+from estimation.kernels import LANES, compile_kernel
 from estimation.layout import layout
+from plant.compiled.intrinsics import ROWS
 from plant.errors import HydrostateError
 
 Array = NDArray[np.float64]
-
-STRETCH = 512
-"""Samples of all lanes that are laid side by side at a time."""
 
 FEWEST_IN_LANES = 8
 """A block of fewer filters is run one after the other: empty lanes cost as much as full ones."""
@@ -78,23 +77,36 @@ def _run_block(rule: Rule, block: Sequence[FilterProblem], settings: dict[str, f
     first = block[0]
     for problem in block:
         _require_alike(first, problem)
-    if len(block) < FEWEST_IN_LANES:
+    if len(block) < FEWEST_IN_LANES or len(first.measured) < ROWS:
         return [run_rule(rule, problem, settings) for problem in block]
-    places = layout(rule, first.model, first.channels)
-    kernel = compile_lanes(rule, first.model, first.channels)
     lanes = [block[min(lane, len(block) - 1)] for lane in range(LANES)]
-    state = np.stack([places.start(problem.mean, problem.covariance) for problem in lanes], axis=-1)
-    rows = np.stack([constant_row(problem, settings) for problem in lanes], axis=-1).ravel()
+    places, kernel = layout(rule, first.model, first.channels), compile_kernel(rule, first.model, first.channels, LANES)
+    carried = len(places.carried)
+    work = aligned(len(kernel.SLOTS), LANES)
+    work[:carried] = places.start(np.array([one.mean for one in lanes]), np.array([one.covariance for one in lanes]))
+    work[carried : carried + len(places.rows)] = constant_rows(lanes, settings)
     track = np.empty(((len(first.measured) - 1) // first.every + 1, first.model.width, LANES))
-    track_variance = np.empty_like(track)
-    logs = np.zeros((len(first.channels), LANES))
-    carried = state.ravel()
-    for begin, drives, measured in _stretches(lanes):
-        kernel(carried, rows, drives, measured, begin, first.substeps, first.every, track, track_variance, logs)
-    variances = np.stack([problem.variances for problem in lanes], axis=-1)
-    final = read_off(places, first.model.width, state, logs, variances)
-    tracks, spreads = (np.ascontiguousarray(np.moveaxis(one, -1, 0)) for one in (track, track_variance))
+    track_variance, logs = np.empty_like(track), np.zeros((len(first.channels), LANES))
+    drives = [np.ascontiguousarray(problem.drives, np.float64) for problem in lanes]
+    measured = [np.ascontiguousarray(problem.measured, np.float64) for problem in lanes]
     nothing = np.empty((0, len(first.channels)))
+    kernel.run(
+        work.ravel(),
+        _places(drives),
+        _places(measured),
+        aligned(len(first.model.drives) + len(first.channels), ROWS, LANES),
+        len(first.measured),
+        first.substeps,
+        first.every,
+        track,
+        track_variance,
+        logs,
+        nothing,
+        nothing,
+    )
+    variances = np.array([one.variances for one in lanes]).T
+    final = read_off(places, first.model.width, work[:carried], logs, variances)
+    tracks, spreads = (np.ascontiguousarray(np.moveaxis(one, -1, 0)) for one in (track, track_variance))
     return [
         Trace(
             mean=final.mean[lane],
@@ -111,18 +123,28 @@ def _run_block(rule: Rule, block: Sequence[FilterProblem], settings: dict[str, f
     ]
 
 
-def _stretches(lanes: Sequence[FilterProblem]) -> Iterator[tuple[int, Array, Array]]:
-    """Yield the logs of all lanes side by side, so much at a time as stays in the processor's cache."""
-    samples = len(lanes[0].measured)
-    longest = min(STRETCH, samples) + 1
-    drives = np.empty((longest, lanes[0].drives.shape[1], LANES))
-    measured = np.empty((longest, lanes[0].measured.shape[1], LANES))
-    for begin in range(0, samples, STRETCH):
-        first, end = max(begin - 1, 0), min(begin + STRETCH, samples)
-        for lane, problem in enumerate(lanes):
-            drives[: end - first, :, lane] = problem.drives[first:end]
-            measured[: end - first, :, lane] = problem.measured[first:end]
-        yield first, drives[: end - first], measured[: end - first]
+def _places(arrays: Sequence[Array]) -> NDArray[np.int64]:
+    """Return the addresses at which arrays begin."""
+    return np.array([one.ctypes.data for one in arrays])
+
+
+def aligned(*shape: int) -> Array:
+    """Return an array that begins where a cache line does: a vector across two of them takes twice as long.
+
+    Parameters
+    ----------
+    *shape : int
+        Its shape.
+
+    Returns
+    -------
+    ndarray
+        The array, not filled.
+    """
+    size = math.prod(shape)
+    buffer = np.empty(size + 8)
+    begin = -buffer.ctypes.data % 64 // 8
+    return buffer[begin : begin + size].reshape(shape)
 
 
 def _require_alike(first: FilterProblem, problem: FilterProblem) -> None:
@@ -130,7 +152,7 @@ def _require_alike(first: FilterProblem, problem: FilterProblem) -> None:
         problem.model is first.model
         and (problem.channels, problem.sample_time, problem.substeps, problem.every)
         == (first.channels, first.sample_time, first.substeps, first.every)
-        and problem.measured.shape == first.measured.shape
+        and len(problem.drives) == len(problem.measured) == len(first.measured)
     ):
         return
     for name in ("channels", "sample_time", "substeps", "every"):
@@ -142,6 +164,7 @@ def _require_alike(first: FilterProblem, problem: FilterProblem) -> None:
         raise HydrostateError(
             f"filters of a batch must share one model, got {first.model.name} and {problem.model.name}"
         )
+    lengths = [len(one) for one in (first.measured, problem.measured, problem.drives)]
     raise HydrostateError(
-        f"filters of a batch must have logs of one length, got {len(first.measured)} and {len(problem.measured)}"
+        f"filters of a batch must have logs of one length, got {lengths[0]} and {lengths[1]}, drives of {lengths[2]}"
     )

@@ -1,6 +1,7 @@
 """Runs a rule's kernel on one filtering task."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from estimation.algebra import Rule
 from estimation.filter import FilterProblem, Trace, empty_trace
-from estimation.kernels import compile_filter
+from estimation.kernels import compile_kernel
 from estimation.layout import Layout, layout, upper_triangle
 
 Array = NDArray[np.float64]
@@ -29,9 +30,30 @@ def constant_row(problem: FilterProblem, settings: dict[str, float]) -> Array:
     ndarray, shape (rows,)
         Parameters [SI], process noise [dimensionless a second], variances [SI squared], settings, step [s], its share.
     """
-    known = problem.parameters[: len(fields(problem.model.parameters))]
-    step = (problem.sample_time / problem.substeps, 1.0 / problem.substeps)
-    return np.concatenate([known, problem.noise, problem.variances, list(settings.values()), step])
+    return constant_rows([problem], settings)[:, 0]
+
+
+def constant_rows(problems: Sequence[FilterProblem], settings: dict[str, float]) -> Array:
+    """Return what a kernel reads and never changes for filters side by side.
+
+    Parameters
+    ----------
+    problems : sequence of FilterProblem
+        The tasks, alike in model and sampling.
+    settings : dict[str, float]
+        The rule's settings with their values, in the rule's order [each in its own unit].
+
+    Returns
+    -------
+    ndarray, shape (rows, filters)
+        One column a filter, see `constant_row`.
+    """
+    first = problems[0]
+    known = np.array([problem.parameters for problem in problems]).T[: len(fields(first.model.parameters))]
+    noise = np.array([problem.noise for problem in problems]).T
+    variances = np.array([problem.variances for problem in problems]).T
+    shared = [*settings.values(), first.sample_time / first.substeps, 1.0 / first.substeps]
+    return np.concatenate([known, noise, variances, np.repeat([shared], len(problems), axis=0).T])
 
 
 def run_rule(rule: Rule, problem: FilterProblem, settings: dict[str, float] | None = None) -> Trace:
@@ -53,20 +75,28 @@ def run_rule(rule: Rule, problem: FilterProblem, settings: dict[str, float] | No
     """
     trace = empty_trace(problem)
     places = layout(rule, problem.model, problem.channels)
-    carried = places.start(problem.mean, problem.covariance)
-    logs = compile_filter(rule, problem.model, problem.channels)(
-        carried,
-        constant_row(problem, settings or {}),
-        problem.drives,
-        problem.measured,
+    kernel = compile_kernel(rule, problem.model, problem.channels)
+    carried, logs = len(places.carried), np.zeros((len(problem.channels), 1))
+    work = np.empty(len(kernel.SLOTS))
+    work[:carried] = places.start(problem.mean, problem.covariance)
+    work[carried : carried + len(places.rows)] = constant_row(problem, settings or {})
+    drives, measured = (np.ascontiguousarray(one, np.float64) for one in (problem.drives, problem.measured))
+    kernel.steps(
+        work,
+        drives.ctypes.data,
+        measured.ctypes.data,
+        0,
+        0,
+        len(measured),
         problem.substeps,
         problem.every,
         trace.track,
         trace.track_variance,
+        logs,
         trace.residuals,
         trace.residual_variances,
     )
-    final = read_off(places, problem.model.width, carried[:, None], logs[:, None], problem.variances[:, None])
+    final = read_off(places, problem.model.width, work[:carried, None], logs, problem.variances[:, None])
     return replace(
         trace,
         mean=final.mean[0],

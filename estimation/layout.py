@@ -11,6 +11,8 @@ from estimation.algebra import Outputs, Rule, belief_names
 from estimation.model import ProcessModel
 from plant.compiled.expression import ONE, ZERO, Expression, select, symbol, unary
 from plant.compiled.hoist import hoisted
+from plant.compiled.simplify import fused, simplified
+from plant.compiled.source import CALLED, symbols_in
 from plant.errors import HydrostateError
 
 Array = NDArray[np.float64]
@@ -41,20 +43,21 @@ class Layout:
 
         Parameters
         ----------
-        mean : ndarray, shape (n,)
+        mean : ndarray, shape (n,) or (filters, n)
             Prior mean in the filter's units [dimensionless].
-        covariance : ndarray, shape (n, n)
+        covariance : ndarray, shape (n, n) or (filters, n, n)
             Prior covariance in the filter's units [dimensionless].
 
         Returns
         -------
-        ndarray, shape (carried,)
+        ndarray, shape (carried,) or (carried, filters)
             Its values.
         """
-        values = np.zeros(len(self.carried))
-        n = len(mean)
-        values[:n] = mean
-        values[n : n + n * (n + 1) // 2] = covariance[upper_triangle(n)]
+        values = np.zeros((len(self.carried), *mean.shape[:-1]))
+        n = mean.shape[-1]
+        rows, columns = upper_triangle(n)
+        values[:n] = mean.T
+        values[n : n + len(rows)] = covariance[..., rows, columns].T
         values[-self.channels :] = 1.0
         return values
 
@@ -122,7 +125,9 @@ def layout(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> Layout
     carried = (*belief_names(model.width), *(f"{name}{c}" for name in each for c in range(len(channels))))
     parameters = tuple(field.name for field in fields(model.parameters))
     noise = tuple(f"q{i}" for i in range(model.width)) + tuple(f"r{c}" for c in range(len(channels)))
-    own = {*carried, *noise, *rule.settings, "h", "share", "j"} | {f"{x}{i}" for x in "abykcdtw" for i in range(9999)}
+    own = {*carried, *noise, *rule.settings, *CALLED, "h", "share", "j"} | {
+        f"{x}{i}" for x in "abykcdtw" for i in range(9999)
+    }
     clash = own & set(parameters)
     if clash:
         raise HydrostateError(f"{model.name}: a parameter may not be named {sorted(clash)[0]!r}, the kernel uses it")
@@ -197,7 +202,9 @@ def halves_of(rule: Rule, model: ProcessModel, channels: tuple[str, ...], *, sco
     if scored:
         update |= score_expressions(update, channels)
     data = {f"{x}{i}" for i in range(len(model.drives)) for x in "ab"} | {f"y{c}" for c in range(len(channels))}
+    predict = rule.predict(model)
     varying = {*layout(rule, model, channels).carried, *data, "j"}
-    before, predict = hoisted(rule.predict(model), varying, "c")
-    after, update = hoisted(update, varying, "d")
-    return Halves(before | after, predict, update)
+    fixed = symbols_in([*predict.values(), *update.values()]) - varying
+    before, predict = hoisted(simplified(predict, fixed), varying, "c")
+    after, update = hoisted(simplified(update, fixed), varying, "d")
+    return Halves(before | after, fused(predict), fused(update))

@@ -7,28 +7,18 @@ from types import ModuleType
 
 from estimation.algebra import bounded, scaled_step
 from estimation.model import ProcessModel
+from estimation.parts import HEADER, function_source
 from plant.compiled.expression import ZERO, Expression
 from plant.compiled.kernel_file import load_kernel
-from plant.compiled.source import statements
 
-_LINEARISED = '''"""Generated: one step of the {name} form, and its Jacobian, in scaled units."""
-
-import math
-
-import numba
-import numpy as np
-
+_STEP = """
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def step(mean, start, end, parameters, h):
-    moved = np.zeros({width})
-    slopes = np.zeros(({width}, {width}))
-    j, share = 0.0, 1.0
-{load}
-{body}
-{store}
+    moved, slopes = np.zeros({width}), np.zeros(({width}, {width}))
+    fill(mean, start, end, parameters, h, 0.0, 1.0, moved, slopes)
     return moved, slopes
-'''
+"""
 
 
 @cache
@@ -51,18 +41,15 @@ def compile_step(model: ProcessModel) -> ModuleType:
     outputs: Mapping[str, Expression] = {f"m{i}": z for i, z in enumerate(bounded(model, mean))} | {
         f"f{i}_{k}": F[i][k] for i in range(n) for k in range(n) if F[i][k] is not ZERO
     }
-    load = [f"    z{i} = mean[{i}]" for i in range(n)]
-    load += [
-        f"    {x}{i} = {array}[{i}]" for i in range(len(model.drives)) for x, array in (("a", "start"), ("b", "end"))
-    ]
-    load += [f"    {field.name} = parameters[{i}]" for i, field in enumerate(fields(model.parameters))]
-    store = [f"    moved[{name[1:]}] = {name}" for name in outputs if name[0] == "m"]
-    store += [f"    slopes[{name[1:].replace('_', ', ')}] = {name}" for name in outputs if name[0] == "f"]
-    source = _LINEARISED.format(
-        name=model.name,
-        width=n,
-        load="\n".join(load),
-        body=statements(outputs, " " * 4),
-        store="\n".join(store),
-    )
+    reads = {f"z{i}": f"mean[{i}]" for i in range(n)}
+    reads |= {
+        f"{x}{i}": f"{array}[{i}]" for i in range(len(model.drives)) for x, array in (("a", "start"), ("b", "end"))
+    }
+    reads |= {field.name: f"parameters[{i}]" for i, field in enumerate(fields(model.parameters))}
+    writes = {
+        name: f"moved[{name[1:]}]" if name[0] == "m" else f"slopes[{name[1:].replace('_', ', ')}]" for name in outputs
+    }
+    arguments = "mean, start, end, parameters, h, j, share, moved, slopes"
+    source = HEADER.format(title=f"one step of the {model.name} form, and its Jacobian, in scaled units")
+    source += function_source("fill", arguments, reads, outputs, writes) + _STEP.format(width=n)
     return load_kernel(f"step_{model.name}", source)

@@ -11,21 +11,27 @@ from estimation.algebra import Rule, belief_names
 from estimation.layout import halves_of, layout
 from estimation.model import ProcessModel
 from plant.compiled.expression import Expression
-from plant.compiled.source import assignments, symbols_in
+from plant.compiled.source import INTRINSICS, lines_source, symbols_in
 
 HEADER = '''"""Generated: {title}."""
 
 import math
 
-import numba
 import numpy as np
-'''
+
+''' + INTRINSICS.replace("{", "{{").replace("}", "}}")
 
 _FUNCTION = """
 
+{lines}
+
+
+_{name} = function_of({name}_lines, {results})
+
+
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def {name}({arguments}):
-{body}
+    ({targets},) = _{name}(({places},))
 """
 
 
@@ -60,18 +66,30 @@ def function_source(
     --------
     >>> from plant.compiled.expression import symbol
     >>> print(function_source("twice", "x", {"a": "x[0]"}, {"b": 2.0 * symbol("a")}, {"b": "x[1]"}).strip())
+    def twice_lines(a):
+        t0_ = 2.0 * a
+        return {"b": t0_}
+    <BLANKLINE>
+    <BLANKLINE>
+    _twice = function_of(twice_lines, 1)
+    <BLANKLINE>
+    <BLANKLINE>
     @numba.njit(cache=True, nogil=True, error_model="numpy")
     def twice(x):
-        a = x[0]
-        t0_ = 2.0 * a
-        x[1] = t0_
+        (x[1],) = _twice((x[0],))
     """
-    used = symbols_in(list(outputs.values()))
-    lines = [f"{symbol} = {place}" for symbol, place in reads.items() if symbol in used]
-    computed, results = assignments(outputs, {}, "t", "")
-    stored = [f"{place} = {results[key]}" for key, place in writes.items() if key in outputs]
-    body = [*lines, *computed, *stored] or ["pass"]
-    return _FUNCTION.format(name=name, arguments=arguments, body="\n".join(f"    {line}" for line in body))
+    wanted = {key: value for key, value in outputs.items() if key in writes}
+    if not wanted:
+        return f"\n\n@numba.njit(cache=True)\ndef {name}({arguments}):\n    pass\n"
+    places = [reads.get(symbol, symbol) for symbol in sorted(symbols_in(list(wanted.values())))]
+    return _FUNCTION.format(
+        name=name,
+        arguments=arguments,
+        lines=lines_source(f"{name}_lines", wanted),
+        results=len(wanted),
+        targets=", ".join(writes[key] for key in wanted),
+        places=", ".join(places),
+    )
 
 
 def data_places(model: ProcessModel, channels: tuple[str, ...]) -> dict[str, str]:

@@ -17,9 +17,10 @@ from plant.compiled.elimination import eliminated_jacobian
 from plant.compiled.expression import ONE, ZERO, Expression, as_expression, symbol
 from plant.compiled.functions import Scalar
 from plant.compiled.hoist import hoisted
+from plant.compiled.intrinsics import native_width
 from plant.compiled.kernel_file import load_kernel
-from plant.compiled.simplify import share_reciprocals
-from plant.compiled.source import statements, symbols_in
+from plant.compiled.simplify import fused, share_ratios, simplified
+from plant.compiled.source import INTRINSICS, lines_source
 from plant.eha import EhaParameters
 from plant.integrate import Derivative, State, parameter_symbols, solve_linear
 
@@ -74,12 +75,40 @@ def rodas3_stages(
     return [[as_expression(u) for u in stage] for stage in (u1, u2, u3, u4)]
 
 
-_KERNEL = """"Generated: trajectories of the {name} plant in steps of controlled error, {lanes} side by side."
+_KERNEL = """# Generated: trajectories of the {name} plant in steps of controlled error, {lanes} side by side.
 
 import math
 
-import numba
 import numpy as np
+
+{intrinsics}
+
+{settle}
+
+
+{stages}
+
+
+{between}
+
+
+SLOTS = {slots}
+
+settle_at = stepping(SLOTS, {vector}, settle)
+stages_at = stepping(SLOTS, {vector}, stages)
+between_at = stepping(SLOTS, {vector}, between)
+move = moving({lanes})
+
+
+@numba.njit(forceinline=True, error_model="numpy")
+def keep(work, place, states, sample):
+    count = states.shape[2]
+    for i in range({width}):
+        if count == {lanes}:
+            move(work.ctypes.data + 8 * (place + {lanes} * i), states[sample, i].ctypes.data)
+        else:
+            for l in range(count):
+                states[sample, i, l] = work[place + {lanes} * i + l]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -101,20 +130,15 @@ def smooth(speed, parameters, begin, bend):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def settle(parameters, work):
-    for l in range({lanes}):
-{load}
-{once}
-{keep}
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
 def run(initial, speed, parameters, sample_time, weights, bend, longest, shortest, states):
-    n, _, count = states.shape
-    states[0] = initial[:, :count]
-    work = np.zeros({total})
+    n = states.shape[0]
+    room = np.zeros({total} + 8)
+    work = room[-room.ctypes.data % 64 // 8 :]  # a vector across two cache lines takes twice as long
+    slots = work.ctypes.data
     work[:{block}] = initial.reshape({block})
-{weigh}
+    keep(work, 0, states, 0)
+    for i in range({width}):
+        work[{weights} + i * {lanes} : {weights} + (i + 1) * {lanes}] = weights[i]
     begin = end = 0
     start = reach = place = 0.0
     size, taken = longest, 1.0
@@ -129,7 +153,11 @@ def run(initial, speed, parameters, sample_time, weights, bend, longest, shortes
             lift = speed[begin] + curvature / 12.0
             if row < 0 or parameters.shape[0] > 1:
                 row = min(begin, parameters.shape[0] - 1)
-                settle(parameters[row], work)
+                for i in range(parameters.shape[2]):
+                    for l in range({lanes}):
+                        work[{known} + i * {lanes} + l] = parameters[row, l, i]
+                for first in range(0, 8 * {lanes}, 8 * {vector}):
+                    settle_at(slots + first, 0.0)
         left = reach - place
         size = min(size, longest)
         if size > 0.999999 * left:
@@ -142,25 +170,20 @@ def run(initial, speed, parameters, sample_time, weights, bend, longest, shortes
         u_end = u_start + size * (slope + 0.5 * curvature * size)
         h = size * sample_time
         for l in range({lanes}):
-{fetch}
-{body}
-{store}
+            work[{shared} + l] = u_start
+            work[{shared} + {lanes} + l] = u_end
+            work[{shared} + 2 * {lanes} + l] = u_rise
+            work[{shared} + 3 * {lanes} + l] = h
+        for first in range(0, 8 * {lanes}, 8 * {vector}):
+            stages_at(slots + first, 0.0)
         here = begin + place
         if sample < here - {tiny}:
-            pace = taken * sample_time
-            for i in range({block}):
-                rise = work[i] - work[{old} + i]
-                first, last = work[{old_rates} + i] * pace, work[{rates} + i] * pace
-                work[{cubic} + i] = first + last - 2.0 * rise
-                work[{cubic} + {block} + i] = 3.0 * rise - 2.0 * first - last
-                work[{cubic} + 2 * {block} + i] = first
+            for l in range({lanes}):
+                work[{shared} + 4 * {lanes} + l] = taken * sample_time
             while sample < here - {tiny}:
-                part = (sample - start) / taken
-                for i in range({width}):
-                    for l in range(count):
-                        j = i * {lanes} + l
-                        curve = work[{cubic} + {block} + j] + part * work[{cubic} + j]
-                        states[sample, i, l] = work[{old} + j] + part * (work[{cubic} + 2 * {block} + j] + part * curve)
+                for first in range(0, 8 * {lanes}, 8 * {vector}):
+                    between_at(slots + first, (sample - start) / taken)
+                keep(work, {seen}, states, sample)
                 sample += 1
         if left <= 0.0:
             break
@@ -178,9 +201,7 @@ def run(initial, speed, parameters, sample_time, weights, bend, longest, shortes
             work[i] = work[{new} + i]
         near = begin + int(place + 0.5)
         if abs(begin + place - near) < {tiny}:
-            for i in range({width}):
-                for l in range(count):
-                    states[near, i, l] = work[i * {lanes} + l]
+            keep(work, 0, states, near)
             if sample == near:
                 sample += 1
         if error < 1.2e-4:
@@ -195,6 +216,10 @@ def run(initial, speed, parameters, sample_time, weights, bend, longest, shortes
             size *= 0.9
         size = max(size, shortest)
 """
+
+
+_SHARED = ("u_start", "u_end", "u_rise", "h", "pace")
+"""Motor speed at a step's start and end and its rise at the first rate [rad/s], the step and the one before [s]."""
 
 
 def _named(letter: str, values: Sequence[Expression]) -> dict[str, Expression]:
@@ -214,6 +239,19 @@ def _outputs(derivative: Derivative, width: int, p: object) -> dict[str, Express
     outputs = _named("n", [x + 2.0 * a + c + d for x, a, c, d in zip(state, u1, u3, u4, strict=True)])
     outputs |= _named("r", [as_expression(rate) for rate in derivative(state, symbol("u_start"), p)])
     return outputs | {"error": error * (1.0 / width)}
+
+
+def _between(width: int) -> dict[str, Expression]:
+    """Return the state ``y`` at a share ``j`` of the step before: the cubic through states and rates at both ends."""
+    part, pace = symbol("j"), symbol("pace")
+    result: dict[str, Expression] = {}
+    for i in range(width):
+        old = symbol(f"o{i}")
+        rise = symbol(f"x{i}") - old
+        first, last = symbol(f"s{i}") * pace, symbol(f"r{i}") * pace
+        curve = 3.0 * rise - 2.0 * first - last + part * (first + last - 2.0 * rise)
+        result[f"y{i}"] = old + part * (first + part * curve)
+    return result
 
 
 @cache
@@ -243,40 +281,36 @@ def compile_adaptive(
     """
     names = [field.name for field in fields(parameter_class)]
     outputs = _outputs(derivative, width, parameter_symbols(parameter_class))
-    outputs = share_reciprocals(outputs, set(names))
-    used = symbols_in(list(outputs.values()))
-    fixed, moving = hoisted(outputs, used - set(names), "c")
+    outputs = simplified(share_ratios(outputs), set(names))
+    moving = {f"{letter}{i}" for letter in "xw" for i in range(width)} | {*_SHARED}
+    fixed, stages = hoisted(outputs, moving, "c")
     span = range(width)
-    block = width * lanes
-    new, rates, old, old_rates, cubic, errors, constants = (block * i for i in (1, 2, 3, 4, 5, 8, 9))
-    kept = {name: constants + i * lanes for i, name in enumerate(fixed)}
+    parts = [[f"{letter}{i}" for i in span] for letter in "xnrosyw"]
+    parts += [["error"], [*_SHARED], names, [*fixed]]
+    every = [name for part in parts for name in part]
+    slots = {name: lanes * i for i, name in enumerate(every)}
     source = _KERNEL.format(
         name=name,
+        intrinsics=INTRINSICS,
+        settle=lines_source("settle", fixed),
+        stages=lines_source("stages", fused(stages)),
+        between=lines_source("between", fused(_between(width))),
+        slots=slots,
+        vector=min(lanes, native_width()),
         width=width,
         lanes=lanes,
-        block=block,
-        new=new,
-        rates=rates,
-        old=old,
-        old_rates=old_rates,
-        cubic=cubic,
-        errors=errors,
-        total=constants + len(kept) * lanes,
+        block=width * lanes,
+        new=slots["n0"],
+        rates=slots["r0"],
+        old=slots["o0"],
+        old_rates=slots["s0"],
+        seen=slots["y0"],
+        weights=slots["w0"],
+        errors=slots["error"],
+        shared=slots[_SHARED[0]],
+        known=slots[names[0]],
+        total=lanes * len(every),
         tiny="1e-6",
         roundest="100.0",
-        weigh="\n".join(f"    w{i} = weights[{i}]" for i in span),
-        load="\n".join(f"        {name} = parameters[l, {i}]" for i, name in enumerate(names)),
-        once=statements(fixed, " " * 8, "k"),
-        keep="\n".join(f"        work[{place} + l] = {name}" for name, place in kept.items()),
-        fetch="\n".join(
-            [f"            x{i} = work[{i * lanes} + l]" for i in span]
-            + [f"            {name} = work[{place} + l]" for name, place in kept.items()]
-        ),
-        body=statements(moving, " " * 12),
-        store="\n".join(
-            [f"            work[{new + i * lanes} + l] = n{i}" for i in span]
-            + [f"            work[{rates + i * lanes} + l] = r{i}" for i in span]
-            + [f"            work[{errors} + l] = error"]
-        ),
     )
     return load_kernel(f"{name}_adaptive_{lanes}", source).run

@@ -6,7 +6,7 @@ the reference, stand in `plant.reference_solver`.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, fields
+from dataclasses import fields
 from functools import cache
 from types import SimpleNamespace
 from typing import Any, TypeAlias
@@ -65,7 +65,7 @@ def parameter_row(parameters: EhaParameters) -> NDArray[np.float64]:
     ndarray, shape (parameters,)
         Their values in SI.
     """
-    return np.array(astuple(parameters), dtype=np.float64)
+    return np.array([getattr(parameters, field.name) for field in fields(parameters)], dtype=np.float64)
 
 
 def solve_linear(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]) -> list[Scalar]:

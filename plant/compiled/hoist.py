@@ -4,6 +4,9 @@ from collections.abc import Collection, Mapping, Sequence, Set
 
 from plant.compiled.expression import Expression, ordered, symbol
 
+COMPARISONS = ("<", "<=", ">", ">=", "present")
+"""Operations whose result is not a number."""
+
 
 def hoisted(
     outputs: Mapping[str, Expression], varying: Set[str], prefix: str
@@ -42,6 +45,8 @@ def hoisted(
         if id(item) not in rewritten:
             if item.operation == "constant":
                 rewritten[id(item)] = item
+            elif item.operation in COMPARISONS:  # not a number: there is no place to keep it
+                rewritten[id(item)] = Expression(item.operation, tuple(map(needed, item.arguments)), item.value)
             else:
                 name = f"{prefix}{len(constants)}"
                 constants[name] = item

@@ -1,7 +1,9 @@
 """Writes an expression graph as straight-line Python that Numba compiles."""
 
+import inspect
 from collections.abc import Mapping, Sequence
 
+from plant.compiled import intrinsics, vector
 from plant.compiled.expression import Expression, ordered
 
 _TEMPLATES: Mapping[str, str] = {
@@ -23,6 +25,22 @@ _TEMPLATES: Mapping[str, str] = {
     "where": "({1} if {0} else {2})",
 }
 """How each operation is spelt; a new one needs a line here and one in `expression.local_derivatives`."""
+
+CALLED = ("present", "sign", "sqrt", "exp", "log", "tanh", "where", "fma")
+"""Functions of `plant.compiled.vector` that lines call: no symbol may have their names."""
+
+_CALLS: Mapping[str, str] = {
+    **_TEMPLATES,
+    **{name: f"{name}({{0}})" for name in CALLED[:-2]},
+    "where": "where({0}, {1}, {2})",
+    "fma": "fma({0}, {1}, {2})",
+    "fnma": "fma(-{0}, {1}, {2})",
+    "fms": "fma({0}, {1}, -{2})",
+}
+"""How each operation is spelt by them."""
+
+INTRINSICS = inspect.getsource(vector) + inspect.getsource(intrinsics).replace(f"from {vector.__name__}", "# from")
+"""What a kernel begins with that calls them: it contains all that it calls."""
 
 
 def statements(outputs: Mapping[str, Expression], indent: str, temporary: str = "t") -> str:
@@ -54,13 +72,21 @@ def statements(outputs: Mapping[str, Expression], indent: str, temporary: str = 
     t1_ = t0_ + 1.0
     y = t1_
     """
-    return "\n".join(_assignments(outputs, ordered(outputs.values()), {}, temporary, indent))
+    names: dict[int, str] = {}
+    lines = _operations(ordered(outputs.values()), names, temporary, indent, _TEMPLATES)
+    targets = [(target, names[id(value)]) for target, value in outputs.items()]
+    wanted = [(target, name) for target, name in targets if target != name]
+    if wanted:
+        left = ", ".join(target for target, _ in wanted)
+        right = ", ".join(name for _, name in wanted)
+        lines.append(f"{indent}{left} = {right}")
+    return "\n".join(lines)
 
 
-def _assignments(
-    outputs: Mapping[str, Expression], items: Sequence[Expression], names: dict[int, str], letter: str, indent: str
+def _operations(
+    items: Sequence[Expression], names: dict[int, str], letter: str, indent: str, spelt: Mapping[str, str]
 ) -> list[str]:
-    """Return one line an operation and one for the outputs; note the variable of each operation in `names`."""
+    """Return one line an operation; note the variable of each in `names`."""
     lines: list[str] = []
     for item in items:
         if item.operation == "symbol":
@@ -72,54 +98,40 @@ def _assignments(
             # the underscore: Numba names a load of t7 at 2854 as it names one of t72 at 854
             name = f"{letter}{len(lines)}_"
             names[id(item)] = name
-            lines.append(f"{indent}{name} = {_TEMPLATES[item.operation].format(*operands)}")
-    targets = [(target, names[id(value)]) for target, value in outputs.items()]
-    wanted = [(target, name) for target, name in targets if target != name]
-    if wanted:
-        left = ", ".join(target for target, _ in wanted)
-        right = ", ".join(name for _, name in wanted)
-        lines.append(f"{indent}{left} = {right}")
+            lines.append(f"{indent}{name} = {spelt[item.operation].format(*operands)}")
     return lines
 
 
-def assignments(
-    outputs: Mapping[str, Expression], known: Mapping[str, str], temporary: str, indent: str
-) -> tuple[list[str], dict[str, str]]:
-    """Return lines that compute the outputs and assign nothing twice, and the variable that holds each output.
-
-    Numba takes a time that grows with the count of variables assigned twice times the length of the function.
+def lines_source(name: str, outputs: Mapping[str, Expression]) -> str:
+    """Write straight lines as a function for `plant.compiled.intrinsics`.
 
     Parameters
     ----------
+    name : str
+        Its name.
     outputs : Mapping[str, Expression]
-        What is computed, by name.
-    known : Mapping[str, str]
-        Variables that hold symbols, where they are not named as the symbols are.
-    temporary : str
-        Beginning of the temporaries' names.
-    indent : str
-        White space in front of every line.
+        What it gives, by name.
 
     Returns
     -------
-    tuple of (list of str, dict[str, str])
-        The lines, and the variable of each output by its name.
+    str
+        Its source; it takes the symbols in alphabetical order.
 
     Examples
     --------
-    >>> from plant.compiled.expression import symbol
-    >>> x = symbol("x")
-    >>> assignments({"x": x * x + 1.0, "y": x}, {"x": "old"}, "t", "")
-    (['t0_ = old * old', 't1_ = t0_ + 1.0'], {'x': 't1_', 'y': 'old'})
+    >>> from plant.compiled.expression import symbol, unary
+    >>> x, y = symbol("x"), symbol("y")
+    >>> print(lines_source("grown", {"x": unary("sqrt", y) + x}))
+    def grown(x, y):
+        t0_ = sqrt(y)
+        t1_ = t0_ + x
+        return {"x": t1_}
     """
-    names = {
-        id(item): known.get(str(item.value), str(item.value))
-        for item in ordered(outputs.values())
-        if item.operation == "symbol"
-    }
-    items = [item for item in ordered(outputs.values()) if item.operation != "symbol"]
-    lines = _assignments({}, items, names, temporary, indent)
-    return lines, {name: names[id(value)] for name, value in outputs.items()}
+    names: dict[int, str] = {}
+    lines = _operations(ordered(outputs.values()), names, "t", " " * 4, _CALLS)
+    given = ", ".join(f'"{output}": {names[id(value)]}' for output, value in outputs.items())
+    takes = ", ".join(sorted(symbols_in(list(outputs.values()))))
+    return "\n".join([f"def {name}({takes}):", *lines, f"    return {{{given}}}"])
 
 
 def symbols_in(outputs: Sequence[Expression]) -> set[str]:

@@ -38,7 +38,7 @@ RULES: dict[str, tuple[Rule, dict[str, float]]] = {
     "sif": (SIF, SIF_SETTINGS),
 }
 EVERY_RULE = pytest.mark.parametrize(("rule", "settings"), RULES.values(), ids=RULES)
-SAMPLES = 700  # more than a stretch that the batch lays side by side
+SAMPLES = 701  # not a whole count of what the batch lays side by side at a time
 
 
 def problems(model: ProcessModel, count: int, samples: int = SAMPLES) -> list[FilterProblem]:
@@ -99,6 +99,23 @@ def test_problems_are_drawn_a_block_at_a_time(linear: ProcessModel) -> None:
     assert len(drawn) == 32
 
 
+@pytest.mark.parametrize("samples", [2, 7, 8, 9, 16])
+def test_short_logs_are_filtered_as_alone(linear: ProcessModel, samples: int) -> None:
+    assert_batch_is_alone(EKF, {}, problems(linear, 33, samples))
+
+
+def test_however_a_log_lies_in_memory_it_is_filtered_as_alone(linear: ProcessModel) -> None:
+    tasks = problems(linear, 40, samples=50)
+    measured = np.concatenate([task.measured for task in tasks], axis=1)
+    measured.flags.writeable = False
+    lying = [replace(task, measured=measured[:, 2 * k : 2 * k + 2]) for k, task in enumerate(tasks)]
+    assert_same_bits(list(filter_batch(lying)), [run_rule(EKF, task) for task in tasks])
+
+
+def test_the_track_of_every_sample_is_kept_as_alone(linear: ProcessModel) -> None:
+    assert_batch_is_alone(EKF, {}, [replace(task, every=1) for task in problems(linear, 33, samples=50)])
+
+
 def test_no_problem_is_no_trace() -> None:
     assert list(filter_batch([], EKF)) == []
 
@@ -113,8 +130,10 @@ def test_filters_of_another_model_or_sampling_are_refused(linear: ProcessModel) 
 
 def test_logs_of_another_length_are_refused(linear: ProcessModel) -> None:
     first, second = problems(linear, 2, samples=20)
-    with pytest.raises(HydrostateError, match="one length, got 20 and 19"):
+    with pytest.raises(HydrostateError, match="one length, got 20 and 19, drives of 19"):
         list(filter_batch([first, replace(second, measured=second.measured[:-1], drives=second.drives[:-1])]))
+    with pytest.raises(HydrostateError, match="one length, got 20 and 20, drives of 19"):
+        list(filter_batch([first, replace(second, drives=second.drives[:-1])]))
 
 
 def test_a_record_is_left_alone(linear: ProcessModel) -> None:

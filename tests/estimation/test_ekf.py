@@ -71,6 +71,18 @@ def test_the_log_likelihood_and_nis_are_those_of_the_innovations(linear: Process
     assert list(estimate.nis.values()) == pytest.approx(np.mean(squares, axis=0).tolist(), rel=1e-12)
 
 
+def test_the_log_likelihood_survives_variances_whose_product_does_not(linear: ProcessModel) -> None:
+    noise = dict.fromkeys((state.name for state in linear.states), 1e12)
+    estimate = run_filter(
+        ekf, linear, PRIOR, noisy_record(), EhaParameters(), variances=VARIANCES, noise=noise, keep_innovations=True
+    )
+    densities = -0.5 * (
+        estimate.residuals**2 / estimate.residual_variances + np.log(2.0 * np.pi * estimate.residual_variances)
+    )
+    assert np.all(np.sum(np.log10(estimate.residual_variances / list(VARIANCES.values())), axis=0) > 900.0)
+    assert estimate.log_likelihood == pytest.approx(float(np.sum(densities)), rel=1e-12)
+
+
 def test_missing_samples_change_nothing_but_the_prediction(linear: ProcessModel) -> None:
     record = noisy_record(2)
     gone = {name: np.array([record[name][0], np.nan]) for name in VARIANCES}

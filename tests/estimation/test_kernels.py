@@ -7,12 +7,15 @@ from estimation.algebra import EKF, predict_expressions, scaled_step, update_exp
 from estimation.eha import ACCELERATION_FORM, FORMS, PRESSURE_FORM
 from estimation.ekf import ekf
 from estimation.gaussian import Gaussian
-from estimation.kernels import compile_filter, one_source
+from estimation.kernels import LANES, compile_kernel, kernel_source
+from estimation.layout import halves_of
 from estimation.model import ProcessModel
 from estimation.run import run_filter
 from plant.compiled.expression import ONE, ZERO, ordered
 from plant.eha import EhaParameters
 from plant.record import Record
+
+CHANNELS = ("position_m", "velocity_m_s")
 
 
 def test_bulk_modulus_is_a_constant_row_that_costs_nothing() -> None:
@@ -32,19 +35,19 @@ def test_predict_and_update_give_every_mean_and_the_upper_triangle(model: Proces
 
 def test_no_update_divides_more_often_than_it_has_channels() -> None:
     channels = ("position_m", "velocity_m_s", "differential_pressure_pa")
-    items = ordered(update_expressions(PRESSURE_FORM, channels).values())
+    items = ordered(halves_of(EKF, PRESSURE_FORM, channels).update.values())
     assert sum(item.operation == "/" for item in items) == len(channels)
 
 
-def test_a_kernel_is_straight_lines_within_samples_and_sub_steps() -> None:
-    source = one_source(EKF, ACCELERATION_FORM, ("position_m", "velocity_m_s"))
-    assert source.count("for ") == 2
-    assert "np.linalg" not in source
+def test_a_rule_is_the_same_straight_lines_for_one_filter_and_for_many() -> None:
+    one, many = (kernel_source(EKF, ACCELERATION_FORM, CHANNELS, lanes) for lanes in (1, LANES))
+    lines = one.split("def prepare(")[1].split("SLOTS = ")[0]
+    assert lines == many.split("def prepare(")[1].split("SLOTS = ")[0]
+    assert not {"for", "if", "while"} & set(lines.split())
 
 
 def test_the_same_model_and_channels_are_compiled_once() -> None:
-    channels = ("position_m", "velocity_m_s")
-    assert compile_filter(EKF, PRESSURE_FORM, channels) is compile_filter(EKF, PRESSURE_FORM, channels)
+    assert compile_kernel(EKF, PRESSURE_FORM, CHANNELS) is compile_kernel(EKF, PRESSURE_FORM, CHANNELS)
 
 
 def test_the_order_of_channels_does_not_change_the_belief(linear: ProcessModel) -> None:

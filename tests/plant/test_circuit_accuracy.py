@@ -54,7 +54,7 @@ def case(condition: str, name: str, seconds: float, **changes: float) -> tuple[C
 @pytest.mark.parametrize("name", ["sine", "prbs"])
 def test_ten_kilohertz_is_within_1e_4_of_the_stiff_solver(condition: str, name: str) -> None:
     p, speed = case(condition, name, 0.4)
-    assert error(run(p, speed), reference(p, speed), p) < 5e-5
+    assert error(run(p, speed), reference(p, speed), p) < 1e-4
 
 
 @pytest.mark.slow
@@ -62,13 +62,13 @@ def test_ten_kilohertz_is_within_1e_4_of_the_stiff_solver(condition: str, name: 
 @pytest.mark.parametrize("name", DRIVES)
 def test_ten_kilohertz_is_within_1e_4_of_the_stiff_solver_everywhere(condition: str, name: str) -> None:
     p, speed = case(condition, name, 4.0)
-    assert error(run(p, speed), reference(p, speed, tolerance=1e-9), p) < 5e-5
+    assert error(run(p, speed), reference(p, speed, tolerance=1e-9), p) < 1e-4
 
 
 @pytest.mark.parametrize("air", [0.02, 0.2])
 def test_air_costs_no_accuracy(air: float) -> None:
     p, speed = case("minor_leakage", "prbs", 0.4, air_fraction=air)
-    assert error(run(p, speed), reference(p, speed), p) < 5e-5
+    assert error(run(p, speed), reference(p, speed), p) < 1e-4
 
 
 def test_cavitation_costs_little_accuracy() -> None:
@@ -146,7 +146,7 @@ def test_side_by_side_runs_are_those_of_each_alone() -> None:
     together = run_plant(CIRCUIT, speed, 1e-4, np.array([parameter_row(p) for p in circuits])[None])
     assert together.shape == (len(circuits), len(speed), 7)
     for p, states in zip(circuits, together, strict=True):
-        assert error(states, run(p, speed), p) < 5e-5
+        assert error(states, run(p, speed), p) < 1e-4
 
 
 def test_a_coarse_log_samples_the_fine_run() -> None:

@@ -1,0 +1,175 @@
+"""What compiled kernels do that Numba has no word for: lines as instructions, on numbers in memory.
+
+A kernel contains the text of this file (`plant.compiled.source`), for Numba's cache does not notice a change in what a
+kernel imports.
+"""
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import llvmlite.binding
+import numba
+from llvmlite import ir
+from numba.extending import intrinsic
+
+from plant.compiled.vector import DOUBLE, SHORT, WORD, Vector, vector_type
+
+ROWS = 8
+"""Samples of as many logs that `transpose` turns at a time."""
+
+
+def native_width() -> int:
+    """Return how many numbers stand in one of the processor's vectors."""
+    features = llvmlite.binding.get_host_cpu_features()
+    return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
+
+
+Lines = Callable[..., Mapping[str, Any]]
+"""Straight lines: from values by name to results by name."""
+
+
+def function_of(lines: Lines, results: int) -> Any:
+    """Return lines as an operation on a tuple of numbers, in the order of their names, which gives all results.
+
+    Parameters
+    ----------
+    lines : callable
+        The lines.
+    results : int
+        How many they give.
+
+    Returns
+    -------
+    intrinsic
+        ``function((a, b))``, a tuple.
+    """
+
+    @intrinsic
+    def function(_: Any, given: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            values = [Vector(builder, builder.extract_value(arguments[0], k)) for k in range(len(given))]
+            found = [Vector(builder, DOUBLE(0.0)).like(value) for value in lines(*values).values()]
+            return context.make_tuple(builder, signature.return_type, found)
+
+        return numba.types.UniTuple(numba.float64, results)(given), code
+
+    return function
+
+
+def stepping(slots: Mapping[str, int], width: int, *parts: Lines) -> Any:
+    """Return an operation on numbers in memory: lines one after the other, each from what stands and from those before.
+
+    Parameters
+    ----------
+    slots : Mapping[str, int]
+        Where the first of a symbol's numbers stands, the others following.
+    width : int
+        How many of each are taken.
+    *parts : callable
+        Lines.
+
+    Returns
+    -------
+    intrinsic
+        ``step(address, j)``, with the address of slot 0; ``j`` is given to the lines by that name.
+    """
+
+    @intrinsic
+    def step(_: Any, address: Any, j: Any) -> Any:  # noqa: ARG001  Numba passes types
+        def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            def place(name: str) -> Any:
+                return _place(builder, arguments[0], WORD(8 * slots[name]), vector_type(width))
+
+            attributes = builder.function.attributes
+            attributes.alignstack = 64  # what registers cannot hold is put aside in whole cache lines
+            attributes.add("nounwind")  # llvmlite forgets an alignment that stands alone
+            known = {"j": Vector(builder, _spread(builder, arguments[1], width))}
+            results: dict[str, Any] = {}
+            for lines in parts:
+                names = inspect.signature(lines).parameters
+                known |= {
+                    name: Vector(builder, builder.load(place(name), align=8)) for name in names if name not in known
+                }
+                results |= lines(*(known[name] for name in names))
+                known |= results
+            for name, value in results.items():
+                if name in slots:
+                    builder.store(known["j"].like(value), place(name), align=8)
+            return context.get_dummy_value()
+
+        return numba.void(numba.int64, numba.float64), code
+
+    return step
+
+
+def _place(builder: Any, address: Any, distance: Any, kind: Any) -> Any:
+    """Return a pointer to what stands at a distance in bytes from an address."""
+    return builder.inttoptr(builder.add(address, distance), kind.as_pointer())
+
+
+def _spread(builder: Any, number: Any, width: int) -> Any:
+    """Return a vector that holds a number in each place."""
+    if width == 1:
+        return number
+    single = builder.insert_element(vector_type(width)(ir.Undefined), number, SHORT(0))
+    return builder.shuffle_vector(single, single, ir.VectorType(SHORT, width)([0] * width))
+
+
+def moving(width: int) -> Any:
+    """Return an operation that copies so many numbers from one address to another.
+
+    Parameters
+    ----------
+    width : int
+        How many.
+
+    Returns
+    -------
+    intrinsic
+        ``move(source, target)``.
+    """
+
+    @intrinsic
+    def move(_: Any, source: Any, target: Any) -> Any:  # noqa: ARG001  Numba passes types
+        def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            source, target = (_place(builder, address, WORD(0), vector_type(width)) for address in arguments)
+            builder.store(builder.load(source, align=8), target, align=8)
+            return context.get_dummy_value()
+
+        return numba.void(numba.int64, numba.int64), code
+
+    return move
+
+
+def _transpose(_: Any, places: Any, offset: Any, ahead: Any, target: Any, stride: Any) -> Any:  # noqa: ARG001  types
+    def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        places, offset, ahead, target, stride = arguments
+        byte, vector, order, every = ir.IntType(8), vector_type(ROWS), ir.VectorType(SHORT, ROWS), range(ROWS)
+        hint = ir.FunctionType(ir.VoidType(), [byte.as_pointer(), SHORT, SHORT, SHORT])
+        prefetch = builder.module.declare_intrinsic("llvm.prefetch", [byte.as_pointer()], hint)
+        rows: list[Any] = []
+        for lane in every:
+            begin = builder.add(builder.load(_place(builder, places, WORD(8 * lane), WORD)), offset)
+            rows.append(builder.load(_place(builder, begin, WORD(0), vector), align=8))
+            flags = SHORT(0), SHORT(2), SHORT(1)  # to read, into the second cache, data
+            builder.call(prefetch, [_place(builder, begin, ahead, byte), *flags])
+        for span in (1, 2, 4):  # exchange what stands off the diagonal of every 2 by 2 blocks of this size
+            kept = [k + ROWS - span if k & span else k for k in every]
+            for low in (lane for lane in every if not lane & span):
+                pair = rows[low], rows[low + span]
+                rows[low] = builder.shuffle_vector(*pair, order(kept))
+                rows[low + span] = builder.shuffle_vector(*pair, order([k + span for k in kept]))
+        for row in every:
+            builder.store(rows[row], _place(builder, target, builder.mul(stride, WORD(row)), vector), align=8)
+        return context.get_dummy_value()
+
+    return numba.void(numba.int64, numba.int64, numba.int64, numba.int64, numba.int64), code
+
+
+transpose = intrinsic(_transpose)
+"""``transpose(places, offset, ahead, target, stride)``: copy 8 numbers from each of 8 places into 8 rows of 8.
+
+All in bytes: the address of the places' addresses, what is added to each, how far ahead of there is fetched into the
+cache, the address of the first row, and that from row to row.
+"""
