@@ -11,6 +11,9 @@ from plant.errors import LogWarning
 
 FloatArray = NDArray[np.float64]
 
+LARGEST_PART = 100_000
+"""Rows of a Jacobian that are factored at a time."""
+
 
 def automatic_lags(residual: FloatArray) -> int:
     """Return the span of a residual's colour, read off its first-order correlation (Andrews 1991, equation 6.2).
@@ -41,9 +44,11 @@ def automatic_lags(residual: FloatArray) -> int:
 
 
 def least_squares_covariance(
-    jacobian: FloatArray, residual: FloatArray, n_used: int, *, coloured: bool, lags: int | None = None
-) -> FloatArray:
-    """Return ``s^2 (J'J)^-1``, or the sandwich ``(J'J)^-1 J'RJ (J'J)^-1`` where the residual is coloured.
+    jacobian: FloatArray, residual: FloatArray, n_used: int, lags: int, prior: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return ``B = (J'J + P)^-1`` and the sandwich ``B (J'RJ + P) B`` of a residual with autocovariance R.
+
+    R is estimated with a Bartlett window (Newey and West 1987).
 
     Parameters
     ----------
@@ -53,26 +58,26 @@ def least_squares_covariance(
         Residual at the optimum, in the Jacobian's unit; zero where a sample is missing.
     n_used : int
         Samples that are not missing.
-    coloured : bool
-        Whether the residual's autocovariance R is estimated (Newey and West 1987) or taken as white.
-    lags : int, optional
-        Span of the autocovariance [samples]; about four times the root of the samples where not given.
+    lags : int
+        Span of the autocovariance [samples], 0 for white; see `automatic_lags`.
+    prior : ndarray, shape (p,)
+        Diagonal of P: one over the variance of each parameter before the fit, zero where nothing is known.
 
     Returns
     -------
-    ndarray, shape (p, p)
-        Covariance of the parameters.
+    tuple of ndarray, shape (p, p)
+        The inverse, and the covariance of the parameters.
 
     Warns
     -----
     LogWarning
         If the parameters are not separately determined; the covariance is then a lower bound.
     """
-    scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
+    scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian) + prior)
     scale[scale == 0.0] = 1.0
-    columns = jacobian / scale
-    triangle = np.linalg.qr(columns, mode="r")
-    n_parameters = columns.shape[1]
+    n_parameters = jacobian.shape[1]
+    triangles = [np.linalg.qr(part, mode="r") for part in _parts(jacobian)]
+    triangle = np.linalg.qr(np.concatenate([*triangles, np.diag(np.sqrt(prior))]), mode="r") / scale
     if np.linalg.matrix_rank(triangle) < n_parameters:
         warnings.warn(
             "the coefficients are not separately determined by this record (a pole cancels a zero, or the "
@@ -83,21 +88,23 @@ def least_squares_covariance(
         inverse = np.linalg.pinv(triangle)
     else:
         inverse = solve_triangular(triangle, np.eye(n_parameters))
-    bread = inverse @ inverse.T
-    freedom = n_used - n_parameters
-    if coloured:
-        spread = bread @ _coloured_meat(columns, residual, n_used, lags) @ bread * (n_used / freedom)
-    else:
-        spread = bread * float(residual @ residual) / freedom
-    return spread / np.outer(scale, scale)
+    bread = inverse @ inverse.T / np.outer(scale, scale)
+    meat = _meat(jacobian, _autocovariance(residual, n_used, min(lags, n_used // 10)))
+    return bread, bread @ (meat * (n_used / (n_used - n_parameters)) + np.diag(prior)) @ bread
 
 
-def _coloured_meat(columns: FloatArray, residual: FloatArray, n_used: int, wanted: int | None) -> FloatArray:
-    """Return ``J'RJ`` with ``R`` the residual's autocovariance, Bartlett window (Newey and West, 1987)."""
-    n_lags = min(n_used // 10, int(4.0 * n_used**0.5) if wanted is None else wanted)
-    n_lags = max(n_lags, 1 if wanted is None else 0)
-    spectrum = np.fft.rfft(residual, 2 * residual.size)
-    lags = np.fft.irfft(np.abs(spectrum) ** 2)[: n_lags + 1] / n_used
-    lags = lags * (1.0 - np.arange(n_lags + 1) / (n_lags + 1.0))
-    kernel = np.concatenate([lags[:0:-1], lags])
+def _parts(jacobian: FloatArray) -> list[FloatArray]:
+    """Return a long Jacobian's rows in parts, so that working on one takes little memory."""
+    return np.array_split(jacobian, max(1, len(jacobian) // LARGEST_PART))
+
+
+def _autocovariance(residual: FloatArray, n_used: int, lags: int) -> FloatArray:
+    """Return the autocovariance at no lag and up to so many, under a Bartlett window."""
+    shifted = [float(residual[lag:] @ residual[: residual.size - lag]) for lag in range(lags + 1)]
+    return np.array(shifted) / n_used * (1.0 - np.arange(lags + 1) / (lags + 1.0))
+
+
+def _meat(columns: FloatArray, autocovariance: FloatArray) -> FloatArray:
+    """Return ``J'RJ``."""
+    kernel = np.concatenate([autocovariance[:0:-1], autocovariance])
     return np.column_stack([columns.T @ oaconvolve(column, kernel, mode="same") for column in columns.T])

@@ -166,6 +166,8 @@ FLOW_FORM = GreyBoxModel(
     initial=_at_rest,
     rates=flow_rates,
     observe=_differential,
+    linear=(("speed_lead", 1e-5),),
+    jump=(0.5, -0.5),
 )
 """The flow form with its unknowns, balanced by volume; friction is none of them."""
 

@@ -1,7 +1,6 @@
 """`fit_flow(record, parameters, ...) -> FormFit`: bulk modulus, leakage and flow bias of a log, by the flow form."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 from math import ceil
 
 import numpy as np
@@ -9,8 +8,9 @@ from numpy.typing import NDArray
 
 from estimation.flow import FLOW_FORM, MASS_FLOW_FORM, relieving
 from estimation.form_fit import LONGEST_STEP, FormFit, weighed
-from estimation.greybox_fit import GreyBoxFit, Search, fit_greybox
-from estimation.greybox_problem import GreyBoxLog, OutputNoise, Problem
+from estimation.greybox_descent import descend
+from estimation.greybox_fit import GreyBoxFit, Search, concluded, roughly
+from estimation.greybox_problem import GreyBoxLog, OutputNoise, Problem, search_bounds
 from estimation.identification.preprocess import bridged
 from estimation.measurement_noise import measurement_variances
 from estimation.outliers import without_outliers
@@ -39,8 +39,15 @@ LEAD_START = 1e-5
 OPENING_START = 1e3
 """First guess of the drop at which a make-up check valve is half open [Pa]."""
 
+LEAST_OPENING, LARGEST_OPENING = 1e2, 1e6
+"""Least and largest of that drop [Pa]; less is a corner that no step of the integrator and no sensor resolves."""
+
 DRAIN_START = 0.05
 """First guess of the pump's case drain, as a share of the healthy leakage [fraction]."""
+
+PRESUMED_STD = 1.0
+"""Standard deviation of the logarithms of the last two about their first guesses, before the log is seen: where the
+make-up valves never open, no log tells a drain from leakage, and any drain would do [dimensionless]."""
 
 SCREENED_SECONDS = 4.0
 """Starts are compared on the beginning of the log: it tells a wrong valley from a right one [s]."""
@@ -63,8 +70,8 @@ LONG_GAP = 5
 FELT_GAP = 0.1
 """A gap in speed matters where what it leaves open moves pressure by this share of its noise or more [fraction]."""
 
-REFILLS = 3
-"""How often the flow within gaps is found from the pressure after them."""
+UNLIKELY = 36.0
+"""Difference of log-likelihood from which a form of the balance counts for nothing beside the other [dimensionless]."""
 
 
 def fit_flow(
@@ -75,7 +82,7 @@ def fit_flow(
 ) -> FormFit:
     """Fit the flow form to a log, balanced by volume and by mass, and weigh the two.
 
-    Gross outliers are taken out, and what the pump delivered while its speed is missing follows from the pressure.
+    Gross outliers are taken out, and what the pump delivered while its speed is missing is read off the pressure after.
 
     Parameters
     ----------
@@ -110,17 +117,21 @@ def fit_flow(
     log = _log(record, parameters, uncertainties or {})
     starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
     search = Search(screened=ceil(SCREENED_SECONDS / record.sample_time))
-    ceilings = {"speed_lead": record.sample_time}
-    gaps = speed_gaps(record, parameters)
-    by_volume = fit_greybox(forms[0], log, starts=starts, search=search, ceilings=ceilings)
-    for number in range(REFILLS if len(gaps) else 0):
-        log = refilled(log, by_volume, gaps)
-        # a fit to a gap's wrong flow may lie in a wrong valley, so all starts are tried again when that is nearly right
-        tried = [by_volume.values, *(starts if number == REFILLS - 2 else [])]
-        by_volume = fit_greybox(forms[0], log, starts=tried, search=search, ceilings=ceilings)
-    by_mass = fit_greybox(forms[1], log, starts=[_restarted(by_volume, starts)], ceilings=ceilings)
-    best = min((by_volume, by_mass), key=lambda fit: fit.cost)
-    found, rig_std = weighed((by_volume, by_mass))
+    limits = {
+        "speed_lead": (0.0, record.sample_time),
+        "makeup_opening": (LEAST_OPENING, LARGEST_OPENING),
+    }
+    guesses = [forms[0].theta(start) for start in starts]
+    bounds = search_bounds(forms[0], guesses, limits)
+    fits: list[GreyBoxFit] = []
+    for form in forms:
+        problem = Problem(form, log)
+        near = roughly(problem, guesses, search, bounds)
+        if not fits or near.cost < fits[0].cost + 2.0 * UNLIKELY:  # which leaves room for the error of long model steps
+            fits.append(concluded(problem, descend(problem.at, near.theta, search.evaluations, bounds)))
+        guesses = [fits[0].theta]
+    best = min(fits, key=lambda fit: fit.cost)
+    found, rig_std = weighed(fits)
     value, std = found["bulk_modulus"]
     return FormFit(found, rig_std, std / value, best.chi_square[0], _objections(best))
 
@@ -137,60 +148,22 @@ def speed_gaps(record: Record, parameters: EhaParameters) -> Array:
 
     Returns
     -------
-    ndarray, shape (gaps, n)
-        For each such gap, one in it and zero elsewhere [dimensionless].
+    ndarray, shape (gaps, 3)
+        As `GreyBoxLog.gaps`, in pressure [Pa squared].
     """
-    speed = record["motor_speed_rad_s"]
-    bounds = np.flatnonzero(np.diff(np.isnan(speed).astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-    noise = measurement_variances(record, ("differential_pressure_pa",))["differential_pressure_pa"] ** 0.5
+    missing = np.isnan(record["motor_speed_rad_s"])
+    first, after = np.flatnonzero(np.diff(missing, prepend=False, append=False)).reshape(-1, 2).T
+    speed, last, length = bridged(record["motor_speed_rad_s"]), len(missing) - 1, after - first
+    before, further, behind = np.maximum(first - 1, 0), np.maximum(first - 2, 0), np.minimum(after, last)
+    # a straight line is right where the speed goes on as it did before the gap and does after it
+    slopes = 0.5 * (speed[before] - speed[further] + speed[np.minimum(after + 1, last)] - speed[behind])
+    sudden = np.abs(speed[behind] - speed[before] - slopes * (length + 1))
+    sudden = np.where(length < LONG_GAP, sudden, np.maximum(sudden, np.std(speed)))
     stiffness = parameters.bulk_modulus / parameters.chamber_volume * parameters.pump_displacement
-    usual = float(np.median(np.diff(np.flatnonzero(np.isfinite(speed)))))  # more than 1 for a slow sensor
-    bumps: list[Array] = []
-    for first, after in bounds:
-        length = after - first
-        if first < 2 or after > len(speed) - 2:
-            continue
-        # a straight line is right where the speed goes on as it did before the gap and does after it
-        slopes = np.nan_to_num([speed[first - 1] - speed[first - 2], speed[after + 1] - speed[after]])
-        sudden = abs(speed[after] - speed[first - 1] - np.mean(slopes) * (length + 1))
-        felt = 0.5 * stiffness * sudden * length * record.sample_time > FELT_GAP * noise
-        if felt or length >= LONG_GAP * usual:
-            bumps.append(np.zeros(len(speed)))
-            bumps[-1][first:after] = 1.0
-    return np.array(bumps)
-
-
-def refilled(log: GreyBoxLog, fit: GreyBoxFit, bumps: Array) -> GreyBoxLog:
-    """Return the log with the speed in its gaps such that the pressure after them is explained.
-
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log, gaps bridged.
-    fit : GreyBoxFit
-        A fit to it.
-    bumps : ndarray, shape (gaps, n)
-        The gaps, of `speed_gaps` [dimensionless].
-
-    Returns
-    -------
-    GreyBoxLog
-        The log, its speed changed by a Gauss-Newton step of the gaps' mean speeds beside the unknowns.
-    """
-    problem = Problem(fit.model, log)
-    errors, slopes = problem.predict(tuple(fit.theta))
-    predicted, _ = problem.run(fit.theta)
-    unit = np.zeros_like(log.drives)
-    responses: list[Array] = []
-    for bump in bumps:
-        unit[:, 0] = bump
-        responses.append(problem.normalised(problem.run(fit.theta, drives=log.drives + unit)[0] - predicted))
-    columns = np.column_stack([slopes, *responses])
-    size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
-    step = np.linalg.lstsq(columns / size, -errors, rcond=None)[0] / size
-    drives = log.drives.copy()
-    drives[:, 0] += step[slopes.shape[1] :] @ bumps
-    return replace(log, drives=drives)
+    open_by = 0.5 * stiffness * sudden * length * record.sample_time
+    noise = measurement_variances(record, ("differential_pressure_pa",))["differential_pressure_pa"] ** 0.5
+    gaps = np.array([first, behind, open_by**2 / (length + 1)], dtype=np.float64)
+    return np.ascontiguousarray(gaps[:, open_by > FELT_GAP * noise].T)
 
 
 def _log(record: Record, parameters: EhaParameters, uncertainties: Mapping[str, float]) -> GreyBoxLog:
@@ -198,23 +171,28 @@ def _log(record: Record, parameters: EhaParameters, uncertainties: Mapping[str, 
     variances = measurement_variances(record, channels)
     return GreyBoxLog(
         drives=np.column_stack([bridged(record[channel]) for channel in FLOW_FORM.drives]),
-        measured=record["differential_pressure_pa"][:, None],
+        # where the piston is within a gap of its position is not known, where it is after it is
+        measured=np.where(np.isnan(record["position_m"]), np.nan, record["differential_pressure_pa"])[:, None],
         parameters=parameter_row(parameters),
         sample_time=record.sample_time,
         steps=np.full(len(record), max(1, ceil(record.sample_time / LONGEST_STEP - 1e-9))),
         noise=(OutputNoise(variances["differential_pressure_pa"]),),
         drive_std=tuple(variances[channel] ** 0.5 for channel in FLOW_FORM.drives),
         uncertainties=uncertainties,
+        gaps=speed_gaps(record, parameters),
+        presumed={
+            "case_leakage": (DRAIN_START * _usual_leakage(parameters), PRESUMED_STD),
+            "makeup_opening": (OPENING_START, PRESUMED_STD),
+        },
     )
 
 
-def _restarted(fit: GreyBoxFit, starts: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return what was found; what vanished has no slope to come back on, so it begins at its first guess again."""
-    return dict(fit.values) | {name: starts[0][name] for name in ("case_leakage", "makeup_opening", "speed_lead")}
+def _usual_leakage(p: EhaParameters) -> float:
+    return max(p.leakage_coefficient, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed / p.relief_pressure)
 
 
 def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
-    leakage = max(p.leakage_coefficient, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed / p.relief_pressure)
+    leakage = _usual_leakage(p)
     bias = max(p.flow_bias, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed)
     moduli = sorted({bulk_modulus, p.bulk_modulus})
     return [

@@ -4,15 +4,15 @@ The variance of an estimate has three parts, told apart: noise of the outputs, n
 well the rig's own parameters are known. The last two are read off the fit's linear response to them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.covariance import automatic_lags, least_squares_covariance
 from estimation.greybox import GreyBoxModel
+from estimation.greybox_descent import Point, descend
 from estimation.greybox_problem import GreyBoxLog, Problem, search_bounds
 from plant.integrate import PARAMETER_NAMES
 
@@ -26,6 +26,12 @@ SCREENED_SAMPLES = 200_000
 
 LENGTHENED = 8
 """Factor between the beginnings of a long log on which a fit is brought near."""
+
+NEAR_ENOUGH = 0.01
+"""Half the sum of squares that a further step must promise while model steps are long [dimensionless]."""
+
+EXPLAINED = 1.2
+"""Mean squared normalised residual up to which no other finalist is tried [dimensionless]."""
 
 DRIVE_DRAWS = 16
 """Realisations of the driving channels' noise; their spread is known to 18 %, of a part that is seldom the larger."""
@@ -56,8 +62,6 @@ class GreyBoxFit:
         Mean squared normalised residual of each output; 1 where the model explains the log [dimensionless].
     autocorrelation : tuple of float
         Of neighbouring normalised residuals; 0 where the model explains the log [dimensionless].
-    normalised : ndarray, shape (blocks, outputs)
-        Measured less predicted, block by block, whitened and over its standard deviation; zero where missing.
     """
 
     model: GreyBoxModel
@@ -68,7 +72,6 @@ class GreyBoxFit:
     cost: float
     chi_square: tuple[float, ...]
     autocorrelation: tuple[float, ...]
-    normalised: Array
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,7 @@ def fit_greybox(
     *,
     starts: Sequence[Mapping[str, float]],
     search: Search = DEFAULT_SEARCH,
-    ceilings: Mapping[str, float] | None = None,
+    limits: Mapping[str, tuple[float, float]] | None = None,
 ) -> GreyBoxFit:
     """Fit the unknowns to a log, from several starts, and return the best.
 
@@ -117,114 +120,140 @@ def fit_greybox(
         First guesses of the unknowns in SI.
     search : Search
         How they are brought to the optimum.
-    ceilings : Mapping[str, float], optional
-        Largest value of an unknown, where physics gives one [SI].
+    limits : Mapping[str, tuple of float], optional
+        Least and largest value of an unknown, where physics gives them [SI].
 
     Returns
     -------
     GreyBoxFit
         The best fit.
     """
-    guesses = [model.theta(start) for start in starts]
-    bounds = search_bounds(model, guesses, ceilings or {})
+    problem, guesses = Problem(model, log), [model.theta(start) for start in starts]
+    bounds = search_bounds(model, guesses, limits or {})
+    near = roughly(problem, guesses, search, bounds)
+    return concluded(problem, descend(problem.at, near.theta, search.evaluations, bounds))
+
+
+def roughly(problem: Problem, guesses: Sequence[Array], search: Search, bounds: tuple[Array, Array]) -> Point:
+    """Return the least cost that is found from several starts, with one model step a sample.
+
+    Parameters
+    ----------
+    problem : Problem
+        Model and log.
+    guesses : sequence of ndarray, shape (unknowns,)
+        The starts [dimensionless].
+    search : Search
+        How they are brought to the optimum.
+    bounds : tuple of ndarray, shape (unknowns,)
+        Lowest and highest coordinates [dimensionless].
+
+    Returns
+    -------
+    Point
+        The best point, with its cost at those model steps.
+    """
+    log = problem.log.coarsened()
+    whole = Problem(problem.model, log)
+
+    def descended(guess: Array, samples: int, evaluations: int) -> Point:
+        part = Problem(problem.model, log.beginning(samples)) if samples < len(log.measured) else whole
+        return descend(part.at, guess, evaluations, bounds, NEAR_ENOUGH)
+
     if len(guesses) > 1:
-        beginning = Problem(model, log.beginning(search.screened))
-        screened = [beginning.solve(guess, search.screening, bounds) for guess in guesses]
-        guesses = [best.x for best in sorted(screened, key=_cost)[: search.finalists]]
-    length = LENGTHENED * search.screened
-    while length < len(log.measured):  # the way is made on ever longer beginnings, so that the whole takes few steps
-        part = Problem(model, log.beginning(length))
-        guesses = [min((part.solve(guess, search.evaluations, bounds) for guess in guesses), key=_cost).x]
-        length *= LENGTHENED
-    whole = Problem(model, log)
-    best = min((whole.solve(guess, search.evaluations, bounds) for guess in guesses), key=_cost)
-    return concluded(whole, np.asarray(best.x, dtype=np.float64), _cost(best))
+        screened = [descended(guess, search.screened, search.screening) for guess in guesses]
+        guesses = [point.theta for point in sorted(screened, key=_cost)[: search.finalists]]
+    points: list[Point] = []
+    for guess in guesses:
+        length = LENGTHENED * search.screened
+        while length < len(log.measured):  # on ever longer beginnings, so that the whole takes few steps
+            guess, length = descended(guess, length, search.evaluations).theta, LENGTHENED * length
+        points.append(descended(guess, len(log.measured), search.evaluations))
+        if 2.0 * points[-1].cost < EXPLAINED * np.count_nonzero(whole.residuals(points[-1].theta)):
+            break
+    return min(points, key=_cost)
 
 
-def _cost(solution: Any) -> float:
-    return float(solution.cost)
+def _cost(point: Point) -> float:
+    return point.cost
 
 
-def concluded(problem: Problem, theta: Array, cost: float) -> GreyBoxFit:
+def concluded(problem: Problem, point: Point) -> GreyBoxFit:
     """Return what a solution says, with its deviations.
 
     Parameters
     ----------
     problem : Problem
         The problem.
-    theta : ndarray, shape (unknowns,)
-        Its solution in fitted coordinates.
-    cost : float
-        Its cost [dimensionless].
+    point : Point
+        Its solution.
 
     Returns
     -------
     GreyBoxFit
         The fit.
     """
-    model = problem.model
-    errors, slope = problem.predict(tuple(theta))
-    felt = np.sqrt(np.einsum("ij,ij->j", slope, slope)) > LEAST_EFFECT
+    model, theta = problem.model, point.theta
+    errors, slopes = problem.residuals(theta), problem.slopes(theta)
+    felt = np.flatnonzero(np.einsum("ij,ij->j", slopes, slopes) > LEAST_EFFECT**2)
     noise, rig = np.full(len(theta), np.inf), np.zeros(len(theta))
     used = int(np.count_nonzero(errors))
-    if np.any(felt) and used > len(theta):
-        covariance = least_squares_covariance(slope[:, felt], errors, used, coloured=True, lags=automatic_lags(errors))
-        spread = np.diag(covariance)
-        spread = np.where(
-            spread > 0.0, spread, np.inf
-        )  # the window's estimate need not be positive: then nothing is known
-        gain = np.asarray(np.linalg.pinv(slope[:, felt]), dtype=np.float64)
-        noise[felt] = np.sqrt(spread + _drive_variance(problem, theta, gain))
-        rig[felt] = np.sqrt(_rig_variance(problem, theta, gain))
+    if len(felt) and used > len(theta):
+        if len(felt) < len(theta):
+            slopes = slopes[:, felt]
+        bread, spread = least_squares_covariance(
+            slopes, errors.ravel(), used, automatic_lags(errors.ravel()), problem.prior[felt]
+        )
+
+        def response(shift: Array) -> Array:
+            return bread @ (slopes.T @ shift.ravel())
+
+        variance = np.diag(spread) + _drive_variance(problem, theta, response)
+        # the window's estimate need not be positive: then nothing is known
+        noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))
+        rig[felt] = np.sqrt(_rig_variance(problem, theta, response))
     sizes = dict(model.linear)
     values = model.values(theta)
     unit = np.array([sizes.get(name, values[name]) for name in model.unknowns])
-    normalised = -errors.reshape(problem.counts.T.shape).T
-    squares = np.einsum("ij,ij->j", normalised, normalised)
-    neighbours = np.einsum("ij,ij->j", normalised[1:], normalised[:-1])
-    seen = np.maximum(np.count_nonzero(problem.counts, axis=0), 1)
+    squares = np.einsum("ij,ij->i", errors, errors)
+    neighbours = np.einsum("ij,ij->i", errors[:, 1:], errors[:, :-1])
+    seen = np.maximum(np.count_nonzero(errors, axis=1), 1)
     return GreyBoxFit(
         model=model,
         theta=theta,
         values=values,
         std=dict(zip(model.unknowns, map(float, unit * noise), strict=True)),
         rig_std=dict(zip(model.unknowns, map(float, unit * rig), strict=True)),
-        cost=cost,
+        cost=point.cost,
         chi_square=tuple(map(float, squares / seen)),
         autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),
-        normalised=normalised,
     )
 
 
-def _response(problem: Problem, change: Array, gain: Array) -> Array:
-    """Return by how much the estimate moves, to first order, if the prediction changes."""
-    return -gain @ problem.normalised(change)
-
-
-def _drive_variance(problem: Problem, theta: Array, gain: Array) -> Array:
+def _drive_variance(problem: Problem, theta: Array, response: Callable[[Array], Array]) -> Array | float:
     """Return the variance that noise of the driving channels adds: measured once, it acts on all later outputs."""
-    spread = np.array(problem.log.drive_std)
-    if not np.any(spread > 0.0):
-        return np.zeros(len(gain))
+    log = problem.log
+    if not any(spread > 0.0 for spread in log.drive_std):
+        return 0.0
+    rough = Problem(problem.model, log.coarsened())
+    undisturbed = rough.residuals(theta)
     rng = np.random.default_rng(0)  # the same draws for every log, so that a result can be repeated
-    predicted, _ = problem.run(theta)
-    shaken, squares = np.empty_like(problem.log.drives), np.zeros(len(gain))
+    shaken, squares = np.empty_like(log.drives), 0.0
     for _ in range(DRIVE_DRAWS):
         rng.standard_normal(out=shaken)
-        shaken *= spread
-        shaken += problem.log.drives
-        squares += _response(problem, problem.run(theta, drives=shaken)[0] - predicted, gain) ** 2
+        shaken *= log.drive_std
+        shaken += log.drives
+        squares = squares + response(rough.residuals(theta, drives=shaken) - undisturbed) ** 2
     return squares / DRIVE_DRAWS
 
 
-def _rig_variance(problem: Problem, theta: Array, gain: Array) -> Array:
+def _rig_variance(problem: Problem, theta: Array, response: Callable[[Array], Array]) -> Array | float:
     """Return the variance that comes from the uncertain parameters of the rig, taken as independent."""
-    total = np.zeros(len(gain))
-    predicted, _ = problem.run(theta)
+    total, known = 0.0, problem.residuals(theta)
     for name, relative in problem.log.uncertainties.items():
         if relative > 0.0 and name in PARAMETER_NAMES and name not in problem.model.unknowns:
             nudged = problem.log.parameters.copy()
             nudged[PARAMETER_NAMES.index(name)] *= 1.0 + RIG_NUDGE
-            change = problem.run(theta, parameters=nudged)[0] - predicted
-            total += (relative / RIG_NUDGE * _response(problem, change, gain)) ** 2
+            shift = response(problem.residuals(theta, parameters=nudged) - known)
+            total = total + (relative / RIG_NUDGE * shift) ** 2
     return total

@@ -2,16 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
-from estimation.greybox import GreyBoxModel, compile_prediction
-from estimation.whitening import block_weights, whitened
+from estimation.greybox import GreyBoxModel
+from estimation.greybox_descent import Point
+from estimation.greybox_kernel import compile_kernel
 
 Array = NDArray[np.float64]
 
@@ -20,9 +18,6 @@ OUTLIER = 3.0
 
 BLOCK = 1e-3
 """Length over which residuals are averaged before they are squared [s]."""
-
-RUNAWAY = 1e6
-"""Largest normalised residual or slope [dimensionless]."""
 
 UPWARD, DOWNWARD = np.log(1e3), 70.0
 """How far the logarithm of an unknown may leave its starts: three decades up; down until it is as good as absent."""
@@ -71,6 +66,11 @@ class GreyBoxLog:
         Standard deviation of each driving channel's noise, where the outputs' noise does not hold it already [SI].
     uncertainties : Mapping[str, float]
         Relative standard deviation of the actuator's parameters [fraction]; those of unknowns are not used.
+    gaps : ndarray, shape (gaps, 3)
+        First and last sample on which a gap in the drives acts, and the variance that it adds to the state from one
+        sample to the next, in units of `GreyBoxModel.jump`; in order of time, none overlapping.
+    presumed : Mapping[str, tuple of float]
+        What is known of positive unknowns before the log is seen: value [SI] and standard deviation of its logarithm.
     """
 
     drives: Array
@@ -81,6 +81,8 @@ class GreyBoxLog:
     noise: tuple[OutputNoise, ...]
     drive_std: tuple[float, ...] = ()
     uncertainties: Mapping[str, float] = field(default_factory=_nothing)
+    gaps: Array = field(default_factory=lambda: np.empty((0, 3)))
+    presumed: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
 
     def beginning(self, samples: int) -> "GreyBoxLog":
         """Return the log's first part.
@@ -96,6 +98,16 @@ class GreyBoxLog:
             The shorter log.
         """
         return replace(self, drives=self.drives[:samples], measured=self.measured[:samples], steps=self.steps[:samples])
+
+    def coarsened(self) -> "GreyBoxLog":
+        """Return the log with one model step a sample: predicted faster and less exactly.
+
+        Returns
+        -------
+        GreyBoxLog
+            The same log.
+        """
+        return replace(self, steps=np.ones_like(self.steps))
 
     def softened(self, variance: float, walk: float) -> "GreyBoxLog":
         """Return the log as if its noise were larger, which makes the way to the optimum smoother.
@@ -113,7 +125,9 @@ class GreyBoxLog:
         return replace(self, noise=tuple(OutputNoise(n.variance * variance, n.walk * walk) for n in self.noise))
 
 
-def search_bounds(model: GreyBoxModel, guesses: Sequence[Array], ceilings: Mapping[str, float]) -> tuple[Array, Array]:
+def search_bounds(
+    model: GreyBoxModel, guesses: Sequence[Array], limits: Mapping[str, tuple[float, float]]
+) -> tuple[Array, Array]:
     """Return how far the fitted coordinates may go.
 
     Parameters
@@ -122,28 +136,30 @@ def search_bounds(model: GreyBoxModel, guesses: Sequence[Array], ceilings: Mappi
         The model.
     guesses : sequence of ndarray, shape (unknowns,)
         The starts.
-    ceilings : Mapping[str, float]
-        Largest value of an unknown, where physics gives one [SI].
+    limits : Mapping[str, tuple of float]
+        Least and largest value of an unknown, where physics gives them [SI].
 
     Returns
     -------
     tuple of ndarray, shape (unknowns,)
         Lower and upper bounds.
     """
-    logarithmic = np.array([name not in dict(model.linear) for name in model.unknowns])
-    lower = np.where(logarithmic, np.min(guesses, axis=0) - DOWNWARD, -np.inf)
-    upper = np.where(logarithmic, np.max(guesses, axis=0) + UPWARD, np.inf)
-    for name, ceiling in ceilings.items():
-        if name in model.unknowns:
-            upper[model.unknowns.index(name)] = np.log(ceiling)
+    sizes = dict(model.linear)
+    lower, upper = np.min(guesses, axis=0) - DOWNWARD, np.max(guesses, axis=0) + UPWARD
+    for i, name in enumerate(model.unknowns):
+        if name in sizes:
+            lower[i], upper[i] = (limit / sizes[name] for limit in limits.get(name, (-np.inf, np.inf)))
+        elif name in limits:
+            least, largest = limits[name]
+            lower[i], upper[i] = np.log(least) if least > 0.0 else lower[i], np.log(largest)
     return lower, upper
 
 
 class Problem:
     """The least-squares problem of one log, on whitened means over blocks of about `BLOCK` seconds.
 
-    Averaging keeps what the log says about unknowns that act more slowly, and makes a 10 kHz log as cheap to solve as a
-    1 kHz one. The last prediction is kept, since the optimiser asks for residual and slopes at the same point.
+    Averaging keeps what the log says about unknowns that act more slowly, and makes a 10 kHz log as cheap to judge as a
+    1 kHz one.
 
     Parameters
     ----------
@@ -151,28 +167,41 @@ class Problem:
         The model.
     log : GreyBoxLog
         The log.
+
+    Attributes
+    ----------
+    prior : ndarray, shape (unknowns,)
+        One over the variance of each coordinate before the log is seen; zero where nothing is known [dimensionless].
     """
 
     def __init__(self, model: GreyBoxModel, log: GreyBoxLog) -> None:
         self.model, self.log = model, log
-        self._run = compile_prediction(model)
+        self._kernel = compile_kernel(model)
         self._block = max(1, round(BLOCK / log.sample_time))
-        edges = np.arange(0, len(log.measured), self._block)
-        self.counts = np.add.reduceat(np.isfinite(log.measured), edges, axis=0, dtype=np.float64)
-        self._weights = [
-            block_weights(counts, noise.variance, noise.walk * self._block * log.sample_time)
-            for counts, noise in zip(self.counts.T, log.noise, strict=True)
-        ]
+        presumed = [log.presumed.get(name, (1.0, np.inf)) for name in model.unknowns]
+        self._presumed = np.array([np.log(value) for value, _ in presumed])
+        self.prior = np.array([deviation**-2.0 for _, deviation in presumed])
 
-        @lru_cache(maxsize=2)
-        def predict(theta: tuple[float, ...]) -> tuple[Array, Array]:
-            excess, slopes = self.run(np.array(theta))
-            return self.normalised(excess), self.normalised(slopes)
+    def at(self, theta: Array) -> Point:
+        """Return the misfit at a point.
 
-        self.predict = predict
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
 
-    def run(self, theta: Array, drives: Array | None = None, parameters: Array | None = None) -> tuple[Array, Array]:
-        """Return what the prediction exceeds the measured outputs by, and its slopes.
+        Returns
+        -------
+        Point
+            Cost and normal equations; nothing as long as the log is stored.
+        """
+        cost, gradient, gram = self._run(theta, np.empty((0, 0)), np.empty((0, 0, 0)))
+        away = theta - self._presumed
+        cost += 0.5 * float(self.prior @ away**2)
+        return Point(theta, cost, gradient + self.prior * away, gram + np.tril(gram, -1).T + np.diag(self.prior))
+
+    def residuals(self, theta: Array, drives: Array | None = None, parameters: Array | None = None) -> Array:
+        """Return the normalised residuals, predicted less measured.
 
         Parameters
         ----------
@@ -185,69 +214,55 @@ class Problem:
 
         Returns
         -------
-        tuple of ndarray
-            Means over blocks, zero where one is missing [SI], shapes (blocks, outputs), (blocks, outputs, unknowns).
+        ndarray, shape (outputs, blocks)
+            White and of unit variance where the model explains the log; zero where a block is missing [dimensionless].
         """
+        errors = self._room()
+        self._run(theta, errors, np.empty((0, 0, 0)), drives, parameters)
+        return errors
+
+    def slopes(self, theta: Array) -> Array:
+        """Return the derivatives of the normalised residuals.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+
+        Returns
+        -------
+        ndarray, shape (outputs * blocks, unknowns)
+            Zero where a block is missing [dimensionless].
+        """
+        slopes = self._room(len(theta))
+        self._run(theta, np.empty((0, 0)), slopes)
+        return slopes.reshape(-1, len(theta))
+
+    def _room(self, *columns: int) -> Array:
+        return np.zeros((self.log.measured.shape[1], -(-len(self.log.measured) // self._block), *columns))
+
+    def _run(
+        self,
+        theta: Array,
+        errors: Array,
+        slopes: Array,
+        drives: Array | None = None,
+        parameters: Array | None = None,
+    ) -> tuple[float, Array, Array]:
         log = self.log
-        return self._run(
-            theta,
-            log.drives if drives is None else drives,
-            log.measured,
-            log.parameters if parameters is None else parameters,
-            log.sample_time,
-            log.steps,
-            self._block,
-        )
-
-    def normalised(self, means: Array) -> Array:
-        """Return block means, whitened and over their standard deviations, one output after the other.
-
-        Parameters
-        ----------
-        means : ndarray, shape (blocks, outputs) or (blocks, outputs, columns)
-            In SI.
-
-        Returns
-        -------
-        ndarray, shape (outputs * blocks,) or (outputs * blocks, columns)
-            Normalised; zero where the block is missing, and a runaway held to a size that an optimiser can step back
-            from [dimensionless].
-        """
-        white = np.concatenate(
-            [whitened(means[:, i].reshape(len(means), -1), weights) for i, weights in enumerate(self._weights)]
-        )
-        np.nan_to_num(white, copy=False, nan=RUNAWAY, posinf=RUNAWAY, neginf=-RUNAWAY)
-        return np.clip(white, -RUNAWAY, RUNAWAY, out=white).reshape(-1, *means.shape[2:])
-
-    def solve(self, start: Array, evaluations: int, bounds: tuple[Array, Array], scale: str | float = "jac") -> Any:
-        """Return scipy's solution from a start in fitted coordinates, with outliers counted linearly.
-
-        Steps are measured against each unknown's own effect (``"jac"``) or, with 1, against decades alone: the better
-        choice where several unknowns must move together.
-
-        Parameters
-        ----------
-        start : ndarray, shape (unknowns,)
-            Where to begin [dimensionless].
-        evaluations : int
-            How often the model may be evaluated [evaluations].
-        bounds : tuple of ndarray, shape (unknowns,)
-            Lowest and highest coordinates [dimensionless].
-        scale : str or float
-            How steps are measured, scipy's ``x_scale`` [dimensionless].
-
-        Returns
-        -------
-        OptimizeResult
-            Scipy's solution: ``x`` and ``cost`` [dimensionless].
-        """
-        return least_squares(
-            lambda theta: self.predict(tuple(theta))[0],
-            start,
-            jac=lambda theta: self.predict(tuple(theta))[1],  # pyright: ignore[reportArgumentType]  # nor a callable
-            loss="huber",
-            f_scale=OUTLIER,
-            x_scale=scale,  # pyright: ignore[reportArgumentType]  # the stubs lack scipy's "jac"
-            max_nfev=evaluations,
-            bounds=bounds,
-        )
+        with np.errstate(all="ignore"):  # a try that runs away is stepped back from
+            return self._kernel(
+                theta,
+                log.drives if drives is None else drives,
+                log.measured,
+                log.parameters if parameters is None else parameters,
+                log.sample_time,
+                log.steps,
+                self._block,
+                np.array([noise.variance for noise in log.noise]),
+                np.array([noise.walk * self._block * log.sample_time for noise in log.noise]),
+                log.gaps,
+                OUTLIER,
+                errors,
+                slopes,
+            )

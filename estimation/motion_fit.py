@@ -10,6 +10,7 @@ from scipy.ndimage import uniform_filter1d
 from estimation.flow_fit import DRAIN_START, FAULTS_TRIED, LEAD_START, LEAST_LEAKAGE
 from estimation.form_fit import LONGEST_STEP, FormFit, weighed
 from estimation.greybox import GreyBoxModel
+from estimation.greybox_descent import Point, descend
 from estimation.greybox_fit import GreyBoxFit, concluded
 from estimation.greybox_problem import GreyBoxLog, OutputNoise, Problem, search_bounds
 from estimation.identification.preprocess import bridged
@@ -52,13 +53,10 @@ MOST_SAMPLES = 30_000
 SCREENED = 4_000
 """Samples on which starts are screened."""
 
-WAYS: tuple[tuple[tuple[tuple[float, float], tuple[float, float]], str | float], ...] = (
-    (((1e2, 1e6), (1.0, 1e3)), 1.0),
-    (((1.0, 1.0), (1.0, 1.0)), "jac"),
-)
+WAYS: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = (((1e2, 1e6), (1.0, 1e3)), ((1.0, 1.0), (1.0, 1.0)))
 """Ways down to the optimum: factors on variance and random walk of the residual while starts are screened and while
-they are brought near, and how steps are measured. With the true, small noise the least misfit of leakage piles up into
-the position and hides other ways down; with a larger walk what counts is increments. Failing that, straight down."""
+they are brought near. With the true, small noise the least misfit of leakage piles up into the position and hides other
+ways down; with a larger walk what counts is increments. Failing that, straight down."""
 
 SCREENING, NEARING, FINISHING = 10, 12, 25
 """Evaluations of the model in the three stages."""
@@ -187,38 +185,36 @@ def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
 def _searched(form: GreyBoxModel, log: GreyBoxLog, starts: list[dict[str, float]]) -> GreyBoxFit:
     """Return the best of several starts; stop at one that explains the log."""
     guesses = [form.theta(start) for start in starts]
-    bounds = search_bounds(form, guesses, {"speed_lead": 0.5 * log.sample_time})
+    bounds = search_bounds(form, guesses, {"speed_lead": (0.0, 0.5 * log.sample_time)})
     whole = Problem(form, log)
-    theta, cost = guesses[0], np.inf
-    for near, scale in _brought_near(form, log, guesses, bounds):
-        solution = whole.solve(near, FINISHING, bounds, scale)
-        if solution.cost < cost:
-            theta, cost = np.asarray(solution.x, dtype=np.float64), float(solution.cost)
-        if 2.0 * cost < EXPLAINED * len(log.measured):
+    best: Point | None = None
+    for near in _brought_near(form, log, guesses, bounds):
+        found = descend(whole.at, near, FINISHING, bounds)
+        best = found if best is None or found.cost < best.cost else best
+        if 2.0 * best.cost < EXPLAINED * len(log.measured):
             break
-    return concluded(whole, theta, cost)
+    return concluded(whole, best or whole.at(guesses[0]))
 
 
 def _brought_near(
     form: GreyBoxModel, log: GreyBoxLog, guesses: list[Array], bounds: tuple[Array, Array]
-) -> Iterator[tuple[Array, str | float]]:
-    """Yield the likelier starts, brought nearer, and how steps from there are to be measured; one way after another."""
-    for (first, second), scale in WAYS:
+) -> Iterator[Array]:
+    """Yield the likelier starts, brought nearer, one way after another."""
+    for first, second in WAYS:
         screen = Problem(form, log.softened(*first).beginning(SCREENED))
         near = Problem(form, log.softened(*second))
-        screened = [screen.solve(guess, SCREENING, bounds, scale) for guess in guesses]
-        for candidate in sorted(screened, key=lambda solution: float(solution.cost))[:FINALISTS]:
-            yield near.solve(candidate.x, NEARING, bounds, scale).x, scale
+        screened = [descend(screen.at, guess, SCREENING, bounds) for guess in guesses]
+        for candidate in sorted(screened, key=lambda point: point.cost)[:FINALISTS]:
+            yield descend(near.at, candidate.theta, NEARING, bounds).theta
 
 
 def _compared(form: GreyBoxModel, log: GreyBoxLog, other: GreyBoxFit, starts: list[dict[str, float]]) -> GreyBoxFit:
     """Return the fit of the other structure: from where the first ended, or by itself where that explains nothing."""
     if other.chi_square[0] > EXPLAINED:
         return _searched(form, log, starts)
-    bounds = search_bounds(form, [form.theta(start) for start in starts], {"speed_lead": 0.5 * log.sample_time})
+    bounds = search_bounds(form, [form.theta(start) for start in starts], {"speed_lead": (0.0, 0.5 * log.sample_time)})
     whole = Problem(form, log)
-    solution = whole.solve(np.clip(other.theta, *bounds), NEARING, bounds, 1.0)
-    return concluded(whole, np.asarray(solution.x, dtype=np.float64), float(solution.cost))
+    return concluded(whole, descend(whole.at, other.theta, NEARING, bounds))
 
 
 def _objections(fits: list[GreyBoxFit], best: GreyBoxFit) -> tuple[str, ...]:

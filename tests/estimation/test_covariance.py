@@ -2,8 +2,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.covariance import least_squares_covariance
+from estimation.covariance import automatic_lags, least_squares_covariance
 from plant.errors import LogWarning
+
+NOTHING = np.zeros(2)
+"""Nothing is known of two parameters before the fit."""
 
 
 def spread_of_estimates(colour: float, runs: int = 300) -> tuple[float, float, float]:
@@ -16,8 +19,8 @@ def spread_of_estimates(colour: float, runs: int = 300) -> tuple[float, float, f
         solution = np.linalg.lstsq(columns, noise, rcond=None)[0]
         residual = noise - columns @ solution
         found.append(solution[1])
-        white.append(least_squares_covariance(columns, residual, n, coloured=False)[1, 1])
-        coloured.append(least_squares_covariance(columns, residual, n, coloured=True)[1, 1])
+        for said, lags in ((white, 0), (coloured, automatic_lags(residual))):
+            said.append(least_squares_covariance(columns, residual, n, lags, NOTHING)[1][1, 1])
     return float(np.std(found)), float(np.sqrt(np.mean(white))), float(np.sqrt(np.mean(coloured)))
 
 
@@ -33,15 +36,23 @@ def test_coloured_noise_needs_the_sandwich() -> None:
     assert coloured == pytest.approx(true, rel=0.25)
 
 
-def test_scaling_a_column_scales_its_variance() -> None:
+def test_the_bread_is_the_inverse_of_the_normal_equations_however_columns_are_scaled() -> None:
     rng = np.random.default_rng(1)
-    columns, residual = rng.standard_normal((50, 2)), rng.standard_normal(50)
-    plain = least_squares_covariance(columns, residual, 50, coloured=False)
-    scaled = least_squares_covariance(columns * [1.0, 1e9], residual, 50, coloured=False)
-    np.testing.assert_allclose(scaled, plain / np.outer([1.0, 1e9], [1.0, 1e9]), rtol=1e-9)
+    columns, residual = rng.standard_normal((250_000, 2)) * [1.0, 1e9], rng.standard_normal(250_000)
+    bread, spread = least_squares_covariance(columns, residual, len(residual), 0, NOTHING)
+    np.testing.assert_allclose(bread, np.linalg.inv(columns.T @ columns), rtol=1e-9)
+    np.testing.assert_allclose(spread, bread * (residual @ residual) / (len(residual) - 2), rtol=1e-9)
 
 
 def test_parameters_that_cannot_be_told_apart_are_warned_of() -> None:
     column = np.random.default_rng(2).standard_normal(40)
     with pytest.warns(LogWarning, match="not separately determined"):
-        least_squares_covariance(np.column_stack([column, column]), column, 40, coloured=False)
+        least_squares_covariance(np.column_stack([column, column]), column, 40, 0, NOTHING)
+
+
+def test_what_is_known_beforehand_tells_parameters_apart() -> None:
+    rng = np.random.default_rng(3)
+    column, noise = rng.standard_normal(4000), rng.standard_normal(4000)
+    _, spread = least_squares_covariance(np.column_stack([column, column]), noise, 4000, 0, np.array([0.0, 25.0]))
+    assert np.sqrt(np.diag(spread)) == pytest.approx([0.2, 0.2], rel=0.01)
+    assert spread.sum() == pytest.approx(1.0 / (column @ column), rel=0.05)

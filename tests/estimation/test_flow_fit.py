@@ -100,9 +100,10 @@ def test_a_gap_in_speed_matters_at_a_reversal_and_not_between() -> None:
     speed = record["motor_speed_rad_s"].copy()
     reversal = int(np.flatnonzero(np.abs(np.diff(speed)) > 100.0)[0])
     speed[reversal] = speed[reversal + 20] = np.nan
-    assert [np.flatnonzero(gap).tolist() for gap in speed_gaps(record.replace(motor_speed_rad_s=speed), HEALTHY)] == [
-        [reversal]
-    ]
+    ((first, last, variance),) = speed_gaps(record.replace(motor_speed_rad_s=speed), HEALTHY)
+    assert (first, last) == (reversal, reversal + 1)
+    jump = HEALTHY.bulk_modulus / HEALTHY.chamber_volume * HEALTHY.pump_displacement * 250.0 * record.sample_time
+    assert variance == pytest.approx((0.5 * jump) ** 2 / 2.0, rel=0.1)
 
 
 @pytest.mark.slow
@@ -114,6 +115,19 @@ def test_speeds_missing_at_reversals_do_not_bias_bulk_modulus() -> None:
     fit = fit_flow(record.replace(motor_speed_rad_s=speed), HEALTHY, 3e8)
     assert fit.parameters["bulk_modulus"][0] == pytest.approx(HEALTHY.bulk_modulus, rel=0.005)
     assert fit.reasons == ()
+
+
+@pytest.mark.parametrize("condition", ["normal", "major_leakage_major_friction"])
+def test_a_drop_out_of_all_channels_costs_no_more_than_its_samples(condition: str) -> None:
+    p = parameters_for(CONDITIONS[condition])
+    record = log(condition, 20, "prbs")
+    gone = {name: np.where(np.abs(record.time - 4.0) < 0.05, np.nan, record[name]) for name in record}
+    whole, holed = fit_flow(record, HEALTHY, 3e8), fit_flow(record.replace(**gone), HEALTHY, 3e8)
+    (sound, deviation), (found, wider) = (fit.parameters["bulk_modulus"] for fit in (whole, holed))
+    assert abs(found - p.bulk_modulus) < 3.0 * wider
+    assert abs(found - sound) < deviation
+    assert wider < 1.2 * deviation
+    assert holed.reasons == ()
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from estimation.greybox import compile_prediction
+from estimation.greybox_problem import GreyBoxLog, OutputNoise, Problem
 from estimation.motion import MOTION_FORMS, lagging_friction, parallel_friction
 from plant.components.cylinder import quadratic_friction
 from plant.eha import EhaParameters
@@ -51,10 +51,11 @@ def test_sensitivities_are_the_derivatives_of_the_motion(form) -> None:
     drives = np.column_stack([np.full(n, 100.0), np.zeros(n)])
     beside = {"speed_lead": 2e-5, "case_leakage": 1e-13, "bristle_stiffness": 2e7, "bristle_damping": 100.0}
     theta = form.theta({name: beside[name] if name in beside else getattr(P, name) for name in form.unknowns})
-    run, rest = compile_prediction(form), (np.zeros((n, 1)), parameter_row(P), 1e-3, np.full(n, 8), 1)
-    _, slopes = run(theta, drives, *rest)
+    log = GreyBoxLog(drives, np.zeros((n, 1)), parameter_row(P), 1e-3, np.full(n, 8), (OutputNoise(1.0),))
+    problem = Problem(form, log)
+    slopes = problem.slopes(theta)
     for j in range(len(theta)):
         nudge = np.eye(len(theta))[j] * 1e-5
-        ahead, behind = (run(theta + side * nudge, drives, *rest)[0] for side in (1.0, -1.0))
-        scale = np.abs(slopes[..., j]).max()
-        assert np.abs((ahead - behind) / 2e-5 - slopes[..., j]).max() <= 1e-2 * scale + 1e-12
+        ahead, behind = (problem.residuals(theta + side * nudge)[0] for side in (1.0, -1.0))
+        scale = np.abs(slopes[:, j]).max()
+        assert np.abs((ahead - behind) / 2e-5 - slopes[:, j]).max() <= 1e-2 * scale + 1e-12
