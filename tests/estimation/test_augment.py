@@ -68,7 +68,7 @@ def test_a_guess_of_nothing_begins_at_a_share_of_the_healthy_value() -> None:
     model = augmented(PRESSURE_FORM, ["leakage_coefficient"])
     base = first_belief(PRESSURE_FORM, Record(1e-3, {"position_m": np.zeros(3)}), 2e8, 1e8)
     prior = augmented_prior(model, base, replace(RIG, leakage_coefficient=0.0))
-    assert prior.mean[-1] == pytest.approx(1e-3 * RIG.leakage_coefficient)
+    assert prior.mean[-1] == pytest.approx(1e-3 * RIG.leakage_coefficient, abs=0.0)
 
 
 def followed(names: list[str], drift: dict[str, float]) -> tuple[Estimate, EhaParameters]:

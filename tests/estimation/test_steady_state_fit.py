@@ -54,7 +54,7 @@ def test_exact_steady_states_give_the_friction_exactly() -> None:
 
 def test_exact_steady_states_give_the_leakage_exactly() -> None:
     fit = fit_leakage(exact_points(RIG, np.linspace(20.0, 250.0, 12)), RIG)
-    assert fit.coefficients["leakage_coefficient"].value == pytest.approx(RIG.leakage_coefficient, rel=1e-6)
+    assert fit.coefficients["leakage_coefficient"].value == pytest.approx(RIG.leakage_coefficient, rel=1e-6, abs=0.0)
     assert fit.coefficients["flow_bias"].value == pytest.approx(RIG.flow_bias, rel=1e-6)
 
 
@@ -85,7 +85,7 @@ def test_leakage_comes_back_from_the_circuit(a_volts: float) -> None:
         for rng in np.random.default_rng(3).spawn(8)
     ]
     mean = np.mean([fit.coefficients["leakage_coefficient"].value for fit in fits])
-    assert mean == pytest.approx(p.settled_leakage, rel=2e-3)
+    assert mean == pytest.approx(p.settled_leakage, rel=2e-3, abs=0.0)
     assert max(fit.misfit for fit in fits) < 3.0
 
 

@@ -56,8 +56,8 @@ def test_a_voltage_out_of_range_is_refused(volts: float) -> None:
 
 def test_a_worn_pump_leaks_into_its_parts_and_not_into_the_cylinder() -> None:
     worn = worn_pump(PAPER, 4.0)
-    assert worn.cylinder_leakage == pytest.approx(PAPER.cylinder_leakage, rel=1e-9)
-    assert worn.pump_case_leakage == pytest.approx(4.0 * PAPER.pump_case_leakage)
+    assert worn.cylinder_leakage == pytest.approx(PAPER.cylinder_leakage, rel=1e-9, abs=0.0)
+    assert worn.pump_case_leakage == pytest.approx(4.0 * PAPER.pump_case_leakage, abs=0.0)
     assert worn.leakage_coefficient > 2.0 * PAPER.leakage_coefficient
 
 

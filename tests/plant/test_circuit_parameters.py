@@ -34,7 +34,7 @@ def test_every_condition_is_a_circuit_and_stays_one(name: str) -> None:
 def test_the_parts_of_the_leakage_sum_to_the_lumped_one() -> None:
     drain = PAPER.pump_case_leakage + PAPER.cylinder_drain_leakage
     parts = PAPER.cylinder_leakage + PAPER.pump_crossport_leakage + 0.5 * drain
-    assert parts == pytest.approx(PAPER.leakage_coefficient, rel=1e-12)
+    assert parts == pytest.approx(PAPER.leakage_coefficient, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("leakage", [0.0, 1e-13, 4.784e-12, 1e-9])

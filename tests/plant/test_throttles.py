@@ -13,7 +13,7 @@ B = ThrottleB((10.0, 2.5, 2.3, 0.0), (1e-9, 4e-7, 8e-7, 6e-5))
 
 @pytest.mark.parametrize(("volts", "leakage", "bias"), list(zip(A.volts, A.leakage, A.bias, strict=True)))
 def test_throttle_a_passes_through_its_points(volts: float, leakage: float, bias: float) -> None:
-    assert A.at(volts) == (pytest.approx(leakage, rel=1e-12), pytest.approx(bias, rel=1e-12))
+    assert A.at(volts) == (pytest.approx(leakage, rel=1e-12, abs=0.0), pytest.approx(bias, rel=1e-12))
 
 
 @pytest.mark.parametrize(("volts", "area"), list(zip(B.volts, B.area, strict=True)))
