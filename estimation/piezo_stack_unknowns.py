@@ -54,6 +54,7 @@ STARTS: Sequence[Mapping[str, float]] = (
     {"crossport_leakage": 1.0},
     {"coulomb_friction": 1.0},
     {"coulomb_friction": 2.5},
+    {"crossport_leakage": 0.5, "coulomb_friction": 2.5},
     {"crossport_leakage": 2.0, "coulomb_friction": 2.5},
     {"polarisation": log(0.8)},
     {"outlet_reed_stiffness": log(0.5)},
