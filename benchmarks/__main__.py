@@ -16,8 +16,14 @@ NAMES = (
     "identification_tests",
     "circuit",
     "piezo_stack",
+    "diagnosis",
+    "batch_scale",
+    "archive",
 )
 """Every benchmark that needs nothing but the project, in the order of `make benchmark`."""
+
+FITS = ("fit_diagnosis",)
+"""Those that write numbers which ship with the package."""
 
 WITH_PEERS = ("identification_peers",)
 """Those that need environments of other tools, which `make peers` sets up."""
@@ -26,8 +32,11 @@ WITH_PEERS = ("identification_peers",)
 def main() -> int:
     """Run the named benchmark with its own arguments, or every one with its defaults."""
     if len(sys.argv) > 1:
-        if sys.argv[1] not in (*NAMES, *WITH_PEERS):
-            print(f"benchmark must be one of {', '.join((*NAMES, *WITH_PEERS))}, got {sys.argv[1]!r}", file=sys.stderr)
+        if sys.argv[1] not in (*NAMES, *FITS, *WITH_PEERS):
+            print(
+                f"benchmark must be one of {', '.join((*NAMES, *FITS, *WITH_PEERS))}, got {sys.argv[1]!r}",
+                file=sys.stderr,
+            )
             return 2
         return int(importlib.import_module(f"benchmarks.{sys.argv[1]}").main(sys.argv[2:]) > 0)
     misses = 0

@@ -7,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from experiments.command import conditions, diagnose, estimate, identifiability, identify, library, simulate
+from experiments.command import (
+    batch,
+    compare,
+    conditions,
+    diagnose,
+    estimate,
+    identifiability,
+    identify,
+    library,
+    simulate,
+)
 from experiments.command.json_output import json_text
 from experiments.command.options import SEED, Json, Seed, require_positive
 from experiments.command.streams import HydrostateGroup, emit
@@ -138,7 +148,7 @@ def piezo_stack(
         emit(str(manifest))
 
 
-for module in (simulate, estimate, identify, library, diagnose, identifiability, conditions):
+for module in (simulate, estimate, identify, library, diagnose, identifiability, conditions, batch, compare):
     app.add_typer(module.commands)
 app.add_typer(conditions.rig_commands, name="rig")
 

@@ -1,14 +1,23 @@
-"""Running independent cases side by side: threads, since the compiled kernels release the interpreter's lock.
+"""Running independent cases side by side: threads for one process, `concurrent.futures` executors for many.
 
-Linear algebra libraries keep to one thread each meanwhile: theirs and ours together would oversubscribe the cores.
+The compiled kernels release the interpreter's lock, so threads do within one process. Linear algebra libraries keep to
+one thread each meanwhile: theirs and ours together would oversubscribe the cores. A batch study takes an executor: this
+process itself, processes of this machine, or a Dask cluster.
 """
 
+import multiprocessing
 import os
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+import signal
+import threading
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
+from multiprocessing.connection import wait
+from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
+
+from plant.errors import HydrostateError
 
 Case = TypeVar("Case")
 Found = TypeVar("Found")
@@ -42,3 +51,119 @@ def side_by_side(run: Callable[[Case], Found], cases: Iterable[Case], workers: i
             yield from executor.map(run, cases)
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
+
+
+class SerialExecutor(Executor):
+    """Runs what is submitted at once, in this process."""
+
+    def submit(self, fn: Callable[..., Found], /, *args: Any, **kwargs: Any) -> Future[Found]:
+        """Run a function and return its finished future.
+
+        Parameters
+        ----------
+        fn : callable
+            The function.
+        *args, **kwargs : object
+            Its arguments.
+
+        Returns
+        -------
+        Future
+            Its result, or what it raised.
+        """
+        future: Future[Found] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+@contextmanager
+def open_executor(workers: int = 1, cluster: str | None = None) -> Generator[tuple[Executor, int]]:
+    """Open what runs a batch study's tasks.
+
+    Parameters
+    ----------
+    workers : int
+        Processes of this machine; one is this process itself.
+    cluster : str, optional
+        Address of a Dask scheduler, ``tcp://host:8786``, which is used instead.
+
+    Yields
+    ------
+    tuple of Executor and int
+        The executor, and how many tasks it runs at a time.
+
+    Raises
+    ------
+    HydrostateError
+        If Dask is wanted and not installed, or no scheduler answers.
+
+    Examples
+    --------
+    >>> with open_executor() as (executor, width):
+    ...     executor.submit(abs, -2).result(), width
+    (2, 1)
+    """
+    if cluster is not None:
+        with _dask(cluster) as client:
+            yield client.get_executor(pure=False), max(1, sum(client.ncores().values()))
+        return
+    if workers == 1:
+        with threadpool_limits(limits=1, user_api="blas"):
+            yield SerialExecutor(), 1
+        return
+    executor = process_pool(workers)
+    try:
+        yield executor, workers
+    except KeyboardInterrupt:  # the user will not wait for what is in flight
+        for process in multiprocessing.active_children():
+            process.terminate()
+        raise
+    finally:
+        executor.shutdown(wait=True, cancel_futures=True)
+
+
+def process_pool(workers: int) -> ProcessPoolExecutor:
+    """Return processes with one thread each, which leave Ctrl-C to the parent and do not outlive it.
+
+    Parameters
+    ----------
+    workers : int
+        How many.
+
+    Returns
+    -------
+    ProcessPoolExecutor
+        The pool.
+    """
+    return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin_worker)
+
+
+def _begin_worker() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threadpool_limits(limits=1, user_api="blas")
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this process when its parent has been killed; it would wait for work for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
+
+
+@contextmanager
+def _dask(address: str) -> Generator[Any]:
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise HydrostateError("--cluster needs Dask: pip install 'hydrostate[cluster]'") from error
+    try:
+        client = Client(address, timeout="20s")
+    except (OSError, ValueError) as error:
+        raise HydrostateError(f"--cluster {address}: no Dask scheduler answers there: {error}") from error
+    with client:
+        yield client

@@ -4,10 +4,10 @@ from math import copysign
 
 from plant.components.cylinder import quadratic_friction, velocity_under_friction
 from plant.components.valves import pumped_flow
-from plant.eha import EhaParameters
+from plant.eha import EhaValues
 
 
-def steady_state(speed: float, p: EhaParameters) -> tuple[float, float]:
+def steady_state(speed: float, p: EhaValues) -> tuple[float, float]:
     """Return velocity and differential pressure in the steady state, with dead zone and relief (errata E7, E8).
 
     With no rates left, the flow balance gives the pressure as a line in velocity, and the force balance becomes the
@@ -17,7 +17,7 @@ def steady_state(speed: float, p: EhaParameters) -> tuple[float, float]:
     ----------
     speed : float
         Motor speed [rad/s].
-    p : EhaParameters
+    p : EhaParameters or namespace of float
         The actuator.
 
     Returns
@@ -39,7 +39,7 @@ def steady_state(speed: float, p: EhaParameters) -> tuple[float, float]:
     return _settled(pumped + held, p.leakage_coefficient, p.relief_conductance, p)
 
 
-def _settled(flow: float, leakage: float, relief: float, p: EhaParameters) -> tuple[float, float]:
+def _settled(flow: float, leakage: float, relief: float, p: EhaValues) -> tuple[float, float]:
     A, conductance = p.piston_area, leakage + relief
     if conductance == 0.0:
         velocity, direction = flow / A, copysign(1.0, flow)

@@ -57,6 +57,31 @@ def draw_confusions(confusions: Mapping[tuple[str, str], pd.DataFrame], accuracy
     return figure
 
 
+def draw_confusion(matrix: pd.DataFrame, share: float) -> Figure:
+    """Draw one confusion matrix.
+
+    Parameters
+    ----------
+    matrix : pandas.DataFrame
+        One row a true condition, one column a found one [count].
+    share : float
+        Share that is right, between 0 and 1 [fraction].
+
+    Returns
+    -------
+    Figure
+        The matrix with its counts.
+    """
+    figure, (axis,) = panels(
+        f"Class found against true class: {100.0 * share:.1f} % right", 1, 1, 5.6, Margins(left=2.2, bottom=1.45)
+    )
+    _counts(axis, matrix.to_numpy())
+    _class_ticks(axis, list(matrix.columns))
+    axis.set_ylabel("true class")
+    axis.set_xlabel("class found")
+    return figure
+
+
 def _counts(axis: Axes, counts: np.ndarray) -> None:
     largest = max(1, int(counts.max()))
     axis.imshow(counts, cmap=COUNTS, vmin=0, vmax=largest, aspect="equal")

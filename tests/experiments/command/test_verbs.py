@@ -183,19 +183,23 @@ def test_diagnose_names_the_condition_in_every_format(steps: dict[str, Path]) ->
             "warnings",
         }
         assert list(one["scores"]) == list(CONDITIONS)
-        assert (one["condition"], one["outcome"], one["probabilities"]) == ("minor_friction", "ok", None)
-        ranked = sorted(one["scores"], key=one["scores"].__getitem__)
+        assert (one["condition"], one["outcome"], one["unknown"]) == ("minor_friction", "ok", False)
+        assert sum(one["probabilities"].values()) == pytest.approx(1.0)
+        ranked = sorted(one["probabilities"], key=one["probabilities"].__getitem__, reverse=True)
         assert [one["condition"], one["runner_up"]] == ranked[:2]
+        assert one["condition"] == min(one["scores"], key=one["scores"].__getitem__)
         assert one["transfer_function_scores"] is None
         assert "normal was expected" in one["message"]
-        assert f"the error of {one['runner_up']} is" in one["message"]
+        low, high = one["severity"]["added_friction"]["ci95"]
+        assert 0.0 < low < one["severity"]["added_friction"]["value"] < high
+        assert one["severity"]["added_friction"]["unit"] == "N"
+        assert one["gate"] == {"passed": True, "reasons": []}
 
 
 def test_diagnose_marks_the_best_on_the_screen(steps: dict[str, Path]) -> None:
-    shown = invoke("diagnose", steps[".csv"]).stdout
+    shown = invoke("diagnose", steps[".csv"], "--scores").stdout
     (marked,) = [line for line in shown.splitlines() if "<- best" in line]
     assert marked.split()[0] == "minor_friction"
-    assert "minor_friction, by a wide margin: the error of" in shown
     many = invoke("diagnose", *[steps[".csv"]] * 4).stdout
     assert "<- best" not in many
     assert many.count(", wide") == 4

@@ -1,0 +1,126 @@
+"""Diagnosis against its targets: accuracy, calibration, severity, unknowns, foreign logs, speed.
+
+The population is `faults.population`: the circuit plant, rig sensors, nine steps and a random binary signal of 10 s,
+test seeds alone. ``--seeds`` and ``--draws`` make it smaller. Foreign logs are read from ``$HYDROSTATE_SHARED/bench``.
+"""
+
+import argparse
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from benchmarks.diagnosis_checks import Check, foreign_checks, limit_checks, speed_checks, stuck_checks, unknown_checks
+from experiments.studies.identification_library import read_library
+from faults.bank import mathematical_bank
+from faults.circuit_runs import coordinates_of
+from faults.class_fit import Actuator
+from faults.classify import score_mathematical
+from faults.diagnosis import Diagnosis, diagnose_log
+from faults.evidence import EVIDENCES
+from faults.population import TEST, Drawn, draw_logs
+from faults.scores import calibration_error, share_interval
+from faults.severity import severities_at
+from plant.eha import EhaParameters
+
+PRESSURE = "differential_pressure_pa"
+
+LUMPED_SEEDS = 5
+"""Seeds on which the paper's lumped models are scored too."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """One log of the population, diagnosed."""
+
+    log: Drawn
+    found: Diagnosis
+    covered: Mapping[str, bool]
+
+
+def main(arguments: list[str]) -> int:
+    """Print every figure beside its target; return how many fall short."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=50)
+    parser.add_argument("--draws", type=int, default=2000)
+    options = parser.parse_args(arguments)
+    actuator = Actuator.of(EhaParameters())
+    checks: list[Check] = []
+
+    def printed(found: list[Check]) -> list[Check]:
+        print("\n".join(str(check) for check in found), flush=True)
+        return found
+
+    for pressure, wanted in ((True, 98.0), (False, 94.0)):
+        began = time.process_time()
+        judged = list(judge(draw_logs(range(TEST, TEST + options.seeds)), actuator, pressure=pressure))
+        print(f"\n{len(judged)} logs {which(pressure)}, {(time.process_time() - began) / len(judged):.3f} CPU s each")
+        print(confusions(judged).to_string())
+        checks += printed(population_checks(judged, which(pressure), wanted))
+    checks += printed(limit_checks(actuator, seeds=max(2, options.seeds // 4), draws=options.draws))
+    checks += printed(unknown_checks(actuator, seeds=max(1, options.seeds // 25)))
+    checks += printed(foreign_checks(actuator))
+    checks += printed(stuck_checks(actuator))
+    checks += printed(speed_checks(actuator))
+    short = sum(not check.met for check in checks)
+    print(f"{short} of {len(checks)} fall short")
+    return short
+
+
+def which(pressure: bool) -> str:
+    """Return how a set of logs is called."""
+    return "with dp" if pressure else "without dp"
+
+
+def judge(logs: Iterable[Drawn], actuator: Actuator, *, pressure: bool) -> Iterable[Judged]:
+    """Diagnose logs and hold them against what was true."""
+    library = read_library()
+    for log in logs:
+        record = log.record if pressure else log.record.replace(**{PRESSURE: None})
+        found = diagnose_log(record, actuator, library)
+        true = severities_at(coordinates_of(log.parameters, actuator.rated), actuator)
+        covered = {name: one.covers(true[name]) for name, one in found.severity.items() if name != "entrained_air"}
+        yield Judged(log, found, covered)
+
+
+def confusions(judged: list[Judged]) -> pd.DataFrame:
+    """Return the pairs that were confused, true against found."""
+    wrong = [(one.log.condition, one.found.condition) for one in judged if one.log.condition != one.found.condition]
+    return pd.DataFrame(wrong, columns=["true", "found"]).value_counts().rename("count").reset_index()
+
+
+def population_checks(judged: list[Judged], name: str, wanted: float) -> list[Check]:
+    """Return accuracy, calibration, coverage and false flags of the population."""
+    truths = [one.log.condition for one in judged]
+    right = np.array([one.found.condition == true for one, true in zip(judged, truths, strict=True)])
+    sure = np.array([one.found.probabilities[one.found.condition] for one in judged])
+    low, high = (100.0 * end for end in share_interval(int(right.sum()), len(right)))
+    each = {e: [one.found.scoreboard.choice(e) == one.log.condition for one in judged] for e in EVIDENCES}
+    print("each evidence alone, % right:", {e: round(100.0 * float(np.mean(hits)), 1) for e, hits in each.items()})
+    brier = np.mean(
+        [
+            sum((p - (c == t)) ** 2 for c, p in o.found.probabilities.items())
+            for o, t in zip(judged, truths, strict=True)
+        ]
+    )
+    print(f"Brier score {brier:.4f}; accuracy's 95 % interval {low:.1f} to {high:.1f} %")
+    print("the paper's way (b), lumped models, % right:", round(100.0 * lumped_accuracy(judged, name), 1))
+    checks = [
+        Check(f"{name}: accuracy, %", 100.0 * float(np.mean(right)), wanted, 100.0),
+        Check(f"{name}: calibration error (ECE, 15 bins)", calibration_error(sure, right), 0.0, 0.03),
+        Check(f"{name}: in-model logs flagged, %", 100.0 * float(np.mean([o.found.unknown for o in judged])), 0.0, 3.0),
+    ]
+    for severity in judged[0].covered:
+        share = 100.0 * float(np.mean([one.covered[severity] for one in judged]))
+        checks.append(Check(f"{name}: 95 % intervals of {severity} that cover, %", share, 90.0, 99.0))
+    return checks
+
+
+def lumped_accuracy(judged: list[Judged], name: str) -> float:
+    """Return how often the smallest error of the lumped models is the true condition's."""
+    bank = mathematical_bank(EhaParameters())
+    some = [one.log for one in judged if int(one.log.record.metadata["seed"]) < TEST + LUMPED_SEEDS]
+    hits = [score_mathematical(log.record, bank, pressure=name == "with dp").condition == log.condition for log in some]
+    return float(np.mean(hits))

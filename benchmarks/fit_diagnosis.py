@@ -1,0 +1,100 @@
+"""Fit what diagnosis ships: weights of the evidences and widths of the intervals, on simulated training seeds alone.
+
+Writes ``faults/calibration.json`` (``--out`` another file). Test seeds and foreign logs are never looked at.
+"""
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from experiments.studies.identification_library import read_library
+from faults.circuit_runs import coordinates_of
+from faults.class_fit import Actuator
+from faults.conditions import CONDITIONS
+from faults.evidence import EVIDENCES, weigh
+from faults.population import TRAINING, draw_logs
+from faults.severity import UNITS, severities, severities_at
+from plant.eha import EhaParameters
+
+Array = NDArray[np.float64]
+
+WIDTHS = (0.1, 0.2)
+"""Spreads of the training population."""
+
+RIDGE = 1e-3
+"""Penalty on squared weights [dimensionless]: where training logs are all right, weights would grow for ever."""
+
+HELD = 0.975
+"""Share of training logs whose interval shall hold the truth."""
+
+PRESSURE = "differential_pressure_pa"
+
+
+def main(arguments: list[str]) -> int:
+    """Fit and write; return 0."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=8)
+    parser.add_argument("--out", type=Path, default=Path("faults/calibration.json"))
+    options = parser.parse_args(arguments)
+    seeds = range(TRAINING, TRAINING + options.seeds)
+    found: dict[str, object] = {}
+    for name, pressure in (("with_pressure", True), ("without_pressure", False)):
+        odds, truths, ratios = gathered(seeds, pressure=pressure)
+        weights = fitted_weights(odds, truths)
+        found[name] = {
+            "weights": dict(zip(EVIDENCES, weights.round(4).tolist(), strict=True)),
+            "widths": {key: round(float(np.quantile(values, HELD)), 3) for key, values in ratios.items()},
+        }
+        print(name, len(truths), "logs", found[name])
+    found["provenance"] = {
+        "script": "python -m benchmarks fit_diagnosis",
+        "population": "faults.population.draw_logs",
+        "first_seed": TRAINING,
+        "seeds": options.seeds,
+        "spreads": list(WIDTHS),
+        "ridge": RIDGE,
+        "held": HELD,
+    }
+    options.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+def gathered(seeds: Sequence[int], *, pressure: bool) -> tuple[Array, NDArray[np.int64], dict[str, list[float]]]:
+    """Return log-odds (logs, evidences, 9), true conditions, and errors over half-widths by severity."""
+    actuator, library = Actuator.of(EhaParameters()), read_library()
+    odds: list[Array] = []
+    truths: list[int] = []
+    ratios: dict[str, list[float]] = {name: [] for name in UNITS if name != "entrained_air"}
+    for width in WIDTHS:
+        for log in draw_logs(seeds, width=width):
+            record = log.record if pressure else log.record.replace(**{PRESSURE: None})
+            board = weigh(record, actuator, library)
+            odds.append(np.array([board.log_odds[name] for name in EVIDENCES]))
+            truths.append(list(CONDITIONS).index(log.condition))
+            true = severities_at(coordinates_of(log.parameters, actuator.rated), actuator)
+            for name, one in severities(board.fits, actuator).items():
+                if name in ratios:
+                    reach = one.ci95[1] - one.value if true[name] > one.value else one.value - one.ci95[0]
+                    ratios[name].append(abs(true[name] - one.value) / max(reach, np.finfo(float).tiny))
+    return np.array(odds), np.array(truths), ratios
+
+
+def fitted_weights(odds: Array, truths: NDArray[np.int64]) -> Array:
+    """Return the weights, none negative, that make the true conditions most probable."""
+
+    def loss(weights: Array) -> tuple[float, Array]:
+        total = np.einsum("e,lec->lc", weights, odds)
+        shares = np.exp(total - total.max(axis=1, keepdims=True))
+        shares /= shares.sum(axis=1, keepdims=True)
+        rows = np.arange(len(truths))
+        value = -float(np.mean(np.log(np.maximum(shares[rows, truths], 1e-300))))
+        slope = np.mean(np.einsum("lc,lec->le", shares, odds) - odds[rows, :, truths], axis=0)
+        return value + RIDGE * float(weights @ weights), slope + 2.0 * RIDGE * weights
+
+    start = np.full(odds.shape[1], 0.1)
+    return minimize(loss, start, jac=True, bounds=[(0.0, None)] * len(start), method="L-BFGS-B").x

@@ -1,0 +1,277 @@
+"""The cases of a study: series and what is done with them, each case under a key that hashes its content."""
+
+import hashlib
+import json
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import asdict, dataclass, fields
+from functools import cache, cached_property
+from glob import glob, has_magic
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from experiments.batch.series import Log, Series, Simulated, Work, content_of
+from experiments.batch.study_file import Logs, Method, Runs, Study, StudyError
+from faults.conditions import CONDITIONS, LEVELS
+from plant.rig import Rig, read_rig
+
+Hash: TypeAlias = Any
+"""A hash that has begun; the standard library does not name its type."""
+
+RESULTS_VERSION = 1
+"""Rises when a case's result changes for a reason that its content does not show; rows made before are then remade."""
+
+TASK_SECONDS = 2.0
+"""About how long a worker is given work for at a time [s]: what a crash can cost, and what a part holds."""
+
+MOST_CASES = 2048
+"""Most cases of a task."""
+
+COSTS: Mapping[str, tuple[float, float]] = {"filter": (0.0, 2.5e-8), "estimate": (0.3, 2e-5), "diagnose": (0.01, 3e-6)}
+"""About what a case costs on one core, by verb: by itself, and for each tenth of a millisecond of its series [s]."""
+
+SERIES_COST = 4e-7
+"""About what it costs to simulate or read a tenth of a millisecond of a series, once [s]."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a worker is given: some series, and the keys and works of each.
+
+    Parameters
+    ----------
+    rig : Rig
+        The healthy actuator.
+    series : tuple
+        Each series with its cases, each case a key and a work.
+    """
+
+    rig: Rig
+    series: tuple[tuple[Series, tuple[tuple[str, Work], ...]], ...]
+
+    @property
+    def keys(self) -> list[str]:
+        """The keys of its cases, in order."""
+        return [key for _, cases in self.series for key, _ in cases]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All cases of a study.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    rig : Rig
+        Its healthy actuator.
+    blocks : tuple
+        Series, and what is done with each of them, a block at a time.
+    """
+
+    study: Study
+    rig: Rig
+    blocks: tuple[tuple[tuple[Series, ...], tuple[Work, ...]], ...]
+
+    def __len__(self) -> int:
+        return sum(len(series) * len(works) for series, works in self.blocks)
+
+    @property
+    def seconds(self) -> float:
+        """About how long all cases take on one core [s]."""
+        return sum(_seconds(sum(map(_steps, series)), len(series), works) for series, works in self.blocks)
+
+    @cached_property
+    def cases(self) -> tuple[tuple[Series, tuple[tuple[str, Work], ...]], ...]:
+        """Every series with its cases, a key and a work each, in the study's order."""
+        common = _hash(None, [RESULTS_VERSION, package_version("hydrostate"), _numbers(self.rig)])
+        out: list[tuple[Series, tuple[tuple[str, Work], ...]]] = []
+        for series, works in self.blocks:
+            encoded = [_bytes(asdict(work)) for work in works]
+            for one in series:
+                begun = _hash(common, _content(one))
+                out.append((one, tuple(zip((_key(begun, text) for text in encoded), works, strict=True))))
+        return tuple(out)
+
+    @cached_property
+    def keys(self) -> list[str]:
+        """The keys of all cases, in the study's order; a case that is named twice counts once."""
+        return list(dict.fromkeys(key for _, cases in self.cases for key, _ in cases))
+
+    def tasks(self, done: Collection[str], workers: int) -> Iterator[Task]:
+        """Yield what is left to do, in pieces that take about `TASK_SECONDS`, less where workers would be idle.
+
+        Parameters
+        ----------
+        done : collection of str
+            Keys of the cases that need not be run.
+        workers : int
+            How many tasks are run at a time.
+
+        Yields
+        ------
+        Task
+            Each case once.
+        """
+        seen = set(done)
+        budget = min(TASK_SECONDS, self.seconds / (4.0 * workers))
+        gathered: list[tuple[Series, tuple[tuple[str, Work], ...]]] = []
+        spent, count = 0.0, 0
+        for one, cases in self.cases:
+            left = tuple((key, work) for key, work in cases if key not in seen)
+            seen.update(key for key, _ in left)
+            if not left:
+                continue
+            gathered.append((one, left))
+            spent += _seconds(_steps(one), 1, [work for _, work in left])
+            count += len(left)
+            if spent >= budget or count >= MOST_CASES:
+                yield Task(self.rig, tuple(gathered))
+                gathered, spent, count = [], 0.0, 0
+        if gathered:
+            yield Task(self.rig, tuple(gathered))
+
+
+def plan_study(study: Study, folder: Path) -> Plan:
+    """List the cases of a study; logs are hashed, nothing is run.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    folder : Path
+        What its paths are relative to.
+
+    Returns
+    -------
+    Plan
+        The cases.
+
+    Raises
+    ------
+    StudyError
+        If a glob finds no log.
+    RigError
+        If the rig file is not usable.
+    """
+    rig = read_rig(folder / study.rig) if study.rig else Rig()
+    simulated = [(tuple(_simulated(runs)), _works(runs.methods, runs.starts_pa)) for runs in study.runs]
+    logs = [
+        (tuple(_logs(one, place, folder)), _works(one.methods, one.starts_pa)) for place, one in enumerate(study.logs)
+    ]
+    return Plan(study, rig, (*simulated, *logs))
+
+
+@cache
+def package_version(name: str) -> str:
+    """Return the version of an installed package; looking it up takes milliseconds.
+
+    Parameters
+    ----------
+    name : str
+        The package.
+
+    Returns
+    -------
+    str
+        Its version.
+    """
+    return version(name)
+
+
+def config_hash(study: Study, rig: Rig) -> str:
+    """Return a hash of a study's content and its rig's.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    rig : Rig
+        Its healthy actuator.
+
+    Returns
+    -------
+    str
+        32 hexadecimal digits.
+    """
+    return _hash(None, [study.model_dump(mode="json"), _numbers(rig)]).hexdigest()[:32]
+
+
+def _simulated(runs: Runs) -> Iterator[Simulated]:
+    """Yield the series, seeds innermost: what seeds share is then computed once."""
+    names = runs.conditions if runs.conditions is not None else (() if runs.severities else tuple(CONDITIONS))
+    places = [(name, *(float(LEVELS.index(level)) for level in _levels(name))) for name in names]
+    places += [(None, leakage, friction) for leakage, friction in runs.severities]
+    for plant in runs.plants:
+        for drive in runs.drives:
+            for sensors in runs.sensors:
+                for name, leakage, friction in places:
+                    for seed in runs.seed_list:
+                        yield Simulated(
+                            plant, drive, sensors, name, leakage, friction, seed, runs.duration_s, runs.sample_time_s
+                        )
+
+
+def _levels(name: str) -> tuple[Any, Any]:
+    return CONDITIONS[name].leakage, CONDITIONS[name].friction
+
+
+def _works(methods: tuple[Method, ...], starts: tuple[float, ...]) -> tuple[Work, ...]:
+    return tuple(
+        Work(one.verb, one.form, one.method, one.pressure, one.told, start, one.start_std_pa)
+        for one in methods
+        for start in ((None,) if one.verb == "diagnose" or not starts else starts)
+    )
+
+
+def _logs(logs: Logs, place: int, folder: Path) -> Iterator[Log]:
+    pattern = str(folder / logs.glob)
+    found = sorted(path for path in glob(pattern, recursive=True) if Path(path).is_file())  # noqa: PTH207 -- absolute too
+    if not found:
+        said = "no file matches" if has_magic(pattern) else "there is no such file as"
+        raise StudyError(f"logs[{place}].glob must match at least one file, got {logs.glob!r}: {said} {pattern}")
+    for name in found:
+        path = Path(name)
+        relative = path.relative_to(folder) if path.is_relative_to(folder) else path
+        columns = tuple(sorted(logs.columns.items()))
+        yield Log(relative.as_posix(), str(path.resolve()), content_of(path), path.stat().st_size, columns)
+
+
+def _content(series: Series) -> list[Any]:
+    """Return what makes a series what it is; where a log's folder stands is not part of it."""
+    if isinstance(series, Log):
+        return ["log", series.file, series.content, series.columns]
+    return ["simulated", *(getattr(series, one.name) for one in fields(series))]
+
+
+def _numbers(rig: Rig) -> list[Any]:
+    return [asdict(rig.parameters), dict(rig.uncertainties), dict(rig.columns)]
+
+
+def _steps(series: Series) -> float:
+    """Return about how many tenths of a millisecond a series is worth, a sample at the least."""
+    if isinstance(series, Simulated):
+        return series.samples * max(1.0, series.sample_time_s / 1e-4)
+    return float(series.samples)
+
+
+def _seconds(steps: float, series: int, works: Collection[Work]) -> float:
+    """Return about what so many series of so many steps together cost on one core."""
+    each = [COSTS[work.verb] for work in works]
+    return steps * (SERIES_COST + sum(step for _, step in each)) + series * sum(alone for alone, _ in each)
+
+
+def _bytes(content: object) -> bytes:
+    return json.dumps(content, sort_keys=True, separators=(",", ":")).encode()
+
+
+def _hash(begun: Hash, content: object) -> Hash:
+    digest = hashlib.sha256() if begun is None else begun.copy()
+    digest.update(_bytes(content))
+    return digest
+
+
+def _key(begun: Hash, text: bytes) -> str:
+    digest = begun.copy()
+    digest.update(text)
+    return digest.hexdigest()[:32]

@@ -1,0 +1,273 @@
+"""Where a store keeps its files: a local folder, or any place that fsspec reaches; a file is there whole or not."""
+
+import os
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from secrets import token_hex
+from typing import Any
+
+from plant.atomic import replacing
+from plant.errors import HydrostateError
+
+TEMPORARY = ".tmp"
+"""How the name of a file ends that is not whole yet."""
+
+LOCK = "lock"
+"""The file that a writer holds."""
+
+
+class Folder(ABC):
+    """A place for files.
+
+    Parameters
+    ----------
+    name : str
+        The place, as the user gave it.
+    """
+
+    locks = False
+    """Whether the place grants the right to write to one process alone."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    @abstractmethod
+    def read(self, file: str) -> bytes:
+        """Return a file's content.
+
+        Parameters
+        ----------
+        file : str
+            Its path within the folder.
+
+        Returns
+        -------
+        bytes
+            The content.
+
+        Raises
+        ------
+        FileNotFoundError
+            If there is no such file.
+        OSError
+            If it cannot be read.
+        """
+
+    @abstractmethod
+    def write(self, file: str, content: bytes) -> None:
+        """Write a file under a temporary name and rename it.
+
+        Parameters
+        ----------
+        file : str
+            Its path within the folder.
+        content : bytes
+            The content.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
+        """
+
+    @abstractmethod
+    def files(self, below: str = "") -> list[str]:
+        """Return the files directly in a sub-folder.
+
+        Parameters
+        ----------
+        below : str
+            The sub-folder; the folder itself if empty.
+
+        Returns
+        -------
+        list[str]
+            Names, in order; temporary ones too.
+        """
+
+    @abstractmethod
+    def move(self, file: str, to: str) -> None:
+        """Rename a file; one that has gone meanwhile is none.
+
+        Parameters
+        ----------
+        file, to : str
+            Paths within the folder.
+        """
+
+    @abstractmethod
+    def remove(self, file: str) -> None:
+        """Remove a file; one that has gone meanwhile is none.
+
+        Parameters
+        ----------
+        file : str
+            Its path within the folder.
+        """
+
+    @contextmanager
+    def writer(self) -> Generator[None]:
+        """Hold the right to write, where the place can grant it to one process alone.
+
+        Yields
+        ------
+        None
+            While it is held.
+
+        Raises
+        ------
+        HydrostateError
+            If another process holds it.
+        """
+        yield
+
+
+class _LocalFolder(Folder):
+    """A folder on a disk.
+
+    Parameters
+    ----------
+    path : Path
+        The folder; made when it is first written to.
+    """
+
+    locks = True
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(str(path))
+        self.path = path
+
+    def read(self, file: str) -> bytes:
+        return (self.path / file).read_bytes()
+
+    def write(self, file: str, content: bytes) -> None:
+        target = self.path / file
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(target) as temporary:
+            temporary.write(content)
+
+    def files(self, below: str = "") -> list[str]:
+        place = self.path / below
+        return sorted(one.name for one in place.iterdir() if one.is_file()) if place.is_dir() else []
+
+    def move(self, file: str, to: str) -> None:
+        (self.path / to).parent.mkdir(parents=True, exist_ok=True)
+        with suppress(FileNotFoundError):
+            (self.path / file).replace(self.path / to)
+
+    def remove(self, file: str) -> None:
+        (self.path / file).unlink(missing_ok=True)
+
+    @contextmanager
+    def writer(self) -> Generator[None]:
+        self.path.mkdir(parents=True, exist_ok=True)
+        with (self.path / LOCK).open("a+b") as file:
+            try:
+                _lock(file.fileno())
+            except OSError as error:
+                raise HydrostateError(
+                    f"store {self.name} is being written by another process: wait until it is done, or choose another"
+                ) from error
+            yield  # the lock goes with the process, whatever ends it
+
+
+def _lock(number: int) -> None:
+    """Take a lock that the system drops when the process ends."""
+    if os.name == "nt":  # pragma: no cover -- the other system's way
+        import msvcrt
+
+        msvcrt.locking(number, msvcrt.LK_NBLCK, 1)  # pyright: ignore[reportAttributeAccessIssue] -- on Windows alone
+        return
+    import fcntl
+
+    fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+class _RemoteFolder(Folder):
+    """A place that fsspec reaches. No lock can be had there: two writers write the same parts under the same names.
+
+    Parameters
+    ----------
+    url : str
+        The place: ``s3://bucket/study``, ``memory://study``.
+
+    Raises
+    ------
+    HydrostateError
+        If fsspec, or what it needs for this protocol, is not installed.
+    """
+
+    def __init__(self, url: str) -> None:
+        super().__init__(url)
+        try:
+            import fsspec
+
+            self._system, self._root = fsspec.core.url_to_fs(url)
+        except ImportError as error:
+            raise HydrostateError(
+                f"store {url} needs fsspec and the package for its protocol (pip install 'hydrostate[remote]'): {error}"
+            ) from error
+        except ValueError as error:
+            raise HydrostateError(f"store {url} must be a folder or a URL that fsspec knows: {error}") from error
+
+    def _path(self, file: str) -> str:
+        return f"{self._root.rstrip('/')}/{file}"
+
+    def read(self, file: str) -> bytes:
+        self._system.invalidate_cache()
+        content: Any = self._system.cat_file(self._path(file))
+        return bytes(content)
+
+    def write(self, file: str, content: bytes) -> None:
+        temporary = f"{file}.{token_hex(4)}{TEMPORARY}"
+        self._system.makedirs(self._path(file).rsplit("/", 1)[0], exist_ok=True)
+        self._system.pipe_file(self._path(temporary), content)
+        self._system.mv(self._path(temporary), self._path(file))
+
+    def files(self, below: str = "") -> list[str]:
+        self._system.invalidate_cache()
+        try:
+            found: Any = self._system.ls(self._path(below).rstrip("/"), detail=True)
+        except FileNotFoundError:
+            return []
+        return sorted(str(one["name"]).rsplit("/", 1)[-1] for one in found if one["type"] == "file")
+
+    def move(self, file: str, to: str) -> None:
+        self._system.makedirs(self._path(to).rsplit("/", 1)[0], exist_ok=True)
+        with suppress(FileNotFoundError):
+            self._system.mv(self._path(file), self._path(to))
+
+    def remove(self, file: str) -> None:
+        with suppress(FileNotFoundError):
+            self._system.rm_file(self._path(file))
+
+
+def open_folder(place: str | Path) -> Folder:
+    """Return the folder of a path or a URL.
+
+    Parameters
+    ----------
+    place : str or Path
+        A local path, or a URL such as ``s3://bucket/study``.
+
+    Returns
+    -------
+    Folder
+        The folder; nothing is made yet.
+
+    Raises
+    ------
+    HydrostateError
+        If the URL cannot be used.
+
+    Examples
+    --------
+    >>> open_folder("results/night").name
+    'results/night'
+    """
+    if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://", str(place)):
+        return _RemoteFolder(str(place))
+    return _LocalFolder(Path(place))

@@ -1,0 +1,223 @@
+"""`run_batch(plan, store, ...)`: every case that the store lacks is run, and kept as soon as its task is done."""
+
+import platform
+import shutil
+import subprocess
+from collections import deque
+from collections.abc import Callable, Collection, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+from experiments.batch.cases import Plan, Task, config_hash, package_version
+from experiments.batch.part_store import PartStore
+from experiments.batch.work import Part, lost_task, run_task
+from plant.errors import HydrostateError
+
+WORKER_ENDED = "the worker process ended while it ran this case, as when memory runs out"
+
+Opener = Callable[[], AbstractContextManager[tuple[Executor, int]]]
+OnPart = Callable[[int, Part], None]
+
+
+@dataclass
+class Tally:
+    """How far a batch has come.
+
+    Parameters
+    ----------
+    done : int
+        Cases run and kept.
+    failed : int
+        Cases among them that failed.
+    stopped : str
+        Why no more were begun; empty where all were.
+    """
+
+    done: int = 0
+    failed: int = 0
+    stopped: str = ""
+
+
+@dataclass(eq=False)
+class _Batch:
+    store: PartStore
+    tasks: Iterator[Task]
+    stop: Event
+    on_part: OnPart
+    max_failures: int | None
+    tally: Tally = field(default_factory=Tally)
+    suspects: deque[Task] = field(default_factory=deque[Task])
+    """Tasks that were in flight when a worker ended; they are run alone until it is clear which of them ends it."""
+
+    def next_task(self) -> Task | None:
+        if self.stop.is_set() or self.tally.stopped:
+            return None
+        return self.suspects.popleft() if self.suspects else next(self.tasks, None)
+
+    def keep(self, task: Task, part: Part) -> None:
+        self.store.add(part.content, task.keys)
+        self.tally.done += len(task.keys)
+        self.tally.failed += len(part.failures)
+        self.on_part(len(task.keys), part)
+        if self.max_failures is not None and self.tally.failed > self.max_failures:
+            self.tally.stopped = f"{self.tally.failed} cases failed, --max-failures is {self.max_failures}"
+
+    def suspect(self, task: Task, *, alone: bool) -> None:
+        """Remember a task whose worker ended; what ended it alone is halved, and a single case is given up."""
+        if not alone:
+            self.suspects.append(task)
+        elif len(task.keys) == 1:
+            self.keep(task, lost_task(task, WORKER_ENDED))
+        else:
+            self.suspects.extendleft(reversed(_halves(task)))
+
+
+def run_batch(
+    plan: Plan,
+    store: PartStore,
+    done: Collection[str],
+    opener: Opener,
+    *,
+    stop: Event,
+    on_part: OnPart,
+    max_failures: int | None = None,
+) -> Tally:
+    """Run the cases of a study that are not done.
+
+    A part is written when its task is done, so whatever ends this process costs the tasks in flight and no more.
+
+    Parameters
+    ----------
+    plan : Plan
+        The study's cases.
+    store : PartStore
+        Where rows go; its right to write is held by the caller.
+    done : collection of str
+        Keys of cases that need not be run.
+    opener : callable
+        Opens an executor and says how many tasks it runs at a time, see `experiments.executors.open_executor`.
+    stop : Event
+        When it is set no task is begun; those in flight are finished and kept.
+    on_part : callable
+        Called with the count of cases and the part, when it has been kept.
+    max_failures : int, optional
+        No task is begun once more cases than this have failed.
+
+    Returns
+    -------
+    Tally
+        How far it came.
+
+    Raises
+    ------
+    HydrostateError
+        If the store cannot be written, or the cluster goes away.
+    """
+    batch: _Batch | None = None
+    while True:
+        with opener() as (executor, width):
+            if batch is None:
+                batch = _Batch(store, plan.tasks(done, width), stop, on_part, max_failures)
+            if not _drained(batch, executor, width):
+                continue
+        if stop.is_set() and not batch.tally.stopped:
+            batch.tally.stopped = "interrupted"
+        return batch.tally
+
+
+def _drained(batch: _Batch, executor: Executor, width: int) -> bool:
+    """Run tasks until none is left; False where the executor broke and must be opened anew."""
+    flying: dict[Future[Part], Task] = {}
+    while True:
+        alone = bool(batch.suspects)
+        whole = _launch(batch, executor, flying, 1 if alone or width == 1 else 2 * width)
+        if not flying:
+            return whole
+        finished, _ = wait(flying, timeout=0.5, return_when=FIRST_COMPLETED)
+        for future in finished:
+            task = flying.pop(future)
+            try:
+                part = future.result()
+            except BrokenExecutor:
+                whole = False
+                batch.suspect(task, alone=alone)
+            except CancelledError as error:
+                raise HydrostateError("the cluster went away; run the same command again to go on") from error
+            except Exception as error:
+                if type(error).__name__ != "KilledWorker":  # Dask's word for it, which need not be installed
+                    raise
+                batch.suspect(task, alone=alone)
+            else:
+                batch.keep(task, part)
+        if not whole:
+            for task in flying.values():
+                batch.suspect(task, alone=alone)
+            return False
+
+
+def _launch(batch: _Batch, executor: Executor, flying: dict[Future[Part], Task], most: int) -> bool:
+    """Submit tasks up to so many in flight; False where the executor is broken."""
+    while len(flying) < most:
+        task = batch.next_task()
+        if task is None:
+            return True
+        try:
+            flying[executor.submit(run_task, task)] = task
+        except BrokenExecutor:
+            batch.suspects.appendleft(task)
+            return False
+    return True
+
+
+def _halves(task: Task) -> list[Task]:
+    cases = [(one, case) for one, cases in task.series for case in cases]
+    middle = len(cases) // 2
+    return [
+        replace(task, series=tuple((one, (case,)) for one, case in half)) for half in (cases[:middle], cases[middle:])
+    ]
+
+
+def manifest_of(plan: Plan, source: str) -> Mapping[str, Any]:
+    """Return what it takes to run a study again.
+
+    Parameters
+    ----------
+    plan : Plan
+        The study's cases.
+    source : str
+        The study file's name.
+
+    Returns
+    -------
+    Mapping[str, Any]
+        The study, its hash, its seeds, versions and commit.
+    """
+    packages = ("hydrostate", "numpy", "scipy", "numba", "pyarrow", "pandas")
+    return {
+        "study": plan.study.name,
+        "source": source,
+        "question": plan.study.question,
+        "cases": len(plan.keys),
+        "config_hash": config_hash(plan.study, plan.rig),
+        "seeds": sorted({seed for runs in plan.study.runs for seed in runs.seed_list}),
+        "config": plan.study.model_dump(mode="json"),
+        "rig": plan.rig.name,
+        "python": platform.python_version(),
+        "machine": platform.machine(),
+        "versions": {name: package_version(name) for name in packages},
+        "commit": _commit(),
+    }
+
+
+def _commit() -> str | None:
+    """Return the commit of the sources, None where they are not a git checkout."""
+    git, folder = shutil.which("git"), Path(__file__).resolve().parents[2]
+    if git is None or not (folder / ".git").exists():
+        return None
+    command = [git, "-C", str(folder), "rev-parse", "HEAD"]
+    found = subprocess.run(command, capture_output=True, text=True, check=False, timeout=10)  # noqa: S603 -- fixed words
+    return found.stdout.strip() or None

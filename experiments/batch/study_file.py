@@ -1,0 +1,309 @@
+"""The study file: which plants, conditions, drives, sensors, methods and seeds, or which logs, in TOML."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
+
+from estimation.eha import FORMS
+from estimation.first_belief import START_STD
+from estimation.run import METHODS
+from faults.conditions import CONDITIONS, HIGHEST_SEVERITY
+from plant.errors import HydrostateError
+from plant.sensors import SENSORS
+from plant.signals import DRIVES
+from plant.simulate import PLANTS
+
+SHIPPED = "experiments.studies"
+"""The package that holds the studies that come with the project."""
+
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Severity = Annotated[float, Field(ge=0.0, le=HIGHEST_SEVERITY)]
+
+
+class StudyError(HydrostateError):
+    """A study file is not usable."""
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+
+def _known(names: Sequence[str], known: Sequence[str]) -> None:
+    for name in names:
+        if name not in known:
+            near = get_close_matches(name, known, n=1)
+            hint = f", did you mean {near[0]!r}?" if near else ""
+            raise ValueError(f"one of {', '.join(known)}, got {name!r}{hint}")
+
+
+class Method(_Table):
+    """What is done with a log or a simulated series.
+
+    Parameters
+    ----------
+    verb : {"filter", "estimate", "diagnose"}
+        ``filter`` runs one filter, compiled and 32 side by side where it is the ``ekf``; ``estimate`` gives the number
+        and verdict of `hydrostate estimate`; ``diagnose`` names one of the nine conditions.
+    form : str
+        The process model; ``auto`` for ``estimate`` alone.
+    method : str
+        The filter; ``auto`` for ``estimate`` alone.
+    pressure : bool
+        Whether differential pressure is used where it is logged.
+    told : {"condition", "healthy"}
+        Whose leakage and friction the method is told: the simulated condition's, or the healthy rig's.
+    start_std_pa : float
+        Standard deviation of the first guess [Pa].
+    """
+
+    verb: Literal["filter", "estimate", "diagnose"]
+    form: str = "auto"
+    method: str = "auto"
+    pressure: bool = True
+    told: Literal["condition", "healthy"] = "condition"
+    start_std_pa: Positive = START_STD
+
+    @field_validator("form", "method")
+    @classmethod
+    def _names(cls, name: str, info: ValidationInfo) -> str:
+        known = list(FORMS if info.field_name == "form" else METHODS)
+        if info.data.get("verb") != "filter":
+            known = ["auto", *(("flow", "motion") if info.field_name == "form" else ("least-squares",)), *known]
+        _known([name], known)
+        return name
+
+
+class Runs(_Table):
+    """Simulated cases: every combination of what is listed.
+
+    Parameters
+    ----------
+    plants, drives, sensors : tuple of str
+        Names, as `hydrostate simulate` knows them.
+    conditions : tuple of str
+        Conditions by name; all nine by default, none where severities are given.
+    severities : tuple of pairs of float
+        Leakage and friction severity, beside the conditions [dimensionless].
+    seeds : int or tuple of int
+        So many seeds, from 0 on, or these.
+    starts_pa : tuple of float
+        First guesses of bulk modulus [Pa]; the rig's own where there are none.
+    duration_s, sample_time_s : float
+        Length of a run and time between its samples [s].
+    methods : tuple of Method
+        What is done with every run.
+    """
+
+    plants: tuple[str, ...] = ("lumped",)
+    drives: tuple[str, ...] = ("steps",)
+    sensors: tuple[str, ...] = ("bench",)
+    conditions: tuple[str, ...] | None = None
+    severities: tuple[tuple[Severity, Severity], ...] = ()
+    seeds: Annotated[int, Field(ge=1)] | tuple[Annotated[int, Field(ge=0)], ...] = 1
+    starts_pa: tuple[NotNegative, ...] = ()
+    duration_s: Positive = 10.0
+    sample_time_s: Positive = 1e-4
+    methods: Annotated[tuple[Method, ...], Field(min_length=1)]
+
+    @field_validator("plants", "drives", "sensors", "conditions")
+    @classmethod
+    def _names(cls, names: tuple[str, ...] | None, info: ValidationInfo) -> tuple[str, ...] | None:
+        known = {"plants": PLANTS, "drives": DRIVES, "sensors": SENSORS, "conditions": CONDITIONS}[str(info.field_name)]
+        _known(names or (), list(known))
+        if not names and info.field_name != "conditions":
+            raise ValueError(f"one or more of {', '.join(known)}, got none")
+        return names
+
+    @model_validator(mode="after")
+    def _samples(self) -> "Runs":
+        if not self.duration_s / self.sample_time_s >= 10.0:
+            raise ValueError(f"at least 10 samples long, got {self.duration_s:g} s at {self.sample_time_s:g} s")
+        return self
+
+    @property
+    def seed_list(self) -> tuple[int, ...]:
+        """The seeds, one by one."""
+        return tuple(range(self.seeds)) if isinstance(self.seeds, int) else self.seeds
+
+
+class Logs(_Table):
+    """Cases that are logs.
+
+    Parameters
+    ----------
+    glob : str
+        Which files, relative to the study file unless absolute; ``**`` reaches into folders.
+    columns : dict[str, str]
+        Foreign column by channel, beside the rig's: ``{ position_m = "POS_MM:mm" }``.
+    starts_pa : tuple of float
+        First guesses of bulk modulus [Pa]; the rig's own where there are none.
+    methods : tuple of Method
+        What is done with every log.
+    """
+
+    glob: Annotated[str, Field(min_length=1)]
+    columns: dict[str, str] = {}
+    starts_pa: tuple[NotNegative, ...] = ()
+    methods: Annotated[tuple[Method, ...], Field(min_length=1)]
+
+
+class Study(_Table):
+    """A study file's content.
+
+    Parameters
+    ----------
+    name : str
+        What reports call it.
+    question : str
+        What it shall answer.
+    rig : str
+        The healthy actuator's rig file, relative to the study file; empty for the paper's.
+    runs : tuple of Runs
+        Simulated cases.
+    logs : tuple of Logs
+        Logs.
+    """
+
+    name: Annotated[str, Field(min_length=1)]
+    question: str = ""
+    rig: str = ""
+    runs: tuple[Runs, ...] = ()
+    logs: tuple[Logs, ...] = ()
+
+    @model_validator(mode="after")
+    def _something(self) -> "Study":
+        if not (self.runs or self.logs):
+            raise ValueError("at least one [[runs]] or [[logs]], got none")
+        return self
+
+
+def read_study(path: str | Path) -> Study:
+    """Read a study file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file, or the name of a study that comes with the project.
+
+    Returns
+    -------
+    Study
+        The study.
+
+    Raises
+    ------
+    StudyError
+        If the file cannot be read or is no TOML, or an entry is unknown, of the wrong kind, or out of range.
+    """
+    path = study_path(path)
+    try:
+        content = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        raise StudyError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise StudyError(f"{path}: a TOML file is wanted: {error}") from error
+    return parse_study(content, str(path))
+
+
+def parse_study(content: Mapping[str, Any], source: str) -> Study:
+    """Return a study from a study file's content.
+
+    Parameters
+    ----------
+    content : Mapping[str, Any]
+        As TOML or JSON gives it.
+    source : str
+        The file, for messages.
+
+    Returns
+    -------
+    Study
+        The study.
+
+    Raises
+    ------
+    StudyError
+        If an entry is unknown, of the wrong kind, or out of range; the message names the first such field.
+
+    Examples
+    --------
+    >>> content = {"name": "a", "runs": [{"seeds": 0, "methods": [{"verb": "diagnose"}]}]}
+    >>> parse_study(content, "a.toml")
+    Traceback (most recent call last):
+    experiments.batch.study_file.StudyError: a.toml: runs[0].seeds must be greater than or equal to 1, got 0
+    """
+    try:
+        return Study.model_validate(content)
+    except ValidationError as error:
+        raise StudyError(f"{source}: {_sentence(max(error.errors(), key=lambda one: len(one['loc'])))}") from error
+
+
+def study_path(path: str | Path) -> Path:
+    """Return the file of a study: the path itself, or that of a study that comes with the project.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file, or a name such as ``eha-paper``.
+
+    Returns
+    -------
+    Path
+        The file.
+    """
+    shipped = files(SHIPPED).joinpath(f"{path}.toml")
+    if Path(path).exists() or not shipped.is_file():
+        return Path(path)
+    return Path(str(shipped))
+
+
+def shipped_studies() -> tuple[str, ...]:
+    """Return the names of the studies that come with the project.
+
+    Returns
+    -------
+    tuple of str
+        Names, in order.
+
+    Examples
+    --------
+    >>> shipped_studies()
+    ('eha-paper', 'fleet-archive')
+    """
+    names = (one.name for one in files(SHIPPED).iterdir())
+    return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
+
+
+def _sentence(error: Any) -> str:
+    """Say which field, what was wanted, and what came."""
+    where = ""
+    for part in error["loc"]:
+        if isinstance(part, int):
+            where += f"[{part}]"
+        elif part not in ("constrained-int", "int", "tuple[constrained-int, ...]", "tuple[int, ...]"):
+            where += f".{part}" if where else str(part)
+    match error["type"]:
+        case "extra_forbidden":
+            return f"{where} is unknown{_nearest(error['loc'])}"
+        case "missing":
+            return f"{where} is wanted, and not there"
+        case "value_error":
+            wanted = str(error["msg"]).removeprefix("Value error, ")
+            return f"{where or 'the file'} must {'have' if wanted.startswith('at least one [[') else 'be'} {wanted}"
+        case _:
+            wanted = str(error["msg"]).removeprefix("Input should be ").removeprefix("Value should ")
+            return f"{where} must be {wanted}, got {error['input']!r}"
+
+
+def _nearest(place: Sequence[str | int]) -> str:
+    names = [part for part in place if isinstance(part, str)]
+    table = {"runs": Runs, "logs": Logs, "methods": Method}.get(names[-2] if len(names) > 1 else "", Study)
+    known = list(table.model_fields)
+    near = get_close_matches(names[-1], known, n=1)
+    return f", did you mean {near[0]!r}?" if near else f", wanted one of {', '.join(known)}"

@@ -1,0 +1,328 @@
+"""`hydrostate batch STUDY`: run a study file's cases into a store, or go on where the last run stopped."""
+
+import os
+import signal
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from experiments.command.json_output import json_text
+from experiments.command.options import Json
+from experiments.command.streams import INTERRUPTED, SOME_FAILED, USAGE, emit, note
+from plant.errors import HydrostateError
+
+if TYPE_CHECKING:
+    from experiments.batch.cases import Plan
+    from experiments.batch.part_store import PartStore
+    from experiments.batch.runner import Tally
+    from experiments.batch.study_file import Study
+    from experiments.batch.work import Part
+
+QUIET_SECONDS = 30.0
+"""Time between lines of progress where standard error is no terminal [s]."""
+
+MOST_NAMED = 20
+"""So many failed cases are named as they come; the store and the report name all."""
+
+commands = typer.Typer()
+
+
+@commands.command(epilog="Example: hydrostate batch fleet-archive --logs 'archive/**/*.csv' --out results/fleet")
+def batch(
+    study: Annotated[
+        str,
+        typer.Argument(
+            metavar="STUDY",
+            help="Study file (TOML), or one that comes along: eha-paper, fleet-archive.",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[
+        str | None,
+        typer.Option(
+            "--out", "-o", metavar="STORE", help="Folder or URL (s3://...) of the store; results/<study> by default."
+        ),
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say how many cases there are and what they cost.")
+    ] = False,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume/--no-resume", help="Keep the cases that the store has, or run all of them again."),
+    ] = True,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run failed cases again.")] = False,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers", min=1, metavar="N", help="Processes, one thread each; the machine's cores by default."
+        ),
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option("--cluster", metavar="ADDRESS", help="Use a Dask cluster: its scheduler, as tcp://host:8786."),
+    ] = None,
+    max_failures: Annotated[
+        int | None, typer.Option("--max-failures", min=0, metavar="N", help="Stop once more than N cases have failed.")
+    ] = None,
+    logs: Annotated[
+        str | None, typer.Option("--logs", metavar="GLOB", help="Replaces the glob of the study's logs.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run a study of many cases into a store that survives whatever stops it, and write its report.
+
+    A case that the store has is not run again: after a crash, or Ctrl-C, the same command goes on where it stopped; of
+    a changed study, only what changed is run. A case that fails is a row with its reason. The last line of standard
+    output is the report's path.
+    """
+    from experiments.batch.cases import plan_study
+    from experiments.batch.part_store import open_store
+    from experiments.batch.study_file import SHIPPED, read_study, shipped_studies, study_path
+
+    chosen = _with_logs(read_study(study), logs)
+    shipped = study in shipped_studies() and not Path(study).exists()
+    folder = Path() if shipped or logs is not None else study_path(study).parent
+    plan = plan_study(chosen, folder)
+    store = open_store(out or f"results/{chosen.name}")
+    width = workers or os.cpu_count() or 1
+    if dry_run:
+        _say_plan(plan, store, width, retry_failed, as_json)
+        return
+    begin = time.perf_counter()
+    source = f"{SHIPPED}/{study}.toml" if shipped else Path(study).name
+    with store.writing():
+        tally, before = _run(plan, store, source, width, cluster, max_failures, resume, retry_failed)
+        report = _reported(store)
+    _finish(plan, store, tally, before, report, as_json, time.perf_counter() - begin)
+
+
+def _with_logs(study: "Study", pattern: str | None) -> "Study":
+    if pattern is None:
+        return study
+    if not study.logs:
+        raise HydrostateError(f"--logs replaces the logs of a study, and {study.name} has none")
+    return study.model_copy(update={"logs": tuple(one.model_copy(update={"glob": pattern}) for one in study.logs)})
+
+
+def _say_plan(plan: "Plan", store: "PartStore", workers: int, again: bool, as_json: bool) -> None:
+    wanted = plan.keys
+    there = store.manifest() is not None
+    left = set(wanted) - (store.done(again=again)[0] if there else set())
+    share = len(left) / len(wanted)
+    seconds = plan.seconds * share / workers
+    series = sum(len(one) for one, _ in plan.blocks)
+    if as_json:
+        entries = {"outcome": "ok", "study": plan.study.name, "store": store.name, "cases": len(wanted)}
+        emit(json_text([{**entries, "series": series, "left": len(left), "seconds": seconds, "workers": workers}]))
+        return
+    emit(f"{plan.study.name}: {len(wanted)} cases on {series} series; {len(left)} are not in {store.name} yet")
+    words = duration(seconds)
+    emit(f"about {words} with {workers} worker{'s' if workers > 1 else ''} (a rough guess from typical costs)")
+
+
+def _run(
+    plan: "Plan",
+    store: "PartStore",
+    source: str,
+    workers: int,
+    cluster: str | None,
+    max_failures: int | None,
+    resume: bool,
+    again: bool,
+) -> "tuple[Tally, int]":
+    from experiments.batch.runner import manifest_of, run_batch
+    from experiments.executors import open_executor
+
+    manifest = manifest_of(plan, source)
+    if resume:
+        _say_differences(store.manifest(), manifest)
+    else:
+        store.clear()
+    done, broken = store.done(again=again)
+    for name in broken:
+        note(f"part {name} of {store.name} cannot be read: it is set aside, and its cases are run again")
+    wanted = plan.keys
+    store.describe(manifest, wanted)
+    before = len(done.intersection(wanted))
+    if before:
+        note(f"{before} of {len(wanted)} cases are in {store.name} already")
+    with _shown(len(wanted), before) as advance, _interruptible() as stop:
+        tally = run_batch(
+            plan,
+            store,
+            done,
+            lambda: open_executor(workers, cluster),
+            stop=stop,
+            on_part=advance,
+            max_failures=max_failures,
+        )
+    return tally, before
+
+
+def _say_differences(old: Any, new: Any) -> None:
+    """Say where kept rows were made by other software than what is to be made now."""
+    if old is None:
+        return
+    then = old["versions"]
+    changed = [f"{name} {then.get(name)}" for name, now in new["versions"].items() if then.get(name) != now]
+    if old.get("commit") != new["commit"]:
+        changed.append(f"commit {str(old.get('commit'))[:10]}")
+    if changed:
+        note(f"rows that are kept may have been made with {', '.join(changed)}; --no-resume makes all of them again")
+
+
+@contextmanager
+def _interruptible() -> Generator[Event]:
+    """Turn the first Ctrl-C into a wish to stop; a second one stops at once."""
+    stop = Event()
+
+    def wish(number: int, frame: object) -> None:
+        del number, frame
+        stop.set()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        note("interrupted: finishing what is in flight; press Ctrl-C again to stop at once")
+
+    before = signal.signal(signal.SIGINT, wish)
+    try:
+        yield stop
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _shown(total: int, before: int) -> "Generator[Callable[[int, Part], None]]":
+    """Show cases done, their rate and the time left; failures are named as they come."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    named = [0]
+
+    def say(part: "Part") -> None:
+        for case, reason in part.failures:
+            named[0] += 1
+            if named[0] <= MOST_NAMED:
+                note(f"{case}: {reason}")
+            elif named[0] == MOST_NAMED + 1:
+                note("more cases failed; the report names all")
+
+    if console.is_terminal:
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = (TextColumn("cases"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}"))
+        with Progress(*columns, TimeRemainingColumn(), console=console, transient=True) as bar:
+            task = bar.add_task("cases", total=total, completed=before, rate="")
+            clock = Pace(total, before)
+
+            def advance(count: int, part: "Part") -> None:
+                say(part)
+                clock.add(count)
+                bar.update(task, advance=count, rate=f"{clock.rate:.3g}/s")
+
+            yield advance
+        return
+    clock = Pace(total, before)
+    spoken = [time.monotonic()]
+
+    def advance_quietly(count: int, part: "Part") -> None:
+        say(part)
+        clock.add(count)
+        if time.monotonic() - spoken[0] > QUIET_SECONDS:
+            spoken[0] = time.monotonic()
+            note(str(clock))
+
+    yield advance_quietly
+
+
+class Pace:
+    """How fast cases are done, and how long the rest will take.
+
+    Parameters
+    ----------
+    total, before : int
+        Cases of the study, and those done before.
+    """
+
+    def __init__(self, total: int, before: int) -> None:
+        self.total, self.done, self._before, self._begin = total, before, before, time.monotonic()
+
+    def add(self, count: int) -> None:
+        """Count cases as done.
+
+        Parameters
+        ----------
+        count : int
+            How many.
+        """
+        self.done += count
+
+    @property
+    def rate(self) -> float:
+        """Cases a second since the beginning [1/s]."""
+        return (self.done - self._before) / max(time.monotonic() - self._begin, 1e-9)
+
+    def __str__(self) -> str:
+        left = (self.total - self.done) / self.rate if self.rate > 0.0 else 0.0
+        return f"{self.done} of {self.total} cases, {self.rate:.3g} a second, {duration(left)} left"
+
+
+def duration(seconds: float) -> str:
+    """Return a length of time as a person says it.
+
+    Parameters
+    ----------
+    seconds : float
+        The time [s].
+
+    Returns
+    -------
+    str
+        In seconds, minutes or hours.
+
+    Examples
+    --------
+    >>> duration(5.2), duration(300.0), duration(40_000.0)
+    ('5 s', '5 min', '11.1 h')
+    """
+    if seconds < 90.0:
+        return f"{max(1.0, seconds):.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+
+
+def _reported(store: "PartStore") -> str:
+    from experiments.batch.reporting import write_report
+
+    return write_report(store, store.folder)
+
+
+def _finish(
+    plan: "Plan",
+    store: "PartStore",
+    tally: "Tally",
+    before: int,
+    report: str,
+    as_json: bool,
+    seconds: float,
+) -> None:
+    total = len(plan.keys)
+    failed = sum(outcome == "failed" for outcome in store.rows(["outcome"])["outcome"].to_pylist())
+    done = before + tally.done
+    if tally.stopped:
+        note(f"{tally.stopped}: {done} of {total} cases are kept in {store.name}; the same command goes on from there")
+    else:
+        kept = f", {before} of them from before" if before else ""
+        note(f"{done} of {total} cases done{kept}, {failed} failed")
+    entries = {"study": plan.study.name, "store": store.name, "report": report, "cases": total, "done": done}
+    if as_json:
+        outcome = "interrupted" if tally.stopped else "ok"
+        emit(json_text([{"outcome": outcome, **entries, "failed": failed, "ran": tally.done, "seconds": seconds}]))
+    else:
+        emit(report)
+    if tally.stopped == "interrupted":
+        raise typer.Exit(INTERRUPTED)
+    if failed:
+        raise typer.Exit(USAGE if failed == total else SOME_FAILED)

@@ -1,0 +1,97 @@
+"""`hydrostate compare A B` and `hydrostate report STORE`: what stores of batch studies say."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from experiments.command.json_output import json_text
+from experiments.command.options import SEED, Json, Seed
+from experiments.command.streams import emit, note, rendered, table
+
+commands = typer.Typer()
+
+
+@commands.command(epilog="Example: hydrostate compare results/before results/after --out comparison.html")
+def compare(
+    first: Annotated[str, typer.Argument(metavar="A", help="Store of the first study.", show_default=False)],
+    second: Annotated[str, typer.Argument(metavar="B", help="Store of the second study.", show_default=False)],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="HTML", help="Also write a page with every condition.")
+    ] = None,
+    seed: Seed = SEED,
+    as_json: Json = False,
+) -> None:
+    """Say what got better and what worse from study A to study B, with 95 % intervals by bootstrap.
+
+    Cases are paired: the same series, and the same done with it. Where each study has one filter (or form, plant, ...)
+    throughout and the two differ in it, that is what is compared. The seed draws the bootstrap.
+    """
+    from experiments.batch.compare import compare_studies
+    from experiments.batch.part_store import open_store
+    from experiments.batch.summary import frame_of
+    from experiments.report.batch import render_comparison
+
+    names = [Path(place.rstrip("/")).name for place in (first, second)]
+    if names[0] == names[1]:
+        names = ["A", "B"]
+    frames = [frame_of(open_store(place).rows()) for place in (first, second)]
+    found = compare_studies(*frames, seed=seed)
+    if out is not None:
+        _write(out, render_comparison(found, names))
+    if as_json:
+        emit(
+            json_text(
+                [{"outcome": "ok", "first": first, "second": second, "seed": seed, "rows": found.to_dict("records")}]
+            )
+        )
+        return
+    shown = table(
+        "asked", "measure", f"{names[0]} [%]", f"{names[1]} [%]", "difference [%]", "95 % interval [%]", "verdict"
+    )
+    for row in found[found["condition"] == "all"].to_dict("records"):
+        known = row["low"] is not None and row["low"] == row["low"]
+        interval = f"{row['low']:+.3g} to {row['high']:+.3g}" if known else "-"
+        numbers = (f"{row['first']:.3g}", f"{row['second']:.3g}", f"{row['difference']:+.3g}", interval)
+        shown.add_row(row["verb"], row["measure"], *numbers, row["verdict"])
+    changed = dict.fromkeys(text for text in found["changed"] if text)
+    single = found[found["condition"] != "all"]
+    by_verdict = {verdict: int((single["verdict"] == verdict).sum()) for verdict in ("better", "worse")}
+    emit(
+        rendered(
+            *(f"changed: {text}" for text in changed),
+            shown,
+            f"by condition: {by_verdict['better']} better, {by_verdict['worse']} worse, of {len(single)}",
+        )
+    )
+
+
+@commands.command(epilog="Example: hydrostate report results/eha-paper --out report")
+def report(
+    store: Annotated[str, typer.Argument(metavar="STORE", help="Store of a batch study.", show_default=False)],
+    out: Annotated[
+        str | None, typer.Option("--out", "-o", metavar="DIR", help="Another folder than the store's own.")
+    ] = None,
+) -> None:
+    """Write the report of a batch study from its store alone, also while the study runs.
+
+    The last line of standard output is the report's path.
+    """
+    from experiments.batch.folder import open_folder
+    from experiments.batch.part_store import open_store
+    from experiments.batch.reporting import write_report
+
+    emit(write_report(open_store(store), open_folder(out or store)))
+
+
+def _write(path: Path, page: str) -> None:
+    from plant.atomic import replacing
+    from plant.errors import HydrostateError
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as file:
+            file.write(page.encode())
+    except OSError as error:
+        raise HydrostateError(f"--out {path}: cannot be written: {error.strerror or error}") from error
+    note(f"written: {path}")

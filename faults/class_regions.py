@@ -1,0 +1,180 @@
+"""How well does each condition explain a log? Fitted circuits are laid beside the conditions' regions.
+
+In a condition leakage, flow bias, friction and bulk modulus differ from the nominal ones as actuators of one kind do, a
+Gaussian region; integrating the likelihood over it in closed form (Laplace's method: MacKay, Information Theory, 2003,
+chapter 27) scores the condition. What a log says nothing of, as friction beyond what a stuck piston is pushed with,
+counts for none.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from faults.circuit_runs import COORDINATES, Blocks
+from faults.class_fit import (
+    LASTING,
+    STARTS,
+    WEAK,
+    WITHIN,
+    Actuator,
+    PointFit,
+    fit_freely,
+    misfit,
+    nominal_runs,
+    scales_of,
+)
+from faults.conditions import CONDITIONS
+
+Array = NDArray[np.float64]
+
+YIELDING = 5.0
+"""Travel in presliding displacements below which a piston counts as stuck [dimensionless]."""
+
+STRUCTURAL = 100.0
+"""By how much a residual that no sensor makes widens what is believed [dimensionless], in variance: it lasts, and it is
+not what the derivatives say that it is."""
+
+_NO_FRICTION = np.array([0.0 if name.startswith("friction") else 1.0 for name in COORDINATES])
+
+PRESSURE_SCALE = np.array([-1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
+"""Direction in which all pressures scale and no motion changes [dimensionless]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClassFits:
+    """What the circuit model says about a log.
+
+    Parameters
+    ----------
+    best : PointFit
+        The circuit that fits best.
+    information : ndarray, shape (7, 7)
+        What is believed to be known of its coordinates: inverse covariance without a prior.
+    nominal : ndarray, shape (9,)
+        Misfit of each condition's nominal circuit [dimensionless].
+    nominal_scales : ndarray, shape (9, outputs)
+        Root mean square of what it leaves [m/s, Pa].
+    scores : ndarray, shape (9,)
+        How well each condition's region holds the fitted circuits: log-likelihoods [dimensionless].
+    """
+
+    best: PointFit
+    information: Array
+    nominal: Array
+    nominal_scales: Array
+    scores: Array
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the coordinates under the weak prior, shape (7, 7) [dimensionless]."""
+        return np.asarray(np.linalg.inv(self.information + np.linalg.inv(WEAK)), dtype=np.float64)
+
+
+def fit_classes(blocks: Blocks, actuator: Actuator) -> ClassFits:
+    """Fit circuits to a log from the nearest conditions and weigh all nine.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ClassFits
+        The best circuit, and the conditions' scores.
+    """
+    runs = nominal_runs(blocks, actuator)
+    nominal = np.array([misfit(blocks, run) for run in runs])
+    order = np.argsort(nominal)[:STARTS]
+    near = [int(i) for i in order if nominal[i] <= nominal[order[0]] + len(blocks.velocity)]
+    fits = [fit_freely(blocks, actuator, list(CONDITIONS)[i]) for i in near or [int(order[0])]]
+    stuck = is_stuck(blocks, actuator)
+    known = [believed_information(fit, blocks, stuck=stuck) for fit in fits]
+    scores = [
+        region_scores(fit, information, actuator) - misfit(blocks, fit.fitted) / LASTING
+        for fit, information in zip(fits, known, strict=True)
+    ]
+    least, held = int(np.argmin([fit.cost for fit in fits])), np.max(scores, axis=0)
+    best = fits[least] if blocks.pressure is not None else _scaled(fits[least], actuator.conditions[np.argmax(held)])
+    return ClassFits(best, known[least], nominal, np.array([scales_of(blocks, run) for run in runs]), held)
+
+
+def _scaled(fit: PointFit, centre: Array) -> PointFit:
+    """Return a fit without pressure at the scale that is the most likely within a condition."""
+    pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
+    shift = float(pull @ (centre - fit.coordinates)) / float(pull @ PRESSURE_SCALE)
+    return replace(fit, coordinates=fit.coordinates + shift * PRESSURE_SCALE)
+
+
+def is_stuck(blocks: Blocks, actuator: Actuator) -> bool:
+    """Return whether the piston only yields on its seals.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    bool
+        Whether it moves no more than a few presliding displacements.
+    """
+    return blocks.travel < YIELDING * actuator.circuit.presliding_displacement
+
+
+def believed_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) -> Array:
+    """Return what a fit may be believed to know: residuals beyond the sensors' noise are a model error that lasts.
+
+    Without pressure nothing is believed of `PRESSURE_SCALE`: motion is the same at twice the pressure, with half the
+    leakage and twice the friction and bulk modulus, but for the inertia, which is less than a model's error.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    blocks : Blocks
+        Its log.
+    stuck : bool
+        Whether the piston sticks: then nothing is believed of friction, as what moves is the seals' unknown stiffness.
+
+    Returns
+    -------
+    ndarray, shape (7, 7)
+        Inverse covariance of the coordinates, without a prior.
+    """
+    unexplained = float(np.max(1.0 - (blocks.noise / fit.scales) ** 2))
+    believed = fit.information / (1.0 + STRUCTURAL * max(unexplained, 0.0))
+    if stuck:
+        believed = believed * np.outer(_NO_FRICTION, _NO_FRICTION)
+    if blocks.pressure is not None:
+        return believed
+    along = believed @ PRESSURE_SCALE
+    curvature = float(PRESSURE_SCALE @ along)
+    return believed - np.outer(along, along) / curvature if curvature > 0.0 else believed
+
+
+def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Array:
+    """Return how well each condition's region holds a fitted circuit: the log of the likelihood over the region.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The circuit.
+    information : ndarray, shape (7, 7)
+        Inverse covariance of its coordinates; directions of which a log says nothing do not count.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (9,)
+        Log-likelihoods [dimensionless] up to a constant.
+    """
+    off = fit.coordinates - actuator.conditions
+    weight = information @ np.linalg.inv(np.eye(len(information)) + WITHIN @ information)
+    return -0.5 * np.einsum("ci,ij,cj->c", off, weight, off)

@@ -1,0 +1,62 @@
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from experiments.batch.cases import plan_study
+from experiments.batch.study_file import StudyError, parse_study
+from tests.experiments.batch.conftest import small_plan
+
+DIAGNOSE = {"verb": "diagnose"}
+
+
+def test_a_study_has_every_combination_once() -> None:
+    plan = small_plan()
+    assert len(plan) == len(set(plan.keys)) == 2 * 4 * 3
+
+
+def test_a_changed_study_shares_the_keys_of_what_did_not_change() -> None:
+    before, more_seeds = set(small_plan().keys), set(small_plan(seeds=5).keys)
+    other_starts = set(small_plan(starts_pa=[2e8, 3e8]).keys)
+    assert before < more_seeds
+    assert len(before & other_starts) == 8
+    assert not before & set(small_plan(duration_s=0.06).keys)
+
+
+def test_a_key_hashes_the_rig_too() -> None:
+    plan = small_plan()
+    parameters = replace(plan.rig.parameters, moving_mass=21.0)
+    assert not set(plan.keys) & set(replace(plan, rig=replace(plan.rig, parameters=parameters)).keys)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 40])
+def test_tasks_hold_every_case_that_is_left_once(workers: int) -> None:
+    plan = small_plan()
+    done = set(plan.keys[3:9])
+    given = [key for task in plan.tasks(done, workers) for key in task.keys]
+    assert sorted(given) == sorted(set(plan.keys) - done)
+
+
+def test_severities_stand_where_conditions_would() -> None:
+    plan = small_plan(conditions=None, severities=[[0.5, 0.0], [1.0, 1.5]])
+    places = {(one.condition, one.leakage_severity, one.friction_severity) for one in plan.blocks[0][0]}  # pyright: ignore
+    assert places == {(None, 0.5, 0.0), (None, 1.0, 1.5)}
+
+
+def test_a_logs_key_follows_its_content_not_its_folder(tmp_path: Path) -> None:
+    def keys(folder: str, text: str, notes: str = "") -> list[str]:
+        (tmp_path / folder).mkdir(exist_ok=True)
+        (tmp_path / folder / "run.csv").write_text(text, encoding="utf-8")
+        if notes:
+            (tmp_path / folder / "run.csv.json").write_text(notes, encoding="utf-8")
+        study = parse_study({"name": "logs", "logs": [{"glob": "*.csv", "methods": [DIAGNOSE]}]}, "logs.toml")
+        return plan_study(study, tmp_path / folder).keys
+
+    assert keys("here", "a") == keys("there", "a")
+    assert len({*keys("here", "a"), *keys("here", "b"), *keys("here", "b", "{}")}) == 3
+
+
+def test_a_glob_without_a_file_is_an_error(tmp_path: Path) -> None:
+    study = parse_study({"name": "logs", "logs": [{"glob": "*.csv", "methods": [DIAGNOSE]}]}, "logs.toml")
+    with pytest.raises(StudyError, match=r"logs\[0\]\.glob must match at least one file"):
+        plan_study(study, tmp_path)

@@ -1,0 +1,89 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.batch.compare import compare_studies
+from plant.errors import HydrostateError
+
+
+def study(seeds: int, error: float, method: str = "ekf", seed: int = 1, **changes: object) -> pd.DataFrame:
+    """Return rows whose errors share a large part, by seed, and have a small one of their own."""
+    rng, own = np.random.default_rng(7), np.random.default_rng(seed)
+    shared = 5.0 + rng.standard_normal(seeds)
+    rows = [
+        {
+            "plant": "lumped",
+            "file": None,
+            "drive": "sine",
+            "sensors": "bench",
+            "condition": condition,
+            "seed": number,
+            "duration_s": 1.0,
+            "sample_time_s": 1e-3,
+            "verb": "filter",
+            "form": "pressure",
+            "method": method,
+            "pressure": True,
+            "told": "condition",
+            "start_pa": start,
+            "start_std_pa": 3e8,
+            "outcome": "ok",
+            "found_condition": None,
+            "error_percent": shared[number] + error + 0.1 * own.standard_normal(),
+            **changes,
+        }
+        for condition in ("normal", "major_leakage")
+        for number in range(seeds)
+        for start in (0.0, 2e8)
+    ]
+    return pd.DataFrame(rows)
+
+
+def overall(table: pd.DataFrame, measure: str = "error of bulk modulus") -> dict[str, object]:
+    (row,) = table[(table["condition"] == "all") & (table["measure"] == measure)].to_dict("records")
+    return {str(name): value for name, value in row.items()}
+
+
+@pytest.mark.parametrize(("change", "verdict"), [(-0.3, "better"), (0.3, "worse")])
+def test_a_small_change_is_seen_through_noise_that_cases_share(change: float, verdict: str) -> None:
+    row = overall(compare_studies(study(20, 0.0), study(20, change, seed=2)))
+    assert row["verdict"] == verdict
+    assert row["difference"] == pytest.approx(change, abs=0.05)
+    assert (row["cases"], row["series"]) == (80, 40)
+
+
+def test_chance_is_called_a_difference_in_about_one_study_of_twenty() -> None:
+    verdicts = [
+        overall(compare_studies(study(20, 0.0, seed=2 * number), study(20, 0.0, seed=2 * number + 1)))["verdict"]
+        for number in range(15)
+    ]
+    assert sum(verdict != "no difference shown" for verdict in verdicts) <= 4  # 5 or more by chance: 1 in 1500
+
+
+def test_first_guesses_on_one_noise_count_as_one_piece_of_evidence() -> None:
+    first, second = study(20, 0.0), study(20, 0.0, seed=2)
+    repeated = [pd.concat([frame.assign(start_pa=start) for start in (0.0, 1e8, 2e8)]) for frame in (first, second)]
+    narrow, wide = (overall(compare_studies(*pair)) for pair in ((first, second), repeated))
+    widths = [float(str(row["high"])) - float(str(row["low"])) for row in (narrow, wide)]
+    assert widths[1] > 0.9 * widths[0]
+
+
+def test_what_each_study_does_in_one_way_of_its_own_is_what_is_compared() -> None:
+    row = overall(compare_studies(study(6, 0.0), study(6, 1.0, "ukf")))
+    assert (row["changed"], row["verdict"], row["cases"]) == ("method: ekf to ukf", "worse", 24)
+
+
+def test_cases_without_an_answer_are_counted_not_averaged() -> None:
+    table = compare_studies(study(6, 0.0), study(6, 0.0, outcome="diverged", error_percent=float("nan")))
+    assert overall(table, "cases with an answer")["verdict"] == "worse"
+    assert "error of bulk modulus" not in set(table["measure"])
+
+
+def test_few_series_get_no_interval_and_no_verdict() -> None:
+    row = overall(compare_studies(study(2, 0.0), study(2, 9.0)))
+    assert (row["low"], row["verdict"]) == (None, "no difference shown")
+
+
+def test_studies_without_a_case_in_common_are_an_error() -> None:
+    with pytest.raises(HydrostateError, match="must have cases in common"):
+        compare_studies(study(3, 0.0, condition="normal"), study(3, 0.0, condition="minor_friction"))

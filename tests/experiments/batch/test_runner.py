@@ -1,0 +1,95 @@
+from collections.abc import Callable, Generator
+from concurrent.futures import Executor, Future
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+import pyarrow as pa
+
+from experiments.batch.part_store import open_store
+from experiments.batch.runner import WORKER_ENDED
+from experiments.executors import SerialExecutor
+from tests.experiments.batch.conftest import rows_in_parts, run_into, small_plan
+
+
+def test_a_repeated_study_runs_nothing(tmp_path: Path, reference: pa.Table) -> None:
+    store = open_store(tmp_path / "store")
+    assert run_into(store, small_plan()).done == 24
+    assert run_into(store, small_plan()).done == 0
+    assert store.rows().equals(reference)
+
+
+def test_a_changed_study_runs_only_what_changed_and_a_study_changed_back_nothing(
+    tmp_path: Path, reference: pa.Table
+) -> None:
+    store = open_store(tmp_path / "store")
+    run_into(store, small_plan())
+    assert run_into(store, small_plan(seeds=[0, 1, 9], starts_pa=[0.0, 2e8])).done == 4
+    assert len(store.rows()) == 12
+    assert run_into(store, small_plan()).done == 0
+    assert store.rows().equals(reference)
+
+
+def test_an_interrupted_study_keeps_what_was_in_flight_and_goes_on(tmp_path: Path, reference: pa.Table) -> None:
+    store, stop = open_store(tmp_path / "store"), Event()
+    tally = run_into(store, small_plan(), stop=stop, on_part=lambda *_: stop.set())
+    assert (tally.stopped, tally.done) == ("interrupted", len(store.rows()))
+    assert 0 < tally.done < 24
+    assert run_into(store, small_plan()).done == 24 - tally.done
+    assert store.rows().equals(reference)
+    assert rows_in_parts(store) == 24
+
+
+def test_too_many_failures_end_a_study(tmp_path: Path) -> None:
+    store = open_store(tmp_path / "store")
+    plan = small_plan(sensors=["rig"], sample_time_s=4e-3, duration_s=0.4)  # its velocity window is too short for it
+    tally = run_into(store, plan, max_failures=2)
+    assert "--max-failures is 2" in tally.stopped
+    assert tally.failed == tally.done < 24
+    assert run_into(store, plan).failed == 24 - tally.done
+
+
+def test_failed_cases_are_run_again_on_demand_and_count_once(tmp_path: Path) -> None:
+    store = open_store(tmp_path / "store")
+    plan = small_plan(sensors=["rig"], sample_time_s=4e-3, duration_s=0.4)
+    run_into(store, plan)
+    assert run_into(store, plan).done == 0
+    assert run_into(store, plan, again=True).done == 24
+    assert len(store.rows()) == 24
+
+
+class _Deadly(SerialExecutor):
+    """Ends its worker whenever it is given one certain case."""
+
+    def __init__(self, key: str) -> None:
+        self._key, self._broken = key, False
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        if self._broken:
+            raise BrokenProcessPool
+        if self._key in args[0].keys:
+            self._broken = True
+            future: Future[Any] = Future()
+            future.set_exception(BrokenProcessPool("a process ended"))
+            return future
+        return super().submit(fn, *args, **kwargs)
+
+
+def test_a_case_that_ends_its_worker_is_found_and_costs_no_other(tmp_path: Path, reference: pa.Table) -> None:
+    plan, store = small_plan(), open_store(tmp_path / "store")
+    deadly = plan.keys[10]
+
+    @contextmanager
+    def opener() -> Generator[tuple[Executor, int]]:
+        yield _Deadly(deadly), 2
+
+    tally = run_into(store, plan, opener=opener)
+    rows = store.rows().to_pylist()
+    assert (tally.done, tally.failed) == (24, 1)
+    assert [row["reason"] for row in rows if row["outcome"] == "failed"] == [WORKER_ENDED]
+    assert [row for row in rows if row["key"] != deadly] == [
+        row for row in reference.to_pylist() if row["key"] != deadly
+    ]
+    assert rows_in_parts(store) == 24

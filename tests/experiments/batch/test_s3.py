@@ -1,0 +1,36 @@
+"""A store on a server that speaks S3, on this machine."""
+
+import pyarrow as pa
+import pytest
+
+from experiments.batch.part_store import open_store
+from experiments.batch.reporting import write_report
+from tests.experiments.batch.conftest import run_into, small_plan
+
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
+
+
+def test_a_store_on_s3_is_resumed_and_holds_the_same_bits(reference: pa.Table, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("s3fs", reason="the extra `remote` is not installed")
+    server = pytest.importorskip("moto.server", reason="moto[server] is not installed").ThreadedMotoServer(port=0)
+    server.start()
+    try:
+        host, port = server.get_host_and_port()
+        for name, value in (
+            ("ENDPOINT_URL", f"http://{host}:{port}"),
+            ("ACCESS_KEY_ID", "test"),
+            ("REGION", "us-east-1"),
+        ):
+            monkeypatch.setenv(f"AWS_{name}", value)
+        monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "test")
+        import s3fs
+
+        s3fs.S3FileSystem().mkdir("hydrostate")
+        store = open_store("s3://hydrostate/studies/small")
+        run_into(store, small_plan(seeds=2))
+        assert run_into(store, small_plan()).done == 12
+        assert store.rows().equals(reference)
+        assert not [name for name in store.folder.files("parts") if name.endswith(".tmp")]
+        assert write_report(store, store.folder) == "s3://hydrostate/studies/small/report.html"
+    finally:
+        server.stop()

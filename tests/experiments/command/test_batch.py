@@ -1,0 +1,92 @@
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from experiments.cli import app
+
+STUDY = """
+name = "small"
+[[runs]]
+plants = ["reduced"]
+drives = ["sine"]
+conditions = ["normal", "major_friction"]
+seeds = 3
+starts_pa = [0.0, 2e8, 5e8]
+duration_s = 0.05
+sensors = ["{sensors}"]
+sample_time_s = {sample_time}
+methods = [{{ verb = "filter", form = "acceleration", method = "ekf" }}]
+"""
+
+
+def invoke(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    path = tmp_path / "small.toml"
+    path.write_text(STUDY.format(sensors="bench", sample_time=1e-4), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("command", ["batch", "compare", "report"])
+def test_help_gives_an_example(command: str) -> None:
+    shown = invoke(command, "--help")
+    assert shown.exit_code == 0
+    assert f"Example: hydrostate {command}" in " ".join(shown.stdout.split())
+
+
+def test_a_dry_run_counts_cases_and_writes_nothing(study: Path, tmp_path: Path) -> None:
+    shown = invoke("batch", study, "--dry-run", "--out", tmp_path / "store")
+    assert shown.exit_code == 0
+    assert "small: 18 cases on 6 series; 18 are not in" in shown.stdout
+    assert not (tmp_path / "store").exists()
+
+
+def test_a_batch_is_run_once_reported_and_compared(study: Path, tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    first = invoke("batch", study, "--out", store, "--workers", 1)
+    assert (first.exit_code, first.stdout.strip()) == (0, f"{store}/report.html")
+    assert "18 of 18 cases done, 0 failed" in first.stderr
+    assert (store / "report.html").exists()
+    (again,) = json.loads(invoke("batch", study, "--out", store, "--workers", 1, "--json").stdout)
+    assert (again["cases"], again["done"], again["ran"], again["failed"]) == (18, 18, 0, 0)
+    (anew,) = json.loads(invoke("batch", study, "--out", store, "--workers", 1, "--no-resume", "--json").stdout)
+    assert anew["ran"] == 18
+    assert invoke("report", store, "--out", tmp_path / "page").stdout.strip() == f"{tmp_path}/page/report.html"
+    compared = invoke("compare", store, store, "--out", tmp_path / "compared.html")
+    assert compared.exit_code == 0
+    assert "no difference shown" in compared.stdout
+    assert "What got better, what worse" in (tmp_path / "compared.html").read_text(encoding="utf-8")
+    manifest = json.loads((store / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["seeds"] == [0, 1, 2]
+    assert {"config_hash", "versions", "commit", "config"} <= set(manifest)
+
+
+def test_cases_that_fail_are_named_and_the_exit_code_says_so(study: Path, tmp_path: Path) -> None:
+    study.write_text(STUDY.format(sensors="rig", sample_time=4e-3), encoding="utf-8")
+    shown = invoke("batch", study, "--out", tmp_path / "store", "--workers", 1)
+    assert shown.exit_code == 2
+    assert "reduced sine normal seed 0 (filter): velocity_window must be at least two sample times" in shown.stderr
+    assert "18 of 18 cases done, 18 failed" in shown.stderr
+    stopped = invoke("batch", study, "--out", tmp_path / "other", "--workers", 1, "--max-failures", 1)
+    assert "--max-failures is 1" in stopped.stderr
+    assert "the same command goes on from there" in stopped.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("batch", "nothing.toml"), "nothing.toml: cannot be read: No such file"),
+        (("report", "nowhere"), "store nowhere: there is no batch study there"),
+        (("compare", "nowhere", "nothing"), "store nowhere: there is no batch study there"),
+        (("batch", "eha-paper", "--logs", "*.csv"), "--logs replaces the logs of a study, and eha-paper has none"),
+    ],
+)
+def test_what_cannot_be_used_is_a_sentence(words: tuple[str, ...], said: str) -> None:
+    shown = invoke(*words)
+    assert shown.exit_code == 2
+    assert said in shown.stderr
