@@ -17,6 +17,7 @@ NAMES = (
     "circuit",
     "detection",
     "real_rig",
+    "piezo_stack",
     "diagnosis",
     "batch_scale",
     "archive",

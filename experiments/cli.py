@@ -21,7 +21,7 @@ from experiments.command import (
     watch,
 )
 from experiments.command.json_output import json_text
-from experiments.command.options import SEED, Json, Seed
+from experiments.command.options import SEED, Json, Seed, require_positive
 from experiments.command.streams import HydrostateGroup, emit
 
 EPILOG = """
@@ -110,6 +110,40 @@ def circuit(
 
     begin = perf_counter()
     manifest = circuit_command(out, seed, Console(stderr=True))
+    if as_json:
+        emit(json_text([{"outcome": "ok", "manifest": str(manifest), "seconds": perf_counter() - begin}]))
+    else:
+        emit(str(manifest))
+
+
+@app.command("piezo-stack", epilog="Example: hydrostate piezo-stack --out results/piezo-stack --quick")
+def piezo_stack(
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the report.")] = Path(
+        "results/piezo-stack"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="A small design map, in seconds.")] = False,
+    voltage_limit: Annotated[
+        float, typer.Option(metavar="V", help="Largest swing of the best operating points [V].")
+    ] = 140.0,
+    power_limit: Annotated[
+        float, typer.Option(metavar="W", help="Largest power of the stack at the best operating points [W].")
+    ] = 30.0,
+    seed: Seed = SEED,
+    as_json: Json = False,
+) -> None:
+    """Repeat the flow experiments of the piezo-stack paper (Figures 10 to 14); maps, limits and best operating points.
+
+    Also what identifies the stack's hysteresis, and what does not. Takes about a minute.
+    The last line of standard output is the manifest's path.
+    """
+    from rich.console import Console
+
+    from experiments.command.piezo_stack import stack_study_command
+
+    require_positive("--voltage-limit", voltage_limit, "V")
+    require_positive("--power-limit", power_limit, "W")
+    begin = perf_counter()
+    manifest = stack_study_command(out, quick, voltage_limit, power_limit, seed, Console(stderr=True))
     if as_json:
         emit(json_text([{"outcome": "ok", "manifest": str(manifest), "seconds": perf_counter() - begin}]))
     else:

@@ -21,6 +21,10 @@ CHANNELS: Mapping[str, str] = MappingProxyType(
         "pressure_a_pa": "Pa",
         "pressure_b_pa": "Pa",
         "motor_voltage_v": "V",
+        "drive_voltage_v": "V",
+        "stack_displacement_m": "m",
+        "stack_force_n": "N",
+        "chamber_pressure_pa": "Pa",
     }
 )
 """Every channel that the project reads, with its unit. `time_s` is implied by `Record.sample_time`."""

@@ -12,15 +12,22 @@ from experiments.command.logs import finish, read_log, run_logs
 from experiments.command.options import (
     PRESSURE,
     SEED,
+    STACK,
     Columns,
     Json,
     Logs,
     Out,
     RigFile,
     Seed,
+    StackBias,
+    StackHealthy,
+    StackLoad,
+    StackPlant,
     figure_path,
     load_columns,
     load_rig,
+    refuse_given,
+    require_one_of,
 )
 from experiments.command.streams import clauses, note, short_names, table
 from experiments.command.verdict import NO_VERDICT, headline, verdict_entries, verdict_lines
@@ -93,6 +100,10 @@ def diagnose(
     no_pressure: Annotated[
         bool, typer.Option("--no-pressure", help="Use velocity alone, even if differential pressure is logged.")
     ] = False,
+    plant: StackPlant = None,
+    bias_pressure: StackBias = None,
+    load: StackLoad = None,
+    healthy: StackHealthy = None,
     out: Out = None,
     seed: Seed = SEED,
     as_json: Json = False,
@@ -104,6 +115,23 @@ def diagnose(
     intervals. In the table of scores a model's error is in velocity [m/s], or relative to the signals [dimensionless]
     where differential pressure counts too. The seed draws the tests behind the transfer functions.
     """
+    if plant is not None:
+        require_one_of("--plant", plant, [STACK])
+        from experiments.command.stack_logs import stack_logs_command
+
+        stack_logs_command(
+            logs,
+            diagnosing=True,
+            sensors="",
+            bias_pressure=bias_pressure,
+            load=load,
+            healthy_log=healthy,
+            expected=condition,
+            columns=columns,
+            out=out,
+            as_json=as_json,
+        )
+    refuse_given({"--bias-pressure": bias_pressure, "--load": load, "--healthy": healthy}, f"needs --plant {STACK}")
     from faults.bank import mathematical_bank
     from faults.conditions import find_condition
 

@@ -11,6 +11,7 @@ from experiments.command.logs import finish, read_log, run_logs
 from experiments.command.options import (
     PRESSURE,
     SEED,
+    STACK,
     Columns,
     ConditionName,
     Json,
@@ -18,9 +19,14 @@ from experiments.command.options import (
     Out,
     RigFile,
     Seed,
+    StackBias,
+    StackHealthy,
+    StackLoad,
+    StackPlant,
     figure_path,
     load_columns,
     load_rig,
+    refuse_given,
     require_one_of,
     require_positive,
 )
@@ -96,7 +102,9 @@ def estimate(
     sensors: Annotated[
         str,
         typer.Option(
-            metavar="NAMES", help="Use these channels alone, comma-separated: position, velocity, dp. All by default."
+            metavar="NAMES",
+            help="Use these channels alone, comma-separated: position, velocity, dp; piezo-stack: stack, force, "
+            "position, pressure. All by default.",
         ),
     ] = "",
     tune: Annotated[
@@ -112,6 +120,10 @@ def estimate(
         Path | None,
         typer.Option(metavar="PNG", help="Draw the filtered estimate with its 95 % band, innovations and NIS."),
     ] = None,
+    plant: StackPlant = None,
+    bias_pressure: StackBias = None,
+    load: StackLoad = None,
+    healthy: StackHealthy = None,
     condition: ConditionName = None,
     rig: RigFile = None,
     columns: Columns = None,
@@ -139,6 +151,23 @@ def estimate(
     sensors hold too little (Cramér-Rao bound over 3 %), the outcome is not_observable and no number is printed.
     Nothing here is random, so the seed changes nothing.
     """
+    if plant is not None:
+        require_one_of("--plant", plant, [STACK])
+        from experiments.command.stack_logs import stack_logs_command
+
+        stack_logs_command(
+            logs,
+            diagnosing=False,
+            sensors=sensors,
+            bias_pressure=bias_pressure,
+            load=load,
+            healthy_log=healthy,
+            expected=None,
+            columns=columns,
+            out=out,
+            as_json=as_json,
+        )
+    refuse_given({"--bias-pressure": bias_pressure, "--load": load, "--healthy": healthy}, f"needs --plant {STACK}")
     from estimation.augment import AUGMENTABLE
     from estimation.bulk_modulus import FITTED, LEAST_SQUARES, estimate_bulk_modulus
     from estimation.eha import FORMS

@@ -2,9 +2,9 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
@@ -59,8 +59,34 @@ ConditionName: TypeAlias = Annotated[
     str | None, typer.Option("--condition", metavar="NAME", help="A condition by name, see `hydrostate conditions`.")
 ]
 
+StackPlant: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--plant",
+        metavar="PLANT",
+        help="piezo-stack: logs of that actuator, with drive_voltage_v and what is measured of stack_displacement_m, "
+        "stack_force_n, position_m, chamber_pressure_pa, from rest on. The options marked so apply to it alone.",
+    ),
+]
+StackBias: TypeAlias = Annotated[
+    float | None,
+    typer.Option(
+        "--bias-pressure", metavar="PA", help="piezo-stack: absolute bias pressure of the runs.", show_default="1e6"
+    ),
+]
+StackLoad: TypeAlias = Annotated[
+    float | None, typer.Option("--load", metavar="KG", help="piezo-stack: mass lifted in the runs.", show_default="0")
+]
+StackHealthy: TypeAlias = Annotated[
+    Path | None,
+    typer.Option("--healthy", metavar="LOG", help="piezo-stack: a run of the healthy actuator to calibrate on."),
+]
+
 PRESSURE = "differential_pressure_pa"
 """The channel that is optional everywhere."""
+
+STACK = "piezo-stack"
+"""The plant with a drive, sensors and faults of its own."""
 
 SEED = 2024
 """Seed where none is given."""
@@ -184,3 +210,23 @@ def figure_path(target: Path | None, log: Path, logs: int) -> Path | None:
     if target is None or logs == 1:
         return target
     return target.with_name(f"{target.stem}-{log.stem}{target.suffix or '.png'}")
+
+
+def refuse_given(options: Mapping[str, Any], why: str) -> None:
+    """Refuse options that do not go with the plant.
+
+    Parameters
+    ----------
+    options : Mapping[str, Any]
+        By name, None where not given.
+    why : str
+        What is wrong with them.
+
+    Raises
+    ------
+    HydrostateError
+        If one is given.
+    """
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise HydrostateError(f"{', '.join(given)} {why}")

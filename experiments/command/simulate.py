@@ -12,11 +12,13 @@ from experiments.command.json_output import json_text
 from experiments.command.options import (
     PRESSURE,
     SEED,
+    STACK,
     ConditionName,
     Json,
     RigFile,
     Seed,
     load_rig,
+    refuse_given,
     require_one_of,
     require_positive,
 )
@@ -26,6 +28,8 @@ from plant.errors import HydrostateError
 if TYPE_CHECKING:
     from plant.eha import EhaParameters
     from plant.record import Record
+
+_DURATION, _SAMPLE_TIME = 10.0, 1e-4
 
 commands = typer.Typer()
 
@@ -43,7 +47,9 @@ def simulate(
     plant: Annotated[
         str,
         typer.Option(
-            metavar="PLANT", help="lumped (5.8 to 5.10, it sticks), reduced (5.14), or circuit (the whole rig)."
+            metavar="PLANT",
+            help="lumped (5.8 to 5.10, it sticks), reduced (5.14), circuit (the whole rig), or piezo-stack, which has "
+            "a sine drive and the options marked so.",
         ),
     ] = "lumped",
     condition: ConditionName = None,
@@ -59,8 +65,13 @@ def simulate(
     drive: Annotated[
         str, typer.Option(metavar="DRIVE", help="sine, prbs, steps, chirp or multisine, of 4 V or up to it.")
     ] = "steps",
-    duration: Annotated[float, typer.Option(metavar="S", help="Length of the run [s].")] = 10.0,
-    sample_time: Annotated[float, typer.Option(metavar="S", help="Time between samples [s].")] = 1e-4,
+    duration: Annotated[
+        float | None, typer.Option(metavar="S", help="Length of the run [s].", show_default="10, piezo-stack 0.16")
+    ] = None,
+    sample_time: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Time between samples [s].", show_default="1e-4, piezo-stack 5e-5"),
+    ] = None,
     sensors: Annotated[
         str,
         typer.Option(
@@ -69,6 +80,22 @@ def simulate(
     ] = "bench",
     rig: RigFile = None,
     seed: Seed = SEED,
+    frequency: Annotated[
+        float | None, typer.Option(metavar="HZ", help="piezo-stack: frequency, up to 450 Hz.", show_default="275")
+    ] = None,
+    voltage: Annotated[
+        float | None,
+        typer.Option(metavar="V", help="piezo-stack: peak to peak, on half of it as bias.", show_default="140"),
+    ] = None,
+    bias_pressure: Annotated[
+        float | None, typer.Option(metavar="PA", help="piezo-stack: absolute bias pressure.", show_default="1e6")
+    ] = None,
+    load: Annotated[
+        float | None, typer.Option(metavar="KG", help="piezo-stack: mass lifted.", show_default="0")
+    ] = None,
+    fault: Annotated[
+        str | None, typer.Option(metavar="NAME", help="piezo-stack: a condition, or such as air_doubled.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Simulate a run and write it as a log in SI, with what made it: parameters, condition, seed, versions.
@@ -77,20 +104,38 @@ def simulate(
     """
     import numpy as np
 
+    from experiments.command.simulate_stack import simulated_stack
     from plant.record_files import write_record
     from plant.sensors import SENSORS
     from plant.signals import DRIVES, make_drive
     from plant.simulate import PLANTS
     from plant.simulate import simulate as simulate_plant
 
+    stack_options = {
+        "--frequency": frequency,
+        "--voltage": voltage,
+        "--bias-pressure": bias_pressure,
+        "--load": load,
+        "--fault": fault,
+    }
+    require_positive("--duration", duration, "s")
+    require_positive("--sample-time", sample_time, "s")
+    if plant == STACK:
+        shared = {"--leakage-severity": leakage_severity, "--friction-severity": friction_severity, "--rig": rig}
+        refuse_given(shared, f"does not apply to --plant {STACK}")
+        record, said = simulated_stack(stack_options, condition, duration, sample_time, sensors, seed)
+        _prepare(out)
+        write_record(record.annotate(versions=_versions()), out)
+        _report(record, out, said, as_json)
+        return
+    duration, sample_time = duration or _DURATION, sample_time or _SAMPLE_TIME
+    refuse_given(stack_options, f"needs --plant {STACK}")
     for option, value, known in (
-        ("--plant", plant, PLANTS),
+        ("--plant", plant, [*PLANTS, STACK]),
         ("--drive", drive, DRIVES),
         ("--sensors", sensors, SENSORS),
     ):
         require_one_of(option, value, list(known))
-    require_positive("--duration", duration, "s")
-    require_positive("--sample-time", sample_time, "s")
     bench = load_rig(rig)
     parameters, made_of = _actuator(bench.parameters, condition, leakage_severity, friction_severity)
     _prepare(out)
@@ -141,7 +186,7 @@ def _versions() -> dict[str, str]:
 
 def _report(record: "Record", out: Path, made_of: Mapping[str, Any], as_json: bool) -> None:
     said = f"{len(record)} samples, {record.duration:g} s at {1.0 / record.sample_time:g} Hz, {', '.join(record)}"
-    if PRESSURE not in record:
+    if PRESSURE not in record and made_of["plant"] != STACK:
         note(f"{PRESSURE} is not logged by these sensors: estimate and diagnose will be less certain")
     if not as_json:
         emit(f"{out}: {said}")

@@ -29,12 +29,29 @@ ERRATA: Mapping[str, str] = MappingProxyType(
         "E18": "The sentence after 5.4 sets P₂ equal to itself; P₂ = P_b is meant.",
         "E19": "Equations 5.13 and 5.14 lack a dot and a sign, which are restored.",
         "E20": "The paper's 2.07e8 Pa is the truth of these simulations; its earlier 2.1e8 Pa stands beside it.",
+        "P1": "The hysteresis law is multiplied out; it has no jump and shares no letter with the chamber's height.",
+        "P2": "Equation 2's product is a first-order lag, and hysteresis takes from the stroke.",
+        "P3": "A run starts where the bias pressure holds the stack.",
+        "P4": "The air fraction holds at atmospheric pressure.",
+        "P5": "Equation 5 needs absolute pressure and a floor; liquid, air and vapour share one closed form.",
+        "P6": "Signs in equations 8 and 11 are mended; ports and leakage are added to the chamber.",
+        "P7": "Equation 13 lets a reed swing through its seat; it has a seat and a stop here.",
+        "P8": "A reed's flow is laminar at small drops.",
+        "P9": "The Reynolds number is checked, not assumed.",
+        "P10": "Equation 17 lacks the volume between reed and line.",
+        "P11": "The cylinder's low side and the way back are added.",
+        "P12": "Minor losses follow the flow's direction; their sum is calibrated.",
+        "P13": "Friction opposes motion, and the rod has end stops.",
+        "P14": "Equations 29 to 33 cannot tell k_u from alpha; all parameters are fitted together.",
+        "P15": "The flow curves are Figure 11, though the text says Figure 9.",
+        "P16": "The accumulator's gas is part of the plant, unless it is shut.",
+        "P17": "Table 1 and the figures are lost; parameters are calibrated to the numbers that the text quotes.",
     }
 )
 """One sentence an erratum, by number."""
 
-_NUMBER = re.compile(r"\b(E\d{1,2})\b")
-_LINK = re.compile(r'href="#(E\d{1,2})"')
+_NUMBER = re.compile(r"\b([EP]\d{1,2})\b")
+_LINK = re.compile(r'href="#([EP]\d{1,2})"')
 
 
 def linked(text: str) -> Markup:

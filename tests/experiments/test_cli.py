@@ -86,7 +86,7 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
         (["estimate"], "hydrostate estimate: Missing argument 'LOG'."),
         (
             ["estimate", "a.csv", "--sart", "1"],
-            "hydrostate estimate: No such option: --sart (Possible options: --start",
+            "hydrostate estimate: No such option: --sart (Possible options: --plant, --start",
         ),
         (
             ["estimate", "a.csv", "--form", "force"],
@@ -110,7 +110,10 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
         (["identify", "a.csv", "--order", "0"], "--order must be a whole number from 1 on, or auto, got '0'"),
         (["simulate"], "hydrostate simulate: Missing option '--out' / '-o'."),
         (["simulate", "-o", "a.xls"], "--out must end in .csv"),
-        (["simulate", "-o", "a.csv", "--plant", "toy"], "--plant must be one of reduced, lumped, circuit, got 'toy'"),
+        (
+            ["simulate", "-o", "a.csv", "--plant", "toy"],
+            "--plant must be one of reduced, lumped, circuit, piezo-stack, got 'toy'",
+        ),
         (["simulate", "-o", "a.csv", "--drive", "walk"], "--drive must be one of sine"),
         (["simulate", "-o", "a.csv", "--duration", "inf"], "--duration must be positive and finite, got inf s"),
         (["simulate", "-o", "a.csv", "--leakage-severity", "9"], "leakage severity must be between 0 and 5, got 9.0"),

@@ -1,0 +1,54 @@
+"""What a bench's sensors can tell of a piezo-stack actuator, before anything is measured."""
+
+import pandas as pd
+
+from estimation.piezo_stack import stack_bounds
+from estimation.piezo_stack_unknowns import DEFAULT_UNKNOWNS
+from plant.piezo_stack_parameters import PiezoStackParameters
+from plant.piezo_stack_run import SAMPLE_TIME, sine_drive
+
+SENSOR_SETS = {
+    "position": ("position_m",),
+    "pressure": ("chamber_pressure_pa",),
+    "stack displacement": ("stack_displacement_m",),
+    "stack displacement, position": ("stack_displacement_m", "position_m"),
+    "all four": ("stack_displacement_m", "stack_force_n", "position_m", "chamber_pressure_pa"),
+}
+"""Channels beside the drive, by what the card calls them."""
+
+FREQUENCIES = (100.0, 275.0)
+"""Drives that are looked at [Hz]."""
+
+DURATION = 0.1
+"""Length of the experiment [s]."""
+
+SIZES = {
+    "chamber_leakage": 5e-12,
+    "crossport_leakage": 5e-12,
+    "coulomb_friction": 100.0,
+}
+"""Minor faults that leaks and friction are compared with [SI]; the others act as factors."""
+
+
+def identifiability_card(healthy: PiezoStackParameters) -> pd.DataFrame:
+    """Return Cramér-Rao bounds of every quantity, all unknown together, by sensors and drive.
+
+    Parameters
+    ----------
+    healthy : PiezoStackParameters
+        The actuator, with its load.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns frequency_hz, sensors, and for each quantity its standard deviation in percent: of a minor fault for
+        leaks and friction, of itself for the others.
+    """
+    rows: list[dict[str, object]] = []
+    for frequency in FREQUENCIES:
+        drive = sine_drive(frequency, 140.0, DURATION, SAMPLE_TIME)
+        for name, channels in SENSOR_SETS.items():
+            bounds = stack_bounds(healthy, drive, SAMPLE_TIME, channels=channels)
+            percent = {unknown: 100.0 * bounds[unknown] / SIZES.get(unknown, 1.0) for unknown in DEFAULT_UNKNOWNS}
+            rows.append({"frequency_hz": frequency, "sensors": name, **percent})
+    return pd.DataFrame(rows)

@@ -1,0 +1,130 @@
+"""Bouc-Wen parameters from loops: those of a stack, and those of the public benchmark."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from estimation.bouc_wen import (
+    SHAPE,
+    fit_oscillator,
+    fit_stack_loop,
+    linear_start,
+    simulate_oscillator,
+)
+from estimation.bouc_wen_printed import REGIONS, printed_fit
+from estimation.step_sensitivity import sensitivity_step
+from plant.bouc_wen import OscillatorParameters, slow_stack_step
+from plant.components.bouc_wen import asymmetric_bouc_wen_rate
+from plant.errors import LogError
+from plant.integrate import compile_trajectory
+from plant.piezo_stack_parameters import PiezoStackParameters
+from plant.piezo_stack_run import stack_row
+
+STACK = PiezoStackParameters()
+SAMPLES = 2000
+NAMES = ("free_stroke_a_volt", *SHAPE)
+
+
+def slow_loop(swing: float, cycles: int, samples: int = SAMPLES) -> tuple[np.ndarray, np.ndarray]:
+    """Equation 1 in tiny Euler steps, which nothing in the packages takes."""
+    fine = 20
+    voltage = 0.5 * swing * (1.0 - np.cos(2.0 * np.pi * np.arange(cycles * samples * fine + 1) / (samples * fine)))
+    shape = [getattr(STACK, name) for name in SHAPE]
+    h, found = 0.0, [0.0]
+    for change in np.diff(voltage).tolist():
+        h += asymmetric_bouc_wen_rate(change, h, *shape)
+        found.append(h)
+    displacement = STACK.free_stroke_a_volt * voltage - np.array(found)
+    return voltage[::fine], displacement[::fine]
+
+
+@pytest.fixture(scope="module")
+def loop() -> tuple[np.ndarray, np.ndarray]:
+    return slow_loop(100.0, 3)
+
+
+def test_every_parameter_comes_back_from_one_noisy_loop(loop: tuple[np.ndarray, np.ndarray]) -> None:
+    voltage, displacement = loop
+    noise = 2e-8 * np.random.default_rng(1).standard_normal(len(voltage))
+    fit = fit_stack_loop(voltage, displacement + noise)
+    for name in NAMES:
+        assert fit.values[name] == pytest.approx(getattr(STACK, name), abs=4.0 * fit.deviations[name])
+        assert fit.deviations[name] < 0.012 * abs(getattr(STACK, name))
+    assert fit.error == pytest.approx(2e-8, rel=0.05)
+
+
+@pytest.mark.slow
+def test_intervals_cover_as_often_as_they_say(loop: tuple[np.ndarray, np.ndarray]) -> None:
+    voltage, displacement = loop
+    covered = 0
+    for seed in range(40):
+        noise = 2e-8 * np.random.default_rng(seed).standard_normal(len(voltage))
+        fit = fit_stack_loop(voltage, displacement + noise)
+        ends = [(*fit.interval(name), getattr(STACK, name)) for name in NAMES]
+        covered += sum(low <= truth <= high for low, high, truth in ends)
+    assert 0.88 <= covered / (40 * len(NAMES)) <= 1.0
+
+
+def test_one_cycle_from_rest_is_not_enough() -> None:
+    with pytest.raises(LogError, match="two cycles or more"):
+        fit_stack_loop(*slow_loop(100.0, 1))
+
+
+def test_a_loop_that_does_not_end_where_it_began_is_refused(loop: tuple[np.ndarray, np.ndarray]) -> None:
+    with pytest.raises(LogError, match="must end at the voltage where it began"):
+        fit_stack_loop(loop[0][: SAMPLES // 2], loop[1][: SAMPLES // 2])
+
+
+def test_the_printed_procedure_misses_though_its_signs_are_right(loop: tuple[np.ndarray, np.ndarray]) -> None:
+    small = slow_loop(5.0, 2)
+    settled = float(STACK.free_stroke_a_volt - STACK.hysteresis) * 5.0
+    last = slice(-SAMPLES - 1, None)
+    printed = printed_fit((5.0, settled), (small[0][last], small[1][last]), (loop[0][last], loop[1][last]))
+    truth = STACK.free_stroke_a_volt - STACK.hysteresis
+    assert printed.values["free_stroke_a_volt"] == pytest.approx(truth, rel=0.01)
+    assert abs(printed.values["hysteresis"]) < 0.2 * STACK.hysteresis
+    assert min(printed.samples) < 0.02 * SAMPLES
+    np.testing.assert_allclose(REGIONS.T @ REGIONS, 4.0 * np.eye(4))
+
+
+def test_sensitivities_are_those_of_the_step() -> None:
+    run = compile_trajectory("slow_stack", sensitivity_step(slow_stack_step, 1, SHAPE), 6, PiezoStackParameters)  # pyright: ignore[reportArgumentType] - any class of named floats serves
+    voltage = 50.0 * (1.0 - np.cos(np.arange(300) / 40.0))
+
+    def end(**changed: float) -> np.ndarray:
+        return run(np.zeros(6), voltage, stack_row(replace(STACK, **changed))[None], 1.0, 1)[-1]
+
+    for place, name in enumerate(SHAPE):
+        value, change = getattr(STACK, name), 1e-4 * abs(getattr(STACK, name))
+        up, down = (float(end(**{name: value + sign * change})[0]) for sign in (1.0, -1.0))
+        assert end()[1 + place] == pytest.approx((up - down) / (2.0 * change), rel=1e-5)
+
+
+@pytest.mark.slow
+def test_the_public_benchmark_is_identified_and_predicted(shared: Path) -> None:
+    folder = shared / "data" / "bouc_wen"
+    if not folder.is_dir():
+        pytest.skip(f"no {folder}")
+    read = {
+        name: pd.read_csv(folder / f"{name}.csv") for name in ("train_multisine", "test_multisine", "test_sinesweep")
+    }
+    period, sample_time = 8192, 1.0 / 750.0
+    force = read["train_multisine"]["u_N"].to_numpy()[:period]
+    measured = read["train_multisine"]["y_m"].to_numpy().reshape(-1, period)[1:].mean(axis=0)
+    fit = fit_oscillator(force, measured, sample_time, linear_start(force, measured, sample_time))
+    for name, truth in (
+        ("mass", 2.0),
+        ("stiffness", 5e4),
+        ("alpha", 5e4),
+        ("beta_gamma", 800.0),
+        ("beta_delta", -1100.0),
+    ):
+        assert fit.values[name] == pytest.approx(truth, rel=0.05)
+    found = OscillatorParameters(**fit.values)
+    for name, most in (("test_multisine", 2e-5), ("test_sinesweep", 3e-5)):
+        log = read[name]
+        predicted = simulate_oscillator(log["u_N"].to_numpy(), sample_time, found, periodic=name == "test_multisine")
+        assert np.sqrt(np.mean((predicted - log["y_m"].to_numpy()) ** 2)) < most
