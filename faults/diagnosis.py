@@ -30,7 +30,7 @@ class Diagnosis:
     reasons : tuple of str
         What.
     severity : Mapping[str, Severity]
-        How bad, by the names of `faults.severity.UNITS`.
+        How bad, by the names of `faults.severity.UNITS` [each in the unit given there].
     not_told : tuple of str
         What the log does not determine.
     scoreboard : Scoreboard

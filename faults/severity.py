@@ -159,7 +159,7 @@ def what_is_not_told(fits: ClassFits, found: Mapping[str, Severity], *, pressure
     fits : ClassFits
         The fit.
     found : Mapping[str, Severity]
-        Its severities.
+        Its severities [each in its unit].
     pressure : bool
         Whether differential pressure is logged.
 
