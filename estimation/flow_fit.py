@@ -6,6 +6,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.bridging import gaps
 from estimation.flow import FLOW_FORM, MASS_FLOW_FORM, relieving
 from estimation.form_fit import LONGEST_STEP, FormFit, weighed
 from estimation.greybox_descent import descend
@@ -162,8 +163,8 @@ def speed_gaps(record: Record, parameters: EhaParameters) -> Array:
     stiffness = parameters.bulk_modulus / parameters.chamber_volume * parameters.pump_displacement
     open_by = 0.5 * stiffness * sudden * length * record.sample_time
     noise = measurement_variances(record, ("differential_pressure_pa",))["differential_pressure_pa"] ** 0.5
-    gaps = np.array([first, behind, open_by**2 / (length + 1)], dtype=np.float64)
-    return np.ascontiguousarray(gaps[:, open_by > FELT_GAP * noise].T)
+    open_gaps = np.array([first, behind, open_by**2 / (length + 1)], dtype=np.float64)
+    return np.ascontiguousarray(open_gaps[:, open_by > FELT_GAP * noise].T)
 
 
 def _log(record: Record, parameters: EhaParameters, uncertainties: Mapping[str, float]) -> GreyBoxLog:
@@ -172,7 +173,7 @@ def _log(record: Record, parameters: EhaParameters, uncertainties: Mapping[str, 
     return GreyBoxLog(
         drives=np.column_stack([bridged(record[channel]) for channel in FLOW_FORM.drives]),
         # where the piston is within a gap of its position is not known, where it is after it is
-        measured=np.where(np.isnan(record["position_m"]), np.nan, record["differential_pressure_pa"])[:, None],
+        measured=np.where(_within_gaps(record["position_m"]), np.nan, record["differential_pressure_pa"])[:, None],
         parameters=parameter_row(parameters),
         sample_time=record.sample_time,
         steps=np.full(len(record), max(1, ceil(record.sample_time / LONGEST_STEP - 1e-9))),
@@ -185,6 +186,15 @@ def _log(record: Record, parameters: EhaParameters, uncertainties: Mapping[str, 
             "makeup_opening": (OPENING_START, PRESUMED_STD),
         },
     )
+
+
+def _within_gaps(position: Array) -> NDArray[np.bool_]:
+    """Return the samples in gaps of the position, and before its first and after its last."""
+    present = np.flatnonzero(np.isfinite(position))
+    apart, wide = gaps(position)
+    within = np.isnan(position)
+    within[present[0] : present[-1]] &= np.repeat(wide, apart.astype(np.int64))
+    return within
 
 
 def _usual_leakage(p: EhaParameters) -> float:
