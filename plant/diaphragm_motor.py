@@ -19,7 +19,7 @@ from plant.components.bouc_wen import power_bouc_wen_rate
 from plant.components.diaphragm import centre_deflection, chamber_compliance
 from plant.components.directional_valve import fed_pressure, pressure_after_return, return_flow, tank_openings
 from plant.components.end_stop import end_stop_force
-from plant.components.flap_valve import opening_target, orifice_drag, port_flow_after
+from plant.components.flap_valve import late_share, opening_target, orifice_drag, port_flow_after
 from plant.diaphragm_motor_parameters import DIAPHRAGMS, ROWS, VALVES, DiaphragmMotorParameters
 
 Array: TypeAlias = NDArray[np.float64]
@@ -206,10 +206,11 @@ def motor_derivative(state: State, rate: Scalar, p: Any) -> State:
 
 
 def motor_step(state: State, voltages: tuple[Scalar, Scalar], flat: Any, h: Scalar) -> State:
-    """Return the state after a semi-implicit step of `motor_derivative`: flows first, then pressures by the new flows.
+    """Return the state after a leapfrog step of `motor_derivative`: flows, openings and speed stand half a step early.
 
-    Ports and lands are solved implicitly, for a shut one is stiffer than any step; friction linearly so. No chamber
-    falls below the least pressure.
+    They are pushed by the pressures between them, pressures by the flows between, so that the scheme is of second
+    order and loses no energy of its own. Losses count as in `port_flow_after`, for a shut port is stiffer than any
+    step. No chamber falls below the least pressure.
 
     Parameters
     ----------
@@ -232,32 +233,34 @@ def motor_step(state: State, voltages: tuple[Scalar, Scalar], flat: Any, h: Scal
     hysteresis = state[HYSTERESIS]
     side_a, side_b, velocity, position = state[SIDE_A:]
     drops = _drops(pressures, fed_pressure(p.spool, side_a, side_b))
-    held = h / p.valve_lag
-    opened = [(s + held * target) / (1.0 + held) for s, target in zip(openings, _targets(drops, p), strict=True)]
+    held = 0.5 * h / p.valve_lag
+    opened = [
+        ((1.0 - held) * s + 2.0 * held * target) / (1.0 + held)
+        for s, target in zip(openings, _targets(drops, p), strict=True)
+    ]
+    midway = tuple(0.5 * (before + after) for before, after in zip(openings, opened, strict=True))
     passed = [
         port_flow_after(q, drop, drag, p.valve_resistance, p.inertance, h)
-        for q, drop, drag in zip(flows, drops, _drags(tuple(opened), p), strict=True)
+        for q, drop, drag in zip(flows, drops, _drags(midway, p), strict=True)
     ]
     swing = voltages[1] - voltages[0]
-    yielded = _hysteresis_rate(swing, hysteresis, p)
+    yielded = _hysteresis_rate(swing, hysteresis + 0.5 * _hysteresis_rate(swing, hysteresis, p), p)
     driven = p.volume_a_volt * (swing - yielded)
-    lowest = p.least_pressure - p.supply_pressure
-    chambers = [
-        maximum(pressure + (h * (into - out) + polarity * share * driven) / compliance, lowest)
-        for pressure, into, out, polarity, share, compliance in zip(
-            pressures, passed[:-1], passed[1:], POLARITY, p.polarisation, _compliances(pressures, p), strict=True
-        )
+    displaced = [
+        h * (into - out) + polarity * share * driven
+        for into, out, polarity, share in zip(passed[:-1], passed[1:], POLARITY, p.polarisation, strict=True)
     ]
     stuck = tanh(velocity / p.friction_speed)
     resistance = p.viscous_friction + p.coulomb_friction / p.friction_speed * (1.0 - stuck * stuck)
     force = _force(side_a, side_b, velocity, position, p)
-    speed = velocity + h * force / (p.moving_mass + h * resistance)
+    late = late_share(h * resistance / p.moving_mass)
+    speed = velocity + h * force / (p.moving_mass + late * h * resistance)
     leaked = p.crossport_leakage * (side_a - side_b)
     into_a, into_b = _side_inflows(passed[-1], speed, leaked, p)
     open_a, open_b = tank_openings(p.spool)
     compliance = _side_compliance(p)
     return (
-        *chambers,
+        *_chambers_after(pressures, displaced, p),
         hysteresis + yielded,
         *passed,
         *opened,
@@ -266,6 +269,18 @@ def motor_step(state: State, voltages: tuple[Scalar, Scalar], flat: Any, h: Scal
         speed,
         position + h * speed,
     )
+
+
+def _chambers_after(pressures: State, displaced: list[Scalar], p: Any) -> list[Scalar]:
+    """Return the chambers' pressures after volumes were pressed in: stiffness is that at the middle of the way."""
+    lowest = p.least_pressure - p.supply_pressure
+    stiff = p.diaphragm_compliance + p.chamber_volume / p.bulk_modulus
+    after: list[Scalar] = []
+    for pressure, volume, compliance in zip(pressures, displaced, _compliances(pressures, p), strict=True):
+        ahead = volume / compliance
+        softening = (1.0 + 1.0 / p.gas_exponent) * (compliance - stiff) / (p.supply_pressure + pressure)
+        after.append(maximum(pressure + volume / (compliance - 0.5 * softening * ahead), lowest))
+    return after
 
 
 def at_rest(p: Any) -> Array:

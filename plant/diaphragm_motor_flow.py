@@ -134,7 +134,7 @@ def operate(
     --------
     >>> point = operate(pump_alone(DiaphragmMotorParameters()), 480.0, 200.0)
     >>> round(6e7 * point.outlet_flow, 1)
-    109.4
+    109.6
     """
     p = parameters
     a_cycle = ceil(1.0 / (frequency * longest_step) - 1e-9)

@@ -3,7 +3,7 @@
 Source: judged; the diaphragm-motor paper gives no law of its umbrella valves, errata M22.
 """
 
-from plant.compiled.functions import Scalar, maximum, minimum
+from plant.compiled.functions import Scalar, absolute, maximum, minimum
 from plant.components.cylinder import velocity_under_friction
 
 
@@ -71,14 +71,17 @@ def orifice_drag(opening: Scalar, area: Scalar, coefficient: Scalar, density: Sc
 def port_flow_after(
     flow: Scalar, drop: Scalar, drag: Scalar, resistance: Scalar, inertance: Scalar, h: Scalar
 ) -> Scalar:
-    """Return the flow after an implicit step of ``I q' = drop - R q - D q |q|``: no port is too tight for it.
+    """Return the flow after a step of ``I q' = drop - R q - D q |q|``, whatever the drag.
+
+    Losses count by a share at the step's end that goes from a half where they are slow, which is of second order, to
+    one where the port is all but shut, so that no port is too tight for the step.
 
     Parameters
     ----------
     flow : float, ndarray or Expression
         Flow at the step's start [m^3/s].
     drop : float, ndarray or Expression
-        Pressure before less pressure behind [Pa].
+        Pressure before less pressure behind at the step's middle [Pa].
     drag : float, ndarray or Expression
         D, see `orifice_drag` [Pa s^2/m^6].
     resistance : float or Expression
@@ -95,9 +98,32 @@ def port_flow_after(
 
     Examples
     --------
-    >>> q = float(port_flow_after(1e-6, 1e4, 3e14, 6e8, 2.5e6, 5e-6))
-    >>> round(2.5e6 * (q - 1e-6) / 5e-6 + 6e8 * q + 3e14 * q * q, 6)
-    10000.0
+    >>> round(6e7 * float(port_flow_after(1e-6, 1e4, 3e14, 6e8, 2.5e6, 5e-6)), 4)
+    61.0907
     """
     carried = inertance / h
-    return velocity_under_friction(carried * flow + drop, carried + resistance, drag, 0.0)
+    lost = drag * absolute(flow)
+    late = late_share((resistance + 2.0 * lost) / carried)
+    push = carried * flow + drop - (1.0 - late) * (resistance + lost) * flow
+    return velocity_under_friction(push, carried + late * resistance, late * drag, 0.0)
+
+
+def late_share(decay: Scalar) -> Scalar:
+    """Return the share of a loss that counts at a step's end: 1/2 for slow decay, of second order; 1 for sudden decay.
+
+    Parameters
+    ----------
+    decay : float, ndarray or Expression
+        Rate of decay times step [dimensionless], not negative.
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Share [dimensionless].
+
+    Examples
+    --------
+    >>> late_share(0.0), round(late_share(1e6), 6)
+    (0.5, 0.999999)
+    """
+    return (1.0 + decay) / (2.0 + decay)

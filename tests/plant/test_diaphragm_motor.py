@@ -1,6 +1,7 @@
 """The diaphragm motor: balances, energy, numerics against a stiff solver, and the flows that the paper quotes."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,8 +15,12 @@ from plant.diaphragm_motor import (
     SIDE_B,
     STATES,
     VELOCITY,
+    MotorRow,
     at_rest,
+    deflections,
+    gathered,
     motor_derivative,
+    motor_row,
 )
 from plant.diaphragm_motor_flow import operate, pump_alone, tone
 from plant.diaphragm_motor_parameters import DiaphragmMotorParameters, changed
@@ -30,6 +35,7 @@ from plant.diaphragm_motor_run import (
     simulate_motor,
 )
 from plant.errors import DriveError, HydrostateError, RigError
+from plant.reference_solver import reference_trajectory
 
 HEALTHY = DiaphragmMotorParameters()
 PUMP = pump_alone(HEALTHY)
@@ -213,3 +219,24 @@ def test_a_schedule_must_rise_from_zero() -> None:
 def test_the_states_are_named_once_each_and_the_rod_comes_last() -> None:
     assert len(set(STATES)) == len(STATES) == 28
     assert STATES[POSITION] == "position_m"
+
+
+@pytest.mark.slow
+def test_flow_and_deflections_follow_a_stiff_solver() -> None:
+    step, time = 1e-5, 0.06
+    drive = motor_drive(PEAK, SWING, time, step)
+    rate = np.gradient(drive, step, edge_order=2)
+    start = at_rest(HEALTHY)
+    start[SIDE_B] = 1.0  # the root in the return land has no slope at zero
+    row = MotorRow(*motor_row(HEALTHY))
+    scale = np.array([2e4] * 7 + [10.0] + [2e-6] * 8 + [1.0] * 8 + [1e4, 1e4, 5e-3, 1e-4])
+
+    def rates(state: tuple[Any, ...], slope: Any, flat: Any) -> tuple[Any, ...]:
+        return motor_derivative(state, slope, gathered(flat))
+
+    wanted = reference_trajectory(rates, start, rate, row, step, scale=scale, relative_tolerance=1e-7)
+    ours = run_motor(HEALTHY, drive, step, start=start)
+    half = len(drive) // 2
+    bent, true = (deflections(states, drive, HEALTHY)[half:] for states in (ours, wanted))
+    assert np.sqrt(np.mean((bent - true) ** 2)) < 1e-3 * np.ptp(true)
+    assert ours[half:, FLOWS].mean() == pytest.approx(wanted[half:, FLOWS].mean(), rel=1e-3)
