@@ -18,10 +18,9 @@ DIAPHRAGMS = 7
 VALVES = DIAPHRAGMS + 1
 """Check valves: one before each chamber and one behind the last (section 2, errata M28)."""
 
-PLATE = "derived: composite plate of Table 1, clamped at 14 mm, see plant.composite_plate"
+PLATE = "derived: composite plate of Table 1, clamped at 14 mm, errata M14"
 CALIBRATED = "calibrated to 110.11 ml/min at 480 Hz and 200 V peak to peak, section 7.1"
 ASSUMED = "assumed, errata M22"
-DERIVED = "derived"
 FAULT = "a fault of ours"
 
 PerDiaphragm = tuple[float, ...]

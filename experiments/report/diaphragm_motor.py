@@ -138,8 +138,8 @@ def _sensitivity(frame: pd.DataFrame) -> Markup:
 
 def _modes(frame: pd.DataFrame) -> Markup:
     columns = (
-        Column("diameters", "nodal diameters"),
-        Column("circles", "nodal circles"),
+        Column("diameters", "nodal diameters", words=str),
+        Column("circles", "nodal circles", words=str),
         Column("root", "λ²"),
         Column("frequency_hz", "frequency", "Hz"),
     )
@@ -150,7 +150,7 @@ def _sets(frame: pd.DataFrame) -> Markup:
     columns = (
         Column("set", "set"),
         Column("frequency_hz", "best frequency", "Hz", digits=3),
-        Column("flow_m3_s", "peak flow", "ml/min", _ML_MIN, digits=3),
+        Column("flow_m3_s", "peak flow", "ml/min", _ML_MIN),
         Column("blocking_n", "blocking force at 480 Hz", "N", digits=3),
     )
     return html_table(
