@@ -187,7 +187,8 @@ def average_run(
 ) -> tuple[Array, Array, Array]:
     """Return pressure, velocity and position of the averaged motor from rest, along a voltage (equations 2 and 18).
 
-    ``C dp' = Q(V, f, dp) - A_c v - G dp`` and ``M v' = A_c dp - F - c v - F_c tanh(v/v_s)``, by a semi-implicit step.
+    ``C p_A' = Q(V, f, p_A) - A_c v - G dp`` and ``M v' = A_c dp - F - c v - F_c tanh(v/v_s)``, by a semi-implicit step.
+    The other side returns to tank at once: ``p_B = (A_c v / K)^2``, which damps the liquid's and the piston's swing.
 
     Parameters
     ----------
@@ -214,18 +215,23 @@ def average_run(
     """
     area, mass, h = p.piston_area, p.moving_mass, sample_time
     compliance = p.line_compliance + p.cylinder_volume / p.cylinder_bulk_modulus
-    pressure, velocity, position = np.zeros(len(swing)), np.zeros(len(swing)), np.zeros(len(swing))
-    row, last = maps.row(maps.flow, frequency, float(swing[0])), float(swing[0])
+    returned = (area / p.land_conductance) ** 2
+    difference, velocity, position = np.zeros(len(swing)), np.zeros(len(swing)), np.zeros(len(swing))
+    fed, last = 0.0, np.nan
+    row = axis = maps.pressures
     for k in range(len(swing) - 1):
         if swing[k] != last:
             last = float(swing[k])
             row = maps.row(maps.flow, frequency, last)
-        dp, v = float(pressure[k]), float(velocity[k])
+            axis = maps.pressures + np.sign(row) * (row / p.land_conductance) ** 2
+        v, dp = float(velocity[k]), float(difference[k])
         rubbed = tanh(v / p.friction_speed)
         push = area * dp - p.load_force - p.viscous_friction * v - p.coulomb_friction * rubbed
         steep = p.viscous_friction + p.coulomb_friction / p.friction_speed * (1.0 - rubbed**2)
-        velocity[k + 1] = v + h * push / (mass + h * steep)
-        delivered = float(np.interp(dp, maps.pressures, row))
-        pressure[k + 1] = dp + h / compliance * (delivered - area * velocity[k + 1] - p.crossport_leakage * dp)
-        position[k + 1] = position[k] + h * velocity[k + 1]
-    return pressure, velocity, position
+        steep += 2.0 * area * returned * abs(v)
+        after = v + h * push / (mass + h * steep)
+        fed += h / compliance * (float(np.interp(fed, axis, row)) - area * after - p.crossport_leakage * dp)
+        velocity[k + 1] = after
+        difference[k + 1] = fed - returned * after * abs(after)
+        position[k + 1] = position[k] + h * after
+    return difference, velocity, position

@@ -23,7 +23,7 @@ from experiments.studies.diaphragm_motor import (
     sweep_load,
     sweep_voltage,
 )
-from experiments.studies.diaphragm_motor_control import control_runs
+from experiments.studies.diaphragm_motor_control import averaged_course, control_runs
 from experiments.studies.diaphragm_motor_quoted import not_reproduced, reproduced
 from plant.diaphragm_motor_parameters import DiaphragmMotorParameters
 
@@ -36,6 +36,7 @@ STUDIES: dict[str, Callable[[DiaphragmMotorParameters], pd.DataFrame]] = {
     "reversal": reversal,
     "sensitivity": sensitivities,
     "other sets": other_sets,
+    "averaged": averaged_course,
 }
 """The tables that are simulated, by name."""
 

@@ -189,6 +189,32 @@ def draw_reversal(tables: Tables) -> Figure:
     return figure
 
 
+def draw_averaged(tables: Tables) -> Figure:
+    """Draw the piston's velocity by the fast plant and by the averaged motor.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The study's tables.
+
+    Returns
+    -------
+    Figure
+        Velocity over time.
+    """
+    course = tables["averaged"]
+    title = "Averaged over cycles: 150, 250 and 200 V at 480 Hz against 5 N"
+    figure, (axis,) = panels(title, 1, 1, 3.2, Margins(left=0.7))
+    axis.plot(
+        course["time_s"], MILLI * course["fast_m_s"], color=SKY, linewidth=2.2, label="fast plant, mean of a cycle"
+    )
+    axis.plot(course["time_s"], MILLI * course["averaged_m_s"], color=VERMILION, label="averaged motor on its maps")
+    axis.set_xlabel("time [s]")
+    axis.set_ylabel("velocity [mm/s]")
+    axis.legend(loc="lower right")
+    return figure
+
+
 def draw_control(tables: Tables) -> Figure:
     """Draw velocity under PI control, healthy above, with a leak past the piston below.
 
@@ -247,6 +273,13 @@ MOTOR_FIGURES: Mapping[str, TableFigure] = MappingProxyType(
             "Reversal: the directional valve",
             "At the valve's centre the pump runs to tank and both sides of the cylinder are shut.",
             draw_reversal,
+        ),
+        "averaged": TableFigure(
+            "Averaged model: beside the fast plant",
+            "What filters and controllers step by 0.2 ms instead of 10 µs: maps of flow against voltage, frequency and "
+            "pressure, and the cylinder on them. The pump's own answer to a step, two or three milliseconds, is "
+            "not in it.",
+            draw_averaged,
         ),
         "control": TableFigure(
             "Control: PI by encoder and by self-sensing",

@@ -8,10 +8,11 @@ import numpy as np
 import pandas as pd
 
 from estimation.diaphragm_motor_control import ControlledRun, controlled_run
-from estimation.diaphragm_motor_maps import MotorMaps, motor_maps
+from estimation.diaphragm_motor_maps import AVERAGE_STEP, MotorMaps, average_run, motor_maps
 from experiments.studies.diaphragm_motor import PEAK
+from plant.diaphragm_motor import POSITION
 from plant.diaphragm_motor_parameters import DiaphragmMotorParameters
-from plant.diaphragm_motor_run import Schedule
+from plant.diaphragm_motor_run import RAMP, SAMPLE_TIME, Schedule, run_motor
 
 LEAK = 2e-12
 """Leakage past the piston that self-sensing is shown not to see [m^3/(s Pa)]."""
@@ -77,6 +78,35 @@ def control_runs(p: DiaphragmMotorParameters, seed: int) -> tuple[pd.DataFrame, 
             }
         )
     return pd.concat(courses, ignore_index=True), pd.DataFrame(figures)
+
+
+def averaged_course(p: DiaphragmMotorParameters) -> pd.DataFrame:
+    """Return the averaged motor beside the fast plant while voltage steps under a load (equations 2 and 18).
+
+    Parameters
+    ----------
+    p : DiaphragmMotorParameters
+        The motor.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns time_s, voltage_v, fast_m_s (mean over the cycle around it), averaged_m_s; every 1 ms.
+    """
+    loaded = replace(p, load_force=LIGHT)
+    time = SAMPLE_TIME * np.arange(round(0.3 / SAMPLE_TIME) + 1)
+    swing = np.where(time < 0.1, 150.0, np.where(time < 0.2, 250.0, 200.0)) * np.minimum(time / RAMP, 1.0)
+    drive = 0.5 * swing * np.sin(2.0 * np.pi * PEAK * time)
+    position = run_motor(loaded, drive, SAMPLE_TIME)[:, POSITION]
+    sparse = round(AVERAGE_STEP / SAMPLE_TIME)
+    _, velocity, _ = average_run(motor_maps(p, (PEAK,)), loaded, PEAK, swing[::sparse])
+    shown = np.arange(round(2e-3 / SAMPLE_TIME), len(time) - 104, round(1e-3 / SAMPLE_TIME))
+    half = 0.5 / PEAK
+    moved = np.interp(time[shown] + half, time, position) - np.interp(time[shown] - half, time, position)
+    averaged = np.interp(time[shown], time[::sparse], velocity)
+    return pd.DataFrame(
+        {"time_s": time[shown], "voltage_v": swing[shown], "fast_m_s": moved * PEAK, "averaged_m_s": averaged}
+    )
 
 
 def _run(schedule: Schedule, maps: MotorMaps, sensing: str, seed: int) -> ControlledRun:
