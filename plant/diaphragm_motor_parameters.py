@@ -58,7 +58,7 @@ class DiaphragmMotorParameters:
     bulk_modulus: Annotated[float, SI("Pa", "bulk modulus beta of the liquid without gas", ASSUMED)] = 1e9
     gas_exponent: Annotated[float, SI("1", "polytropic exponent n of the entrapped gas", ASSUMED)] = 1.2
     supply_pressure: Annotated[float, SI("Pa", "absolute pressure p_0 of tank and supply", ASSUMED)] = 1.5e5
-    least_pressure: Annotated[float, SI("Pa", "absolute pressure that no chamber falls below", ASSUMED)] = 3e3
+    least_pressure: Annotated[float, SI("Pa", "absolute pressure that no liquid falls below", ASSUMED)] = 3e3
     density: Annotated[float, SI("kg/m^3", "density rho of the liquid, water", ASSUMED)] = 998.0
     inertance: Annotated[float, SI("kg/m^4", "inertance I of the liquid in a port", CALIBRATED)] = 2.461e6
     port_area: Annotated[float, SI("m^2", "area A_v of a wide open check valve", CALIBRATED)] = 1.894e-6
