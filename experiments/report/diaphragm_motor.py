@@ -14,7 +14,7 @@ from plant.units import notes
 INTRODUCTION = (
     "Seven piezo diaphragms in series pump water through eight check valves to a double-acting cylinder. The paper "
     "prints sizes, materials and one flow; many of its other numbers are entries of a table of other devices. Below "
-    "stands what a plant built from the physics gives: first what agrees with the paper, then what does not."
+    "stands what a plant built from the physics gives: first the claims that such a motor can bear, then those that it cannot."
 )
 """The page's first paragraph."""
 
@@ -42,7 +42,7 @@ def render_motor_report(
     """
     beside = {"load": [_blocking(tables["load sweep"])], "control": [_control(tables["control"])]}
     sections = [
-        Section("reproduced", "Reproduced: claims that hold", tables=(_claims(tables["reproduced"]),)),
+        Section("reproduced", "Reproduced: what the physics can bear", tables=(_claims(tables["reproduced"]),)),
         Section(
             "not-reproduced",
             "Not reproduced: claims that do not hold",

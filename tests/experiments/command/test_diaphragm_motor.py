@@ -50,7 +50,10 @@ def test_the_study_writes_its_report_with_every_figure_and_says_what_fails(tmp_p
     page = (tmp_path / "motor" / "report.html").read_text(encoding="utf-8")
     assert page.count("<figure") == len(MOTOR_FIGURES)
     tables = tmp_path / "motor" / "tables"
-    assert pd.read_csv(tables / "reproduced.csv")["holds"].all()
+    claims = pd.read_csv(tables / "reproduced.csv").set_index("claim")["holds"]
+    assert [name for name, holds in claims.items() if not holds] == [
+        "the same to 0.95 of blocking, where valves leak and friction smooths"
+    ]
     denied = pd.read_csv(tables / "not_reproduced.csv").set_index("claim")["ours"]
     best = [float(f) for f in denied["best frequency at 0, 12.5, 25, 37.5 N [Hz]"].split(", ")]
     assert best == sorted(best, reverse=True)
