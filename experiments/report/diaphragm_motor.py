@@ -14,7 +14,8 @@ from plant.units import notes
 INTRODUCTION = (
     "Seven piezo diaphragms in series pump water through eight check valves to a double-acting cylinder. The paper "
     "prints sizes, materials and one flow; many of its other numbers are entries of a table of other devices. Below "
-    "stands what a plant built from the physics gives: first the claims that such a motor can bear, then those that it cannot."
+    "stands what a plant built from the physics gives: first the claims that such a motor can bear, then those that "
+    "it cannot."
 )
 """The page's first paragraph."""
 
