@@ -6,6 +6,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from experiments.figures.diaphragm_motor import MOTOR_FIGURES
+from experiments.report.errata import linked
 from experiments.report.sectioned import Section, render_sections
 from experiments.report.tables import Cell, Column, html_table, number
 from plant.diaphragm_motor_parameters import ROWS, DiaphragmMotorParameters
@@ -98,7 +99,8 @@ def _claims(frame: pd.DataFrame) -> Markup:
 
 
 def _denied(frame: pd.DataFrame) -> Markup:
-    columns = tuple(Column(name, name) for name in ("section", "claim", "published", "ours", "why"))
+    plain = (Column(name, name) for name in ("section", "claim", "published", "ours"))
+    columns = (*plain, Column("why", "why", words=linked))
     return html_table(frame, columns, "What the paper says, what the plant gives, and why.")
 
 
