@@ -150,8 +150,8 @@ def pid_step(pid: Pid, memory: PidMemory, error: float, sample_time: float) -> t
 
     Examples
     --------
-    >>> pid_step(Pid(2.0, 10.0, high=1.0), PidMemory(), 0.4, 0.1)
-    (1.0, PidMemory(integral=0.0, error=0.4))
+    >>> pid_step(Pid(2.0, 10.0, high=1.0), PidMemory(), 0.5, 0.1)
+    (1.0, PidMemory(integral=0.0, error=0.5))
     """
     filtered = memory.error + (error - memory.error) * sample_time / (sample_time + pid.filter_time)
     integral = memory.integral + pid.integral * error * sample_time

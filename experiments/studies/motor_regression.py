@@ -1,4 +1,4 @@
-"""The regression of the diaphragm-motor paper's Figure 12, in three readings of its Table 2 (errata M32).
+"""The regression of the diaphragm-motor paper's Figure 12, in three readings of its Table 2 (errata M24).
 
 Flow on deformation and velocity, least squares with an intercept, six rows. Table 3's rules are applied as printed, and
 what they cannot see is said beside: flow and velocity are one number, by equations 17 and 18.
@@ -34,7 +34,7 @@ HIGH_R_SQUARE, SIGNIFICANCE, HIGH_VIF = 0.9, 0.05, 5.0
 
 
 def reading(name: str) -> pd.DataFrame:
-    """Return Table 2 in one of its readings (errata M32).
+    """Return Table 2 in one of its readings (errata M24).
 
     Parameters
     ----------

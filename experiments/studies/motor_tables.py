@@ -1,4 +1,4 @@
-"""Tables 1, 2, 4 and 5 of the diaphragm-motor paper, and what holds in them (errata M14 to M18, M22 to M34).
+"""Tables 1, 2, 4 and 5 of the diaphragm-motor paper, and what holds in them (errata M14 to M18, M23 to M29).
 
 Printed units are kept: they are part of what is checked.
 """
@@ -13,7 +13,7 @@ from experiments.published import load
 from experiments.studies.motor_regression import FLOW, VELOCITY, reading
 
 PUMP_PISTON_MM = 38.0
-"""Bore by which Table 4's theory was computed (errata M33) [mm]."""
+"""Bore by which Table 4's theory was computed (errata M29) [mm]."""
 
 UNIT_FACTOR = 1000.0
 """The factor that equation 17 lacks in Table 2 (errata M17) [dimensionless]."""
@@ -47,7 +47,7 @@ def efficiency(table: pd.DataFrame, *, chambers: int = 5, inverted: bool = True,
     Examples
     --------
     >>> efficiency(reading("physical")).round(3).tolist()
-    [0.85, 0.85, 0.85, 0.85, 0.851, 0.85]
+    [0.85, 0.85, 0.85, 0.85, 0.85, 0.85]
     """
     deformation, voltage = table["deformation_delta_mm"], table["driving_voltage_us"]
     diameter = table["diaphragm_diameter_mm"]
@@ -139,7 +139,7 @@ def relations() -> pd.DataFrame:
 
 
 def table_4() -> pd.DataFrame:
-    """Return Table 4 with its theory and errors computed anew (errata M33).
+    """Return Table 4 with its theory and errors computed anew (errata M29).
 
     Returns
     -------
@@ -177,7 +177,7 @@ def table_5() -> pd.DataFrame:
 
 
 def published_motor() -> pd.DataFrame:
-    """Return why the proposed actuator's published numbers do not belong together (errata M28).
+    """Return why the proposed actuator's published numbers do not belong together (errata M26).
 
     Returns
     -------
