@@ -199,7 +199,7 @@ def oustaloup_states(order: float, low_hz: float, high_hz: float, count: int = 5
     order : float
         Order a [dimensionless], 0 or more and below 2; 0 and 1 are exact and need no state.
     low_hz, high_hz : float
-        The band; keep a decade away from what matters on either side [Hz].
+        The band; two decades beyond what matters on either side for an error below one percent [Hz].
     count : int
         States, one pole and one zero each.
 

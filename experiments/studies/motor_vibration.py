@@ -1,0 +1,356 @@
+"""The diaphragm-motor paper's linear models: poles by whose signs, Bode, Nyquist, fractional damping, hysteresis."""
+
+from dataclasses import replace
+from math import gamma, pi
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from plant.fractional import grunwald_letnikov
+from plant.hysteresis_model import (
+    HysteresisParameters,
+    describing_function,
+    harmonics,
+    hysteresis_loop,
+    linearised,
+    loop_area,
+    total_harmonic_distortion,
+)
+from plant.vibration_model import VibrationParameters, exact_response, first_mode, state_space
+
+if TYPE_CHECKING:
+    import control
+
+FREQUENCIES = np.geomspace(10.0, 1e4, 1201)
+"""Where responses are shown [Hz]."""
+
+TUNED_FREQUENCY = 480.0
+"""The published resonance, section 7.1 [Hz]."""
+
+ORDERS = (0.5, 1.0, 1.5)
+"""Of Figures 7 to 9."""
+
+LOOP_FREQUENCIES, LOOP_AMPLITUDE = (1.0, 10.0, 100.0, 480.0), 100.0
+"""Of the hysteresis loops [Hz, V]."""
+
+
+def vibration_models(p: VibrationParameters) -> "dict[str, control.StateSpace]":
+    """Return equations 1 to 4 as models of python-control (errata M1 to M4).
+
+    Parameters
+    ----------
+    p : VibrationParameters
+        Masses, springs, dampers.
+
+    Returns
+    -------
+    dict[str, control.StateSpace]
+        By name.
+    """
+    return {
+        "equations 1 and 2, signs mended": state_space(p),
+        "equations 1 and 2, as printed": state_space(p, signs="printed"),
+        "equation 4, signs mended": state_space(p, massless=True),
+    }
+
+
+def pole_table(p: VibrationParameters) -> pd.DataFrame:
+    """Return the poles of each model, one of each pair.
+
+    Parameters
+    ----------
+    p : VibrationParameters
+        Masses, springs, dampers.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns model, real_rad_s, imaginary_rad_s, frequency_hz, damping_ratio and stable.
+    """
+    return _poles({**vibration_models(p), "equation 20, small voltages": linearised(HysteresisParameters())})
+
+
+def _poles(models: "dict[str, Any]") -> pd.DataFrame:
+    rows = [
+        {
+            "model": name,
+            "real_rad_s": float(pole.real),
+            "imaginary_rad_s": float(pole.imag),
+            "frequency_hz": float(abs(pole) / (2.0 * pi)),
+            "damping_ratio": float(-pole.real / abs(pole)),
+            "stable": bool(pole.real < 0.0),
+        }
+        for name, model in models.items()
+        for pole in sorted(model.poles(), key=abs)
+        if pole.imag >= 0.0
+    ]
+    return pd.DataFrame(rows)
+
+
+def margin_table(p: VibrationParameters) -> pd.DataFrame:
+    """Return margins of the loops that Figures 22, 23, 31 and 32 speak of: each model times a gain, fed back.
+
+    The gain makes the model's own 1 at rest. A loop is stable if its closed poles are; Nyquist's count of clockwise
+    turns says the same only together with the open loop's unstable poles (errata M30).
+
+    Parameters
+    ----------
+    p : VibrationParameters
+        Masses, springs, dampers.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns model, gain_margin (infinite if none), phase_margin_deg, crossover_hz, open_unstable_poles, turns,
+        closed_unstable_poles and stable.
+    """
+    import control  # slow to import, and few callers need it
+
+    rows: list[dict[str, Any]] = []
+    models: dict[str, Any] = {**vibration_models(p), "equation 20, small voltages": linearised(HysteresisParameters())}
+    for name, model in models.items():
+        loop = model / float(np.real(model.dcgain()))
+        gain, phase, _, crossover = control.margin(loop)
+        closed_loop: Any = control.feedback(loop, 1)
+        open_poles, closed = np.real(loop.poles()), np.real(closed_loop.poles())
+        turns = control.nyquist_response(
+            loop, omega=_past_poles(np.asarray(loop.poles())), warn_encirclements=False
+        ).count
+        rows.append(
+            {
+                "model": name,
+                "gain_margin": float(gain),
+                "phase_margin_deg": float(phase),
+                "crossover_hz": float(crossover) / (2.0 * pi),
+                "open_unstable_poles": int(np.sum(open_poles > 0.0)),
+                "turns": int(turns),
+                "closed_unstable_poles": int(np.sum(closed > 0.0)),
+                "stable": bool(np.all(closed < 0.0)),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _past_poles(poles: "np.ndarray[Any, np.dtype[np.complex128]]") -> "np.ndarray[Any, np.dtype[np.float64]]":
+    """Angular frequencies with steps fine enough for a resonance a ten-thousandth wide, which a plain grid misses."""
+    near = [abs(pole) + abs(pole.real) * np.linspace(-300.0, 300.0, 2401) for pole in poles if pole.imag > 0.0]
+    grid = np.concatenate([np.geomspace(1.0, 1e6, 2001), *near])
+    return np.unique(grid[grid > 0.0])
+
+
+def response_table(p: VibrationParameters) -> pd.DataFrame:
+    """Return the frequency responses of Figures 22 and 23, each over its own gain at rest.
+
+    Parameters
+    ----------
+    p : VibrationParameters
+        Masses, springs, dampers.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns model, frequency_hz, gain [dimensionless], phase_deg.
+    """
+    return pd.concat([_response(name, model) for name, model in vibration_models(p).items()], ignore_index=True)
+
+
+def _response(name: str, model: Any) -> pd.DataFrame:
+    values = np.asarray(model(2j * pi * FREQUENCIES)).ravel() / float(np.real(model.dcgain()))
+    phase = np.degrees(np.unwrap(np.angle(values)))
+    columns = {"frequency_hz": FREQUENCIES, "gain": np.abs(values), "phase_deg": phase}
+    return pd.DataFrame({"model": name, **columns})
+
+
+def tuning_table(p: VibrationParameters) -> pd.DataFrame:
+    """Return what stiffness and damping do to the first mode, as section 5.1.1 tunes them.
+
+    Parameters
+    ----------
+    p : VibrationParameters
+        The model from which one value at a time is changed.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns changed, factor, frequency_hz, damping_ratio, peak_gain (over that at rest) and decay_time_s (to a
+        tenth).
+    """
+    rows: list[dict[str, Any]] = []
+    for name in ("diaphragm_stiffness", "fluid_stiffness", "load_stiffness", "cylinder_mass", "damping"):
+        for factor in (0.5, 1.0, 2.0):
+            model = state_space(replace(p, **{name: factor * getattr(p, name)}), massless=True)
+            pole = first_mode(model.poles())
+            rows.append(
+                {
+                    "changed": name,
+                    "factor": factor,
+                    "frequency_hz": abs(pole) / (2.0 * pi),
+                    "damping_ratio": -pole.real / abs(pole),
+                    "peak_gain": float(_response(name, model)["gain"].max()),
+                    "decay_time_s": -np.log(10.0) / pole.real,
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def figures_7_to_9() -> pd.DataFrame:
+    """Return fractional integral and derivative of t^2, exactly and sampled, Figures 7 to 9 and equation 6 (errata M6).
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns order, time_s, integral, derivative (exact), sampled_integral and sampled_derivative (1 ms).
+    """
+    time = np.linspace(0.0, 1.0, 1001)
+    square = np.square(time)
+    parts = [
+        pd.DataFrame(
+            {
+                "order": a,
+                "time_s": time,
+                "integral": 2.0 * time ** (2.0 + a) / gamma(3.0 + a),
+                "derivative": 2.0 * time ** (2.0 - a) / gamma(3.0 - a),
+                "sampled_integral": grunwald_letnikov(square, -a, 1e-3),
+                "sampled_derivative": grunwald_letnikov(square, a, 1e-3),
+            }
+        )
+        for a in ORDERS
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+def with_order(p: VibrationParameters, order: float) -> VibrationParameters:
+    """Return a model whose damper has another order and the same size of force at 480 Hz (errata M5).
+
+    Parameters
+    ----------
+    p : VibrationParameters
+        A model with viscous damping.
+    order : float
+        Order of the damping [dimensionless].
+
+    Returns
+    -------
+    VibrationParameters
+        The same with fractional in place of viscous damping.
+    """
+    size = p.damping * (2.0 * pi * TUNED_FREQUENCY) ** (1.0 - order)
+    return replace(p, damping=0.0, fractional_damping=size, fractional_order=order)
+
+
+def fractional_table(p: VibrationParameters) -> pd.DataFrame:
+    """Return responses with fractional damping, exact and by Oustaloup's states.
+
+    Parameters
+    ----------
+    p : VibrationParameters
+        A model with viscous damping.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns order, frequency_hz, gain and imitated_gain [m/N].
+    """
+    parts: list[pd.DataFrame] = []
+    for order in ORDERS:
+        q = with_order(p, order)
+        imitated = np.abs(np.asarray(state_space(q)(2j * pi * FREQUENCIES)).ravel())
+        columns = {
+            "frequency_hz": FREQUENCIES,
+            "gain": np.abs(exact_response(q, FREQUENCIES)),
+            "imitated_gain": imitated,
+        }
+        parts.append(pd.DataFrame({"order": order, **columns}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def hysteresis_loops(p: HysteresisParameters) -> pd.DataFrame:
+    """Return the loops of Figures 27 and 34, by the law with rates and as printed (errata M21).
+
+    Parameters
+    ----------
+    p : HysteresisParameters
+        The diaphragm, moved slowly: displacement is ``d (u - h)``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns law, frequency_hz, voltage_v, hysteresis_v, displacement_m.
+    """
+    parts: list[pd.DataFrame] = []
+    for law in ("mended", "printed"):
+        for frequency in LOOP_FREQUENCIES:
+            voltage, hysteresis = hysteresis_loop(p, LOOP_AMPLITUDE, frequency, law=law)
+            displacement = p.stroke_a_volt * (voltage - hysteresis)
+            columns = {"voltage_v": voltage, "hysteresis_v": hysteresis, "displacement_m": displacement}
+            parts.append(pd.DataFrame({"law": law, "frequency_hz": frequency, **columns}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def hysteresis_table(loops: pd.DataFrame) -> pd.DataFrame:
+    """Return what each loop amounts to.
+
+    Parameters
+    ----------
+    loops : pandas.DataFrame
+        As `hysteresis_loops` returns them.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns law, frequency_hz, area_v2, width_percent (at no voltage, of the stroke), gain and lag_deg of the
+        displacement's first harmonic over that without hysteresis, distortion_percent.
+    """
+    rows: list[dict[str, Any]] = []
+    for (law, frequency), loop in loops.groupby(["law", "frequency_hz"]):
+        voltage, hysteresis = loop["voltage_v"].to_numpy(), loop["hysteresis_v"].to_numpy()
+        left = voltage - hysteresis
+        passed = 1.0 - describing_function(voltage, hysteresis)
+        rows.append(
+            {
+                "law": law,
+                "frequency_hz": frequency,
+                "area_v2": loop_area(voltage, hysteresis),
+                "width_percent": 100.0 * abs(left[0] - left[len(left) // 2]) / np.ptp(left),
+                "gain": abs(passed),
+                "lag_deg": -np.degrees(np.angle(passed)),
+                "distortion_percent": 100.0 * total_harmonic_distortion(harmonics(left, 9)),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def impulse_table(p: HysteresisParameters) -> pd.DataFrame:
+    """Return the impulse response of the linearised equation 20, Figure 35.
+
+    Parameters
+    ----------
+    p : HysteresisParameters
+        The diaphragm.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns time_s and displacement_m_per_v_s, after an impulse of 1 V s.
+    """
+    import control
+
+    response = control.impulse_response(linearised(p), np.linspace(0.0, 4e-3, 2001))
+    return pd.DataFrame({"time_s": response.time, "displacement_m_per_v_s": np.asarray(response.outputs).ravel()})
+
+
+def hysteresis_response(p: HysteresisParameters) -> pd.DataFrame:
+    """Return the frequency response of the linearised equation 20, Figures 31 and 32.
+
+    Parameters
+    ----------
+    p : HysteresisParameters
+        The diaphragm.
+
+    Returns
+    -------
+    pandas.DataFrame
+        As `response_table`.
+    """
+    return _response("equation 20, small voltages", linearised(p))
