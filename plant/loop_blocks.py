@@ -56,7 +56,7 @@ def relay(was_high: bool, error: float, width: float = 0.0) -> bool:
     error : float
         What it listens to, in any unit.
     width : float
-        It turns at plus and minus half of this, in the error's unit.
+        It turns at plus and minus half of this [the error's unit].
 
     Returns
     -------
@@ -86,7 +86,7 @@ class Pid:
     filter_time : float
         Time constant of the derivative's filter [s].
     low, high : float
-        Limits of the command, in its unit.
+        Limits of the command [its unit].
 
     Raises
     ------
@@ -118,9 +118,9 @@ class PidMemory:
     Parameters
     ----------
     integral : float
-        Part of the command that has been integrated, in its unit.
+        Part of the command that has been integrated [its unit].
     error : float
-        The last error, filtered for the derivative, in its unit.
+        The last error, filtered for the derivative [its unit].
     """
 
     integral: float = 0.0
@@ -240,7 +240,7 @@ def ultimate_point(run: LoopRun, amplitude: float) -> tuple[float, float]:
     run : LoopRun
         A run to a reference of zero; its second half counts.
     amplitude : float
-        The relay's, in the command's unit.
+        The relay's [the command's unit].
 
     Returns
     -------

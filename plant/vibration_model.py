@@ -97,7 +97,7 @@ class VibrationParameters:
 
 
 def reduced_stiffness(
-    p: VibrationParameters, equation: Literal["mended", "printed", "printed 1 to 3"] = "mended"
+    p: VibrationParameters, equation: Literal["mended", "printed", "printed_1_to_3"] = "mended"
 ) -> float:
     """Return the linear stiffness on x_2 after x_1 is eliminated, equation 4 (errata M3, M4).
 
@@ -105,7 +105,7 @@ def reduced_stiffness(
     ----------
     p : VibrationParameters
         Springs.
-    equation : {"mended", "printed", "printed 1 to 3"}
+    equation : {"mended", "printed", "printed_1_to_3"}
         With restoring springs; as equation 4 prints it; or as equations 1 to 3 as printed would give it.
 
     Returns
@@ -116,7 +116,7 @@ def reduced_stiffness(
     Examples
     --------
     >>> p = VibrationParameters(diaphragm_stiffness=1.0, fluid_stiffness=2.0, load_stiffness=0.1)
-    >>> [round(reduced_stiffness(p, name), 3) for name in ("mended", "printed", "printed 1 to 3")]
+    >>> [round(reduced_stiffness(p, name), 3) for name in ("mended", "printed", "printed_1_to_3")]
     [0.767, 2.2, -2.1]
     """
     k1, k2, k3 = p.diaphragm_stiffness, p.fluid_stiffness, p.load_stiffness

@@ -11,7 +11,7 @@ from experiments.figures.motor_vibration import VIBRATION_FIGURES
 from experiments.figures.tables import figure_files
 from experiments.report.motor_paper import render_motor_paper
 from experiments.store import check_target, write_tables
-from experiments.studies import motor_loop, motor_regression, motor_tables, motor_vibration
+from experiments.studies import motor_hysteresis, motor_loop, motor_regression, motor_tables, motor_vibration
 from plant.hysteresis_model import HysteresisParameters
 from plant.vibration_model import VibrationParameters
 
@@ -33,7 +33,7 @@ def motor_paper_tables(seed: int) -> dict[str, pd.DataFrame]:
         By name.
     """
     p, diaphragm = VibrationParameters(), HysteresisParameters()
-    loops, runs = motor_vibration.hysteresis_loops(diaphragm), motor_loop.loop_runs(p, seed)
+    loops, runs = motor_hysteresis.hysteresis_loops(diaphragm), motor_loop.loop_runs(p, seed)
     return {
         "table 1": motor_tables.table_1(),
         "table 2": motor_tables.table_2(),
@@ -55,9 +55,9 @@ def motor_paper_tables(seed: int) -> dict[str, pd.DataFrame]:
         "loop spectra": motor_loop.spectrum_table(runs),
         "relay": motor_loop.relay_table(p),
         "hysteresis loops": loops,
-        "hysteresis": motor_vibration.hysteresis_table(loops),
-        "hysteresis response": motor_vibration.hysteresis_response(diaphragm),
-        "impulse response": motor_vibration.impulse_table(diaphragm),
+        "hysteresis": motor_hysteresis.hysteresis_table(loops),
+        "hysteresis response": motor_hysteresis.hysteresis_response(diaphragm),
+        "impulse response": motor_hysteresis.impulse_table(diaphragm),
         "figures 7 to 9": motor_vibration.figures_7_to_9(),
         "fractional responses": motor_vibration.fractional_table(p),
     }

@@ -134,7 +134,7 @@ REGRESSION_FIGURES: Mapping[str, TableFigure] = MappingProxyType(
         ),
         "circle": TableFigure(
             "What is behind the fit",
-            "Velocity over the share of force that is left is flow over one piston area, to four digits in every row but one.",
+            "Velocity over the share of force that is left is flow over one piston area, to four digits in five rows.",
             draw_circle,
         ),
     }

@@ -167,7 +167,7 @@ def _table_sections(tables: Tables) -> Sequence[Section]:
             "table_4",
             "Table 4: its errors",
             (
-                "All five errors come back as (theory less flow meter) over flow meter. Theory is a piston of 38 mm whose "
+                "All five errors come back as theory less flow meter, over flow meter. Theory is a 38 mm piston whose "
                 "displacement is in micrometres; row 1's should be 25.11. At 1 to 5 Hz it is a piston pump, not this "
                 "motor (errata M29).",
             ),

@@ -1,4 +1,4 @@
-"""The diaphragm-motor paper's linear models: poles by whose signs, Bode, Nyquist, fractional damping, hysteresis."""
+"""The diaphragm-motor paper's linear models: poles by whose signs, Bode, Nyquist, fractional damping."""
 
 from dataclasses import replace
 from math import gamma, pi
@@ -8,15 +8,7 @@ import numpy as np
 import pandas as pd
 
 from plant.fractional import grunwald_letnikov
-from plant.hysteresis_model import (
-    HysteresisParameters,
-    describing_function,
-    harmonics,
-    hysteresis_loop,
-    linearised,
-    loop_area,
-    total_harmonic_distortion,
-)
+from plant.hysteresis_model import HysteresisParameters, linearised
 from plant.vibration_model import VibrationParameters, exact_response, first_mode, state_space
 
 if TYPE_CHECKING:
@@ -30,9 +22,6 @@ TUNED_FREQUENCY = 480.0
 
 ORDERS = (0.5, 1.0, 1.5)
 """Of Figures 7 to 9."""
-
-LOOP_FREQUENCIES, LOOP_AMPLITUDE = (1.0, 10.0, 100.0, 480.0), 100.0
-"""Of the hysteresis loops [Hz, V]."""
 
 
 def vibration_models(p: VibrationParameters) -> "dict[str, control.StateSpace]":
@@ -114,7 +103,7 @@ def margin_table(p: VibrationParameters) -> pd.DataFrame:
         gain, phase, _, crossover = control.margin(loop)
         closed_loop: Any = control.feedback(loop, 1)
         open_poles, closed = np.real(loop.poles()), np.real(closed_loop.poles())
-        turns = control.nyquist_response(
+        turns = control.nyquistresponse_rows(
             loop, omega=_past_poles(np.asarray(loop.poles())), warn_encirclements=False
         ).count
         rows.append(
@@ -152,10 +141,24 @@ def response_table(p: VibrationParameters) -> pd.DataFrame:
     pandas.DataFrame
         Columns model, frequency_hz, gain [dimensionless], phase_deg.
     """
-    return pd.concat([_response(name, model) for name, model in vibration_models(p).items()], ignore_index=True)
+    return pd.concat([response_rows(name, model) for name, model in vibration_models(p).items()], ignore_index=True)
 
 
-def _response(name: str, model: Any) -> pd.DataFrame:
+def response_rows(name: str, model: Any) -> pd.DataFrame:
+    """Return the frequency response of one model over its own gain at rest (equation 13).
+
+    Parameters
+    ----------
+    name : str
+        What the model is called.
+    model : control.StateSpace or control.TransferFunction
+        With one input and one output.
+
+    Returns
+    -------
+    pandas.DataFrame
+        As `response_table`.
+    """
     values = np.asarray(model(2j * pi * FREQUENCIES)).ravel() / float(np.real(model.dcgain()))
     phase = np.degrees(np.unwrap(np.angle(values)))
     columns = {"frequency_hz": FREQUENCIES, "gain": np.abs(values), "phase_deg": phase}
@@ -187,7 +190,7 @@ def tuning_table(p: VibrationParameters) -> pd.DataFrame:
                     "factor": factor,
                     "frequency_hz": abs(pole) / (2.0 * pi),
                     "damping_ratio": -pole.real / abs(pole),
-                    "peak_gain": float(_response(name, model)["gain"].max()),
+                    "peak_gain": float(response_rows(name, model)["gain"].max()),
                     "decay_time_s": -np.log(10.0) / pole.real,
                 }
             )
@@ -258,99 +261,8 @@ def fractional_table(p: VibrationParameters) -> pd.DataFrame:
         imitated = np.abs(np.asarray(state_space(q)(2j * pi * FREQUENCIES)).ravel())
         columns = {
             "frequency_hz": FREQUENCIES,
-            "gain": np.abs(exact_response(q, FREQUENCIES)),
+            "gain": np.abs(exactresponse_rows(q, FREQUENCIES)),
             "imitated_gain": imitated,
         }
         parts.append(pd.DataFrame({"order": order, **columns}))
     return pd.concat(parts, ignore_index=True)
-
-
-def hysteresis_loops(p: HysteresisParameters) -> pd.DataFrame:
-    """Return the loops of Figures 27 and 34, by the law with rates and as printed (errata M21).
-
-    Parameters
-    ----------
-    p : HysteresisParameters
-        The diaphragm, moved slowly: displacement is ``d (u - h)``.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns law, frequency_hz, voltage_v, hysteresis_v, displacement_m.
-    """
-    parts: list[pd.DataFrame] = []
-    for law in ("mended", "printed"):
-        for frequency in LOOP_FREQUENCIES:
-            voltage, hysteresis = hysteresis_loop(p, LOOP_AMPLITUDE, frequency, law=law)
-            displacement = p.stroke_a_volt * (voltage - hysteresis)
-            columns = {"voltage_v": voltage, "hysteresis_v": hysteresis, "displacement_m": displacement}
-            parts.append(pd.DataFrame({"law": law, "frequency_hz": frequency, **columns}))
-    return pd.concat(parts, ignore_index=True)
-
-
-def hysteresis_table(loops: pd.DataFrame) -> pd.DataFrame:
-    """Return what each loop amounts to.
-
-    Parameters
-    ----------
-    loops : pandas.DataFrame
-        As `hysteresis_loops` returns them.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns law, frequency_hz, area_v2, width_percent (at no voltage, of the stroke), gain and lag_deg of the
-        displacement's first harmonic over that without hysteresis, distortion_percent.
-    """
-    rows: list[dict[str, Any]] = []
-    for (law, frequency), loop in loops.groupby(["law", "frequency_hz"]):
-        voltage, hysteresis = loop["voltage_v"].to_numpy(), loop["hysteresis_v"].to_numpy()
-        left = voltage - hysteresis
-        passed = 1.0 - describing_function(voltage, hysteresis)
-        rows.append(
-            {
-                "law": law,
-                "frequency_hz": frequency,
-                "area_v2": loop_area(voltage, hysteresis),
-                "width_percent": 100.0 * abs(left[0] - left[len(left) // 2]) / np.ptp(left),
-                "gain": abs(passed),
-                "lag_deg": -np.degrees(np.angle(passed)),
-                "distortion_percent": 100.0 * total_harmonic_distortion(harmonics(left, 9)),
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def impulse_table(p: HysteresisParameters) -> pd.DataFrame:
-    """Return the impulse response of the linearised equation 20, Figure 35.
-
-    Parameters
-    ----------
-    p : HysteresisParameters
-        The diaphragm.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns time_s and displacement_m_per_v_s, after an impulse of 1 V s.
-    """
-    import control
-
-    response = control.impulse_response(linearised(p), np.linspace(0.0, 4e-3, 2001))
-    return pd.DataFrame({"time_s": response.time, "displacement_m_per_v_s": np.asarray(response.outputs).ravel()})
-
-
-def hysteresis_response(p: HysteresisParameters) -> pd.DataFrame:
-    """Return the frequency response of the linearised equation 20, Figures 31 and 32.
-
-    Parameters
-    ----------
-    p : HysteresisParameters
-        The diaphragm.
-
-    Returns
-    -------
-    pandas.DataFrame
-        As `response_table`.
-    """
-    return _response("equation 20, small voltages", linearised(p))

@@ -4,13 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from experiments.studies.motor_hysteresis import hysteresis_loops, hysteresis_table, impulse_table
 from experiments.studies.motor_loop import loop_runs, loop_table, relay_table, spectrum_table
 from experiments.studies.motor_vibration import (
     figures_7_to_9,
     fractional_table,
-    hysteresis_loops,
-    hysteresis_table,
-    impulse_table,
     margin_table,
     pole_table,
     response_table,
