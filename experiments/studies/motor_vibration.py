@@ -103,7 +103,7 @@ def margin_table(p: VibrationParameters) -> pd.DataFrame:
         gain, phase, _, crossover = control.margin(loop)
         closed_loop: Any = control.feedback(loop, 1)
         open_poles, closed = np.real(loop.poles()), np.real(closed_loop.poles())
-        turns = control.nyquistresponse_rows(
+        turns = control.nyquist_response(
             loop, omega=_past_poles(np.asarray(loop.poles())), warn_encirclements=False
         ).count
         rows.append(
@@ -261,7 +261,7 @@ def fractional_table(p: VibrationParameters) -> pd.DataFrame:
         imitated = np.abs(np.asarray(state_space(q)(2j * pi * FREQUENCIES)).ravel())
         columns = {
             "frequency_hz": FREQUENCIES,
-            "gain": np.abs(exactresponse_rows(q, FREQUENCIES)),
+            "gain": np.abs(exact_response(q, FREQUENCIES)),
             "imitated_gain": imitated,
         }
         parts.append(pd.DataFrame({"order": order, **columns}))
