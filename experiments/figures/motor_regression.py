@@ -41,7 +41,7 @@ def draw_residuals(tables: Tables) -> Figure:
     """
     rows = tables["regression residuals"]
     title = "Residuals of the regression: six rows, three readings"
-    figure, axes = panels(title, 1, 3, 3.6, Margins(left=0.75, top=0.75, across=0.25), sharey=True)
+    figure, axes = panels(title, 1, 3, 3.6, Margins(left=0.75, top=0.75, across=0.4), sharey=True)
     words = ("deformation [as printed: mm]", "velocity [as printed: mm/s]", "predicted flow [mL/s]")
     heads = ("Figure 15", "Figure 10", "Figure 16")
     for axis, column, label, head in zip(axes, ("deformation", "velocity", "predicted"), words, heads, strict=True):
@@ -105,12 +105,12 @@ def draw_circle(tables: Tables) -> Figure:
     """
     table = tables["circularity"].iloc[::-1]
     title = "R² of a straight line through pairs of Table 2's columns, physical reading"
-    figure, (axis,) = panels(title, 1, 1, 2.6, Margins(left=2.6, top=0.45))
+    figure, (axis,) = panels(title, 1, 1, 2.6, Margins(left=2.6, right=2.9, top=0.45))
     colours = {"the same number twice, by equation 18": ORANGE, "what the text claims": VERMILION}
     places = np.arange(len(table))
     axis.barh(places, table["r_square"], 0.6, color=[colours.get(words, GREY) for words in table["meaning"].tolist()])
     for place, value, words in zip(places, table["r_square"].tolist(), table["meaning"].tolist(), strict=True):
-        axis.annotate(f"{value:.3f}  {words}", (min(value, 0.45) + 0.01, float(place)), va="center", fontsize=8.5)
+        axis.annotate(f"{value:.3f}  {words}", (1.02, float(place)), va="center", annotation_clip=False)
     axis.set_yticks(places, table["pair"].tolist())
     axis.grid(visible=False, axis="y")
     axis.set_xlim(0.0, 1.0)

@@ -76,16 +76,18 @@ def draw_poles(tables: Tables) -> Figure:
     figure, (left, right) = panels(title, 1, 2, 4.2, Margins(left=0.75, top=0.55, across=0.8))
     for name, part in tables["poles"].groupby("model", sort=False):
         if str(name) in _MODELS:
-            slow = part.sort_values("frequency_hz").iloc[0]
-            both = MILLI**-1 * np.array([slow["imaginary_rad_s"], -slow["imaginary_rad_s"]])
-            left.plot([slow["real_rad_s"]] * 2, both, "x", color=_MODELS[str(name)][0], markersize=8, label=str(name))
+            first = part.sort_values("frequency_hz").iloc[0]
+            both = np.array([first["imaginary_rad_s"], -first["imaginary_rad_s"]]) / MILLI
+            short = str(name).removeprefix("equations ").removeprefix("equation ")
+            left.plot([first["real_rad_s"]] * 2, both, "x", color=_MODELS[str(name)][0], markersize=8, label=short)
     left.axvline(0.0, color=BLACK, linewidth=0.8)
     left.set_xlim(-450.0, 450.0)
     left.set_xlabel("real part [1/s]; right of zero is unstable")
     left.set_ylabel("imaginary part [1000 rad/s]")
     left.set_ylim(-6.5, 6.5)
-    left.legend(loc="upper left", fontsize=8.0)
-    for name, part in tables["vibration responses"].groupby("model", sort=False):
+    left.legend(loc="center left", fontsize=8.0)
+    slow = tables["vibration responses"].query("frequency_hz < 2000")
+    for name, part in slow.groupby("model", sort=False):
         colour, line = _MODELS[str(name)]
         angle = np.radians(part["phase_deg"])
         right.plot(part["gain"] * np.cos(angle), part["gain"] * np.sin(angle), line, color=colour)
@@ -233,8 +235,8 @@ VIBRATION_FIGURES: Mapping[str, TableFigure] = MappingProxyType(
         ),
         "poles": TableFigure(
             "Figures 23 and 24: Nyquist and poles",
-            "With the printed signs two poles lie right of zero, so the stable diagrams of the paper do not belong to "
-            "its equations (errata M1, M2, M30).",
+            "Poles of the slow mode; Nyquist's curves up to 2 kHz. With the printed signs two poles lie right of zero, "
+            "so the stable diagrams of the paper do not belong to its equations (errata M1, M2, M30).",
             draw_poles,
         ),
         "loop": TableFigure(

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from experiments.figures.motor_regression import READING_WORDS, REGRESSION_FIGURES
 from experiments.figures.motor_vibration import VIBRATION_FIGURES
 from experiments.report.sectioned import Section, render_sections
-from experiments.report.tables import Cell, Column, html_table
+from experiments.report.tables import Cell, Column, exact, fixed, html_table
 
 INTRODUCTION = (
     "The paper of the hydraulic motor with seven piezo diaphragms prints tables, a regression, and linear models with "
@@ -21,6 +21,10 @@ INTRODUCTION = (
 """The page's first paragraph."""
 
 Tables = Mapping[str, pd.DataFrame]
+
+
+def _as_printed(value: float) -> Cell:
+    return Cell(exact(float(value)), "number")
 
 
 def _yes(good: bool) -> Cell:
@@ -143,7 +147,7 @@ def _table_sections(tables: Tables) -> Sequence[Section]:
                     tables["table 1"],
                     (
                         Column("item", "item"),
-                        Column("value", "value", digits=3),
+                        Column("value", "value", words=_as_printed),
                         Column("unit", "unit"),
                         Column("remark", "remark"),
                     ),
@@ -187,9 +191,13 @@ def _anova(frame: pd.DataFrame) -> Markup:
         Column("quantity", "quantity", words=lambda name: str(name).replace("_", " ")),
         Column("published", "published", digits=9),
         *(Column(name, words, digits=9) for name, words in READING_WORDS.items()),
-        Column("relative_difference", "Figure 12's reading over published, less 1", digits=2),
+        Column("relative_difference", "relative difference", digits=2),
     )
-    return html_table(frame, columns, "Analysis of variance and coefficients: published, and in three readings.")
+    return html_table(
+        frame,
+        columns,
+        "Analysis of variance and coefficients: published, in three readings, and how far Figure 12's is off.",
+    )
 
 
 def _decisions(frame: pd.DataFrame) -> Markup:
@@ -209,7 +217,7 @@ def _relations(frame: pd.DataFrame) -> Markup:
     columns = (
         Column("relation", "relation"),
         Column("constant", "constant (median)"),
-        Column("worst_percent", "furthest off", "%", digits=2),
+        Column("worst_percent", "furthest off", "%", words=lambda value: Cell(fixed(value, 2), "number")),
         Column("worst_row", "in row", digits=1),
         Column("holds", "holds within 0.5 %", words=_yes),
     )
@@ -256,10 +264,10 @@ def _flow(frame: pd.DataFrame) -> Markup:
 def _actuators(frame: pd.DataFrame) -> Markup:
     columns = (
         Column("actuator", "actuator"),
-        Column("voltage_vpp", "voltage", "V"),
-        Column("frequency_hz", "frequency", "Hz"),
-        Column("no_load_velocity_mm_per_s", "velocity without load", "mm/s"),
-        Column("blocking_force_n", "blocking force", "N"),
+        Column("voltage_vpp", "voltage", "V", words=_as_printed),
+        Column("frequency_hz", "frequency", "Hz", words=_as_printed),
+        Column("no_load_velocity_mm_per_s", "velocity without load", "mm/s", words=_as_printed),
+        Column("blocking_force_n", "blocking force", "N", words=_as_printed),
         Column("most_power_w", "most power", "W", digits=3),
     )
     return html_table(frame, columns, "As printed; power is a quarter of velocity times force, on a straight line.")
@@ -293,7 +301,7 @@ def _margins(frame: pd.DataFrame) -> Markup:
         Column("closed_unstable_poles", "unstable poles, closed", digits=1),
         Column("stable", "stable, closed", words=_yes),
     )
-    return html_table(frame, columns, "Loops with a gain of 1 at rest; a dash: no gain margin, because none is needed.")
+    return html_table(frame, columns, "Loops with a gain of 1 at rest; a dash: no finite gain margin.")
 
 
 def _tuning(frame: pd.DataFrame) -> Markup:
