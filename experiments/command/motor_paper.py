@@ -7,15 +7,24 @@ import pandas as pd
 from rich.console import Console
 
 from experiments.figures.motor_regression import REGRESSION_FIGURES
+from experiments.figures.motor_sensing import SENSING_FIGURES
 from experiments.figures.motor_vibration import VIBRATION_FIGURES
 from experiments.figures.tables import figure_files
 from experiments.report.motor_paper import render_motor_paper
 from experiments.store import check_target, write_tables
-from experiments.studies import motor_hysteresis, motor_loop, motor_regression, motor_tables, motor_vibration
+from experiments.studies import (
+    motor_hysteresis,
+    motor_loop,
+    motor_regression,
+    motor_sensing,
+    motor_tables,
+    motor_vibration,
+)
+from plant.diaphragm_motor_parameters import DiaphragmMotorParameters
 from plant.hysteresis_model import HysteresisParameters
 from plant.vibration_model import VibrationParameters
 
-MOTOR_PAPER_FIGURES = {**REGRESSION_FIGURES, **VIBRATION_FIGURES}
+MOTOR_PAPER_FIGURES = {**REGRESSION_FIGURES, **SENSING_FIGURES, **VIBRATION_FIGURES}
 """All figures of the study, by file name."""
 
 
@@ -25,7 +34,7 @@ def motor_paper_tables(seed: int) -> dict[str, pd.DataFrame]:
     Parameters
     ----------
     seed : int
-        Seed of the loop's noise.
+        Seed of every noise.
 
     Returns
     -------
@@ -33,6 +42,8 @@ def motor_paper_tables(seed: int) -> dict[str, pd.DataFrame]:
         By name.
     """
     p, diaphragm = VibrationParameters(), HysteresisParameters()
+    motor = DiaphragmMotorParameters()
+    points, spectra = motor_sensing.operating_points(motor, seed), motor_sensing.motor_spectra(motor)
     loops, runs = motor_hysteresis.hysteresis_loops(diaphragm), motor_loop.loop_runs(p, seed)
     return {
         "table 1": motor_tables.table_1(),
@@ -46,6 +57,12 @@ def motor_paper_tables(seed: int) -> dict[str, pd.DataFrame]:
         "regression residuals": motor_regression.residual_table(),
         "decisions": motor_regression.decisions(),
         "circularity": motor_regression.circularity(),
+        "sensing points": points,
+        "sensing predictions": motor_sensing.sensing_predictions(points),
+        "sensing regressions": motor_sensing.sensing_regressions(points),
+        "sensing faults": motor_sensing.sensing_faults(motor, points),
+        "motor spectra": spectra,
+        "distortion": motor_sensing.distortion_table(spectra),
         "poles": motor_vibration.pole_table(p),
         "margins": motor_vibration.margin_table(p),
         "vibration responses": motor_vibration.response_table(p),
@@ -71,7 +88,7 @@ def motor_paper_command(out: Path, seed: int, console: Console) -> Path:
     out : Path
         Folder of the result; replaced whole if it holds an earlier study.
     seed : int
-        Seed of the loop's noise.
+        Seed of every noise.
     console : rich.console.Console
         Where progress goes.
 
@@ -94,6 +111,10 @@ def motor_paper_command(out: Path, seed: int, console: Console) -> Path:
     manifest = {
         "study": "motor-paper",
         "settings": {"seed": seed},
-        "parameters": {"vibration": asdict(VibrationParameters()), "hysteresis": asdict(HysteresisParameters())},
+        "parameters": {
+            "motor": asdict(DiaphragmMotorParameters()),
+            "vibration": asdict(VibrationParameters()),
+            "hysteresis": asdict(HysteresisParameters()),
+        },
     }
     return write_tables(tables, manifest, out, files)

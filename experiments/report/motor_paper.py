@@ -1,6 +1,6 @@
 """The diaphragm-motor paper's report: what holds in its tables, its regression and its linear models.
 
-`paper_sections` and `vibration_sections` return sections, so that another report can hold them too.
+`paper_sections`, `vibration_sections` and `sensing_sections` return sections, so that another report can hold them too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from experiments.figures.motor_regression import READING_WORDS, REGRESSION_FIGURES
 from experiments.figures.motor_vibration import VIBRATION_FIGURES
+from experiments.report.motor_sensing import sensing_sections
 from experiments.report.sectioned import Section, render_sections
 from experiments.report.tables import Cell, Column, exact, fixed, html_table
 
@@ -39,14 +40,15 @@ def render_motor_paper(tables: Tables, figures: Mapping[str, bytes]) -> str:
     tables : Mapping[str, pandas.DataFrame]
         What the study found, by the names of `hydrostate motor-paper`.
     figures : Mapping[str, bytes]
-        SVG files, by the names of `REGRESSION_FIGURES` and `VIBRATION_FIGURES`.
+        SVG files, by the names of `experiments.command.motor_paper.MOTOR_PAPER_FIGURES`.
 
     Returns
     -------
     str
         The page; it loads nothing.
     """
-    sections = [*paper_sections(tables, figures), *vibration_sections(tables, figures)]
+    makers = (paper_sections, sensing_sections, vibration_sections)
+    sections = [section for make in makers for section in make(tables, figures)]
     return render_sections("The diaphragm-motor paper, checked", "published numbers", INTRODUCTION, sections)
 
 
