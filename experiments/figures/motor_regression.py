@@ -105,7 +105,7 @@ def draw_circle(tables: Tables) -> Figure:
     """
     table = tables["circularity"].iloc[::-1]
     title = "R² of a straight line through pairs of Table 2's columns, physical reading"
-    figure, (axis,) = panels(title, 1, 1, 2.6, Margins(left=2.6, right=2.9, top=0.45))
+    figure, (axis,) = panels(title, 1, 1, 2.6, Margins(left=2.6, right=3.2, top=0.45))
     colours = {"the same number twice, by equation 18": ORANGE, "what the text claims": VERMILION}
     places = np.arange(len(table))
     axis.barh(places, table["r_square"], 0.6, color=[colours.get(words, GREY) for words in table["meaning"].tolist()])

@@ -117,7 +117,8 @@ SENSING_FIGURES: Mapping[str, TableFigure] = MappingProxyType(
         "sensing_faults": TableFigure(
             "Velocity when a part fails",
             "Coefficients of opposite sign, a few thousand times inflated, turn a fault of one electrode into a "
-            "velocity that no motor has.",
+            "velocity that no motor has. The pair on the right side of the figure above is off as well, though less: "
+            "find the fault first.",
             draw_faults,
         ),
         "spectra": TableFigure(

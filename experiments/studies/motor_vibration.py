@@ -159,9 +159,11 @@ def response_rows(name: str, model: Any) -> pd.DataFrame:
     pandas.DataFrame
         As `response_table`.
     """
-    values = np.asarray(model(2j * pi * FREQUENCIES)).ravel() / float(np.real(model.dcgain()))
+    near = [abs(pole) / (2.0 * pi) * np.linspace(0.9, 1.1, 101) for pole in model.poles() if pole.imag > 0.0]
+    frequency = np.unique(np.concatenate([FREQUENCIES, *near]))
+    values = np.asarray(model(2j * pi * frequency)).ravel() / float(np.real(model.dcgain()))
     phase = np.degrees(np.unwrap(np.angle(values)))
-    columns = {"frequency_hz": FREQUENCIES, "gain": np.abs(values), "phase_deg": phase}
+    columns = {"frequency_hz": frequency, "gain": np.abs(values), "phase_deg": phase}
     return pd.DataFrame({"model": name, **columns})
 
 
