@@ -18,6 +18,7 @@ from experiments.command import (
     isolability,
     library,
     simulate,
+    size_cylinder,
     watch,
 )
 from experiments.command.json_output import json_text
@@ -187,6 +188,7 @@ VERBS = (
     conditions,
     batch,
     compare,
+    size_cylinder,
 )
 for module in VERBS:
     app.add_typer(module.commands)

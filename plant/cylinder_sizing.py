@@ -104,15 +104,17 @@ class CylinderCircuit:
     extend_force: Annotated[float, SI("N", "force it can give going out", "pressure times area")]
     retract_force: Annotated[float, SI("N", "force it can give going in", "pressure times area")]
     buckling_force: Annotated[float, SI("N", "Euler's load of the rod, wholly out, its end free", "Euler")]
-    extend_pressure: Annotated[float, SI("Pa", "pressure behind the piston that the load asks for", "balance")]
-    retract_pressure: Annotated[float, SI("Pa", "pressure before the piston that the load asks for", "balance")]
-    cap_flow: Annotated[float, SI("m^3/s", "largest flow of the port behind the piston, in or out", "area times speed")]
-    rod_flow: Annotated[float, SI("m^3/s", "largest flow of the port before the piston", "area times speed")]
+    extend_pressure: Annotated[float, SI("Pa", "pressure behind the piston for the load going out", "balance")]
+    retract_pressure: Annotated[float, SI("Pa", "pressure on the rod side for the load going in", "balance")]
+    cap_flow: Annotated[float, SI("m^3/s", "largest flow of the port behind the piston", "area times speed")]
+    rod_flow: Annotated[float, SI("m^3/s", "largest flow of the rod side's port", "area times speed")]
     pump_flow: Annotated[float, SI("m^3/s", "flow that the pump must give", "larger of the two inflows")]
     cycle_time: Annotated[float, SI("s", "out and in again", "stroke over speeds")]
     relief_setting: Annotated[float, SI("Pa", "setting of the relief valve, which takes the pump's flow", "margin")]
     power: Annotated[float, SI("W", "hydraulic power at the relief setting", "pressure times flow")]
-    valve_conductance: Annotated[float, SI("m^3/(s Pa^0.5)", "K of the directional valve, Q = K sqrt(dp)", "drop")]
+    valve_conductance: Annotated[
+        float, SI("m^3/(s Pa^0.5)", "conductance K of the directional valve, Q = K sqrt(dp)", "drop")
+    ]
     check_valve_area: Annotated[float, SI("m^2", "open area of a check valve at the same drop", "orifice")]
     pipe_bore: Annotated[float, SI("m", "smallest bore of the pipes", "line speed")]
 

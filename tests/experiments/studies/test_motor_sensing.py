@@ -14,6 +14,8 @@ from experiments.studies.motor_sensing import (
 )
 from plant.diaphragm_motor_parameters import DiaphragmMotorParameters
 
+pytestmark = pytest.mark.slow
+
 MOTOR = DiaphragmMotorParameters()
 WANTED, WORKING = "A3, A4, A5, as the paper wants", "A4 and drive voltage"
 
