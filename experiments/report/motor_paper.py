@@ -1,6 +1,6 @@
 """The diaphragm-motor paper's report: what holds in its tables, its regression and its linear models.
 
-`paper_sections`, `vibration_sections` and `sensing_sections` return sections, so that another report can hold them too.
+`paper_sections`, `sensing_sections` and `vibration_sections` return sections, so that another report can hold them too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,10 +9,10 @@ import pandas as pd
 from markupsafe import Markup
 
 from experiments.figures.motor_regression import READING_WORDS, REGRESSION_FIGURES
-from experiments.figures.motor_vibration import VIBRATION_FIGURES
 from experiments.report.motor_sensing import sensing_sections
+from experiments.report.motor_vibration import vibration_sections
 from experiments.report.sectioned import Section, render_sections
-from experiments.report.tables import Cell, Column, exact, fixed, html_table
+from experiments.report.tables import Cell, Column, exact, fixed, html_table, yes_or_no
 
 INTRODUCTION = (
     "The paper of the hydraulic motor with seven piezo diaphragms prints tables, a regression, and linear models with "
@@ -26,10 +26,6 @@ Tables = Mapping[str, pd.DataFrame]
 
 def _as_printed(value: float) -> Cell:
     return Cell(exact(float(value)), "number")
-
-
-def _yes(good: bool) -> Cell:
-    return Cell("yes", "good") if good else Cell("no", "bad")
 
 
 def render_motor_paper(tables: Tables, figures: Mapping[str, bytes]) -> str:
@@ -89,52 +85,6 @@ def paper_sections(tables: Tables, figures: Mapping[str, bytes]) -> Sequence[Sec
             Section(name, kind.heading, figure=figures[name], caption=kind.caption)
             for name, kind in REGRESSION_FIGURES.items()
         ),
-    ]
-
-
-def vibration_sections(tables: Tables, figures: Mapping[str, bytes]) -> Sequence[Section]:
-    """Return the sections on the paper's linear models.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-    figures : Mapping[str, bytes]
-        SVG files, by name.
-
-    Returns
-    -------
-    sequence of Section
-        Poles, responses, the loop, hysteresis and fractional damping.
-    """
-    beside = {
-        "bode": [_tuning(tables["tuning"])],
-        "poles": [_poles(tables["poles"]), _margins(tables["margins"])],
-        "loop": [_loop(tables["loop"]), _relay(tables["relay"])],
-        "hysteresis_loops": [_hysteresis(tables["hysteresis"])],
-    }
-    said = {
-        "bode": (
-            "Diaphragms, fluid and load as springs, the piston as mass. With the signs mended the first mode is at "
-            "480 Hz. The model gives the alternating motion only: nothing in it rectifies, so it has no mean velocity. "
-            "Its natural frequency rises with the load's stiffness, as the paper argues; the best frequency of the "
-            "motor that pumps does not (errata M31).",
-        ),
-        "poles": (
-            "The loop around both masses is unstable at a gain of 1 although each Bode curve looks harmless at 480 Hz: "
-            "the undamped mode at 4.5 kHz turns too far. A grid of frequencies that misses this mode counts no turns.",
-        ),
-    }
-    return [
-        Section(
-            name,
-            kind.heading,
-            said.get(name, ()),
-            figure=figures[name],
-            caption=kind.caption,
-            tables=beside.get(name, ()),
-        )
-        for name, kind in VIBRATION_FIGURES.items()
     ]
 
 
@@ -209,7 +159,7 @@ def _decisions(frame: pd.DataFrame) -> Markup:
         Column("quantity", "quantity"),
         Column("value", "value"),
         Column("limit", "limit"),
-        Column("met", "met", words=_yes),
+        Column("met", "met", words=yes_or_no),
         Column("decision", "decision"),
     )
     return html_table(frame, columns, "Table 3's rules, applied.")
@@ -221,7 +171,7 @@ def _relations(frame: pd.DataFrame) -> Markup:
         Column("constant", "constant (median)"),
         Column("worst_percent", "furthest off", "%", words=lambda value: Cell(fixed(value, 2), "number")),
         Column("worst_row", "in row", digits=1),
-        Column("holds", "holds within 0.5 %", words=_yes),
+        Column("holds", "holds within 0.5 %", words=yes_or_no),
     )
     return html_table(frame, columns, "Relations between Table 2's columns, physical reading.")
 
@@ -278,75 +228,3 @@ def _actuators(frame: pd.DataFrame) -> Markup:
 def _claims(frame: pd.DataFrame) -> Markup:
     columns = (Column("claim", "what follows"), Column("value", "value", digits=3), Column("unit", "unit"))
     return html_table(frame, columns, "From 110.11 mL/min, 168.1 mm/s and 141 N.")
-
-
-def _poles(frame: pd.DataFrame) -> Markup:
-    columns = (
-        Column("model", "model"),
-        Column("real_rad_s", "real part", "1/s"),
-        Column("imaginary_rad_s", "imaginary part", "rad/s", digits=5),
-        Column("frequency_hz", "frequency", "Hz"),
-        Column("damping_ratio", "damping ratio", digits=3),
-        Column("stable", "stable", words=_yes),
-    )
-    return html_table(frame, columns, "Poles, one of each pair.")
-
-
-def _margins(frame: pd.DataFrame) -> Markup:
-    columns = (
-        Column("model", "model"),
-        Column("gain_margin", "gain margin", digits=3),
-        Column("phase_margin_deg", "phase margin", "°", digits=3),
-        Column("crossover_hz", "at", "Hz"),
-        Column("open_unstable_poles", "unstable poles", digits=1),
-        Column("turns", "clockwise turns", digits=1),
-        Column("closed_unstable_poles", "unstable poles, closed", digits=1),
-        Column("stable", "stable, closed", words=_yes),
-    )
-    return html_table(frame, columns, "Loops with a gain of 1 at rest; a dash: no finite gain margin.")
-
-
-def _tuning(frame: pd.DataFrame) -> Markup:
-    columns = (
-        Column("changed", "changed", words=lambda name: str(name).replace("_", " ")),
-        Column("factor", "times", digits=2),
-        Column("frequency_hz", "first mode", "Hz"),
-        Column("damping_ratio", "damping ratio", digits=3),
-        Column("peak_gain", "peak over rest", digits=3),
-        Column("decay_time_s", "decay to a tenth", "ms", 1e3, digits=3),
-    )
-    return html_table(frame, columns, "Stiffness and damping tuned, one at a time, equation 4.")
-
-
-def _loop(frame: pd.DataFrame) -> Markup:
-    columns = (
-        Column("controller", "controller"),
-        Column("overshoot_percent", "overshoot", "%", digits=3),
-        Column("settling_time_s", "settles within", "ms", 1e3, digits=3),
-        Column("error_percent", "error left", "%", digits=2),
-        Column("ripple_m", "ripple", "nm", 1e9, digits=2),
-    )
-    return html_table(frame, columns, "A step of 20 µm; settled is within 5 % of the value that is reached.")
-
-
-def _relay(frame: pd.DataFrame) -> Markup:
-    columns = (
-        Column("quantity", "quantity"),
-        Column("relay", "found by a relay in the loop"),
-        Column("model", "from the model"),
-        Column("unit", "unit"),
-    )
-    return html_table(frame, columns, "Where a proportional loop would swing for ever.")
-
-
-def _hysteresis(frame: pd.DataFrame) -> Markup:
-    columns = (
-        Column("law", "law"),
-        Column("frequency_hz", "frequency", "Hz"),
-        Column("area_v2", "area", "V²"),
-        Column("width_percent", "width", "% of stroke", digits=3),
-        Column("gain", "gain of the first harmonic"),
-        Column("lag_deg", "lag", "°", digits=3),
-        Column("distortion_percent", "harmonic distortion", "%", digits=2),
-    )
-    return html_table(frame, columns, "Loops of 100 V.")
