@@ -38,7 +38,7 @@ def fractional_push(ring, newest, sample):
 '''
 """Text for a generated kernel (`plant.compiled.kernel_file`): a ring of past samples and its weighted sum.
 
-With ``weights = gl_weights(a, m + 1)``, ``ring = zeros(2 m)``, ``newest = 0`` and step h, the derivative at the next
+With ``weights = gl_weights(a, m)``, ``ring = zeros(2 (m - 1))``, ``newest = 0`` and step h, the derivative at the next
 sample is ``h**-a * (sample + fractional_history(weights, ring, newest))``: known but for the sample, so that an
 implicit step stays linear in it. Then ``newest = fractional_push(ring, newest, sample)``. Samples are less the first.
 """
@@ -83,7 +83,7 @@ def grunwald_letnikov(samples: Array, order: float, sample_time: float, memory: 
     sample_time : float
         Time between samples [s].
     memory : int, optional
-        How many samples are remembered; all unless given.
+        How many samples are weighed, the newest included; all unless given.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def caputo_from_rest(samples: Array, order: float, sample_time: float, memory: i
     sample_time : float
         Time between samples [s].
     memory : int, optional
-        How many samples are remembered; all unless given.
+        How many samples are weighed, the newest included; all unless given.
 
     Returns
     -------

@@ -73,7 +73,7 @@ def vibration_run(
     speed : float
         Velocity at the first sample [m/s]; with an order above 1 it should be zero.
     memory : int, optional
-        How many samples the fractional damping remembers; all unless given.
+        How many samples the fractional damping weighs, the newest included; all unless given.
 
     Returns
     -------
@@ -81,7 +81,7 @@ def vibration_run(
         Displacement [m] and velocity [m/s].
     """
     k1, k2, a = p.diaphragm_stiffness, p.fluid_stiffness, p.fractional_order
-    remembered = min(memory or force.shape[0], force.shape[0]) if p.fractional_damping else 1
+    remembered = max(2, min(memory or force.shape[0], force.shape[0])) if p.fractional_damping else 2
     constants = (
         p.cylinder_mass,
         reduced_stiffness(p),
@@ -89,5 +89,5 @@ def vibration_run(
         p.damping,
         p.fractional_damping / sample_time**a,
     )
-    weights = gl_weights(a, remembered + 1)
+    weights = gl_weights(a, remembered)
     return _kernel().run(k2 / (k1 + k2) * force, start, speed, constants, weights, sample_time)

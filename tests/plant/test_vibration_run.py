@@ -6,6 +6,7 @@ from math import pi
 import numpy as np
 import pytest
 
+from plant.fractional import caputo_from_rest
 from plant.hysteresis_model import harmonics
 from plant.vibration_model import VibrationParameters, exact_response, reduced_stiffness
 from plant.vibration_run import vibration_run
@@ -38,6 +39,16 @@ def test_a_sine_settles_to_the_exact_response(order: float) -> None:
     response = harmonics(moved[last], 1, 5)[1] / harmonics(force[last], 1, 5)[1]
     exact = exact_response(replace(_fractional(order), diaphragm_mass=1e-9), np.array([480.0]))[0]
     assert abs(response / exact - 1.0) < 0.013
+
+
+@pytest.mark.parametrize("memory", [None, 150])
+def test_every_step_balances_with_the_sampled_derivative(memory: int | None) -> None:
+    model, force = _fractional(0.5), _force(2)
+    x, v = vibration_run(model, force, STEP, memory=memory)
+    resisted = model.fractional_damping * caputo_from_rest(x, 0.5, STEP, memory)[1:]
+    share = model.fluid_stiffness / (model.diaphragm_stiffness + model.fluid_stiffness)
+    pushed = share * force[1:] - reduced_stiffness(model) * x[:-1] - resisted
+    assert model.cylinder_mass * np.diff(v) / STEP == pytest.approx(pushed, rel=1e-9, abs=1e-9)
 
 
 def test_a_memory_of_a_thousand_samples_is_enough_for_two_and_a_half_cycles() -> None:
