@@ -17,6 +17,7 @@ from experiments.command import (
     identify,
     isolability,
     library,
+    motor_paper,
     simulate,
     size_cylinder,
     watch,
@@ -151,31 +152,6 @@ def piezo_stack(
         emit(str(manifest))
 
 
-@app.command("motor-paper", epilog="Example: hydrostate motor-paper --out results/motor-paper")
-def motor_paper(
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the report.")] = Path(
-        "results/motor-paper"
-    ),
-    seed: Seed = SEED,
-    as_json: Json = False,
-) -> None:
-    """Check the diaphragm-motor paper: Tables 1, 2, 4, 5, its regression (Figure 12), its linear models and hysteresis.
-
-    Says what holds, what holds in one reading only, and what does not. Takes some seconds.
-    The last line of standard output is the manifest's path.
-    """
-    from rich.console import Console
-
-    from experiments.command.motor_paper import motor_paper_command
-
-    begin = perf_counter()
-    manifest = motor_paper_command(out, seed, Console(stderr=True))
-    if as_json:
-        emit(json_text([{"outcome": "ok", "manifest": str(manifest), "seconds": perf_counter() - begin}]))
-    else:
-        emit(str(manifest))
-
-
 VERBS = (
     simulate,
     estimate,
@@ -188,6 +164,7 @@ VERBS = (
     conditions,
     batch,
     compare,
+    motor_paper,
     size_cylinder,
 )
 for module in VERBS:

@@ -4,11 +4,15 @@
 """
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import pandas as pd
 from markupsafe import Markup
 
 from experiments.figures.motor_regression import READING_WORDS, REGRESSION_FIGURES
+from experiments.figures.motor_sensing import SENSING_FIGURES
+from experiments.figures.motor_vibration import VIBRATION_FIGURES
+from experiments.figures.tables import TableFigure
 from experiments.report.motor_sensing import sensing_sections
 from experiments.report.motor_vibration import vibration_sections
 from experiments.report.sectioned import Section, render_sections
@@ -20,6 +24,11 @@ INTRODUCTION = (
     "reading, and what does not."
 )
 """The page's first paragraph."""
+
+MOTOR_PAPER_FIGURES: Mapping[str, TableFigure] = MappingProxyType(
+    {**REGRESSION_FIGURES, **SENSING_FIGURES, **VIBRATION_FIGURES}
+)
+"""All figures of the report, by file name."""
 
 Tables = Mapping[str, pd.DataFrame]
 
@@ -36,7 +45,7 @@ def render_motor_paper(tables: Tables, figures: Mapping[str, bytes]) -> str:
     tables : Mapping[str, pandas.DataFrame]
         What the study found, by the names of `hydrostate motor-paper`.
     figures : Mapping[str, bytes]
-        SVG files, by the names of `experiments.command.motor_paper.MOTOR_PAPER_FIGURES`.
+        SVG files, by the names of `MOTOR_PAPER_FIGURES`.
 
     Returns
     -------

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from experiments.cli import app
-from experiments.command.motor_paper import MOTOR_PAPER_FIGURES
+from experiments.report.motor_paper import MOTOR_PAPER_FIGURES
 
 RUN = CliRunner()
 
