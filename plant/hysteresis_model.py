@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.compiled.functions import Scalar
-from plant.components.bouc_wen import bouc_wen_rate
+from plant.components.bouc_wen import power_bouc_wen_rate
 from plant.errors import RigError
 from plant.integrate import rk4_step
 from plant.units import SI
@@ -25,12 +25,12 @@ Array: TypeAlias = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class HysteresisParameters:
-    """A diaphragm's centre as mass, damper and spring, with hysteresis in volts, exponent 1.
+    """A diaphragm's centre as mass, damper and spring, with hysteresis in volts.
 
     Raises
     ------
     RigError
-        If a value is not finite, or mass, damping or stiffness are not positive.
+        If a value is not finite, mass, damping or stiffness are not positive, or the exponent is below 1.
 
     Examples
     --------
@@ -43,14 +43,19 @@ class HysteresisParameters:
     stiffness: Annotated[float, SI("N/m", "stiffness k", "first mode of Table 1's composite plate, dry")] = 3.26e5
     stroke_a_volt: Annotated[float, SI("m/V", "d: displacement a volt without hysteresis", "composite plate")] = 8.38e-8
     alpha: Annotated[float, SI("1", "alpha of equation 21: share of hysteresis at small voltage", "judged")] = 0.30
-    beta: Annotated[float, SI("1/V", "beta of equation 21", "judged: a loop 11 % wide at 100 V")] = 0.006
-    gamma: Annotated[float, SI("1/V", "gamma of equation 21", "judged")] = 0.002
+    beta: Annotated[float, SI("1/V", "beta of equation 21, for exponent 1", "judged: a loop 11 % wide at 100 V")] = (
+        0.006
+    )
+    gamma: Annotated[float, SI("1/V", "gamma of equation 21, for exponent 1", "judged")] = 0.002
+    exponent: Annotated[float, SI("1", "exponent n of equation 21", "judged")] = 1.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
             if not isfinite(value) or (field.name in ("mass", "damping", "stiffness") and value <= 0.0):
                 raise RigError(f"{field.name} must be finite, and mass, damping and stiffness positive, got {value!r}")
+        if self.exponent < 1.0:
+            raise RigError(f"exponent must be at least 1, got {self.exponent!r}")
 
     @property
     def natural_frequency(self) -> float:
@@ -78,7 +83,7 @@ def hysteresis_loop(
     samples : int
         Steps a cycle.
     law : {"mended", "printed"}
-        ``alpha u' - beta abs(u') h - gamma u' abs(h)``, or as printed, ``alpha u - beta abs(u') h - gamma u abs(h)``.
+        ``alpha u' - beta abs(u') h abs(h)^(n-1) - gamma u' abs(h)^n``; printed, u' is u in the first and last term.
 
     Returns
     -------
@@ -95,7 +100,7 @@ def hysteresis_loop(
     voltage, rate = amplitude * np.sin(angle), 2.0 * pi * frequency * amplitude * np.cos(angle)
 
     def mended(state: tuple[Scalar, ...], speed: Scalar, _p: object) -> tuple[Scalar, ...]:
-        return (bouc_wen_rate(speed, state[0], p.alpha, 1.0, p.beta, p.gamma),)
+        return (power_bouc_wen_rate(speed, state[0], p.alpha, p.beta, p.gamma, p.exponent),)
 
     step = rk4_step(mended)
     seconds = 1.0 / (frequency * samples)
@@ -106,7 +111,8 @@ def hysteresis_loop(
             h = step((h,), (rate[k], rate[k + 1]), p, seconds)[0]
         else:
             u, speed = 0.5 * (voltage[k] + voltage[k + 1]), abs(0.5 * (rate[k] + rate[k + 1]))
-            h = (h + seconds * p.alpha * u) / (1.0 + seconds * (p.beta * speed + p.gamma * u * np.sign(h)))
+            yielding = (p.beta * speed + p.gamma * u * np.sign(h)) * abs(h) ** (p.exponent - 1.0)
+            h = (h + seconds * p.alpha * u) / (1.0 + seconds * yielding)
         hysteresis[k + 1] = h
     return voltage[-samples - 1 :], hysteresis[-samples - 1 :]
 

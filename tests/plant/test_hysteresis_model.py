@@ -16,12 +16,14 @@ from plant.hysteresis_model import (
 DIAPHRAGM = HysteresisParameters()
 
 
-def _area(frequency: float, samples: int, law: str = "mended") -> float:
-    return loop_area(*hysteresis_loop(DIAPHRAGM, 100.0, frequency, samples, law=law))  # pyright: ignore[reportArgumentType] - one of two words
+def _area(frequency: float, samples: int, law: str = "mended", p: HysteresisParameters = DIAPHRAGM) -> float:
+    return loop_area(*hysteresis_loop(p, 100.0, frequency, samples, law=law))  # pyright: ignore[reportArgumentType] - one of two words
 
 
-def test_the_loops_area_is_equal_at_1_and_480_hz() -> None:
-    assert _area(1.0, 2000) == pytest.approx(_area(480.0, 417), rel=1e-3)
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_the_loops_area_is_equal_at_1_and_480_hz(exponent: float) -> None:
+    p = HysteresisParameters(exponent=exponent)
+    assert _area(1.0, 2000, p=p) == pytest.approx(_area(480.0, 417, p=p), rel=1e-3)
 
 
 def test_the_printed_laws_loop_vanishes_with_frequency() -> None:
@@ -50,3 +52,5 @@ def test_hysteresis_makes_odd_harmonics_only() -> None:
 def test_impossible_parameters_are_refused() -> None:
     with pytest.raises(RigError, match=r"stiffness must be finite, .* got 0.0"):
         HysteresisParameters(stiffness=0.0)
+    with pytest.raises(RigError, match=r"exponent must be at least 1, got 0.5"):
+        HysteresisParameters(exponent=0.5)

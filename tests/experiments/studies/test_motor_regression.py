@@ -27,6 +27,11 @@ def test_figure_12_is_reproduced_in_all_its_figures() -> None:
     assert table["relative_difference"].max() < 1e-6
 
 
+def test_figure_12_s_intervals_are_those_of_its_fit() -> None:
+    printed = [[-0.074924071, 0.07625904], [-0.001613371, 0.019799738], [2.389416288, 4.48304371]]
+    assert fit(reading("anova")).conf_int().to_numpy() == pytest.approx(np.array(printed), rel=1e-6)
+
+
 def test_no_other_reading_reproduces_figure_12() -> None:
     table = anova_table().set_index("quantity")
     for name in ("as_printed", "physical"):
