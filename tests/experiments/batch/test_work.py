@@ -97,3 +97,14 @@ def test_a_filter_without_lanes_gives_rows_too() -> None:
     (task,) = small_plan(seeds=1, conditions=["normal"], starts_pa=[2e8], methods=methods).tasks(set(), 1)
     ours, theirs = table_of(run_task(task))["bulk_modulus_pa"].to_pylist()
     assert ours == pytest.approx(theirs, rel=1e-6)
+
+
+def test_a_filter_that_diverges_beside_others_is_a_row_without_numbers() -> None:
+    methods = [FILTER, {**FILTER, "start_std_pa": 1e150}]
+    plan = small_plan(seeds=1, conditions=["normal"], starts_pa=[2e8], methods=methods)
+    fine, diverged = table_of(run_task(Task(plan.rig, plan.groups))).to_pylist()
+    assert (fine["outcome"], diverged["outcome"]) == ("ok", "diverged")
+    assert diverged["reason"] == "the estimate stopped being finite"
+    numbers = ("bulk_modulus_pa", "bulk_modulus_std_pa", "error_percent", "nis_position", "log_likelihood")
+    assert [diverged[name] for name in numbers] == [None] * 5
+    assert None not in [fine[name] for name in numbers]
