@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from estimation.piezo_stack_unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, changed
 from plant.errors import HydrostateError, LogError
 from plant.piezo_stack_parameters import LONGEST_STEP, PiezoStackParameters
-from plant.piezo_stack_run import BENCH_SENSORS, StackSensors, checked_voltage, run_stack, stack_channels
+from plant.piezo_stack_run import BENCH_SENSORS, StackSensors, checked_voltage, run_stacks, stack_channels
 from plant.record import Record
 
 Array: TypeAlias = NDArray[np.float64]
@@ -35,6 +35,9 @@ COARSE_STEP = 5e-6
 
 SLOPE_STEP = 1e-3
 """Change of a scaled parameter for a slope [dimensionless]."""
+
+COARSE_SLOPE_STEP = 2e-2
+"""The same far from the answer, where bouncing reeds roughen the misfit [dimensionless]."""
 
 
 @dataclass(frozen=True)
@@ -95,21 +98,26 @@ class _Runs:
     def actuator(self, theta: Array) -> SimpleNamespace:
         return changed(self.healthy, dict(zip(self.names, theta.tolist(), strict=True)))
 
-    def scaled(self, theta: Array, longest_step: float = LONGEST_STEP) -> Array:
-        """Return every channel over its noise, one after the other."""
-        self.count += 1
-        p = self.actuator(theta)
-        try:
-            states = run_stack(p, self.voltage, self.sample_time, longest_step=longest_step)
-        except HydrostateError:  # an estimate on its way may stray where no actuator is
-            return np.full(len(self.voltage) * len(self.noise), _HOPELESS)
-        channels = stack_channels(states, p)
-        return np.concatenate([channels[name] / deviation for name, deviation in self.noise.items()])
+    def scaled(self, thetas: Sequence[Array], longest_step: float = LONGEST_STEP) -> Array:
+        """Return every channel over its noise, one after the other, a row for each guess; guesses run side by side."""
+        self.count += len(thetas)
+        actuators = [self.actuator(theta) for theta in thetas]
+        rows = [
+            np.concatenate([channels[name] / deviation for name, deviation in self.noise.items()])
+            for p, states in zip(
+                actuators, run_stacks(actuators, self.voltage, self.sample_time, longest_step=longest_step), strict=True
+            )
+            for channels in [stack_channels(states, p)]
+        ]
+        found = np.array(rows)  # an estimate on its way may stray where no actuator is
+        return np.where(np.isfinite(found).all(axis=1, keepdims=True), found, _HOPELESS)
 
-    def slopes(self, theta: Array, longest_step: float) -> Array:
-        base = self.scaled(theta, longest_step)
-        columns = [self.scaled(theta + SLOPE_STEP * unit, longest_step) - base for unit in np.eye(len(theta))]
-        return np.column_stack(columns) / SLOPE_STEP
+    def around(
+        self, theta: Array, longest_step: float = LONGEST_STEP, slope_step: float = SLOPE_STEP
+    ) -> tuple[Array, Array]:
+        """Return the channels at a guess, and their slopes there."""
+        base, *moved = self.scaled([theta, *(theta + slope_step * np.eye(len(theta)))], longest_step)
+        return base, np.column_stack([row - base for row in moved]) / slope_step
 
 
 def estimate_stack(
@@ -214,7 +222,7 @@ def stack_bounds(
     """
     noise = {name: value for name, value in asdict(sensors).items() if name in channels}
     runs = _Runs(checked_voltage(voltage), sample_time, parameters, tuple(unknowns), noise)
-    deviations = np.sqrt(np.diag(covariance(runs.slopes(np.zeros(len(runs.names)), LONGEST_STEP))))
+    deviations = np.sqrt(np.diag(covariance(runs.around(np.zeros(len(runs.names)), LONGEST_STEP)[1])))
     return {
         name: (UNKNOWNS[name].scale or 1.0) * float(deviation)
         for name, deviation in zip(runs.names, deviations, strict=True)
@@ -227,48 +235,39 @@ def _descended(runs: _Runs, measured: Array, start: Array) -> tuple[Array, Array
     It ends where a step is a tenth of the standard deviations, which no reader could tell from none.
     """
     theta = _coarsely_descended(runs, measured, start)
-    slopes = runs.slopes(theta, LONGEST_STEP)
+    found, slopes = runs.around(theta, LONGEST_STEP)
     known = covariance(slopes)
-    residuals = runs.scaled(theta) - measured
+    residuals = found - measured
     for _ in range(_MOST_EXACT):
-        whole = -known @ (slopes.T @ residuals)
-        for share in _SHORTENED:
-            change = share * whole
-            tried = runs.scaled(theta + change) - measured
-            if float(tried @ tried) < float(residuals @ residuals):
-                break
-        else:
+        changes = np.outer(_SHORTENED, -known @ (slopes.T @ residuals))
+        tried = runs.scaled([*(theta + changes)]) - measured
+        best = int(np.argmin(np.sum(tried**2, axis=1)))
+        if float(tried[best] @ tried[best]) >= float(residuals @ residuals):
             break
-        theta, residuals = theta + change, tried
-        if _share(change, known) < _DONE:
+        theta, residuals = theta + changes[best], tried[best]
+        if _share(changes[best], known) < _DONE:
             break
     return theta, residuals, slopes
 
 
 def _coarsely_descended(runs: _Runs, measured: Array, start: Array) -> Array:
-    """Descend by Levenberg and Marquardt; while it goes fast, slopes are carried along by Broyden's update."""
-    theta, damping, fresh = start, 1e-3, True
-    residuals = runs.scaled(theta, COARSE_STEP) - measured
-    slopes = runs.slopes(theta, COARSE_STEP)
+    """Descend by Levenberg and Marquardt, several dampings tried side by side."""
+    theta = start
+    found, slopes = runs.around(theta, COARSE_STEP, COARSE_SLOPE_STEP)
+    residuals = found - measured
     for _ in range(_MOST_STEPS):
         normal = slopes.T @ slopes
         own = np.diag(np.diag(normal) + 1e-12)
-        change = np.linalg.solve(normal + damping * own, -slopes.T @ residuals)
-        if (fresh and _share(change, covariance(slopes)) < _NEAR) or damping > _STUCK:
+        changes = [np.linalg.solve(normal + damping * own, -slopes.T @ residuals) for damping in _DAMPINGS]
+        if _share(changes[0], covariance(slopes)) < _NEAR:
             break
-        tried = runs.scaled(theta + change, COARSE_STEP) - measured
-        gain = float(tried @ tried) / float(residuals @ residuals)
-        if gain < 1.0:
-            if gain < _FAST:
-                missed = tried - residuals - slopes @ change
-                slopes = slopes + np.outer(missed, change) / float(change @ change)
-            theta, residuals, damping = theta + change, tried, 0.1 * damping
-        elif fresh:
-            damping *= 10.0
-            continue
-        fresh = gain >= _FAST
-        if fresh:
-            slopes = runs.slopes(theta, COARSE_STEP)
+        tried = runs.scaled([theta + change for change in changes], COARSE_STEP) - measured
+        best = int(np.argmin(np.sum(tried**2, axis=1)))
+        if float(tried[best] @ tried[best]) >= float(residuals @ residuals):
+            break
+        theta = theta + changes[best]
+        found, slopes = runs.around(theta, COARSE_STEP, COARSE_SLOPE_STEP)
+        residuals = found - measured
     return theta
 
 
@@ -283,8 +282,7 @@ _NEAR = 3.0
 _DONE = 0.1
 _SHORTENED = (1.0, 0.5, 0.2)
 _MOST_EXACT = 6
-_FAST = 0.7
-_STUCK = 1e6
+_DAMPINGS = (1e-6, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2, 1e4)
 _UNEXPLAINED = 1.1
 _MOST_GUESSES = 4
 
@@ -323,7 +321,8 @@ def _ordered_starts(runs: _Runs, measured: Array, starts: Sequence[Mapping[str, 
     ]
     if not guesses:
         raise HydrostateError("no first guess is made of the unknowns alone")
-    return sorted(guesses, key=lambda theta: float(np.sum((runs.scaled(theta, COARSE_STEP) - measured) ** 2)))
+    misfits = np.sum((runs.scaled(guesses, COARSE_STEP) - measured) ** 2, axis=1)
+    return [guesses[place] for place in np.argsort(misfits, kind="stable")]
 
 
 def _concluded(runs: _Runs, theta: Array, residuals: Array, scaled: Array) -> StackEstimate:
