@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from estimation.bouc_wen import SHAPE, fit_oscillator, fit_stack_loop, linear_start, simulate_oscillator
+from estimation.bouc_wen import LOOP, fit_stack_loop
+from estimation.bouc_wen_oscillator import fit_oscillator, linear_start, simulate_oscillator
 from estimation.piezo_stack import NORMAL_95, estimate_stack, stack_bounds
 from experiments.studies.piezo_stack import DESIGN_GRID, figure_points, loop_widths, stack_loops, sweep
 from experiments.studies.piezo_stack_hysteresis import NOISE, slow_loop
@@ -123,15 +124,14 @@ def hysteresis(seeds: int) -> None:
     """Fit one loop of the stack, and the public benchmark."""
     p = PiezoStackParameters()
     voltage, displacement = slow_loop(p, 100.0)
-    fit_stack_loop(voltage, displacement)
-    names = ("free_stroke_a_volt", *SHAPE)
+    fit_stack_loop(voltage, displacement, from_rest=False)
     worst, covered, seconds = [], [], []
     for seed in range(seeds):
         noise = NOISE * np.random.default_rng(seed).standard_normal(len(voltage))
-        took, fit = timed(lambda n=noise: fit_stack_loop(voltage, displacement + n))
+        took, fit = timed(lambda n=noise: fit_stack_loop(voltage, displacement + n, from_rest=False))
         seconds.append(took)
-        worst.append(max(abs(fit.values[name] / getattr(p, name) - 1.0) for name in names))
-        covered += [fit.interval(name)[0] <= getattr(p, name) <= fit.interval(name)[1] for name in names]
+        worst.append(max(abs(fit.values[name] / getattr(p, name) - 1.0) for name in LOOP))
+        covered += [fit.interval(name)[0] <= getattr(p, name) <= fit.interval(name)[1] for name in LOOP]
     say(f"worst Bouc-Wen parameter over {seeds} seeds [%]", 100.0 * max(worst), 2.0)
     say("time of a fit, median [s]", float(np.median(seconds)), 0.5)
     say("95 % intervals that cover [%]", 100.0 * float(np.mean(covered)), 90.0, most=False)

@@ -1,9 +1,9 @@
 """Kernels of fixed steps written as straight lines of instructions: one run, or several runs side by side.
 
-`plant.integrate.compile_trajectory` lets Numba compile the same step. Here factors are gathered, products are fused with
-sums, choices are instructions instead of branches, and a lone run divides several numbers at a time
-(`plant.compiled.pack`). As many runs as fit into the processor's vectors take little longer than one, and give the same
-bits as one.
+`plant.integrate.compile_trajectory` lets Numba compile the same step. Here factors are gathered, products are fused
+with sums, choices are instructions instead of branches, and a lone run divides several numbers at a time
+(`plant.compiled.pack`). As many runs as fit into the processor's vectors take little longer than one, and give the
+same bits as one.
 """
 
 from collections.abc import Callable

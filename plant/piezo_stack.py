@@ -197,7 +197,9 @@ def stack_derivative(state: tuple[Scalar, ...], voltage: Scalar, rate: Scalar, p
     pushed = stack_force(driven, h, x, v, p.stack_stiffness, p.stack_damping)
     held = p.head_stiffness * x + p.head_damping * v + pressure.chamber * p.piston_area
     lifted = p.carriage_mass + p.load_mass
-    friction = p.viscous_friction * speed + p.coulomb_friction * speed / sqrt(speed * speed + p.friction_speed * p.friction_speed)
+    friction = p.viscous_friction * speed + p.coulomb_friction * speed / sqrt(
+        speed * speed + p.friction_speed * p.friction_speed
+    )
     middle = 0.5 * p.cylinder_length - p.cylinder_start
     stopped = end_stop_force(
         position - middle, speed, 0.5 * p.cylinder_length - p.end_clearance, END_STIFFNESS, END_DAMPING

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
@@ -66,12 +67,14 @@ def render_stack_report(
             "hysteresis",
             "Hysteresis: what identifies it",
             (
-                "One loop of 100 V, three slow cycles from rest, 20 nm of noise. The paper's procedure measures the "
-                "sum of two parameters twice and gets both wrong; one of its four regions then holds no sample, so the "
-                "rest cannot be solved for. Fitting all parameters together gives them back, with intervals (errata "
-                "P14).",
+                "One loop of 100 V at 0.1 Hz and 20 kHz, logged once it has closed, with 20 nm of noise. The paper's "
+                "procedure measures the sum of two parameters twice and gets both wrong, and the rest cannot be solved "
+                "for. Fitting all parameters together gives them back, with intervals (errata P14).",
+                "Below stands what no estimate can beat. A closed loop shows all four signs of rate and hysteresis: "
+                "from 200,000 samples it tells every parameter to half a percent; from 5,000 it cannot. A "
+                "first loop from rest does not tell them apart at any length, for on it the hysteresis keeps its sign.",
             ),
-            tables=(_hysteresis(tables["hysteresis parameters"]),),
+            tables=(_hysteresis(tables["hysteresis parameters"]), _loop_card(tables["what loops tell"])),
         ),
         Section(
             "identifiability",
@@ -129,6 +132,21 @@ def _hysteresis(frame: pd.DataFrame) -> Markup:
         Column("covered", "covers", words=lambda yes: Cell("yes", "good") if yes else Cell("no", "bad")),
     )
     return html_table(frame.assign(interval=low + " to " + high), columns, "Parameters of equation 1 in SI units.")
+
+
+def _loop_card(frame: pd.DataFrame) -> Markup:
+    def told(value: object) -> Cell | str:
+        percent = float(str(value))
+        return number(percent, 2) if np.isfinite(percent) else Cell("not told", "bad")
+
+    columns = (
+        Column("loop", "loop"),
+        Column("samples", "samples a cycle"),
+        *(Column(name, f"{name.replace('_', ' ')} [%]", words=told) for name in frame.columns[2:].tolist()),
+    )
+    return html_table(
+        frame, columns, "Standard deviation of each parameter at best (Cramér-Rao), 20 nm of white noise."
+    )
 
 
 def _card(frame: pd.DataFrame) -> Markup:
