@@ -13,31 +13,16 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.piezo_stack_unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, changed
-from plant.errors import HydrostateError, LogError
+from estimation.piezo_stack_runs import COARSE_SLOPE_STEP, COARSE_STEP, STACK_CHANNELS, StackRuns, prepared
+from estimation.piezo_stack_unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS
 from plant.piezo_stack_parameters import LONGEST_STEP, PiezoStackParameters
-from plant.piezo_stack_run import BENCH_SENSORS, StackSensors, checked_voltage, run_stacks, stack_channels
+from plant.piezo_stack_run import BENCH_SENSORS, StackSensors, checked_voltage
 from plant.record import Record
 
 Array: TypeAlias = NDArray[np.float64]
 
 NORMAL_95 = 1.959963984540054
 """Half width of a 95 % interval over the standard deviation [dimensionless]."""
-
-DRIVE = "drive_voltage_v"
-"""The channel of the drive."""
-
-STACK_CHANNELS = tuple(asdict(BENCH_SENSORS))
-"""Channels that a bench may log beside the drive."""
-
-COARSE_STEP = 5e-6
-"""Longest step of the runs that slopes and starts are taken from [s]."""
-
-SLOPE_STEP = 1e-3
-"""Change of a scaled parameter for a slope [dimensionless]."""
-
-COARSE_SLOPE_STEP = 2e-2
-"""The same far from the answer, where bouncing reeds roughen the misfit [dimensionless]."""
 
 
 @dataclass(frozen=True)
@@ -84,42 +69,6 @@ class StackEstimate:
         return self.values[name] - half, self.values[name] + half
 
 
-@dataclass
-class _Runs:
-    """The log that runs are compared with, and how many there were."""
-
-    voltage: Array
-    sample_time: float
-    healthy: PiezoStackParameters
-    names: tuple[str, ...]
-    noise: Mapping[str, float]
-    count: int = 0
-
-    def actuator(self, theta: Array) -> SimpleNamespace:
-        return changed(self.healthy, dict(zip(self.names, theta.tolist(), strict=True)))
-
-    def scaled(self, thetas: Sequence[Array], longest_step: float = LONGEST_STEP) -> Array:
-        """Return every channel over its noise, one after the other, a row for each guess; guesses run side by side."""
-        self.count += len(thetas)
-        actuators = [self.actuator(theta) for theta in thetas]
-        rows = [
-            np.concatenate([channels[name] / deviation for name, deviation in self.noise.items()])
-            for p, states in zip(
-                actuators, run_stacks(actuators, self.voltage, self.sample_time, longest_step=longest_step), strict=True
-            )
-            for channels in [stack_channels(states, p)]
-        ]
-        found = np.array(rows)  # an estimate on its way may stray where no actuator is
-        return np.where(np.isfinite(found).all(axis=1, keepdims=True), found, _HOPELESS)
-
-    def around(
-        self, theta: Array, longest_step: float = LONGEST_STEP, slope_step: float = SLOPE_STEP
-    ) -> tuple[Array, Array]:
-        """Return the channels at a guess, and their slopes there."""
-        base, *moved = self.scaled([theta, *(theta + slope_step * np.eye(len(theta)))], longest_step)
-        return base, np.column_stack([row - base for row in moved]) / slope_step
-
-
 def estimate_stack(
     record: Record,
     healthy: PiezoStackParameters,
@@ -158,8 +107,8 @@ def estimate_stack(
     HydrostateError
         If an unknown is not known, or no first guess is made of them.
     """
-    runs, measured = _prepared(record, healthy, tuple(unknowns), channels, sensors)
-    guesses = _ordered_starts(runs, measured, starts)
+    runs, measured = prepared(record, healthy, tuple(unknowns), channels, sensors)
+    guesses = runs.ordered(measured, starts)
 
     theta, residuals, slopes = _descended(runs, measured, guesses[0])
     for guess in guesses[1:_MOST_GUESSES]:
@@ -221,7 +170,7 @@ def stack_bounds(
         Standard deviation by name [SI]; of factors, relative.
     """
     noise = {name: value for name, value in asdict(sensors).items() if name in channels}
-    runs = _Runs(checked_voltage(voltage), sample_time, parameters, tuple(unknowns), noise)
+    runs = StackRuns(checked_voltage(voltage), sample_time, parameters, tuple(unknowns), noise)
     deviations = np.sqrt(np.diag(covariance(runs.around(np.zeros(len(runs.names)), LONGEST_STEP)[1])))
     return {
         name: (UNKNOWNS[name].scale or 1.0) * float(deviation)
@@ -229,7 +178,7 @@ def stack_bounds(
     }
 
 
-def _descended(runs: _Runs, measured: Array, start: Array) -> tuple[Array, Array, Array]:
+def _descended(runs: StackRuns, measured: Array, start: Array) -> tuple[Array, Array, Array]:
     """Descend by Levenberg and Marquardt in coarse runs, then by Gauss and Newton in exact ones.
 
     It ends where a step is a tenth of the standard deviations, which no reader could tell from none.
@@ -250,7 +199,7 @@ def _descended(runs: _Runs, measured: Array, start: Array) -> tuple[Array, Array
     return theta, residuals, slopes
 
 
-def _coarsely_descended(runs: _Runs, measured: Array, start: Array) -> Array:
+def _coarsely_descended(runs: StackRuns, measured: Array, start: Array) -> Array:
     """Descend by Levenberg and Marquardt, several dampings tried side by side."""
     theta = start
     found, slopes = runs.around(theta, COARSE_STEP, COARSE_SLOPE_STEP)
@@ -276,7 +225,6 @@ def _share(change: NDArray[Any], known: Array) -> float:
     return float(np.max(np.abs(change) / np.sqrt(np.diag(known))))
 
 
-_HOPELESS = 1e6
 _MOST_STEPS = 30
 _NEAR = 3.0
 _DONE = 0.1
@@ -287,45 +235,11 @@ _UNEXPLAINED = 1.1
 _MOST_GUESSES = 4
 
 
-def _prepared(
-    record: Record,
-    healthy: PiezoStackParameters,
-    names: tuple[str, ...],
-    channels: Collection[str],
-    sensors: StackSensors,
-) -> tuple[_Runs, Array]:
-    for name in names:
-        if name not in UNKNOWNS:
-            raise HydrostateError(f"an unknown must be one of {', '.join(UNKNOWNS)}, got {name!r}")
-    if DRIVE not in record:
-        raise LogError(f"{DRIVE} is wanted, the log has {', '.join(record)}")
-    used = [name for name in STACK_CHANNELS if name in channels and name in record]
-    if not used:
-        raise LogError(f"one of {', '.join(STACK_CHANNELS)} is wanted beside {DRIVE}, the log has {', '.join(record)}")
-    for name in (DRIVE, *used):
-        if not np.all(np.isfinite(record[name])):
-            raise LogError(f"{name} must be whole, got {int(np.sum(~np.isfinite(record[name])))} missing samples")
-    noise = {name: value for name, value in asdict(sensors).items() if name in used}
-    runs = _Runs(checked_voltage(record[DRIVE]), record.sample_time, healthy, names, noise)
-    return runs, np.concatenate([record[name] / deviation for name, deviation in noise.items()])
-
-
 def _spread(residuals: Array, theta: Array) -> float:
     return float(residuals @ residuals) / (len(residuals) - len(theta))
 
 
-def _ordered_starts(runs: _Runs, measured: Array, starts: Sequence[Mapping[str, float]]) -> list[Array]:
-    """Return the first guesses that are made of the unknowns, the one that fits best first."""
-    guesses = [
-        np.array([start.get(name, 0.0) for name in runs.names]) for start in starts if set(start) <= set(runs.names)
-    ]
-    if not guesses:
-        raise HydrostateError("no first guess is made of the unknowns alone")
-    misfits = np.sum((runs.scaled(guesses, COARSE_STEP) - measured) ** 2, axis=1)
-    return [guesses[place] for place in np.argsort(misfits, kind="stable")]
-
-
-def _concluded(runs: _Runs, theta: Array, residuals: Array, scaled: Array) -> StackEstimate:
+def _concluded(runs: StackRuns, theta: Array, residuals: Array, scaled: Array) -> StackEstimate:
     p = runs.actuator(theta)
     deviations = np.sqrt(np.diag(scaled))
     values: dict[str, float] = {}

@@ -199,7 +199,8 @@ def run_stack(
         If the state stops being finite.
     """
     initial = at_bias(parameters, float(voltage[0])) if start is None else start
-    states = _run_lanes([parameters], initial[:, None], voltage[:, None], sample_time, longest_step, 1)[:, :, 0]
+    row, start_, drive = stack_row(parameters)[None], initial[:, None], voltage[:, None]
+    states = run_rows(row, start_, drive, sample_time, longest_step=longest_step)[:, :, 0]
     if not np.all(np.isfinite(states[-1])):
         when = sample_time * int(np.argmin(np.isfinite(states).all(axis=1)))
         raise HydrostateError(f"the {NAME} plant stopped being finite at {when:.4f} s: check its parameters")
@@ -236,22 +237,46 @@ def run_stacks(
         some = parameters[first : first + LANES]
         drive = drives[:, first : first + LANES]
         starts = np.column_stack([at_bias(p, float(u)) for p, u in zip(some, drive[0], strict=True)])
-        states = _run_lanes(some, starts, drive, sample_time, longest_step, LANES)
+        rows = np.array([stack_row(p) for p in some])
+        states = run_rows(rows, starts, drive, sample_time, longest_step=longest_step)
         yield from (states[:, :, lane] for lane in range(len(some)))
 
 
-def _run_lanes(
-    parameters: Sequence[StackValues], starts: Array, drives: Array, sample_time: float, longest_step: float, lanes: int
+def run_rows(
+    rows: Array, starts: Array, voltages: Array, sample_time: float, *, longest_step: float = LONGEST_STEP
 ) -> Array:
-    """Run up to so many actuators; copies of the last fill the lanes that are left."""
+    """Run actuators given as rows of parameters, eight side by side; one alone takes a kernel of its own.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (actuators, parameters)
+        As `stack_row` gives them.
+    starts : ndarray, shape (19, actuators)
+        Initial states.
+    voltages : ndarray, shape (n, actuators)
+        Drive at the samples [V], linear between.
+    sample_time : float
+        Seconds between samples [s].
+    longest_step : float
+        Longest step [s].
+
+    Returns
+    -------
+    ndarray, shape (n, 19, actuators)
+        States at the samples; not finite where a run stopped being so.
+    """
+    count = len(rows)
+    lanes = LANES if count > 1 else 1
     run = compile_fixed_step("piezo_stack", stack_step, len(STATES), PiezoStackParameters, lanes)
-    count = len(parameters)
-    lane = np.minimum(np.arange(lanes), count - 1)
-    rows = np.array([stack_row(p) for p in parameters])[lane]
-    states = np.empty((len(drives), len(STATES), count))
+    states = np.empty((len(voltages), len(STATES), count))
     substeps = max(1, ceil(sample_time / longest_step - 1e-9))
-    initial, drive = (np.ascontiguousarray(values[:, lane], dtype=np.float64) for values in (starts, drives))
-    run(initial, drive, rows, sample_time, substeps, states)
+    for first in range(0, count, lanes):
+        lane = np.minimum(np.arange(first, first + lanes), count - 1)  # copies of the last fill what is left
+        initial, drive = (np.ascontiguousarray(values[:, lane], dtype=np.float64) for values in (starts, voltages))
+        part = states if count <= lanes else np.empty((len(voltages), len(STATES), min(lanes, count - first)))
+        run(initial, drive, rows[lane], sample_time, substeps, part)
+        if part is not states:
+            states[:, :, first : first + lanes] = part
     return states
 
 
