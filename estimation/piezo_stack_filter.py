@@ -1,4 +1,4 @@
-"""The piezo-stack actuator's unknowns followed from sample to sample: an extended Kalman filter (decision 26).
+"""The piezo-stack actuator's unknowns followed from sample to sample: an extended Kalman filter (decision 25).
 
 Nineteen states and the logarithms or amounts that `UNKNOWNS` name, all carried from one sample to the next by the
 plant's own steps of 2 us. Slopes are differences of runs side by side: a step's Jacobian in closed form, as the other
