@@ -105,7 +105,7 @@ def stack_with_fault(healthy: PiezoStackParameters, name: str) -> PiezoStackPara
     Examples
     --------
     >>> stack_with_fault(PiezoStackParameters(), "air_doubled").air_fraction
-    0.0274
+    0.049
     """
     if name in STACK_FAULTS:
         return STACK_FAULTS[name](healthy)

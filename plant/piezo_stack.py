@@ -281,7 +281,7 @@ def at_bias(p: StackValues, voltage: float = 0.0) -> NDArray[np.float64]:
     Examples
     --------
     >>> round(1e6 * float(at_bias(PiezoStackParameters())[0]), 2)
-    -15.4
+    -17.61
     """
     driven = p.free_stroke_a_volt * p.stack_stiffness * voltage
     x = (driven - p.bias_pressure * p.piston_area) / (p.stack_stiffness + p.head_stiffness)

@@ -347,7 +347,7 @@ def simulate_stack(
     --------
     >>> record = simulate_stack(PiezoStackParameters(), sine_drive(275.0, 140.0, 0.01, 1e-5), 1e-5)
     >>> round(1e6 * float(np.ptp(record["stack_displacement_m"])))
-    38
+    39
     """
     drive = checked_voltage(voltage)
     states = run_stack(parameters, drive, sample_time)

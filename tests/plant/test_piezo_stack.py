@@ -87,7 +87,7 @@ def test_actuators_run_side_by_side_as_they_run_alone_to_the_bit() -> None:
 
 
 def test_a_port_too_small_for_the_step_is_refused() -> None:
-    with pytest.raises(RigError, match=r"port_volume must be at least 2\.1e-06"):
+    with pytest.raises(RigError, match=r"port_volume must be at least 2\.4e-06"):
         PiezoStackParameters(port_volume=1e-6)
     assert least_port(HEALTHY) < HEALTHY.port_volume
 
