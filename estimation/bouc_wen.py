@@ -82,8 +82,9 @@ def fit_stack_loop(voltage: Array, displacement: Array, *, from_rest: bool = Tru
     """Fit a stack's free stroke a volt and its hysteresis to one slow loop (equation 27 with errata P2, P14).
 
     One loop that has been gone round before shows all four signs of rate and hysteresis, and what it tells grows with
-    its samples (`loop_bounds`). Cycles from rest, the first rise among them, tell three times more; one cycle from rest
-    alone does not do: its hysteresis keeps its sign, and four parameters act as two.
+    its samples (`loop_bounds`). Three cycles from rest, the first rise among them, tell several times more; one cycle
+    from rest alone does not do: on it voltage never rises while hysteresis is negative, so four parameters act as
+    three.
 
     Parameters
     ----------

@@ -72,7 +72,8 @@ def render_stack_report(
                 "for. Fitting all parameters together gives them back, with intervals (errata P14).",
                 "Below stands what no estimate can beat. A closed loop shows all four signs of rate and hysteresis: "
                 "from 200,000 samples it tells every parameter to half a percent; from 5,000 it cannot. A "
-                "first loop from rest does not tell them apart at any length, for on it the hysteresis keeps its sign.",
+                "first loop from rest cannot tell the last four apart at any sampling: on it voltage never rises while "
+                "hysteresis is negative.",
             ),
             tables=(_hysteresis(tables["hysteresis parameters"]), _loop_card(tables["what loops tell"])),
         ),
@@ -82,9 +83,9 @@ def render_stack_report(
             (
                 "Standard deviations that no estimate from 0.1 s at 20 kHz and 10 kg can beat, all quantities unknown "
                 "together. The stack is the pressure sensor: its displacement tells nearly all that is told. The "
-                "cylinder's position alone tells the air, and of leaks and friction forty to a hundred times less than "
-                "the stack. All this takes the model for granted: another line or reed misleads friction and leaks "
-                "first, so calibrate on a healthy run.",
+                "cylinder's position alone tells the air, and of leaks and friction thirty to three hundred times less "
+                "than the stack. All this takes the model for granted: another line or reed misleads friction and "
+                "leaks first, so calibrate on a healthy run.",
             ),
             tables=(_card(tables["identifiability"]),),
         ),
