@@ -35,6 +35,7 @@ CYCLES = 3
 _FEWEST = 50
 _ENOUGH = 5000
 _WORST_CONDITION = 1e6
+_TOUCHED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -149,11 +150,12 @@ def loop_bounds(
     truth = np.array([float(getattr(parameters, name)) for name in LOOP])
     slopes = _loop_model(voltage, from_rest)(np.append(truth, [0.0, 0.0]))[1]
     size = np.linalg.norm(slopes, axis=0)
-    known = (slopes / size).T @ (slopes / size)
-    if np.linalg.cond(slopes / size) > _WORST_CONDITION:
-        return MappingProxyType(dict.fromkeys(LOOP, float("inf")))
-    deviations = noise * np.sqrt(np.diag(np.linalg.inv(known)))[: len(LOOP)] / size[: len(LOOP)]
-    return MappingProxyType(dict(zip(LOOP, (deviations / np.abs(truth)).tolist(), strict=True)))
+    _, told, directions = np.linalg.svd(slopes / size, full_matrices=False)
+    lost = told < told[0] / _WORST_CONDITION
+    deviations = noise * np.sqrt(np.sum((directions[~lost] / told[~lost, None]) ** 2, axis=0)) / size
+    deviations[np.any(np.abs(directions[lost]) > _TOUCHED, axis=0)] = np.inf
+    relative = deviations[: len(LOOP)] / np.abs(truth)
+    return MappingProxyType(dict(zip(LOOP, relative.tolist(), strict=True)))
 
 
 def _loop_model(u: Array, from_rest: bool) -> Callable[[Array], tuple[Array, Array]]:

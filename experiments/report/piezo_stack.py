@@ -142,7 +142,7 @@ def _loop_card(frame: pd.DataFrame) -> Markup:
 
     columns = (
         Column("loop", "loop"),
-        Column("samples", "samples a cycle"),
+        Column("samples", "samples a cycle", words=lambda count: f"{int(str(count)):,}"),
         *(Column(name, f"{name.replace('_', ' ')} [%]", words=told) for name in frame.columns[2:].tolist()),
     )
     return html_table(
