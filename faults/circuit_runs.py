@@ -226,27 +226,28 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
     ----------
     blocks : Blocks
         The log.
-    rows : ndarray, shape (m, parameters)
-        The circuits.
+    rows : ndarray, shape (m, parameters) or (samples, m, parameters)
+        The circuits; what they are at each sample, if they change.
 
     Returns
     -------
     ndarray, shape (m, n, outputs)
         Mean velocity [m/s] over each block, and mean pressure [Pa] where it is logged.
     """
-    starts = np.array([CIRCUIT.start(row) for row in rows])
+    rows = rows[None] if rows.ndim == 2 else rows
+    starts = np.array([CIRCUIT.start(row) for row in rows[0]])
     runs = controlled_run(
         CIRCUIT.name,
         _CONTROL,
         starts,
         blocks.speed,
-        rows[None],
+        rows,
         blocks.sample_time,
         CIRCUIT.parameter_class,
         tolerance=TOLERANCE,
         drive_tolerance=DRIVE_TOLERANCE,
     )
-    return np.array([_outputs(blocks, states, row) for states, row in zip(runs, rows, strict=True)])
+    return np.array([_outputs(blocks, states, rows[:, i]) for i, states in enumerate(runs)])
 
 
 def _outputs(blocks: Blocks, states: Array, row: Array) -> Array:
@@ -254,7 +255,7 @@ def _outputs(blocks: Blocks, states: Array, row: Array) -> Array:
     if blocks.pressure is None:
         return velocity[:, None]
     position, oil = states[:, 2], states[:, 4:6]
-    area, volume, modulus, air, vapour = (row[_COLUMN[n]] for n in _PRESSURE_OF)
+    area, volume, modulus, air, vapour = (row[:, _COLUMN[n]] for n in _PRESSURE_OF)
     swept = area * position
     high = oil_pressure(oil[:, 0], 2 * volume + swept, modulus, air, vapour)
     low = oil_pressure(oil[:, 1], 2 * volume - swept, modulus, air, vapour)

@@ -133,7 +133,7 @@ def severities(
     """
     rng = np.random.default_rng(0)
     centre = fits.best.coordinates
-    drawn = rng.multivariate_normal(centre, fits.covariance, DRAWS, method="cholesky")
+    drawn = rng.multivariate_normal(centre, fits.spread, DRAWS, method="cholesky")
     with np.errstate(all="ignore"):  # friction that falls faster than leakage holds has no steady state
         table, best = [severities_at(point, actuator) for point in drawn], severities_at(centre, actuator)
     found: dict[str, Severity] = {}

@@ -31,7 +31,6 @@ from experiments.batch.rows import NIS, Row, as_table, case_row, failed, in_word
 from experiments.batch.series import Log, Series, Simulated, Work, content_of
 from experiments.command.logs import read_log
 from experiments.streams import stream
-from faults.bank import mathematical_bank
 from faults.conditions import severity
 from plant.eha import EhaParameters
 from plant.errors import HydrostateError, LogError, LogWarning
@@ -194,7 +193,7 @@ def _run(case: Row, prepared: _Prepared, work: Work, lanes: "_Lanes") -> Row | N
         return _filtered([case], problem, [METHODS[work.method](problem)])[0]
     with _one_at_a_time, _caught() as said:
         if work.verb == "diagnose":
-            found = diagnosed(record, mathematical_bank(prepared.rig.parameters))
+            found = diagnosed(record, prepared.rig.parameters)
         else:
             found = _estimated(record, parameters, work, prepared)
     sentences = [sentence for sentence in (case.get("warnings"), *said()) if sentence]
