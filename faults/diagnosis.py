@@ -17,7 +17,7 @@ from plant.record import Record
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What is wrong with an actuator, by its log.
+    """What is wrong with an actuator, by its log, when the log ends.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def diagnose_log(
     pressure = board.blocks.pressure is not None
     probabilities = board.probabilities(numbers)
     region = float(np.max(region_scores(board.fits.best, board.fits.information, actuator)))
-    reasons = reasons_against(record, board.blocks, board.fits, region, actuator)
+    reasons = reasons_against(board.window, board.blocks, board.fits, region, actuator)
     found = severities(board.fits, actuator, numbers.widths(pressure))
     return Diagnosis(
         max(probabilities, key=lambda name: probabilities[name]),

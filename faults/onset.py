@@ -5,16 +5,20 @@ generalised likelihood ratio, linearised: Basseville and Nikiforov, Detection of
 Where that is much, both are fitted; it is a change if they are in different conditions.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from faults.circuit_runs import Blocks, parameter_rows, predicted
+from faults.circuit_runs import LONGEST, Blocks, blocks_of, parameter_rows, predicted
 from faults.class_fit import LASTING, WEAK, Actuator, PointFit, least_scales, misfit
 from faults.class_regions import ClassFits, fit_classes, lasting_misfit
 from faults.conditions import CONDITIONS
+from faults.detection import LEAST_LEARNING, SLOWEST, watch_record
+from faults.detection_events import Alarm
 from plant.adaptive import LANES
+from plant.record import Record
 
 Array = NDArray[np.float64]
 
@@ -27,6 +31,9 @@ GAIN = 10.0
 LATE, EARLY = 0.8, 0.1
 """How much later, or earlier, than it came a change may be seen [s]."""
 
+MOST_ALARMS = 3
+"""Alarms of a watch that are looked into, from the last."""
+
 LIKELY = 1.92
 """Log-likelihood below the best up to which a time is in the 95 % interval [dimensionless]: half of chi-squared's."""
 
@@ -38,7 +45,7 @@ class Onset:
     Parameters
     ----------
     since : float
-        When [s from the log's first sample].
+        When [s].
     ci95 : tuple of float
         Its 95 % interval [s].
     before : str
@@ -48,6 +55,82 @@ class Onset:
     since: float
     ci95: tuple[float, float]
     before: str
+
+
+@dataclass(frozen=True, eq=False)
+class LastPart:
+    """A log, as far as it is in the condition in which it ends.
+
+    Parameters
+    ----------
+    window : Record
+        The stretch that was looked at.
+    record : Record
+        What of it is in the last condition.
+    blocks : Blocks
+        The stretch in blocks; what is in another condition is missing.
+    fits : ClassFits
+        Circuits fitted to them.
+    onset : Onset or None
+        When the condition began; None if it did so before the log.
+    """
+
+    window: Record
+    record: Record
+    blocks: Blocks
+    fits: ClassFits
+    onset: Onset | None
+
+
+def last_part(record: Record, actuator: Actuator) -> LastPart:
+    """Return the part of a log that is in the condition in which it ends.
+
+    Parameters
+    ----------
+    record : Record
+        The log. Of one longer than `LONGEST` the stretch about the last change that `watch_record` finds is looked at,
+        or its beginning if there is none.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    LastPart
+        The part, fitted.
+
+    Raises
+    ------
+    LogError
+        If the log has neither position nor velocity, or is too short.
+    """
+    for window in _about_alarms(record, actuator):
+        found = _last_of(window, actuator)
+        if found.onset is not None:
+            return found
+    return _last_of(record, actuator)
+
+
+def _last_of(window: Record, actuator: Actuator) -> LastPart:
+    blocks = blocks_of(window)
+    fits = fit_classes(blocks, actuator)
+    found = find_onset(blocks, fits, actuator)
+    if found is None:
+        return LastPart(window, window, blocks, fits, None)
+    onset, blocks, fits = found
+    rest = window.slice(round(onset.since / window.sample_time), None)
+    ends = onset.ci95[0] + window.start_time, onset.ci95[1] + window.start_time
+    return LastPart(window, rest, blocks, fits, Onset(onset.since + window.start_time, ends, onset.before))
+
+
+def _about_alarms(record: Record, actuator: Actuator) -> Iterator[Record]:
+    """Yield stretches about the last alarms of a watch, the last first, of logs too long to be fitted whole."""
+    if record.duration <= LONGEST + LEAST_LEARNING or record.sample_time > SLOWEST:
+        return
+    events = watch_record(record, actuator.circuit, learning=LEAST_LEARNING)
+    changes = [event.since - record.start_time for event in events if isinstance(event, Alarm)]
+    for since in changes[: -MOST_ALARMS - 1 : -1]:
+        first = round(max(since - 0.5 * LONGEST, 0.0) / record.sample_time)
+        yield record.slice(first, first + round(LONGEST / record.sample_time) + 1)
 
 
 def find_onset(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Onset, Blocks, ClassFits] | None:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from experiments.command.verdict import SHOWN, amount, believed, headline, next_step
+from experiments.command.verdict import SHOWN, amount, believed, headline, next_step, since
 from experiments.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, Margins, panels, styled
 from experiments.report.sectioned import Section, render_sections
 from experiments.report.tables import Column, html_table
@@ -21,9 +21,11 @@ if TYPE_CHECKING:
 
 ASSUMED = (
     "The rig file's geometry, pump and relief setting are taken as true; the piston starts at rest in mid-stroke; "
-    "leakage, flow bias, friction and bulk modulus are constant over the log. Probabilities hold if the actuator is in "
-    "one of the nine conditions, each as likely as the next before the log; they were calibrated on simulated logs of "
-    "the whole circuit. Intervals are 95 %."
+    "leakage, flow bias, friction and bulk modulus change at most once, at the time under 'Since when'. Probabilities "
+    "hold if the actuator is in one of the nine conditions, each as likely as the next before the log; they were "
+    "calibrated on simulated logs of the whole circuit. Intervals are 95 %, wider the more of the log the circuit "
+    "leaves unexplained. Without pressure leakage, friction and bulk modulus share a scale that no log holds: their intervals "
+    "then rest on how alike actuators of one kind are."
 )
 
 CHANNELS = (("velocity", "mm/s", 1e3), ("differential pressure", "bar", 1e-5))
@@ -57,6 +59,9 @@ def diagnosis_page(result: Mapping[str, Any], found: "Diagnosis") -> str:
             tuple(_sentence(said) for said in result["not_told"]),
             *_svg(_draw_severities(found)),
             tables=[_severities(result)],
+        ),
+        Section(
+            "since", "Since when", (_sentence(since(result) or "nothing began: healthy from the log's beginning"),)
         ),
         Section("fit", "Measured and fitted", (), *_svg(_draw_fit(found))),
         Section("next", "What to measure next", (_sentence(next_step(result)),)),
@@ -142,7 +147,8 @@ def _draw_severities(found: "Diagnosis") -> tuple[Figure, str]:
 
 def _draw_fit(found: "Diagnosis") -> tuple[Figure, str]:
     blocks, fit = found.scoreboard.blocks, found.scoreboard.fits.best
-    time = (np.arange(len(blocks.velocity)) + 0.5) * blocks.block * blocks.sample_time
+    onset, begin = found.scoreboard.onset, found.scoreboard.window.start_time
+    time = begin + (np.arange(len(blocks.velocity)) + 0.5) * blocks.block * blocks.sample_time
     outputs = blocks.outputs.shape[1]
     with styled():
         title = "Log and fitted circuit, means over 10 ms, and what is left"
@@ -154,10 +160,12 @@ def _draw_fit(found: "Diagnosis") -> tuple[Figure, str]:
             axes[2 * i].set_ylabel(f"{name}\n[{unit}]")
             axes[2 * i + 1].plot(time, measured - scale * fit.fitted[:, i], color=GREY, lw=0.7)
             axes[2 * i + 1].set_ylabel(f"left\n[{unit}]")
+        for axis in axes:
+            if onset is not None:
+                axis.axvline(onset.since, color=VERMILION, ls="--", lw=1.2)
         axes[-1].set_xlabel("time [s]")
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.0))
-    return (
-        figure,
-        "Measured velocity and pressure, the circuit that fits best, and the residuals on a scale of their own.",
-    )
+    dated = "" if onset is None else " The dashed line is the change; what came before it is not fitted."
+    said = "Measured velocity and pressure, the circuit that fits best, and the residuals on a scale of their own."
+    return figure, f"{said}{dated}"
