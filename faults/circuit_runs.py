@@ -67,6 +67,8 @@ class Blocks:
         Mean differential pressure over each block [Pa], None where it is not logged.
     noise : ndarray, shape (outputs,)
         Standard deviation of what the sensors add to velocity [m/s] and pressure [Pa].
+    earlier : tuple of int and ndarray, shape (parameters,), or None
+        Another circuit that ran up to a sample, as a row of parameters; None if one ran throughout.
     """
 
     speed: Array
@@ -75,6 +77,7 @@ class Blocks:
     velocity: Array
     pressure: Array | None
     noise: Array
+    earlier: tuple[int, Array] | None = None
 
     @property
     def outputs(self) -> Array:
@@ -235,6 +238,9 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
         Mean velocity [m/s] over each block, and mean pressure [Pa] where it is logged.
     """
     rows = rows[None] if rows.ndim == 2 else rows
+    if blocks.earlier is not None:
+        until, row = blocks.earlier
+        rows = np.where(np.arange(len(blocks.speed))[:, None, None] < until, row, rows)
     starts = np.array([CIRCUIT.start(row) for row in rows[0]])
     runs = controlled_run(
         CIRCUIT.name,

@@ -148,8 +148,8 @@ def find_onset(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Ons
     Returns
     -------
     tuple of Onset, Blocks and ClassFits, or None
-        The change, the log with all before it taken as missing, and the circuits that fit the rest; None for a log
-        in one condition throughout.
+        The change, the log with all before it taken as missing, and the circuits that fit the rest, which go on from
+        where the circuit before had brought the piston; None for a log in one condition throughout.
     """
     place = likeliest_split(blocks, fits.best)
     if place is None:
@@ -162,10 +162,12 @@ def find_onset(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Ons
     first, last = (int(np.argmax(one.scores)) for one in found)
     if gain < GAIN * LASTING or first == last:
         return None
-    low, best, high = _when(blocks, found[0].best.coordinates, found[1].best.coordinates, place, actuator)
+    before = parameter_rows(found[0].best.coordinates[None], actuator.circuit, actuator.rated)[0]
+    low, best, high = _when(blocks, before, found[1].best.coordinates, place, actuator)
     step = blocks.block * blocks.sample_time
     onset = Onset(best * step, (low * step, high * step), list(CONDITIONS)[first])
-    return onset, parts[1], found[1]
+    rest = replace(part_of(blocks, best, len(blocks.velocity)), earlier=(best * blocks.block, before))
+    return onset, rest, fit_classes(rest, actuator)
 
 
 def part_of(blocks: Blocks, begin: int, end: int) -> Blocks:
@@ -240,12 +242,12 @@ def _when(blocks: Blocks, before: Array, after: Array, place: int, actuator: Act
     step = blocks.block * blocks.sample_time
     first = max(place - round(LATE / step), blocks.first)
     candidates = np.arange(first, min(place + round(EARLY / step), len(blocks.velocity) - 1))
-    rows = parameter_rows(np.array([before, after]), actuator.circuit, actuator.rated)
+    (row,) = parameter_rows(after[None], actuator.circuit, actuator.rated)
     sample = np.arange(len(blocks.speed))[:, None, None]
     costs: list[float] = []
     least, best = np.inf, before
     for some in np.array_split(candidates, range(LANES, len(candidates), LANES)):
-        paths = np.where(sample < blocks.block * some[:, None], rows[0], rows[1])
+        paths = np.where(sample < blocks.block * some[:, None], before, row)
         for run in predicted(blocks, paths):
             left = (blocks.outputs - run)[blocks.first :] / least_scales(blocks)
             costs.append(0.5 * float(np.nansum(left**2)))

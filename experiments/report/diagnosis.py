@@ -15,6 +15,7 @@ from experiments.command.verdict import SHOWN, amount, believed, headline, next_
 from experiments.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, Margins, panels, styled
 from experiments.report.sectioned import Section, render_sections
 from experiments.report.tables import Column, html_table
+from faults.circuit_runs import blocks_of
 
 if TYPE_CHECKING:
     from faults.diagnosis import Diagnosis
@@ -24,8 +25,8 @@ ASSUMED = (
     "leakage, flow bias, friction and bulk modulus change at most once, at the time under 'Since when'. Probabilities "
     "hold if the actuator is in one of the nine conditions, each as likely as the next before the log; they were "
     "calibrated on simulated logs of the whole circuit. Intervals are 95 %, wider the more of the log the circuit "
-    "leaves unexplained. Without pressure leakage, friction and bulk modulus share a scale that no log holds: their intervals "
-    "then rest on how alike actuators of one kind are."
+    "leaves unexplained. Without pressure leakage, friction and bulk modulus share a scale that no log holds: their "
+    "intervals then rest on how alike actuators of one kind are."
 )
 
 CHANNELS = (("velocity", "mm/s", 1e3), ("differential pressure", "bar", 1e-5))
@@ -146,7 +147,7 @@ def _draw_severities(found: "Diagnosis") -> tuple[Figure, str]:
 
 
 def _draw_fit(found: "Diagnosis") -> tuple[Figure, str]:
-    blocks, fit = found.scoreboard.blocks, found.scoreboard.fits.best
+    blocks, fit = blocks_of(found.scoreboard.window), found.scoreboard.fits.best
     onset, begin = found.scoreboard.onset, found.scoreboard.window.start_time
     time = begin + (np.arange(len(blocks.velocity)) + 0.5) * blocks.block * blocks.sample_time
     outputs = blocks.outputs.shape[1]
@@ -166,6 +167,6 @@ def _draw_fit(found: "Diagnosis") -> tuple[Figure, str]:
         axes[-1].set_xlabel("time [s]")
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.0))
-    dated = "" if onset is None else " The dashed line is the change; what came before it is not fitted."
+    dated = "" if onset is None else " The dashed line is the change, between two circuits."
     said = "Measured velocity and pressure, the circuit that fits best, and the residuals on a scale of their own."
     return figure, f"{said}{dated}"
