@@ -44,8 +44,7 @@ def diagnosed(record: Record, rig: EhaParameters) -> dict[str, Any]:
     if margin < TOLD_APART:
         said = f"no class: under this drive {best} and {second} move alike; drive the actuator, at best with steps"
         return {"outcome": "not_observable", "reason": said, "margin": margin}
-    entries = {"outcome": "ok", "found_condition": best, "runner_up": second, "margin": margin, "trusted": True}
-    return entries | {"reason": "; ".join(found.not_told) or None}
+    return {"outcome": "ok", "found_condition": best, "runner_up": second, "margin": margin, "trusted": True}
 
 
 @lru_cache(maxsize=4)
