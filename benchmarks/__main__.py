@@ -18,6 +18,7 @@ NAMES = (
     "detection",
     "real_rig",
     "piezo_stack",
+    "diaphragm_motor",
     "diagnosis",
     "batch_scale",
     "archive",

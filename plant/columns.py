@@ -25,6 +25,7 @@ CHANNELS: Mapping[str, str] = MappingProxyType(
         "stack_displacement_m": "m",
         "stack_force_n": "N",
         "chamber_pressure_pa": "Pa",
+        **{f"electrode_{i}_v": "V" for i in range(1, 8)},
     }
 )
 """Every channel that the project reads, with its unit. `time_s` is implied by `Record.sample_time`."""

@@ -22,12 +22,12 @@ TEXTS = {".py", ".html", ".j2", ".md"}
 
 PHYSICS = ("plant/components/", "plant/eha", "plant/piezo", "plant/diaphragm")
 SOURCE = re.compile(
-    r"\b(?:equations?\s+\(?\d|tables?\s+\d|sections?\s+\d|errata\s+[EP]\d|sources?:\s+\w)", re.IGNORECASE
+    r"\b(?:equations?\s+\(?\d|tables?\s+\d|sections?\s+\d|errata\s+[EPM]\d|sources?:\s+\w)", re.IGNORECASE
 )
 
-ERRATUM = r"[EP]\d+(?:\s*(?:,|and|to)\s*(?:and\s+)?[EP]\d+)*"
+ERRATUM = r"[EPM]\d+(?:\s*(?:,|and|to)\s*(?:and\s+)?[EPM]\d+)*"
 CITATION = re.compile(rf"\berrata[\s#]+({ERRATUM})")
-ERRATA_ROW = re.compile(r"^\| ([EP]\d+) \|.*\| (code departs|noted only) \|$", re.MULTILINE)
+ERRATA_ROW = re.compile(r"^\| ([EPM]\d+) \|.*\| (code departs|noted only) \|$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def citations(texts: Mapping[str, str]) -> Iterator[Cited]:
     for path, text in texts.items():
         for found in CITATION.finditer(text):
             line = text.count("\n", 0, found.start()) + 1
-            yield from (Cited(path, line, number) for number in re.findall(r"[EP]\d+", found[1]))
+            yield from (Cited(path, line, number) for number in re.findall(r"[EPM]\d+", found[1]))
 
 
 def unknown_errata(texts: Mapping[str, str], errata: str) -> list[str]:
@@ -224,7 +224,7 @@ def test_every_departure_in_the_list_is_cited_by_code(errata: str) -> None:
 
 def test_errata_are_numbered_in_order_and_marked(errata: str) -> None:
     marked = [number for number, _ in ERRATA_ROW.findall(errata)]
-    for paper, count in (("E", 20), ("P", 17)):
+    for paper, count in (("E", 20), ("P", 17), ("M", 31)):
         rows = re.findall(rf"^\| {paper}\d.*$", errata, re.MULTILINE)
         numbers = [number for number in marked if number.startswith(paper)]
         assert numbers == [f"{paper}{number}" for number in range(1, len(rows) + 1)]

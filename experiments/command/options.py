@@ -88,6 +88,9 @@ PRESSURE = "differential_pressure_pa"
 STACK = "piezo-stack"
 """The plant with a drive, sensors and faults of its own."""
 
+MOTOR = "diaphragm-motor"
+"""The other one."""
+
 SEED = 2024
 """Seed where none is given."""
 

@@ -10,6 +10,7 @@ import typer
 
 from experiments.command.json_output import json_text
 from experiments.command.options import (
+    MOTOR,
     PRESSURE,
     SEED,
     STACK,
@@ -48,8 +49,8 @@ def simulate(
         str,
         typer.Option(
             metavar="PLANT",
-            help="lumped (5.8 to 5.10, it sticks), reduced (5.14), circuit (the whole rig), or piezo-stack, which has "
-            "a sine drive and the options marked so.",
+            help="lumped (5.8 to 5.10, it sticks), reduced (5.14), circuit (the whole rig), or piezo-stack and "
+            "diaphragm-motor, which have a sine drive and the options marked so.",
         ),
     ] = "lumped",
     condition: ConditionName = None,
@@ -66,11 +67,16 @@ def simulate(
         str, typer.Option(metavar="DRIVE", help="sine, prbs, steps, chirp or multisine, of 4 V or up to it.")
     ] = "steps",
     duration: Annotated[
-        float | None, typer.Option(metavar="S", help="Length of the run [s].", show_default="10, piezo-stack 0.16")
+        float | None,
+        typer.Option(
+            metavar="S", help="Length of the run [s].", show_default="10, piezo-stack 0.16, diaphragm-motor 0.2"
+        ),
     ] = None,
     sample_time: Annotated[
         float | None,
-        typer.Option(metavar="S", help="Time between samples [s].", show_default="1e-4, piezo-stack 5e-5"),
+        typer.Option(
+            metavar="S", help="Time between samples [s].", show_default="1e-4, piezo-stack 5e-5, diaphragm-motor 2e-5"
+        ),
     ] = None,
     sensors: Annotated[
         str,
@@ -81,17 +87,29 @@ def simulate(
     rig: RigFile = None,
     seed: Seed = SEED,
     frequency: Annotated[
-        float | None, typer.Option(metavar="HZ", help="piezo-stack: frequency, up to 450 Hz.", show_default="275")
+        float | None,
+        typer.Option(
+            metavar="HZ",
+            help="piezo-stack: frequency, up to 450 Hz; diaphragm-motor: up to 1000 Hz.",
+            show_default="275, diaphragm-motor 480",
+        ),
     ] = None,
     voltage: Annotated[
         float | None,
-        typer.Option(metavar="V", help="piezo-stack: peak to peak, on half of it as bias.", show_default="140"),
+        typer.Option(
+            metavar="V",
+            help="piezo-stack: peak to peak, on half of it as bias; diaphragm-motor: peak to peak, up to 300 V.",
+            show_default="140, diaphragm-motor 200",
+        ),
     ] = None,
     bias_pressure: Annotated[
         float | None, typer.Option(metavar="PA", help="piezo-stack: absolute bias pressure.", show_default="1e6")
     ] = None,
     load: Annotated[
-        float | None, typer.Option(metavar="KG", help="piezo-stack: mass lifted.", show_default="0")
+        float | None,
+        typer.Option(
+            metavar="KG|N", help="piezo-stack: mass lifted [kg]; diaphragm-motor: force [N].", show_default="0"
+        ),
     ] = None,
     fault: Annotated[
         str | None, typer.Option(metavar="NAME", help="piezo-stack: a condition, or such as air_doubled.")
@@ -104,6 +122,7 @@ def simulate(
     """
     import numpy as np
 
+    from experiments.command.simulate_motor import simulated_motor
     from experiments.command.simulate_stack import simulated_stack
     from plant.record_files import write_record
     from plant.sensors import SENSORS
@@ -120,18 +139,23 @@ def simulate(
     }
     require_positive("--duration", duration, "s")
     require_positive("--sample-time", sample_time, "s")
-    if plant == STACK:
+    if plant in (STACK, MOTOR):
         shared = {"--leakage-severity": leakage_severity, "--friction-severity": friction_severity, "--rig": rig}
-        refuse_given(shared, f"does not apply to --plant {STACK}")
-        record, said = simulated_stack(stack_options, condition, duration, sample_time, sensors, seed)
+        if plant == MOTOR:
+            shared |= {"--condition": condition, "--fault": fault, "--bias-pressure": bias_pressure}
+        refuse_given(shared, f"does not apply to --plant {plant}")
+        if plant == STACK:
+            record, said = simulated_stack(stack_options, condition, duration, sample_time, sensors, seed)
+        else:
+            record, said = simulated_motor(stack_options, duration, sample_time, sensors, seed)
         _prepare(out)
         write_record(record.annotate(versions=_versions()), out)
         _report(record, out, said, as_json)
         return
     duration, sample_time = duration or _DURATION, sample_time or _SAMPLE_TIME
-    refuse_given(stack_options, f"needs --plant {STACK}")
+    refuse_given(stack_options, f"needs --plant {STACK} or {MOTOR}")
     for option, value, known in (
-        ("--plant", plant, [*PLANTS, STACK]),
+        ("--plant", plant, [*PLANTS, STACK, MOTOR]),
         ("--drive", drive, DRIVES),
         ("--sensors", sensors, SENSORS),
     ):
@@ -186,7 +210,7 @@ def _versions() -> dict[str, str]:
 
 def _report(record: "Record", out: Path, made_of: Mapping[str, Any], as_json: bool) -> None:
     said = f"{len(record)} samples, {record.duration:g} s at {1.0 / record.sample_time:g} Hz, {', '.join(record)}"
-    if PRESSURE not in record and made_of["plant"] != STACK:
+    if PRESSURE not in record and made_of["plant"] not in (STACK, MOTOR):
         note(f"{PRESSURE} is not logged by these sensors: estimate and diagnose will be less certain")
     if not as_json:
         emit(f"{out}: {said}")

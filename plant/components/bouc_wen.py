@@ -3,7 +3,10 @@
 Both are rate-independent: the hysteresis moves with its input only. Written without ``sign``, they are Lipschitz.
 """
 
-from plant.compiled.functions import Scalar, absolute
+from plant.compiled.functions import Scalar, absolute, exp, log, maximum
+
+LEAST_SIZE = 1e-12
+"""Hysteresis whose powers are taken for zero's [V]: a logarithm has none."""
 
 
 def asymmetric_bouc_wen_rate(
@@ -65,3 +68,38 @@ def bouc_wen_rate(rate: Scalar, force: Scalar, alpha: Scalar, beta: Scalar, gamm
     530.0
     """
     return alpha * rate - beta * (gamma * absolute(rate) * force + delta * rate * absolute(force))
+
+
+def power_bouc_wen_rate(
+    rate: Scalar, hysteresis: Scalar, alpha: Scalar, beta: Scalar, gamma: Scalar, exponent: Scalar
+) -> Scalar:
+    """Return the rate of the classical law of any exponent, ``a u' - b |u'| h |h|^(n-1) - g u' |h|^n``.
+
+    Source: equation 21 of the diaphragm-motor paper with the rates that it leaves out, errata M21.
+
+    Parameters
+    ----------
+    rate : float or Expression
+        Rate of the input, voltage for a diaphragm [V/s].
+    hysteresis : float or Expression
+        Hysteretic part of the input h [V].
+    alpha : float or Expression
+        Small-signal slope [dimensionless].
+    beta, gamma : float or Expression
+        Shape of the loop, 1/V^n [units of that].
+    exponent : float or Expression
+        Sharpness n of the yield, at least 1 [dimensionless].
+
+    Returns
+    -------
+    float or Expression
+        Rate of h [V/s].
+
+    Examples
+    --------
+    >>> round(float(power_bouc_wen_rate(100.0, 10.0, 0.3, 0.006, 0.002, 1.0)), 9)
+    22.0
+    """
+    size = absolute(hysteresis)
+    power = exp((exponent - 1.0) * log(maximum(size, LEAST_SIZE)))
+    return alpha * rate - power * (beta * absolute(rate) * hysteresis + gamma * rate * size)

@@ -112,7 +112,7 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
         (["simulate", "-o", "a.xls"], "--out must end in .csv"),
         (
             ["simulate", "-o", "a.csv", "--plant", "toy"],
-            "--plant must be one of reduced, lumped, circuit, piezo-stack, got 'toy'",
+            "--plant must be one of reduced, lumped, circuit, piezo-stack, diaphragm-motor, got 'toy'",
         ),
         (["simulate", "-o", "a.csv", "--drive", "walk"], "--drive must be one of sine"),
         (["simulate", "-o", "a.csv", "--duration", "inf"], "--duration must be positive and finite, got inf s"),
