@@ -30,7 +30,6 @@ from experiments.batch.rows import NIS, TRUTH, Row, Rows, error_percent
 from experiments.batch.series import Log, Series, Simulated, Work, content_of
 from experiments.command.logs import read_log
 from experiments.streams import stream
-from faults.bank import mathematical_bank
 from faults.conditions import severity
 from plant.eha import EhaParameters
 from plant.errors import LogError, LogWarning
@@ -193,7 +192,7 @@ def _run(place: int, prepared: _Prepared, work: Work, rows: Rows, lanes: Lanes) 
         return
     with _one_at_a_time, _caught() as said:
         if work.verb == "diagnose":
-            found = diagnosed(record, mathematical_bank(prepared.rig.parameters))
+            found = diagnosed(record, prepared.rig.parameters)
         else:
             found = _estimated(record, parameters, work, prepared)
     sentences = [sentence for sentence in (prepared.warnings, *said()) if sentence]

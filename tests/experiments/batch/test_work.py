@@ -71,7 +71,8 @@ def test_a_log_that_cannot_be_read_is_a_row_and_the_others_are_diagnosed(tmp_pat
     (tmp_path / "d.csv").unlink()
     rows = table_of(run_task(Task(plan.rig, plan.groups))).to_pylist()
     assert [row["file"] for row in rows] == ["a.csv", "b.csv", "c.csv", "d.csv"]
-    assert [row["outcome"] for row in rows] == ["ok", "failed", "failed", "failed"]
+    assert [row["outcome"] for row in rows] == ["mismatch", "failed", "failed", "failed"]
+    assert "in none of the nine conditions" in rows[0]["reason"]
     assert "the file is empty" in rows[2]["reason"]
     assert "there is no such file" in rows[3]["reason"]
 
