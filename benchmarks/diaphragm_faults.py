@@ -1,8 +1,8 @@
 """The diaphragm motor's faults: isolation over seeds, leakage and load, load steps, and what cannot be told apart.
 
-Prints every figure with what is wanted of it. Logs are of the same model as the curves they are laid beside; the second
-isolation is of motors that differ from it by the tolerance, each in its own way; the third and fourth are of motors that
-differ by four times as much, without and with a healthy run of each to calibrate on.
+Prints every figure with what is wanted of it. Logs are of the same model as the curves they are laid beside. The second
+isolation is of motors that differ from it by the tolerance, each in its own way; the third and fourth are of motors
+that differ by four times as much, without and with a healthy run of each to calibrate on.
 """
 
 import argparse

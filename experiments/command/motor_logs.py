@@ -40,7 +40,7 @@ NOTHING: Result = {
 """The entries of a log that could not be used."""
 
 MOST_DEVIATION = 0.3
-"""Standard deviation over the least fault's size above which no number is given."""
+"""Standard deviation, over the value or the least fault's size, above which no number is given."""
 
 SIZES: Mapping[str, tuple[str, float]] = {
     "crossport_leakage": ("m^3/(s Pa)", LEAKAGE),
@@ -160,7 +160,7 @@ def _doubts(found: MotorEstimate) -> list[str]:
 def _quantity(name: str, found: MotorEstimate, *, told: bool) -> dict[str, Any]:
     unit, size = SIZES[name]
     value, deviation = found.values[name], found.deviations[name]
-    given = told and deviation < MOST_DEVIATION * size
+    given = told and deviation < MOST_DEVIATION * max(size, abs(value))
     half = NORMAL_95 * deviation
     return {
         "value": value if given else None,
