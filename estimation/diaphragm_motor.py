@@ -45,7 +45,7 @@ class MotorEstimate:
     values, deviations : Mapping[str, float]
         ``crossport_leakage`` [m^3/(s Pa)], ``load_force`` [N] and ``gas_fraction``, with standard deviations.
     pattern : float
-        Chi-square of the electrodes' pattern over its degrees of freedom.
+        Chi-square of the electrodes' pattern over its degrees of freedom [dimensionless].
     pattern_holds : bool
         Whether the pump is healthy but for gas, so that the maps hold.
     drive : Drive

@@ -31,7 +31,7 @@ class MotorFault:
     unit : str
         Of the severity.
     severities : tuple of float
-        Rising severities at which the fault's signature is computed; 0 is healthy.
+        Rising severities at which the fault's signature is computed [the fault's unit]; 0 is healthy.
     inject : callable
         Takes a healthy motor and a severity.
     """
@@ -190,7 +190,7 @@ def motor_with_fault(healthy: DiaphragmMotorParameters, name: str, severity: flo
     name : str
         One of `MOTOR_FAULTS`.
     severity : float
-        How bad, in the fault's own unit; 0 is healthy.
+        How bad [the fault's unit]; 0 is healthy.
 
     Returns
     -------

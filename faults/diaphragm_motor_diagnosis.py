@@ -56,13 +56,13 @@ class Match:
     name : str
         The fault, or ``healthy``.
     severity : float
-        Severity there, in the fault's unit.
+        Severity there [the fault's unit].
     deviation : float
-        Its standard deviation.
+        Its standard deviation [the fault's unit].
     chi_square : float
-        Squared distance, in standard deviations.
+        Squared distance in standard deviations [dimensionless].
     probability : float
-        Of the fault after the log was seen.
+        Of the fault after the log was seen [fraction].
     """
 
     name: str
@@ -237,7 +237,7 @@ def separations(
     frequency, peak_to_peak : float
         Of the drive [Hz], [V].
     sizes : Mapping[str, float]
-        Severity of each fault that is asked for.
+        Severity of each fault that is asked for [the fault's unit].
 
     Returns
     -------

@@ -44,6 +44,18 @@ def test_a_fault_is_diagnosed_with_its_severity(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_fault_that_is_simulated_is_the_one_diagnosed(tmp_path: Path) -> None:
+    log = tmp_path / "run.csv"
+    words = ["simulate", "--plant", "diaphragm-motor", "--load", "10", "--out", str(log), "--fault"]
+    assert RUN.invoke(app, [*words, "chamber_5_gas=0.03"]).exit_code == 0
+    assert said("diagnose", log)["condition"] == "chamber_5_gas"
+    for wrong in ("chamber_5_gas", "rust=1", "chamber_5_gas=7"):
+        done = RUN.invoke(app, [*words, wrong])
+        assert done.exit_code == 2
+        assert "must be" in done.stderr
+
+
+@pytest.mark.slow
 def test_friction_and_load_are_named_together_on_screen(tmp_path: Path) -> None:
     log = logged(tmp_path, motor_with_fault(MOTOR, "friction", 8.0))
     done = RUN.invoke(app, ["diagnose", "--plant", "diaphragm-motor", "--load", "10", str(log)])
