@@ -17,7 +17,9 @@ from experiments.command import (
     identify,
     isolability,
     library,
+    motor_paper,
     simulate,
+    size_cylinder,
     watch,
 )
 from experiments.command.json_output import json_text
@@ -186,6 +188,8 @@ VERBS = (
     conditions,
     batch,
     compare,
+    motor_paper,
+    size_cylinder,
 )
 for module in VERBS:
     app.add_typer(module.commands)

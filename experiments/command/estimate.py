@@ -9,6 +9,7 @@ import typer
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, read_log, run_logs
 from experiments.command.options import (
+    MOTOR,
     PRESSURE,
     SEED,
     STACK,
@@ -152,10 +153,10 @@ def estimate(
     Nothing here is random, so the seed changes nothing.
     """
     if plant is not None:
-        require_one_of("--plant", plant, [STACK])
-        from experiments.command.stack_logs import stack_logs_command
+        from experiments.command.plant_logs import plant_logs_command
 
-        stack_logs_command(
+        plant_logs_command(
+            plant,
             logs,
             diagnosing=False,
             sensors=sensors,
@@ -167,7 +168,9 @@ def estimate(
             out=out,
             as_json=as_json,
         )
-    refuse_given({"--bias-pressure": bias_pressure, "--load": load, "--healthy": healthy}, f"needs --plant {STACK}")
+    refuse_given(
+        {"--bias-pressure": bias_pressure, "--load": load, "--healthy": healthy}, f"needs --plant {STACK} or {MOTOR}"
+    )
     from estimation.augment import AUGMENTABLE
     from estimation.bulk_modulus import FITTED, LEAST_SQUARES, estimate_bulk_modulus
     from estimation.eha import FORMS
