@@ -88,8 +88,8 @@ def estimate(
         str,
         typer.Option(
             metavar="METHOD",
-            help="least-squares (flow, motion), or a filter: ekf, iekf, ukf, ckf, svsf, sif, smoother, filterpy-ekf; "
-            "auto: least squares where the form allows.",
+            help="least-squares (flow, motion), or a filter: ekf, iekf, ukf, ckf, svsf, sif, smoother, "
+            "iterated-smoother, filterpy-ekf; auto: least squares where the form allows.",
         ),
     ] = "auto",
     states: Annotated[
@@ -220,7 +220,7 @@ def estimate(
         path = figure_path(figure, log, len(logs))
         if path is not None:
             _draw(found, path, log)
-        return {**_entries(found, method), **chosen}
+        return {**_entries(found), **chosen}
 
     batch = run_logs(logs, work, {**NOTHING, **chosen}, "estimating")
     if condition is None and any(result["form"] not in (None, "flow") for result in batch.results):
@@ -242,15 +242,14 @@ def _draw(found: "BulkModulusEstimate", path: Path, log: Path) -> None:
     write_innovations(found, log.name, path)
 
 
-def _entries(found: "BulkModulusEstimate", method: str) -> dict[str, Any]:
-    filtered = found.estimate is not None
+def _entries(found: "BulkModulusEstimate") -> dict[str, Any]:
     return {
         "outcome": found.outcome.value,
         "bulk_modulus_pa": {"value": found.value, "std": found.std, "ci95": found.interval},
         "leakage_coefficient_m3_s_pa": _number(found.others.get("leakage_coefficient")),
         "flow_bias_m3_s": _number(found.others.get("flow_bias")),
         "nis": dict(found.nis),
-        "method": ("ekf" if method == "auto" else method) if filtered else "least-squares",
+        "method": found.method,
         "states": {name: _number(value) for name, value in found.others.items()},
         "noise": None if found.tuning is None else {**found.tuning.tuned.noise, **found.tuning.tuned.variances},
         "form": found.form,
