@@ -7,7 +7,7 @@ Where no curve comes near, the fault is unknown.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import log, pi, sqrt
 from typing import Any, TypeAlias
@@ -91,7 +91,7 @@ class MotorDiagnosis:
     freedom : int
         Degrees of freedom of the best one's chi-square.
     signature : Signature
-        What the log showed.
+        What the log showed, as the model's own motor would have if there is a calibration.
     expected : ndarray, shape (29,)
         What a healthy motor shows.
     lookalikes : tuple of str
@@ -181,11 +181,10 @@ def diagnose_motor(
         If the log cannot be used, or the calibration is of another drive.
     """
     seen = logged_signature(record)
-    offset = np.zeros(len(seen.values)) if calibration is None else _offset(calibration, seen, healthy)
-    return diagnose_signature(seen, healthy, offset)
+    return diagnose_signature(seen if calibration is None else _calibrated(seen, calibration, healthy), healthy)
 
 
-def diagnose_signature(seen: Signature, healthy: DiaphragmMotorParameters, offset: Array) -> MotorDiagnosis:
+def diagnose_signature(seen: Signature, healthy: DiaphragmMotorParameters) -> MotorDiagnosis:
     """Lay a signature beside every fault's curve (`diagnose_motor`).
 
     Parameters
@@ -194,8 +193,6 @@ def diagnose_signature(seen: Signature, healthy: DiaphragmMotorParameters, offse
         What the log shows.
     healthy : DiaphragmMotorParameters
         The motor as it should be.
-    offset : ndarray, shape (29,)
-        By how much this motor's signature exceeds its model's.
 
     Returns
     -------
@@ -205,7 +202,7 @@ def diagnose_signature(seen: Signature, healthy: DiaphragmMotorParameters, offse
     point = _operating_point(seen)
     simulated = _simulated(healthy, *point)
     whitening = _whitening(tolerance(healthy, *point) + seen.covariance)
-    white = whitening @ (seen.values - offset)
+    white = whitening @ seen.values
     found = [(HEALTHY, 0.0, 0.0, float(np.sum((white - whitening @ simulated[HEALTHY]) ** 2)), log(PRIOR_HEALTHY))]
     for name, fault in MOTOR_FAULTS.items():
         curve = _Curve(fault, simulated[name], whitening)
@@ -222,7 +219,7 @@ def diagnose_signature(seen: Signature, healthy: DiaphragmMotorParameters, offse
     freedom = len(white) - (matches[0].name != HEALTHY)
     unknown = min(match.chi_square for match in matches) > float(chi2.isf(UNKNOWN_BELOW, freedom))
     alike = _lookalikes(matches[0], healthy, point)
-    return MotorDiagnosis(tuple(matches), unknown, freedom, seen, simulated[HEALTHY] + offset, alike)
+    return MotorDiagnosis(tuple(matches), unknown, freedom, seen, simulated[HEALTHY], alike)
 
 
 def separations(
@@ -282,14 +279,30 @@ def _operating_point(seen: Signature) -> tuple[float, float]:
     return round(seen.drive.frequency, 2), round(seen.drive.peak_to_peak, 1)
 
 
-def _offset(calibration: Signature, seen: Signature, healthy: DiaphragmMotorParameters) -> Array:
+def _calibrated(seen: Signature, calibration: Signature, healthy: DiaphragmMotorParameters) -> Signature:
+    """Return what a log would show on the model's own motor: fundamentals by ratio, all else by difference."""
     was, drive = calibration.drive, seen.drive
     if abs(was.frequency / drive.frequency - 1.0) > _SAME or abs(was.peak_to_peak / drive.peak_to_peak - 1.0) > _SAME:
         raise LogError(
             f"the healthy run must be under the log's drive, {drive.frequency:.4g} Hz and {drive.peak_to_peak:.4g} V "
             f"peak to peak, got {was.frequency:.4g} Hz and {was.peak_to_peak:.4g} V"
         )
-    return calibration.values - modelled_signature(healthy, *_operating_point(calibration))
+    if float(np.min(np.abs(calibration.tones))) < _LEAST_TONE:
+        raise LogError(f"the healthy run has an electrode below {_LEAST_TONE:g} V: it is not of a healthy motor")
+    model = modelled_signature(healthy, *_operating_point(calibration))
+    turn = (model[:7] + 1j * model[7:_FUNDAMENTALS]) / calibration.tones
+    gain = np.tile(np.abs(turn), 2)
+    first = seen.tones * turn
+    second = slice(_FUNDAMENTALS, 2 * _FUNDAMENTALS)
+    values = np.concatenate(
+        [
+            first.real,
+            first.imag,
+            model[second] + gain * (seen.values - calibration.values)[second],
+            [model[-1] + seen.velocity - calibration.velocity],
+        ]
+    )
+    return replace(seen, values=values, covariance=seen.covariance + calibration.covariance)
 
 
 def _priors() -> dict[str, float]:
@@ -302,4 +315,5 @@ _PRIORS = _priors()
 _GRID = 201
 _FUNDAMENTALS = 14
 _LEAST_CHANGE = 1e-3
+_LEAST_TONE = 0.1
 _SAME = 0.005

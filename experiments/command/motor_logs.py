@@ -128,6 +128,8 @@ def _estimated(record: Record, motor: DiaphragmMotorParameters, calibration: Sig
     if lost and not reasons:
         named = ", ".join(name.replace("_", " ") for name in lost)
         said.append(f"too uncertain to give: {named}; a load of 10 N or more, or a healthy run (--healthy), would help")
+    if quantities["load_force"]["value"] is not None:
+        said.append("load counts any friction above the model's")
     alarm = found.track.alarm_time
     if alarm is not None and not reasons:
         said.append(f"the piston leaks, certain since {alarm:.2f} s")
