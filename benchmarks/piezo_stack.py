@@ -30,7 +30,8 @@ from plant.bouc_wen import OscillatorParameters
 from plant.piezo_stack import OIL, at_bias, stack_derivative, stack_pressures
 from plant.piezo_stack_flow import mean_flow
 from plant.piezo_stack_parameters import PiezoStackParameters
-from plant.piezo_stack_run import BENCH_SENSORS, FINE_TIME, SAMPLE_TIME, run_stack, simulate_stack, sine_drive
+from plant.piezo_stack_run import BENCH_SENSORS, FINE_TIME, SAMPLE_TIME, simulate_stack, sine_drive
+from plant.piezo_stack_trajectory import run_stack
 from plant.record import Record
 from plant.reference_solver import reference_trajectory
 

@@ -18,7 +18,8 @@ from estimation.piezo_stack_unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, 
 from plant.errors import HydrostateError
 from plant.piezo_stack import STATES, at_bias
 from plant.piezo_stack_parameters import PiezoStackParameters
-from plant.piezo_stack_run import BENCH_SENSORS, NAME, StackSensors, run_rows, stack_channels, stack_row
+from plant.piezo_stack_run import BENCH_SENSORS, StackSensors, stack_channels
+from plant.piezo_stack_trajectory import NAME, run_rows, stack_row
 from plant.record import Record
 
 Array: TypeAlias = NDArray[np.float64]
