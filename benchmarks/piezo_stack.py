@@ -232,7 +232,7 @@ def main(arguments: list[str]) -> int:
     """Print every figure; return how many fall short."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=20, help="seeds of the hysteresis and estimation studies")
-    parser.add_argument("--mismatch-seeds", type=int, default=5, help="seeds of the mismatch study; 50 take 10 minutes")
+    parser.add_argument("--mismatch-seeds", type=int, default=5, help="seeds of the mismatch study; 50 take 4 minutes")
     options = parser.parse_args(arguments)
     misses.clear()
     numerics()
