@@ -22,7 +22,7 @@ from plant.csv_log import read_csv
 from plant.record_files import write_record
 from plant.sensors import BENCH
 from plant.signals import make_drive
-from plant.simulate import LUMPED, simulate
+from plant.simulate import CIRCUIT, simulate
 
 SAMPLE_TIME = 1e-3
 WANTED_SPEED = 5.0
@@ -37,7 +37,7 @@ def make_archive(folder: Path, logs: int, duration: float) -> None:
         name, rng = names[number % len(names)], np.random.default_rng(number)
         p = parameters_for(CONDITIONS[name])
         speed = make_drive("steps", duration, SAMPLE_TIME, p, rng)
-        record = simulate(LUMPED, speed, SAMPLE_TIME, p, sensors=BENCH, rng=rng).annotate(condition=name)
+        record = simulate(CIRCUIT, speed, SAMPLE_TIME, p, sensors=BENCH, rng=rng).annotate(condition=name)
         write_record(record, folder / f"actuator{number // 50:02d}" / f"run{number:04d}.csv")
     good = (folder / "actuator00" / "run0000.csv").read_text(encoding="utf-8")
     header, first, *rest = good.splitlines()

@@ -1,7 +1,8 @@
 """Diagnosis against its targets: accuracy, calibration, severity, unknowns, foreign logs, speed.
 
 The population is `faults.population`: the circuit plant, rig sensors, nine steps and a random binary signal of 10 s,
-test seeds alone. ``--seeds`` and ``--draws`` make it smaller. Foreign logs are read from ``$HYDROSTATE_SHARED/bench``.
+test seeds alone. ``--seeds`` and ``--draws`` make it smaller, no draws leave the limit out. Foreign logs are read from
+``$HYDROSTATE_SHARED/bench``.
 """
 
 import argparse
@@ -12,7 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from benchmarks.diagnosis_checks import Check, foreign_checks, limit_checks, speed_checks, stuck_checks, unknown_checks
+from benchmarks.diagnosis_checks import (
+    Check,
+    foreign_checks,
+    limit_checks,
+    onset_checks,
+    speed_checks,
+    stuck_checks,
+    unknown_checks,
+)
 from experiments.studies.identification_library import read_library
 from faults.bank import mathematical_bank
 from faults.circuit_runs import coordinates_of
@@ -59,7 +68,11 @@ def main(arguments: list[str]) -> int:
         print(f"\n{len(judged)} logs {which(pressure)}, {(time.process_time() - began) / len(judged):.3f} CPU s each")
         print(confusions(judged).to_string())
         checks += printed(population_checks(judged, which(pressure), wanted))
-    checks += printed(limit_checks(actuator, seeds=max(2, options.seeds // 4), draws=options.draws))
+    for pressure in (True, False):
+        checks += printed(other_circuits(actuator, seeds=max(1, options.seeds // 5), pressure=pressure))
+    if options.draws:
+        checks += printed(limit_checks(actuator, seeds=max(2, options.seeds // 4), draws=options.draws))
+    checks += printed(onset_checks(actuator, seeds=max(1, options.seeds // 10)))
     checks += printed(unknown_checks(actuator, seeds=max(1, options.seeds // 25)))
     checks += printed(foreign_checks(actuator))
     checks += printed(stuck_checks(actuator))
@@ -83,6 +96,20 @@ def judge(logs: Iterable[Drawn], actuator: Actuator, *, pressure: bool) -> Itera
         true = severities_at(coordinates_of(log.parameters, actuator.rated), actuator)
         covered = {name: one.covers(true[name]) for name, one in found.severity.items() if name != "entrained_air"}
         yield Judged(log, found, covered)
+
+
+def other_circuits(actuator: Actuator, seeds: int, *, pressure: bool) -> list[Check]:
+    """Return class and coverage on circuits that are not of the kind that is fitted."""
+    judged = list(judge(draw_logs(range(TEST + 300, TEST + 300 + seeds), like=False), actuator, pressure=pressure))
+    name = f"{len(judged)} logs of other circuits {which(pressure)}"
+    right = 100.0 * float(np.mean([one.found.condition == one.log.condition for one in judged]))
+    covered = 100.0 * float(np.mean([list(one.covered.values()) for one in judged]))
+    dated = sum(one.found.scoreboard.onset is not None for one in judged)
+    return [
+        Check(f"{name}: class right, %", right, 94.0, 100.0),
+        Check(f"{name}: 95 % intervals that cover, %", covered, 85.0, 100.0),
+        Check(f"{name}: taken to have changed", dated, 0, 0.01 * len(judged)),
+    ]
 
 
 def confusions(judged: list[Judged]) -> pd.DataFrame:

@@ -16,6 +16,7 @@ from faults.circuit_runs import Blocks, blocks_of, coordinates_of, predicted
 from faults.class_fit import Actuator
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import diagnose_log
+from faults.inject import abrupt
 from faults.population import DRIVES, DURATION, OUT_OF_MODEL, SAMPLE_TIME, TEST, TRAINING, draw_logs, draw_parameters
 from faults.severity import severities_at
 from plant.eha import EhaParameters
@@ -150,6 +151,37 @@ def foreign_checks(actuator: Actuator) -> list[Check]:
         checks.append(Check(f"foreign logs {with_or_without}: class right, of 18", right, 18, 18))
         checks.append(Check(f"foreign logs {with_or_without}: flagged unknown, of 18", flagged, 0, 18))
         checks.append(Check(f"foreign logs {with_or_without}: 95 % intervals that cover, %", share, 85.0, 100.0))
+    return checks
+
+
+def onset_checks(actuator: Actuator, seeds: int) -> list[Check]:
+    """Diagnose logs of an actuator that was healthy until some time within the log."""
+    names = [name for name in CONDITIONS if name != "normal"]
+    checks: list[Check] = []
+    logs: list[tuple[str, float, Record]] = []
+    for seed in range(seeds):
+        for which, drive in enumerate(DRIVES):
+            rng = np.random.default_rng([TEST + 700 + seed, which])
+            speed = make_drive(drive, DURATION, SAMPLE_TIME, EhaParameters(), rng)
+            for name in names:
+                at = float(rng.uniform(0.2, 0.8)) * DURATION
+                path = abrupt(draw_parameters("normal", rng, 0.1), draw_parameters(name, rng, 0.1), at)
+                logs.append((name, at, simulate(CIRCUIT, speed, SAMPLE_TIME, path, sensors=RIG, rng=rng)))
+    for pressure in (True, False):
+        right, dated, held = 0, 0, 0
+        late: list[float] = []
+        for name, at, record in logs:
+            found = diagnose_log(record if pressure else record.replace(**{PRESSURE: None}), actuator)
+            onset = found.scoreboard.onset
+            right += found.condition == name
+            if onset is not None:
+                dated, held = dated + 1, held + (onset.ci95[0] <= at <= onset.ci95[1])
+                late.append(abs(onset.since - at))
+        said = f"{len(logs)} logs that change {'with' if pressure else 'without'} dp"
+        error = f"median error {1e3 * float(np.median(late)):.0f} ms" if late else "none"
+        checks.append(Check(f"{said}: condition after it right, %", 100.0 * right / len(logs), 94.0, 100.0))
+        checks.append(Check(f"{said}: dated, %, {error}", 100.0 * dated / len(logs), 90.0, 100.0))
+        checks.append(Check(f"{said}: interval of the time covers, %", 100.0 * held / max(dated, 1), 85.0, 100.0))
     return checks
 
 

@@ -23,14 +23,14 @@ from plant.eha import EhaParameters
 
 Array = NDArray[np.float64]
 
-WIDTHS = (0.1, 0.2)
-"""Spreads of the training population."""
-
 RIDGE = 1e-3
 """Penalty on squared weights [dimensionless]: where training logs are all right, weights would grow for ever."""
 
-HELD = 0.975
-"""Share of training logs whose interval shall hold the truth."""
+HELD, HELD_ALIKE = 0.96, 0.95
+"""Shares of all training logs, and of those of the first population, whose interval shall hold the truth."""
+
+POPULATIONS = ((0.1, True), (0.2, True), (0.1, False))
+"""Spread, and whether the circuits are of the kind that is fitted: weights see the first two, widths all three."""
 
 PRESSURE = "differential_pressure_pa"
 
@@ -38,7 +38,7 @@ PRESSURE = "differential_pressure_pa"
 def main(arguments: list[str]) -> int:
     """Fit and write; return 0."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=8)
+    parser.add_argument("--seeds", type=int, default=24)
     parser.add_argument("--out", type=Path, default=Path("faults/calibration.json"))
     options = parser.parse_args(arguments)
     seeds = range(TRAINING, TRAINING + options.seeds)
@@ -48,7 +48,7 @@ def main(arguments: list[str]) -> int:
         weights = fitted_weights(odds, truths)
         found[name] = {
             "weights": dict(zip(EVIDENCES, weights.round(4).tolist(), strict=True)),
-            "widths": {key: round(float(np.quantile(values, HELD)), 3) for key, values in ratios.items()},
+            "widths": {key: round(fitted_width(values), 3) for key, values in ratios.items()},
         }
         print(name, len(truths), "logs", found[name])
     found["provenance"] = {
@@ -56,9 +56,9 @@ def main(arguments: list[str]) -> int:
         "population": "faults.population.draw_logs",
         "first_seed": TRAINING,
         "seeds": options.seeds,
-        "spreads": list(WIDTHS),
+        "spread, and whether the circuit is of the kind that is fitted": [list(one) for one in POPULATIONS],
         "ridge": RIDGE,
-        "held": HELD,
+        "held of all, of the first": [HELD, HELD_ALIKE],
     }
     options.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     return 0
@@ -70,18 +70,25 @@ def gathered(seeds: Sequence[int], *, pressure: bool) -> tuple[Array, NDArray[np
     odds: list[Array] = []
     truths: list[int] = []
     ratios: dict[str, list[float]] = {name: [] for name in UNITS if name != "entrained_air"}
-    for width in WIDTHS:
-        for log in draw_logs(seeds, width=width):
+    for width, like in POPULATIONS:
+        for log in draw_logs(seeds, width=width, like=like):
             record = log.record if pressure else log.record.replace(**{PRESSURE: None})
             board = weigh(record, actuator, library)
-            odds.append(np.array([board.log_odds[name] for name in EVIDENCES]))
-            truths.append(list(CONDITIONS).index(log.condition))
+            if like:
+                odds.append(np.array([board.log_odds[name] for name in EVIDENCES]))
+                truths.append(list(CONDITIONS).index(log.condition))
             true = severities_at(coordinates_of(log.parameters, actuator.rated), actuator)
             for name, one in severities(board.fits, actuator).items():
                 if name in ratios:
                     reach = one.ci95[1] - one.value if true[name] > one.value else one.value - one.ci95[0]
                     ratios[name].append(abs(true[name] - one.value) / max(reach, np.finfo(float).tiny))
     return np.array(odds), np.array(truths), ratios
+
+
+def fitted_width(ratios: Sequence[float]) -> float:
+    """Return by what an interval is stretched to hold its shares; the populations follow on each other, alike long."""
+    first = ratios[: len(ratios) // len(POPULATIONS)]
+    return max(float(np.quantile(ratios, HELD)), float(np.quantile(first, HELD_ALIKE)))
 
 
 def fitted_weights(odds: Array, truths: NDArray[np.int64]) -> Array:

@@ -67,6 +67,8 @@ class Blocks:
         Mean differential pressure over each block [Pa], None where it is not logged.
     noise : ndarray, shape (outputs,)
         Standard deviation of what the sensors add to velocity [m/s] and pressure [Pa].
+    earlier : tuple of int and ndarray, shape (parameters,), or None
+        Another circuit that ran up to a sample, as a row of parameters; None if one ran throughout.
     """
 
     speed: Array
@@ -75,6 +77,7 @@ class Blocks:
     velocity: Array
     pressure: Array | None
     noise: Array
+    earlier: tuple[int, Array] | None = None
 
     @property
     def outputs(self) -> Array:
@@ -226,27 +229,31 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
     ----------
     blocks : Blocks
         The log.
-    rows : ndarray, shape (m, parameters)
-        The circuits.
+    rows : ndarray, shape (m, parameters) or (samples, m, parameters)
+        The circuits; what they are at each sample, if they change.
 
     Returns
     -------
     ndarray, shape (m, n, outputs)
         Mean velocity [m/s] over each block, and mean pressure [Pa] where it is logged.
     """
-    starts = np.array([CIRCUIT.start(row) for row in rows])
+    rows = rows[None] if rows.ndim == 2 else rows
+    if blocks.earlier is not None:
+        until, row = blocks.earlier
+        rows = np.where(np.arange(len(blocks.speed))[:, None, None] < until, row, rows)
+    starts = np.array([CIRCUIT.start(row) for row in rows[0]])
     runs = controlled_run(
         CIRCUIT.name,
         _CONTROL,
         starts,
         blocks.speed,
-        rows[None],
+        rows,
         blocks.sample_time,
         CIRCUIT.parameter_class,
         tolerance=TOLERANCE,
         drive_tolerance=DRIVE_TOLERANCE,
     )
-    return np.array([_outputs(blocks, states, row) for states, row in zip(runs, rows, strict=True)])
+    return np.array([_outputs(blocks, states, rows[:, i]) for i, states in enumerate(runs)])
 
 
 def _outputs(blocks: Blocks, states: Array, row: Array) -> Array:
@@ -254,7 +261,7 @@ def _outputs(blocks: Blocks, states: Array, row: Array) -> Array:
     if blocks.pressure is None:
         return velocity[:, None]
     position, oil = states[:, 2], states[:, 4:6]
-    area, volume, modulus, air, vapour = (row[_COLUMN[n]] for n in _PRESSURE_OF)
+    area, volume, modulus, air, vapour = (row[:, _COLUMN[n]] for n in _PRESSURE_OF)
     swept = area * position
     high = oil_pressure(oil[:, 0], 2 * volume + swept, modulus, air, vapour)
     low = oil_pressure(oil[:, 1], 2 * volume - swept, modulus, air, vapour)

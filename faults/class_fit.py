@@ -157,9 +157,25 @@ def scales_of(blocks: Blocks, fitted: Array) -> Array:
     ndarray, shape (outputs,)
         Residuals [m/s, Pa], not below the sensors' noise and `LEAST_SCALE`.
     """
-    measured = blocks.outputs[blocks.first :]
-    least = np.maximum(blocks.noise, LEAST_SCALE * np.sqrt(np.nanmean(measured**2, axis=0)))
-    return np.maximum(np.sqrt(np.nanmean((measured - fitted[blocks.first :]) ** 2, axis=0)), least)
+    left = blocks.outputs[blocks.first :] - fitted[blocks.first :]
+    return np.maximum(np.sqrt(np.nanmean(left**2, axis=0)), least_scales(blocks))
+
+
+def least_scales(blocks: Blocks) -> Array:
+    """Return what a model leaves of a log at the least.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+
+    Returns
+    -------
+    ndarray, shape (outputs,)
+        The sensors' noise, and not below `LEAST_SCALE` of the signal [m/s, Pa].
+    """
+    size = np.sqrt(np.nanmean(blocks.outputs[blocks.first :] ** 2, axis=0))
+    return np.maximum(blocks.noise, LEAST_SCALE * size)
 
 
 def misfit(blocks: Blocks, fitted: Array) -> float:

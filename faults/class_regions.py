@@ -20,6 +20,7 @@ from faults.class_fit import (
     Actuator,
     PointFit,
     fit_freely,
+    least_scales,
     misfit,
     nominal_runs,
     scales_of,
@@ -34,6 +35,13 @@ YIELDING = 5.0
 STRUCTURAL = 100.0
 """By how much a residual that no sensor makes widens what is believed [dimensionless], in variance: it lasts, and it is
 not what the derivatives say that it is."""
+
+AVERAGED = 10
+"""Blocks over which residuals are averaged to see what lasts of them [dimensionless]: a tenth of a second."""
+
+ALIKE, ALIKE_COUNT = 0.25, 1.0
+"""Squared deviation of actuators of one kind, in units of `WITHIN`, before a log is seen, and how many deviations that
+belief counts as [dimensionless]: 0.25 are some 10 % in leakage and friction."""
 
 _NO_FRICTION = np.array([0.0 if name.startswith("friction") else 1.0 for name in COORDINATES])
 
@@ -57,6 +65,8 @@ class ClassFits:
         Root mean square of what it leaves [m/s, Pa].
     scores : ndarray, shape (9,)
         How well each condition's region holds the fitted circuits: log-likelihoods [dimensionless].
+    spread : ndarray, shape (7, 7)
+        Covariance of the coordinates for intervals, see `spread_of` [dimensionless].
     """
 
     best: PointFit
@@ -64,6 +74,7 @@ class ClassFits:
     nominal: Array
     nominal_scales: Array
     scores: Array
+    spread: Array
 
     @property
     def covariance(self) -> Array:
@@ -98,8 +109,10 @@ def fit_classes(blocks: Blocks, actuator: Actuator) -> ClassFits:
         for fit, information in zip(fits, known, strict=True)
     ]
     least, held = int(np.argmin([fit.cost for fit in fits])), np.max(scores, axis=0)
-    best = fits[least] if blocks.pressure is not None else _scaled(fits[least], actuator.conditions[np.argmax(held)])
-    return ClassFits(best, known[least], nominal, np.array([scales_of(blocks, run) for run in runs]), held)
+    centre = actuator.conditions[np.argmax(held)]
+    best = fits[least] if blocks.pressure is not None else _scaled(fits[least], centre)
+    spread = spread_of(best, known[least], blocks, centre)
+    return ClassFits(best, known[least], nominal, np.array([scales_of(blocks, run) for run in runs]), held, spread)
 
 
 def _scaled(fit: PointFit, centre: Array) -> PointFit:
@@ -107,6 +120,63 @@ def _scaled(fit: PointFit, centre: Array) -> PointFit:
     pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
     shift = float(pull @ (centre - fit.coordinates)) / float(pull @ PRESSURE_SCALE)
     return replace(fit, coordinates=fit.coordinates + shift * PRESSURE_SCALE)
+
+
+def spread_of(fit: PointFit, information: Array, blocks: Blocks, centre: Array) -> Array:
+    """Return the covariance of a fit's coordinates, for intervals that know how well the model describes this log.
+
+    What is left of a log that the model describes is the sensors' noise, which averages away; the error of a wrong
+    model lasts. So variances grow with what is left after averaging over a tenth of a second, over what white noise
+    would leave. Without pressure the common scale is known only as far as actuators of one kind are alike, and an
+    actuator that differs much from its kind in what its log tells is taken to do so in what it does not tell.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    information : ndarray, shape (7, 7)
+        What is believed of it, see `believed_information`.
+    blocks : Blocks
+        Its log.
+    centre : ndarray, shape (7,)
+        Coordinates of the condition that it is in.
+
+    Returns
+    -------
+    ndarray, shape (7, 7)
+        Covariance under the weak prior [dimensionless].
+    """
+    known = information / max(1.0, lasting_misfit(fit.fitted, blocks)) + np.linalg.inv(WEAK)
+    if blocks.pressure is None:
+        weight = information @ np.linalg.inv(np.eye(len(WITHIN)) + WITHIN @ information)
+        off, told = fit.coordinates - centre, float(np.trace(WITHIN @ weight))
+        unlike = (ALIKE_COUNT * ALIKE + float(off @ weight @ off)) / (ALIKE_COUNT + told)
+        pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
+        known = known + np.outer(pull, pull) / (unlike * float(pull @ PRESSURE_SCALE))
+    return np.asarray(np.linalg.inv(known), dtype=np.float64)
+
+
+def lasting_misfit(fitted: Array, blocks: Blocks) -> float:
+    """Return how far what a model leaves of a log, averaged over `AVERAGED` blocks, exceeds white noise of the sensors.
+
+    Parameters
+    ----------
+    fitted : ndarray, shape (n, outputs)
+        What the model does [m/s, Pa].
+    blocks : Blocks
+        Its log.
+
+    Returns
+    -------
+    float
+        Ratio of root mean squares, the larger of the outputs' [dimensionless]: 1 or less where noise alone is left.
+    """
+    left = (blocks.outputs - fitted)[blocks.first :]
+    size = min(AVERAGED, len(left))
+    left = left[: len(left) // size * size].reshape(-1, size, left.shape[1])
+    there = np.sum(np.isfinite(left), axis=(0, 1))
+    power = np.sum(np.nansum(left, axis=1) ** 2, axis=0) / np.maximum(there, 1)
+    return float(np.max(np.sqrt(power) / least_scales(blocks)))
 
 
 def is_stuck(blocks: Blocks, actuator: Actuator) -> bool:

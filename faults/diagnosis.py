@@ -11,13 +11,13 @@ from faults.class_fit import Actuator
 from faults.class_regions import region_scores
 from faults.evidence import Scoreboard, weigh
 from faults.out_of_model import reasons_against
-from faults.severity import Severity, severities, what_is_not_told
+from faults.severity import Severity, severities, severities_at, what_is_not_told
 from plant.record import Record
 
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What is wrong with an actuator, by its log.
+    """What is wrong with an actuator, by its log, when the log ends.
 
     Parameters
     ----------
@@ -31,6 +31,8 @@ class Diagnosis:
         What.
     severity : Mapping[str, Severity]
         How bad, by the names of `faults.severity.UNITS` [each in the unit given there].
+    healthy : Mapping[str, float]
+        The same of the healthy actuator [each in the same unit].
     not_told : tuple of str
         What the log does not determine.
     scoreboard : Scoreboard
@@ -42,6 +44,7 @@ class Diagnosis:
     unknown: bool
     reasons: tuple[str, ...]
     severity: Mapping[str, Severity]
+    healthy: Mapping[str, float]
     not_told: tuple[str, ...]
     scoreboard: Scoreboard
 
@@ -80,7 +83,7 @@ def diagnose_log(
     pressure = board.blocks.pressure is not None
     probabilities = board.probabilities(numbers)
     region = float(np.max(region_scores(board.fits.best, board.fits.information, actuator)))
-    reasons = reasons_against(record, board.blocks, board.fits, region, actuator)
+    reasons = reasons_against(board.window, board.blocks, board.fits, region, actuator)
     found = severities(board.fits, actuator, numbers.widths(pressure))
     return Diagnosis(
         max(probabilities, key=lambda name: probabilities[name]),
@@ -88,6 +91,7 @@ def diagnose_log(
         bool(reasons),
         tuple(reasons),
         found,
+        severities_at(actuator.conditions[0], actuator),
         tuple(what_is_not_told(board.fits, found, pressure=pressure)),
         board,
     )

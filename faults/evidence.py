@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 
 from estimation.identification.linear_model import LinearModel
 from faults.calibration import Calibration
-from faults.circuit_runs import COORDINATES, Blocks, blocks_of
+from faults.circuit_runs import COORDINATES, Blocks
 from faults.class_fit import Actuator
-from faults.class_regions import ClassFits, fit_classes, is_stuck
+from faults.class_regions import ClassFits, is_stuck
 from faults.classify import score_transfer_functions
 from faults.conditions import CONDITIONS
 from faults.innovation_bank import innovation_scores
+from faults.onset import Onset, last_part
 from plant.record import Record
 
 Array = NDArray[np.float64]
@@ -44,11 +45,17 @@ class Scoreboard:
         The log as it was compared.
     fits : ClassFits
         The circuits that were fitted.
+    window : Record
+        The stretch of the log that was looked at.
+    onset : Onset or None
+        When the condition began, which alone is judged; None if it did so before the log.
     """
 
     log_odds: Mapping[str, Array]
     blocks: Blocks
     fits: ClassFits
+    window: Record
+    onset: Onset | None
 
     def choice(self, evidence: str) -> str:
         """Return the condition that one evidence alone names.
@@ -85,7 +92,7 @@ class Scoreboard:
 
 
 def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel] | None = None) -> Scoreboard:
-    """Return what the evidences say of a log.
+    """Return what the evidences say of a log, of the condition in which it ends.
 
     Parameters
     ----------
@@ -106,8 +113,8 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
     LogError
         If the log has neither position nor velocity, or is too short.
     """
-    blocks = blocks_of(record)
-    fits = fit_classes(blocks, actuator)
+    part = last_part(record, actuator)
+    record, blocks, fits = part.record, part.blocks, part.fits
     found = {
         "models": -SAMPLES * np.sum(np.log(fits.nominal_scales), axis=1),
         "innovations": innovation_scores(record, actuator.circuit) / blocks.block,
@@ -118,7 +125,8 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
         found["transfer_functions"] = -SAMPLES * np.log([table[name] for name in CONDITIONS])
     if is_stuck(blocks, actuator):
         found = {name: _friction_left_open(scores, blocks, actuator) for name, scores in found.items()}
-    return Scoreboard({name: bounded(found[name]) for name in EVIDENCES if name in found}, blocks, fits)
+    odds = {name: bounded(found[name]) for name in EVIDENCES if name in found}
+    return Scoreboard(odds, blocks, fits, part.window, part.onset)
 
 
 def _friction_left_open(scores: Array, blocks: Blocks, actuator: Actuator) -> Array:

@@ -110,6 +110,8 @@ def _biases(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[str]:
     fit, first = fits.best, blocks.first
     rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
     size = float(np.sqrt(np.mean(blocks.speed**2)))
+    if size == 0.0:
+        return []
     nudge = 0.01 * size
     faster = predicted(replace(blocks, speed=blocks.speed + nudge), rows)[0]
     columns = [*fit.slopes, (faster - fit.fitted) / nudge]

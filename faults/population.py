@@ -88,10 +88,55 @@ def draw_parameters(
     return replace(drawn, presliding_displacement=factor * drawn.presliding_displacement)
 
 
+def unlike(p: CircuitParameters, rng: np.random.Generator) -> CircuitParameters:
+    """Return an actuator whose circuit is not the one that a diagnosis fits.
+
+    Seals, make-up valves, motor, moving mass, accumulator and the pump's share of the leakage are drawn at random from
+    wide ranges; what a diagnosis looks for, and geometry and pump, stay.
+
+    Parameters
+    ----------
+    p : CircuitParameters
+        The actuator.
+    rng : numpy.random.Generator
+        Source of the draw.
+
+    Returns
+    -------
+    CircuitParameters
+        The other circuit.
+
+    Examples
+    --------
+    >>> other = unlike(CircuitParameters(), np.random.default_rng(0))
+    >>> other.leakage_coefficient == CircuitParameters().leakage_coefficient, other.motor_lag == 2e-3
+    (True, False)
+    """
+    factors = {name: float(np.exp(rng.uniform(-np.log(most), np.log(most)))) for name, most in UNLIKE.items()}
+    drawn = {name: factor * getattr(p, name) for name, factor in factors.items()}
+    case = float(rng.uniform(0.0, 2.0)) * p.pump_case_leakage
+    within = float(rng.uniform(0.05, 0.95)) * (p.leakage_coefficient - 1.5 * case)
+    return replace(p, **drawn, pump_case_leakage=case, pump_crossport_leakage=within)
+
+
+UNLIKE: Mapping[str, float] = MappingProxyType(
+    {
+        "presliding_displacement": 4.0,
+        "presliding_damping": 2.5,
+        "makeup_opening": 5.0,
+        "motor_lag": 3.0,
+        "moving_mass": 1.3,
+        "accumulator_pressure": 1.5,
+    }
+)
+"""Factors by which `unlike` multiplies or divides at most [dimensionless], judged: what a rig file seldom knows."""
+
+
 def draw_logs(
     seeds: Sequence[int],
     *,
     width: float = 0.1,
+    like: bool = True,
     drives: Sequence[str] = DRIVES,
     sensors: Sensors = RIG,
     duration: float = DURATION,
@@ -105,6 +150,8 @@ def draw_logs(
         From `TRAINING` or from `TEST` on.
     width : float
         Half-width of the spread [dimensionless], see `draw_parameters`.
+    like : bool
+        Whether the circuits are of the kind that a diagnosis fits; if not, see `unlike`.
     drives : sequence of str
         Names of drives.
     sensors : Sensors
@@ -127,6 +174,7 @@ def draw_logs(
             rng = np.random.default_rng([seed, which])
             speed = make_drive(drive, duration, sample_time, EhaParameters(), rng)
             actuators = [draw_parameters(name, rng, width) for name in CONDITIONS]
+            actuators = actuators if like else [unlike(p, rng) for p in actuators]
             records = simulate_each(CIRCUIT, speed, sample_time, actuators, sensors=sensors, rngs=rng.spawn(9))
             for name, parameters, record in zip(CONDITIONS, actuators, records, strict=True):
                 yield Drawn(name, parameters, record.annotate(drive=drive, seed=seed), speed)

@@ -133,7 +133,7 @@ def severities(
     """
     rng = np.random.default_rng(0)
     centre = fits.best.coordinates
-    drawn = rng.multivariate_normal(centre, fits.covariance, DRAWS, method="cholesky")
+    drawn = rng.multivariate_normal(centre, fits.spread, DRAWS, method="cholesky")
     with np.errstate(all="ignore"):  # friction that falls faster than leakage holds has no steady state
         table, best = [severities_at(point, actuator) for point in drawn], severities_at(centre, actuator)
     found: dict[str, Severity] = {}
@@ -176,12 +176,16 @@ def what_is_not_told(fits: ClassFits, found: Mapping[str, Severity], *, pressure
     if "bulk_modulus" in blind:
         said.append("bulk modulus is not visible under this drive")
     flow, speed = found["leakage_flow"], found["velocity_lost"]
-    if _width(flow) > VAGUE * (speed.ci95[1] - speed.ci95[0]) / 100.0 and _width(flow) > 0.3:
-        cause = "leakage coefficient and flow bias" if pressure else "leakage and friction"
+    low, high = speed.ci95
+    lost = f": the velocity lost, {speed.value:.0f} % ({low:.0f} to {high:.0f}), is what the log determines"
+    lost = lost if np.isfinite(speed.value) else ""
+    if not pressure:
         said.append(
-            f"{cause} are not told apart: the velocity lost, {speed.value:.0f} % ({speed.ci95[0]:.0f} to "
-            f"{speed.ci95[1]:.0f}), is what the log determines"
+            "without pressure leakage and friction share one scale, beyond which they are not told apart but by how "
+            f"alike actuators of one kind are{lost}"
         )
+    elif _width(flow) > VAGUE * (high - low) / 100.0 and _width(flow) > 0.3:
+        said.append(f"leakage coefficient and flow bias are not told apart{lost}")
     return said
 
 

@@ -1,44 +1,52 @@
 """The class of a log, as a batch asks for it: the one place that knows how a log is diagnosed."""
 
-import math
-from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
-from faults.classify import score_mathematical
+from faults.class_fit import Actuator
+from faults.diagnosis import diagnose_log
 from plant.eha import EhaParameters
 from plant.record import Record
 
 TOLD_APART = 1.001
-"""Least ratio of the runner-up's score to the best at which a class is named [dimensionless]."""
+"""Least ratio of the best class's probability to the runner-up's at which a class is named [dimensionless]."""
 
 
-def diagnosed(record: Record, bank: Mapping[str, EhaParameters]) -> dict[str, Any]:
-    """Say which of the bank's conditions a log fits best.
+def diagnosed(record: Record, rig: EhaParameters) -> dict[str, Any]:
+    """Say which of the nine conditions a log was taken in, or that it is in none.
 
     Parameters
     ----------
     record : Record
         The log.
-    bank : Mapping[str, EhaParameters]
-        Parameters by condition name.
+    rig : EhaParameters
+        The healthy actuator.
 
     Returns
     -------
     dict[str, Any]
-        Entries of a row: outcome, reason, and where there is a class, it, its runner-up and the ratio of their scores.
+        Entries of a row: outcome, reason, and where there is a class, it, its runner-up and the ratio of their
+        probabilities. A log that is in none of the nine is a mismatch without a class.
 
     Raises
     ------
     LogError
-        If the log cannot be scored.
+        If the log cannot be diagnosed.
+    RigError
+        If no circuit fits around the rig.
     """
-    scores = score_mathematical(record, bank).by_condition
-    ranked = sorted(scores.items(), key=lambda item: item[1] if math.isfinite(item[1]) else math.inf)
-    (best, least), (second, next_least) = ranked[:2]
-    if not math.isfinite(least):
-        return {"outcome": "diverged", "reason": "no condition's model stayed finite; check units and rig"}
-    margin = next_least / least if least > 0.0 else (math.inf if next_least > 0.0 else 1.0)
+    found = diagnose_log(record, _actuator(rig))
+    (best, first), (second, other) = sorted(found.probabilities.items(), key=lambda item: -item[1])[:2]
+    margin = first / max(other, 1e-300)
+    if found.unknown:
+        said = f"in none of the nine conditions, the nearest is {best}: {'; '.join(found.reasons)}"
+        return {"outcome": "mismatch", "reason": said, "trusted": False}
     if margin < TOLD_APART:
-        said = "no class: under this drive the models move alike; drive the actuator, at best with steps"
+        said = f"no class: under this drive {best} and {second} move alike; drive the actuator, at best with steps"
         return {"outcome": "not_observable", "reason": said, "margin": margin}
-    return {"outcome": "ok", "found_condition": best, "runner_up": second, "margin": margin}
+    return {"outcome": "ok", "found_condition": best, "runner_up": second, "margin": margin, "trusted": True}
+
+
+@lru_cache(maxsize=4)
+def _actuator(rig: EhaParameters) -> Actuator:
+    return Actuator.of(rig)

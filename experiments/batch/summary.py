@@ -148,8 +148,8 @@ def diagnosis_table(frame: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        One row a way of doing it and condition: counts, share that is right [%], and the ratio of the runner-up's score
-        to the best, at the median [dimensionless].
+        One row a way of doing it and condition: counts, share that is right [%], and the ratio of the best probability
+        to the runner-up's, at the median [dimensionless].
     """
     rows: list[dict[str, object]] = []
     for keys, group in _classified(frame).groupby([*METHOD, "condition"], sort=False):

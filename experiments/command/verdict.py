@@ -24,6 +24,8 @@ NO_VERDICT: Mapping[str, Any] = {
     "severity": None,
     "not_told": [],
     "since_s": None,
+    "since_ci95_s": None,
+    "condition_before": None,
     "gate": None,
 }
 """The entries of a log without a verdict."""
@@ -40,9 +42,11 @@ def verdict_entries(found: "Diagnosis") -> dict[str, Any]:
     Returns
     -------
     dict[str, object]
-        ``condition``, ``probabilities``, ``unknown`` with ``reasons``, ``severity`` and ``gate``; ``since_s`` is not
-        known of a log that is taken as a whole.
+        ``condition``, ``probabilities``, ``unknown`` with ``reasons``, ``severity``, ``gate``, and where the condition
+        changed within the log ``since_s``, ``since_ci95_s`` and ``condition_before``, which else are None: the log was
+        in one condition before it began.
     """
+    onset = found.scoreboard.onset
     return {
         "condition": found.condition,
         "probabilities": dict(found.probabilities),
@@ -52,7 +56,9 @@ def verdict_entries(found: "Diagnosis") -> dict[str, Any]:
             name: {"value": one.value, "unit": one.unit, "ci95": list(one.ci95)} for name, one in found.severity.items()
         },
         "not_told": list(found.not_told),
-        "since_s": None,
+        "since_s": None if onset is None else round(onset.since, 4),
+        "since_ci95_s": None if onset is None else [round(end, 4) for end in onset.ci95],
+        "condition_before": None if onset is None else onset.before,
         "gate": {"passed": not found.unknown, "reasons": list(found.reasons)},
     }
 
@@ -90,14 +96,40 @@ def headline(result: Mapping[str, Any]) -> str:
     Returns
     -------
     str
-        Condition and probability, or that it is unknown.
+        Condition and probability, or that it is unknown; and since when.
     """
     ranked = sorted(result["probabilities"].items(), key=lambda item: -item[1])
     (best, first), (second, other) = ranked[:2]
-    named = f"{_said(best)}, probability {_percent(first)}; next {_said(second)}, {_percent(other)}"
+    parts = [f"{_said(best)}, probability {_percent(first)}", since(result), f"next {_said(second)}, {_percent(other)}"]
+    named = "; ".join(part for part in parts if part)
     if result["unknown"]:
         return f"UNKNOWN, in none of the nine conditions; the nearest: {named}"
     return named
+
+
+def since(result: Mapping[str, Any]) -> str:
+    """Return since when the actuator is in its condition.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries with a verdict.
+
+    Returns
+    -------
+    str
+        A clause; empty for a healthy actuator that was so from the beginning.
+
+    Examples
+    --------
+    >>> since({"condition": "minor_leakage", "since_s": None})
+    'since before the log began'
+    """
+    if result["since_s"] is not None:
+        low, high = result["since_ci95_s"]
+        before = _said(result["condition_before"])
+        return f"since {result['since_s']:.2f} s ({low:.2f} to {high:.2f}), {before} until then"
+    return "" if result["condition"] == "normal" else "since before the log began"
 
 
 def amounts(result: Mapping[str, Any], names: Sequence[str]) -> str:

@@ -1,5 +1,6 @@
 """The page on one log: the verdict, probabilities, severities, measured against fitted, what to measure next."""
 
+import math
 from collections.abc import Mapping
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
@@ -7,20 +8,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
-from experiments.command.verdict import SHOWN, amount, believed, headline, next_step
-from experiments.figures.style import BLUE, GREY, ORANGE, VERMILION, Margins, panels, styled
+from experiments.command.verdict import SHOWN, amount, believed, headline, next_step, since
+from experiments.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, Margins, panels, styled
 from experiments.report.sectioned import Section, render_sections
 from experiments.report.tables import Column, html_table
+from faults.circuit_runs import blocks_of
 
 if TYPE_CHECKING:
     from faults.diagnosis import Diagnosis
 
 ASSUMED = (
     "The rig file's geometry, pump and relief setting are taken as true; the piston starts at rest in mid-stroke; "
-    "leakage, flow bias, friction and bulk modulus are constant over the log. Probabilities hold if the actuator is in "
-    "one of the nine conditions, each as likely as the next before the log; they were calibrated on simulated logs of "
-    "the whole circuit. Intervals are 95 %."
+    "leakage, flow bias, friction and bulk modulus change at most once, at the time under 'Since when'. Probabilities "
+    "hold if the actuator is in one of the nine conditions, each as likely as the next before the log; they were "
+    "calibrated on simulated logs of the whole circuit. Intervals are 95 %, wider the more of the log the circuit "
+    "leaves unexplained. Without pressure leakage, friction and bulk modulus share a scale that no log holds: their "
+    "intervals then rest on how alike actuators of one kind are."
 )
 
 CHANNELS = (("velocity", "mm/s", 1e3), ("differential pressure", "bar", 1e-5))
@@ -45,15 +51,30 @@ def diagnosis_page(result: Mapping[str, Any], found: "Diagnosis") -> str:
         Section(
             "probabilities",
             "Which condition",
-            (f"To be believed? {believed(result)}.",),
+            (f"To be believed? {_sentence(believed(result))}",),
             *_svg(_draw_probabilities(found)),
         ),
-        Section("severity", "How bad", tuple(result["not_told"]), tables=[_severities(result)]),
+        Section(
+            "severity",
+            "How bad",
+            tuple(_sentence(said) for said in result["not_told"]),
+            *_svg(_draw_severities(found)),
+            tables=[_severities(result)],
+        ),
+        Section(
+            "since", "Since when", (_sentence(since(result) or "nothing began: healthy from the log's beginning"),)
+        ),
         Section("fit", "Measured and fitted", (), *_svg(_draw_fit(found))),
-        Section("next", "What to measure next", (f"{next_step(result)}.",)),
+        Section("next", "What to measure next", (_sentence(next_step(result)),)),
         Section("assumed", "What was assumed", (ASSUMED,)),
     ]
-    return render_sections(headline(result), f"diagnosis of {result['file']}", _introduction(result), sections)
+    title = _sentence(headline(result)).removesuffix(".")
+    return render_sections(title, f"diagnosis of {result['file']}", _introduction(result), sections)
+
+
+def _sentence(said: str) -> str:
+    """Return a clause as a sentence."""
+    return f"{said[:1].upper()}{said[1:]}."
 
 
 def _introduction(result: Mapping[str, Any]) -> str:
@@ -92,9 +113,43 @@ def _draw_probabilities(found: "Diagnosis") -> tuple[Figure, str]:
     return figure, "Probabilities of the nine conditions."
 
 
+def _draw_severities(found: "Diagnosis") -> tuple[Figure, str]:
+    """Draw a bar for each severity, on a scale of its own, from zero, with its interval and the healthy value."""
+    shown = [name for name, one in found.severity.items() if all(map(math.isfinite, (one.value, *one.ci95)))]
+    with styled():
+        margins = Margins(left=2.4, right=2.5, top=0.75, bottom=0.35, down=0.32)
+        height = 1.1 + len(shown) * (0.24 + margins.down)
+        figure, axes = panels("Severities, with 95 % intervals", len(shown), 1, height, margins)
+        for axis, name in zip(axes, shown, strict=True):
+            one = found.severity[name]
+            scale = 1e-6 if one.unit == "Pa" else 1.0
+            value, low, high, sound = (scale * number for number in (one.value, *one.ci95, found.healthy[name]))
+            axis.barh([0.0], [value], height=0.8, color=SKY)
+            error = [[max(value - low, 0.0)], [max(high - value, 0.0)]]
+            axis.errorbar([value], [0.0], xerr=error, fmt="none", ecolor=BLACK, elinewidth=1.6, capsize=5.0)
+            axis.axvline(sound, color=VERMILION, ls="--", lw=1.4)
+            reach = max(abs(number) for number in (value, low, high, sound)) or 1.0
+            axis.set_xlim(1.08 * min(0.0, low, sound) - 0.01 * reach, 1.08 * max(value, high, sound) + 0.01 * reach)
+            axis.set_ylim(-0.6, 0.6)
+            unit = "MPa" if one.unit == "Pa" else one.unit
+            axis.set_yticks([0.0], [f"{SHOWN[name].replace(', at most', '')} [{unit}]"])
+            axis.tick_params(axis="y", length=0)
+            axis.grid(visible=False, axis="y")
+            words = amount({"value": one.value, "unit": one.unit, "ci95": one.ci95})
+            axis.text(1.02, 0.5, words, transform=axis.transAxes, va="center", fontsize=8.5)
+        handles = [
+            Patch(color=SKY, label="estimate"),
+            Line2D([], [], color=BLACK, lw=1.6, label="95 % interval"),
+            Line2D([], [], color=VERMILION, ls="--", lw=1.4, label="healthy actuator"),
+        ]
+        figure.legend(handles=handles, loc="upper right", ncols=3, bbox_to_anchor=(1.0, 1.0))
+    return figure, "Each on a scale of its own; the estimate and its interval in figures on the right."
+
+
 def _draw_fit(found: "Diagnosis") -> tuple[Figure, str]:
-    blocks, fit = found.scoreboard.blocks, found.scoreboard.fits.best
-    time = (np.arange(len(blocks.velocity)) + 0.5) * blocks.block * blocks.sample_time
+    blocks, fit = blocks_of(found.scoreboard.window), found.scoreboard.fits.best
+    onset, begin = found.scoreboard.onset, found.scoreboard.window.start_time
+    time = begin + (np.arange(len(blocks.velocity)) + 0.5) * blocks.block * blocks.sample_time
     outputs = blocks.outputs.shape[1]
     with styled():
         title = "Log and fitted circuit, means over 10 ms, and what is left"
@@ -104,11 +159,14 @@ def _draw_fit(found: "Diagnosis") -> tuple[Figure, str]:
             axes[2 * i].plot(time, measured, color=BLUE, lw=1.6, label="measured")
             axes[2 * i].plot(time, scale * fit.fitted[:, i], color=ORANGE, lw=0.9, label="fitted circuit")
             axes[2 * i].set_ylabel(f"{name}\n[{unit}]")
-            axes[2 * i].legend(loc="upper right", ncols=2)
             axes[2 * i + 1].plot(time, measured - scale * fit.fitted[:, i], color=GREY, lw=0.7)
             axes[2 * i + 1].set_ylabel(f"left\n[{unit}]")
+        for axis in axes:
+            if onset is not None:
+                axis.axvline(onset.since, color=VERMILION, ls="--", lw=1.2)
         axes[-1].set_xlabel("time [s]")
-    return (
-        figure,
-        "Measured velocity and pressure, the circuit that fits best, and the residuals on a scale of their own.",
-    )
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.0))
+    dated = "" if onset is None else " The dashed line is the change, between two circuits."
+    said = "Measured velocity and pressure, the circuit that fits best, and the residuals on a scale of their own."
+    return figure, f"{said}{dated}"

@@ -1,11 +1,13 @@
 """Fitted circuits beside the conditions' regions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from faults.circuit_runs import COORDINATES, Blocks
 from faults.class_fit import Actuator, PointFit
-from faults.class_regions import PRESSURE_SCALE, believed_information, is_stuck, region_scores
+from faults.class_regions import PRESSURE_SCALE, believed_information, is_stuck, region_scores, spread_of
 from faults.conditions import CONDITIONS
 from plant.eha import EhaParameters
 
@@ -60,3 +62,37 @@ def test_a_stuck_piston_says_nothing_of_friction() -> None:
         "friction_quadratic",
         "friction_rated",
     ]
+
+
+def residual(left: np.ndarray, *, pressure: bool = True) -> tuple[PointFit, Blocks]:
+    """A fit that leaves what is given of both channels."""
+    log = blocks(pressure=pressure)
+    outputs = log.outputs
+    found = fit(0, outputs=outputs.shape[1])
+    return replace(found, fitted=outputs - 1e-3 * left[:, None]), log
+
+
+def test_what_lasts_widens_intervals_and_white_noise_does_not() -> None:
+    white = np.random.default_rng(1).normal(size=100)
+    lasting = np.repeat(white[:10] / np.std(white[:10]), 10)
+    spreads = [spread_of(*_with(left), ACTUATOR.conditions[0]) for left in (np.zeros(100), white, lasting)]
+    quiet, noisy, coloured = (float(np.sqrt(spread[0, 0])) for spread in spreads)
+    assert noisy < 1.3 * quiet
+    assert coloured > 1.5 * quiet
+
+
+def _with(left: np.ndarray, *, pressure: bool = True) -> tuple[PointFit, np.ndarray, Blocks]:
+    found, log = residual(left, pressure=pressure)
+    return found, INFORMATION, log
+
+
+def test_without_pressure_an_actuator_unlike_its_kind_is_known_less_well() -> None:
+    found, log = residual(np.zeros(100), pressure=False)
+    believed = believed_information(found, log)
+    along = PRESSURE_SCALE / np.linalg.norm(PRESSURE_SCALE)
+    near, far = (
+        float(along @ spread_of(replace(found, coordinates=found.coordinates + off), believed, log, centre) @ along)
+        for centre in [ACTUATOR.conditions[0]]
+        for off in (np.zeros(7), np.array([0.2, -0.2, 0.2, 0.0, 0.0, 0.0, 0.0]))
+    )
+    assert 1.5 * near < far < 1.0
