@@ -31,7 +31,7 @@ STATE_SIZES = np.array(
 
 STATE_NOISE, FIRST_STATE_NOISE = 1e-4, 0.1
 """What a sample adds to the states' standard deviations in the end and at the start [filter's units]: it stands for the
-error of a straight line through bouncing reeds. Without the larger one a filter in three is lost (decision 19)."""
+error of a straight line through bouncing reeds. Without the larger one some filters are lost (decision 25)."""
 
 CALMING = 200.0
 """Samples in which the noise at the start falls to a third."""
