@@ -18,7 +18,8 @@ from estimation.piezo_stack_unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, 
 from plant.errors import HydrostateError
 from plant.piezo_stack import STATES, at_bias
 from plant.piezo_stack_parameters import PiezoStackParameters
-from plant.piezo_stack_run import BENCH_SENSORS, NAME, StackSensors, run_rows, stack_channels, stack_row
+from plant.piezo_stack_run import BENCH_SENSORS, StackSensors, stack_channels
+from plant.piezo_stack_trajectory import NAME, run_rows, stack_row
 from plant.record import Record
 
 Array: TypeAlias = NDArray[np.float64]
@@ -30,7 +31,7 @@ STATE_SIZES = np.array(
 
 STATE_NOISE, FIRST_STATE_NOISE = 1e-4, 0.1
 """What a sample adds to the states' standard deviations in the end and at the start [filter's units]: it stands for the
-error of a straight line through bouncing reeds. Without the larger one a filter in three is lost (decision 19)."""
+error of a straight line through bouncing reeds. Without the larger one some filters are lost (decision 25)."""
 
 CALMING = 200.0
 """Samples in which the noise at the start falls to a third."""

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from estimation.piezo_stack_unknowns import UNKNOWNS, changed
 from plant.errors import HydrostateError, LogError
 from plant.piezo_stack_parameters import LONGEST_STEP, PiezoStackParameters
-from plant.piezo_stack_run import BENCH_SENSORS, StackSensors, checked_voltage, run_stacks, stack_channels
+from plant.piezo_stack_run import BENCH_SENSORS, StackSensors, checked_voltage, stack_channels
+from plant.piezo_stack_trajectory import run_stacks
 from plant.record import Record
 
 Array: TypeAlias = NDArray[np.float64]

@@ -17,7 +17,8 @@ from plant.piezo_stack import GRAVITY, stack_pressures
 from plant.piezo_stack_flow import FLOW_TIME, STAGES, line_reynolds_numbers, mean_flow, stages
 from plant.piezo_stack_free import loop_width, stack_loop
 from plant.piezo_stack_parameters import PiezoStackParameters
-from plant.piezo_stack_run import FINE_TIME, LANES, run_stack, run_stacks, sine_drive
+from plant.piezo_stack_run import FINE_TIME, sine_drive
+from plant.piezo_stack_trajectory import LANES, run_stack, run_stacks
 
 LOOP_FREQUENCIES = (1.0, 50.0, 100.0, 200.0, 300.0, 400.0)
 """Frequencies of Figure 10's loops [Hz]."""

@@ -16,7 +16,7 @@ from plant.components.bouc_wen import asymmetric_bouc_wen_rate
 from plant.errors import LogError
 from plant.integrate import compile_trajectory
 from plant.piezo_stack_parameters import PiezoStackParameters
-from plant.piezo_stack_run import stack_row
+from plant.piezo_stack_trajectory import stack_row
 
 STACK = PiezoStackParameters()
 SAMPLES = 2000

@@ -7,7 +7,7 @@ from plant.bouc_wen import slow_stack_step
 from plant.fixed_step_kernel import compile_fixed_step
 from plant.integrate import compile_trajectory
 from plant.piezo_stack_parameters import PiezoStackParameters
-from plant.piezo_stack_run import stack_row
+from plant.piezo_stack_trajectory import stack_row
 
 VOLTAGE = 50.0 * (1.0 - np.cos(np.arange(300) / 20.0))
 STARTS = np.linspace(-1e-6, 1e-6, 8)[None]

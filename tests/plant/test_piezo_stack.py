@@ -10,15 +10,8 @@ from plant.errors import DriveError, HydrostateError, RigError
 from plant.piezo_stack import OIL, STATES, at_bias, stack_derivative, stack_pressures
 from plant.piezo_stack_flow import STAGES, line_reynolds_numbers, mean_flow, output_flow, stages
 from plant.piezo_stack_parameters import PiezoStackParameters, least_port
-from plant.piezo_stack_run import (
-    FINE_TIME,
-    IDEAL_SENSORS,
-    StackSensors,
-    run_stack,
-    run_stacks,
-    simulate_stack,
-    sine_drive,
-)
+from plant.piezo_stack_run import FINE_TIME, IDEAL_SENSORS, StackSensors, simulate_stack, sine_drive
+from plant.piezo_stack_trajectory import run_stack, run_stacks
 from plant.reference_solver import reference_trajectory
 from plant.units import LITRE_PER_MINUTE
 
