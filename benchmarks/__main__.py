@@ -19,6 +19,7 @@ NAMES = (
     "real_rig",
     "piezo_stack",
     "diaphragm_motor",
+    "diaphragm_faults",
     "diagnosis",
     "batch_scale",
     "archive",

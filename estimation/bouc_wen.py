@@ -4,16 +4,16 @@ The paper's own procedure is in `estimation.bouc_wen_printed`; it cannot work (e
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from types import MappingProxyType
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from estimation.step_sensitivity import sensitivity_step
-from plant.bouc_wen import OscillatorParameters, oscillator_step, slow_stack_step
+from plant.bouc_wen import slow_stack_step
 from plant.errors import LogError
 from plant.integrate import compile_trajectory
 from plant.piezo_stack_parameters import PiezoStackParameters
@@ -26,14 +26,16 @@ NORMAL_95 = 1.959963984540054
 SHAPE = ("hysteresis", "hysteresis_phi_1", "hysteresis_phi_2", "hysteresis_phi_3", "hysteresis_gamma")
 """The parameters of the loop's shape, equation 1."""
 
+LOOP = ("free_stroke_a_volt", *SHAPE)
+"""What a loop tells of a stack."""
+
 CYCLES = 3
 """Cycles after which a loop has closed."""
 
-OVERSAMPLING = 20
-"""Steps between the benchmark's samples, as its authors integrated it."""
-
 _FEWEST = 50
+_ENOUGH = 5000
 _WORST_CONDITION = 1e6
+_TOUCHED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -80,8 +82,10 @@ class HysteresisFit:
 def fit_stack_loop(voltage: Array, displacement: Array, *, from_rest: bool = True) -> HysteresisFit:
     """Fit a stack's free stroke a volt and its hysteresis to one slow loop (equation 27 with errata P2, P14).
 
-    Cycles from rest, the first rise among them, tell the parameters apart twenty times better than a closed loop does.
-    One cycle from rest alone does not: its hysteresis keeps its sign, and four parameters act as two.
+    One loop that has been gone round before shows all four signs of rate and hysteresis, and what it tells grows with
+    its samples (`loop_bounds`). Three cycles from rest, the first rise among them, tell several times more; one cycle
+    from rest alone does not do: on it voltage never rises while hysteresis is negative, so four parameters act as
+    three.
 
     Parameters
     ----------
@@ -104,11 +108,64 @@ def fit_stack_loop(voltage: Array, displacement: Array, *, from_rest: bool = Tru
         If the loop is too short, not closed, not finite, or cannot tell the parameters apart.
     """
     u, x = _checked_loop(voltage, displacement)
+    if not from_rest:
+        u, x = (_averaged(values) for values in (u, x))
+    stroke = float(np.ptp(x) / np.ptp(u))
+    start = np.array([1.2 * stroke, 0.2 * stroke, 1.0 / np.ptp(u), 0.0, 0.0, 0.0, float(x.min()), 0.0])
+    scale = np.array([stroke, stroke, *[1.0 / np.ptp(u)] * 4, float(np.ptp(x)), stroke])
+    fit = fitted(_loop_model(u, from_rest), x, start, scale, (*LOOP, "offset", "lag"))
+    if fit.condition > _WORST_CONDITION:
+        raise LogError("the loop cannot tell the hysteresis' parameters apart, wanted two cycles or more from rest")
+    return fit
+
+
+def loop_bounds(
+    parameters: PiezoStackParameters, voltage: Array, noise: float, *, from_rest: bool = True
+) -> Mapping[str, float]:
+    """Return how well a loop could tell what `fit_stack_loop` fits: Cramér-Rao bounds, all unknown together.
+
+    Parameters
+    ----------
+    parameters : PiezoStackParameters
+        The stack.
+    voltage : ndarray, shape (n,)
+        Whole cycles, from trough to trough [V].
+    noise : float
+        Standard deviation of the displacement sensor, white [m].
+    from_rest : bool
+        As in `fit_stack_loop`.
+
+    Returns
+    -------
+    Mapping[str, float]
+        Standard deviation by name, over the parameter's size [dimensionless]; infinite where the loop cannot tell.
+
+    Examples
+    --------
+    >>> voltage = 50.0 * (1.0 - np.cos(2.0 * np.pi * np.arange(5001) / 5000))
+    >>> bounds = loop_bounds(PiezoStackParameters(), voltage, 2e-8, from_rest=False)
+    >>> round(100.0 * max(bounds.values()), 1)
+    2.7
+    """
+    truth = np.array([float(getattr(parameters, name)) for name in LOOP])
+    slopes = _loop_model(voltage, from_rest)(np.append(truth, [0.0, 0.0]))[1]
+    size = np.linalg.norm(slopes, axis=0)
+    _, told, directions = np.linalg.svd(slopes / size, full_matrices=False)
+    lost = told < told[0] / _WORST_CONDITION
+    deviations = noise * np.sqrt(np.sum((directions[~lost] / told[~lost, None]) ** 2, axis=0)) / size
+    deviations[np.any(np.abs(directions[lost]) > _TOUCHED, axis=0)] = np.inf
+    relative = deviations[: len(LOOP)] / np.abs(truth)
+    return MappingProxyType(dict(zip(LOOP, relative.tolist(), strict=True)))
+
+
+def _loop_model(u: Array, from_rest: bool) -> Callable[[Array], tuple[Array, Array]]:
+    """Return a slow loop's displacement, and its slopes, as a function of what is fitted."""
     step = sensitivity_step(slow_stack_step, 1, SHAPE)
     run = compile_trajectory("slow_stack", step, 1 + len(SHAPE), PiezoStackParameters)  # pyright: ignore[reportArgumentType] - any class of named floats serves
     columns = [field.name for field in fields(PiezoStackParameters)]
     row = np.array([float(field.default) for field in fields(PiezoStackParameters)])  # pyright: ignore[reportArgumentType] - every field has a default
     drive = u if from_rest else np.concatenate([np.tile(u[:-1], CYCLES), u[-1:]])
+    rate = np.gradient(u)
 
     def simulate(theta: Array) -> tuple[Array, Array]:
         row[[columns.index(name) for name in SHAPE]] = theta[1:6]
@@ -116,14 +173,15 @@ def fit_stack_loop(voltage: Array, displacement: Array, *, from_rest: bool = Tru
         slopes = np.column_stack([u, -states[:, 1:], np.ones(len(u)), -rate])
         return theta[0] * u - states[:, 0] + theta[6] - theta[7] * rate, slopes
 
-    rate = np.gradient(u)
-    stroke = float(np.ptp(x) / np.ptp(u))
-    start = np.array([1.2 * stroke, 0.2 * stroke, 1.0 / np.ptp(u), 0.0, 0.0, 0.0, float(x.min()), 0.0])
-    scale = np.array([stroke, stroke, *[1.0 / np.ptp(u)] * 4, float(np.ptp(x)), stroke])
-    fit = _fitted(simulate, x, start, scale, ("free_stroke_a_volt", *SHAPE, "offset", "lag"))
-    if fit.condition > _WORST_CONDITION:
-        raise LogError("the loop cannot tell the hysteresis' parameters apart, wanted two cycles or more from rest")
-    return fit
+    return simulate
+
+
+def _averaged(values: Array) -> Array:
+    """Average a closed loop over as many neighbours as leave `_ENOUGH` samples: the fit then takes a fraction."""
+    many = max(1, (len(values) - 1) // _ENOUGH)
+    count = (len(values) - 1) // many * many
+    means = values[:count].reshape(-1, many).mean(axis=1)
+    return np.append(means, means[0])
 
 
 def _checked_loop(voltage: Array, displacement: Array) -> tuple[Array, Array]:
@@ -138,138 +196,31 @@ def _checked_loop(voltage: Array, displacement: Array) -> tuple[Array, Array]:
     return u, x
 
 
-def fit_oscillator(
-    force: Array, displacement: Array, sample_time: float, start: OscillatorParameters, periodic: bool = True
-) -> HysteresisFit:
-    """Fit the benchmark's oscillator to force and displacement, all six parameters together.
-
-    Parameters
-    ----------
-    force : ndarray, shape (n,)
-        Drive [N], band-limited.
-    displacement : ndarray, shape (n,)
-        Measured displacement [m].
-    sample_time : float
-        Seconds between samples [s].
-    start : OscillatorParameters
-        First guess, as `linear_start` gives it.
-    periodic : bool
-        Whether the force is one period of a signal on which the oscillator has settled; else it starts at rest.
-
-    Returns
-    -------
-    HysteresisFit
-        The six parameters.
-    """
-    names = [field.name for field in fields(OscillatorParameters)]
-    run = _oscillator_run(tuple(names))
-
-    def simulate(theta: Array) -> tuple[Array, Array]:
-        states = _settled_run(run, force, sample_time, theta, 3 * (1 + len(names)), periodic)
-        return states[:, 0], states[:, 3::3]
-
-    first = np.array([getattr(start, name) for name in names])
-    scale = np.abs(first)
-    scale[4:] = max(float(scale[4:].max()), 1e2)
-    return _fitted(simulate, displacement, first, scale, tuple(names))
-
-
-def simulate_oscillator(
-    force: Array, sample_time: float, parameters: OscillatorParameters, periodic: bool = True
-) -> Array:
-    """Return the benchmark oscillator's displacement.
-
-    Parameters
-    ----------
-    force : ndarray, shape (n,)
-        Drive [N], band-limited.
-    sample_time : float
-        Seconds between samples [s].
-    parameters : OscillatorParameters
-        The oscillator.
-    periodic : bool
-        As in `fit_oscillator`.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Displacement [m].
-    """
-    theta = np.array([getattr(parameters, field.name) for field in fields(OscillatorParameters)])
-    return _settled_run(_oscillator_run(()), force, sample_time, theta, 3, periodic)[:, 0]
-
-
-def linear_start(force: Array, displacement: Array, sample_time: float) -> OscillatorParameters:
-    """Return a first guess: mass, damping and stiffness by least squares on spectra, the spring shared with hysteresis.
-
-    Parameters
-    ----------
-    force : ndarray, shape (n,)
-        One period of the drive, or a long record of it [N].
-    displacement : ndarray, shape (n,)
-        Measured displacement [m].
-    sample_time : float
-        Seconds between samples [s].
-
-    Returns
-    -------
-    OscillatorParameters
-        A guess from which `fit_oscillator` converges.
-    """
-    u, y = np.fft.rfft(force), np.fft.rfft(displacement)
-    omega = 2.0 * np.pi * np.fft.rfftfreq(len(force), sample_time)
-    used = np.abs(u) > 0.1 * np.abs(u).max()
-    columns = np.column_stack([-(omega**2) * y, 1j * omega * y, y])[used]
-    both = np.concatenate([columns.real, columns.imag])
-    size = np.linalg.norm(both, axis=0)
-    m, c, k = np.linalg.lstsq(both / size, np.concatenate([u[used].real, u[used].imag]), rcond=None)[0] / size
-    swing = float(np.ptp(displacement))
-    guess = OscillatorParameters()
-    return replace(
-        guess,
-        mass=abs(m),
-        damping=abs(c),
-        stiffness=0.6 * abs(k),
-        alpha=0.6 * abs(k),
-        beta_gamma=1.0 / swing,
-        beta_delta=-0.5 / swing,
-    )
-
-
-def _oscillator_run(names: tuple[str, ...]) -> Callable[..., Array]:
-    step = sensitivity_step(oscillator_step, 3, names) if names else oscillator_step
-    label = "oscillator_slopes" if names else "oscillator"
-    return compile_trajectory(label, step, 3 * (1 + len(names)), OscillatorParameters)  # pyright: ignore[reportArgumentType] - any class of named floats serves
-
-
-def _settled_run(
-    run: Callable[..., Array], force: Array, sample_time: float, theta: Array, width: int, periodic: bool
-) -> Array:
-    """Run on the force, interpolated by its spectrum; where it is periodic, a second time round."""
-    from scipy.signal import resample, resample_poly
-
-    fine: Any = (
-        resample(force, OVERSAMPLING * len(force))
-        if periodic
-        else resample_poly(np.append(force, 0.0), OVERSAMPLING, 1)
-    )
-    drive = np.concatenate([fine[-OVERSAMPLING * _LEAD_IN :], fine, fine[:1]]) if periodic else fine
-    states = run(np.zeros(width), np.ascontiguousarray(drive), theta[None], sample_time / OVERSAMPLING, 1)
-    first = OVERSAMPLING * _LEAD_IN if periodic else 0
-    return states[first : first + OVERSAMPLING * len(force) : OVERSAMPLING]
-
-
-_LEAD_IN = 750
-"""Samples before a period begins, in which the oscillator settles: it decays within 0.4 s."""
-
-
-def _fitted(
+def fitted(
     simulate: Callable[[Array], tuple[Array, Array]],
     measured: Array,
     start: Array,
     scale: Array,
     names: Sequence[str],
 ) -> HysteresisFit:
+    """Fit a simulated displacement to a measured one by Levenberg and Marquardt (errata P14).
+
+    Parameters
+    ----------
+    simulate : callable
+        From the parameters to the displacement [m], shape (n,), and its slopes by them.
+    measured : ndarray, shape (n,)
+        Displacement [m].
+    start, scale : ndarray, shape (parameters,)
+        First guess, and the size of each parameter [SI].
+    names : sequence of str
+        The parameters.
+
+    Returns
+    -------
+    HysteresisFit
+        What was found.
+    """
     size = float(np.std(measured))
     last: dict[bytes, tuple[Array, Array]] = {}
 

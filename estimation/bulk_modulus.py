@@ -65,7 +65,7 @@ def estimate_bulk_modulus(
     method : str
         ``"least-squares"`` for the forms that can be fitted, flow and motion; a filter of `estimation.run.METHODS`; or
         ``"auto"``: least squares where the form allows, the log begins at rest, and nothing is asked for that only a
-        filter does, else ``ekf``.
+        filter does, else what `estimation.filter_estimate.chosen_method` says.
     start : float, optional
         First guess [Pa].
     start_std : float
@@ -95,7 +95,7 @@ def estimate_bulk_modulus(
     if not (np.isfinite(guess) and guess >= 0.0 and np.isfinite(start_std) and start_std > 0.0):
         raise HydrostateError(f"the first guess must be 0 Pa or more, its deviation positive, got {guess}, {start_std}")
     known = uncertainties or {}
-    options = FilterOptions("ekf" if method in ("auto", LEAST_SQUARES) else method, states, tuned, robust)
+    options = FilterOptions("auto" if method in ("auto", LEAST_SQUARES) else method, states, tuned, robust)
     filtering = method not in ("auto", LEAST_SQUARES) or options != FilterOptions()
     automatic = form == "auto"
     if automatic:

@@ -73,6 +73,8 @@ class BulkModulusEstimate:
         The rig's part of the deviation [Pa]; zero where the rig has no uncertainties.
     tuning : Tuning or None
         Noise levels, where they were tuned to the log.
+    method : str
+        How it was estimated: ``least-squares``, or a filter of `estimation.run.METHODS`.
     """
 
     outcome: Outcome
@@ -88,6 +90,7 @@ class BulkModulusEstimate:
     first_pass: Estimate | None
     rig_std: float = 0.0
     tuning: Tuning | None = None
+    method: str = "least-squares"
 
     @property
     def interval(self) -> tuple[float, float] | None:

@@ -12,6 +12,7 @@ from estimation.consistency import Gate, consistency_gate, describes
 from estimation.eha import BULK_MODULUS
 from estimation.first_belief import PRESSURE_NOISE_LOGGED, first_belief
 from estimation.flow_filter import filter_flow
+from estimation.iterated_smoother import LONGEST
 from estimation.measurement_noise import measurement_variances
 from estimation.model import ProcessModel
 from estimation.run import METHODS, Estimate, available_channels, require_known, run_filter
@@ -27,6 +28,9 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
 }
 """Short names for states that belong together."""
 
+PRESSURE = "differential_pressure_pa"
+"""The channel, and the state of its name."""
+
 WALK = 0.05
 """Random walk of a further state that lets it follow a change: of its logarithm, in a second [1/s^(1/2)]."""
 
@@ -38,7 +42,7 @@ class FilterOptions:
     Parameters
     ----------
     method : str
-        A filter of `estimation.run.METHODS`.
+        A filter of `estimation.run.METHODS`, or ``"auto"``: see `chosen_method`.
     states : tuple of str
         What is estimated beside bulk modulus: of `AUGMENTABLE`, or of `GROUPS`.
     tuned : bool
@@ -47,7 +51,7 @@ class FilterOptions:
         How gross outliers count, see `estimation.run.ROBUST`.
     """
 
-    method: str = "ekf"
+    method: str = "auto"
     states: tuple[str, ...] = ()
     tuned: bool = False
     robust: str = "none"
@@ -93,14 +97,13 @@ def estimate_by_filter(
     HydrostateError
         If a name in the options is unknown.
     """
-    require_known("method", options.method, list(METHODS))
+    require_known("method", options.method, ["auto", *METHODS])
+    method = options.method if options.method != "auto" else chosen_method(record, model, options.tuned)
     names = options.names
     wide = augmented(model, names, dict.fromkeys(names, WALK**2))
     channels = available_channels(model, record)
     variances = measurement_variances(record, channels)
-    noise: Mapping[str, float] = (
-        {"differential_pressure_pa": PRESSURE_NOISE_LOGGED} if "differential_pressure_pa" in channels else {}
-    )
+    noise: Mapping[str, float] = {PRESSURE: PRESSURE_NOISE_LOGGED} if PRESSURE in channels else {}
     found: Tuning | None = None
     if options.tuned:
         found = tune(
@@ -118,7 +121,7 @@ def estimate_by_filter(
     def filtered(first_guess: float) -> Estimate:
         prior = augmented_prior(wide, first_belief(model, record, first_guess, start_std), parameters)
         return run_filter(
-            METHODS[options.method],
+            METHODS[method],
             wide,
             prior,
             record,
@@ -141,7 +144,30 @@ def estimate_by_filter(
     nominal = parameters.bulk_modulus
     bound = max(bound_at(nominal), bound_at(max(value, 1e-3 * nominal))) if np.isfinite(value) else float("inf")
     concluded = conclude(estimate, record, bound, model.name, names)
-    return replace(concluded, first_pass=first, tuning=found)
+    return replace(concluded, first_pass=first, tuning=found, method=method)
+
+
+def chosen_method(record: Record, model: ProcessModel, tuned: bool) -> str:
+    """Return the filter that serves a log best.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    model : ProcessModel
+        The process model.
+    tuned : bool
+        Whether its noise levels are those of the log.
+
+    Returns
+    -------
+    str
+        ``iterated-smoother`` where pressure is a state that is not logged, for a filter may then lose its way while the
+        piston sticks and never know; it presumes the right noise levels, so ``ekf`` where they are not tuned, and for
+        logs that are too long to be held.
+    """
+    unseen = PRESSURE in [state.name for state in model.states] and PRESSURE not in record
+    return "iterated-smoother" if tuned and unseen and len(record) <= LONGEST else "ekf"
 
 
 def estimate_by_flow_filter(record: Record, parameters: EhaParameters, options: FilterOptions) -> BulkModulusEstimate:
@@ -154,7 +180,7 @@ def estimate_by_flow_filter(record: Record, parameters: EhaParameters, options: 
     parameters : EhaParameters
         Geometry and pump, and the size of the first guesses.
     options : FilterOptions
-        The method must be ``ekf``; nothing else can be chosen.
+        The method must be ``ekf`` or ``auto``; nothing else can be chosen.
 
     Returns
     -------
@@ -166,7 +192,11 @@ def estimate_by_flow_filter(record: Record, parameters: EhaParameters, options: 
     HydrostateError
         If something else is chosen.
     """
-    if replace(options, states=()) != FilterOptions() or any(name != "leakage" for name in options.states):
+    if (
+        replace(options, states=(), method="auto") != FilterOptions()
+        or options.method not in ("auto", "ekf")
+        or any(name != "leakage" for name in options.states)
+    ):
         raise HydrostateError(
             "the flow form is filtered by a bank of ekf, which finds leakage along with bulk modulus; "
             f"it takes no other method, states, tuning or robust update, got {options}"
@@ -174,7 +204,8 @@ def estimate_by_flow_filter(record: Record, parameters: EhaParameters, options: 
     estimate = filter_flow(record, parameters)
     value, std = estimate.settled(BULK_MODULUS, 0.02)
     bound = std / value if np.isfinite(value) and value > 0.0 else float("inf")
-    return conclude(estimate, record, bound, "flow", ("leakage_coefficient", "flow_bias"), fraction=0.02)
+    found = conclude(estimate, record, bound, "flow", ("leakage_coefficient", "flow_bias"), fraction=0.02)
+    return replace(found, method="ekf")
 
 
 def conclude(

@@ -13,28 +13,16 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.piezo_stack_unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, changed
-from plant.errors import HydrostateError, LogError
+from estimation.piezo_stack_runs import COARSE_SLOPE_STEP, COARSE_STEP, STACK_CHANNELS, StackRuns, prepared
+from estimation.piezo_stack_unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS
 from plant.piezo_stack_parameters import LONGEST_STEP, PiezoStackParameters
-from plant.piezo_stack_run import BENCH_SENSORS, StackSensors, checked_voltage, run_stack, stack_channels
+from plant.piezo_stack_run import BENCH_SENSORS, StackSensors, checked_voltage
 from plant.record import Record
 
 Array: TypeAlias = NDArray[np.float64]
 
 NORMAL_95 = 1.959963984540054
 """Half width of a 95 % interval over the standard deviation [dimensionless]."""
-
-DRIVE = "drive_voltage_v"
-"""The channel of the drive."""
-
-STACK_CHANNELS = tuple(asdict(BENCH_SENSORS))
-"""Channels that a bench may log beside the drive."""
-
-COARSE_STEP = 5e-6
-"""Longest step of the runs that slopes and starts are taken from [s]."""
-
-SLOPE_STEP = 1e-3
-"""Change of a scaled parameter for a slope [dimensionless]."""
 
 
 @dataclass(frozen=True)
@@ -81,37 +69,6 @@ class StackEstimate:
         return self.values[name] - half, self.values[name] + half
 
 
-@dataclass
-class _Runs:
-    """The log that runs are compared with, and how many there were."""
-
-    voltage: Array
-    sample_time: float
-    healthy: PiezoStackParameters
-    names: tuple[str, ...]
-    noise: Mapping[str, float]
-    count: int = 0
-
-    def actuator(self, theta: Array) -> SimpleNamespace:
-        return changed(self.healthy, dict(zip(self.names, theta.tolist(), strict=True)))
-
-    def scaled(self, theta: Array, longest_step: float = LONGEST_STEP) -> Array:
-        """Return every channel over its noise, one after the other."""
-        self.count += 1
-        p = self.actuator(theta)
-        try:
-            states = run_stack(p, self.voltage, self.sample_time, longest_step=longest_step)
-        except HydrostateError:  # an estimate on its way may stray where no actuator is
-            return np.full(len(self.voltage) * len(self.noise), _HOPELESS)
-        channels = stack_channels(states, p)
-        return np.concatenate([channels[name] / deviation for name, deviation in self.noise.items()])
-
-    def slopes(self, theta: Array, longest_step: float) -> Array:
-        base = self.scaled(theta, longest_step)
-        columns = [self.scaled(theta + SLOPE_STEP * unit, longest_step) - base for unit in np.eye(len(theta))]
-        return np.column_stack(columns) / SLOPE_STEP
-
-
 def estimate_stack(
     record: Record,
     healthy: PiezoStackParameters,
@@ -150,8 +107,8 @@ def estimate_stack(
     HydrostateError
         If an unknown is not known, or no first guess is made of them.
     """
-    runs, measured = _prepared(record, healthy, tuple(unknowns), channels, sensors)
-    guesses = _ordered_starts(runs, measured, starts)
+    runs, measured = prepared(record, healthy, tuple(unknowns), channels, sensors)
+    guesses = runs.ordered(measured, starts)
 
     theta, residuals, slopes = _descended(runs, measured, guesses[0])
     for guess in guesses[1:_MOST_GUESSES]:
@@ -213,62 +170,53 @@ def stack_bounds(
         Standard deviation by name [SI]; of factors, relative.
     """
     noise = {name: value for name, value in asdict(sensors).items() if name in channels}
-    runs = _Runs(checked_voltage(voltage), sample_time, parameters, tuple(unknowns), noise)
-    deviations = np.sqrt(np.diag(covariance(runs.slopes(np.zeros(len(runs.names)), LONGEST_STEP))))
+    runs = StackRuns(checked_voltage(voltage), sample_time, parameters, tuple(unknowns), noise)
+    deviations = np.sqrt(np.diag(covariance(runs.around(np.zeros(len(runs.names)), LONGEST_STEP)[1])))
     return {
         name: (UNKNOWNS[name].scale or 1.0) * float(deviation)
         for name, deviation in zip(runs.names, deviations, strict=True)
     }
 
 
-def _descended(runs: _Runs, measured: Array, start: Array) -> tuple[Array, Array, Array]:
+def _descended(runs: StackRuns, measured: Array, start: Array) -> tuple[Array, Array, Array]:
     """Descend by Levenberg and Marquardt in coarse runs, then by Gauss and Newton in exact ones.
 
     It ends where a step is a tenth of the standard deviations, which no reader could tell from none.
     """
     theta = _coarsely_descended(runs, measured, start)
-    slopes = runs.slopes(theta, LONGEST_STEP)
+    found, slopes = runs.around(theta, LONGEST_STEP)
     known = covariance(slopes)
-    residuals = runs.scaled(theta) - measured
+    residuals = found - measured
     for _ in range(_MOST_EXACT):
-        whole = -known @ (slopes.T @ residuals)
-        for share in _SHORTENED:
-            change = share * whole
-            tried = runs.scaled(theta + change) - measured
-            if float(tried @ tried) < float(residuals @ residuals):
-                break
-        else:
+        changes = np.outer(_SHORTENED, -known @ (slopes.T @ residuals))
+        tried = runs.scaled([*(theta + changes)]) - measured
+        best = int(np.argmin(np.sum(tried**2, axis=1)))
+        if float(tried[best] @ tried[best]) >= float(residuals @ residuals):
             break
-        theta, residuals = theta + change, tried
-        if _share(change, known) < _DONE:
+        theta, residuals = theta + changes[best], tried[best]
+        if _share(changes[best], known) < _DONE:
             break
     return theta, residuals, slopes
 
 
-def _coarsely_descended(runs: _Runs, measured: Array, start: Array) -> Array:
-    """Descend by Levenberg and Marquardt; while it goes fast, slopes are carried along by Broyden's update."""
-    theta, damping, fresh = start, 1e-3, True
-    residuals = runs.scaled(theta, COARSE_STEP) - measured
-    slopes = runs.slopes(theta, COARSE_STEP)
+def _coarsely_descended(runs: StackRuns, measured: Array, start: Array) -> Array:
+    """Descend by Levenberg and Marquardt, several dampings tried side by side."""
+    theta = start
+    found, slopes = runs.around(theta, COARSE_STEP, COARSE_SLOPE_STEP)
+    residuals = found - measured
     for _ in range(_MOST_STEPS):
         normal = slopes.T @ slopes
         own = np.diag(np.diag(normal) + 1e-12)
-        change = np.linalg.solve(normal + damping * own, -slopes.T @ residuals)
-        if (fresh and _share(change, covariance(slopes)) < _NEAR) or damping > _STUCK:
+        changes = [np.linalg.solve(normal + damping * own, -slopes.T @ residuals) for damping in _DAMPINGS]
+        if _share(changes[0], covariance(slopes)) < _NEAR:
             break
-        tried = runs.scaled(theta + change, COARSE_STEP) - measured
-        gain = float(tried @ tried) / float(residuals @ residuals)
-        if gain < 1.0:
-            if gain < _FAST:
-                missed = tried - residuals - slopes @ change
-                slopes = slopes + np.outer(missed, change) / float(change @ change)
-            theta, residuals, damping = theta + change, tried, 0.1 * damping
-        elif fresh:
-            damping *= 10.0
-            continue
-        fresh = gain >= _FAST
-        if fresh:
-            slopes = runs.slopes(theta, COARSE_STEP)
+        tried = runs.scaled([theta + change for change in changes], COARSE_STEP) - measured
+        best = int(np.argmin(np.sum(tried**2, axis=1)))
+        if float(tried[best] @ tried[best]) >= float(residuals @ residuals):
+            break
+        theta = theta + changes[best]
+        found, slopes = runs.around(theta, COARSE_STEP, COARSE_SLOPE_STEP)
+        residuals = found - measured
     return theta
 
 
@@ -277,56 +225,21 @@ def _share(change: NDArray[Any], known: Array) -> float:
     return float(np.max(np.abs(change) / np.sqrt(np.diag(known))))
 
 
-_HOPELESS = 1e6
 _MOST_STEPS = 30
 _NEAR = 3.0
 _DONE = 0.1
 _SHORTENED = (1.0, 0.5, 0.2)
 _MOST_EXACT = 6
-_FAST = 0.7
-_STUCK = 1e6
+_DAMPINGS = (1e-6, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2, 1e4)
 _UNEXPLAINED = 1.1
 _MOST_GUESSES = 4
-
-
-def _prepared(
-    record: Record,
-    healthy: PiezoStackParameters,
-    names: tuple[str, ...],
-    channels: Collection[str],
-    sensors: StackSensors,
-) -> tuple[_Runs, Array]:
-    for name in names:
-        if name not in UNKNOWNS:
-            raise HydrostateError(f"an unknown must be one of {', '.join(UNKNOWNS)}, got {name!r}")
-    if DRIVE not in record:
-        raise LogError(f"{DRIVE} is wanted, the log has {', '.join(record)}")
-    used = [name for name in STACK_CHANNELS if name in channels and name in record]
-    if not used:
-        raise LogError(f"one of {', '.join(STACK_CHANNELS)} is wanted beside {DRIVE}, the log has {', '.join(record)}")
-    for name in (DRIVE, *used):
-        if not np.all(np.isfinite(record[name])):
-            raise LogError(f"{name} must be whole, got {int(np.sum(~np.isfinite(record[name])))} missing samples")
-    noise = {name: value for name, value in asdict(sensors).items() if name in used}
-    runs = _Runs(checked_voltage(record[DRIVE]), record.sample_time, healthy, names, noise)
-    return runs, np.concatenate([record[name] / deviation for name, deviation in noise.items()])
 
 
 def _spread(residuals: Array, theta: Array) -> float:
     return float(residuals @ residuals) / (len(residuals) - len(theta))
 
 
-def _ordered_starts(runs: _Runs, measured: Array, starts: Sequence[Mapping[str, float]]) -> list[Array]:
-    """Return the first guesses that are made of the unknowns, the one that fits best first."""
-    guesses = [
-        np.array([start.get(name, 0.0) for name in runs.names]) for start in starts if set(start) <= set(runs.names)
-    ]
-    if not guesses:
-        raise HydrostateError("no first guess is made of the unknowns alone")
-    return sorted(guesses, key=lambda theta: float(np.sum((runs.scaled(theta, COARSE_STEP) - measured) ** 2)))
-
-
-def _concluded(runs: _Runs, theta: Array, residuals: Array, scaled: Array) -> StackEstimate:
+def _concluded(runs: StackRuns, theta: Array, residuals: Array, scaled: Array) -> StackEstimate:
     p = runs.actuator(theta)
     deviations = np.sqrt(np.diag(scaled))
     values: dict[str, float] = {}

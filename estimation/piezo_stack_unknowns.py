@@ -52,6 +52,7 @@ STARTS: Sequence[Mapping[str, float]] = (
     {"chamber_leakage": 0.5},
     {"chamber_leakage": 2.0},
     {"crossport_leakage": 1.0},
+    {"crossport_leakage": 2.0},
     {"coulomb_friction": 1.0},
     {"coulomb_friction": 2.5},
     {"crossport_leakage": 0.5, "coulomb_friction": 2.5},

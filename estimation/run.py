@@ -14,6 +14,7 @@ from estimation.filter import FilterProblem, Method, Trace
 from estimation.filterpy_bridge import filterpy_ekf
 from estimation.gaussian import Gaussian
 from estimation.iekf import iekf
+from estimation.iterated_smoother import iterated_smoother
 from estimation.measurement_noise import measurement_variances
 from estimation.model import ProcessModel
 from estimation.sif import sif
@@ -37,6 +38,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         "svsf": svsf,
         "sif": sif,
         "smoother": smoother,
+        "iterated-smoother": iterated_smoother,
         "filterpy-ekf": filterpy_ekf,
     }
 )

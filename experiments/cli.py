@@ -17,7 +17,9 @@ from experiments.command import (
     identify,
     isolability,
     library,
+    motor_paper,
     simulate,
+    size_cylinder,
     watch,
 )
 from experiments.command.json_output import json_text
@@ -150,6 +152,30 @@ def piezo_stack(
         emit(str(manifest))
 
 
+@app.command("diaphragm-motor", epilog="Example: hydrostate diaphragm-motor --out results/diaphragm-motor")
+def diaphragm_motor(
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the report.")] = Path(
+        "results/diaphragm-motor"
+    ),
+    seed: Seed = SEED,
+    as_json: Json = False,
+) -> None:
+    """Repeat sections 7.1 to 7.3 of the seven-chamber diaphragm motor's paper; reversal, control, and what fails.
+
+    Takes some ten seconds. The last line of standard output is the manifest's path.
+    """
+    from rich.console import Console
+
+    from experiments.command.diaphragm_motor import motor_study_command
+
+    begin = perf_counter()
+    manifest = motor_study_command(out, seed, Console(stderr=True))
+    if as_json:
+        emit(json_text([{"outcome": "ok", "manifest": str(manifest), "seconds": perf_counter() - begin}]))
+    else:
+        emit(str(manifest))
+
+
 VERBS = (
     simulate,
     estimate,
@@ -162,6 +188,8 @@ VERBS = (
     conditions,
     batch,
     compare,
+    motor_paper,
+    size_cylinder,
 )
 for module in VERBS:
     app.add_typer(module.commands)

@@ -13,10 +13,10 @@ StackFault: TypeAlias = Callable[[PiezoStackParameters], PiezoStackParameters]
 """From a healthy actuator to a faulty one."""
 
 CROSSPORT_LEAKAGE: Mapping[str, float] = MappingProxyType({"none": 0.0, "minor": 5e-12, "major": 2e-11})
-"""Leakage across the cylinder of each level [m^3/(s Pa)]: about 11 and 39 % of the flow at 275 Hz and 10 kg, judged."""
+"""Leakage across the cylinder of each level [m^3/(s Pa)]: about 10 and 33 % of the flow at 275 Hz and 10 kg, judged."""
 
 ADDED_FRICTION: Mapping[str, float] = MappingProxyType({"none": 0.0, "minor": 100.0, "major": 250.0})
-"""Coulomb friction of each level above the healthy one [N]: about 25 and 57 % of that flow, judged."""
+"""Coulomb friction of each level above the healthy one [N]: about 23 and 56 % of that flow, judged."""
 
 
 def _air(factor: float) -> StackFault:
@@ -105,7 +105,7 @@ def stack_with_fault(healthy: PiezoStackParameters, name: str) -> PiezoStackPara
     Examples
     --------
     >>> stack_with_fault(PiezoStackParameters(), "air_doubled").air_fraction
-    0.0274
+    0.049
     """
     if name in STACK_FAULTS:
         return STACK_FAULTS[name](healthy)

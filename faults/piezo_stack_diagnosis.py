@@ -4,7 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from estimation.piezo_stack import STACK_CHANNELS, StackEstimate, estimate_stack
+from estimation.piezo_stack import StackEstimate, estimate_stack
+from estimation.piezo_stack_runs import STACK_CHANNELS
 from estimation.piezo_stack_unknowns import DEFAULT_UNKNOWNS, STARTS
 from faults.conditions import CONDITIONS
 from faults.piezo_stack import ADDED_FRICTION, CROSSPORT_LEAKAGE

@@ -210,7 +210,7 @@ def motor_step(state: State, voltages: tuple[Scalar, Scalar], flat: Any, h: Scal
 
     They are pushed by the pressures between them, pressures by the flows between, so that the scheme is of second
     order and loses no energy of its own. Losses count as in `port_flow_after`, for a shut port is stiffer than any
-    step. No chamber falls below the least pressure.
+    step. Nothing falls below the least pressure.
 
     Parameters
     ----------
@@ -259,13 +259,14 @@ def motor_step(state: State, voltages: tuple[Scalar, Scalar], flat: Any, h: Scal
     into_a, into_b = _side_inflows(passed[-1], speed, leaked, p)
     open_a, open_b = tank_openings(p.spool)
     compliance = _side_compliance(p)
+    lowest = p.least_pressure - p.supply_pressure
     return (
         *_chambers_after(pressures, displaced, p),
         hysteresis + yielded,
         *passed,
         *opened,
-        pressure_after_return(side_a, into_a, compliance, p.land_conductance * open_a, h),
-        pressure_after_return(side_b, into_b, compliance, p.land_conductance * open_b, h),
+        maximum(pressure_after_return(side_a, into_a, compliance, p.land_conductance * open_a, h), lowest),
+        maximum(pressure_after_return(side_b, into_b, compliance, p.land_conductance * open_b, h), lowest),
         speed,
         position + h * speed,
     )

@@ -104,6 +104,7 @@ def operate(
     peak_to_peak: float,
     *,
     longest_step: float = LONGEST_STEP,
+    start: Array | None = None,
 ) -> OperatingPoint:
     """Run the motor on a sine until it has settled, and average whole cycles (section 7.1).
 
@@ -117,6 +118,8 @@ def operate(
         Swing of the drive [V].
     longest_step : float
         Longest step [s]; a whole count of steps makes a cycle.
+    start : ndarray, shape (28,), optional
+        Initial state; at rest if not given.
 
     Returns
     -------
@@ -142,11 +145,11 @@ def operate(
     settling = ceil(SETTLING * frequency) * a_cycle
     measured = max(FEWEST_CYCLES, ceil(MEASURED * frequency)) * a_cycle
     drive = motor_drive(frequency, peak_to_peak, (settling + measured) * between, between)
-    states = run_motor(p, drive, between, longest_step=longest_step)[settling:-1]
-    start = settling * between
+    states = run_motor(p, drive, between, longest_step=longest_step, start=start)[settling:-1]
+    began = settling * between
     bent = deflections(states, drive[settling:-1], p) * p.sensing_gain * np.array(p.sensor_gain)
     first, second = (
-        tone(bent, between, order * frequency, start) / (1.0 - 1j * p.sensing_corner / (order * frequency))
+        tone(bent, between, order * frequency, began) / (1.0 - 1j * p.sensing_corner / (order * frequency))
         for order in (1.0, 2.0)
     )
     flows = states[:, FLOWS].mean(axis=0)

@@ -18,10 +18,9 @@ DIAPHRAGMS = 7
 VALVES = DIAPHRAGMS + 1
 """Check valves: one before each chamber and one behind the last (section 2, errata M28)."""
 
-PLATE = "derived: composite plate of Table 1, clamped at 14 mm, see plant.composite_plate"
+PLATE = "derived: composite plate of Table 1, clamped at 14 mm, errata M14"
 CALIBRATED = "calibrated to 110.11 ml/min at 480 Hz and 200 V peak to peak, section 7.1"
 ASSUMED = "assumed, errata M22"
-DERIVED = "derived"
 FAULT = "a fault of ours"
 
 PerDiaphragm = tuple[float, ...]
@@ -59,7 +58,7 @@ class DiaphragmMotorParameters:
     bulk_modulus: Annotated[float, SI("Pa", "bulk modulus beta of the liquid without gas", ASSUMED)] = 1e9
     gas_exponent: Annotated[float, SI("1", "polytropic exponent n of the entrapped gas", ASSUMED)] = 1.2
     supply_pressure: Annotated[float, SI("Pa", "absolute pressure p_0 of tank and supply", ASSUMED)] = 1.5e5
-    least_pressure: Annotated[float, SI("Pa", "absolute pressure that no chamber falls below", ASSUMED)] = 3e3
+    least_pressure: Annotated[float, SI("Pa", "absolute pressure that no liquid falls below", ASSUMED)] = 3e3
     density: Annotated[float, SI("kg/m^3", "density rho of the liquid, water", ASSUMED)] = 998.0
     inertance: Annotated[float, SI("kg/m^4", "inertance I of the liquid in a port", CALIBRATED)] = 2.461e6
     port_area: Annotated[float, SI("m^2", "area A_v of a wide open check valve", CALIBRATED)] = 1.894e-6

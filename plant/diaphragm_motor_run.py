@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 
 from plant.diaphragm_motor import POSITION, STATES, MotorRow, at_rest, deflections, motor_row, motor_step
 from plant.diaphragm_motor_parameters import DIAPHRAGMS, DiaphragmMotorParameters
-from plant.drive_limits import require_frequency, sample_count
+from plant.drive_limits import sample_count
 from plant.errors import DriveError, HydrostateError, RigError
 from plant.integrate import compile_trajectory
 from plant.record import Record
@@ -38,6 +38,9 @@ LONGEST_STEP = 1e-5
 
 SAMPLE_TIME = 2e-5
 """Time between the samples of a log [s]: 104 in a cycle of 480 Hz."""
+
+FEWEST_SAMPLES = 20
+"""Fewest samples in a cycle: linear between them, a sine then errs by 1 %."""
 
 RAMP = 0.01
 """Time over which a drive rises to its full swing [s]."""
@@ -107,13 +110,18 @@ def motor_drive(frequency: float, peak_to_peak: float, duration: float, sample_t
 
     Examples
     --------
-    >>> motor_drive(50.0, 200.0, 0.02, 5e-3).round(6).tolist()
+    >>> motor_drive(50.0, 200.0, 0.02, 1e-3)[::5].round(6).tolist()
     [0.0, 50.0, 0.0, -100.0, -0.0]
     """
     count = sample_count(duration, sample_time) + 1
     if not isfinite(frequency) or not 0.0 < frequency <= HIGHEST_FREQUENCY:
         raise DriveError(f"frequency must be above 0 and at most {HIGHEST_FREQUENCY:g} Hz, got {frequency:g} Hz")
-    require_frequency("frequency", frequency, sample_time)
+    if frequency * sample_time * FEWEST_SAMPLES > 1.0 + 1e-9:
+        most = 1.0 / (FEWEST_SAMPLES * frequency)
+        raise DriveError(
+            f"sample_time must be at most {most:.3g} s, {FEWEST_SAMPLES} samples in a cycle of {frequency:g} Hz, "
+            f"got {sample_time:g} s"
+        )
     time = sample_time * np.arange(count)
     swing = 0.5 * peak_to_peak * np.minimum(time / RAMP, 1.0)
     return checked_drive(swing * np.sin(2.0 * pi * frequency * time))

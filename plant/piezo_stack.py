@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.compiled.functions import Scalar, tanh, where
+from plant.compiled.functions import Scalar, sqrt, where
 from plant.components.bouc_wen import asymmetric_bouc_wen_rate
 from plant.components.end_stop import end_stop_force
 from plant.components.gas_compliance import compliant_oil_pressure
@@ -197,7 +197,9 @@ def stack_derivative(state: tuple[Scalar, ...], voltage: Scalar, rate: Scalar, p
     pushed = stack_force(driven, h, x, v, p.stack_stiffness, p.stack_damping)
     held = p.head_stiffness * x + p.head_damping * v + pressure.chamber * p.piston_area
     lifted = p.carriage_mass + p.load_mass
-    friction = p.viscous_friction * speed + p.coulomb_friction * tanh(speed / p.friction_speed)
+    friction = p.viscous_friction * speed + p.coulomb_friction * speed / sqrt(
+        speed * speed + p.friction_speed * p.friction_speed
+    )
     middle = 0.5 * p.cylinder_length - p.cylinder_start
     stopped = end_stop_force(
         position - middle, speed, 0.5 * p.cylinder_length - p.end_clearance, END_STIFFNESS, END_DAMPING
@@ -279,7 +281,7 @@ def at_bias(p: StackValues, voltage: float = 0.0) -> NDArray[np.float64]:
     Examples
     --------
     >>> round(1e6 * float(at_bias(PiezoStackParameters())[0]), 2)
-    -15.4
+    -17.61
     """
     driven = p.free_stroke_a_volt * p.stack_stiffness * voltage
     x = (driven - p.bias_pressure * p.piston_area) / (p.stack_stiffness + p.head_stiffness)

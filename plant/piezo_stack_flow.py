@@ -9,7 +9,8 @@ from plant.components.line import reynolds_number
 from plant.errors import DriveError
 from plant.piezo_stack import stack_pressures
 from plant.piezo_stack_parameters import PiezoStackParameters
-from plant.piezo_stack_run import FINE_TIME, run_stack, sine_drive
+from plant.piezo_stack_run import FINE_TIME, sine_drive
+from plant.piezo_stack_trajectory import run_stack
 
 Array: TypeAlias = NDArray[np.float64]
 

@@ -11,7 +11,8 @@ from plant.components.bouc_wen import asymmetric_bouc_wen_rate
 from plant.components.piezo_stack import lagged_force_rate, stack_force
 from plant.integrate import compile_trajectory, rk4_step
 from plant.piezo_stack_parameters import PiezoStackParameters
-from plant.piezo_stack_run import sine_drive, stack_row
+from plant.piezo_stack_run import sine_drive
+from plant.piezo_stack_trajectory import stack_row
 
 Array: TypeAlias = NDArray[np.float64]
 

@@ -31,7 +31,7 @@ class PiezoStackParameters:
     >>> round(1e6 * p.free_stroke_a_volt * 140.0, 1)
     46.6
     >>> round(p.reed_frequency)
-    662
+    751
     """
 
     stack_mass: Annotated[float, SI("kg", "moving mass m_0 of the stack", JUDGED)] = 0.025
@@ -49,40 +49,40 @@ class PiezoStackParameters:
     head_mass: Annotated[float, SI("kg", "mass m_p + m_r of piston and rod, equation 3", JUDGED)] = 0.20
     head_damping: Annotated[float, SI("N s/m", "damping c_r of piston and rod, equation 3", JUDGED)] = 500.0
     head_stiffness: Annotated[
-        float, SI("N/m", "stiffness k_B + k_d of disc spring and diaphragm, equation 3", JUDGED)
-    ] = 6e6
-    piston_area: Annotated[float, SI("m^2", "area A_p of the pump's piston", CALIBRATED)] = 2.371e-3
-    chamber_height: Annotated[float, SI("m", "height h of the pump chamber, equation 8", JUDGED)] = 1e-3
-    dead_volume: Annotated[float, SI("m^3", "ports of the pump chamber, errata P6", CALIBRATED)] = 4.78e-7
+        float, SI("N/m", "stiffness k_B + k_d of disc spring and diaphragm, equation 3", CALIBRATED)
+    ] = 3.6e6
+    piston_area: Annotated[float, SI("m^2", "area A_p of the pump's piston", CALIBRATED)] = 2.67e-3
+    chamber_height: Annotated[float, SI("m", "height h of the pump chamber, equation 8", CALIBRATED)] = 5.86e-4
+    dead_volume: Annotated[float, SI("m^3", "ports of the pump chamber, errata P6", CALIBRATED)] = 4.03e-7
     density: Annotated[float, SI("kg/m^3", "density of the oil", JUDGED)] = 850.0
-    viscosity: Annotated[float, SI("Pa s", "dynamic viscosity of the oil", CALIBRATED)] = 0.0207
+    viscosity: Annotated[float, SI("Pa s", "dynamic viscosity of the oil", CALIBRATED)] = 0.0224
     bulk_modulus: Annotated[float, SI("Pa", "bulk modulus beta_f of the oil without air, equation 5", JUDGED)] = 1.4e9
     air_fraction: Annotated[
         float, SI("1", "entrained air lambda_a at atmospheric pressure, equation 6, errata P4", CALIBRATED)
-    ] = 0.0137
+    ] = 0.0245
     vapour_pressure: Annotated[float, SI("Pa", "absolute pressure of the vapour", "judged, errata P5")] = 2e3
-    reed_mass: Annotated[float, SI("kg", "mass of a reed with the oil it carries", CALIBRATED)] = 4.01e-3
-    reed_damping: Annotated[float, SI("N s/m", "damping of a reed, equation 13", CALIBRATED)] = 14.8
-    outlet_reed_stiffness: Annotated[float, SI("N/m", "stiffness of the outlet reed", CALIBRATED)] = 6.94e4
-    inlet_reed_stiffness: Annotated[float, SI("N/m", "stiffness of the inlet reed", CALIBRATED)] = 6.94e4
+    reed_mass: Annotated[float, SI("kg", "mass of a reed with the oil it carries", CALIBRATED)] = 2.89e-3
+    reed_damping: Annotated[float, SI("N s/m", "damping of a reed, equation 13", CALIBRATED)] = 17.6
+    outlet_reed_stiffness: Annotated[float, SI("N/m", "stiffness of the outlet reed", CALIBRATED)] = 6.43e4
+    inlet_reed_stiffness: Annotated[float, SI("N/m", "stiffness of the inlet reed", CALIBRATED)] = 7.06e4
     outlet_reed_gap: Annotated[
         float, SI("m", "opening at which the outlet reed rests; 0 healthy", "a fault of ours")
     ] = 0.0
     inlet_reed_gap: Annotated[float, SI("m", "opening at which the inlet reed rests; 0 healthy", "a fault of ours")] = (
         0.0
     )
-    reed_area: Annotated[float, SI("m^2", "area A_R that pressure acts on, equation 13", CALIBRATED)] = 4.31e-5
-    reed_perimeter: Annotated[float, SI("m", "perimeter w of the opening, equation 15", CALIBRATED)] = 0.0124
-    reed_lift: Annotated[float, SI("m", "lift at the stop, errata P7", CALIBRATED)] = 2.75e-4
+    reed_area: Annotated[float, SI("m^2", "area A_R that pressure acts on, equation 13", CALIBRATED)] = 4.75e-5
+    reed_perimeter: Annotated[float, SI("m", "perimeter w of the opening, equation 15", CALIBRATED)] = 0.0101
+    reed_lift: Annotated[float, SI("m", "lift at the stop, errata P7", CALIBRATED)] = 3.88e-4
     discharge_coefficient: Annotated[float, SI("1", "discharge coefficient c_d, equation 15", JUDGED)] = 0.62
     seat_stiffness: Annotated[float, SI("N/m", "stiffness of seat and stop, errata P7", JUDGED)] = 2e7
     seat_damping: Annotated[float, SI("N s/m", "damping of seat and stop, errata P7", JUDGED)] = 300.0
     laminar_drop: Annotated[float, SI("Pa", "drop below which an opening's flow is laminar, errata P8", JUDGED)] = 1e4
-    delivery_length: Annotated[float, SI("m", "line from pump to cylinder", CALIBRATED)] = 0.462
-    return_length: Annotated[float, SI("m", "line from cylinder to accumulator", CALIBRATED)] = 0.232
-    intake_length: Annotated[float, SI("m", "line from accumulator to pump", CALIBRATED)] = 0.232
-    line_area: Annotated[float, SI("m^2", "cross-section A_t of the lines, equation 19", CALIBRATED)] = 3.85e-5
-    minor_losses: Annotated[float, SI("1", "sum of xi in a line, equation 21, errata P12", CALIBRATED)] = 2.34
+    delivery_length: Annotated[float, SI("m", "line from pump to cylinder", CALIBRATED)] = 0.23
+    return_length: Annotated[float, SI("m", "line from cylinder to accumulator", CALIBRATED)] = 0.163
+    intake_length: Annotated[float, SI("m", "line from accumulator to pump", CALIBRATED)] = 0.406
+    line_area: Annotated[float, SI("m^2", "cross-section A_t of the lines, equation 19", CALIBRATED)] = 6.89e-5
+    minor_losses: Annotated[float, SI("1", "sum of xi in a line, equation 21, errata P12", CALIBRATED)] = 1.97
     port_volume: Annotated[float, SI("m^3", "oil between a reed and its line, errata P10", JUDGED)] = 3e-6
     accumulator_volume: Annotated[float, SI("m^3", "oil at the accumulator's port, errata P16", JUDGED)] = 2e-6
     accumulator_gas: Annotated[
@@ -90,14 +90,14 @@ class PiezoStackParameters:
     ] = 30e-6
     gas_exponent: Annotated[float, SI("1", "polytropic exponent of that gas", JUDGED)] = 1.4
     bias_pressure: Annotated[float, SI("Pa", "bias pressure, absolute", "test conditions: 0.6 and 1.0 MPa")] = 1e6
-    cylinder_area: Annotated[float, SI("m^2", "area A_cp of the cylinder", CALIBRATED)] = 3.491e-4
+    cylinder_area: Annotated[float, SI("m^2", "area A_cp of the cylinder", CALIBRATED)] = 4.16e-4
     cylinder_start: Annotated[float, SI("m", "rod's start x_0 from the high side's end, equation 18", CALIBRATED)] = (
-        0.0805
+        0.151
     )
-    cylinder_length: Annotated[float, SI("m", "length L_c of both sides together, errata P11", CALIBRATED)] = 0.161
+    cylinder_length: Annotated[float, SI("m", "length L_c of both sides together, errata P11", CALIBRATED)] = 0.302
     carriage_mass: Annotated[float, SI("kg", "rod and carriage, moved without load", CALIBRATED)] = 0.886
     load_mass: Annotated[float, SI("kg", "load lifted, equation 22", "test conditions: 0 to 60 kg")] = 0.0
-    viscous_friction: Annotated[float, SI("N s/m", "movement damping c_c, equation 22", CALIBRATED)] = 822.0
+    viscous_friction: Annotated[float, SI("N s/m", "movement damping c_c, equation 22", CALIBRATED)] = 1200.0
     coulomb_friction: Annotated[float, SI("N", "friction F_f, equation 22, errata P13", JUDGED)] = 20.0
     friction_speed: Annotated[float, SI("m/s", "speed that smooths the Coulomb force, errata P13", JUDGED)] = 2e-3
     end_clearance: Annotated[float, SI("m", "least length of a side, at the end stop, errata P13", JUDGED)] = 4e-3

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
-from math import ceil, isfinite
+from math import isfinite
 from types import MappingProxyType
 from typing import Annotated, TypeAlias
 
@@ -12,16 +12,13 @@ from numpy.typing import NDArray
 from plant.components.piezo_stack import stack_force
 from plant.drive_limits import require_frequency, sample_count
 from plant.errors import DriveError, HydrostateError, RigError
-from plant.integrate import compile_trajectory
-from plant.piezo_stack import STATES, StackValues, at_bias, stack_pressures, stack_step
-from plant.piezo_stack_parameters import LONGEST_STEP, PiezoStackParameters
+from plant.piezo_stack import StackValues, stack_pressures
+from plant.piezo_stack_parameters import PiezoStackParameters
+from plant.piezo_stack_trajectory import NAME, run_stack
 from plant.record import Record
 from plant.units import SI
 
 Array: TypeAlias = NDArray[np.float64]
-
-NAME = "piezo-stack"
-"""What the plant is called on the command line and in metadata."""
 
 HIGHEST_VOLTAGE = 150.0
 """Rated voltage of the stack [V]; it cannot withstand reverse voltage either (output performance section)."""
@@ -146,65 +143,6 @@ def checked_voltage(voltage: Array) -> Array:
     return drive
 
 
-def stack_row(parameters: StackValues) -> Array:
-    """Return the parameters as an array, in the order of their fields (errata P17).
-
-    Parameters
-    ----------
-    parameters : PiezoStackParameters or namespace
-        The actuator; a namespace of the same names may hold what no actuator has, such as a negative leakage.
-
-    Returns
-    -------
-    ndarray, shape (parameters,)
-        Their values in SI.
-    """
-    return np.array([getattr(parameters, field.name) for field in fields(PiezoStackParameters)], dtype=np.float64)
-
-
-def run_stack(
-    parameters: StackValues,
-    voltage: Array,
-    sample_time: float,
-    *,
-    longest_step: float = LONGEST_STEP,
-    start: Array | None = None,
-) -> Array:
-    """Return the states of a run from rest at the bias pressure, by classical Runge-Kutta steps (equations 1 to 22).
-
-    Parameters
-    ----------
-    parameters : PiezoStackParameters or namespace
-        The actuator; a namespace of the same names may hold what no actuator has, such as a negative leakage.
-    voltage : ndarray, shape (n,)
-        Drive at the samples [V], linear between.
-    sample_time : float
-        Seconds between samples [s].
-    longest_step : float
-        Longest step [s].
-    start : ndarray, shape (19,), optional
-        Initial state; settled to the first voltage if not given.
-
-    Returns
-    -------
-    ndarray, shape (n, 19)
-        States at the samples, as named in `plant.piezo_stack.STATES`.
-
-    Raises
-    ------
-    HydrostateError
-        If the state stops being finite.
-    """
-    run = compile_trajectory("piezo_stack", stack_step, len(STATES), PiezoStackParameters)  # pyright: ignore[reportArgumentType] - any class of named floats serves
-    initial = at_bias(parameters, float(voltage[0])) if start is None else start
-    substeps = max(1, ceil(sample_time / longest_step - 1e-9))
-    states = run(initial, voltage, stack_row(parameters)[None], sample_time, substeps)
-    if not np.all(np.isfinite(states[-1])):
-        when = sample_time * int(np.argmin(np.isfinite(states).all(axis=1)))
-        raise HydrostateError(f"the {NAME} plant stopped being finite at {when:.4f} s: check its parameters")
-    return states
-
-
 def stack_channels(states: Array, parameters: StackValues) -> Mapping[str, Array]:
     """Return what the bench's sensors see: displacement, force below the stack (equation 2), rod, chamber pressure.
 
@@ -272,7 +210,7 @@ def simulate_stack(
     --------
     >>> record = simulate_stack(PiezoStackParameters(), sine_drive(275.0, 140.0, 0.01, 1e-5), 1e-5)
     >>> round(1e6 * float(np.ptp(record["stack_displacement_m"])))
-    38
+    39
     """
     drive = checked_voltage(voltage)
     states = run_stack(parameters, drive, sample_time)

@@ -20,19 +20,26 @@ def test_the_readme_shows_every_verb_that_works_on_logs() -> None:
     assert {"simulate", "estimate", "identify", "diagnose"} <= {words[0] for words in readme_commands()}
 
 
-def test_every_command_of_the_readme_runs_as_printed_and_in_order(tmp_path: Path) -> None:
-    for words in readme_commands():
-        done = subprocess.run([COMMAND, *words], cwd=tmp_path, capture_output=True, text=True, check=False)  # noqa: S603 - the README's own commands
-        assert done.returncode == 0, f"hydrostate {' '.join(words)}: {done.stderr}"
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> list[subprocess.CompletedProcess[str]]:
+    """Run the README's commands in order, in one folder."""
+    folder = tmp_path_factory.mktemp("readme")
+    return [
+        subprocess.run([COMMAND, *words], cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603 - the README's own commands
+        for words in readme_commands()
+    ]
 
 
-def test_the_readme_quotes_what_estimate_prints(tmp_path: Path) -> None:
+def test_every_command_of_the_readme_runs_as_printed_and_in_order(done: list[subprocess.CompletedProcess[str]]) -> None:
+    for words, one in zip(readme_commands(), done, strict=True):
+        assert one.returncode == 0, f"hydrostate {' '.join(words)}: {one.stderr}"
+
+
+def test_the_readme_quotes_what_estimate_prints(done: list[subprocess.CompletedProcess[str]]) -> None:
     quoted = re.search(r"```text\n(.*?)\n```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
     assert quoted is not None
-    simulate, estimate = readme_commands()[:2]
-    subprocess.run([COMMAND, *simulate], cwd=tmp_path, capture_output=True, check=True)  # noqa: S603 - as above
-    done = subprocess.run([COMMAND, *estimate], cwd=tmp_path, capture_output=True, text=True, check=True)  # noqa: S603 - as above
-    assert quoted.group(1) in done.stdout + done.stderr
+    assert readme_commands()[1][0] == "estimate"
+    assert quoted.group(1) in done[1].stdout + done[1].stderr
 
 
 @pytest.mark.parametrize("link", sorted(set(re.findall(r"\]\(([\w/.-]+)\)", README.read_text(encoding="utf-8")))))

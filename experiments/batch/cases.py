@@ -3,14 +3,15 @@
 import hashlib
 import json
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache, cached_property
 from glob import glob, has_magic
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from experiments.batch.series import Log, Series, Simulated, Work, content_of
+from estimation.kernels import LANES
+from experiments.batch.series import Group, Log, Series, Simulated, Work, content_of
 from experiments.batch.study_file import Logs, Method, Runs, Study, StudyError
 from faults.conditions import CONDITIONS, LEVELS
 from plant.rig import Rig, read_rig
@@ -36,23 +37,23 @@ SERIES_COST = 4e-7
 
 @dataclass(frozen=True)
 class Task:
-    """What a worker is given: some series, and the keys and works of each.
+    """What a worker is given: some series with their cases.
 
     Parameters
     ----------
     rig : Rig
         The healthy actuator.
-    series : tuple
-        Each series with its cases, each case a key and a work.
+    groups : tuple of Group
+        The cases, a series at a time.
     """
 
     rig: Rig
-    series: tuple[tuple[Series, tuple[tuple[str, Work], ...]], ...]
+    groups: tuple[Group, ...]
 
     @property
     def keys(self) -> list[str]:
         """The keys of its cases, in order."""
-        return [key for _, cases in self.series for key, _ in cases]
+        return [key for group in self.groups for key in group.keys]
 
 
 @dataclass(frozen=True)
@@ -82,21 +83,21 @@ class Plan:
         return sum(_seconds(sum(map(_steps, series)), len(series), works) for series, works in self.blocks)
 
     @cached_property
-    def cases(self) -> tuple[tuple[Series, tuple[tuple[str, Work], ...]], ...]:
-        """Every series with its cases, a key and a work each, in the study's order."""
+    def groups(self) -> tuple[Group, ...]:
+        """Every series with its cases, in the study's order."""
         common = _hash(None, [RESULTS_VERSION, package_version("hydrostate"), _numbers(self.rig)])
-        out: list[tuple[Series, tuple[tuple[str, Work], ...]]] = []
+        out: list[Group] = []
         for series, works in self.blocks:
             encoded = [_bytes(asdict(work)) for work in works]
             for one in series:
                 begun = _hash(common, _content(one))
-                out.append((one, tuple(zip((_key(begun, text) for text in encoded), works, strict=True))))
+                out.append(Group(one, tuple([_key(begun, text) for text in encoded]), works))
         return tuple(out)
 
     @cached_property
     def keys(self) -> list[str]:
         """The keys of all cases, in the study's order; a case that is named twice counts once."""
-        return list(dict.fromkeys(key for _, cases in self.cases for key, _ in cases))
+        return list(dict.fromkeys(key for group in self.groups for key in group.keys))
 
     def tasks(self, done: Collection[str], workers: int) -> Iterator[Task]:
         """Yield what is left to do, in pieces that take about `TASK_SECONDS`, less where workers would be idle.
@@ -114,22 +115,56 @@ class Plan:
             Each case once.
         """
         seen = set(done)
-        budget = min(TASK_SECONDS, self.seconds / (4.0 * workers))
-        gathered: list[tuple[Series, tuple[tuple[str, Work], ...]]] = []
-        spent, count = 0.0, 0
-        for one, cases in self.cases:
-            left = tuple((key, work) for key, work in cases if key not in seen)
-            seen.update(key for key, _ in left)
-            if not left:
+        gathered = _Gathered(min(TASK_SECONDS, self.seconds / (2.0 * workers)))
+        for group in self.groups:
+            left = _left(group, seen)
+            if not left.keys:
                 continue
-            gathered.append((one, left))
-            spent += _seconds(_steps(one), 1, [work for _, work in left])
-            count += len(left)
-            if spent >= budget or count >= MOST_CASES:
-                yield Task(self.rig, tuple(gathered))
-                gathered, spent, count = [], 0.0, 0
-        if gathered:
-            yield Task(self.rig, tuple(gathered))
+            seen.update(left.keys)
+            if gathered.groups and gathered.ends_before(left):
+                yield Task(self.rig, tuple(gathered.groups))
+                gathered = _Gathered(gathered.budget)
+            gathered.add(left)
+            if gathered.is_whole():
+                yield Task(self.rig, tuple(gathered.groups))
+                gathered = _Gathered(gathered.budget)
+        if gathered.groups:
+            yield Task(self.rig, tuple(gathered.groups))
+
+
+def _left(group: Group, done: Collection[str]) -> Group:
+    """Return the cases of a group that are not done."""
+    left = [place for place, key in enumerate(group.keys) if key not in done]
+    if len(left) == len(group.keys):
+        return group
+    return Group(group.series, tuple(group.keys[place] for place in left), tuple(group.works[place] for place in left))
+
+
+@dataclass(eq=False)
+class _Gathered:
+    """Cases gathered for a task of about so many seconds, which ends where it costs least.
+
+    That is where the lanes of filters are full, or where a simulated motion ends that would be simulated again.
+    """
+
+    budget: float
+    groups: list[Group] = field(default_factory=list[Group])
+    spent: float = 0.0
+    count: int = 0
+    filters: int = 0
+
+    def add(self, group: Group) -> None:
+        self.groups.append(group)
+        self.spent += _seconds(_steps(group.series), 1, group.works)
+        self.count += len(group.keys)
+        self.filters += sum(work.verb == "filter" for work in group.works)
+
+    def ends_before(self, group: Group) -> bool:
+        moved_on = _motion(group.series) != _motion(self.groups[-1].series)
+        return self.count + len(group.keys) > MOST_CASES or (moved_on and self.spent >= 0.5 * self.budget)
+
+    def is_whole(self) -> bool:
+        return self.spent >= (self.budget if self.filters % LANES == 0 else 2.0 * self.budget)
 
 
 def plan_study(study: Study, folder: Path) -> Plan:
@@ -246,6 +281,11 @@ def _content(series: Series) -> list[Any]:
 
 def _numbers(rig: Rig) -> list[Any]:
     return [asdict(rig.parameters), dict(rig.uncertainties), dict(rig.columns)]
+
+
+def _motion(series: Series) -> Series | None:
+    """Return what all series with one motion have in common; logs have nothing."""
+    return replace(series, condition=None, seed=0, sensors="") if isinstance(series, Simulated) else None
 
 
 def _steps(series: Series) -> float:

@@ -1,13 +1,18 @@
-"""One row a case: what it was, and what came of it. Nothing in it depends on when or where it was run."""
+"""One row a case: what it was, and what came of it. Nothing in it depends on when or where it was run.
 
-from collections.abc import Mapping
+A task's rows are kept column by column. What a case is stands once a series and once a work, and is laid out over the
+rows at the end; what came of a case is written to its place.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 import pyarrow as pa
 
-from experiments.batch.series import Log, Series, Simulated, Work
+from experiments.batch.series import Group, Log, Series, Simulated, Work
+from plant.errors import HydrostateError
 
 SCHEMA = pa.schema(
     [
@@ -58,86 +63,144 @@ NIS: Mapping[str, str] = MappingProxyType(
 )
 """Column of each channel's normalised innovation squared [dimensionless]."""
 
-Row = dict[str, Any]
+Row: TypeAlias = dict[str, Any]
+"""Entries by column."""
+
+SIMULATED_FIELDS = tuple(one.name for one in fields(Simulated))
+WORK_FIELDS = tuple(one.name for one in fields(Work))
+
+TRUTH = "true_bulk_modulus_pa"
+
+FOUND = tuple(name for name in SCHEMA.names[SCHEMA.names.index("outcome") :] if name != TRUTH)
+"""Columns of what came of a case; those before them, and the truth, say what it is."""
 
 
-def case_row(key: str, series: Series, work: Work) -> Row:
-    """Return the entries of a row that say which case it is.
-
-    Parameters
-    ----------
-    key : str
-        The case's key.
-    series : Series
-        Its series.
-    work : Work
-        What is done with it.
-
-    Returns
-    -------
-    dict[str, Any]
-        Entries by column.
-    """
-    return {"key": key, **_series_entries(series), **work.__dict__}
-
-
-def failed(case: Row, reason: str) -> Row:
-    """Return the row of a case that could not be run.
+class Rows:
+    """The rows of a task while its cases are run, each known by its place in the task.
 
     Parameters
     ----------
-    case : dict[str, Any]
-        From `case_row`.
-    reason : str
-        Why.
-
-    Returns
-    -------
-    dict[str, Any]
-        The row.
+    groups : sequence of Group
+        The task's cases, a series at a time.
     """
-    return {**case, "outcome": "failed", "reason": " ".join(reason.split())}
+
+    def __init__(self, groups: Sequence[Group]) -> None:
+        self._keys = [key for group in groups for key in group.keys]
+        self._works = [work for group in groups for work in group.works]
+        self._series_of = [number for number, group in enumerate(groups) for _ in group.keys]
+        self._series = [_series_entries(group.series) for group in groups]
+        self._found: dict[str, list[Any]] = {name: [None] * len(self._keys) for name in FOUND}
+
+    def describe(self, series: int, entries: Mapping[str, Any]) -> None:
+        """Note what was learnt of a series when it was read.
+
+        Parameters
+        ----------
+        series : int
+            Its place among the task's series.
+        entries : Mapping[str, Any]
+            Entries by column, of those that say what a case is.
+        """
+        self._series[series] |= entries
+
+    def put(self, places: Sequence[int], columns: Mapping[str, Sequence[Any]]) -> None:
+        """Write what came of some cases.
+
+        Parameters
+        ----------
+        places : sequence of int
+            Their places.
+        columns : Mapping[str, sequence]
+            A value for each of them, by column of `FOUND`.
+        """
+        for name, values in columns.items():
+            column = self._found[name]
+            for place, value in zip(places, values, strict=True):
+                column[place] = value
+
+    def fail(self, places: Sequence[int], reason: str | Exception) -> None:
+        """Note that cases could not be run.
+
+        Parameters
+        ----------
+        places : sequence of int
+            Their places.
+        reason : str or Exception
+            Why.
+        """
+        told = " ".join(_said(reason).split())
+        self.put(places, {"outcome": ["failed"] * len(places), "reason": [told] * len(places)})
+
+    def failures(self) -> tuple[tuple[str, str], ...]:
+        """Return each case that failed.
+
+        Returns
+        -------
+        tuple of pairs of str
+            The case in words, and the reason.
+        """
+        outcomes, reasons = self._found["outcome"], self._found["reason"]
+        places = (place for place, outcome in enumerate(outcomes) if outcome == "failed")
+        return tuple((self._in_words(place), str(reasons[place])) for place in places)
+
+    def table(self) -> pa.Table:
+        """Return the rows as a table of the store.
+
+        Returns
+        -------
+        pyarrow.Table
+            The table, with `SCHEMA`; what is not known is null.
+        """
+        works = {work: number for number, work in enumerate(dict.fromkeys(self._works))}
+        work_of = pa.array([works[work] for work in self._works], pa.int32())
+        series_of = pa.array(self._series_of, pa.int32())
+        columns: dict[str, Any] = {"key": pa.array(self._keys, pa.string())}
+        for name, kind in zip(SCHEMA.names[1:], SCHEMA.types[1:], strict=True):
+            if name in WORK_FIELDS:
+                columns[name] = pa.array([getattr(work, name) for work in works], kind).take(work_of)
+            elif name in self._found:
+                columns[name] = pa.array(self._found[name], kind)
+            else:
+                columns[name] = pa.array([one.get(name) for one in self._series], kind).take(series_of)
+        return pa.table(columns, schema=SCHEMA)
+
+    def _in_words(self, place: int) -> str:
+        """Return what a case is called in a sentence: the log's file, or what was simulated; and what was done."""
+        series, verb = self._series[self._series_of[place]], self._works[place].verb
+        if series["plant"] == "log":
+            return f"{series['file']} ({verb})"
+        condition = series["condition"] or f"severity {series['leakage_severity']:g}, {series['friction_severity']:g}"
+        return f"{series['plant']} {series['drive']} {condition} seed {series['seed']} ({verb})"
 
 
-def in_words(row: Row) -> str:
-    """Return what a case is called in a sentence.
+def error_percent(value: float | None, truth: float | None) -> float | None:
+    """Return how far a value is off [%].
 
     Parameters
     ----------
-    row : dict[str, Any]
-        Its row.
+    value, truth : float or None
+        Estimate and truth, in one unit.
 
     Returns
     -------
-    str
-        The log's file, or what was simulated; and what was done.
+    float or None
+        The error; None where either is not known.
+
+    Examples
+    --------
+    >>> error_percent(2.5e8, 2e8)
+    25.0
     """
-    if row["plant"] == "log":
-        return f"{row['file']} ({row['verb']})"
-    condition = row["condition"] or f"severity {row['leakage_severity']:g}, {row['friction_severity']:g}"
-    return f"{row['plant']} {row['drive']} {condition} seed {row['seed']} ({row['verb']})"
+    return None if value is None or truth is None else 100.0 * (value / truth - 1.0)
+
+
+def _said(reason: str | Exception) -> str:
+    if isinstance(reason, str | HydrostateError):
+        return str(reason)
+    return f"an internal error, {type(reason).__name__}: {str(reason)[:300]}"
 
 
 def _series_entries(series: Series) -> Row:
     if isinstance(series, Log):
         return {"plant": "log", "file": series.file}
-    return {one.name: getattr(series, one.name) for one in SIMULATED_FIELDS}
-
-
-SIMULATED_FIELDS = fields(Simulated)
-
-
-def as_table(rows: list[Row]) -> pa.Table:
-    """Return rows as a table of the store.
-
-    Parameters
-    ----------
-    rows : list of dict
-        Entries by column; a column that a row lacks is null.
-
-    Returns
-    -------
-    pyarrow.Table
-        The table, with `SCHEMA`.
-    """
-    return pa.Table.from_pydict({name: [row.get(name) for row in rows] for name in SCHEMA.names}, schema=SCHEMA)
+    return {name: getattr(series, name) for name in SIMULATED_FIELDS}

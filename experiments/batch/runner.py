@@ -14,6 +14,7 @@ from typing import Any
 
 from experiments.batch.cases import Plan, Task, config_hash, package_version
 from experiments.batch.part_store import PartStore
+from experiments.batch.series import Group
 from experiments.batch.work import Part, lost_task, run_task
 from plant.errors import HydrostateError
 
@@ -174,11 +175,9 @@ def _launch(batch: _Batch, executor: Executor, flying: dict[Future[Part], Task],
 
 
 def _halves(task: Task) -> list[Task]:
-    cases = [(one, case) for one, cases in task.series for case in cases]
+    cases = [Group(one.series, (key,), (work,)) for one in task.groups for key, work in zip(*one[1:], strict=True)]
     middle = len(cases) // 2
-    return [
-        replace(task, series=tuple((one, (case,)) for one, case in half)) for half in (cases[:middle], cases[middle:])
-    ]
+    return [replace(task, groups=tuple(half)) for half in (cases[:middle], cases[middle:])]
 
 
 def manifest_of(plan: Plan, source: str) -> Mapping[str, Any]:

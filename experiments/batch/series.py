@@ -3,7 +3,7 @@
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from plant.record_files import sidecar
 
@@ -103,6 +103,24 @@ class Work:
     told: str
     start_pa: float | None
     start_std_pa: float
+
+
+class Group(NamedTuple):
+    """The cases of one series.
+
+    Parameters
+    ----------
+    series : Simulated or Log
+        The series.
+    keys : tuple of str
+        The key of each case.
+    works : tuple of Work
+        What is done in each.
+    """
+
+    series: Series
+    keys: tuple[str, ...]
+    works: tuple[Work, ...]
 
 
 def content_of(path: Path) -> str:

@@ -10,6 +10,7 @@ import typer
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, read_log, run_logs
 from experiments.command.options import (
+    MOTOR,
     PRESSURE,
     SEED,
     STACK,
@@ -27,7 +28,6 @@ from experiments.command.options import (
     load_columns,
     load_rig,
     refuse_given,
-    require_one_of,
 )
 from experiments.command.streams import clauses, note, short_names, table
 from experiments.command.verdict import NO_VERDICT, headline, verdict_entries, verdict_lines
@@ -116,10 +116,10 @@ def diagnose(
     where differential pressure counts too. The seed draws the tests behind the transfer functions.
     """
     if plant is not None:
-        require_one_of("--plant", plant, [STACK])
-        from experiments.command.stack_logs import stack_logs_command
+        from experiments.command.plant_logs import plant_logs_command
 
-        stack_logs_command(
+        plant_logs_command(
+            plant,
             logs,
             diagnosing=True,
             sensors="",
@@ -131,7 +131,9 @@ def diagnose(
             out=out,
             as_json=as_json,
         )
-    refuse_given({"--bias-pressure": bias_pressure, "--load": load, "--healthy": healthy}, f"needs --plant {STACK}")
+    refuse_given(
+        {"--bias-pressure": bias_pressure, "--load": load, "--healthy": healthy}, f"needs --plant {STACK} or {MOTOR}"
+    )
     from faults.bank import mathematical_bank
     from faults.conditions import find_condition
 

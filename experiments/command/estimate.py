@@ -9,6 +9,7 @@ import typer
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, read_log, run_logs
 from experiments.command.options import (
+    MOTOR,
     PRESSURE,
     SEED,
     STACK,
@@ -87,8 +88,8 @@ def estimate(
         str,
         typer.Option(
             metavar="METHOD",
-            help="least-squares (flow, motion), or a filter: ekf, iekf, ukf, ckf, svsf, sif, smoother, filterpy-ekf; "
-            "auto: least squares where the form allows.",
+            help="least-squares (flow, motion), or a filter: ekf, iekf, ukf, ckf, svsf, sif, smoother, "
+            "iterated-smoother, filterpy-ekf; auto: least squares where the form allows.",
         ),
     ] = "auto",
     states: Annotated[
@@ -152,10 +153,10 @@ def estimate(
     Nothing here is random, so the seed changes nothing.
     """
     if plant is not None:
-        require_one_of("--plant", plant, [STACK])
-        from experiments.command.stack_logs import stack_logs_command
+        from experiments.command.plant_logs import plant_logs_command
 
-        stack_logs_command(
+        plant_logs_command(
+            plant,
             logs,
             diagnosing=False,
             sensors=sensors,
@@ -167,7 +168,9 @@ def estimate(
             out=out,
             as_json=as_json,
         )
-    refuse_given({"--bias-pressure": bias_pressure, "--load": load, "--healthy": healthy}, f"needs --plant {STACK}")
+    refuse_given(
+        {"--bias-pressure": bias_pressure, "--load": load, "--healthy": healthy}, f"needs --plant {STACK} or {MOTOR}"
+    )
     from estimation.augment import AUGMENTABLE
     from estimation.bulk_modulus import FITTED, LEAST_SQUARES, estimate_bulk_modulus
     from estimation.eha import FORMS
@@ -217,7 +220,7 @@ def estimate(
         path = figure_path(figure, log, len(logs))
         if path is not None:
             _draw(found, path, log)
-        return {**_entries(found, method), **chosen}
+        return {**_entries(found), **chosen}
 
     batch = run_logs(logs, work, {**NOTHING, **chosen}, "estimating")
     if condition is None and any(result["form"] not in (None, "flow") for result in batch.results):
@@ -239,15 +242,14 @@ def _draw(found: "BulkModulusEstimate", path: Path, log: Path) -> None:
     write_innovations(found, log.name, path)
 
 
-def _entries(found: "BulkModulusEstimate", method: str) -> dict[str, Any]:
-    filtered = found.estimate is not None
+def _entries(found: "BulkModulusEstimate") -> dict[str, Any]:
     return {
         "outcome": found.outcome.value,
         "bulk_modulus_pa": {"value": found.value, "std": found.std, "ci95": found.interval},
         "leakage_coefficient_m3_s_pa": _number(found.others.get("leakage_coefficient")),
         "flow_bias_m3_s": _number(found.others.get("flow_bias")),
         "nis": dict(found.nis),
-        "method": ("ekf" if method == "auto" else method) if filtered else "least-squares",
+        "method": found.method,
         "states": {name: _number(value) for name, value in found.others.items()},
         "noise": None if found.tuning is None else {**found.tuning.tuned.noise, **found.tuning.tuned.variances},
         "form": found.form,

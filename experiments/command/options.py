@@ -65,7 +65,8 @@ StackPlant: TypeAlias = Annotated[
         "--plant",
         metavar="PLANT",
         help="piezo-stack: logs of that actuator, with drive_voltage_v and what is measured of stack_displacement_m, "
-        "stack_force_n, position_m, chamber_pressure_pa, from rest on. The options marked so apply to it alone.",
+        "stack_force_n, position_m, chamber_pressure_pa, from rest on. diaphragm-motor: with drive_voltage_v, a steady "
+        "sine, electrode_1_v to electrode_7_v and position_m. Options that name a plant apply to it alone.",
     ),
 ]
 StackBias: TypeAlias = Annotated[
@@ -75,11 +76,19 @@ StackBias: TypeAlias = Annotated[
     ),
 ]
 StackLoad: TypeAlias = Annotated[
-    float | None, typer.Option("--load", metavar="KG", help="piezo-stack: mass lifted in the runs.", show_default="0")
+    float | None,
+    typer.Option(
+        "--load",
+        metavar="KG|N",
+        help="piezo-stack: mass lifted in the runs [kg]; diaphragm-motor: known force against extension [N].",
+        show_default="0",
+    ),
 ]
 StackHealthy: TypeAlias = Annotated[
     Path | None,
-    typer.Option("--healthy", metavar="LOG", help="piezo-stack: a run of the healthy actuator to calibrate on."),
+    typer.Option(
+        "--healthy", metavar="LOG", help="piezo-stack, diaphragm-motor: a run of the healthy actuator to calibrate on."
+    ),
 ]
 
 PRESSURE = "differential_pressure_pa"

@@ -26,7 +26,7 @@ from experiments.studies.piezo_stack import (
     sweep,
 )
 from experiments.studies.piezo_stack_card import identifiability_card
-from experiments.studies.piezo_stack_hysteresis import hysteresis_table
+from experiments.studies.piezo_stack_hysteresis import hysteresis_table, loop_card
 from experiments.studies.piezo_stack_quoted import quoted_numbers
 from plant.piezo_stack_parameters import PiezoStackParameters
 
@@ -75,6 +75,7 @@ def stack_study_command(
     tables["what limits the flow"] = sensitivities(p)
     tables["best operating points"] = best_points(tables["design map"], voltage_limit, power_limit)
     tables["hysteresis parameters"] = hysteresis_table(p, seed)
+    tables["what loops tell"] = loop_card(p)
     tables["identifiability"] = identifiability_card(replace(p, load_mass=10.0))
     tables["quoted numbers"] = quoted_numbers(tables)
     settings = {"quick": quick, "voltage_limit_v": voltage_limit, "power_limit_w": power_limit, "seed": seed}

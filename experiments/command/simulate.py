@@ -112,7 +112,11 @@ def simulate(
         ),
     ] = None,
     fault: Annotated[
-        str | None, typer.Option(metavar="NAME", help="piezo-stack: a condition, or such as air_doubled.")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="piezo-stack: a condition, or such as air_doubled; diaphragm-motor: such as valve_4_leak=0.1.",
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -142,7 +146,7 @@ def simulate(
     if plant in (STACK, MOTOR):
         shared = {"--leakage-severity": leakage_severity, "--friction-severity": friction_severity, "--rig": rig}
         if plant == MOTOR:
-            shared |= {"--condition": condition, "--fault": fault, "--bias-pressure": bias_pressure}
+            shared |= {"--condition": condition, "--bias-pressure": bias_pressure}
         refuse_given(shared, f"does not apply to --plant {plant}")
         if plant == STACK:
             record, said = simulated_stack(stack_options, condition, duration, sample_time, sensors, seed)

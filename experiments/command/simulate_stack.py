@@ -12,7 +12,8 @@ from faults.piezo_stack import stack_with_fault
 from plant.errors import HydrostateError
 from plant.piezo_stack_flow import FLOW_TIME, mean_flow
 from plant.piezo_stack_parameters import PiezoStackParameters
-from plant.piezo_stack_run import NAME, SAMPLE_TIME, STACK_SENSORS, simulate_stack, sine_drive
+from plant.piezo_stack_run import SAMPLE_TIME, STACK_SENSORS, simulate_stack, sine_drive
+from plant.piezo_stack_trajectory import NAME
 from plant.record import Record
 from plant.units import LITRE_PER_MINUTE
 

@@ -6,7 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from estimation.piezo_stack import DRIVE, STACK_CHANNELS, StackEstimate, estimate_stack
+from estimation.piezo_stack import StackEstimate, estimate_stack
+from estimation.piezo_stack_runs import DRIVE, STACK_CHANNELS
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, run_logs
 from experiments.command.options import load_columns

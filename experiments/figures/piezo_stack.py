@@ -260,8 +260,7 @@ STACK_FIGURES: Mapping[str, TableFigure] = MappingProxyType(
         ),
         "figures_11_and_12": TableFigure(
             "Figures 11 and 12: no load",
-            "The diamond is the one flow that the text quotes; the figures themselves are lost (errata P17). Around "
-            "200 Hz this model pumps more at 0.6 MPa than at 1.0 MPa, which the paper does not report.",
+            "The diamond is the one flow that the text quotes; the figures themselves are lost (errata P17).",
             draw_no_load,
         ),
         "figures_13_and_14": TableFigure(

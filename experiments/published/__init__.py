@@ -1,4 +1,4 @@
-"""The published results of the EHA paper, as printed: Tables 1 to 6 and the scalars of the text.
+"""The published results, as printed: tables and scalars of the EHA paper, and tables of the diaphragm-motor paper.
 
 Nothing here is corrected. What the project departs from is told in ``docs/errata.md``, by number.
 """
@@ -16,6 +16,9 @@ from plant.units import PSI
 
 TableName: TypeAlias = Literal["conditions", "parameters", "leakage", "friction", "rmse", "transfer_functions"]
 """The six tables, in the paper's order."""
+
+MotorTableName: TypeAlias = Literal["table1_geometry", "table2", "fig12_anova", "table4_flow", "table5_actuators"]
+"""The diaphragm-motor paper's tables, and the regression that its Figure 12 holds."""
 
 
 @dataclass(frozen=True)
@@ -70,19 +73,22 @@ SCALARS: Mapping[str, PublishedScalar] = MappingProxyType(
 )
 """The text's scalars by name."""
 
-_FILES: Mapping[TableName, str] = MappingProxyType(
-    {name: f"eha_table{number}_{name}.csv" for number, name in enumerate(get_args(TableName), start=1)}
+_FILES: Mapping[TableName | MotorTableName, str] = MappingProxyType(
+    {
+        **{name: f"eha_table{number}_{name}.csv" for number, name in enumerate(get_args(TableName), start=1)},
+        **{name: f"motor_{name}.csv" for name in get_args(MotorTableName)},
+    }
 )
 
 
-def load(name: TableName) -> pd.DataFrame:
+def load(name: TableName | MotorTableName) -> pd.DataFrame:
     """Return a published table, one row a line of the paper's, columns named with their units.
 
     Parameters
     ----------
-    name : {"conditions", "parameters", "leakage", "friction", "rmse", "transfer_functions"}
-        Which of Tables 1 to 6, in this order. The transfer functions are
-        ``(b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2)``, their sample time and input are not given (errata E14).
+    name : TableName or MotorTableName
+        Which of the EHA paper's Tables 1 to 6, in this order, or of the diaphragm-motor paper's. The transfer functions
+        are ``(b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2)``, their sample time and input are not given (errata E14).
 
     Returns
     -------

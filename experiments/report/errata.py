@@ -46,12 +46,43 @@ ERRATA: Mapping[str, str] = MappingProxyType(
         "P15": "The flow curves are Figure 11, though the text says Figure 9.",
         "P16": "The accumulator's gas is part of the plant, unless it is shut.",
         "P17": "Table 1 and the figures are lost; parameters are calibrated to the numbers that the text quotes.",
+        "M1": "The spring between diaphragm and cylinder restores; printed, the model is unstable.",
+        "M2": "Springs and damping restore and damp; k₄ is a cubic spring.",
+        "M3": "Signs follow equation 1; the diaphragm's mass may be left out.",
+        "M4": "The natural frequency follows from the mended equations 1 to 3.",
+        "M5": "Equation 5 is a free motion, not a damping; a Caputo derivative stands in its place.",
+        "M6": "Equation 6 is the fractional derivative of t², a test and no part of the plant.",
+        "M7": "Equation 7 is a textbook example and left out.",
+        "M8": "Permittivity is at constant stress.",
+        "M9": "Two indices, with engineering shear strains.",
+        "M10": "Transposition and constant stress are told apart.",
+        "M11": "The field has three components.",
+        "M12": "The stress has six components.",
+        "M13": "The matrices are those of the mended equations.",
+        "M14": "Table 2 does not obey equation 14, whichever thickness is meant.",
+        "M15": "h₃₁ is a calibration in V/m here; in Table 2 each row has its own.",
+        "M16": "Voltage and pressure bend the diaphragm together.",
+        "M17": "√5 is of a pump with five chambers; Table 2 was made with it.",
+        "M18": "Table 2 obeys equation 18 but for two misprints.",
+        "M19": "The load counts twice; the drive voltage is needed beside the sensing voltage.",
+        "M20": "du is d times u.",
+        "M21": "The law depends on rates of u alone, and so not on frequency.",
+        "M22": "Table 1 holds sizes and materials only; the other parameters are derived, calibrated or assumed.",
+        "M23": "Table 2's headings have wrong units and no driving voltage; row 1's diameter comes from its area.",
+        "M24": "Figure 12 needs two numbers of Table 2 read otherwise; its regression is circular.",
+        "M25": "The optimal frequencies of abstract and conclusion pair rows that do not belong together.",
+        "M26": "Velocities and voltages of 7.2 and 7.3 are entries of Table 5; 168 mm/s does not belong to 110 mL/min.",
+        "M27": "Volts are peak to peak; drives that would depole the ceramic are refused.",
+        "M28": "Seven diaphragms, eight valves, seven electrodes.",
+        "M29": "Table 4's errors are divided by the flow meter; it is another machine.",
+        "M30": "Poles alone decide on stability.",
+        "M31": "The best frequency does not rise with load, nor does the first electrode's voltage with frequency.",
     }
 )
 """One sentence an erratum, by number."""
 
-_NUMBER = re.compile(r"\b([EP]\d{1,2})\b")
-_LINK = re.compile(r'href="#([EP]\d{1,2})"')
+_NUMBER = re.compile(r"\b([EPM]\d{1,2})\b")
+_LINK = re.compile(r'href="#([EPM]\d{1,2})"')
 
 
 def linked(text: str) -> Markup:

@@ -63,6 +63,22 @@ class Column:
     words: Callable[[Any], str | Cell | Markup] | None = None
 
 
+def yes_or_no(good: bool) -> Cell:
+    """Return a cell that says yes, or no as what a reader should see.
+
+    Parameters
+    ----------
+    good : bool
+        Which.
+
+    Returns
+    -------
+    Cell
+        The word in its tone.
+    """
+    return Cell("yes", "good") if good else Cell("no", "bad")
+
+
 def number(value: float | None, digits: int = 4) -> str:
     """Write a number as an engineer does: exponents in threes, no more digits than are asked for.
 

@@ -4,19 +4,21 @@ Published are only the numbers that the paper's text quotes (errata P17).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import product
+from dataclasses import asdict, dataclass, replace
+from itertools import groupby, product
 from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
 
 from experiments.executors import side_by_side
+from plant.errors import HydrostateError
 from plant.piezo_stack import GRAVITY, stack_pressures
 from plant.piezo_stack_flow import FLOW_TIME, STAGES, line_reynolds_numbers, mean_flow, stages
 from plant.piezo_stack_free import loop_width, stack_loop
 from plant.piezo_stack_parameters import PiezoStackParameters
-from plant.piezo_stack_run import FINE_TIME, run_stack, sine_drive
+from plant.piezo_stack_run import FINE_TIME, sine_drive
+from plant.piezo_stack_trajectory import LANES, run_stack, run_stacks
 
 LOOP_FREQUENCIES = (1.0, 50.0, 100.0, 200.0, 300.0, 400.0)
 """Frequencies of Figure 10's loops [Hz]."""
@@ -88,49 +90,8 @@ QUICK_GRID = DesignGrid((150.0, 275.0, 400.0), (100.0, 140.0), (LOW_BIAS, HIGH_B
 """A small map that shows the same."""
 
 
-def at_point(p: PiezoStackParameters, point: OperatingPoint) -> dict[str, float]:
-    """Return what an operating point gives: flow, and power in and out.
-
-    Parameters
-    ----------
-    p : PiezoStackParameters
-        The actuator.
-    point : OperatingPoint
-        The setting.
-
-    Returns
-    -------
-    dict[str, float]
-        The setting, ``flow_m3_s``, ``stack_power_w`` that the stack gives to its head, and ``output_power_w`` that
-        lifts rod, carriage and load.
-    """
-    q = replace(p, bias_pressure=point.bias_pressure_pa, load_mass=point.load_kg)
-    time = _run_time(point.frequency_hz)
-    voltage = sine_drive(point.frequency_hz, point.voltage_v, time, FINE_TIME)
-    states = run_stack(q, voltage, FINE_TIME)
-    flow = mean_flow(states[:, 12], FINE_TIME, point.frequency_hz, q.cylinder_area)
-    half = states[len(states) // 2 :]
-    _, v, driven, h = half.T[:4]
-    power = float(np.mean((driven - q.stack_stiffness * h) * v))
-    lifted = q.moving_mass * GRAVITY * flow / q.cylinder_area
-    return {
-        "frequency_hz": point.frequency_hz,
-        "voltage_v": point.voltage_v,
-        "bias_pressure_pa": point.bias_pressure_pa,
-        "load_kg": point.load_kg,
-        "flow_m3_s": flow,
-        "stack_power_w": power,
-        "output_power_w": lifted,
-    }
-
-
-def _run_time(frequency: float) -> float:
-    """Return the length of a run: the bench's, longer where its second half would hold no cycle [s]."""
-    return max(FLOW_TIME, 4.0 / frequency)
-
-
 def sweep(p: PiezoStackParameters, points: Sequence[OperatingPoint]) -> Iterator[dict[str, float]]:
-    """Run many operating points side by side, in their order.
+    """Run many operating points, several side by side, and return what each gives: flow, and power in and out.
 
     Parameters
     ----------
@@ -142,9 +103,55 @@ def sweep(p: PiezoStackParameters, points: Sequence[OperatingPoint]) -> Iterator
     Yields
     ------
     dict[str, float]
-        As `at_point`.
+        In the points' order: the setting, ``flow_m3_s``, ``stack_power_w`` that the stack gives to its head, and
+        ``output_power_w`` that lifts rod, carriage and load.
     """
-    yield from side_by_side(lambda point: at_point(p, point), points)
+    yield from rows_of([(p, point) for point in points])
+
+
+def rows_of(cases: Sequence[tuple[PiezoStackParameters, OperatingPoint]]) -> Iterator[dict[str, float]]:
+    """Return what actuators give at operating points, as `sweep` does; runs of one length take one kernel together.
+
+    Parameters
+    ----------
+    cases : sequence of tuple
+        Actuator and setting of each.
+
+    Yields
+    ------
+    dict[str, float]
+        As `sweep`.
+    """
+    alike = groupby(cases, key=lambda case: _run_time(case[1].frequency_hz))
+    groups = [list(group) for _, group in alike]
+    parts = [group[first : first + LANES] for group in groups for first in range(0, len(group), LANES)]
+    for rows in side_by_side(_rows_together, parts):
+        yield from rows
+
+
+def _rows_together(cases: Sequence[tuple[PiezoStackParameters, OperatingPoint]]) -> list[dict[str, float]]:
+    """Run cases of one length in one kernel."""
+    time = _run_time(cases[0][1].frequency_hz)
+    actuators = [replace(p, bias_pressure=at.bias_pressure_pa, load_mass=at.load_kg) for p, at in cases]
+    drives = [sine_drive(at.frequency_hz, at.voltage_v, time, FINE_TIME) for _, at in cases]
+    runs = run_stacks(actuators, np.column_stack(drives), FINE_TIME)
+    return [_row(q, at, states) for q, (_, at), states in zip(actuators, cases, runs, strict=True)]
+
+
+def _row(q: PiezoStackParameters, point: OperatingPoint, states: np.ndarray) -> dict[str, float]:
+    if not np.all(np.isfinite(states[-1])):
+        raise HydrostateError(f"the run at {point.frequency_hz:g} Hz stopped being finite: check its parameters")
+    flow = mean_flow(states[:, 12], FINE_TIME, point.frequency_hz, q.cylinder_area)
+    half = states[len(states) // 2 :]
+    _, v, driven, h = half.T[:4]
+    power = float(np.mean((driven - q.stack_stiffness * h) * v))
+    lifted = q.moving_mass * GRAVITY * flow / q.cylinder_area
+    return {**asdict(point), "flow_m3_s": flow, "stack_power_w": power, "output_power_w": lifted}
+
+
+def _run_time(frequency: float) -> float:
+    """Return the length of a run: the bench's, longer where its second half would hold no cycle [s]."""
+    return max(FLOW_TIME, 4.0 / frequency)
 
 
 def pump_cycle(p: PiezoStackParameters, point: OperatingPoint) -> pd.DataFrame:
@@ -292,7 +299,7 @@ def sensitivities(p: PiezoStackParameters, load: float = 10.0) -> pd.DataFrame:
         for names in LIMITS.values()
         for factor in (1.0 + STEP, 1.0 - STEP)
     ]
-    base, *flows = side_by_side(lambda q: at_point(q, point)["flow_m3_s"], changed)
+    base, *flows = (row["flow_m3_s"] for row in rows_of([(q, point) for q in changed]))
     percent = [100.0 * (flow / base - 1.0) for flow in flows]
     return pd.DataFrame({"part": list(LIMITS), "percent_up": percent[::2], "percent_down": percent[1::2]})
 
@@ -303,7 +310,7 @@ def best_points(design: pd.DataFrame, voltage_limit: float, power_limit: float) 
     Parameters
     ----------
     design : pandas.DataFrame
-        Rows of `at_point`.
+        Rows of `sweep`.
     voltage_limit : float
         Largest swing [V].
     power_limit : float

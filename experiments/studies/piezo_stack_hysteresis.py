@@ -5,21 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from estimation.bouc_wen import SHAPE, fit_stack_loop
+from estimation.bouc_wen import LOOP, fit_stack_loop, loop_bounds
 from estimation.bouc_wen_printed import printed_fit
 from experiments.streams import stream
 from plant.piezo_stack_free import run_free_stack
 from plant.piezo_stack_parameters import PiezoStackParameters
-from plant.piezo_stack_run import sine_drive
+from plant.piezo_stack_run import SAMPLE_TIME, sine_drive
 
 SLOW = 0.1
 """Frequency at which the stack's lag moves it by a nanometre only [Hz]."""
 
-SAMPLES = 5000
-"""Samples in a cycle."""
+SAMPLES = round(1.0 / (SLOW * SAMPLE_TIME))
+"""Samples in a cycle, as the bench logs them."""
+
+FEW_SAMPLES = 5000
+"""Samples in a cycle of a slow logger."""
 
 CYCLES = 3
-"""Cycles from rest: on the first the hysteresis hardly changes sign, and its four parameters are two."""
+"""Cycles from rest until a loop has closed: the last is the one that is logged."""
 
 NOISE = 2e-8
 """Noise of the displacement sensor [m]."""
@@ -29,7 +32,7 @@ SMALL, LARGE = 5.0, 100.0
 
 
 def hysteresis_table(p: PiezoStackParameters, seed: int) -> pd.DataFrame:
-    """Return what the printed procedure and the fit make of one 100 V loop.
+    """Return what the printed procedure and the fit make of one closed loop of 100 V.
 
     Parameters
     ----------
@@ -45,15 +48,12 @@ def hysteresis_table(p: PiezoStackParameters, seed: int) -> pd.DataFrame:
     """
     voltage, displacement = slow_loop(p, LARGE)
     noisy = displacement + NOISE * stream(seed, "stack loop").standard_normal(len(displacement))
-    fit = fit_stack_loop(voltage, noisy)
+    fit = fit_stack_loop(voltage, noisy, from_rest=False)
     small = slow_loop(p, SMALL)
     settled = run_free_stack(p, np.append(0.0, np.full(400, SMALL)), 1e-5)[-1]
-    last = slice(-SAMPLES - 1, None)
-    printed = printed_fit(
-        (SMALL, float(settled)), (small[0][last], small[1][last]), (voltage[last], displacement[last])
-    )
+    printed = printed_fit((SMALL, float(settled)), small, (voltage, displacement))
     rows = []
-    for name in ("free_stroke_a_volt", *SHAPE):
+    for name in LOOP:
         truth, (low, high) = float(getattr(p, name)), fit.interval(name)
         rows.append(
             {
@@ -70,8 +70,35 @@ def hysteresis_table(p: PiezoStackParameters, seed: int) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def loop_card(p: PiezoStackParameters) -> pd.DataFrame:
+    """Return what no estimate from a slow loop of 100 V can beat, by how the loop was run and how often sampled.
+
+    Parameters
+    ----------
+    p : PiezoStackParameters
+        The stack.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns loop, samples, and for each parameter its standard deviation in percent; infinite where the loop cannot
+        tell it.
+    """
+    rows = []
+    for samples in (FEW_SAMPLES, SAMPLES):
+        for loop, cycles, from_rest in (
+            ("one, the first from rest", 1, True),
+            ("one, gone round before", 1, False),
+            ("three from rest", CYCLES, True),
+        ):
+            voltage = 0.5 * LARGE * (1.0 - np.cos(2.0 * np.pi * np.arange(cycles * samples + 1) / samples))
+            bounds = loop_bounds(p, voltage, NOISE, from_rest=from_rest)
+            rows.append({"loop": loop, "samples": samples, **{name: 100.0 * bound for name, bound in bounds.items()}})
+    return pd.DataFrame(rows)
+
+
 def slow_loop(p: PiezoStackParameters, swing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return voltage and displacement of slow cycles from rest.
+    """Return voltage and displacement of one slow cycle, after the stack has been cycled until its loop closed.
 
     Parameters
     ----------
@@ -85,7 +112,7 @@ def slow_loop(p: PiezoStackParameters, swing: float) -> tuple[np.ndarray, np.nda
     tuple of ndarray, shape (n,)
         Voltage [V], displacement [m].
     """
-    sample_time = 1.0 / (SLOW * SAMPLES)
-    voltage = sine_drive(SLOW, swing, CYCLES / SLOW, sample_time)
+    voltage = sine_drive(SLOW, swing, CYCLES / SLOW, SAMPLE_TIME)
     heavy = replace(p, stack_mass=100.0 * p.stack_mass, stack_damping=10.0 * p.stack_damping)
-    return voltage, run_free_stack(heavy, voltage, sample_time)
+    displacement = run_free_stack(heavy, voltage, SAMPLE_TIME)
+    return voltage[-SAMPLES - 1 :], displacement[-SAMPLES - 1 :]

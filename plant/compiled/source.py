@@ -26,12 +26,12 @@ _TEMPLATES: Mapping[str, str] = {
 }
 """How each operation is spelt; a new one needs a line here and one in `expression.local_derivatives`."""
 
-CALLED = ("present", "sign", "sqrt", "exp", "log", "tanh", "where", "fma")
+CALLED = ("present", "sign", "sqrt", "exp", "log", "tanh", "ratios", "roots", "where", "fma")
 """Functions of `plant.compiled.vector` that lines call: no symbol may have their names."""
 
 _CALLS: Mapping[str, str] = {
     **_TEMPLATES,
-    **{name: f"{name}({{0}})" for name in CALLED[:-2]},
+    **{name: f"{name}({{0}})" for name in CALLED[:-4]},
     "where": "where({0}, {1}, {2})",
     "fma": "fma({0}, {1}, {2})",
     "fnma": "fma(-{0}, {1}, {2})",
@@ -132,6 +132,24 @@ def lines_source(name: str, outputs: Mapping[str, Expression]) -> str:
     given = ", ".join(f'"{output}": {names[id(value)]}' for output, value in outputs.items())
     takes = ", ".join(sorted(symbols_in(list(outputs.values()))))
     return "\n".join([f"def {name}({takes}):", *lines, f"    return {{{given}}}"])
+
+
+def spelt(item: Expression, names: Mapping[int, str]) -> str:
+    """Return how `plant.compiled.vector` spells an operation.
+
+    Parameters
+    ----------
+    item : Expression
+        The operation.
+    names : Mapping[int, str]
+        Variables of its operands, by their ids.
+
+    Returns
+    -------
+    str
+        The right side of an assignment.
+    """
+    return _CALLS[item.operation].format(*(names[id(argument)] for argument in item.arguments))
 
 
 def symbols_in(outputs: Sequence[Expression]) -> set[str]:

@@ -243,6 +243,58 @@ def sqrt(x: Any) -> Any:
     return x.of("sqrt") if isinstance(x, Vector) else math.sqrt(x)
 
 
+def roots(values: tuple[Any, ...]) -> list[Any]:
+    """Return square roots, of single numbers by one instruction.
+
+    Parameters
+    ----------
+    values : tuple of Vector
+        Not negative, any unit.
+
+    Returns
+    -------
+    list of Vector
+        Their roots.
+    """
+    if values[0].width > 1:
+        return [sqrt(value) for value in values]
+    return _apart(_beside(values).of("sqrt"), len(values))
+
+
+def ratios(above: tuple[Any, ...], below: tuple[Any, ...]) -> list[Any]:
+    """Return quotients, of single numbers by one instruction.
+
+    Parameters
+    ----------
+    above, below : tuple of Vector or float
+        Dividends and divisors [any unit].
+
+    Returns
+    -------
+    list of Vector
+        The quotients.
+    """
+    one = next(value for value in (*above, *below) if isinstance(value, Vector))
+    if one.width > 1:
+        return [a / b for a, b in zip(above, below, strict=True)]
+    return _apart(_beside(above, one) / _beside(below, one), len(above))
+
+
+def _beside(values: tuple[Any, ...], one: Any = None) -> Vector:
+    """Return single numbers as one vector."""
+    builder = (one or values[0]).builder
+    result: Any = ir.Constant(vector_type(len(values)), [1.0] * len(values))
+    for place, value in enumerate(values):
+        single = value.value if isinstance(value, Vector) else DOUBLE(value)
+        result = builder.insert_element(result, single, SHORT(place))
+    return Vector(builder, result)
+
+
+def _apart(many: Vector, count: int) -> list[Vector]:
+    """Return the numbers of a vector."""
+    return [Vector(many.builder, many.builder.extract_element(many.value, SHORT(place))) for place in range(count)]
+
+
 def exp(x: Any) -> Any:
     """Return e to the power x.
 

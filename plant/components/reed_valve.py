@@ -36,8 +36,8 @@ def reed_flow(
     2.237
     """
     area = coefficient * perimeter * maximum(opening, 0.0)
-    root = sqrt(sqrt(drop * drop + laminar_drop * laminar_drop))
-    return area * sqrt(2.0 / density) * drop / root
+    size = sqrt(drop * drop + laminar_drop * laminar_drop)
+    return area * sqrt(2.0 / density) * (drop / size) * sqrt(size)
 
 
 def contact_force(depth: Scalar, rate: Scalar, stiffness: Scalar, damping: Scalar, soft_depth: Scalar) -> Scalar:

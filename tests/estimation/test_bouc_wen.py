@@ -7,13 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from estimation.bouc_wen import (
-    SHAPE,
-    fit_oscillator,
-    fit_stack_loop,
-    linear_start,
-    simulate_oscillator,
-)
+from estimation.bouc_wen import LOOP, SHAPE, fit_stack_loop, loop_bounds
+from estimation.bouc_wen_oscillator import fit_oscillator, linear_start, simulate_oscillator
 from estimation.bouc_wen_printed import REGIONS, printed_fit
 from estimation.step_sensitivity import sensitivity_step
 from plant.bouc_wen import OscillatorParameters, slow_stack_step
@@ -21,11 +16,11 @@ from plant.components.bouc_wen import asymmetric_bouc_wen_rate
 from plant.errors import LogError
 from plant.integrate import compile_trajectory
 from plant.piezo_stack_parameters import PiezoStackParameters
-from plant.piezo_stack_run import stack_row
+from plant.piezo_stack_trajectory import stack_row
 
 STACK = PiezoStackParameters()
 SAMPLES = 2000
-NAMES = ("free_stroke_a_volt", *SHAPE)
+NOISE = 2e-8
 
 
 def slow_loop(swing: float, cycles: int, samples: int = SAMPLES) -> tuple[np.ndarray, np.ndarray]:
@@ -46,14 +41,41 @@ def loop() -> tuple[np.ndarray, np.ndarray]:
     return slow_loop(100.0, 3)
 
 
-def test_every_parameter_comes_back_from_one_noisy_loop(loop: tuple[np.ndarray, np.ndarray]) -> None:
+def test_every_parameter_comes_back_from_three_noisy_cycles_from_rest(loop: tuple[np.ndarray, np.ndarray]) -> None:
     voltage, displacement = loop
-    noise = 2e-8 * np.random.default_rng(1).standard_normal(len(voltage))
+    noise = NOISE * np.random.default_rng(1).standard_normal(len(voltage))
     fit = fit_stack_loop(voltage, displacement + noise)
-    for name in NAMES:
+    for name in LOOP:
         assert fit.values[name] == pytest.approx(getattr(STACK, name), abs=4.0 * fit.deviations[name])
         assert fit.deviations[name] < 0.012 * abs(getattr(STACK, name))
     assert fit.error == pytest.approx(2e-8, rel=0.05)
+
+
+def closed_loop(loop: tuple[np.ndarray, np.ndarray], samples: int) -> tuple[np.ndarray, np.ndarray]:
+    """The last cycle, logged so often."""
+    moments = np.linspace(0.0, SAMPLES, samples + 1)
+    voltage, displacement = (np.interp(moments, np.arange(SAMPLES + 1), values[-SAMPLES - 1 :]) for values in loop)
+    return voltage, displacement
+
+
+def test_one_closed_loop_at_the_benchs_rate_gives_every_parameter_to_two_percent(
+    loop: tuple[np.ndarray, np.ndarray],
+) -> None:
+    voltage, displacement = closed_loop(loop, 200_000)
+    noise = NOISE * np.random.default_rng(1).standard_normal(len(voltage))
+    fit = fit_stack_loop(voltage, displacement + noise, from_rest=False)
+    bounds = loop_bounds(STACK, voltage, NOISE, from_rest=False)
+    for name in LOOP:
+        truth = getattr(STACK, name)
+        assert fit.values[name] == pytest.approx(truth, rel=0.02)
+        assert fit.deviations[name] == pytest.approx(bounds[name] * abs(truth), rel=0.05)
+
+
+def test_no_estimate_from_a_twentieth_of_the_samples_or_from_a_first_loop_can_be_that_good() -> None:
+    voltage = 50.0 * (1.0 - np.cos(2.0 * np.pi * np.arange(5001) / 5000))
+    closed, first = (loop_bounds(STACK, voltage, NOISE, from_rest=from_rest) for from_rest in (False, True))
+    assert 0.02 < max(closed.values()) < 0.03
+    assert {name for name, bound in first.items() if np.isinf(bound)} == set(SHAPE[1:])
 
 
 @pytest.mark.slow
@@ -61,11 +83,11 @@ def test_intervals_cover_as_often_as_they_say(loop: tuple[np.ndarray, np.ndarray
     voltage, displacement = loop
     covered = 0
     for seed in range(40):
-        noise = 2e-8 * np.random.default_rng(seed).standard_normal(len(voltage))
+        noise = NOISE * np.random.default_rng(seed).standard_normal(len(voltage))
         fit = fit_stack_loop(voltage, displacement + noise)
-        ends = [(*fit.interval(name), getattr(STACK, name)) for name in NAMES]
+        ends = [(*fit.interval(name), getattr(STACK, name)) for name in LOOP]
         covered += sum(low <= truth <= high for low, high, truth in ends)
-    assert 0.88 <= covered / (40 * len(NAMES)) <= 1.0
+    assert 0.88 <= covered / (40 * len(LOOP)) <= 1.0
 
 
 def test_one_cycle_from_rest_is_not_enough() -> None:

@@ -122,7 +122,7 @@ def test_a_log_without_motion_is_refused() -> None:
     ("options", "message"),
     [
         ({"form": "viscous"}, "form must be one of acceleration, pressure.*, got 'viscous'"),
-        ({"method": "ukf9", "form": "pressure"}, "method must be one of ekf, .*filterpy-ekf.*, got 'ukf9'"),
+        ({"method": "ukf9", "form": "pressure"}, "method must be one of auto, ekf, .*filterpy-ekf.*, got 'ukf9'"),
         ({"start": -1.0}, "first guess must be 0 Pa or more"),
         ({"start": float("nan")}, "first guess must be 0 Pa or more"),
         ({"start_std": 0.0}, "its deviation positive"),

@@ -13,7 +13,13 @@ from plant.piezo_stack_run import BENCH_SENSORS, simulate_stack, sine_drive
 from plant.record import Record
 
 HEALTHY = PiezoStackParameters(load_mass=10.0)
-WORN = replace(HEALTHY, air_fraction=0.0274, chamber_leakage=3e-12, crossport_leakage=3e-12, coulomb_friction=45.0)
+WORN = replace(
+    HEALTHY,
+    air_fraction=2.0 * HEALTHY.air_fraction,
+    chamber_leakage=3e-12,
+    crossport_leakage=3e-12,
+    coulomb_friction=45.0,
+)
 SAMPLE_TIME = 5e-5
 DRIVE = sine_drive(275.0, 140.0, 0.05, SAMPLE_TIME)
 

@@ -84,7 +84,11 @@ def test_the_gradient_by_the_prior_is_exact() -> None:
     assert gradient[1] == pytest.approx(central(moved_variance, 1e-3), rel=1e-5)
 
 
-@EVERY_FORM
+@pytest.mark.parametrize(
+    "model",
+    [pytest.param(LUMPED_FORM, marks=pytest.mark.slow), PRESSURE_FORM, ACCELERATION_FORM],
+    ids=lambda m: m.name,
+)
 def test_the_innovations_are_those_of_the_filter(model: ProcessModel) -> None:
     problem = task(model)
     none = np.zeros((len(layout(EKF, model, problem.channels).rows), 0))

@@ -180,6 +180,18 @@ def test_a_frequency_out_of_range_is_refused(frequency: float) -> None:
         motor_drive(frequency, SWING, 0.1, SAMPLE_TIME)
 
 
+def test_a_sine_of_too_few_samples_is_refused() -> None:
+    with pytest.raises(DriveError, match=r"sample_time must be at most 0\.000104 s"):
+        motor_drive(PEAK, SWING, 0.1, 1e-3)
+
+
+def test_a_load_that_runs_ahead_pulls_no_liquid_below_the_least_pressure() -> None:
+    states = run_motor(replace(HEALTHY, load_force=-500.0), motor_drive(PEAK, SWING, 0.1, SAMPLE_TIME), SAMPLE_TIME)
+    lowest = HEALTHY.least_pressure - HEALTHY.supply_pressure
+    assert states[:, SIDE_A].min() >= lowest
+    assert np.all(np.isfinite(states))
+
+
 def test_sensor_noise_is_that_of_the_sensors_and_a_seed_decides_it() -> None:
     drive = motor_drive(PEAK, SWING, 0.05, SAMPLE_TIME)
 

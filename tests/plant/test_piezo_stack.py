@@ -10,7 +10,8 @@ from plant.errors import DriveError, HydrostateError, RigError
 from plant.piezo_stack import OIL, STATES, at_bias, stack_derivative, stack_pressures
 from plant.piezo_stack_flow import STAGES, line_reynolds_numbers, mean_flow, output_flow, stages
 from plant.piezo_stack_parameters import PiezoStackParameters, least_port
-from plant.piezo_stack_run import FINE_TIME, IDEAL_SENSORS, StackSensors, run_stack, simulate_stack, sine_drive
+from plant.piezo_stack_run import FINE_TIME, IDEAL_SENSORS, StackSensors, simulate_stack, sine_drive
+from plant.piezo_stack_trajectory import run_stack, run_stacks
 from plant.reference_solver import reference_trajectory
 from plant.units import LITRE_PER_MINUTE
 
@@ -69,8 +70,17 @@ def test_flow_and_pressure_follow_a_stiff_solver(loaded: np.ndarray) -> None:
     assert flows[0] == pytest.approx(flows[1], rel=5e-4)
 
 
+def test_actuators_run_side_by_side_as_they_run_alone_to_the_bit() -> None:
+    many = [replace(HEALTHY, load_mass=mass) for mass in np.linspace(0.0, 20.0, 9)]
+    drive = DRIVE[:301]
+    together = list(run_stacks(many, drive, FINE_TIME))
+    assert len(together) == len(many)
+    for place in (0, 4, 8):
+        np.testing.assert_array_equal(together[place], run_stack(many[place], drive, FINE_TIME))
+
+
 def test_a_port_too_small_for_the_step_is_refused() -> None:
-    with pytest.raises(RigError, match=r"port_volume must be at least 2\.1e-06"):
+    with pytest.raises(RigError, match=r"port_volume must be at least 2\.4e-06"):
         PiezoStackParameters(port_volume=1e-6)
     assert least_port(HEALTHY) < HEALTHY.port_volume
 

@@ -3,6 +3,8 @@ from pathlib import Path
 
 import pytest
 
+from estimation.kernels import LANES
+from experiments.batch import cases
 from experiments.batch.cases import plan_study
 from experiments.batch.study_file import StudyError, parse_study
 from tests.experiments.batch.conftest import small_plan
@@ -35,6 +37,15 @@ def test_tasks_hold_every_case_that_is_left_once(workers: int) -> None:
     done = set(plan.keys[3:9])
     given = [key for task in plan.tasks(done, workers) for key in task.keys]
     assert sorted(given) == sorted(set(plan.keys) - done)
+
+
+def test_a_task_ends_where_its_lanes_are_full_or_its_motion_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cases, "MOST_CASES", 2048)
+    tasks = list(small_plan(seeds=64).tasks(set(), 2))
+    conditions = [{group.series.condition for group in task.groups} for task in tasks]  # pyright: ignore -- simulated, not logs
+    sizes = [len(task.keys) for task in tasks]
+    assert max(map(len, conditions)) == 1
+    assert sum(-(-size // LANES) for size in sizes) == 2 * 64 * 3 // LANES
 
 
 def test_severities_stand_where_conditions_would() -> None:

@@ -8,6 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from experiments.batch.cases import Task, plan_study
+from experiments.batch.series import Group
 from experiments.batch.study_file import parse_study
 from experiments.batch.work import DRAWN_ONCE, Part, run_task
 from plant.eha import EhaParameters
@@ -22,17 +23,17 @@ def table_of(part: Part) -> pa.Table:
 def test_one_seed_reproduces_one_case_alone_to_the_last_bit(reference: pa.Table) -> None:
     plan = small_plan()
     for place in (0, 7, 23):
-        series, cases = plan.cases[place // 3]
-        alone = run_task(Task(plan.rig, ((series, cases[place % 3 : place % 3 + 1]),)))
+        series, keys, works = plan.groups[place // 3]
+        alone = run_task(Task(plan.rig, (Group(series, (keys[place % 3],), (works[place % 3],)),)))
         assert table_of(alone).equals(reference.slice(place, 1))
 
 
 def test_neither_order_nor_grouping_changes_a_bit(reference: pa.Table) -> None:
     plan = small_plan()
     for pieces in (1, 3, 8):
-        shuffled = np.random.default_rng(pieces).permutation(len(plan.cases))
+        shuffled = np.random.default_rng(pieces).permutation(len(plan.groups))
         parts = [
-            table_of(run_task(Task(plan.rig, tuple(plan.cases[place] for place in chosen))))
+            table_of(run_task(Task(plan.rig, tuple(plan.groups[place] for place in chosen))))
             for chosen in np.array_split(shuffled, pieces)
         ]
         table = pa.concat_tables(parts)
@@ -50,9 +51,9 @@ def test_the_filter_finds_bulk_modulus_on_its_own_plant() -> None:
 
 def test_a_series_that_cannot_be_run_is_rows_with_their_reason() -> None:
     plan = small_plan(seeds=1)
-    good, bad = plan.cases
-    impossible = replace(bad[0], drive="nothing")  # pyright: ignore -- simulated, not a log
-    part = run_task(Task(plan.rig, (good, (impossible, bad[1]))))
+    good, bad = plan.groups
+    impossible = replace(bad.series, drive="nothing")  # pyright: ignore -- simulated, not a log
+    part = run_task(Task(plan.rig, (good, bad._replace(series=impossible))))
     outcomes = table_of(part)["outcome"].to_pylist()
     assert outcomes == ["ok"] * 3 + ["failed"] * 3
     assert len(part.failures) == 3
@@ -68,7 +69,7 @@ def test_a_log_that_cannot_be_read_is_a_row_and_the_others_are_diagnosed(tmp_pat
     logs = [{"glob": "*.csv", "methods": [{"verb": "diagnose"}]}]
     plan = plan_study(parse_study({"name": "logs", "logs": logs}, "logs.toml"), tmp_path)
     (tmp_path / "d.csv").unlink()
-    rows = table_of(run_task(Task(plan.rig, plan.cases))).to_pylist()
+    rows = table_of(run_task(Task(plan.rig, plan.groups))).to_pylist()
     assert [row["file"] for row in rows] == ["a.csv", "b.csv", "c.csv", "d.csv"]
     assert [row["outcome"] for row in rows] == ["mismatch", "failed", "failed", "failed"]
     assert "in none of the nine conditions" in rows[0]["reason"]
@@ -82,7 +83,7 @@ def test_a_log_that_changes_after_the_study_began_is_not_taken_for_what_it_was(t
     logs = [{"glob": "*.csv", "methods": [{"verb": "diagnose"}]}]
     plan = plan_study(parse_study({"name": "logs", "logs": logs}, "logs.toml"), tmp_path)
     (tmp_path / "a.csv").write_text(text.replace("1,0", "2,0"), encoding="utf-8")
-    ((_, reason),) = run_task(Task(plan.rig, plan.cases)).failures
+    ((_, reason),) = run_task(Task(plan.rig, plan.groups)).failures
     assert "was changed after the study began" in reason
 
 
@@ -97,3 +98,14 @@ def test_a_filter_without_lanes_gives_rows_too() -> None:
     (task,) = small_plan(seeds=1, conditions=["normal"], starts_pa=[2e8], methods=methods).tasks(set(), 1)
     ours, theirs = table_of(run_task(task))["bulk_modulus_pa"].to_pylist()
     assert ours == pytest.approx(theirs, rel=1e-6)
+
+
+def test_a_filter_that_diverges_beside_others_is_a_row_without_numbers() -> None:
+    methods = [FILTER, {**FILTER, "start_std_pa": 1e150}]
+    plan = small_plan(seeds=1, conditions=["normal"], starts_pa=[2e8], methods=methods)
+    fine, diverged = table_of(run_task(Task(plan.rig, plan.groups))).to_pylist()
+    assert (fine["outcome"], diverged["outcome"]) == ("ok", "diverged")
+    assert diverged["reason"] == "the estimate stopped being finite"
+    numbers = ("bulk_modulus_pa", "bulk_modulus_std_pa", "error_percent", "nis_position", "log_likelihood")
+    assert [diverged[name] for name in numbers] == [None] * 5
+    assert None not in [fine[name] for name in numbers]

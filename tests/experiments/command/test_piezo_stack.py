@@ -52,7 +52,7 @@ def test_the_study_writes_its_report_with_every_figure(tmp_path: Path) -> None:
     page = (tmp_path / "stack" / "report.html").read_text(encoding="utf-8")
     assert page.count("<figure") == len(STACK_FIGURES)
     quoted = pd.read_csv(tmp_path / "stack" / "tables" / "quoted_numbers.csv")
-    assert quoted.loc[quoted["claim"] == "no-load maximum, 140 V, 1.0 MPa", "holds"].item()
+    assert quoted["holds"].all(), quoted.loc[~quoted["holds"], "claim"].tolist()
 
 
 def _logged(folder: Path, fault: str) -> Path:

@@ -155,18 +155,23 @@ def test_no_number_is_given_where_none_is_observable(sine: Path) -> None:
     assert "not observable" in shown.stdout
 
 
-def test_every_verb_says_what_the_absence_of_pressure_costs(steps: dict[str, Path]) -> None:
-    estimate = ("estimate", steps[".csv"], "--condition", "minor_friction")
-    diagnose = ("diagnose", steps[".csv"])
-    for arguments, words in (
-        (estimate, "rests on how the piston starts"),
-        (diagnose, "friction shows in velocity alone"),
-    ):
-        (one,) = results(*arguments, "--no-pressure")
-        assert PRESSURE not in one["channels"]
-        assert words in one["message"]
-        assert words in invoke(*arguments, "--no-pressure").stdout
-        assert words not in invoke(*arguments).stdout
+@pytest.mark.parametrize(
+    ("verb", "words"),
+    [
+        pytest.param("estimate", "rests on how the piston starts", marks=pytest.mark.slow),
+        ("diagnose", "friction shows in velocity alone"),
+    ],
+)
+def test_every_verb_says_what_the_absence_of_pressure_costs(verb: str, words: str, steps: dict[str, Path]) -> None:
+    arguments = (verb, steps[".csv"], "--condition", "minor_friction")
+    (one,) = results(*arguments, "--no-pressure")
+    assert PRESSURE not in one["channels"]
+    assert words in one["message"]
+    assert words in invoke(*arguments, "--no-pressure").stdout
+    assert words not in invoke(*arguments).stdout
+
+
+def test_identify_says_that_the_absence_of_pressure_costs_nothing() -> None:
     assert "its absence costs nothing" in " ".join(invoke("identify", "--help").stdout.replace("│", " ").split())
 
 

@@ -1,0 +1,113 @@
+"""Filters side by side: cases wait until the lanes of a kernel are full, and what comes of them goes to their rows."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.batch import FEWEST_IN_LANES, filter_batch
+from estimation.eha import BULK_MODULUS
+from estimation.filter import FilterProblem, Trace
+from estimation.kernels import LANES
+from experiments.batch.rows import NIS, Rows, error_percent
+
+SETTLED = 0.2
+"""Share of a run that counts as its end [fraction], as in `estimation.run.Estimate.settled`."""
+
+
+class Waiting(NamedTuple):
+    """A filter to be run.
+
+    Parameters
+    ----------
+    place : int
+        Its row's place.
+    problem : FilterProblem
+        Its task.
+    truth : float or None
+        The true bulk modulus, where that is known [Pa].
+    """
+
+    place: int
+    problem: FilterProblem
+    truth: float | None
+
+
+class Lanes:
+    """Filters that wait for others like them, until the lanes of a kernel are full.
+
+    Parameters
+    ----------
+    rows : Rows
+        Where results go.
+    """
+
+    def __init__(self, rows: Rows) -> None:
+        self._rows = rows
+        self._waiting: dict[tuple[object, ...], list[Waiting]] = {}
+
+    def add(self, one: Waiting) -> None:
+        """Let a filter wait; those that fill the lanes of a kernel are run.
+
+        Parameters
+        ----------
+        one : Waiting
+            The filter.
+        """
+        problem = one.problem
+        alike = (id(problem.model), problem.channels, problem.sample_time, problem.measured.shape)
+        waiting = self._waiting.setdefault(alike, [])
+        waiting.append(one)
+        if len(waiting) == LANES:
+            self._run(self._waiting.pop(alike))
+
+    def finish(self) -> None:
+        """Run all that wait, whether their lanes are full or not."""
+        for waiting in self._waiting.values():
+            self._run(waiting)
+        self._waiting.clear()
+
+    def _run(self, waiting: list[Waiting]) -> None:
+        problems = [one.problem for one in waiting]
+        padded = problems + problems[-1:] * max(0, FEWEST_IN_LANES - len(problems))
+        try:
+            write_filtered(self._rows, waiting, list(filter_batch(padded))[: len(waiting)])
+        except Exception as error:  # one block must not cost the others their results
+            self._rows.fail([one.place for one in waiting], error)
+
+
+def write_filtered(rows: Rows, ran: Sequence[Waiting], traces: Sequence[Trace]) -> None:
+    """Write what came of filters of one model and length.
+
+    Parameters
+    ----------
+    rows : Rows
+        Where it goes.
+    ran : sequence of Waiting
+        The filters.
+    traces : sequence of Trace
+        What each of them returned.
+    """
+    problem = ran[0].problem
+    model, state = problem.model, problem.model.index(BULK_MODULUS)
+    first = int(np.floor(len(traces[0].track) * (1.0 - SETTLED)))
+    with np.errstate(all="ignore"):  # a filter that diverged shows in its row
+        ends, _ = model.to_si(np.array([trace.track[first:] for trace in traces]))
+        values = ends[..., state].mean(axis=1)
+        _, slopes = model.to_si(np.array([trace.mean for trace in traces]))
+        stds = np.sqrt([trace.covariance[state, state] for trace in traces]) * slopes[:, state]
+        nis = np.array([trace.nis for trace in traces]) / np.array([trace.count for trace in traces])
+        finite = np.isfinite(values + stds)
+    columns = {
+        "outcome": ["ok"] * len(ran),
+        "bulk_modulus_pa": values.tolist(),
+        "bulk_modulus_std_pa": stds.tolist(),
+        "error_percent": [error_percent(value, one.truth) for value, one in zip(values.tolist(), ran, strict=True)],
+        **{NIS[channel]: ratios.tolist() for channel, ratios in zip(problem.channels, nis.T, strict=True)},
+        "log_likelihood": [trace.log_likelihood for trace in traces],
+    }
+    places = [one.place for one in ran]
+    rows.put(places, columns)
+    for lane in np.flatnonzero(~finite).tolist():
+        said = {"outcome": ["diverged"], "reason": ["the estimate stopped being finite"]}
+        rows.put(places[lane : lane + 1], {**{name: [None] for name in columns}, **said})

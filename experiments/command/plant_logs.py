@@ -1,0 +1,81 @@
+"""`estimate` and `diagnose` with `--plant`: logs of actuators with a drive, sensors and faults of their own."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from experiments.command.options import MOTOR, STACK, refuse_given, require_one_of
+
+
+def plant_logs_command(
+    plant: str,
+    logs: Sequence[Path],
+    *,
+    diagnosing: bool,
+    sensors: str,
+    bias_pressure: float | None,
+    load: float | None,
+    healthy_log: Path | None,
+    expected: str | None,
+    columns: Sequence[str] | None,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Estimate or diagnose logs of another actuator, and leave with the exit code.
+
+    Parameters
+    ----------
+    plant : str
+        ``piezo-stack`` or ``diaphragm-motor``.
+    logs : sequence of Path
+        The logs.
+    diagnosing : bool
+        Whether a fault is wanted, not quantities.
+    sensors : str
+        The piezo stack's channels that are used; all where empty.
+    bias_pressure, load : float or None
+        Of the runs: the piezo stack's [Pa]; mass [kg] or, of the diaphragm motor, force [N].
+    healthy_log : Path or None
+        A run of the healthy actuator to calibrate on.
+    expected : str or None
+        The condition or fault that is expected.
+    columns : sequence of str or None
+        Foreign columns, as ``--columns`` gives them.
+    out : Path or None
+        Where results are written too.
+    as_json : bool
+        Whether a program reads.
+
+    Raises
+    ------
+    HydrostateError
+        If an option is not usable.
+    """
+    require_one_of("--plant", plant, [STACK, MOTOR])
+    if plant == MOTOR:
+        from experiments.command.motor_logs import motor_logs_command
+
+        refuse_given({"--bias-pressure": bias_pressure, "--sensors": sensors or None}, f"does not go with {MOTOR}")
+        motor_logs_command(
+            logs,
+            diagnosing=diagnosing,
+            load=load,
+            healthy_log=healthy_log,
+            expected=expected,
+            columns=columns,
+            out=out,
+            as_json=as_json,
+        )
+    from experiments.command.stack_logs import stack_logs_command
+
+    stack_logs_command(
+        logs,
+        diagnosing=diagnosing,
+        sensors=sensors,
+        bias_pressure=bias_pressure,
+        load=load,
+        healthy_log=healthy_log,
+        expected=expected,
+        columns=columns,
+        out=out,
+        as_json=as_json,
+    )

@@ -1,0 +1,72 @@
+"""Lets one run share the divider: divisions and roots that do not wait for each other become one instruction.
+
+A processor divides eight numbers in little more time than one, and one run of a plant asks for dozens of quotients and
+roots a step. Side by side runs fill the vectors by themselves.
+"""
+
+from collections.abc import Mapping
+
+from plant.compiled.expression import Expression, ordered
+from plant.compiled.source import spelt, symbols_in
+
+PACKED: Mapping[str, str] = {"/": "ratios", "sqrt": "roots"}
+"""Operations that are packed, and the functions of `plant.compiled.vector` that do it."""
+
+
+def packed_source(name: str, outputs: Mapping[str, Expression]) -> str:
+    """Write straight lines as `plant.compiled.source.lines_source` does, divisions and roots side by side.
+
+    Parameters
+    ----------
+    name : str
+        The function's name.
+    outputs : Mapping[str, Expression]
+        What it gives, by name.
+
+    Returns
+    -------
+    str
+        Its source; it takes the symbols in alphabetical order.
+
+    Examples
+    --------
+    >>> from plant.compiled.expression import symbol
+    >>> x, y = symbol("x"), symbol("y")
+    >>> print(packed_source("lines", {"a": x / y, "b": y / x, "c": (x / y) / (x + y)}))
+    def lines(x, y):
+        t0_ = x + y
+        t1_, t2_ = ratios((x, y), (y, x))
+        t3_ = t1_ / t0_
+        return {"a": t1_, "b": t2_, "c": t3_}
+    """
+    order = ordered(outputs.values())
+    turns: dict[int, int] = {}
+    for item in order:
+        waits = max((turns[id(a)] for a in item.arguments), default=0)
+        turns[id(item)] = waits + (item.operation in PACKED)
+    names: dict[int, str] = {}
+    lines: list[str] = []
+    count = 0
+    for turn in range(max(turns.values(), default=0) + 1):
+        here = [item for item in order if turns[id(item)] == turn]
+        for operation, function in PACKED.items():
+            group = [item for item in here if item.operation == operation]
+            for item in group:
+                names[id(item)] = f"t{count}_"
+                count += 1
+            if len(group) == 1:
+                lines.append(f"{names[id(group[0])]} = {spelt(group[0], names)}")
+            elif group:
+                columns = zip(*([names[id(a)] for a in item.arguments] for item in group), strict=True)
+                given = ", ".join(f"({', '.join(column)})" for column in columns)
+                lines.append(f"{', '.join(names[id(item)] for item in group)} = {function}({given})")
+        for item in here:
+            if item.operation in ("symbol", "constant"):
+                names[id(item)] = str(item.value) if item.operation == "symbol" else repr(item.value)
+            elif item.operation not in PACKED:
+                names[id(item)] = f"t{count}_"
+                count += 1
+                lines.append(f"{names[id(item)]} = {spelt(item, names)}")
+    given = ", ".join(f'"{output}": {names[id(value)]}' for output, value in outputs.items())
+    takes = ", ".join(sorted(symbols_in(list(outputs.values()))))
+    return "\n    ".join([f"def {name}({takes}):", *lines, f"return {{{given}}}"])

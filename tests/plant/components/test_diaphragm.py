@@ -1,0 +1,26 @@
+"""A diaphragm's chamber: what it stores is the slope of the volume it takes in."""
+
+import pytest
+
+from plant.components.diaphragm import centre_deflection, chamber_compliance
+
+GAS, EXPONENT, REST = 3e-10, 1.2, 1.5e5
+
+
+@pytest.mark.parametrize("pressure", [2e4, 1e5, 3e5])
+def test_the_gas_gives_as_its_polytropic_volume_shrinks(pressure: float) -> None:
+    def volume(p: float) -> float:
+        return GAS * (REST / p) ** (1.0 / EXPONENT)
+
+    slope = (volume(pressure - 1.0) - volume(pressure + 1.0)) / 2.0
+    found = float(chamber_compliance(pressure, 1e-13, 2e-16, GAS, EXPONENT, REST))
+    assert found - 1e-13 - 2e-16 == pytest.approx(slope, rel=1e-6)
+
+
+def test_gas_softens_a_chamber_most_where_pressure_is_low() -> None:
+    low, high = (float(chamber_compliance(p, 1e-13, 2e-16, GAS, EXPONENT, REST)) for p in (1e4, 3e5))
+    assert low > 10.0 * high - 9.0 * (1e-13 + 2e-16)
+
+
+def test_pressure_bends_the_centre_back() -> None:
+    assert centre_deflection(100.0, 1e4, 8.38e-8, 5.193e-10) < centre_deflection(100.0, 0.0, 8.38e-8, 5.193e-10)
