@@ -177,7 +177,7 @@ def what_is_not_told(fits: ClassFits, found: Mapping[str, Severity], *, pressure
         said.append("bulk modulus is not visible under this drive")
     flow, speed = found["leakage_flow"], found["velocity_lost"]
     low, high = speed.ci95
-    lost = f": the velocity lost, {speed.value:.0f} % ({low:.0f} to {high:.0f}), is what the log determines"
+    lost = f": the velocity lost, {speed.value:z.1f} % ({low:z.1f} to {high:z.1f}), is what the log determines"
     lost = lost if np.isfinite(speed.value) else ""
     if not pressure:
         said.append(
