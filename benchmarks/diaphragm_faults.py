@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.targets import misses, say
 from estimation.diaphragm_motor import estimate_motor
 from estimation.diaphragm_motor_card import flow_change, motor_card
 from estimation.diaphragm_motor_signature import GAIN_TOLERANCE, TOLERANCE, logged_signature
@@ -46,17 +47,6 @@ SINGLE: Mapping[str, float] = {
 
 TOGETHER = frozenset({"friction", "load"})
 """What no sensor of the motor tells apart."""
-
-misses: list[str] = []
-
-
-def say(what: str, value: float, bound: float, *, most: bool = True) -> None:
-    """Print a figure beside its target, and note it if it falls short."""
-    met = value <= bound if most else value >= bound
-    word = "at most" if most else "at least"
-    print(f"{'met   ' if met else 'MISSED'} {what}: {value:.4g} (wanted: {word} {bound:g})")
-    if not met:
-        misses.append(what)
 
 
 def logged(motor: DiaphragmMotorParameters | Schedule, seed: int, seconds: float = 0.2) -> Record:

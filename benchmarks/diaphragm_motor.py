@@ -6,13 +6,12 @@ at 1e-9. A peer counts at the loosest tolerance whose error is no larger than ou
 """
 
 import argparse
-import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from scipy import integrate
 
+from benchmarks.targets import misses, say, timed
 from plant.diaphragm_motor import FLOWS, SIDE_B, MotorRow, at_rest, deflections, gathered, motor_derivative, motor_row
 from plant.diaphragm_motor_flow import operate, pump_alone
 from plant.diaphragm_motor_parameters import DiaphragmMotorParameters
@@ -32,25 +31,6 @@ LADDER = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 1e-6)
 
 METHODS: tuple[Method, ...] = ("odeint", "LSODA")
 """Scipy's solvers; its BDF and Radau stop on a Jacobian that is not finite."""
-
-misses: list[str] = []
-
-
-def say(what: str, value: float, bound: float, *, most: bool = True) -> None:
-    """Print a figure beside its target, and note it if it falls short."""
-    met = value <= bound if most else value >= bound
-    print(
-        f"{'met   ' if met else 'MISSED'} {what}: {value:.4g} (wanted: {'at most' if most else 'at least'} {bound:g})"
-    )
-    if not met:
-        misses.append(what)
-
-
-def timed(work: Callable[[], Any]) -> tuple[float, Any]:
-    """Return the processor time that some work took [s], and its result."""
-    start = time.process_time()
-    found = work()
-    return time.process_time() - start, found
 
 
 def physics() -> None:

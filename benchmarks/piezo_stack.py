@@ -7,8 +7,6 @@ other lines, reeds and discharge. The public benchmark takes part where its data
 
 import argparse
 import os
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from benchmarks.targets import misses, say, timed
 from estimation.bouc_wen import LOOP, fit_stack_loop
 from estimation.bouc_wen_oscillator import fit_oscillator, linear_start, simulate_oscillator
 from estimation.piezo_stack import NORMAL_95, estimate_stack, stack_bounds
@@ -41,25 +40,6 @@ SCALE = np.array(
     [1e-5, 0.02, 2e3, 1e-6, 1e-9, 1e-4, 0.1, 1e-4, 0.1, 1e-9, 1e-5, 1e-9, 1e-3, 0.1, 1e-9, 1e-5, 1e-9, 1e-5, 1e-9, 70.0]
 )
 """How much each state changes, the drive last [SI]."""
-
-misses: list[str] = []
-
-
-def say(what: str, value: float, bound: float, *, most: bool = True) -> None:
-    """Print a figure beside its target, and note it if it falls short."""
-    met = value <= bound if most else value >= bound
-    print(
-        f"{'met   ' if met else 'MISSED'} {what}: {value:.4g} (wanted: {'at most' if most else 'at least'} {bound:g})"
-    )
-    if not met:
-        misses.append(what)
-
-
-def timed(work: Callable[[], Any]) -> tuple[float, Any]:
-    """Return the processor time that some work took [s], and its result."""
-    start = time.process_time()
-    found = work()
-    return time.process_time() - start, found
 
 
 def flows() -> None:
