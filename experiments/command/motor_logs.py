@@ -15,6 +15,7 @@ from estimation.diaphragm_motor_track import NORMAL_95
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, run_logs
 from experiments.command.options import MOTOR, load_columns, require_one_of
+from experiments.command.plant_logs import quantities_shown
 from experiments.command.streams import clauses, short_names, table
 from faults.diaphragm_motor import MOTOR_FAULTS
 from faults.diaphragm_motor_diagnosis import HEALTHY, Match, MotorDiagnosis, diagnose_motor
@@ -108,7 +109,7 @@ def motor_logs_command(
         return {**NOTHING, **work(_read(log, mapping), motor, calibration), **chosen}
 
     batch = run_logs(logs, one, {**NOTHING, **chosen}, "diagnosing" if diagnosing else "estimating")
-    finish(batch, _faults_shown if diagnosing else _quantities_shown, as_json=as_json, out=out)
+    finish(batch, _faults_shown if diagnosing else quantities_shown, as_json=as_json, out=out)
 
 
 def _read(log: Path, mapping: Mapping[str, str]) -> Record:
@@ -240,17 +241,6 @@ def _finding(match: Match) -> str:
     unit = "" if fault.unit == "1" else f" {fault.unit}"
     name = match.name.replace("_", " ")
     return f"{name}: {fault.meaning}: {match.severity:.3g}{unit}, 95 % interval {low:.3g} to {high:.3g}{unit}"
-
-
-def _quantities_shown(results: Sequence[Result]) -> "Iterable[RenderableType]":
-    for result in results:
-        shown = table("quantity", "value", "95 % interval", "unit", title=result["file"])
-        for name, entry in result["quantities"].items():
-            words = "-" if entry["ci95"] is None else f"{entry['ci95'][0]:.4g} to {entry['ci95'][1]:.4g}"
-            value = "-" if entry["value"] is None else f"{entry['value']:.4g}"
-            shown.add_row(name.replace("_", " "), value, words, entry["unit"])
-        yield shown
-        yield f"{result['file']}: {result['outcome'].replace('_', ' ')}: {result['message']}"
 
 
 def _faults_shown(results: Sequence[Result]) -> "Iterable[RenderableType]":

@@ -1,9 +1,15 @@
 """`estimate` and `diagnose` with `--plant`: logs of actuators with a drive, sensors and faults of their own."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from experiments.command.json_output import Result
 from experiments.command.options import MOTOR, STACK, refuse_given, require_one_of
+from experiments.command.streams import table
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
 
 
 def plant_logs_command(
@@ -79,3 +85,26 @@ def plant_logs_command(
         out=out,
         as_json=as_json,
     )
+
+
+def quantities_shown(results: Sequence[Result]) -> "Iterable[RenderableType]":
+    """Show what was estimated of each log: a table of quantities with their intervals, and the outcome in words.
+
+    Parameters
+    ----------
+    results : sequence of Result
+        One a log, with ``quantities``.
+
+    Yields
+    ------
+    RenderableType
+        For the terminal.
+    """
+    for result in results:
+        shown = table("quantity", "value", "95 % interval", "unit", title=result["file"])
+        for name, entry in result["quantities"].items():
+            words = "-" if entry["ci95"] is None else f"{entry['ci95'][0]:.4g} to {entry['ci95'][1]:.4g}"
+            value = "-" if entry["value"] is None else f"{entry['value']:.4g}"
+            shown.add_row(name.replace("_", " "), value, words, entry["unit"])
+        yield shown
+        yield f"{result['file']}: {result['outcome'].replace('_', ' ')}: {result['message']}"

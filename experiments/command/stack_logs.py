@@ -11,6 +11,7 @@ from estimation.piezo_stack_runs import DRIVE, STACK_CHANNELS
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, run_logs
 from experiments.command.options import load_columns
+from experiments.command.plant_logs import quantities_shown
 from experiments.command.streams import clauses, short_names, table
 from faults.conditions import find_condition
 from faults.piezo_stack_diagnosis import MOST_MISFIT, calibrated_stack, diagnose_stack
@@ -119,7 +120,7 @@ def stack_logs_command(
         return {**NOTHING, **work(_read(log, mapping), healthy, channels), **chosen}
 
     batch = run_logs(logs, one, {**NOTHING, **chosen}, "diagnosing" if diagnosing else "estimating")
-    finish(batch, _conditions_shown if diagnosing else _quantities_shown, as_json=as_json, out=out)
+    finish(batch, _conditions_shown if diagnosing else quantities_shown, as_json=as_json, out=out)
 
 
 def _channels(sensors: str) -> tuple[str, ...]:
@@ -192,17 +193,6 @@ def _quantities(found: StackEstimate, healthy: PiezoStackParameters) -> dict[str
             "ci95": list(found.interval(name)) if told else None,
         }
     return entries
-
-
-def _quantities_shown(results: Sequence[Result]) -> "Iterable[RenderableType]":
-    for result in results:
-        shown = table("quantity", "value", "95 % interval", "unit", title=result["file"])
-        for name, entry in result["quantities"].items():
-            words = "-" if entry["ci95"] is None else f"{entry['ci95'][0]:.4g} to {entry['ci95'][1]:.4g}"
-            value = "-" if entry["value"] is None else f"{entry['value']:.4g}"
-            shown.add_row(name.replace("_", " "), value, words, entry["unit"])
-        yield shown
-        yield f"{result['file']}: {result['outcome'].replace('_', ' ')}: {result['message']}"
 
 
 def _conditions_shown(results: Sequence[Result]) -> "Iterable[RenderableType]":
