@@ -16,6 +16,7 @@ from estimation.iterated_smoother import LONGEST
 from estimation.measurement_noise import measurement_variances
 from estimation.model import ProcessModel
 from estimation.run import METHODS, Estimate, available_channels, require_known, run_filter
+from estimation.sensor_check import PRESSURE
 from estimation.tuning import Tuning, tune
 from plant.eha import EhaParameters
 from plant.errors import HydrostateError
@@ -27,9 +28,6 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "air": ("air_fraction",),
 }
 """Short names for states that belong together."""
-
-PRESSURE = "differential_pressure_pa"
-"""The channel, and the state of its name."""
 
 WALK = 0.05
 """Random walk of a further state that lets it follow a change: of its logarithm, in a second [1/s^(1/2)]."""

@@ -1,7 +1,7 @@
 """Runs of the diaphragm motor: its drive, its seven sensing electrodes, the encoder on its rod (sections 2 and 7)."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from math import ceil, isfinite, pi
 from types import MappingProxyType
@@ -14,9 +14,10 @@ from scipy.signal import lfilter
 from plant.diaphragm_motor import POSITION, STATES, MotorRow, at_rest, deflections, motor_row, motor_step
 from plant.diaphragm_motor_parameters import DIAPHRAGMS, DiaphragmMotorParameters
 from plant.drive_limits import sample_count
-from plant.errors import DriveError, HydrostateError, RigError
+from plant.errors import DriveError, HydrostateError
 from plant.integrate import compile_trajectory
 from plant.record import Record
+from plant.sensors import require_not_negative
 from plant.units import SI
 
 Array: TypeAlias = NDArray[np.float64]
@@ -70,10 +71,7 @@ class MotorSensors:
     position_m: Annotated[float, SI("m", "encoder on the rod", JUDGED)] = 2e-6
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not isfinite(value) or value < 0.0:
-                raise RigError(f"{field.name} must be finite and not negative, got {value!r}")
+        require_not_negative(self)
 
 
 BENCH_SENSORS = MotorSensors()

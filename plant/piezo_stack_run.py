@@ -1,7 +1,7 @@
 """Runs of the piezo-stack actuator: its drive, its sensors, and the flow that a bench infers (test-bench section)."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from math import isfinite
 from types import MappingProxyType
 from typing import Annotated, TypeAlias
@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from plant.components.piezo_stack import stack_force
 from plant.drive_limits import require_frequency, sample_count
-from plant.errors import DriveError, HydrostateError, RigError
+from plant.errors import DriveError, HydrostateError
 from plant.piezo_stack import StackValues, stack_pressures
 from plant.piezo_stack_parameters import PiezoStackParameters
 from plant.piezo_stack_trajectory import NAME, run_stack
 from plant.record import Record
+from plant.sensors import require_not_negative
 from plant.units import SI
 
 Array: TypeAlias = NDArray[np.float64]
@@ -56,10 +57,7 @@ class StackSensors:
     chamber_pressure_pa: Annotated[float, SI("Pa", "pressure sensor in the pump chamber", OBSERVED)] = 1e4
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not isfinite(value) or value < 0.0:
-                raise RigError(f"{field.name} must be finite and not negative, got {value!r}")
+        require_not_negative(self)
 
 
 BENCH_SENSORS = StackSensors()

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from math import isfinite
 from types import MappingProxyType
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,29 @@ from plant.record import Record
 from plant.units import SI
 
 BENCH_NOTES = "reference bench logs"
+
+
+def require_not_negative(sensors: Any) -> None:
+    """Refuse a set of sensors with a number that is negative or not finite.
+
+    Parameters
+    ----------
+    sensors : dataclass instance
+        Its noises and quanta, each in its own unit; what is true or false is left alone.
+
+    Raises
+    ------
+    RigError
+        If one is, with its name.
+
+    Examples
+    --------
+    >>> require_not_negative(Sensors())
+    """
+    for field in fields(sensors):
+        value = getattr(sensors, field.name)
+        if not isinstance(value, bool) and (not isfinite(value) or value < 0.0):
+            raise RigError(f"{field.name} must be finite and not negative, got {value!r}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,12 +76,7 @@ class Sensors:
     pressure: Annotated[bool, SI("1", "differential pressure is logged", "section 2")] = True
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, bool):
-                continue
-            if not isfinite(value) or value < 0.0:
-                raise RigError(f"{field.name} must be finite and not negative, got {value!r}")
+        require_not_negative(self)
         if self.velocity_window == 0.0:
             raise RigError("velocity_window must be positive, got 0.0 s")
 
