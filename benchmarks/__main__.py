@@ -32,13 +32,18 @@ FITS = ("fit_diagnosis",)
 WITH_PEERS = ("identification_peers",)
 """Those that need environments of other tools, which `make peers` sets up."""
 
+OF_COMMITS = ("same_numbers",)
+"""Those that compare commits, named behind the script's name."""
+
+ALL = (*NAMES, *FITS, *WITH_PEERS, *OF_COMMITS)
+
 
 def main() -> int:
     """Run the named benchmark with its own arguments, or every one with its defaults."""
     if len(sys.argv) > 1:
-        if sys.argv[1] not in (*NAMES, *FITS, *WITH_PEERS):
+        if sys.argv[1] not in ALL:
             print(
-                f"benchmark must be one of {', '.join((*NAMES, *FITS, *WITH_PEERS))}, got {sys.argv[1]!r}",
+                f"benchmark must be one of {', '.join(ALL)}, got {sys.argv[1]!r}",
                 file=sys.stderr,
             )
             return 2

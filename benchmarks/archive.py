@@ -1,6 +1,6 @@
 """An archive of 1,000 CSV logs, three of them bad, diagnosed in one command; and how fast they are read.
 
-Reading is that of `plant.csv_log` beside pandas' `read_csv` as it comes, on the same files in turn.
+Reading is that of `plant.log.csv` beside pandas' `read_csv` as it comes, on the same files in turn.
 """
 
 import argparse
@@ -17,12 +17,12 @@ import numpy as np
 import pandas as pd
 
 from faults.conditions import CONDITIONS, parameters_for
-from plant.columns import resolve_columns
-from plant.csv_log import read_csv
-from plant.record_files import write_record
-from plant.sensors import BENCH
-from plant.signals import make_drive
-from plant.simulate import CIRCUIT, simulate
+from plant.eha.drives import make_drive
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.columns import resolve_columns
+from plant.log.csv import read_csv
+from plant.log.files import write_record
+from plant.sensors.sensors import BENCH
 
 SAMPLE_TIME = 1e-3
 WANTED_SPEED = 5.0

@@ -22,21 +22,21 @@ from threading import Event
 
 import numpy as np
 
-from estimation.batch import filter_batch
-from estimation.eha import ACCELERATION_FORM, BULK_MODULUS
-from estimation.filter import FilterProblem
-from estimation.first_belief import START_STD, first_belief
-from estimation.run import filter_problem
+from estimation.engine.contract import FilterProblem
+from estimation.filters.batch import filter_batch
+from estimation.filters.run import filter_problem
+from estimation.log_checks.first_belief import START_STD, first_belief
+from estimation.models.eha_forms import ACCELERATION_FORM, BULK_MODULUS
 from experiments.batch.cases import Plan, plan_study
 from experiments.batch.part_store import open_store
 from experiments.batch.runner import manifest_of, run_batch
 from experiments.batch.study_file import parse_study
 from experiments.batch.work import TRACK_ROWS
-from experiments.executors import open_executor
+from experiments.running.executors import open_executor
 from faults.conditions import CONDITIONS, parameters_for
-from plant.sensors import BENCH, measure
-from plant.signals import make_drive
-from plant.simulate import REDUCED, simulate
+from plant.eha.drives import make_drive
+from plant.eha.simulate import REDUCED, simulate
+from plant.sensors.sensors import BENCH, measure
 
 STARTS = tuple(0.5e8 * k for k in range(10))
 SAMPLE_TIME = 1e-4

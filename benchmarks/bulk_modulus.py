@@ -9,13 +9,14 @@ from itertools import product
 
 import pandas as pd
 
-from estimation.bulk_modulus import Outcome, estimate_bulk_modulus
-from experiments.executors import side_by_side
-from experiments.streams import stream
+from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from estimation.finding import Outcome
+from experiments.running.executors import side_by_side
+from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
-from plant.sensors import BENCH
-from plant.signals import make_drive
-from plant.simulate import PLANTS, simulate
+from plant.eha.drives import make_drive
+from plant.eha.simulate import PLANTS, simulate
+from plant.sensors.sensors import BENCH
 
 STARTS = (0.0, 0.5e8, 1e8, 2e8, 3e8, 4e8, 5e8)
 

@@ -16,13 +16,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from benchmarks.peers.stiff_solvers import Method, reference_trajectory
 from faults.conditions import CONDITIONS, parameters_for
-from plant.circuit import circuit_derivative, circuit_scales
-from plant.circuit_parameters import CircuitParameters, circuit_of
-from plant.integrate import parameter_row
-from plant.reference_solver import Method, reference_trajectory
-from plant.signals import DRIVES, make_drive
-from plant.simulate import CIRCUIT, run_plant
+from plant.eha.circuit import circuit_derivative, circuit_scales
+from plant.eha.circuit_parameters import CircuitParameters, circuit_of
+from plant.eha.drives import DRIVES, make_drive
+from plant.eha.simulate import CIRCUIT, run_plant
+from plant.solvers.steps import parameter_row
 
 Array = NDArray[np.float64]
 

@@ -2,11 +2,11 @@
 
 import argparse
 
-from experiments.frames import cell
-from experiments.studies.settings import StudySettings
-from experiments.studies.transfer_functions import identification_study
-from experiments.studies.validation import classification_study, validation_study
-from plant.eha import EhaParameters
+from experiments.nine_conditions.settings import StudySettings
+from experiments.nine_conditions.transfer_functions import identification_study
+from experiments.nine_conditions.validation import classification_study, validation_study
+from experiments.page.frames import cell
+from plant.eha.model import EhaParameters
 
 WANTED = {
     ("mathematical, pressure logged", "nominal"): 1.0,
@@ -25,8 +25,8 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     settings = StudySettings(seed=options.seed, seeds=options.seeds)
     rig = EhaParameters()
-    library, _ = identification_study(rig, settings, lambda: None)
-    summary = classification_study(rig, library, settings, lambda: None)["classification"]
+    library, _ = identification_study(rig, settings)
+    summary = classification_study(rig, library, settings)["classification"]
     print(summary.to_string(index=False))
     rmse, _ = validation_study(rig, library, settings)
     print(rmse.to_string(index=False))

@@ -14,20 +14,20 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from estimation.bounds import at_bulk_modulus, bulk_modulus_bound
-from estimation.eha import BULK_MODULUS, FORMS
-from estimation.first_belief import PRESSURE_NOISE_LOGGED, START_STD, first_belief
-from estimation.measurement_noise import measurement_variances
-from estimation.run import METHODS, available_channels, run_filter
-from experiments.executors import side_by_side
-from experiments.streams import stream
+from estimation.filters.run import METHODS, available_channels, run_filter
+from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, START_STD, first_belief
+from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.models.eha_forms import BULK_MODULUS, FORMS
+from estimation.trust.bounds import at_bulk_modulus, bulk_modulus_bound
+from experiments.running.executors import side_by_side
+from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
-from plant.circuit_parameters import CircuitParameters, circuit_of
-from plant.eha import EhaParameters
-from plant.record import Record
-from plant.sensors import BENCH
-from plant.signals import make_drive
-from plant.simulate import PLANTS, simulate
+from plant.eha.circuit_parameters import CircuitParameters, circuit_of
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import PLANTS, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
 
 Array = NDArray[np.float64]
 

@@ -11,11 +11,11 @@ from time import process_time
 
 import numpy as np
 
-from experiments.studies.watching import PIECE, SAMPLE_TIME, CircuitStream, detect_fault, false_alarms, learnt
-from faults.detection import LEARNING, Watch
-from faults.detection_events import Alarm
-from faults.detection_scores import alarm_rate, median_delay
-from plant.circuit_parameters import CircuitParameters
+from benchmarks.scores import alarm_rate, median_delay
+from benchmarks.watching import PIECE, SAMPLE_TIME, CircuitStream, detect_fault, false_alarms, learnt
+from faults.watch.events import Alarm
+from faults.watch.watch import LEARNING, Watch
+from plant.eha.circuit_parameters import CircuitParameters
 
 FAULTS = ("minor_leakage", "minor_friction")
 LONGEST_DELAY = 0.5

@@ -1,8 +1,8 @@
 """Diagnosis against its targets: accuracy, calibration, severity, unknowns, foreign logs, speed.
 
-The population is `faults.population`: the circuit plant, rig sensors, nine steps and a random binary signal of 10 s,
-test seeds alone. ``--seeds`` and ``--draws`` make it smaller, no draws leave the limit out. Foreign logs are read from
-``$HYDROSTATE_SHARED/bench``.
+The population is `benchmarks.population`: the circuit plant, rig sensors, nine steps and a random binary signal of 10
+s, test seeds alone. ``--seeds`` and ``--draws`` make it smaller, no draws leave the limit out. Foreign logs are read
+from ``$HYDROSTATE_SHARED/bench``.
 """
 
 import argparse
@@ -22,17 +22,17 @@ from benchmarks.diagnosis_checks import (
     stuck_checks,
     unknown_checks,
 )
-from experiments.studies.identification_library import read_library
-from faults.bank import mathematical_bank
-from faults.circuit_runs import coordinates_of
-from faults.class_fit import Actuator
-from faults.classify import score_mathematical
-from faults.diagnosis import Diagnosis, diagnose_log
-from faults.evidence import EVIDENCES
-from faults.population import TEST, Drawn, draw_logs
-from faults.scores import calibration_error, share_interval
-from faults.severity import severities_at
-from plant.eha import EhaParameters
+from benchmarks.population import TEST, Drawn, draw_logs
+from benchmarks.scores import calibration_error, share_interval
+from experiments.library.library import read_library
+from faults.diagnosis.circuit_runs import coordinates_of
+from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.diagnose import Diagnosis, diagnose_log
+from faults.diagnosis.evidence import EVIDENCES
+from faults.diagnosis.rmse import score_mathematical
+from faults.diagnosis.severity import severities_at
+from faults.eha.bank import mathematical_bank
+from plant.eha.model import EhaParameters
 
 PRESSURE = "differential_pressure_pa"
 

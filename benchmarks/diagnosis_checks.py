@@ -11,21 +11,30 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from experiments.studies.identification_library import read_library
-from faults.circuit_runs import Blocks, blocks_of, coordinates_of, predicted
-from faults.class_fit import Actuator
+from benchmarks.population import (
+    DRIVES,
+    DURATION,
+    OUT_OF_MODEL,
+    SAMPLE_TIME,
+    TEST,
+    TRAINING,
+    draw_logs,
+    draw_parameters,
+)
+from experiments.library.library import read_library
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis import diagnose_log
-from faults.inject import abrupt
-from faults.population import DRIVES, DURATION, OUT_OF_MODEL, SAMPLE_TIME, TEST, TRAINING, draw_logs, draw_parameters
-from faults.severity import severities_at
-from plant.eha import EhaParameters
-from plant.integrate import parameter_row
-from plant.record import Record
-from plant.record_files import read_record
-from plant.sensors import RIG
-from plant.signals import make_drive
-from plant.simulate import CIRCUIT, simulate, simulate_each
+from faults.diagnosis.circuit_runs import Blocks, blocks_of, coordinates_of, predicted
+from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.diagnose import diagnose_log
+from faults.diagnosis.severity import severities_at
+from faults.eha.inject import abrupt
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate, simulate_each
+from plant.log.files import read_record
+from plant.log.record import Record
+from plant.sensors.sensors import RIG
+from plant.solvers.steps import parameter_row
 
 Array = NDArray[np.float64]
 

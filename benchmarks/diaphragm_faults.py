@@ -14,15 +14,15 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.targets import misses, say
-from estimation.diaphragm_motor import estimate_motor
-from estimation.diaphragm_motor_card import flow_change, motor_card
-from estimation.diaphragm_motor_signature import GAIN_TOLERANCE, TOLERANCE, logged_signature
-from faults.diaphragm_motor import MOTOR_FAULTS, motor_with_fault
-from faults.diaphragm_motor_diagnosis import HEALTHY, TOLD_APART, MotorDiagnosis, diagnose_motor, separations
-from plant.diaphragm_motor_flow import pump_alone
-from plant.diaphragm_motor_parameters import DiaphragmMotorParameters
-from plant.diaphragm_motor_run import BENCH_SENSORS, SAMPLE_TIME, Schedule, motor_drive, simulate_motor
-from plant.record import Record
+from estimation.diaphragm_motor.card import flow_change, motor_card
+from estimation.diaphragm_motor.estimate import estimate_motor
+from estimation.diaphragm_motor.signature import GAIN_TOLERANCE, TOLERANCE, logged_signature
+from faults.diaphragm_motor.diagnose import TOLD_APART, MotorDiagnosis, diagnose_motor, separations
+from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS, motor_with_fault
+from plant.diaphragm_motor.flow import pump_alone
+from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
+from plant.diaphragm_motor.run import BENCH_SENSORS, SAMPLE_TIME, Schedule, motor_drive, simulate_motor
+from plant.log.record import Record
 
 FREQUENCY, SWING, LOAD = 480.0, 200.0, 10.0
 MOTOR = DiaphragmMotorParameters(load_force=LOAD)

@@ -11,12 +11,21 @@ from typing import Any
 import numpy as np
 from scipy import integrate
 
+from benchmarks.peers.stiff_solvers import Method, reference_trajectory
 from benchmarks.targets import misses, say, timed
-from plant.diaphragm_motor import FLOWS, SIDE_B, MotorRow, at_rest, deflections, gathered, motor_derivative, motor_row
-from plant.diaphragm_motor_flow import operate, pump_alone
-from plant.diaphragm_motor_parameters import DiaphragmMotorParameters
-from plant.diaphragm_motor_run import LONGEST_STEP, RAMP, motor_drive, run_motor
-from plant.reference_solver import Method, reference_trajectory
+from plant.diaphragm_motor.flow import operate, pump_alone
+from plant.diaphragm_motor.model import (
+    FLOWS,
+    SIDE_B,
+    MotorRow,
+    at_rest,
+    deflections,
+    gathered,
+    motor_derivative,
+    motor_row,
+)
+from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
+from plant.diaphragm_motor.run import LONGEST_STEP, RAMP, motor_drive, run_motor
 
 HEALTHY = DiaphragmMotorParameters()
 PUMP = pump_alone(HEALTHY)

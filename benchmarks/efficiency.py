@@ -21,24 +21,24 @@ import numpy as np
 import pandas as pd
 from scipy.stats import beta, chi2
 
-from estimation.augment import augmented, augmented_prior
-from estimation.bounds import bulk_modulus_bound
-from estimation.bulk_modulus import estimate_bulk_modulus
-from estimation.bulk_modulus_estimate import LARGEST_BOUND
-from estimation.eha import BULK_MODULUS, PRESSURE_FORM
-from estimation.ekf import ekf
-from estimation.filter_estimate import GROUPS
-from estimation.first_belief import START_STD, first_belief
-from estimation.iterated_smoother import iterated_smoother
-from estimation.run import run_filter
-from experiments.executors import side_by_side
-from experiments.streams import stream
+from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from estimation.eha.by_filter import GROUPS
+from estimation.eha.result import LARGEST_BOUND
+from estimation.filters.ekf import ekf
+from estimation.filters.iterated_smoother import iterated_smoother
+from estimation.filters.run import run_filter
+from estimation.log_checks.first_belief import START_STD, first_belief
+from estimation.models.augment import augmented, augmented_prior
+from estimation.models.eha_forms import BULK_MODULUS, PRESSURE_FORM
+from estimation.trust.bounds import bulk_modulus_bound
+from experiments.running.executors import side_by_side
+from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
-from plant.eha import EhaParameters
-from plant.record import Record
-from plant.sensors import BENCH, noise_variances
-from plant.signals import make_drive
-from plant.simulate import LUMPED, simulate
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import LUMPED, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH, noise_variances
 
 SAMPLE_TIME, DURATION = 1e-3, 10.0
 FIRST_GUESS = 3e8

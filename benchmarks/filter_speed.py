@@ -22,23 +22,22 @@ from numpy.typing import NDArray
 
 from benchmarks.peers import cpp_lanes, filterpy_user
 from benchmarks.peers.acceleration_form import coefficients
-from estimation.algebra import EKF
-from estimation.batch import aligned, filter_batch
-from estimation.compiled import constant_row
-from estimation.eha import ACCELERATION_FORM, FORMS
-from estimation.ekf import ekf
-from estimation.filter import FilterProblem
-from estimation.filterpy_bridge import filterpy_ekf
-from estimation.first_belief import first_belief
-from estimation.kernels import LANES, compile_kernel
-from estimation.layout import halves_of, layout
-from estimation.run import filter_problem
+from estimation.engine.contract import FilterProblem
+from estimation.engine.kernels import LANES, compile_kernel
+from estimation.engine.layout import halves_of, layout
+from estimation.engine.runner import constant_row
+from estimation.filters.batch import aligned, filter_batch
+from estimation.filters.ekf import EKF, ekf
+from estimation.filters.filterpy_bridge import filterpy_ekf
+from estimation.filters.run import filter_problem
+from estimation.log_checks.first_belief import first_belief
+from estimation.models.eha_forms import ACCELERATION_FORM, FORMS
 from plant.compiled.expression import ordered
 from plant.compiled.simplify import FUSED
-from plant.eha import EhaParameters
-from plant.sensors import BENCH
-from plant.signals import make_drive
-from plant.simulate import REDUCED, simulate
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import REDUCED, simulate
+from plant.sensors.sensors import BENCH
 
 Array = NDArray[np.float64]
 

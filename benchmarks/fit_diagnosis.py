@@ -1,6 +1,6 @@
 """Fit what diagnosis ships: weights of the evidences and widths of the intervals, on simulated training seeds alone.
 
-Writes ``faults/calibration.json`` (``--out`` another file). Test seeds and foreign logs are never looked at.
+Writes ``faults/diagnosis/calibration.json`` (``--out`` another file). Test seeds and foreign logs are never looked at.
 """
 
 import argparse
@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from experiments.studies.identification_library import read_library
-from faults.circuit_runs import coordinates_of
-from faults.class_fit import Actuator
+from benchmarks.population import TRAINING, draw_logs
+from experiments.library.library import read_library
 from faults.conditions import CONDITIONS
-from faults.evidence import EVIDENCES, weigh
-from faults.population import TRAINING, draw_logs
-from faults.severity import UNITS, severities, severities_at
-from plant.eha import EhaParameters
+from faults.diagnosis.circuit_runs import coordinates_of
+from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.evidence import EVIDENCES, weigh
+from faults.diagnosis.severity import UNITS, severities, severities_at
+from plant.eha.model import EhaParameters
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ def main(arguments: list[str]) -> int:
     """Fit and write; return 0."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=24)
-    parser.add_argument("--out", type=Path, default=Path("faults/calibration.json"))
+    parser.add_argument("--out", type=Path, default=Path("faults/diagnosis/calibration.json"))
     options = parser.parse_args(arguments)
     seeds = range(TRAINING, TRAINING + options.seeds)
     found: dict[str, object] = {}
@@ -53,7 +53,7 @@ def main(arguments: list[str]) -> int:
         print(name, len(truths), "logs", found[name])
     found["provenance"] = {
         "script": "python -m benchmarks fit_diagnosis",
-        "population": "faults.population.draw_logs",
+        "population": "benchmarks.population.draw_logs",
         "first_seed": TRAINING,
         "seeds": options.seeds,
         "spread, and whether the circuit is of the kind that is fitted": [list(one) for one in POPULATIONS],

@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from estimation.bulk_modulus import BulkModulusEstimate, estimate_bulk_modulus
-from faults.bank import mathematical_bank
-from faults.classify import score_mathematical
+from estimation.eha.bulk_modulus import BulkModulusEstimate, estimate_bulk_modulus
 from faults.conditions import CONDITIONS
-from plant.eha import EhaParameters
-from plant.record import Record
-from plant.record_files import read_record
+from faults.diagnosis.rmse import score_mathematical
+from faults.eha.bank import mathematical_bank
+from plant.eha.model import EhaParameters
+from plant.log.files import read_record
+from plant.log.record import Record
 
 HEALTHY = EhaParameters()
 

@@ -13,10 +13,10 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.identification_data import NOISES, TABLE_6, Case, random_system, table6_case
 from estimation.identification import LinearModel, fit_output_error
-from estimation.identification.criterion import Structure, sensitivities
-from estimation.identification.experiments import Experiments
-from estimation.identification.output_error import descend_from
-from estimation.identification.profile_interval import dc_gain_interval
+from estimation.identification.fit.output_error import descend_from
+from estimation.identification.fit.profile_interval import dc_gain_interval
+from estimation.identification.search.criterion import Structure, sensitivities
+from estimation.identification.search.experiments import Experiments
 from plant.errors import LogWarning
 
 FORM = {"n_numerator": 3, "n_denominator": 2}

@@ -27,10 +27,10 @@ from estimation.identification import (
     fit_output_error,
     order_table,
     order_test,
-    validate,
     zero_phase_filter,
 )
-from estimation.identification.inverse_dynamics import fit_rigid_body, force_error
+from estimation.identification.fit.inverse_dynamics import fit_rigid_body, force_error
+from estimation.identification.fit.validate import validate
 from plant.errors import LogWarning
 
 FORM = {"n_numerator": 3, "n_denominator": 2}

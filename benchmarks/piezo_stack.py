@@ -14,25 +14,25 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from benchmarks.bouc_wen_oscillator import OscillatorParameters, fit_oscillator, linear_start, simulate_oscillator
+from benchmarks.peers.stiff_solvers import reference_trajectory
 from benchmarks.targets import misses, say, timed
-from estimation.bouc_wen import LOOP, fit_stack_loop
-from estimation.bouc_wen_oscillator import fit_oscillator, linear_start, simulate_oscillator
-from estimation.piezo_stack import NORMAL_95, estimate_stack, stack_bounds
-from estimation.piezo_stack_filter import filter_stack
-from experiments.studies.piezo_stack import DESIGN_GRID, figure_points, loop_widths, stack_loops, sweep
-from experiments.studies.piezo_stack_hysteresis import NOISE, slow_loop
-from experiments.studies.piezo_stack_quoted import quoted_numbers
+from estimation.finding import NORMAL_95
+from estimation.piezo_stack.bouc_wen import LOOP, fit_stack_loop
+from estimation.piezo_stack.estimate import estimate_stack, stack_bounds
+from estimation.piezo_stack.filter import filter_stack
+from experiments.piezo_stack.flow import DESIGN_GRID, figure_points, loop_widths, stack_loops, sweep
+from experiments.piezo_stack.hysteresis import NOISE, slow_loop
+from experiments.piezo_stack.quoted import quoted_numbers
 from faults.conditions import CONDITIONS
-from faults.piezo_stack import stack_in_condition
-from faults.piezo_stack_diagnosis import calibrated_stack, diagnose_stack
-from plant.bouc_wen import OscillatorParameters
-from plant.piezo_stack import OIL, at_bias, stack_derivative, stack_pressures
-from plant.piezo_stack_flow import mean_flow
-from plant.piezo_stack_parameters import PiezoStackParameters
-from plant.piezo_stack_run import BENCH_SENSORS, FINE_TIME, SAMPLE_TIME, simulate_stack, sine_drive
-from plant.piezo_stack_trajectory import run_stack
-from plant.record import Record
-from plant.reference_solver import reference_trajectory
+from faults.piezo_stack.diagnose import calibrated_stack, diagnose_stack
+from faults.piezo_stack.faults import stack_in_condition
+from plant.log.record import Record
+from plant.piezo_stack.flow import mean_flow
+from plant.piezo_stack.model import OIL, at_bias, stack_derivative, stack_pressures
+from plant.piezo_stack.parameters import PiezoStackParameters
+from plant.piezo_stack.run import BENCH_SENSORS, FINE_TIME, SAMPLE_TIME, simulate_stack, sine_drive
+from plant.piezo_stack.trajectory import run_stack
 
 HEALTHY = PiezoStackParameters(load_mass=10.0)
 PEAK = 275.0
@@ -70,7 +70,7 @@ def numerics() -> None:
 
     def lsoda(tolerance: float) -> np.ndarray:
         options = {"scale": SCALE, "relative_tolerance": tolerance}
-        return reference_trajectory(augmented, start, rate, HEALTHY, FINE_TIME, **options)  # pyright: ignore[reportArgumentType] - any class of named floats serves
+        return reference_trajectory(augmented, start, rate, HEALTHY, FINE_TIME, **options)
 
     def seen(states: np.ndarray) -> tuple[np.ndarray, float]:
         flow = mean_flow(states[:, 12], FINE_TIME, PEAK, HEALTHY.cylinder_area)
@@ -203,7 +203,7 @@ def mismatch(seeds: int) -> None:
             log = log_of(stack_in_condition(other, name), 10 * seed + place)
             right.append(diagnose_stack(log, calibrated).condition == name)
             if seed == 0:
-                warned.append(bool(diagnose_stack(log, p).reasons))
+                warned.append(not diagnose_stack(log, p).gate.passed)
     say(f"right of {len(right)} after calibration [%]", 100.0 * float(np.mean(right)), 95.0, most=False)
     say(f"warned of {len(warned)} without it [%]", 100.0 * float(np.mean(warned)), 100.0, most=False)
 

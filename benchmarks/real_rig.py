@@ -7,7 +7,7 @@ import argparse
 import os
 from pathlib import Path
 
-from experiments.studies.own_classes import BLOCKS, rig_verdicts
+from benchmarks.own_classes import BLOCKS, rig_verdicts
 from plant.errors import HydrostateError
 
 LEAST = 0.97

@@ -11,16 +11,17 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from estimation.bulk_modulus import Outcome, estimate_bulk_modulus
-from experiments.executors import side_by_side
-from experiments.streams import stream
+from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from estimation.finding import Outcome
+from experiments.running.executors import side_by_side
+from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
-from plant.eha import EhaParameters
-from plant.record import Record
-from plant.sensor_faults import SensorFault, with_fault
-from plant.sensors import BENCH, drop_samples
-from plant.signals import make_drive
-from plant.simulate import LUMPED, simulate
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import LUMPED, simulate
+from plant.log.record import Record
+from plant.sensors.faults import SensorFault, with_fault
+from plant.sensors.sensors import BENCH, drop_samples
 
 SAMPLE_TIME, DURATION = 1e-3, 10.0
 FIRST_GUESS = 3e8

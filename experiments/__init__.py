@@ -1,1 +1,49 @@
-"""Studies, published numbers, figures, reports, and the command `hydrostate`."""
+"""Studies, batches, figures, reports, and the command line.
+
+The names that a user needs, each with an example; everything else is found by the names of the files.
+
+```text
+actuator      actuator("piezo-stack").description
+ActuatorKind  ActuatorKind(name="tank", description="a tank", ...)
+ACTUATORS     list(ACTUATORS)
+Answer        answer.to_frame()
+load          load("rmse")
+Log           Log(record, Rig()).estimate()
+main          main()
+```
+"""
+
+from typing import TYPE_CHECKING
+
+from plant.lazy import lazily
+
+if TYPE_CHECKING:
+    from experiments.actuator_kind import ActuatorKind as ActuatorKind
+    from experiments.actuators import ACTUATORS as ACTUATORS
+    from experiments.actuators import actuator as actuator
+    from experiments.cli import main as main
+    from experiments.log_pages.answers import Answer as Answer
+    from experiments.log_pages.log import Log as Log
+    from experiments.published import load as load
+
+_PLACES = {
+    "ACTUATORS": "actuators",
+    "ActuatorKind": "actuator_kind",
+    "Answer": "log_pages.answers",
+    "Log": "log_pages.log",
+    "actuator": "actuators",
+    "load": "published",
+    "main": "cli",
+}
+
+__all__ = [
+    "ACTUATORS",
+    "ActuatorKind",
+    "Answer",
+    "Log",
+    "actuator",
+    "load",
+    "main",
+]
+
+__getattr__ = lazily(__name__, _PLACES)

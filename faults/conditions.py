@@ -6,9 +6,9 @@ from math import isfinite
 from types import MappingProxyType
 from typing import Annotated, Literal, TypeAlias, get_args
 
-from plant.eha import EhaParameters
-from plant.errors import HydrostateError
-from plant.steady_state import steady_state
+from plant.eha.model import EhaParameters
+from plant.eha.steady_state import steady_state
+from plant.errors import HydrostateError, require_known
 from plant.units import SI
 
 Level: TypeAlias = Literal["none", "minor", "major"]
@@ -82,8 +82,7 @@ class Condition:
 
     def __post_init__(self) -> None:
         for axis, level in (("leakage", self.leakage), ("friction", self.friction)):
-            if level not in LEVELS:
-                raise HydrostateError(f"{axis} level must be one of {', '.join(LEVELS)}, got {level!r}")
+            require_known(f"{axis} level", level, LEVELS)
 
 
 def _nine_conditions() -> Mapping[str, Condition]:
@@ -128,8 +127,7 @@ def find_condition(name: str) -> Condition:
     >>> find_condition("minor_leakage").leakage
     'minor'
     """
-    if name not in CONDITIONS:
-        raise HydrostateError(f"condition must be one of {', '.join(CONDITIONS)}, got {name!r}")
+    require_known("condition", name, CONDITIONS)
     return CONDITIONS[name]
 
 

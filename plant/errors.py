@@ -1,12 +1,58 @@
 """What goes wrong at the door, as one family of exceptions whose message is written for the user."""
 
+from collections.abc import Iterable, Sequence
+
+from plant.notes import Note
+
 
 class HydrostateError(ValueError):
-    """A user's input cannot be used; the message says what, what was wanted, and what came."""
+    """A user's input cannot be used; the message says what, what was wanted, and what came.
+
+    Parameters
+    ----------
+    message : str
+        The sentence.
+    source : str, optional
+        The file that it is about, which stands in front of the sentence.
+    """
+
+    def __init__(self, message: str, source: str | None = None) -> None:
+        super().__init__(message if source is None else f"{source}: {message}")
+        self.message = message
+        self.source = source
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.message, self.source)
+
+
+class NoSuchNameError(HydrostateError, AttributeError):
+    """An attribute is asked for that is not there; the message has the nearest one."""
 
 
 class LogError(HydrostateError):
     """A log file cannot be read or trusted."""
+
+
+class MissingColumnError(LogError):
+    """A column that a mapping names is not in the log.
+
+    Parameters
+    ----------
+    channel, column : str
+        The channel, and the column that was wanted for it.
+    known : str
+        The columns that the log has, as a list in words.
+    source : str, optional
+        The file.
+    """
+
+    def __init__(self, channel: str, column: str, known: str, source: str | None = None) -> None:
+        wanted = f"column {column!r} is wanted for {channel}, the log has {known}"
+        super().__init__(f"{wanted}; name one of them as {channel}=NAME:UNIT", source)
+        self.channel, self.column, self.known = channel, column, known
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return MissingColumnError, (self.channel, self.column, self.known, self.source)
 
 
 class RigError(HydrostateError):
@@ -18,8 +64,72 @@ class DriveError(HydrostateError):
 
 
 class LogWarning(UserWarning):
-    """A log was accepted, with something the reader should know."""
+    """A log was accepted, with something the reader should know.
+
+    Parameters
+    ----------
+    note : Note
+        What.
+    source : str, optional
+        The file that it is about, which stands in front of the sentence.
+    """
+
+    def __init__(self, note: Note, source: str | None = None) -> None:
+        super().__init__(str(note) if source is None else f"{source}: {note}")
+        self.note = note
+        self.source = source
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.note, self.source)
 
 
 class CovarianceWarning(LogWarning):
     """A model was fitted whose covariance says too little; what it predicts is not affected."""
+
+
+def require_known(
+    what: str, name: object, known: Iterable[str], error: type[HydrostateError] = HydrostateError
+) -> None:
+    """Refuse a name that is not among those known.
+
+    Parameters
+    ----------
+    what : str
+        What is named.
+    name : object
+        The name.
+    known : iterable of str
+        Those that there are.
+    error : type
+        What is raised.
+
+    Raises
+    ------
+    HydrostateError
+        If the name is not among them.
+    """
+    names = list(known)
+    if name not in names:
+        raise error(f"{what} must be one of {', '.join(names)}, got {name!r}")
+
+
+def require_each_known(what: str, names: Sequence[str], known: Sequence[str]) -> None:
+    """Refuse names of which one is not among those known, or comes twice.
+
+    Parameters
+    ----------
+    what : str
+        What is named.
+    names : sequence of str
+        The names.
+    known : sequence of str
+        Those that there are.
+
+    Raises
+    ------
+    HydrostateError
+        If one is not among them, or comes twice.
+    """
+    for i, name in enumerate(names):
+        if name not in known or name in names[:i]:
+            raise HydrostateError(f"{what} must be one of {', '.join(known)}, once, got {name!r}")

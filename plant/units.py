@@ -3,11 +3,14 @@
 Inside the project everything is SI; a unit stands only in a name's suffix (``speed_rpm``) or in an `SI` note.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
+from math import isfinite
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
+
+from plant.errors import RigError
 
 if TYPE_CHECKING:
     import pint
@@ -65,7 +68,7 @@ def notes(parameter_class: type) -> Mapping[str, SI]:
 
     Examples
     --------
-    >>> from plant.eha import EhaParameters
+    >>> from plant.eha.model import EhaParameters
     >>> notes(EhaParameters)["piston_area"].unit
     'm^2'
     """
@@ -79,6 +82,64 @@ def notes(parameter_class: type) -> Mapping[str, SI]:
             raise TypeError(f"{parameter_class.__name__}.{field.name} must carry an SI note, got {hint}")
         found[field.name] = note
     return found
+
+
+def require_number(name: str, value: object, *, signed: bool = False, zero: bool = False) -> None:
+    """Refuse a parameter that is not a finite number, or not of its sign.
+
+    Parameters
+    ----------
+    name : str
+        What it is called in the message.
+    value : object
+        Its value [its own unit].
+    signed : bool
+        Whether it may be negative.
+    zero : bool
+        Whether it may be zero.
+
+    Raises
+    ------
+    RigError
+        If it is not what it must be.
+
+    Examples
+    --------
+    >>> require_number("moving_mass", 0.0)
+    Traceback (most recent call last):
+        ...
+    plant.errors.RigError: moving_mass must be positive, got 0.0
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        raise RigError(f"{name} must be a finite number, got {value!r}")
+    if not signed and (value < 0.0 or (value == 0.0 and not zero)):
+        raise RigError(f"{name} must {'not be negative' if zero else 'be positive'}, got {value!r}")
+
+
+def require_numbers(parameters: Any, *, signed: Collection[str] = (), zero: Collection[str] = ()) -> None:
+    """Refuse a set of parameters with a number, or a row of them, that is not finite or not of its sign.
+
+    Parameters
+    ----------
+    parameters : dataclass instance
+        The parameters, each in its own unit.
+    signed : collection of str
+        Those that may be negative.
+    zero : collection of str
+        Those that may be zero.
+
+    Raises
+    ------
+    RigError
+        If one is not what it must be, with its name.
+    """
+    for field in fields(parameters):
+        value, rule = getattr(parameters, field.name), {"signed": field.name in signed, "zero": field.name in zero}
+        if not isinstance(value, tuple | list):
+            require_number(field.name, value, **rule)
+            continue
+        for i, one in enumerate(value, start=1):
+            require_number(f"{field.name} [{i}]", one, **rule)
 
 
 @cache

@@ -18,8 +18,14 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 LAYERS = ("plant", "estimation", "faults", "experiments")
-FILTERPY_BRIDGE = "estimation/filterpy_bridge.py"
+FILTERPY_BRIDGE = "estimation/filters/filterpy_bridge.py"
 LONGEST_FILE = 350
+ACTUATORS = ("eha", "piezo_stack", "diaphragm_motor")
+SHARED = (
+    *(f"plant/{room}/" for room in ("compiled", "components", "solvers")),
+    *(f"estimation/{room}/" for room in ("engine", "filters")),
+    *(f"estimation/{file}" for file in ("fits/greybox", "models/model", "models/greybox", "models/gaussian")),
+)
 FAULT_NAME = re.compile(r"\b(?:minor|major)[ _-](?:leakage|friction)", re.IGNORECASE)
 
 
@@ -118,6 +124,17 @@ def imports_that_point_right(sources: Sequence[Source]) -> list[str]:
     ]
 
 
+def actuators_in_shared_rooms(sources: Sequence[Source]) -> list[str]:
+    """An import of an actuator, doctests aside, where what serves every actuator stands."""
+    return [
+        f"{source.path}:{found.line}: imports {found.target}, but serves every actuator"
+        for source in sources
+        if source.path.startswith(SHARED)
+        for found in _imports_below(source.tree, source, eager=True)
+        if any(_below(found.target, f"{layer}.{actuator}") for layer in LAYERS for actuator in ACTUATORS)
+    ]
+
+
 def imports_of_the_workshop(sources: Sequence[Source]) -> list[str]:
     """A package that imports tests or benchmarks, which are not installed."""
     return [
@@ -205,6 +222,7 @@ Guard = Callable[[Sequence[Source]], list[str]]
 
 GUARDS: tuple[Guard, ...] = (
     imports_that_point_right,
+    actuators_in_shared_rooms,
     imports_of_the_workshop,
     second_importers_of_filterpy,
     import_cycles,
@@ -218,19 +236,20 @@ OFFENDERS: dict[str, tuple[Guard, str, str, int]] = {
     "right, typing": (
         imports_that_point_right,
         "estimation/a.py",
-        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import experiments.store",
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import experiments.page.folder",
         3,
     ),
     "right, deferred": (imports_that_point_right, "faults/a.py", "def f():\n    import experiments", 2),
-    "right, by name": (imports_that_point_right, "plant/a.py", "import_module('faults.bank')", 1),
+    "right, by name": (imports_that_point_right, "plant/a.py", "import_module('faults.eha.bank')", 1),
     "right, doctest": (
         imports_that_point_right,
         "plant/a.py",
         '"""A.\n\n>>> from faults import bank\n"""',
         3,
     ),
+    "actuator": (actuators_in_shared_rooms, "plant/solvers/a.py", "def f():\n    from plant.eha import model", 2),
     "workshop": (imports_of_the_workshop, "plant/a.py", "import os\nfrom tests import helpers", 2),
-    "filterpy": (second_importers_of_filterpy, "estimation/ekf.py", "from filterpy.kalman import UKF", 1),
+    "filterpy": (second_importers_of_filterpy, "estimation/filters/ekf.py", "from filterpy.kalman import UKF", 1),
     "overlong": (overlong_files, "tests/test_a.py", "x = 1\n" * (LONGEST_FILE + 1), LONGEST_FILE + 1),
     "print": (prints_outside_experiments, "faults/a.py", "def f():\n    print('x')", 2),
     "fault name": (fault_names_in_estimation, "estimation/a.py", "x = 1\nif c == 'minor_leakage': ...", 2),
@@ -241,10 +260,11 @@ INNOCENTS: dict[str, tuple[Guard, str, str]] = {
     "left": (
         imports_that_point_right,
         "faults/a.py",
-        "from plant.record import Record\nimport estimation.run",
+        "from plant.log.record import Record\nimport estimation.filters.run",
     ),
+    "actuator in its room": (actuators_in_shared_rooms, "estimation/eha/a.py", "from plant.eha.model import A"),
     "own layer": (imports_that_point_right, "plant/a.py", "from plant import units"),
-    "alike name": (second_importers_of_filterpy, "estimation/a.py", "import estimation.filterpy_bridge"),
+    "alike name": (second_importers_of_filterpy, "estimation/a.py", "import estimation.filters.filterpy_bridge"),
     "bridge": (second_importers_of_filterpy, FILTERPY_BRIDGE, "import filterpy.kalman"),
     "just short enough": (overlong_files, "plant/a.py", "x = 1\n" * LONGEST_FILE),
     "print in experiments": (prints_outside_experiments, "experiments/cli.py", "print('x')"),
@@ -287,7 +307,7 @@ def test_cycle_guard_allows_imports_that_wait(deferred: str) -> None:
 
 def test_the_walk_finds_the_packages(packages: list[Source]) -> None:
     modules = {source.module for source in packages}
-    assert {"plant", "plant.units", "plant.record"} <= modules
+    assert {"plant", "plant.units", "plant.log.record"} <= modules
     assert {source.layer for source in packages} == set(LAYERS)
 
 

@@ -35,6 +35,20 @@ def test_every_command_of_the_readme_runs_as_printed_and_in_order(done: list[sub
         assert one.returncode == 0, f"hydrostate {' '.join(words)}: {one.stderr}"
 
 
+def test_the_readmes_script_runs_as_printed(tmp_path: Path) -> None:
+    (script,) = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
+    done = subprocess.run(  # noqa: S603 - our own interpreter on the README's own lines
+        [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(README.parent)!r})\n{script}"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "minor_leakage" in done.stdout
+    assert "TransferFunction" in done.stdout or "z^2" in done.stdout
+
+
 def test_the_readme_quotes_what_estimate_prints(done: list[subprocess.CompletedProcess[str]]) -> None:
     quoted = re.search(r"```text\n(.*?)\n```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
     assert quoted is not None

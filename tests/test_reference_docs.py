@@ -12,15 +12,15 @@ from typing import Annotated
 
 import pytest
 
-from plant.eha import EhaParameters
-from plant.record import CHANNELS
+from plant.eha.model import EhaParameters
+from plant.log.record import CHANNELS
 from plant.units import SI, notes, unit_registry
 
 ROOT = Path(__file__).resolve().parents[1]
 LAYERS = ("plant", "estimation", "faults", "experiments")
 TEXTS = {".py", ".html", ".j2", ".md"}
 
-PHYSICS = ("plant/components/", "plant/eha", "plant/piezo", "plant/diaphragm")
+PHYSICS = ("plant/components/", "plant/eha/model", "plant/piezo_stack/", "plant/diaphragm_motor/")
 SOURCE = re.compile(
     r"\b(?:equations?\s+\(?\d|tables?\s+\d|sections?\s+\d|errata\s+[EPM]\d|sources?:\s+\w)", re.IGNORECASE
 )
@@ -181,9 +181,9 @@ def test_physics_without_a_source_is_found() -> None:
     (offence,) = unsourced_physics("plant/components/a.py", function.format(" of the pressure source"))
     assert offence.startswith("plant/components/a.py:1: flow cites no")
     for said in (", equation 5.8", ". Table 3", " (errata\n    E8)", ".\n\n    Source: judged"):
-        assert unsourced_physics("plant/eha.py", function.format(said)) == []
-    assert unsourced_physics("plant/eha.py", '"""Section 5."""\n' + function) == []
-    assert unsourced_physics("plant/record.py", function) == []
+        assert unsourced_physics("plant/eha/model.py", function.format(said)) == []
+    assert unsourced_physics("plant/eha/model.py", '"""Section 5."""\n' + function) == []
+    assert unsourced_physics("plant/log/record.py", function) == []
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ With states in units ``s``, equation 5.14 (errata E3, E8) reads
 
 from dataclasses import dataclass
 
-from estimation.eha import ACCELERATION_FORM
-from plant.eha import EhaParameters
+from estimation.models.eha_forms import ACCELERATION_FORM
+from plant.eha.model import EhaParameters
 
 
 @dataclass(frozen=True)

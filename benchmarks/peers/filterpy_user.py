@@ -4,7 +4,7 @@ import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 
-from plant.eha import EhaParameters
+from plant.eha.model import EhaParameters
 
 Array = NDArray[np.float64]
 

@@ -1,57 +1,18 @@
-"""System identification: from input and output samples to a transfer function that says how sure it is."""
+"""System identification: from input and output samples to a transfer function that says how sure it is.
 
-from estimation.identification.arx import fit_arx
-from estimation.identification.automatic_window import automatic_response
-from estimation.identification.choose import STRUCTURES, Choice, choose_model
-from estimation.identification.continuous import fit_continuous
-from estimation.identification.dead_time import estimate_delay
-from estimation.identification.etfe import FrequencyResponse, etfe, etfe_welch
-from estimation.identification.from_record import identify_record
-from estimation.identification.input_design import Limits, multisine_for, prbs_for, rank_inputs
-from estimation.identification.instrumental import fit_instrumental
-from estimation.identification.linear_model import LinearModel
-from estimation.identification.model_table import model_table
-from estimation.identification.order import OrderTest, markov_parameters, order_table, order_test
-from estimation.identification.output_error import fit_output_error
-from estimation.identification.prediction_error import fit_armax, fit_box_jenkins
-from estimation.identification.preprocess import detrend, resample, zero_phase_filter
-from estimation.identification.profile_interval import dc_gain_interval
-from estimation.identification.subspace import SubspaceFit, fit_subspace
-from estimation.identification.validate import Validation, estimate_initial_state, validate
+The names in `face` are at hand here too; its modules are imported when one of them is asked for.
+"""
 
-__all__ = [
-    "STRUCTURES",
-    "Choice",
-    "FrequencyResponse",
-    "Limits",
-    "LinearModel",
-    "OrderTest",
-    "SubspaceFit",
-    "Validation",
-    "automatic_response",
-    "choose_model",
-    "dc_gain_interval",
-    "detrend",
-    "estimate_delay",
-    "estimate_initial_state",
-    "etfe",
-    "etfe_welch",
-    "fit_armax",
-    "fit_arx",
-    "fit_box_jenkins",
-    "fit_continuous",
-    "fit_instrumental",
-    "fit_output_error",
-    "fit_subspace",
-    "identify_record",
-    "markov_parameters",
-    "model_table",
-    "multisine_for",
-    "order_table",
-    "order_test",
-    "prbs_for",
-    "rank_inputs",
-    "resample",
-    "validate",
-    "zero_phase_filter",
-]
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from estimation.identification.face import *  # noqa: F403  type checkers see the names that __getattr__ gives
+
+
+def __getattr__(name: str) -> Any:
+    import estimation.identification.face as face
+
+    try:
+        return getattr(face, name)
+    except AttributeError:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}") from None

@@ -3,23 +3,25 @@
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 
-from estimation.identification.arx import fit_arx
-from estimation.identification.dead_time import estimate_delay
-from estimation.identification.experiments import Signals, listed
-from estimation.identification.fitted import CovarianceKind
-from estimation.identification.instrumental import fit_instrumental
-from estimation.identification.linear_model import FloatArray, LinearModel
-from estimation.identification.order import order_table
-from estimation.identification.output_error import fit_output_error
-from estimation.identification.prediction_error import fit_armax, fit_box_jenkins
-from estimation.identification.validate import fit_percent, validate
+from estimation.identification.design.dead_time import estimate_delay
+from estimation.identification.fit.arx import fit_arx
+from estimation.identification.fit.fitted import CovarianceKind
+from estimation.identification.fit.instrumental import fit_instrumental
+from estimation.identification.fit.order import order_table
+from estimation.identification.fit.output_error import fit_output_error
+from estimation.identification.fit.prediction_error import fit_armax, fit_box_jenkins
+from estimation.identification.fit.validate import fit_percent, validate
+from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.search.experiments import Signals, listed
 from plant.errors import HydrostateError, LogWarning
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 StructureName: TypeAlias = Literal["ARX", "ARMAX", "output-error", "Box-Jenkins", "SRIV"]
 
@@ -44,16 +46,16 @@ class Choice:
     ----------
     model : LinearModel
         Fitted to the whole record.
-    orders : pandas.DataFrame
-        As `order_table`; empty where the order was given.
-    structures : pandas.DataFrame
+    orders : pandas.DataFrame or None
+        As `order_table`; None where the order was given.
+    structures : pandas.DataFrame or None
         Indexed by structure: ``fit_percent`` of the free run and ``one_step_percent`` on the part held back,
-        ``whiteness`` and ``cross_correlation`` p-values on the part fitted.
+        ``whiteness`` and ``cross_correlation`` p-values on the part fitted. None where one structure was given.
     """
 
     model: LinearModel
-    orders: pd.DataFrame
-    structures: pd.DataFrame
+    orders: "pd.DataFrame | None"
+    structures: "pd.DataFrame | None"
 
 
 def choose_model(
@@ -109,8 +111,7 @@ def choose_model(
         )
     inputs, outputs = np.asarray(u, dtype=np.float64), np.asarray(y, dtype=np.float64)
     lag = estimate_delay(inputs, outputs) if delay is None else delay
-    table = pd.DataFrame()
-    order = orders[0]
+    order, table, compared = orders[0], None, None
     if len(orders) > 1:
         table = order_table(inputs, outputs, sample_time, orders=tuple(orders), delay=lag)
         # a pole that a zero nearly cancels is there for a nonlinearity or drift, not for the order
@@ -120,16 +121,16 @@ def choose_model(
     n_b = (order + (1 if lag == 0 else 0)) if n_numerator is None else n_numerator
     form = {"n_numerator": n_b, "n_denominator": order, "delay": lag, "covariance": covariance}
     form |= {"input_name": input_name, "output_name": output_name}
-    compared = (
-        compare_structures(inputs, outputs, sample_time, form, structures) if len(structures) > 1 else pd.DataFrame()
-    )
-    best = str(compared["fit_percent"].idxmax()) if len(structures) > 1 else structures[0]
+    best: str = structures[0]
+    if len(structures) > 1:
+        compared = compare_structures(inputs, outputs, sample_time, form, structures)
+        best = str(compared["fit_percent"].idxmax())
     return Choice(fit_structure(best, inputs, outputs, sample_time, form), table, compared)
 
 
 def compare_structures(
     u: Signals, y: Signals, sample_time: float, form: dict[str, Any], structures: Sequence[str]
-) -> pd.DataFrame:
+) -> "pd.DataFrame":
     """Return how structures of one size do on the last third of a record, or of the experiments, fitted to the rest.
 
     Parameters
@@ -166,6 +167,8 @@ def compare_structures(
             "whiteness": own.whiteness.p_value,
             "cross_correlation": own.cross_correlation.p_value,
         }
+    import pandas as pd
+
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("structure")
 
 

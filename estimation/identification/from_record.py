@@ -1,18 +1,21 @@
 """From a log to a linear model in one verb."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from estimation.identification.choose import STRUCTURES, Choice, StructureName, choose_model
-from estimation.identification.fitted import CovarianceKind
-from estimation.identification.linear_model import FloatArray, LinearModel
-from estimation.identification.preprocess import bridged, resample, zero_phase_filter
-from estimation.identification.residual_tests import DEFAULT_LAGS, feedback_test
-from estimation.identification.sticking import rest_shares, rests
+from estimation.identification.choose import STRUCTURES, StructureName, choose_model
+from estimation.identification.design.sticking import rest_shares, rests
+from estimation.identification.fit.fitted import CovarianceKind
+from estimation.identification.fit.residual_tests import DEFAULT_LAGS, feedback_test
+from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.notes import IdentificationCode
+from estimation.identification.signals.preprocess import resample, zero_phase_filter
+from estimation.log_checks.bridging import bridged
 from plant.errors import LogError, LogWarning
-from plant.record import Record
+from plant.log.record import Record
 
 FEEDBACK = 1e-6
 """p-value below which data are said to come from a closed loop; a linear model's errors must not look like one."""
@@ -100,8 +103,8 @@ def identify_record(
     # a filter that looks ahead makes outputs follow future inputs, as feedback does
     if filter_cutoff_hz is None and u.size == len(record) and output in record:
         _warn_of_feedback(choice.model, u, y)
-    if len(choice.orders) > 1 and output == "velocity_m_s":
-        _warn_of_rest(choice, u, y)
+    if choice.orders is not None and output == "velocity_m_s":
+        _warn_of_rest(choice.model, choice.orders["fit_percent"].to_dict(), u, y)
     return choice.model
 
 
@@ -148,19 +151,20 @@ def record_signals(
     return (u, y) if filter_cutoff_hz is None else zero_phase_filter(u, y, sample_time, cutoff_hz=filter_cutoff_hz)
 
 
-def _warn_of_rest(choice: Choice, u: FloatArray, y: FloatArray) -> None:
-    model, part = choice.model, slice(0, RESTING_SAMPLES)
+def _warn_of_rest(model: LinearModel, fit_percents: Mapping[Any, float], u: FloatArray, y: FloatArray) -> None:
+    part = slice(0, RESTING_SAMPLES)
     measured, linear = rest_shares(u[part], y[part], model.sample_time)
     if rests(measured, linear):
-        fits = ", ".join(f"{fit:.1f} % ({order})" for order, fit in choice.orders["fit_percent"].items())
-        warnings.warn(
-            f"{model.output_name!r} rests in {measured:.0%} of the samples in which {model.input_name!r} drives it, a "
-            f"second-order model in {linear:.0%}: it sticks, and further poles imitate the wait, so order "
-            f"{model.denominator.size - 1} is not the plant's. The fits by order are {fits}: give the order, or drive "
-            "the piston around a mean that keeps it moving",
-            LogWarning,
-            stacklevel=3,
+        fits = ", ".join(f"{fit:.1f} % ({order})" for order, fit in fit_percents.items())
+        said = IdentificationCode.PISTON_RESTS.note(
+            output=model.output_name,
+            input=model.input_name,
+            measured=measured,
+            linear=linear,
+            order=model.denominator.size - 1,
+            fits=fits,
         )
+        warnings.warn(LogWarning(said), stacklevel=3)
 
 
 def _warn_of_feedback(model: LinearModel, u: FloatArray, y: FloatArray) -> None:
@@ -170,12 +174,8 @@ def _warn_of_feedback(model: LinearModel, u: FloatArray, y: FloatArray) -> None:
     residual = y[part] - model.simulate(u[part], initial=model.initial_state)
     found = feedback_test(residual, u[part])
     if found.p_value < FEEDBACK:
-        warnings.warn(
-            f"input {model.input_name!r} follows the noise of {model.output_name!r} (p = {found.p_value:.1g}): the "
-            "data seem to come from a closed loop, where output error is biased; fit ARMAX or Box-Jenkins",
-            LogWarning,
-            stacklevel=3,
-        )
+        said = IdentificationCode.FEEDBACK.note(input=model.input_name, output=model.output_name, p_value=found.p_value)
+        warnings.warn(LogWarning(said), stacklevel=3)
 
 
 def _output(record: Record, name: str) -> FloatArray:
@@ -183,12 +183,7 @@ def _output(record: Record, name: str) -> FloatArray:
         return record[name]
     if len(record) < 3:
         raise LogError(f"velocity by differentiation needs 3 samples of 'position_m' or more, got {len(record)}")
-    warnings.warn(
-        "channel 'velocity_m_s' is absent: it is differentiated from 'position_m' by central differences, "
-        "which amplifies its noise",
-        LogWarning,
-        stacklevel=3,
-    )
+    warnings.warn(LogWarning(IdentificationCode.VELOCITY_DIFFERENTIATED.note()), stacklevel=3)
     return np.gradient(record["position_m"], record.sample_time)
 
 
@@ -196,9 +191,6 @@ def _without_gaps(values: FloatArray, name: str) -> FloatArray:
     n_missing = int(np.count_nonzero(np.isnan(values)))
     if n_missing == 0:
         return values
-    warnings.warn(
-        f"input {name!r} misses {n_missing} of {values.size} samples: they are bridged by straight lines",
-        LogWarning,
-        stacklevel=3,
-    )
+    said = IdentificationCode.INPUT_BRIDGED.note(channel=name, count=n_missing, total=values.size)
+    warnings.warn(LogWarning(said), stacklevel=3)
     return bridged(values)

@@ -4,17 +4,19 @@ import hashlib
 import json
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from glob import glob, has_magic
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from estimation.kernels import LANES
+from estimation.engine.kernels import LANES
+from experiments.actuators import DEFAULT, actuator
+from experiments.batch.of_kind import simulated_of
 from experiments.batch.series import Group, Log, Series, Simulated, Work, content_of
 from experiments.batch.study_file import Logs, Method, Runs, Study, StudyError
 from faults.conditions import CONDITIONS, LEVELS
-from plant.rig import Rig, read_rig
+from plant.eha.rig import Rig
 
 Hash: TypeAlias = Any
 """A hash that has begun; the standard library does not name its type."""
@@ -45,10 +47,13 @@ class Task:
         The healthy actuator.
     groups : tuple of Group
         The cases, a series at a time.
+    plant : str
+        Its kind.
     """
 
-    rig: Rig
+    rig: Rig[Any]
     groups: tuple[Group, ...]
+    plant: str = DEFAULT
 
     @property
     def keys(self) -> list[str]:
@@ -71,7 +76,7 @@ class Plan:
     """
 
     study: Study
-    rig: Rig
+    rig: Rig[Any]
     blocks: tuple[tuple[tuple[Series, ...], tuple[Work, ...]], ...]
 
     def __len__(self) -> int:
@@ -85,7 +90,8 @@ class Plan:
     @cached_property
     def groups(self) -> tuple[Group, ...]:
         """Every series with its cases, in the study's order."""
-        common = _hash(None, [RESULTS_VERSION, package_version("hydrostate"), _numbers(self.rig)])
+        plant = [] if self.study.plant == DEFAULT else [self.study.plant]
+        common = _hash(None, [RESULTS_VERSION, package_version("hydrostate"), _numbers(self.rig), *plant])
         out: list[Group] = []
         for series, works in self.blocks:
             encoded = [_bytes(asdict(work)) for work in works]
@@ -122,14 +128,17 @@ class Plan:
                 continue
             seen.update(left.keys)
             if gathered.groups and gathered.ends_before(left):
-                yield Task(self.rig, tuple(gathered.groups))
+                yield self._task(gathered)
                 gathered = _Gathered(gathered.budget)
             gathered.add(left)
             if gathered.is_whole():
-                yield Task(self.rig, tuple(gathered.groups))
+                yield self._task(gathered)
                 gathered = _Gathered(gathered.budget)
         if gathered.groups:
-            yield Task(self.rig, tuple(gathered.groups))
+            yield self._task(gathered)
+
+    def _task(self, gathered: "_Gathered") -> Task:
+        return Task(self.rig, tuple(gathered.groups), self.study.plant)
 
 
 def _left(group: Group, done: Collection[str]) -> Group:
@@ -189,8 +198,10 @@ def plan_study(study: Study, folder: Path) -> Plan:
     RigError
         If the rig file is not usable.
     """
-    rig = read_rig(folder / study.rig) if study.rig else Rig()
-    simulated = [(tuple(_simulated(runs)), _works(runs.methods, runs.starts_pa)) for runs in study.runs]
+    kind = actuator(study.plant)
+    rig = kind.read_rig(folder / study.rig if study.rig else None)
+    listed = _simulated if kind.name == DEFAULT else partial(simulated_of, kind)
+    simulated = [(tuple(listed(runs)), _works(runs.methods, runs.starts_pa)) for runs in study.runs]
     logs = [
         (tuple(_logs(one, place, folder)), _works(one.methods, one.starts_pa)) for place, one in enumerate(study.logs)
     ]
@@ -214,7 +225,7 @@ def package_version(name: str) -> str:
     return version(name)
 
 
-def config_hash(study: Study, rig: Rig) -> str:
+def config_hash(study: Study, rig: Rig[Any]) -> str:
     """Return a hash of a study's content and its rig's.
 
     Parameters
@@ -279,7 +290,7 @@ def _content(series: Series) -> list[Any]:
     return ["simulated", *(getattr(series, one.name) for one in fields(series))]
 
 
-def _numbers(rig: Rig) -> list[Any]:
+def _numbers(rig: Rig[Any]) -> list[Any]:
     return [asdict(rig.parameters), dict(rig.uncertainties), dict(rig.columns)]
 
 

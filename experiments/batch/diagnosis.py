@@ -1,25 +1,36 @@
 """The class of a log, as a batch asks for it: the one place that knows how a log is diagnosed."""
 
-from functools import lru_cache
+import warnings
 from typing import Any
 
-from faults.class_fit import Actuator
-from faults.diagnosis import diagnose_log
-from plant.eha import EhaParameters
-from plant.record import Record
+from estimation.finding import Finding, Outcome
+from estimation.notes import SensorCode
+from faults.diagnosis.diagnose import diagnose_log
+from faults.notes import ClassCode
+from plant.eha.rig import Rig
+from plant.errors import LogWarning
+from plant.log.record import Record
 
 TOLD_APART = 1.001
 """Least ratio of the best class's probability to the runner-up's at which a class is named [dimensionless]."""
 
+WHY_NONE = {
+    ClassCode.MODELS_ALIKE,
+    ClassCode.MODELS_DIVERGED,
+    ClassCode.NO_CIRCUIT,
+    ClassCode.NO_PROBABILITIES,
+}
+"""Why there are no probabilities."""
 
-def diagnosed(record: Record, rig: EhaParameters) -> dict[str, Any]:
+
+def diagnosed(record: Record, rig: Rig) -> dict[str, Any]:
     """Say which of the nine conditions a log was taken in, or that it is in none.
 
     Parameters
     ----------
     record : Record
         The log.
-    rig : EhaParameters
+    rig : Rig
         The healthy actuator.
 
     Returns
@@ -32,14 +43,22 @@ def diagnosed(record: Record, rig: EhaParameters) -> dict[str, Any]:
     ------
     LogError
         If the log cannot be diagnosed.
-    RigError
-        If no circuit fits around the rig.
+
+    Warns
+    -----
+    LogWarning
+        If samples were left out.
     """
-    found = diagnose_log(record, _actuator(rig))
+    found = diagnose_log(record, rig)
+    for note in found.notes:
+        if isinstance(note.code, SensorCode):
+            warnings.warn(LogWarning(note), stacklevel=2)
+    if not found.probabilities:
+        return _without_class(found)
     (best, first), (second, other) = sorted(found.probabilities.items(), key=lambda item: -item[1])[:2]
     margin = first / max(other, 1e-300)
     if found.unknown:
-        said = f"in none of the nine conditions, the nearest is {best}: {'; '.join(found.reasons)}"
+        said = f"in none of the nine conditions, the nearest is {best}: {'; '.join(map(str, found.against))}"
         return {"outcome": "mismatch", "reason": said, "trusted": False}
     if margin < TOLD_APART:
         said = f"no class: under this drive {best} and {second} move alike; drive the actuator, at best with steps"
@@ -47,6 +66,8 @@ def diagnosed(record: Record, rig: EhaParameters) -> dict[str, Any]:
     return {"outcome": "ok", "found_condition": best, "runner_up": second, "margin": margin, "trusted": True}
 
 
-@lru_cache(maxsize=4)
-def _actuator(rig: EhaParameters) -> Actuator:
-    return Actuator.of(rig)
+def _without_class(found: Finding) -> dict[str, Any]:
+    """Return the entries of a log for which there are no probabilities: it holds too little, or no circuit fits."""
+    said = "; ".join(str(note) for note in found.notes if note.code in WHY_NONE)
+    outcome = Outcome.FAILED if found.outcome is Outcome.OK else found.outcome
+    return {"outcome": outcome.value, "reason": said, "trusted": False}

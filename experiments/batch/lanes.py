@@ -5,14 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimation.batch import FEWEST_IN_LANES, filter_batch
-from estimation.eha import BULK_MODULUS
-from estimation.filter import FilterProblem, Trace
-from estimation.kernels import LANES
+from estimation.engine.contract import FilterProblem, Trace
+from estimation.engine.kernels import LANES
+from estimation.filters.batch import FEWEST_IN_LANES, filter_batch
+from estimation.models.eha_forms import BULK_MODULUS
 from experiments.batch.rows import NIS, Rows, error_percent
 
 SETTLED = 0.2
-"""Share of a run that counts as its end [fraction], as in `estimation.run.Estimate.settled`."""
+"""Share of a run that counts as its end [fraction], as in `estimation.filters.run.Estimate.settled`."""
 
 
 class Waiting(NamedTuple):

@@ -23,7 +23,7 @@ import pyarrow.parquet as pq
 
 from experiments.batch.folder import LOCK, TEMPORARY, Folder, open_folder
 from experiments.batch.rows import SCHEMA
-from experiments.store import DESKTOP_FILES
+from experiments.page.folder import DESKTOP_FILES
 from plant.errors import HydrostateError
 
 FORMAT = 1
@@ -219,7 +219,8 @@ class PartStore:
 
     def _read(self, name: str, columns: list[str] | None) -> pa.Table:
         content = BytesIO(self.folder.read(f"{PARTS}/{name}"))
-        return pq.read_table(content, columns=columns, page_checksum_verification=True)
+        schema = None if columns is None else SCHEMA  # a part that is older than a column holds nothing in it
+        return pq.read_table(content, columns=columns, schema=schema, page_checksum_verification=True)
 
     def _parts(self) -> list[str]:
         return [name for name in self.folder.files(PARTS) if name.endswith(".parquet")]

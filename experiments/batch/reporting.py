@@ -1,15 +1,13 @@
 """Writes a store's report, figures and tables beside it or elsewhere, from the store alone."""
 
-from collections.abc import Mapping
-
-import pandas as pd
-
+from experiments.batch.figures import BATCH_FIGURES
 from experiments.batch.folder import Folder
 from experiments.batch.part_store import PartStore
+from experiments.batch.report import render_batch_report
 from experiments.batch.summary import frame_of, summary_tables
-from experiments.figures.batch import BATCH_FIGURES
-from experiments.figures.tables import figure_files
-from experiments.report.batch import render_batch_report
+from experiments.page.figure_files import figure_files
+from experiments.page.folder import csv_files
+from experiments.page.frames import Tables
 from plant.errors import HydrostateError
 
 REPORT = "report.html"
@@ -40,27 +38,19 @@ def write_report(store: PartStore, folder: Folder) -> str:
         raise HydrostateError(f"store {store.name}: there is no batch study there")
     rows = store.rows()
     tables = summary_tables(frame_of(rows))
-    kinds = {name: kind for name, kind in BATCH_FIGURES.items() if _drawable(name, tables)}
-    figures = figure_files(kinds, tables)
-    page = render_batch_report(manifest, tables, figures["svg"], len(rows))
-    files = {
-        f"figures/{name.replace(' ', '_')}.{kind}": image
-        for kind, all_ in figures.items()
-        for name, image in all_.items()
-    }
-    files |= {
-        f"tables/{name.replace(' ', '_')}.csv": table.to_csv(index=name == "confusion").encode()
-        for name, table in tables.items()
-    }
+    drawings = {name: draw for name, draw in BATCH_FIGURES.items() if _drawable(name.replace("_", " "), tables)}
+    figures = figure_files(drawings, tables)
+    page = render_batch_report(manifest, tables, figures, len(rows)).encode()
+    numbered = {name: table.reset_index() if table.index.name else table for name, table in tables.items()}
     try:
-        for name, content in {**files, REPORT: page.encode()}.items():
+        for name, content in {**figures, **csv_files("tables", numbered), REPORT: page}.items():
             folder.write(name, content)
     except OSError as error:
         raise HydrostateError(f"report {folder.name} cannot be written: {error.strerror or error}") from error
     return f"{folder.name.rstrip('/')}/{REPORT}"
 
 
-def _drawable(name: str, tables: Mapping[str, pd.DataFrame]) -> bool:
+def _drawable(name: str, tables: Tables) -> bool:
     if name not in tables:
         return False
     return name != "bulk modulus" or bool(tables[name]["median_percent"].notna().any())

@@ -49,10 +49,12 @@ SCHEMA = pa.schema(
         ("nis_velocity", pa.float64()),
         ("nis_pressure", pa.float64()),
         ("log_likelihood", pa.float64()),
+        ("quantities", pa.string()),
     ]
 )
 """Columns of the store. ``outcome`` is ok, not_observable, mismatch, diverged or failed, and ``reason`` says why;
-``plant`` is ``log`` for a log, whose ``condition`` is known only if whoever made the log wrote it down."""
+``plant`` is ``log`` for a log, whose ``condition`` is known only if whoever made the log wrote it down; of a kind of
+actuator that is not the gear-pump one it is the kind, and ``quantities`` holds what was found, as JSON."""
 
 NIS: Mapping[str, str] = MappingProxyType(
     {
@@ -167,7 +169,7 @@ class Rows:
     def _in_words(self, place: int) -> str:
         """Return what a case is called in a sentence: the log's file, or what was simulated; and what was done."""
         series, verb = self._series[self._series_of[place]], self._works[place].verb
-        if series["plant"] == "log":
+        if series.get("file"):
             return f"{series['file']} ({verb})"
         condition = series["condition"] or f"severity {series['leakage_severity']:g}, {series['friction_severity']:g}"
         return f"{series['plant']} {series['drive']} {condition} seed {series['seed']} ({verb})"

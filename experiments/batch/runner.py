@@ -100,7 +100,7 @@ def run_batch(
     done : collection of str
         Keys of cases that need not be run.
     opener : callable
-        Opens an executor and says how many tasks it runs at a time, see `experiments.executors.open_executor`.
+        Opens an executor and says how many tasks it runs at a time, see `experiments.running.executors.open_executor`.
     stop : Event
         When it is set no task is begun; those in flight are finished and kept.
     on_part : callable

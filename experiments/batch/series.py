@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
-from plant.record_files import sidecar
+from plant.log.files import sidecar
 
 BYTES_A_SAMPLE = 50
 """About how much of a log's file a sample takes [byte]."""

@@ -9,16 +9,18 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
-from estimation.eha import FORMS
-from estimation.first_belief import START_STD
-from estimation.run import METHODS
+from estimation.filters.run import METHODS
+from estimation.log_checks.first_belief import START_STD
+from estimation.models.eha_forms import FORMS
+from experiments.actuator_kind import ActuatorKind
+from experiments.actuators import DEFAULT, actuator, offered
 from faults.conditions import CONDITIONS, HIGHEST_SEVERITY
+from plant.eha.drives import DRIVES
+from plant.eha.simulate import PLANTS
 from plant.errors import HydrostateError
-from plant.sensors import SENSORS
-from plant.signals import DRIVES
-from plant.simulate import PLANTS
+from plant.sensors.sensors import SENSORS
 
-SHIPPED = "experiments.studies"
+SHIPPED = "experiments.batch.studies"
 """The package that holds the studies that come with the project."""
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -32,6 +34,12 @@ class StudyError(HydrostateError):
 
 class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+
+def _other_kind(info: ValidationInfo) -> ActuatorKind | None:
+    """Return the study's kind of actuator; None for the gear-pump actuator."""
+    kind: ActuatorKind | None = (info.context or {}).get("kind")
+    return None if kind is None or kind.name == DEFAULT else kind
 
 
 def _known(names: Sequence[str], known: Sequence[str]) -> None:
@@ -85,9 +93,9 @@ class Runs(_Table):
     Parameters
     ----------
     plants, drives, sensors : tuple of str
-        Names, as `hydrostate simulate` knows them.
+        Names, as `hydrostate simulate` knows them; plants and drives of the gear-pump actuator alone.
     conditions : tuple of str
-        Conditions by name; all nine by default, none where severities are given.
+        Conditions by name; all of them by default, none where severities are given.
     severities : tuple of pairs of float
         Leakage and friction severity, beside the conditions [dimensionless].
     seeds : int or tuple of int
@@ -114,6 +122,10 @@ class Runs(_Table):
     @field_validator("plants", "drives", "sensors", "conditions")
     @classmethod
     def _names(cls, names: tuple[str, ...] | None, info: ValidationInfo) -> tuple[str, ...] | None:
+        kind = _other_kind(info)
+        if kind is not None:
+            _known(names or (), kind.conditions if info.field_name == "conditions" else names or ())
+            return names
         known = {"plants": PLANTS, "drives": DRIVES, "sensors": SENSORS, "conditions": CONDITIONS}[str(info.field_name)]
         _known(names or (), list(known))
         if not names and info.field_name != "conditions":
@@ -162,6 +174,8 @@ class Study(_Table):
         What reports call it.
     question : str
         What it shall answer.
+    plant : str
+        The kind of actuator that its runs and logs are of.
     rig : str
         The healthy actuator's rig file, relative to the study file; empty for the paper's.
     runs : tuple of Runs
@@ -172,14 +186,21 @@ class Study(_Table):
 
     name: Annotated[str, Field(min_length=1)]
     question: str = ""
+    plant: str = DEFAULT
     rig: str = ""
     runs: tuple[Runs, ...] = ()
     logs: tuple[Logs, ...] = ()
 
     @model_validator(mode="after")
-    def _something(self) -> "Study":
+    def _something(self, info: ValidationInfo) -> "Study":
         if not (self.runs or self.logs):
             raise ValueError("at least one [[runs]] or [[logs]], got none")
+        kind = _other_kind(info)
+        if kind is not None:
+            if self.runs:
+                offered(kind, "simulate")
+            verbs = [one for one in ("estimate", "diagnose") if getattr(kind, one) is not None]
+            _known([method.verb for some in (*self.runs, *self.logs) for method in some.methods], verbs)
         return self
 
 
@@ -239,7 +260,11 @@ def parse_study(content: Mapping[str, Any], source: str) -> Study:
     experiments.batch.study_file.StudyError: a.toml: runs[0].seeds must be greater than or equal to 1, got 0
     """
     try:
-        return Study.model_validate(content)
+        kind = actuator(str(content.get("plant", DEFAULT)))
+    except HydrostateError as error:
+        raise StudyError(f"{source}: {str(error).removeprefix('--')}") from error
+    try:
+        return Study.model_validate(content, context={"kind": kind})
     except ValidationError as error:
         raise StudyError(f"{source}: {_sentence(max(error.errors(), key=lambda one: len(one['loc'])))}") from error
 

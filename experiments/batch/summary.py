@@ -1,11 +1,13 @@
 """What a store says, as tables: computed from its rows alone."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
+from typing import cast
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from estimation.finding import NORMAL_95
 from faults.conditions import CONDITIONS
 from faults.scores import confusion_matrix
 
@@ -17,7 +19,6 @@ OUTCOME_NAMES = ("ok", "not_observable", "mismatch", "diverged", "failed")
 NEAR_PERCENT = 3.0
 """An estimate within this of the truth counts as near [%]."""
 
-NORMAL_95 = 1.959963984540054
 
 MOST_LISTED = 200
 """Most rows of a table that lists cases one by one on a page; its CSV holds all."""
@@ -34,16 +35,18 @@ def frame_of(rows: pa.Table) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        One row a case. A condition is its name, its severities where it has no name, or ``unknown``.
+        One row a case. A condition is its name, its severities where it has no name, or ``unknown``; ``known`` where it
+        is one that a diagnosis can name.
     """
     frame = rows.to_pandas()
     free = frame["condition"].isna() & frame["leakage_severity"].notna()
     named = frame["condition"].fillna("unknown").astype(object)
     pairs = zip(frame.loc[free, "leakage_severity"], frame.loc[free, "friction_severity"], strict=True)
+    known = frame["condition"].isin(list(CONDITIONS)) | (frame["condition"].notna() & (frame["plant"] != "log"))
     named[free] = [f"leakage {leakage:g}, friction {friction:g}" for leakage, friction in pairs]
     for name in METHOD:
         frame[name] = frame[name].astype(object).where(frame[name].notna(), "")
-    return frame.assign(condition=named)
+    return frame.assign(condition=named, known=known)
 
 
 def summary_tables(frame: pd.DataFrame) -> Mapping[str, pd.DataFrame]:
@@ -85,12 +88,12 @@ def outcome_table(frame: pd.DataFrame) -> pd.DataFrame:
     pandas.DataFrame
         One row a way of doing it: counts of cases, and of each outcome.
     """
-    rows: list[dict[str, object]] = []
-    for keys, group in frame.groupby(METHOD, sort=False):
+
+    def entries(group: pd.DataFrame) -> dict[str, object]:
         counts = group["outcome"].value_counts()
-        entries = {name: int(counts.get(name, 0)) for name in OUTCOME_NAMES}
-        rows.append({**dict(zip(METHOD, keys, strict=True)), "cases": len(group), **entries})
-    return pd.DataFrame(rows)
+        return {"cases": len(group), **{name: int(counts.get(name, 0)) for name in OUTCOME_NAMES}}
+
+    return _each(frame, METHOD, entries)
 
 
 def bulk_modulus_table(frame: pd.DataFrame) -> pd.DataFrame:
@@ -108,33 +111,29 @@ def bulk_modulus_table(frame: pd.DataFrame) -> pd.DataFrame:
         `NEAR_PERCENT` and share of 95 % intervals that cover the truth [%].
     """
     known = frame[frame["verb"].isin(["filter", "estimate"]) & frame["true_bulk_modulus_pa"].notna()]
-    rows: list[dict[str, object]] = []
-    for keys, group in known.groupby([*METHOD, "condition"], sort=False):
-        found = group[group["error_percent"].notna()]
-        error = found["error_percent"].to_numpy()
-        miss = (found["bulk_modulus_pa"] - found["true_bulk_modulus_pa"]).abs()
-        covered = miss <= NORMAL_95 * found["bulk_modulus_std_pa"]
-        entries = {"cases": len(group), "estimates": len(found)}
-        entries |= dict(zip(("low_percent", "median_percent", "high_percent"), _spread(error), strict=True))
-        entries |= {
-            "rms_percent": float(np.sqrt(np.mean(error**2))) if len(error) else None,
-            "near_percent": 100.0 * float(np.mean(np.abs(error) <= NEAR_PERCENT)) if len(error) else None,
-            "covered_percent": 100.0 * float(covered.mean()) if len(error) else None,
-        }
-        rows.append({**dict(zip([*METHOD, "condition"], keys, strict=True)), **entries})
-    return _by_way(rows)
+    return _each(known, [*METHOD, "condition"], _errors)
 
 
-def _by_way(rows: list[dict[str, object]]) -> pd.DataFrame:
-    """Return rows with each way of doing it in one block, in the order of first appearance."""
+def _errors(group: pd.DataFrame) -> dict[str, object]:
+    found = group[group["error_percent"].notna()]
+    error = found["error_percent"].to_numpy()
+    miss = (found["bulk_modulus_pa"] - found["true_bulk_modulus_pa"]).abs()
+    covered = miss <= NORMAL_95 * found["bulk_modulus_std_pa"]
+    names = ("low_percent", "median_percent", "high_percent", "rms_percent", "near_percent", "covered_percent")
+    counts = {"cases": len(group), "estimates": len(found)}
+    if not len(error):
+        return {**counts, **dict.fromkeys(names)}
+    shares = [100.0 * np.mean(np.abs(error) <= NEAR_PERCENT), 100.0 * covered.mean()]
+    values = [*np.quantile(error, [0.05, 0.5, 0.95]), np.sqrt(np.mean(error**2)), *shares]
+    return {**counts, **dict(zip(names, map(float, values), strict=True))}
+
+
+def _each(frame: pd.DataFrame, by: list[str], entries: Callable[[pd.DataFrame], dict[str, object]]) -> pd.DataFrame:
+    """Return a row a group, with each way of doing it in one block, in the order of first appearance."""
+    groups = frame.groupby(by, sort=False)
+    rows = [{**dict(zip(by, cast(tuple[object, ...], keys), strict=True)), **entries(group)} for keys, group in groups]
     first: dict[tuple[object, ...], int] = {}
     return pd.DataFrame(sorted(rows, key=lambda row: first.setdefault(tuple(row[name] for name in METHOD), len(first))))
-
-
-def _spread(error: np.ndarray) -> Sequence[float | None]:
-    if not len(error):
-        return (None, None, None)
-    return [float(value) for value in np.quantile(error, [0.05, 0.5, 0.95])]
 
 
 def diagnosis_table(frame: pd.DataFrame) -> pd.DataFrame:
@@ -151,13 +150,13 @@ def diagnosis_table(frame: pd.DataFrame) -> pd.DataFrame:
         One row a way of doing it and condition: counts, share that is right [%], and the ratio of the best probability
         to the runner-up's, at the median [dimensionless].
     """
-    rows: list[dict[str, object]] = []
-    for keys, group in _classified(frame).groupby([*METHOD, "condition"], sort=False):
+
+    def entries(group: pd.DataFrame) -> dict[str, object]:
         right = group["found_condition"] == group["condition"]
-        entries = {"cases": len(group), "right": int(right.sum()), "right_percent": 100.0 * float(right.mean())}
-        entries["median_margin"] = float(group["margin"].median())
-        rows.append({**dict(zip([*METHOD, "condition"], keys, strict=True)), **entries})
-    return _by_way(rows)
+        shares = {"right": int(right.sum()), "right_percent": 100.0 * float(right.mean())}
+        return {"cases": len(group), **shares, "median_margin": float(group["margin"].median())}
+
+    return _each(_classified(frame), [*METHOD, "condition"], entries)
 
 
 def confusion_table(frame: pd.DataFrame) -> pd.DataFrame:
@@ -177,11 +176,13 @@ def confusion_table(frame: pd.DataFrame) -> pd.DataFrame:
     known = known[known["found_condition"].notna()]
     if not len(known):
         return pd.DataFrame()
-    return confusion_matrix(known["condition"].tolist(), known["found_condition"].tolist())
+    true, found = known["condition"].tolist(), known["found_condition"].tolist()
+    names = dict.fromkeys((*true, *found))
+    return confusion_matrix(true, found, CONDITIONS if set(names) <= set(CONDITIONS) else names)
 
 
 def _classified(frame: pd.DataFrame) -> pd.DataFrame:
-    return frame[(frame["verb"] == "diagnose") & frame["condition"].isin(list(CONDITIONS))]
+    return frame[(frame["verb"] == "diagnose") & frame["known"]]
 
 
 def class_table(frame: pd.DataFrame) -> pd.DataFrame:
@@ -197,9 +198,11 @@ def class_table(frame: pd.DataFrame) -> pd.DataFrame:
     pandas.DataFrame
         One row a condition that was found, or ``none``: count of logs, and share [%].
     """
-    logs = frame[(frame["plant"] == "log") & (frame["verb"] == "diagnose")]
+    logs = frame[frame["file"].notna() & (frame["verb"] == "diagnose")]
     counts = logs["found_condition"].fillna("none").value_counts()
-    names = [name for name in (*CONDITIONS, "none") if name in counts]
+    names = [
+        name for name in dict.fromkeys((*CONDITIONS, *sorted(set(counts.index) - {"none"}), "none")) if name in counts
+    ]
     shares = [100.0 * int(counts[name]) / len(logs) for name in names]
     return pd.DataFrame({"class": names, "logs": [int(counts[name]) for name in names], "percent": shares})
 
@@ -218,8 +221,8 @@ def log_table(frame: pd.DataFrame) -> pd.DataFrame:
         One row a log and verb.
     """
     names = ["file", "verb", "outcome", "found_condition", "runner_up", "margin", "bulk_modulus_pa"]
-    names += ["bulk_modulus_std_pa", "trusted", "reason", "warnings"]
-    return frame.loc[frame["plant"] == "log", names].reset_index(drop=True)
+    names += ["bulk_modulus_std_pa", "quantities", "trusted", "reason", "warnings"]
+    return frame.loc[frame["file"].notna(), names].reset_index(drop=True)
 
 
 def failure_table(frame: pd.DataFrame) -> pd.DataFrame:

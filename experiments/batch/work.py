@@ -12,32 +12,36 @@ from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
 
-from estimation.bulk_modulus import estimate_bulk_modulus
-from estimation.bulk_modulus_estimate import OUTCOMES
-from estimation.eha import BULK_MODULUS, FORMS
-from estimation.filter import FilterProblem
-from estimation.first_belief import PRESSURE_NOISE_LOGGED, first_belief
-from estimation.measurement_noise import SMALLEST_VARIANCE, measurement_variances
-from estimation.run import METHODS, filter_problem, predicted_channels
+from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from estimation.engine.contract import FilterProblem
+from estimation.filters.run import METHODS, filter_problem, predicted_channels
+from estimation.finding import OUTCOMES
+from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, first_belief
+from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
+from estimation.models.eha_forms import BULK_MODULUS, FORMS
+from experiments.actuator_kind import ActuatorKind
+from experiments.actuators import DEFAULT, actuator
 from experiments.batch.cases import Task
 from experiments.batch.diagnosis import diagnosed
 from experiments.batch.lanes import Lanes, Waiting, write_filtered
+from experiments.batch.of_kind import found_of, simulated_run
 from experiments.batch.rows import NIS, TRUTH, Row, Rows, error_percent
 from experiments.batch.series import Log, Series, Simulated, Work, content_of
 from experiments.command.logs import read_log
-from experiments.streams import stream
+from experiments.running.random_streams import stream
 from faults.conditions import severity
-from plant.eha import EhaParameters
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.eha.simulate import PLANTS, simulate
 from plant.errors import LogError, LogWarning
-from plant.record import Record
-from plant.rig import Rig
-from plant.sensors import SENSORS, measure, noise_variances
-from plant.signals import make_drive
-from plant.simulate import PLANTS, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import SENSORS, measure, noise_variances
 
 PRESSURE = "differential_pressure_pa"
 
@@ -86,7 +90,7 @@ def run_task(task: Task) -> Part:
     for number, (series, keys, works) in enumerate(task.groups):
         places = range(after, after := after + len(keys))
         try:
-            prepared = _prepared(series, task.rig)
+            prepared = _prepared(series, task)
         except Exception as error:  # whatever a series brings up must not cost the others their results
             rows.fail(places, error)
             continue
@@ -133,11 +137,12 @@ class _Prepared:
     """A series with what a method may be told of it, and the entries that it adds to its cases' rows."""
 
     record: Record
-    rig: Rig
+    rig: Rig[Any]
     parameters: EhaParameters
     sensors: str | None
     entries: Row
     warnings: str | None = None
+    other: ActuatorKind | None = None
     problems: dict[tuple[object, ...], FilterProblem] = field(default_factory=dict[tuple[object, ...], FilterProblem])
 
     @property
@@ -146,16 +151,21 @@ class _Prepared:
         return self.entries.get(TRUTH)
 
 
-def _prepared(series: Series, rig: Rig) -> _Prepared:
+def _prepared(series: Series, task: Task) -> _Prepared:
+    rig, kind = task.rig, actuator(task.plant)
+    other = None if kind.name == DEFAULT else kind
     if isinstance(series, Log):
         with _one_at_a_time, _caught() as said:
-            record = read_log(Path(series.path), rig.columns, dict(series.columns))
+            record = read_log(Path(series.path), rig.columns, dict(series.columns), kind.required)
         if content_of(Path(series.path)) != series.content:
             raise LogError(f"{series.path}: was changed after the study began; run the same command again")
         known = record.metadata.get("condition")
         entries: Row = {"duration_s": record.duration, "sample_time_s": record.sample_time}
         entries |= {"condition": known} if isinstance(known, str) else {}
-        return _Prepared(record, rig, rig.parameters, None, entries, "; ".join(said()) or None)
+        entries |= {} if other is None else {"plant": kind.name}
+        return _Prepared(record, rig, rig.parameters, None, entries, "; ".join(said()) or None, other)
+    if other is not None:
+        return _Prepared(simulated_run(other, series, rig), rig, rig.parameters, series.sensors, {}, None, other)
     truth, parameters = _truth(series, rig.parameters)
     record = measure(truth, SENSORS[series.sensors], _stream(series, "sensors"))
     return _Prepared(record, rig, parameters, series.sensors, {TRUTH: parameters.bulk_modulus})
@@ -191,8 +201,10 @@ def _run(place: int, prepared: _Prepared, work: Work, rows: Rows, lanes: Lanes) 
             write_filtered(rows, [waiting], [METHODS[work.method](problem)])
         return
     with _one_at_a_time, _caught() as said:
-        if work.verb == "diagnose":
-            found = diagnosed(record, prepared.rig.parameters)
+        if prepared.other is not None:
+            found = found_of(prepared.other, work.verb, prepared.record, prepared.rig)
+        elif work.verb == "diagnose":
+            found = diagnosed(record, prepared.rig)
         else:
             found = _estimated(record, parameters, work, prepared)
     sentences = [sentence for sentence in (prepared.warnings, *said()) if sentence]
@@ -217,7 +229,7 @@ def _estimated(record: Record, parameters: EhaParameters, work: Work, prepared: 
         start_std=work.start_std_pa,
         uncertainties=prepared.rig.uncertainties,
     )
-    reasons = list(found.gate.reasons) if found.value is not None else [OUTCOMES[found.outcome]]
+    reasons = [str(note) for note in found.gate.reasons] if found.value is not None else [OUTCOMES[found.outcome]]
     row: Row = {"outcome": found.outcome.value, "reason": "; ".join(reasons) or None, "trusted": found.gate.passed}
     row |= {"bulk_modulus_pa": found.value, "bulk_modulus_std_pa": found.std}
     row["error_percent"] = error_percent(found.value, prepared.truth)

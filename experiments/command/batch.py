@@ -13,7 +13,7 @@ import typer
 
 from experiments.command.json_output import json_text
 from experiments.command.options import Json
-from experiments.command.streams import INTERRUPTED, SOME_FAILED, USAGE, emit, note
+from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, emit, note
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ def _run(
     again: bool,
 ) -> "tuple[Tally, int]":
     from experiments.batch.runner import manifest_of, run_batch
-    from experiments.executors import open_executor
+    from experiments.running.executors import open_executor
 
     manifest = manifest_of(plan, source)
     if resume:

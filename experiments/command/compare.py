@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from experiments.command.json_output import json_text
+from experiments.command.json_output import json_text, write_whole
 from experiments.command.options import SEED, Json, Seed
-from experiments.command.streams import emit, note, rendered, table
+from experiments.command.terminal import emit, note, rendered, table
 
 commands = typer.Typer()
 
@@ -29,8 +29,8 @@ def compare(
     """
     from experiments.batch.compare import compare_studies
     from experiments.batch.part_store import open_store
+    from experiments.batch.report import render_comparison
     from experiments.batch.summary import frame_of
-    from experiments.report.batch import render_comparison
 
     names = [Path(place.rstrip("/")).name for place in (first, second)]
     if names[0] == names[1]:
@@ -38,7 +38,8 @@ def compare(
     frames = [frame_of(open_store(place).rows()) for place in (first, second)]
     found = compare_studies(*frames, seed=seed)
     if out is not None:
-        _write(out, render_comparison(found, names))
+        write_whole(out, render_comparison(found, names), "--out", parents=True)
+        note(f"written: {out}")
     if as_json:
         emit(
             json_text(
@@ -82,16 +83,3 @@ def report(
     from experiments.batch.reporting import write_report
 
     emit(write_report(open_store(store), open_folder(out or store)))
-
-
-def _write(path: Path, page: str) -> None:
-    from plant.atomic import replacing
-    from plant.errors import HydrostateError
-
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as file:
-            file.write(page.encode())
-    except OSError as error:
-        raise HydrostateError(f"--out {path}: cannot be written: {error.strerror or error}") from error
-    note(f"written: {path}")

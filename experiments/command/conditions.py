@@ -8,8 +8,8 @@ import typer
 
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish
-from experiments.command.options import SEED, Json, Out, RigFile, Seed, load_rig
-from experiments.command.streams import emit, table
+from experiments.command.options import SEED, Json, Out, Plant, RigFile, Seed, load_actuator, load_rig
+from experiments.command.terminal import emit, table
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -47,7 +47,7 @@ def conditions(rig: RigFile = None, out: Out = None, seed: Seed = SEED, as_json:
 
 
 def _screen(results: "Sequence[Result]") -> "Iterable[RenderableType]":
-    from plant.eha import EhaParameters
+    from plant.eha.model import EhaParameters
     from plant.units import notes
 
     shown_names = ("leakage_coefficient", "flow_bias", "friction_quadratic", "friction_linear", "friction_coulomb")
@@ -65,9 +65,12 @@ def rig_init(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="File to write; an existing one is kept.")] = Path(
         "rig.toml"
     ),
+    plant: Plant = None,
 ) -> None:
     """Write a commented rig file (TOML, SI) that describes the paper's actuator, to be changed into yours."""
-    from plant.rig import write_rig_template
+    from plant.eha.rig import EHA, rig_template, write_rig_template
 
-    write_rig_template(path)
+    kind, _ = load_actuator(plant, None)
+    columns = {name: f"NAME:{unit}" for name, unit in kind.channels.items()}
+    write_rig_template(path, None if kind.name == EHA else rig_template(kind.parameters, kind.name, columns))
     emit(f"{path}: fill in your actuator's parameters, then pass it as --rig {path}")

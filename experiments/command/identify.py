@@ -22,14 +22,14 @@ from experiments.command.options import (
     require_one_of,
     require_positive,
 )
-from experiments.command.streams import short_names, table
+from experiments.command.terminal import short_names, table
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from estimation.identification.choose import StructureName
-    from estimation.identification.linear_model import FloatArray, LinearModel
+    from estimation.identification.model.linear_model import FloatArray, LinearModel
 
 TABLE_6_TIME = 1e-3
 """Sample time of Table 6 as we read it [s] (errata E14)."""
@@ -207,8 +207,8 @@ def _entries(model: "LinearModel") -> dict[str, Any]:
 
 def _judged(model: "LinearModel", u: "FloatArray", y: "FloatArray", log: Path, figure: Path | None) -> dict[str, Any]:
     """Return what the data say of the model: tests of its residual, and the gain's interval; draw both if wanted."""
-    from estimation.identification.profile_interval import dc_gain_interval
-    from estimation.identification.validate import validate
+    from estimation.identification.fit.profile_interval import dc_gain_interval
+    from estimation.identification.fit.validate import validate
 
     gain, std = model.dc_gain, model.dc_gain_std
     fitted = model.structure == "output-error"
@@ -221,7 +221,7 @@ def _judged(model: "LinearModel", u: "FloatArray", y: "FloatArray", log: Path, f
     part = slice(0, MOST_TESTED)
     found = validate(model, u[part], y[part], fitted=fitted)
     if figure is not None:
-        from experiments.figures.identified import write_identified
+        from experiments.log_pages.identified import write_identified
 
         write_identified(model, u, y, found, log.name, figure)
     tests = {"whiteness_p": found.whiteness.p_value, "cross_correlation_p": found.cross_correlation.p_value}

@@ -5,27 +5,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.command.identifiability import MOST_SAMPLES, sensed_channels
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish
-from experiments.command.options import (
-    SEED,
-    Json,
-    Out,
-    RigFile,
-    Seed,
-    load_rig,
-    require_one_of,
-    require_positive,
-)
-from experiments.command.streams import note, table
-from plant.errors import DriveError, HydrostateError
+from experiments.command.options import SEED, Json, Out, RigFile, Seed, load_rig
+from experiments.command.terminal import table
+from experiments.eha.identifiability import checked_experiment, within_limits
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from faults.isolability import Distances
-    from plant.rig import Rig
+    from faults.eha.isolability import Distances
+    from plant.eha.rig import Rig
 
 commands = typer.Typer()
 
@@ -53,30 +43,13 @@ def isolability(
     distance a second between the nine conditions under the drive, each a class of actuators. The seed is that of random
     drives.
     """
-    from plant.sensors import SENSORS
-    from plant.signals import DRIVES
-
-    channels = sensed_channels(sensors)
-    require_one_of("--noise", noise, [name for name in SENSORS if name != "ideal"])
-    require_one_of("--drive", drive, list(DRIVES))
-    require_positive("--seconds", seconds, "s")
-    require_positive("--rate", rate, "Hz")
-    if not 2.0 <= seconds * rate <= MOST_SAMPLES:
-        raise HydrostateError(f"--seconds times --rate must be 2 to {MOST_SAMPLES} samples, got {seconds * rate:g}")
+    options = {"sensors": sensors, "noise": noise, "drive": drive, "seconds": seconds, "rate": rate, "ranked": ranked}
+    channels = checked_experiment(options)
     bench = load_rig(rig)
     prepare_output(out)
     about = {"rig": bench.name, "sensors": list(channels), "noise": noise}
     about |= {"seconds": seconds, "rate_hz": rate, "seed": seed}
-    found: dict[str, Distances] = {}
-    for name in DRIVES if ranked else [drive]:
-        try:
-            found[name] = _distances(name, bench, channels, about)
-        except DriveError as error:
-            if not ranked:
-                raise
-            note(f"{name} is left out: {error}")
-    if not found:
-        raise HydrostateError("no drive is within this actuator's limits")
+    found = within_limits(options, lambda name: _distances(name, bench, channels, about))
     results = _results(found, channels, about)
     finish(Batch(results, len(results)), _ranking if ranked else _screen, as_json=as_json, out=out)
 
@@ -84,9 +57,9 @@ def isolability(
 def _distances(drive: str, bench: "Rig", channels: Mapping[str, str], about: Mapping[str, Any]) -> "Distances":
     import numpy as np
 
-    from faults.isolability import condition_distances
-    from plant.sensors import SENSORS
-    from plant.signals import make_drive
+    from faults.eha.isolability import condition_distances
+    from plant.eha.drives import make_drive
+    from plant.sensors.sensors import SENSORS
 
     T = 1.0 / about["rate_hz"]
     speed = make_drive(drive, about["seconds"], T, bench.parameters, np.random.default_rng(about["seed"]))
@@ -96,7 +69,7 @@ def _distances(drive: str, bench: "Rig", channels: Mapping[str, str], about: Map
 def _results(
     found: "Mapping[str, Distances]", channels: Mapping[str, str], about: Mapping[str, Any]
 ) -> tuple[Result, ...]:
-    from faults.isolability import structural_isolability, wrong_verdicts
+    from faults.eha.isolability import structural_isolability, wrong_verdicts
 
     structure = structural_isolability(tuple(channels.values()))
     results: list[Result] = []
@@ -131,7 +104,7 @@ def _results(
 
 
 def _verdict(distances: "Distances") -> str:
-    from faults.isolability import ERROR, wrong_verdicts
+    from faults.eha.isolability import ERROR, wrong_verdicts
 
     pairs = [
         (one, other)

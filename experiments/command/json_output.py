@@ -171,12 +171,36 @@ def write_results(results: Sequence[Result], out: Path) -> list[Path]:
     if out == _folder(out):
         texts = {out / "results.json": json_text(results), out / "results.csv": csv_text(results)}
     for path, text in texts.items():
-        try:
-            with replacing(path) as file:
-                file.write(text.encode() if path.suffix == ".csv" else (text + "\n").encode())
-        except OSError as error:
-            raise HydrostateError(f"{path}: cannot be written: {error.strerror or error}") from error
+        write_whole(path, text if path.suffix == ".csv" else text + "\n")
     return list(texts)
+
+
+def write_whole(path: Path, text: str, option: str = "", *, parents: bool = False) -> None:
+    """Write a file, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        Where to.
+    text : str
+        What it shall hold.
+    option : str
+        Of the command, that asked for it.
+    parents : bool
+        Whether folders that are missing are made.
+
+    Raises
+    ------
+    HydrostateError
+        If it cannot be written.
+    """
+    try:
+        if parents:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as file:
+            file.write(text.encode())
+    except OSError as error:
+        raise HydrostateError(f"{option} {path}: cannot be written: {error.strerror or error}".lstrip()) from error
 
 
 def _folder(out: Path) -> Path:

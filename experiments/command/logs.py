@@ -1,8 +1,7 @@
 """Several logs, one after the other: one that fails is named and the rest are done."""
 
-import re
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
@@ -10,18 +9,17 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 import typer
 
 from experiments.command.json_output import Result, json_text, write_results
-from experiments.command.streams import INTERRUPTED, SOME_FAILED, USAGE, emit, note, progress, rendered, unexpected
-from plant.errors import HydrostateError, LogError, LogWarning
+from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, emit, note, progress, rendered, unexpected
+from plant.errors import HydrostateError, LogWarning, MissingColumnError
+from plant.log.notes import LogCode
+from plant.notes import distinct
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from plant.record import Record
+    from plant.log.record import Record
 
 T = TypeVar("T")
-
-ABSENT = re.compile(r"column .* is wanted for (\w+), the log has")
-"""How `plant.columns` says that a mapped column is not in a log."""
 
 Work: TypeAlias = Callable[[Path], Result]
 """What a command does with one log."""
@@ -100,24 +98,21 @@ def _one(log: Path, work: Work, blank: Result) -> Result:
         try:
             result = dict(work(log))
         except HydrostateError as error:
-            result = _failure(blank, _without(log, str(error)))
+            result = _failure(blank, error.message if error.source == str(log) else str(error))
         except Exception as error:  # whatever a log brings up must not cost the others their results
             result = _failure(blank, unexpected(error))
-    said = [_without(log, str(one.message)) for one in caught if issubclass(one.category, LogWarning)]
-    said = list(dict.fromkeys([*said, *result.get("warnings", ())]))
+    raised = distinct(one.message.note for one in caught if isinstance(one.message, LogWarning))
+    said = list(dict.fromkeys([*map(str, raised), *result.get("warnings", ())]))
+    notes = [*(one.to_dict() for one in raised), *result.get("notes", ())]
     for sentence in said:
         note(f"{log}: warning: {sentence}")
     if result["outcome"] in {"failed", "diverged"}:
         note(f"{log}: {result['message']}")
-    return {"file": str(log), **result, "warnings": said}
+    return {"file": str(log), **result, "warnings": said, "notes": notes}
 
 
 def _failure(blank: Result, message: str) -> dict[str, Any]:
     return {"outcome": "failed", **blank, "message": message}
-
-
-def _without(log: Path, sentence: str) -> str:
-    return sentence.removeprefix(f"{log}: ")
 
 
 def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None) -> None:
@@ -153,7 +148,9 @@ def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None) -> 
     raise typer.Exit(code)
 
 
-def read_log(path: Path, rig_columns: Mapping[str, str], columns: Mapping[str, str]) -> "Record":
+def read_log(
+    path: Path, rig_columns: Mapping[str, str], columns: Mapping[str, str], required: Collection[str] | None = None
+) -> "Record":
     """Read a log by a rig's column names and the command line's, which go first.
 
     A rig names the columns of a bench, not of every log: one that a log lacks is looked for under the channel's own
@@ -165,6 +162,8 @@ def read_log(path: Path, rig_columns: Mapping[str, str], columns: Mapping[str, s
         The log.
     rig_columns, columns : Mapping[str, str]
         Foreign column by channel, from the rig file and from the command line.
+    required : collection of str, optional
+        Channels that must be there; those of the gear-pump actuator if not given.
 
     Returns
     -------
@@ -181,9 +180,11 @@ def read_log(path: Path, rig_columns: Mapping[str, str], columns: Mapping[str, s
     LogWarning
         If a column of the rig's is not in the log.
     """
-    from plant.record_files import read_record
+    from plant.log.checks import REQUIRED
+    from plant.log.files import read_record
 
-    return with_rig_columns(lambda mapping: read_record(path, columns=mapping), rig_columns, columns)
+    wanted = REQUIRED if required is None else required
+    return with_rig_columns(lambda given: read_record(path, columns=given, required=wanted), rig_columns, columns)
 
 
 def with_rig_columns(
@@ -219,12 +220,11 @@ def with_rig_columns(
             kept = {channel: name for channel, name in rig_columns.items() if channel not in absent}
             try:
                 return read({**kept, **columns})
-            except LogError as error:
-                missed = ABSENT.search(str(error))
-                if missed is None or missed[1] not in kept or missed[1] in columns:
+            except MissingColumnError as error:
+                if error.channel not in kept or error.channel in columns:
                     raise
-                absent.append(missed[1])
+                absent.append(error.channel)
     finally:
         if absent:
-            names = ", ".join(rig_columns[channel] for channel in absent)
-            warnings.warn(f"the log has no {names} of the rig's columns", LogWarning, stacklevel=2)
+            missed = LogCode.COLUMNS_ABSENT.note(columns=", ".join(rig_columns[channel] for channel in absent))
+            warnings.warn(LogWarning(missed), stacklevel=2)

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -11,7 +11,8 @@ import typer
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
-    from plant.rig import Rig
+    from experiments.actuator_kind import ActuatorKind
+    from plant.eha.rig import Rig
 
 Logs: TypeAlias = Annotated[
     list[Path],
@@ -59,23 +60,25 @@ ConditionName: TypeAlias = Annotated[
     str | None, typer.Option("--condition", metavar="NAME", help="A condition by name, see `hydrostate conditions`.")
 ]
 
-StackPlant: TypeAlias = Annotated[
+Plant: TypeAlias = Annotated[
     str | None,
     typer.Option(
         "--plant",
         metavar="PLANT",
-        help="piezo-stack: logs of that actuator, with drive_voltage_v and what is measured of stack_displacement_m, "
-        "stack_force_n, position_m, chamber_pressure_pa, from rest on. diaphragm-motor: with drive_voltage_v, a steady "
-        "sine, electrode_1_v to electrode_7_v and position_m. Options that name a plant apply to it alone.",
+        help="The actuator's kind: eha, the gear-pump actuator; piezo-stack, with drive_voltage_v and what is measured "
+        "of stack_displacement_m, stack_force_n, position_m, chamber_pressure_pa, from rest on; diaphragm-motor, with "
+        "drive_voltage_v, a steady sine, electrode_1_v to electrode_7_v and position_m. Options that name a plant "
+        "apply to it alone.",
+        show_default="that of the rig file, else eha",
     ),
 ]
-StackBias: TypeAlias = Annotated[
+BiasPressure: TypeAlias = Annotated[
     float | None,
     typer.Option(
         "--bias-pressure", metavar="PA", help="piezo-stack: absolute bias pressure of the runs.", show_default="1e6"
     ),
 ]
-StackLoad: TypeAlias = Annotated[
+Load: TypeAlias = Annotated[
     float | None,
     typer.Option(
         "--load",
@@ -84,7 +87,23 @@ StackLoad: TypeAlias = Annotated[
         show_default="0",
     ),
 ]
-StackHealthy: TypeAlias = Annotated[
+Frequency: TypeAlias = Annotated[
+    float | None,
+    typer.Option(
+        metavar="HZ",
+        help="piezo-stack: frequency, up to 450 Hz; diaphragm-motor: up to 1000 Hz.",
+        show_default="275, diaphragm-motor 480",
+    ),
+]
+Voltage: TypeAlias = Annotated[
+    float | None,
+    typer.Option(
+        metavar="V",
+        help="piezo-stack: peak to peak, on half of it as bias; diaphragm-motor: peak to peak, up to 300 V.",
+        show_default="140, diaphragm-motor 200",
+    ),
+]
+Healthy: TypeAlias = Annotated[
     Path | None,
     typer.Option(
         "--healthy", metavar="LOG", help="piezo-stack, diaphragm-motor: a run of the healthy actuator to calibrate on."
@@ -93,12 +112,6 @@ StackHealthy: TypeAlias = Annotated[
 
 PRESSURE = "differential_pressure_pa"
 """The channel that is optional everywhere."""
-
-STACK = "piezo-stack"
-"""The plant with a drive, sensors and faults of its own."""
-
-MOTOR = "diaphragm-motor"
-"""The other one."""
 
 SEED = 2024
 """Seed where none is given."""
@@ -122,7 +135,7 @@ def load_rig(path: Path | None) -> "Rig":
     RigError
         If the file is not usable.
     """
-    from plant.rig import Rig, read_rig
+    from plant.eha.rig import Rig, read_rig
 
     return Rig() if path is None else read_rig(path)
 
@@ -150,7 +163,7 @@ def load_columns(texts: Sequence[str] | None) -> dict[str, str]:
     >>> load_columns(["position_m=POS, MM:mm,motor_speed_rad_s=RPM:rpm"])
     {'position_m': 'POS, MM:mm', 'motor_speed_rad_s': 'RPM:rpm'}
     """
-    from plant.columns import parse_columns
+    from plant.log.columns import parse_columns
 
     return parse_columns([part for text in texts or () for part in re.split(r",(?=\s*[A-Za-z]\w*=)", text)])
 
@@ -224,21 +237,77 @@ def figure_path(target: Path | None, log: Path, logs: int) -> Path | None:
     return target.with_name(f"{target.stem}-{log.stem}{target.suffix or '.png'}")
 
 
-def refuse_given(options: Mapping[str, Any], why: str) -> None:
-    """Refuse options that do not go with the plant.
+def load_actuator(plant: str | None, path: Path | None) -> "tuple[ActuatorKind, Rig[Any]]":
+    """Return the kind of actuator that is asked for, and its rig.
 
     Parameters
     ----------
-    options : Mapping[str, Any]
-        By name, None where not given.
-    why : str
-        What is wrong with them.
+    plant : str or None
+        As ``--plant`` names it; the rig file's if not given, and the gear-pump actuator where that names none.
+    path : Path or None
+        The rig file.
+
+    Returns
+    -------
+    tuple of ActuatorKind and Rig
+        Both.
 
     Raises
     ------
     HydrostateError
-        If one is given.
+        If there is no such kind, or the rig file is not usable or of another kind.
     """
-    given = [name for name, value in options.items() if value is not None]
-    if given:
-        raise HydrostateError(f"{', '.join(given)} {why}")
+    from experiments.actuators import DEFAULT, actuator
+
+    if plant is None and path is not None:
+        from plant.eha.rig import plant_of
+
+        plant = plant_of(path)
+    kind = actuator(plant or DEFAULT)
+    return kind, kind.read_rig(path)
+
+
+def understood(
+    context: typer.Context, asked: Mapping[str, Any], kind: "ActuatorKind", verb: str, common: Collection[str]
+) -> dict[str, Any]:
+    """Return the options of a command line that a kind of actuator understands, at its defaults where not given.
+
+    Parameters
+    ----------
+    context : typer.Context
+        The command line.
+    asked : Mapping[str, Any]
+        Its arguments by name.
+    kind : ActuatorKind
+        The kind of actuator.
+    verb : str
+        The verb.
+    common : collection of str
+        Options of all kinds, which the verb itself sees to.
+
+    Returns
+    -------
+    dict[str, Any]
+        Values by name.
+
+    Raises
+    ------
+    HydrostateError
+        If an option is given that the kind does not understand, or the kind lacks the verb.
+    """
+    from experiments.actuators import actuators, offered
+
+    defaults: Mapping[str, Any] = offered(kind, verb).options
+    flags = {str(one.name): one.opts[0] for one in context.command.params}
+    sources = {name: str(context.get_parameter_source(name)) for name in flags if name not in common}
+    given = {name: asked[name] for name, source in sources.items() if source == "ParameterSource.COMMANDLINE"}
+    strange = [name for name in given if name not in defaults]
+    if strange:
+        takers = [
+            one.name
+            for one in actuators()
+            if getattr(one, verb) is not None and set(strange) <= set(getattr(one, verb).options)
+        ]
+        needed = f" needs --plant {' or '.join(takers)}, and" if takers else ""
+        raise HydrostateError(f"{', '.join(flags[name] for name in strange)}{needed} does not go with {kind.name}")
+    return {**defaults, **given}

@@ -1,8 +1,7 @@
-"""`hydrostate simulate --out run.csv`: a run of the actuator, as its sensors would have logged it."""
+"""`hydrostate simulate --out run.csv`: a run of an actuator, as its sensors would have logged it."""
 
 import platform
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,27 +9,27 @@ import typer
 
 from experiments.command.json_output import json_text
 from experiments.command.options import (
-    MOTOR,
-    PRESSURE,
     SEED,
-    STACK,
+    BiasPressure,
     ConditionName,
+    Frequency,
     Json,
+    Load,
     RigFile,
     Seed,
-    load_rig,
-    refuse_given,
-    require_one_of,
+    Voltage,
+    load_actuator,
     require_positive,
+    understood,
 )
-from experiments.command.streams import emit, note
+from experiments.command.terminal import emit, note
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
-    from plant.eha import EhaParameters
-    from plant.record import Record
+    from experiments.actuator_kind import Run, Simulation
 
-_DURATION, _SAMPLE_TIME = 10.0, 1e-4
+COMMON = frozenset({"plant", "rig", "out", "seed", "as_json"})
+"""Options of every kind of actuator."""
 
 commands = typer.Typer()
 
@@ -39,6 +38,7 @@ commands = typer.Typer()
     epilog="Example: hydrostate simulate --condition major_leakage --drive steps --duration 10 --out run.parquet"
 )
 def simulate(
+    context: typer.Context,
     out: Annotated[
         Path,
         typer.Option(
@@ -46,13 +46,14 @@ def simulate(
         ),
     ],
     plant: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="PLANT",
             help="lumped (5.8 to 5.10, it sticks), reduced (5.14), circuit (the whole rig), or piezo-stack and "
             "diaphragm-motor, which have a sine drive and the options marked so.",
+            show_default="that of the rig file, else lumped",
         ),
-    ] = "lumped",
+    ] = None,
     condition: ConditionName = None,
     leakage_severity: Annotated[
         float | None,
@@ -86,31 +87,10 @@ def simulate(
     ] = "bench",
     rig: RigFile = None,
     seed: Seed = SEED,
-    frequency: Annotated[
-        float | None,
-        typer.Option(
-            metavar="HZ",
-            help="piezo-stack: frequency, up to 450 Hz; diaphragm-motor: up to 1000 Hz.",
-            show_default="275, diaphragm-motor 480",
-        ),
-    ] = None,
-    voltage: Annotated[
-        float | None,
-        typer.Option(
-            metavar="V",
-            help="piezo-stack: peak to peak, on half of it as bias; diaphragm-motor: peak to peak, up to 300 V.",
-            show_default="140, diaphragm-motor 200",
-        ),
-    ] = None,
-    bias_pressure: Annotated[
-        float | None, typer.Option(metavar="PA", help="piezo-stack: absolute bias pressure.", show_default="1e6")
-    ] = None,
-    load: Annotated[
-        float | None,
-        typer.Option(
-            metavar="KG|N", help="piezo-stack: mass lifted [kg]; diaphragm-motor: force [N].", show_default="0"
-        ),
-    ] = None,
+    frequency: Frequency = None,
+    voltage: Voltage = None,
+    bias_pressure: BiasPressure = None,
+    load: Load = None,
     fault: Annotated[
         str | None,
         typer.Option(
@@ -124,78 +104,26 @@ def simulate(
 
     Columns have the project's own names, whatever the rig calls its logs' columns.
     """
-    import numpy as np
+    from experiments.actuators import offered
+    from plant.log.files import write_record
 
-    from experiments.command.simulate_motor import simulated_motor
-    from experiments.command.simulate_stack import simulated_stack
-    from plant.record_files import write_record
-    from plant.sensors import SENSORS
-    from plant.signals import DRIVES, make_drive
-    from plant.simulate import PLANTS
-    from plant.simulate import simulate as simulate_plant
-
-    stack_options = {
-        "--frequency": frequency,
-        "--voltage": voltage,
-        "--bias-pressure": bias_pressure,
-        "--load": load,
-        "--fault": fault,
-    }
+    asked = locals()
     require_positive("--duration", duration, "s")
     require_positive("--sample-time", sample_time, "s")
-    if plant in (STACK, MOTOR):
-        shared = {"--leakage-severity": leakage_severity, "--friction-severity": friction_severity, "--rig": rig}
-        if plant == MOTOR:
-            shared |= {"--condition": condition, "--bias-pressure": bias_pressure}
-        refuse_given(shared, f"does not apply to --plant {plant}")
-        if plant == STACK:
-            record, said = simulated_stack(stack_options, condition, duration, sample_time, sensors, seed)
-        else:
-            record, said = simulated_motor(stack_options, duration, sample_time, sensors, seed)
-        _prepare(out)
-        write_record(record.annotate(versions=_versions()), out)
-        _report(record, out, said, as_json)
-        return
-    duration, sample_time = duration or _DURATION, sample_time or _SAMPLE_TIME
-    refuse_given(stack_options, f"needs --plant {STACK} or {MOTOR}")
-    for option, value, known in (
-        ("--plant", plant, [*PLANTS, STACK, MOTOR]),
-        ("--drive", drive, DRIVES),
-        ("--sensors", sensors, SENSORS),
-    ):
-        require_one_of(option, value, list(known))
-    bench = load_rig(rig)
-    parameters, made_of = _actuator(bench.parameters, condition, leakage_severity, friction_severity)
+    kind, bench = load_actuator(plant, rig)
+    options = {**understood(context, asked, kind, "simulate", COMMON), "seed": seed, "plant": plant}
+    simulation: Simulation = offered(kind, "simulate")
     _prepare(out)
-    drive_rng, sensor_rng = np.random.default_rng(seed).spawn(2)
-    speed = make_drive(drive, duration, sample_time, parameters, drive_rng)
-    record = simulate_plant(
-        PLANTS[plant], speed, sample_time, parameters, sensors=SENSORS[sensors], rng=sensor_rng
-    ).annotate(**made_of, drive=drive, rig=bench.name, seed=seed, versions=_versions())
-    write_record(record, out)
-    _report(record, out, {"plant": plant, **made_of, "drive": drive, "sensors": sensors, "seed": seed}, as_json)
-
-
-def _actuator(
-    rig: "EhaParameters", condition: str | None, leakage: float | None, friction: float | None
-) -> "tuple[EhaParameters, dict[str, Any]]":
-    """Return the faulty actuator, and what made it so."""
-    from faults.conditions import LEVELS, find_condition, severity
-
-    name = condition
-    if leakage is None and friction is None:
-        found = find_condition(condition or "normal")
-        name, leakage, friction = found.name, float(LEVELS.index(found.leakage)), float(LEVELS.index(found.friction))
-    elif condition is not None:
-        raise HydrostateError("a --condition or severities are wanted, got both")
-    leaking, rubbing = leakage or 0.0, friction or 0.0
-    made_of = {"condition": name, "leakage_severity": leaking, "friction_severity": rubbing}
-    return severity(leaking, rubbing, rig), made_of
+    run = simulation.run(bench, options)
+    for one in run.notes:
+        note(str(one))
+    write_record(run.record.annotate(versions=_versions()), out)
+    _report(run, out, {"plant": kind.name, **run.about}, as_json)
 
 
 def _prepare(out: Path) -> None:
     """Refuse a file that cannot be written before the work, not after it."""
-    from plant.record_files import SUFFIXES
+    from plant.log.files import SUFFIXES
 
     if out.suffix.lower() not in SUFFIXES:
         raise HydrostateError(f"--out must end in {', '.join(SUFFIXES)}, got {str(out)!r}")
@@ -208,14 +136,15 @@ def _prepare(out: Path) -> None:
 
 
 def _versions() -> dict[str, str]:
+    from importlib.metadata import version
+
     packages = {name: version(name) for name in ("hydrostate", "numpy", "numba")}
     return {"python": platform.python_version(), **packages}
 
 
-def _report(record: "Record", out: Path, made_of: Mapping[str, Any], as_json: bool) -> None:
+def _report(run: "Run", out: Path, made_of: Mapping[str, Any], as_json: bool) -> None:
+    record = run.record
     said = f"{len(record)} samples, {record.duration:g} s at {1.0 / record.sample_time:g} Hz, {', '.join(record)}"
-    if PRESSURE not in record and made_of["plant"] not in (STACK, MOTOR):
-        note(f"{PRESSURE} is not logged by these sensors: estimate and diagnose will be less certain")
     if not as_json:
         emit(f"{out}: {said}")
         return
@@ -228,6 +157,7 @@ def _report(record: "Record", out: Path, made_of: Mapping[str, Any], as_json: bo
         "duration_s": record.duration,
         "channels": list(record),
         "warnings": [],
+        "notes": [one.to_dict() for one in run.notes],
         "message": said,
     }
     emit(json_text([entries]))

@@ -9,7 +9,7 @@ import typer
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish
 from experiments.command.options import Json, Out
-from experiments.command.streams import table
+from experiments.command.terminal import table
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -53,8 +53,8 @@ def size_cylinder(
     Section 5.1 of the diaphragm-motor paper as a small calculator, with steady balances. With --bore and --rod it says
     what that cylinder gives; a cylinder too weak for its duty is an error.
     """
-    from plant.cylinder_sizing import Duty, cylinder_circuit
-    from plant.cylinder_sizing import size_cylinder as smallest_standard
+    from plant.eha.cylinder_sizing import Duty, cylinder_circuit
+    from plant.eha.cylinder_sizing import size_cylinder as smallest_standard
 
     prepare_output(out)
     duty = Duty(
@@ -81,7 +81,7 @@ def size_cylinder(
 
 
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
-    from plant.cylinder_sizing import CylinderCircuit
+    from plant.eha.cylinder_sizing import CylinderCircuit
     from plant.units import notes
 
     shown = table("quantity", "value", "unit")

@@ -14,17 +14,18 @@ import typer
 from experiments.command.json_output import plain
 from experiments.command.logs import read_log, with_rig_columns
 from experiments.command.options import PRESSURE, Columns, RigFile, load_columns, load_rig
-from experiments.command.streams import emit, note
+from experiments.command.terminal import emit, note
 from plant.errors import HydrostateError, LogError, LogWarning
+from plant.notes import distinct
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from faults.detection import Watch
-    from faults.detection_events import Alarm, Change, Event
-    from plant.record import Record
-    from plant.rig import Rig
+    from faults.watch.events import Alarm, Change, Event
+    from faults.watch.watch import Watch
+    from plant.eha.rig import Rig
+    from plant.log.record import Record
 
 T = TypeVar("T")
 
@@ -99,8 +100,8 @@ class _Asked:
 
     def watch(self, sample_time: float, pressure: bool, start: float) -> "Watch":
         """Return the watch, with the healthy log learnt."""
-        from faults.detection import Watch
-        from faults.detection_events import Alarm
+        from faults.watch.events import Alarm
+        from faults.watch.watch import Watch
 
         made = Watch(
             self.bench.parameters,
@@ -160,7 +161,7 @@ class _Told:
         self._line("ready", time, thresholds=named, message="alarms can come from here on")
 
     def events(self, events: "Sequence[Event]") -> None:
-        from faults.detection_events import Alarm, Ready
+        from faults.watch.events import Alarm, Ready
 
         for event in events:
             if isinstance(event, Ready):
@@ -226,7 +227,7 @@ def _file(told: _Told, path: Path, asked: _Asked) -> None:
 def _stream(told: _Told, lines: Iterable[str], asked: _Asked) -> None:
     import numpy as np
 
-    from plant.csv_stream import CsvStream
+    from plant.log.csv_stream import CsvStream
 
     rest = iter(lines)
     header = next((line for line in rest if line.strip()), "")
@@ -257,12 +258,12 @@ def _stream(told: _Told, lines: Iterable[str], asked: _Asked) -> None:
 def _samples(
     channels: "Mapping[str, NDArray[np.float64]]", sample_time: float, source: str, travelled: float = 0.0
 ) -> "tuple[NDArray[np.float64], bool]":
-    from faults.detection_samples import watched_samples
+    from faults.watch.samples import watched_samples
 
     try:
         return watched_samples(channels, sample_time, travelled)
     except LogError as error:
-        raise LogError(f"{source}: {error}") from error
+        raise LogError(error.message, source) from error
 
 
 def _channels(record: "Record") -> "dict[str, NDArray[np.float64]]":
@@ -279,6 +280,6 @@ def _noted(source: str, read: Callable[[], T]) -> T:
         warnings.simplefilter("ignore")
         warnings.simplefilter("always", LogWarning)
         found = read()
-    for said in dict.fromkeys(str(one.message).removeprefix(f"{source}: ") for one in caught):
+    for said in distinct(one.message.note for one in caught if isinstance(one.message, LogWarning)):
         note(f"{source}: warning: {said}")
     return found

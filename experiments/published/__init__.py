@@ -3,6 +3,7 @@
 Nothing here is corrected. What the project departs from is told in ``docs/errata.md``, by number.
 """
 
+import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
@@ -11,8 +12,7 @@ from typing import Literal, TypeAlias, get_args
 
 import pandas as pd
 
-from plant.errors import HydrostateError
-from plant.units import PSI
+from plant.errors import require_known
 
 TableName: TypeAlias = Literal["conditions", "parameters", "leakage", "friction", "rmse", "transfer_functions"]
 """The six tables, in the paper's order."""
@@ -49,28 +49,15 @@ class PublishedScalar:
     where: str
 
 
-def _percent_of_normal(value: float, what: str) -> PublishedScalar:
-    return PublishedScalar(value, "%", value / 100.0, "1", f"{what}, of normal", "section 3, errata E7")
+def _scalars() -> Mapping[str, PublishedScalar]:
+    with files(__name__).joinpath("eha_scalars.csv").open(encoding="utf-8") as stream:
+        return {
+            row.pop("name"): PublishedScalar(value=float(row.pop("value")), si_value=float(row.pop("si_value")), **row)
+            for row in csv.DictReader(stream)
+        }
 
 
-SCALARS: Mapping[str, PublishedScalar] = MappingProxyType(
-    {
-        "normal_differential_pressure": PublishedScalar(
-            58.0, "psi", 58.0 * PSI, "Pa", "differential pressure when normal", "section 3, errata E7"
-        ),
-        "minor_leakage_velocity": _percent_of_normal(75.0, "velocity under minor leakage"),
-        "major_leakage_velocity": _percent_of_normal(50.0, "velocity under major leakage"),
-        "minor_friction_pressure": _percent_of_normal(200.0, "differential pressure under minor friction"),
-        "major_friction_pressure": _percent_of_normal(300.0, "differential pressure under major friction"),
-        "bandwidth": PublishedScalar(25.0, "Hz", 25.0, "Hz", "bandwidth of the actuator", "section 7, errata E14"),
-        "bulk_modulus": PublishedScalar(
-            2.07e8, "Pa", 2.07e8, "Pa", "effective bulk modulus, by the filter", "section 7, errata E2"
-        ),
-        "earlier_bulk_modulus": PublishedScalar(
-            2.1e8, "Pa", 2.1e8, "Pa", "effective bulk modulus of the earlier work", "section 7, errata E20"
-        ),
-    }
-)
+SCALARS: Mapping[str, PublishedScalar] = MappingProxyType(_scalars())
 """The text's scalars by name."""
 
 _FILES: Mapping[TableName | MotorTableName, str] = MappingProxyType(
@@ -106,7 +93,6 @@ def load(name: TableName | MotorTableName) -> pd.DataFrame:
     >>> table.loc["major", "leakage_coefficient_m3_per_s_pa"]
     np.float64(6.006e-11)
     """
-    if name not in _FILES:
-        raise HydrostateError(f"published table must be one of {', '.join(_FILES)}, got {name!r}")
+    require_known("published table", name, _FILES)
     with files(__name__).joinpath(_FILES[name]).open(encoding="utf-8") as stream:
         return pd.read_csv(stream, keep_default_na=False)

@@ -5,7 +5,7 @@ kernel imports.
 """
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import llvmlite.binding
@@ -55,6 +55,82 @@ def function_of(lines: Lines, results: int) -> Any:
         return numba.types.UniTuple(numba.float64, results)(given), code
 
     return function
+
+
+def advancing(given: Sequence[str], slots: Mapping[str, int], lines: Lines, results: int) -> Any:
+    """Return lines as an operation on a tuple of numbers, and on numbers in memory, which gives all results.
+
+    Parameters
+    ----------
+    given : sequence of str
+        Names of the numbers in the tuple.
+    slots : Mapping[str, int]
+        Where the others stand.
+    lines : callable
+        The lines.
+    results : int
+        How many they give.
+
+    Returns
+    -------
+    intrinsic
+        ``advance((a, b), address)``, a tuple, with the address of slot 0.
+    """
+
+    @intrinsic
+    def advance(_: Any, numbers: Any, address: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            def value(name: str) -> Vector:
+                if name in given:
+                    return Vector(builder, builder.extract_value(arguments[0], given.index(name)))
+                return Vector(builder, builder.load(_place(builder, arguments[1], WORD(8 * slots[name]), DOUBLE)))
+
+            found = lines(*map(value, inspect.signature(lines).parameters)).values()
+            numbers = [Vector(builder, DOUBLE(0.0)).like(result) for result in found]
+            return context.make_tuple(builder, signature.return_type, numbers)
+
+        return numba.types.UniTuple(numba.float64, results)(numbers, address), code
+
+    return advance
+
+
+def loading(count: int) -> Any:
+    """Return an operation that reads so many numbers, one after the other.
+
+    Parameters
+    ----------
+    count : int
+        How many.
+
+    Returns
+    -------
+    intrinsic
+        ``load(address)``, a tuple.
+    """
+
+    @intrinsic
+    def load(_: Any, address: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            places = [_place(builder, arguments[0], WORD(8 * k), DOUBLE) for k in range(count)]
+            return context.make_tuple(builder, signature.return_type, [builder.load(place) for place in places])
+
+        return numba.types.UniTuple(numba.float64, count)(address), code
+
+    return load
+
+
+def _store(_: Any, numbers: Any, address: Any) -> Any:
+    def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        for k in range(len(numbers)):
+            place = _place(builder, arguments[1], WORD(8 * k), DOUBLE)
+            builder.store(builder.extract_value(arguments[0], k), place)
+        return context.get_dummy_value()
+
+    return numba.void(numbers, address), code
+
+
+store = intrinsic(_store)
+"""``store(numbers, address)``: write a tuple's numbers, one after the other."""
 
 
 def stepping(slots: Mapping[str, int], width: int, *parts: Lines) -> Any:

@@ -134,6 +134,27 @@ def lines_source(name: str, outputs: Mapping[str, Expression]) -> str:
     return "\n".join([f"def {name}({takes}):", *lines, f"    return {{{given}}}"])
 
 
+def operations_source(lines: Mapping[str, str], slots: Mapping[str, int], width: int) -> str:
+    """Write lines and, as ``NAME_at``, each of them as an operation on numbers in memory.
+
+    Parameters
+    ----------
+    lines : Mapping[str, str]
+        Source of functions by their names, as `lines_source` gives it.
+    slots : Mapping[str, int]
+        Where the first of a symbol's numbers stands.
+    width : int
+        How many numbers of each are taken at a time.
+
+    Returns
+    -------
+    str
+        Their source, see `plant.compiled.intrinsics.stepping`.
+    """
+    made = "\n".join(f"{name}_at = stepping(SLOTS, {width}, {name})" for name in lines)
+    return "\n\n\n".join([*lines.values(), f"SLOTS = {dict(slots)}\n\n{made}"])
+
+
 def spelt(item: Expression, names: Mapping[int, str]) -> str:
     """Return how `plant.compiled.vector` spells an operation.
 

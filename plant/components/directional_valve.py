@@ -1,7 +1,7 @@
 """A 4/3 directional valve with tandem centre: which side of the cylinder the pump feeds, and what returns to tank."""
 
 from plant.compiled.functions import Scalar, absolute, sign, sqrt, where
-from plant.components.cylinder import velocity_under_friction
+from plant.components.friction import velocity_under_friction
 
 SHUT = 1e-5
 """Share of a land's opening that remains when it is covered: a spool is not tight [dimensionless]."""

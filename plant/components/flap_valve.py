@@ -4,7 +4,7 @@ Source: judged; the diaphragm-motor paper gives no law of its umbrella valves, e
 """
 
 from plant.compiled.functions import Scalar, absolute, maximum, minimum
-from plant.components.cylinder import velocity_under_friction
+from plant.components.friction import velocity_under_friction
 
 
 def opening_target(

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, LEVELS, Condition, find_condition, parameters_for
-from plant.eha import EhaParameters
-from plant.simulate import LUMPED, simulate
-from plant.steady_state import steady_state
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import LUMPED, simulate
+from plant.eha.steady_state import steady_state
 
 RIG = EhaParameters()
 EVERY_CONDITION = pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)

@@ -3,22 +3,29 @@
 import numpy as np
 import pytest
 
-from estimation.eha import BULK_MODULUS, FORMS
-from estimation.filter import Method
-from estimation.first_belief import first_belief
-from estimation.linearised import compile_step
-from estimation.model import ProcessModel
-from estimation.run import METHODS, Estimate, run_filter
+from estimation.engine.contract import Method
+from estimation.engine.linearised import compile_step
+from estimation.filters.run import METHODS, Estimate, run_filter
+from estimation.log_checks.first_belief import first_belief
+from estimation.models.eha_forms import BULK_MODULUS, FORMS
+from estimation.models.model import ProcessModel
 from faults.conditions import CONDITIONS, Condition, parameters_for
-from plant.eha import EhaParameters
-from plant.integrate import parameter_row
-from plant.record import CHANNELS, Record
-from plant.sensors import BENCH
-from plant.signals import sine
-from plant.simulate import LUMPED, simulate
+from plant.eha.drives import sine
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import LUMPED, simulate
+from plant.log.record import CHANNELS, Record
+from plant.sensors.sensors import BENCH
+from plant.solvers.steps import parameter_row
 
 EVERY_FORM = pytest.mark.parametrize("model", FORMS.values(), ids=FORMS)
 EVERY_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+WITHOUT_CHANCE = pytest.mark.parametrize(  # what particles do instead is said in test_particle
+    "method",
+    [method for name, method in METHODS.items() if name != "particle"],
+    ids=[n for n in METHODS if n != "particle"],
+)
+ROUNDING = {METHODS["imm"]: 1e-9}
+"""Of a log-likelihood of nothing: a bank's probabilities sum to one to rounding."""
 RIG = EhaParameters()
 
 
@@ -90,7 +97,7 @@ def test_the_covariance_stays_symmetric_and_positive(method: Method, model: Proc
 
 
 @EVERY_FORM
-@EVERY_METHOD
+@WITHOUT_CHANCE
 def test_a_log_with_nothing_measured_leaves_bulk_modulus_as_believed(method: Method, model: ProcessModel) -> None:
     record = bench_log()
     channels = {name: np.full(len(record), np.nan) for name in ("position_m", "velocity_m_s")}
@@ -98,10 +105,10 @@ def test_a_log_with_nothing_measured_leaves_bulk_modulus_as_believed(method: Met
     mean, std = estimate.track(BULK_MODULUS)
     assert mean[-1] == pytest.approx(2e8)
     assert std[-1] == pytest.approx(3e8)
-    assert estimate.log_likelihood == 0.0
+    assert abs(estimate.log_likelihood) <= ROUNDING.get(method, 0.0)
 
 
-@EVERY_METHOD
+@WITHOUT_CHANCE
 def test_a_filter_that_diverges_returns_that_and_raises_nothing(method: Method) -> None:
     parameters = parameters_for(CONDITIONS["major_friction"])
     drive = sine(0.5, 1e-3, parameters.rated_speed, 2.0)

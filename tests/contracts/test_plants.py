@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, Condition, parameters_for
-from plant.eha import EhaParameters
-from plant.parameter_path import ParameterPath
-from plant.record import Record
-from plant.sensors import BENCH
-from plant.signals import sine
-from plant.simulate import PLANTS, Plant, simulate
+from plant.eha.drives import sine
+from plant.eha.model import EhaParameters
+from plant.eha.parameter_path import ParameterPath
+from plant.eha.simulate import PLANTS, Plant, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
 
 EVERY_PLANT = pytest.mark.parametrize("plant", PLANTS.values(), ids=PLANTS)
 CHANNELS = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa")

@@ -1,14 +1,18 @@
 """A linear process model, on which every filter has a textbook answer."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
+from inspect import Parameter, signature
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from estimation.model import ProcessModel, StateVariable
+from estimation.models.eha_forms import volume_left_open
+from estimation.models.model import ProcessModel, StateVariable
 from plant.compiled.functions import Scalar
-from plant.eha import EhaValues
+from plant.eha.model import EhaParameters, EhaValues
 
 Array = NDArray[np.float64]
 
@@ -36,6 +40,8 @@ LINEAR = ProcessModel(
     _step,
     _observe,
     2.5e-4,
+    parameters=EhaParameters,
+    opening=volume_left_open,
 )
 
 
@@ -54,3 +60,17 @@ def transition() -> Array:
 def observation() -> Array:
     """H of the linear model, in SI."""
     return np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.25]])
+
+
+@pytest.fixture(scope="session")
+def as_python() -> Callable[..., Callable[..., Any]]:
+    """Return what makes of a loop as it is written, and of its kernel's own function, one that runs in Python.
+
+    The kernel gives it the sizes, and the functions that tracing wrote.
+    """
+
+    def bound(loop: Callable[..., Any], compiled: Any) -> Callable[..., Any]:
+        names = (p.name for p in signature(loop).parameters.values() if p.kind is Parameter.KEYWORD_ONLY)
+        return partial(loop, **{name: compiled.py_func.__globals__[name] for name in names})
+
+    return bound

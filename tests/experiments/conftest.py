@@ -5,31 +5,34 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
-from experiments.figures import FIGURES, draw
-from experiments.figures.style import styled
-from experiments.store import write_study
-from experiments.studies.settings import StudySettings
-from experiments.study import StudyResult, run_study
+from experiments.nine_conditions.figures import FIGURES
+from experiments.nine_conditions.settings import StudySettings
+from experiments.nine_conditions.study import NINE_CONDITIONS
+from experiments.page.style import styled
+from experiments.running.progress import untracked
+from experiments.running.study import Found, write_result
 
 SMALL = StudySettings(seed=7, starts=(0.0, 4e8), duration=1.0, sample_time=1e-3, identification_duration=2.5, seeds=1)
 
 
 @pytest.fixture(scope="session")
-def study() -> StudyResult:
-    return run_study(SMALL, lambda _: None)
+def study() -> Found:
+    return NINE_CONDITIONS.find(SMALL, untracked)
 
 
 @pytest.fixture(scope="session")
-def written(study: StudyResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def written(study: Found, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of the written study."""
-    return write_study(study, tmp_path_factory.mktemp("results") / "study").parent
+    folder = tmp_path_factory.mktemp("results") / "study"
+    write_result(NINE_CONDITIONS, SMALL, study, folder)
+    return folder
 
 
 @pytest.fixture(scope="session")
-def drawn(study: StudyResult) -> dict[str, Figure]:
+def drawn(study: Found) -> dict[str, Figure]:
     """Return every figure, drawn and laid out once."""
-    figures = {name: draw(name, study) for name in FIGURES}
     with styled():
+        figures = {name: draw(study.frames) for name, draw in FIGURES.items()}
         for figure in figures.values():
             figure.draw_without_rendering()
     return figures

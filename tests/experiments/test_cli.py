@@ -4,16 +4,18 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner, Result
 
 import faults.conditions
 from experiments.cli import app
+from experiments.nine_conditions.settings import quick_settings
+from experiments.running.study import Study
 from faults.conditions import CONDITIONS
-from plant.eha import EhaParameters
-from plant.rig import read_rig
+from plant.eha.model import EhaParameters
+from plant.eha.rig import read_rig
 
 PUBLISHED = Path(__file__).resolve().parents[2] / "experiments" / "published"
 COMMANDS = ("study", "simulate", "estimate", "identify", "diagnose", "identifiability", "conditions")
@@ -189,17 +191,17 @@ def test_rig_init_writes_a_file_once(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("as_json", [False, True])
 def test_study_ends_with_the_reports_path(as_json: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[tuple[Path, int, bool]] = []
+    asked: list[tuple[str, object, Path]] = []
 
-    def command(out: Path, seed: int, quick: bool, console: object) -> Path:
+    def run(study: Study[Any], settings: object, out: Path, console: object) -> Path:
         del console
-        asked.append((out, seed, quick))
+        asked.append((study.name, settings, out))
         return out / "report.html"
 
-    monkeypatch.setitem(sys.modules, "experiments.command.study", SimpleNamespace(study_command=command))
+    monkeypatch.setattr("experiments.running.study.run_study", run)
     done = invoke("study", "--quick", "--out", tmp_path, "--seed", 7, *(["--json"] if as_json else []))
     assert done.exit_code == 0
-    assert asked == [(tmp_path, 7, True)]
+    assert asked == [("nine conditions", quick_settings(7), tmp_path)]
     if as_json:
         (found,) = json.loads(done.stdout)
         assert (found["outcome"], found["report"]) == ("ok", str(tmp_path / "report.html"))

@@ -19,9 +19,9 @@ from faults.conditions import (
     parameters_for,
     severity,
 )
-from plant.eha import EhaParameters
+from plant.eha.model import EhaParameters
+from plant.eha.steady_state import steady_state
 from plant.errors import HydrostateError
-from plant.steady_state import steady_state
 
 PUBLISHED = Path(__file__).parents[2] / "experiments" / "published"
 RIG = EhaParameters()

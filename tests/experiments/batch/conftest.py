@@ -12,7 +12,7 @@ from experiments.batch.cases import Plan, plan_study
 from experiments.batch.part_store import PartStore, open_store
 from experiments.batch.runner import Opener, Tally, manifest_of, run_batch
 from experiments.batch.study_file import parse_study
-from experiments.executors import open_executor
+from experiments.running.executors import open_executor
 
 FILTER = {"verb": "filter", "form": "acceleration", "method": "ekf"}
 RUNS: dict[str, Any] = {

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from estimation.kernels import LANES
+from estimation.engine.kernels import LANES
 from experiments.batch import cases
 from experiments.batch.cases import plan_study
 from experiments.batch.study_file import StudyError, parse_study

@@ -1,22 +1,30 @@
 """A batch diagnoses as `diagnose` does."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from benchmarks.population import OUT_OF_MODEL, TEST, draw_logs
+from estimation.notes import SensorCode
 from experiments.batch.diagnosis import diagnosed
-from faults.class_fit import Actuator
-from faults.diagnosis import diagnose_log
-from faults.population import OUT_OF_MODEL, TEST, draw_logs
-from plant.eha import EhaParameters
-from plant.record import Record
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.diagnose import diagnose_log
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.eha.simulate import LUMPED, simulate
+from plant.errors import LogWarning
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
 
-RIG = EhaParameters()
+RIG = Rig()
 
 
 @pytest.mark.slow
 def test_a_batch_finds_what_diagnose_finds() -> None:
     log = next(iter(draw_logs([TEST], drives=("prbs",), duration=3.0)))
-    row, found = diagnosed(log.record, RIG), diagnose_log(log.record, Actuator.of(RIG))
+    row, found = diagnosed(log.record, RIG), diagnose_log(log.record, RIG)
     first, second = sorted(found.probabilities, key=lambda name: -found.probabilities[name])[:2]
     assert (row["outcome"], row["found_condition"], row["runner_up"]) == ("ok", first, second)
     assert row["margin"] == pytest.approx(found.probabilities[first] / found.probabilities[second])
@@ -25,14 +33,40 @@ def test_a_batch_finds_what_diagnose_finds() -> None:
 @pytest.mark.slow
 def test_a_log_in_none_of_the_nine_conditions_is_a_mismatch_with_a_reason() -> None:
     log = next(iter(draw_logs([TEST], drives=("prbs",), duration=3.0)))
-    row = diagnosed(OUT_OF_MODEL["encoder gain, - 30 %"](log), RIG)
+    spoilt = OUT_OF_MODEL["encoder gain, - 30 %"](log)
+    row = diagnosed(spoilt, RIG)
     assert row["outcome"] == "mismatch"
     assert row.get("found_condition") is None
     assert row["reason"].startswith("in none of the nine conditions, the nearest is")
+    assert row["reason"].endswith("; ".join(map(str, diagnose_log(spoilt, RIG).against)))
 
 
 @pytest.mark.slow
 def test_a_log_at_rest_is_in_no_class() -> None:
     rng = np.random.default_rng(0)
     still = {"motor_speed_rad_s": np.zeros(2000), "position_m": 1e-7 * rng.standard_normal(2000)}
-    assert diagnosed(Record(1e-3, still), RIG)["outcome"] in ("not_observable", "mismatch")
+    row = diagnosed(Record(1e-3, still), RIG)
+    assert row["outcome"] in ("not_observable", "mismatch")
+    assert row["reason"]
+
+
+def steps(duration: float = 3.0) -> Record:
+    p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(8)
+    return simulate(LUMPED, make_drive("steps", duration, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+
+
+def test_a_rig_around_which_no_circuit_fits_fails_as_a_row_that_says_why() -> None:
+    row = diagnosed(steps(), Rig("no circuit", replace(EhaParameters(), relief_pressure=1e9)))
+    assert (row["outcome"], row["trusted"]) == ("failed", False)
+    assert "accumulator_oil must fill both chambers" in row["reason"]
+    assert "found_condition" not in row
+
+
+def test_what_was_left_out_of_a_log_is_a_warning_of_its_row() -> None:
+    velocity = steps()["velocity_m_s"].copy()
+    velocity[::150] += 1.0
+    with pytest.warns(LogWarning) as caught:
+        row = diagnosed(steps().replace(velocity_m_s=velocity), RIG)
+    left_out = SensorCode.OUTLIERS_LEFT_OUT.note(channel="velocity_m_s", count=20, total=3000)
+    assert [one.message.note for one in caught] == [left_out]
+    assert (row["outcome"], row["found_condition"]) == ("ok", "minor_leakage")

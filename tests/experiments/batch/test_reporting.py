@@ -15,11 +15,11 @@ from experiments.batch.rows import SCHEMA
 from experiments.batch.study_file import Study, read_study
 from experiments.batch.summary import frame_of, summary_tables
 from faults.conditions import CONDITIONS, parameters_for
+from plant.eha.drives import make_drive
+from plant.eha.simulate import LUMPED, simulate
 from plant.errors import HydrostateError
-from plant.record_files import write_record
-from plant.sensors import BENCH
-from plant.signals import make_drive
-from plant.simulate import LUMPED, simulate
+from plant.log.files import write_record
+from plant.sensors.sensors import BENCH
 from tests.experiments.batch.conftest import run_into, small_plan
 
 

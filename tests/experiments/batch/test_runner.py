@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from experiments.batch.part_store import open_store
 from experiments.batch.runner import WORKER_ENDED
-from experiments.executors import SerialExecutor
+from experiments.running.executors import SerialExecutor
 from tests.experiments.batch.conftest import rows_in_parts, run_into, small_plan
 
 

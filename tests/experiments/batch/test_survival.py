@@ -16,7 +16,7 @@ import pyarrow as pa
 import pytest
 
 from experiments.batch.part_store import open_store
-from experiments.executors import open_executor
+from experiments.running.executors import open_executor
 from tests.experiments.batch.conftest import RUNS, rows_in_parts, run_into, small_plan
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name == "nt", reason="needs SIGKILL and fork")]

@@ -11,8 +11,8 @@ from experiments.batch.cases import Task, plan_study
 from experiments.batch.series import Group
 from experiments.batch.study_file import parse_study
 from experiments.batch.work import DRAWN_ONCE, Part, run_task
-from plant.eha import EhaParameters
-from plant.signals import DRIVES
+from plant.eha.drives import DRIVES
+from plant.eha.model import EhaParameters
 from tests.experiments.batch.conftest import FILTER, small_plan
 
 

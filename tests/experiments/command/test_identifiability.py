@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from experiments.cli import app
-from plant.rig import rig_template
+from plant.eha.rig import rig_template
 
 
 def invoke(*arguments: object) -> Result:

@@ -5,16 +5,17 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from estimation.identification.linear_model import LinearModel
+from estimation.identification.model.linear_model import LinearModel
+from estimation.identification.notes import IdentificationCode
 from experiments.cli import app
 from experiments.command.identify import whole_or_auto
-from plant.eha import EhaParameters
+from plant.eha.drives import prbs
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import LUMPED, simulate
 from plant.errors import HydrostateError
-from plant.record import Record
-from plant.record_files import write_record
-from plant.sensors import BENCH
-from plant.signals import prbs
-from plant.simulate import LUMPED, simulate
+from plant.log.files import write_record
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +68,7 @@ def test_an_order_chosen_for_a_piston_that_sticks_warns_and_for_a_linear_plant_n
     write_record(record, tmp_path / "sticks.parquet")
     for log, sticks in ((tmp_path / "sticks.parquet", True), (logs[0], False)):
         (entry,) = json.loads(CliRunner().invoke(app, ["identify", str(log), "--order", "auto", "--json"]).stdout)
-        assert any("it sticks" in said for said in entry["warnings"]) == sticks
+        assert (IdentificationCode.PISTON_RESTS in [one["code"] for one in entry["notes"]]) == sticks
 
 
 @pytest.mark.parametrize("structure", ["arx", "armax", "box-jenkins"])

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.bulk_modulus import Outcome
+from estimation.eha.bulk_modulus import Outcome
 from experiments.command.json_output import csv_text, json_text, plain, prepare_output, write_results
 from plant.errors import HydrostateError
 

@@ -5,13 +5,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-import plant.record_files
-from estimation.bulk_modulus import OUTCOMES
+import plant.log.files
+from estimation.finding import OUTCOMES
+from estimation.notes import SensorCode
 from experiments.cli import app
 from experiments.command.logs import Batch, read_log
-from plant.errors import LogError, LogWarning
-from plant.record import Record
-from plant.record_files import read_record, write_record
+from plant.errors import LogWarning, MissingColumnError
+from plant.log.files import read_record, write_record
+from plant.log.notes import LogCode
+from plant.log.record import Record
 
 WORDS = {outcome.value for outcome in OUTCOMES}
 VERBS = ("estimate", "identify", "diagnose")
@@ -88,7 +90,7 @@ def test_an_internal_error_on_one_log_costs_the_others_nothing(good: Path, monke
             raise RuntimeError("the mill is broken")
         return read_record(path)
 
-    monkeypatch.setattr(plant.record_files, "read_record", broken)
+    monkeypatch.setattr(plant.log.files, "read_record", broken)
     done = invoke("diagnose", good.with_name("broken.csv"), good, "--json")
     assert done.exit_code == 1
     assert [one["outcome"] for one in json.loads(done.stdout)] == ["failed", "ok"]
@@ -101,7 +103,7 @@ def test_an_interruption_keeps_what_is_done(good: Path, tmp_path: Path, monkeypa
             raise KeyboardInterrupt
         return read_record(path)
 
-    monkeypatch.setattr(plant.record_files, "read_record", interrupted)
+    monkeypatch.setattr(plant.log.files, "read_record", interrupted)
     done = invoke("diagnose", good, good.with_name("second.csv"), good, "--json", "--out", tmp_path)
     assert done.exit_code == 130
     assert "interrupted after 1 of 3 logs" in done.stderr.splitlines()
@@ -117,30 +119,39 @@ def test_a_warning_is_printed_with_the_log_and_kept_in_the_result(good: Path, tm
     done = invoke("diagnose", good, tmp_path / "gappy.csv", "--json")
     plain, warned = json.loads(done.stdout)
     assert plain["warnings"] == []
-    (sentence,) = warned["warnings"]
-    assert "velocity_m_s" in sentence
-    assert f"{tmp_path / 'gappy.csv'}: warning: {sentence}" in done.stderr.splitlines()
+    masked = LogCode.SAMPLES_MASKED.note(channel="velocity_m_s", count=50, total=4000, percent=1.25)
+    assert warned["warnings"] == [str(masked)]
+    assert masked.to_dict() in warned["notes"]
+    assert masked.to_dict() not in plain["notes"]
+    assert f"{tmp_path / 'gappy.csv'}: warning: {masked}" in done.stderr.splitlines()
 
 
 def test_what_a_pressure_sensor_could_not_show_is_named_and_the_estimate_stands(good: Path, tmp_path: Path) -> None:
     record = read_record(good)
     pressure = record["differential_pressure_pa"]
     limit = 0.7 * np.max(np.abs(pressure))
+    channel = "differential_pressure_pa"
     logs = {
-        "is at the end of its range": np.clip(pressure, -limit, limit),
-        "is logged every 4 samples of the clock": np.where(np.arange(len(record)) % 4 == 1, pressure, np.nan),
-        "stands out grossly in 2 of 4000 samples": np.where(np.isin(np.arange(len(record)), (9, 99)), 1e8, pressure),
+        SensorCode.SENSOR_CLIPPED: np.clip(pressure, -limit, limit),
+        LogCode.CHANNEL_SLOWER: np.where(np.arange(len(record)) % 4 == 1, pressure, np.nan),
+        SensorCode.OUTLIERS_LEFT_OUT: np.where(np.isin(np.arange(len(record)), (9, 99)), 1e8, pressure),
+    }
+    wanted = {
+        LogCode.CHANNEL_SLOWER: {"channel": channel, "rows": 4},
+        SensorCode.OUTLIERS_LEFT_OUT: {"channel": channel, "count": 2, "total": 4000},
     }
     for name, values in zip("abc", logs.values(), strict=True):
         write_record(record.replace(differential_pressure_pa=values), tmp_path / f"{name}.csv")
     done = invoke("estimate", *(tmp_path / f"{name}.csv" for name in "abc"), "--json")
-    for sentence, one in zip(logs, json.loads(done.stdout), strict=True):
+    for code, one in zip(logs, json.loads(done.stdout), strict=True):
         low, high = one["bulk_modulus_pa"]["ci95"]
         assert abs(one["bulk_modulus_pa"]["value"] - 2.07e8) < 0.75 * (high - low)  # three standard deviations
         assert one["gate"]["passed"]
-        (warned,) = one["warnings"]
-        assert warned.startswith("differential_pressure_pa")
-        assert sentence in warned
+        (note,) = one["notes"]
+        assert note["code"] == code
+        assert note["data"]["channel"] == channel
+        assert note["data"] == wanted.get(code, note["data"])
+        assert one["warnings"] == [note["text"]]
 
 
 @pytest.mark.parametrize(
@@ -185,8 +196,9 @@ def test_a_full_disk_costs_the_file_and_not_the_screen(
 
 def test_a_rigs_columns_that_a_log_lacks_are_named(good: Path) -> None:
     columns = {"position_m": "POS_MM:mm", "differential_pressure_pa": "DP_BAR:bar"}
-    with pytest.warns(LogWarning, match="the log has no POS_MM:mm, DP_BAR:bar of the rig's columns"):
+    with pytest.warns(LogWarning) as caught:
         record = read_log(good, columns, {})
+    assert [one.message.note for one in caught] == [LogCode.COLUMNS_ABSENT.note(columns="POS_MM:mm, DP_BAR:bar")]
     assert "differential_pressure_pa" in record
 
 
@@ -197,5 +209,6 @@ def test_a_column_asked_for_on_the_command_line_must_be_there(good: Path) -> Non
 
 
 def test_the_command_line_goes_before_the_rig(good: Path) -> None:
-    with pytest.raises(LogError, match="'OTHER' is wanted"):
+    with pytest.raises(MissingColumnError) as caught:
         read_log(good, {"position_m": "position_m"}, {"position_m": "OTHER"})
+    assert (caught.value.channel, caught.value.column, caught.value.source) == ("position_m", "OTHER", str(good))

@@ -10,9 +10,9 @@ import pytest
 from pyarrow import csv as arrow_csv
 
 from faults.conditions import CONDITIONS, parameters_for
-from plant.sensors import BENCH
-from plant.signals import nine_steps
-from plant.simulate import LUMPED, simulate
+from plant.eha.drives import nine_steps
+from plant.eha.simulate import LUMPED, simulate
+from plant.sensors.sensors import BENCH
 
 COMMAND = Path(sys.executable).parent / "hydrostate"
 

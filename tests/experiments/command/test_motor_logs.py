@@ -10,10 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 from experiments.cli import app
-from faults.diaphragm_motor import motor_with_fault
-from plant.diaphragm_motor_parameters import DiaphragmMotorParameters
-from plant.diaphragm_motor_run import BENCH_SENSORS, SAMPLE_TIME, motor_drive, simulate_motor
-from plant.record_files import write_record
+from faults.diaphragm_motor.faults import motor_with_fault
+from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
+from plant.diaphragm_motor.run import BENCH_SENSORS, SAMPLE_TIME, motor_drive, simulate_motor
+from plant.log.files import write_record
 
 RUN = CliRunner()
 MOTOR = DiaphragmMotorParameters(load_force=10.0)

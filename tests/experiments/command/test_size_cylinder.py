@@ -34,7 +34,7 @@ def test_the_screen_shows_shop_units() -> None:
         (["--bore", "0.032", "--rod", "0.02"], "gives 6"),
         (["--bore", "0.04"], "--bore and --rod are given together"),
         (["--retract-force", "1e9"], "no standard cylinder up to 320 mm"),
-        (["--retract-speed", "-1"], "retract_speed must be finite and not negative"),
+        (["--retract-speed", "-1"], "retract_speed must not be negative"),
     ],
 )
 def test_what_cannot_be_is_refused(more: list[str], said: str) -> None:

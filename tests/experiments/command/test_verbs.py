@@ -7,14 +7,18 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
 
-import faults.bank
-from estimation.bulk_modulus import OUTCOMES
-from estimation.identification.linear_model import LinearModel
+import faults.eha.bank
+from estimation.finding import OUTCOMES
+from estimation.identification.model.linear_model import LinearModel
+from estimation.notes import EstimateCode
 from experiments.cli import app
 from faults.conditions import CONDITIONS
-from plant.eha import EhaParameters
-from plant.record_files import read_record
-from plant.rig import rig_template
+from faults.notes import AdviceCode, AgainstCode, ClassCode
+from plant.eha.model import EhaParameters
+from plant.eha.rig import rig_template
+from plant.log.files import read_record
+from plant.log.notes import LogCode
+from plant.notes import Code
 
 TRUTH = 2.07e8
 PRESSURE = "differential_pressure_pa"
@@ -33,6 +37,10 @@ def results(*arguments: object) -> list[dict[str, Any]]:
 
 def _no_constant(name: str) -> None:
     raise AssertionError(f"JSON has no {name}")
+
+
+def codes(result: dict[str, Any]) -> list[str]:
+    return [note["code"] for note in result["notes"]]
 
 
 @pytest.fixture(scope="module")
@@ -156,19 +164,19 @@ def test_no_number_is_given_where_none_is_observable(sine: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("verb", "words"),
+    ("verb", "code"),
     [
-        pytest.param("estimate", "rests on how the piston starts", marks=pytest.mark.slow),
-        ("diagnose", "friction shows in velocity alone"),
+        pytest.param("estimate", EstimateCode.PRESSURE_ABSENT, marks=pytest.mark.slow),
+        pytest.param("diagnose", ClassCode.PRESSURE_ABSENT_CLASS, marks=pytest.mark.slow),
     ],
 )
-def test_every_verb_says_what_the_absence_of_pressure_costs(verb: str, words: str, steps: dict[str, Path]) -> None:
+def test_every_verb_says_what_the_absence_of_pressure_costs(verb: str, code: Code, steps: dict[str, Path]) -> None:
     arguments = (verb, steps[".csv"], "--condition", "minor_friction")
     (one,) = results(*arguments, "--no-pressure")
     assert PRESSURE not in one["channels"]
-    assert words in one["message"]
-    assert words in invoke(*arguments, "--no-pressure").stdout
-    assert words not in invoke(*arguments).stdout
+    assert code in codes(one)
+    assert f"1 of 1 logs: {code.note()}" in " ".join(invoke(*arguments, "--no-pressure").stdout.split())
+    assert str(code.note()) not in " ".join(invoke(*arguments).stdout.split())
 
 
 def test_identify_says_that_the_absence_of_pressure_costs_nothing() -> None:
@@ -186,6 +194,8 @@ def test_diagnose_names_the_condition_in_every_format(steps: dict[str, Path]) ->
             "channels",
             "runner_up",
             "warnings",
+            "notes",
+            "advice",
         }
         assert list(one["scores"]) == list(CONDITIONS)
         assert (one["condition"], one["outcome"], one["unknown"]) == ("minor_friction", "ok", False)
@@ -216,7 +226,9 @@ def test_no_class_is_given_where_nothing_moves(folder: Path) -> None:
     still.to_csv(folder / "still.csv", index=False)
     (one,) = results("diagnose", folder / "still.csv")
     assert (one["outcome"], one["condition"], one["runner_up"]) == ("not_observable", None, None)
-    assert any("motor_speed_rad_s is constant" in warning for warning in one["warnings"])
+    assert one["warnings"] == [str(LogCode.SPEED_CONSTANT.note())]
+    assert {LogCode.SPEED_CONSTANT, ClassCode.MODELS_ALIKE} <= set(codes(one))
+    assert one["message"] == str(ClassCode.MODELS_ALIKE.note())
 
 
 def test_a_log_that_no_model_fits_is_called_so(steps: dict[str, Path], folder: Path) -> None:
@@ -225,7 +237,10 @@ def test_a_log_that_no_model_fits_is_called_so(steps: dict[str, Path], folder: P
     frame[PRESSURE] *= 5.0
     frame.drop(columns="position_m").to_parquet(folder / "odd.parquet")
     (one,) = results("diagnose", folder / "odd.parquet")
-    assert any("none of the nine fits" in warning for warning in one["warnings"])
+    assert one["unknown"]
+    assert AgainstCode.NONE_FITS in codes(one)
+    assert len(one["reasons"]) >= 1
+    assert AdviceCode.FIT_DOUBTED in codes(one)
 
 
 def test_transfer_functions_are_scored_on_request(steps: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -238,7 +253,7 @@ def test_transfer_functions_are_scored_on_request(steps: dict[str, Path], monkey
         made = (LinearModel(np.array([gain]), np.array([1.0]), 1e-3, *channels) for gain in gains)
         return dict(zip(CONDITIONS, made, strict=True))
 
-    monkeypatch.setattr(faults.bank, "identify_bank", bank)
+    monkeypatch.setattr(faults.eha.bank, "identify_bank", bank)
     paths = list(steps.values())
     first, second, _ = results("diagnose", *paths, "--transfer-functions", "--seed", 3)
     scores = first["transfer_function_scores"]
@@ -297,12 +312,13 @@ def test_an_actuator_that_is_not_the_papers_comes_back_through_its_rig_file(fold
     assert diagnosed["condition"] == "major_leakage_minor_friction"
     (own,) = results("diagnose", folder / "ours.parquet", "--rig", rig)
     assert own["condition"] == "major_leakage_minor_friction"
-    assert "RPM:rpm, POS_MM:mm, DP_BAR:bar" in own["warnings"][0]
+    assert LogCode.COLUMNS_ABSENT.note(columns="RPM:rpm, POS_MM:mm, DP_BAR:bar").to_dict() in own["notes"]
 
     columns = "motor_speed_rad_s=RPM:rpm,position_m=POS_MM:mm"
     (asked,) = results("diagnose", folder / "theirs.csv", "--columns", columns, "--columns", f"{PRESSURE}=DP_BAR:bar")
     assert asked["channels"] == ["velocity_m_s", PRESSURE]
-    assert any("none of the nine fits" in warning for warning in asked["warnings"])
+    assert asked["unknown"]
+    assert AgainstCode.NONE_FITS in codes(asked)
 
 
 def test_the_flow_form_needs_no_condition_and_finds_the_leakage(steps: dict[str, Path]) -> None:

@@ -8,9 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 from experiments.cli import app
-from plant.eha import EhaParameters
-from plant.record import Record
-from plant.record_files import write_record
+from plant.eha.model import EhaParameters
+from plant.log.files import write_record
+from plant.log.record import Record
 
 P = EhaParameters()
 T = 5e-3

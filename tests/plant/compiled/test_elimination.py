@@ -6,15 +6,15 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from plant.circuit import circuit_derivative
-from plant.circuit_parameters import CircuitParameters
 from plant.compiled.elimination import eliminated_jacobian
 from plant.compiled.expression import ZERO, Expression, jacobian, ordered, symbol
 from plant.compiled.functions import absolute, maximum, sqrt, where
 from plant.compiled.simplify import share_reciprocals
 from plant.compiled.source import statements
-from plant.eha import reduced_derivative
-from plant.integrate import parameter_symbols
+from plant.eha.circuit import circuit_derivative
+from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.model import EhaParameters, reduced_derivative
+from plant.solvers.steps import parameter_symbols
 
 X, Y, U = symbol("x"), symbol("y"), symbol("u")
 
@@ -61,7 +61,7 @@ def test_it_needs_fewer_products_on_the_circuit() -> None:
 
 def test_it_is_the_jacobian_of_the_reduced_plant() -> None:
     state = x, v, a = [symbol(f"x{i}") for i in range(3)]
-    p = parameter_symbols()
+    p = parameter_symbols(EhaParameters)
     found, wanted = both(list(reduced_derivative((x, v, a), U, p)), [*state, U])
     rng = np.random.default_rng(1)
     inputs = {

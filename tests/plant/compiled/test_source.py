@@ -12,8 +12,9 @@ from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.compiled.expression import constant, symbol
 from plant.compiled.functions import absolute, exp, maximum, minimum, sign, sqrt, tanh, where
 from plant.compiled.source import statements, symbols_in
-from plant.eha import GAMMA, EhaParameters, lumped_step, reduced_derivative
-from plant.integrate import StepFunction, compile_trajectory, parameter_row, ros2_step
+from plant.eha.model import EhaParameters, lumped_step, reduced_derivative
+from plant.solvers.steps import GAMMA, StepFunction, parameter_row, ros2_step
+from plant.solvers.trajectory import compile_trajectory
 
 STEP = 1e-4
 SPEEDS = (100.0, 104.0)
@@ -23,7 +24,7 @@ RELIEVED = (0.01, -0.02, -3.6e6)
 
 
 def emitted(step: StepFunction, state: tuple[float, ...], name: str, parameters: EhaParameters) -> NDArray[np.float64]:
-    run = compile_trajectory(name, step, len(state))
+    run = compile_trajectory(name, step, len(state), EhaParameters)
     return run(np.array(state), np.array(SPEEDS), parameter_row(parameters)[None], STEP, 1)[1]
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from faults.conditions import FRICTION_TABLE, Level
-from plant.components.cylinder import quadratic_friction
+from plant.components.friction import quadratic_friction
 from plant.components.presliding import bristle_rate, presliding_friction
 
 DISPLACEMENT, MASS, DAMPING = 2e-5, 7.376, 0.2

@@ -1,0 +1,103 @@
+"""What the diaphragm motor's sensors can know of it: bulk modulus not, gas yes (the identifiability card)."""
+
+from dataclasses import replace
+from math import sqrt
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diaphragm_motor.signature import DRIVE, POSITION, modelled_signature, tolerance
+from estimation.trust.card import Card
+from plant.diaphragm_motor.flow import operate
+from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
+from plant.diaphragm_motor.run import ELECTRODES
+
+Array: TypeAlias = NDArray[np.floating[Any]]
+
+UNKNOWNS = ("bulk_modulus", "gas_fraction", "crossport_leakage", "load_force")
+"""What the card asks for."""
+
+LEAKAGE, LOAD = 2e-12, 10.0
+"""Sizes that leakage [m^3/(s Pa)] and load [N] are relative to."""
+
+
+def flow_change(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float, factor: float) -> float:
+    """Return by how much the mean flow changes with bulk modulus.
+
+    Parameters
+    ----------
+    p : DiaphragmMotorParameters
+        The motor.
+    frequency, peak_to_peak : float
+        Of the drive [Hz], [V].
+    factor : float
+        On bulk modulus [dimensionless].
+
+    Returns
+    -------
+    float
+        Relative change [fraction].
+
+    Examples
+    --------
+    >>> abs(flow_change(DiaphragmMotorParameters(), 480.0, 200.0, 2.0)) < 1e-3
+    True
+    """
+    other = operate(replace(p, bulk_modulus=factor * p.bulk_modulus), frequency, peak_to_peak).outlet_flow
+    return other / operate(p, frequency, peak_to_peak).outlet_flow - 1.0
+
+
+def motor_card(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Card:
+    """Return how well a run under a sine knows bulk modulus, gas, leakage and load, all unknown together.
+
+    Cramér-Rao bounds with the tolerance to which a motor is the one modelled, and a prior of 100 % on each. The
+    liquid's bulk modulus counts for no more than V_0/beta beside the diaphragm's compliance C_d, 400 times as large.
+
+    Parameters
+    ----------
+    p : DiaphragmMotorParameters
+        The motor.
+    frequency, peak_to_peak : float
+        Of the drive [Hz], [V].
+
+    Returns
+    -------
+    Card
+        Relative standard deviations; leakage's and load's relative to `LEAKAGE` and `LOAD`.
+
+    Examples
+    --------
+    >>> card = motor_card(DiaphragmMotorParameters(load_force=10.0), 480.0, 200.0)
+    >>> card.relative_std["bulk_modulus"] > 0.9, card.relative_std["load_force"] < 0.1
+    (True, True)
+    """
+    base = modelled_signature(p, frequency, peak_to_peak)
+    whitening = np.linalg.inv(np.linalg.cholesky(tolerance(p, frequency, peak_to_peak)))
+    moved = {
+        "bulk_modulus": replace(p, bulk_modulus=(1.0 + _STEP) * p.bulk_modulus),
+        "gas_fraction": replace(p, gas_fraction=tuple((1.0 + _STEP) * share for share in p.gas_fraction)),
+        "crossport_leakage": replace(p, crossport_leakage=p.crossport_leakage + _STEP * LEAKAGE),
+        "load_force": replace(p, load_force=p.load_force + _STEP * LOAD),
+    }
+    slopes = [(modelled_signature(moved[name], frequency, peak_to_peak) - base) / _STEP for name in UNKNOWNS]
+    scaled = whitening @ np.column_stack(slopes)
+    covariance = np.linalg.inv(scaled.T @ scaled + np.eye(len(UNKNOWNS)))
+    deviations = np.sqrt(np.diag(covariance))
+    values, directions = np.linalg.eigh(covariance)
+    bounds = {name: float(std) for name, std in zip(UNKNOWNS, deviations, strict=True)}
+    return Card(
+        channels=(DRIVE, *ELECTRODES, POSITION),
+        unknowns=UNKNOWNS,
+        relative_std=bounds,
+        known_exactly=bounds,
+        correlation=covariance / np.outer(deviations, deviations),
+        friction_force=1.0,
+        weakest=dict(zip(UNKNOWNS, directions[:, -1].tolist(), strict=True)),
+        weakest_std=sqrt(float(values[-1])),
+        stuck=0.0,
+        uncertainties={},
+    )
+
+
+_STEP = 0.05

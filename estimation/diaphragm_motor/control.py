@@ -1,0 +1,211 @@
+"""Velocity control of the diaphragm motor: PID on the drive's voltage, by encoder or by the middle electrode alone.
+
+The controller acts once in some cycles, where the sine passes zero. The sign of the wanted velocity sets the 4/3 valve.
+Self-sensing reads velocity from the amplitude of A4 and the voltage through the healthy motor's maps, as section 4 of
+the diaphragm-motor paper is after; what leaks past the piston does not show there.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import ceil, pi
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.diaphragm_motor.maps import MIDDLE, MotorMaps
+from plant.diaphragm_motor.flow import tone
+from plant.diaphragm_motor.model import POSITION, at_rest, deflections
+from plant.diaphragm_motor.run import BENCH_SENSORS, HIGHEST_VOLTAGE, LONGEST_STEP, MotorSensors, Schedule, run_motor
+
+Array: TypeAlias = NDArray[np.float64]
+
+CYCLES = 4
+"""Cycles of the drive between actions of the controller."""
+
+SENSED_CYCLES = 2
+"""Last cycles of a period from which an electrode's amplitude is taken, when the motor has followed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class VelocityController:
+    """Gains of a PID on the drive's peak-to-peak voltage.
+
+    Parameters
+    ----------
+    proportional : float
+        [V s/m].
+    integral : float
+        [V/m].
+    derivative : float
+        Of the measured velocity, not of the error [V s^2/m].
+    most : float
+        Largest voltage peak to peak [V]; the integral stands still while the voltage is at a limit and would go on.
+    """
+
+    proportional: float = 8e3
+    integral: float = 6e5
+    derivative: float = 0.0
+    most: float = 2.0 * HIGHEST_VOLTAGE
+
+    def act(self, error: float, change: float, held: float, period: float) -> tuple[float, float]:
+        """Return the next voltage and the integral's part of it.
+
+        Parameters
+        ----------
+        error : float
+            Wanted less measured speed [m/s].
+        change : float
+            What the measured speed gained over the last period [m/s].
+        held : float
+            The integral's part so far [V].
+        period : float
+            Time between actions [s].
+
+        Returns
+        -------
+        tuple of float
+            Voltage peak to peak [V], integral part [V].
+
+        Examples
+        --------
+        >>> VelocityController().act(1e-3, 0.0, 295.0, 0.01)
+        (300.0, 295.0)
+        """
+        summed = held + self.integral * period * error
+        wanted = self.proportional * error + summed - self.derivative * change / period
+        given = min(max(wanted, 0.0), self.most)
+        windup = (wanted > given and error > 0.0) or (wanted < given and error < 0.0)
+        return given, held if windup else summed
+
+
+@dataclass(frozen=True, eq=False)
+class ControlledRun:
+    """A run under control, one row a period.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        End of each period [s].
+    wanted, measured, velocity : ndarray, shape (n,)
+        Reference, what the controller saw, and the piston's true mean velocity [m/s].
+    swing : ndarray, shape (n,)
+        Voltage peak to peak [V].
+    position : ndarray, shape (n,)
+        Piston at the end of each period [m].
+    """
+
+    time: Array
+    wanted: Array
+    measured: Array
+    velocity: Array
+    swing: Array
+    position: Array
+
+    def settling(self, since: float, until: float, band: float = 0.05) -> float:
+        """Return how long after a change the true velocity stays within a band of what is wanted, until a time.
+
+        Parameters
+        ----------
+        since, until : float
+            From when to when [s].
+        band : float
+            Share of the wanted velocity [dimensionless].
+
+        Returns
+        -------
+        float
+            Time [s]; infinity if it never does.
+        """
+        here = (self.time > since) & (self.time <= until)
+        off = np.abs(self.velocity[here] - self.wanted[here]) > band * np.abs(self.wanted[here])
+        time = self.time[here]
+        if off[-1]:
+            return np.inf
+        return float(time[np.flatnonzero(off)[-1] + 1] - since) if off.any() else 0.0
+
+
+def controlled_run(
+    schedule: Schedule,
+    wanted: Callable[[float], float],
+    duration: float,
+    frequency: float,
+    maps: MotorMaps,
+    rng: np.random.Generator,
+    *,
+    controller: VelocityController | None = None,
+    sensing: Literal["encoder", "self"] = "encoder",
+    sensors: MotorSensors = BENCH_SENSORS,
+) -> ControlledRun:
+    """Run the fast plant under velocity control, from rest (sections 4 and 5.1, errata M19).
+
+    Parameters
+    ----------
+    schedule : sequence of tuple of float and DiaphragmMotorParameters
+        From when on [s] which motor; the spool is the controller's.
+    wanted : callable
+        Velocity [m/s] by time [s].
+    duration : float
+        Length of the run [s].
+    frequency : float
+        Of the drive [Hz].
+    maps : MotorMaps
+        Of the healthy motor at this frequency, for self-sensing.
+    rng : numpy.random.Generator
+        Source of sensor noise.
+    controller : VelocityController, optional
+        Gains; those of the class if not given.
+    sensing : {"encoder", "self"}
+        Where the velocity comes from.
+    sensors : MotorSensors
+        Noise.
+
+    Returns
+    -------
+    ControlledRun
+        The run.
+
+    Raises
+    ------
+    HydrostateError
+        If the frequency lies off the maps, or the state stops being finite.
+    """
+    control = controller or VelocityController()
+    a_cycle = ceil(1.0 / (frequency * LONGEST_STEP) - 1e-9)
+    between = 1.0 / (frequency * a_cycle)
+    period, count = CYCLES / frequency, round(duration * frequency / CYCLES)
+    sine = 0.5 * np.sin(2.0 * pi * np.arange(CYCLES * a_cycle + 1) / a_cycle)
+    seen, held = 0.0, 0.0
+    state = at_rest(schedule[0][1])
+    rows = np.empty((count, 6))
+    for k in range(count):
+        begin = k * period
+        goal = wanted(begin)
+        way = 1.0 if goal >= 0.0 else -1.0
+        motor = replace([p for time, p in schedule if time <= begin + 1e-9][-1], spool=way)
+        swing, held = control.act(abs(goal) - seen, seen - rows[k - 1, 5] if k else 0.0, held, period)
+        states = run_motor(motor, swing * sine, between, start=state)
+        state = states[-1].copy()
+        if sensing == "encoder":
+            measured = way * _encoder_speed(states[1:, POSITION], a_cycle, period, sensors, rng)
+        else:
+            bent = deflections(states[1:], swing * sine[1:], motor)[-SENSED_CYCLES * a_cycle :, MIDDLE]
+            read = motor.sensing_gain * motor.sensor_gain[MIDDLE] * bent
+            noisy = read + sensors.electrode_v * rng.standard_normal(len(read))
+            flow, pressure = maps.sensed(frequency, swing, float(abs(tone(noisy, between, frequency))))
+            measured = (flow - maps.motor.crossport_leakage * pressure) / maps.motor.piston_area
+        rows[k] = begin + period, goal, way * measured, state[POSITION] - states[0, POSITION], swing, measured
+        rows[k, 3] /= period
+        seen = measured
+    position = np.cumsum(rows[:, 3]) * period
+    time, aim, saw, velocity, swings = rows[:, :5].T
+    return ControlledRun(time, aim, saw, velocity, swings, position)
+
+
+def _encoder_speed(
+    position: Array, a_cycle: int, period: float, sensors: MotorSensors, rng: np.random.Generator
+) -> float:
+    """Return the mean velocity of a period: its last cycle's mean position less its first's, free of ripple."""
+    noisy = position + sensors.position_m * rng.standard_normal(len(position))
+    moved = float(noisy[-a_cycle:].mean() - noisy[:a_cycle].mean())
+    return moved / (period * (CYCLES - 1) / CYCLES)

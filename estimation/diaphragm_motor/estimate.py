@@ -1,0 +1,157 @@
+"""Leakage across the diaphragm motor's piston, load on its rod and gas in its pump, from electrodes and encoder.
+
+Gas and load are fitted to the tones of all electrodes first. Where that leaves no misfit, the pump is healthy but for
+its gas, and `estimation.diaphragm_motor.track` reads flow and pressure off the middle electrode.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from estimation.diaphragm_motor.signature import (
+    SETTLED,
+    Drive,
+    Signature,
+    logged_signature,
+    modelled_signature,
+    require_channels,
+    tolerance,
+)
+from estimation.diaphragm_motor.track import MotorTrack, healthy_maps, motor_blocks, track_leakage
+from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
+from plant.diaphragm_motor.run import ELECTRODES
+from plant.log.record import Record
+
+Array: TypeAlias = NDArray[np.floating[Any]]
+
+CALIBRATED_SHARE = 0.2
+"""What is left of both tolerances when a healthy run of the same motor has set the gains, judged [dimensionless]."""
+
+PATTERN_BELOW = 1e-3
+"""Probability of so large a chi-square of the electrodes' pattern below which the maps are not used."""
+
+
+@dataclass(frozen=True)
+class MotorEstimate:
+    """What a log says of the motor.
+
+    Parameters
+    ----------
+    values, deviations : Mapping[str, float]
+        ``crossport_leakage`` [m^3/(s Pa)], ``load_force`` [N] and ``gas_fraction``, with standard deviations.
+    pattern : float
+        Chi-square of the electrodes' pattern over its degrees of freedom [dimensionless].
+    pattern_holds : bool
+        Whether the pump is healthy but for gas, so that the maps hold.
+    drive : Drive
+        The sine that the log was taken under.
+    track : MotorTrack
+        Leakage and load over time.
+    parameters : DiaphragmMotorParameters
+        The motor with the estimates in it.
+    """
+
+    values: Mapping[str, float]
+    deviations: Mapping[str, float]
+    pattern: float
+    pattern_holds: bool
+    drive: Drive
+    track: MotorTrack
+    parameters: DiaphragmMotorParameters
+
+
+def estimate_motor(
+    record: Record, healthy: DiaphragmMotorParameters, *, calibration: Signature | None = None
+) -> MotorEstimate:
+    """Estimate leakage across the piston, load and gas from a run under a steady sine.
+
+    Parameters
+    ----------
+    record : Record
+        Drive, seven electrodes, position.
+    healthy : DiaphragmMotorParameters
+        The motor as it should be; at the calibration's load, if there is one.
+    calibration : Signature, optional
+        Of this motor when it was healthy, under the same drive: it corrects the electrodes' gains.
+
+    Returns
+    -------
+    MotorEstimate
+        Estimates, and how far the electrodes' pattern bears them.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be used.
+    """
+    require_channels(record)
+    length = len(record) * record.sample_time
+    gains = np.ones(len(ELECTRODES)) if calibration is None else _gains(calibration, healthy)
+    read = record.replace(**{name: record[name] / gain for name, gain in zip(ELECTRODES, gains, strict=True)})
+    seen = logged_signature(read, max(SETTLED, length - _PATTERN_TIME))
+    gas, gas_std, pattern, freedom = _gas_fitted(seen, healthy)
+    more = gas if abs(gas - 1.0) > _SURE_GAS * gas_std else 1.0
+    pump = replace(healthy, gas_fraction=tuple(more * share for share in healthy.gas_fraction))
+    trust = 1.0 if calibration is None else CALIBRATED_SHARE
+    track = track_leakage(motor_blocks(read, seen.drive), pump, healthy_maps(pump, seen.drive), trust)
+    share = float(np.mean(healthy.gas_fraction))
+    values = {"crossport_leakage": track.leakage[-1], "load_force": track.load[-1], "gas_fraction": gas * share}
+    deviations = {
+        "crossport_leakage": track.leakage_std[-1],
+        "load_force": track.load_std[-1],
+        "gas_fraction": gas_std * share,
+    }
+    return MotorEstimate(
+        {name: float(value) for name, value in values.items()},
+        {name: float(value) for name, value in deviations.items()},
+        pattern / freedom,
+        pattern <= float(chdtri(freedom, PATTERN_BELOW)),
+        seen.drive,
+        track,
+        replace(pump, crossport_leakage=max(0.0, values["crossport_leakage"]), load_force=values["load_force"]),
+    )
+
+
+def _gains(calibration: Signature, healthy: DiaphragmMotorParameters) -> Array:
+    """Return the electrodes' gains by which a healthy run differs from its model."""
+    drive = calibration.drive
+    model = modelled_signature(healthy, drive.frequency, drive.peak_to_peak)
+    return np.abs(calibration.tones) / np.hypot(model[:7], model[7:14])
+
+
+def _gas_fitted(seen: Signature, healthy: DiaphragmMotorParameters) -> tuple[float, float, float, int]:
+    """Fit gas, as a factor, and load to the tones: factor, its deviation, chi-square, degrees of freedom."""
+    point = seen.drive.frequency, seen.drive.peak_to_peak
+    tones = slice(0, len(seen.values) - 1)
+
+    def shown(theta: Array) -> Array:
+        gas = tuple(float(np.exp(theta[0])) * share for share in healthy.gas_fraction)
+        return modelled_signature(replace(healthy, gas_fraction=gas, load_force=float(theta[1])), *point)[tones]
+
+    whitening = np.linalg.inv(np.linalg.cholesky((tolerance(healthy, *point) + seen.covariance)[tones, tones]))
+
+    def linearised(theta: Array) -> tuple[Array, Array]:
+        base = shown(theta)
+        slopes = np.column_stack([(shown(theta + step) - base) / step.sum() for step in np.diag(_SLOPE_STEPS)])
+        return whitening @ (seen.values[tones] - base), whitening @ slopes
+
+    theta = np.array([0.0, healthy.load_force])
+    for _ in range(_ITERATIONS):
+        left, slopes = linearised(theta)
+        theta = theta + np.clip(np.linalg.lstsq(slopes, left, rcond=None)[0], -_LONGEST, _LONGEST)
+    left, slopes = linearised(theta)
+    known = np.linalg.inv(slopes.T @ slopes)
+    factor = float(np.exp(theta[0]))
+    return factor, factor * sqrt(known[0, 0]), float(left @ left), len(left) - len(theta)
+
+
+_PATTERN_TIME = 0.2
+_ITERATIONS = 5
+_SLOPE_STEPS = (0.02, 0.2)
+_LONGEST = np.array([1.0, 10.0])
+_SURE_GAS = 3.0

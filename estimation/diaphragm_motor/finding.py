@@ -1,0 +1,153 @@
+"""`motor_finding(record, motor) -> Finding`: leakage, load and gas of the diaphragm motor, and what a log lacks."""
+
+from collections.abc import Mapping
+
+from estimation.diaphragm_motor.card import LEAKAGE, LOAD, flow_change, motor_card
+from estimation.diaphragm_motor.estimate import MotorEstimate, estimate_motor
+from estimation.diaphragm_motor.signature import Signature
+from estimation.finding import Finding, Gate, Outcome, Quantity
+from estimation.trust.card import percent
+from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
+from plant.diaphragm_motor.run import NAME
+from plant.log.record import Record
+from plant.notes import Code, Note
+
+MOST_DEVIATION = 0.3
+"""Standard deviation, over the value or the least fault's size, above which no number is given."""
+
+SIZES: Mapping[str, tuple[str, float]] = {
+    "crossport_leakage": ("m^3/(s Pa)", LEAKAGE),
+    "load_force": ("N", 10.0),
+    "gas_fraction": ("1", 0.01),
+}
+"""Unit of each quantity, and the least fault's size that its deviation is judged by."""
+
+CLEARLY = 4.0
+"""Standard deviations of a negative leakage from which the maps are not believed."""
+
+
+class MotorCode(Code):
+    """Notes on an estimate of the diaphragm motor."""
+
+    PATTERN_BROKEN = (
+        "pattern_broken",
+        "the electrodes' pattern is not a healthy pump's (chi-square {chi_square:.3g} a degree of freedom), so its "
+        "maps of flow and pressure do not hold: diagnose it first",
+    )
+    FASTER_THAN_MAPS = (
+        "faster_than_maps",
+        "the rod moves faster than the pump's maps allow (leakage {leakage:.2g} m^3/(s Pa)): ports may be clogged",
+    )
+    TOO_UNCERTAIN = (
+        "too_uncertain",
+        "too uncertain to give: {names}; a load of 10 N or more, or a healthy run (--healthy), would help",
+    )
+    LOAD_AND_FRICTION = "load_and_friction", "load counts any friction above the model's"
+    PISTON_LEAKS = "piston_leaks", "the piston leaks, certain since {since_s:.2f} s"
+    BULK_MODULUS_HIDDEN = (
+        "bulk_modulus_hidden",
+        "bulk modulus is not observable here (bound {bound} of it): halved it changes the flow by {halved}, doubled by "
+        "{doubled}, for the diaphragms give 400 times as much",
+    )
+
+
+def motor_finding(
+    record: Record, healthy: DiaphragmMotorParameters, *, calibration: Signature | None = None
+) -> Finding:
+    """Estimate leakage across the piston, load and gas from a run under a steady sine.
+
+    Parameters
+    ----------
+    record : Record
+        Drive, seven electrodes, position.
+    healthy : DiaphragmMotorParameters
+        The motor as it should be; at the calibration's load, if there is one.
+    calibration : Signature, optional
+        Of this motor when it was healthy, under the same drive.
+
+    Returns
+    -------
+    Finding
+        Its evidence is the `MotorEstimate`.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be used.
+    """
+    found = estimate_motor(record, healthy, calibration=calibration)
+    reasons = _doubts(found)
+    quantities = {name: _quantity(name, found, told=not reasons) for name in SIZES}
+    lost = [name for name, one in quantities.items() if one.value is None]
+    believed = healthy if reasons else found.parameters
+    card = motor_card(believed, found.drive.frequency, found.drive.peak_to_peak)
+    bound = card.relative_std["bulk_modulus"]
+    alarm = None if reasons else found.track.alarm_time
+    not_told: list[Note] = []
+    if lost and not reasons:
+        not_told.append(MotorCode.TOO_UNCERTAIN.note(names=", ".join(name.replace("_", " ") for name in lost)))
+    if quantities["load_force"].value is not None:
+        not_told.append(MotorCode.LOAD_AND_FRICTION.note())
+    told = Outcome.NOT_OBSERVABLE if len(lost) == len(SIZES) else Outcome.OK
+    return Finding(
+        actuator=NAME,
+        outcome=Outcome.MISMATCH if reasons else told,
+        quantities={**quantities, "bulk_modulus": Quantity(None, "Pa", None, bound * healthy.bulk_modulus)},
+        gate=Gate(not reasons, reasons),
+        channels=card.channels,
+        faults=() if alarm is None else (MotorCode.PISTON_LEAKS.note(since_s=alarm),),
+        not_told=(*not_told, _bulk_modulus(believed, found, bound)),
+        evidence=found,
+    )
+
+
+def motor_prospect(motor: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Finding:
+    """Say what a run under a steady sine would tell, before it is made (`estimation.diaphragm_motor.card`).
+
+    Parameters
+    ----------
+    motor : DiaphragmMotorParameters
+        The motor, under its load.
+    frequency, peak_to_peak : float
+        Of the drive [Hz], [V].
+
+    Returns
+    -------
+    Finding
+        The motor's own values with the least standard deviations that any method could reach.
+    """
+    card = motor_card(motor, frequency, peak_to_peak)
+    gas = sum(motor.gas_fraction) / len(motor.gas_fraction)
+    known = {
+        "bulk_modulus": (motor.bulk_modulus, "Pa", motor.bulk_modulus),
+        "gas_fraction": (gas, "1", gas),
+        "crossport_leakage": (motor.crossport_leakage, SIZES["crossport_leakage"][0], LEAKAGE),
+        "load_force": (motor.load_force, SIZES["load_force"][0], LOAD),
+    }
+    quantities = {
+        name: Quantity(value, unit, None, card.relative_std[name] * size) for name, (value, unit, size) in known.items()
+    }
+    return Finding(NAME, Outcome.OK, quantities, Gate(True, ()), card.channels, evidence=card)
+
+
+def _doubts(found: MotorEstimate) -> tuple[Note, ...]:
+    leakage, deviation = (one["crossport_leakage"] for one in (found.values, found.deviations))
+    if not found.pattern_holds:
+        return (MotorCode.PATTERN_BROKEN.note(chi_square=found.pattern),)
+    if leakage < -CLEARLY * deviation:
+        return (MotorCode.FASTER_THAN_MAPS.note(leakage=leakage),)
+    return ()
+
+
+def _quantity(name: str, found: MotorEstimate, *, told: bool) -> Quantity:
+    unit, size = SIZES[name]
+    value, deviation = found.values[name], found.deviations[name]
+    if told and deviation < MOST_DEVIATION * max(size, abs(value)):
+        return Quantity.normal(value, deviation, unit)
+    return Quantity(None, unit, None, deviation)
+
+
+def _bulk_modulus(motor: DiaphragmMotorParameters, found: MotorEstimate, bound: float) -> Note:
+    drive = found.drive.frequency, found.drive.peak_to_peak
+    halved, doubled = (percent(abs(flow_change(motor, *drive, factor))) for factor in (0.5, 2.0))
+    return MotorCode.BULK_MODULUS_HIDDEN.note(bound=percent(bound), halved=halved, doubled=doubled)

@@ -1,0 +1,340 @@
+"""What a log of the diaphragm motor is compared by: tones of the seven electrodes and the rod's mean velocity.
+
+Under a steady sine the electrodes' fundamentals and second harmonics, and the mean velocity, are 29 numbers. They come
+from a log by least squares over whole cycles, with their covariance from what is left over, and from the plant by
+`plant.diaphragm_motor.flow.operate`. To the sensors' noise the tolerance is added to which a motor is the one modelled,
+because noise alone would let the model claim what no bench can hold.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from math import ceil, pi
+from types import MappingProxyType
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.diaphragm_motor.flow import operate
+from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
+from plant.diaphragm_motor.run import ELECTRODES, HIGHEST_FREQUENCY, HIGHEST_VOLTAGE
+from plant.errors import LogError
+from plant.log.record import Record
+
+Array: TypeAlias = NDArray[np.floating[Any]]
+
+DRIVE, POSITION = "drive_voltage_v", "position_m"
+"""Channels beside the electrodes."""
+
+SETTLED = 0.1
+"""Time from a log's start after which the motor has settled; the research gives 22 ms to 90 % [s]."""
+
+FEWEST_CYCLES = 20
+"""Fewest whole cycles that are averaged."""
+
+HARMONICS = 6
+"""Harmonics that are fitted, so that what is left over is noise."""
+
+STEADY = 0.01
+"""Root mean square, over the sine's amplitude, by which a drive may differ from a steady sine [dimensionless]."""
+
+TOLERANCE: Mapping[str, float] = MappingProxyType(
+    {
+        "diaphragm_compliance": 0.005,
+        "volume_a_volt": 0.005,
+        "inertance": 0.005,
+        "port_area": 0.005,
+        "valve_lag": 0.005,
+        "valve_resistance": 0.02,
+    }
+)
+"""Relative standard deviations by which a healthy motor differs from its model, judged [dimensionless]."""
+
+GAIN_TOLERANCE = 0.005
+"""Relative standard deviation of each electrode's gain, judged [dimensionless]."""
+
+FLOOR = 0.002
+"""What the model is taken to miss in any tone, over the mean fundamental, and in velocity [dimensionless]."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A steady sine on the first diaphragm.
+
+    Parameters
+    ----------
+    frequency : float
+        Frequency [Hz].
+    peak_to_peak : float
+        Swing [V].
+    phase : float
+        Phase of ``sin`` at the log's first sample [rad].
+    """
+
+    frequency: float
+    peak_to_peak: float
+    phase: float
+
+
+@dataclass(frozen=True)
+class Signature:
+    """The 29 numbers that a log is compared by.
+
+    Parameters
+    ----------
+    drive : Drive
+        The sine that it was taken under.
+    values : ndarray, shape (29,)
+        Fundamentals' real and imaginary parts, second harmonics' likewise [V], mean velocity [m/s].
+    covariance : ndarray, shape (29, 29)
+        Of the sensors' noise alone.
+    """
+
+    drive: Drive
+    values: Array
+    covariance: Array
+
+    @property
+    def tones(self) -> NDArray[np.complexfloating[Any, Any]]:
+        """Electrodes' fundamentals against the drive [V]: amplitude and phase."""
+        return self.values[:7] + 1j * self.values[7:14]
+
+    @property
+    def velocity(self) -> float:
+        """Mean velocity [m/s]."""
+        return float(self.values[-1])
+
+
+def modelled_signature(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Array:
+    """Return a motor's signature by its model, without noise (section 7.1).
+
+    Parameters
+    ----------
+    p : DiaphragmMotorParameters
+        The motor.
+    frequency, peak_to_peak : float
+        Of the drive [Hz], [V].
+
+    Returns
+    -------
+    ndarray, shape (29,)
+        As `Signature.values`.
+
+    Examples
+    --------
+    >>> values = modelled_signature(DiaphragmMotorParameters(), 480.0, 200.0)
+    >>> len(values), round(1e3 * float(values[-1]), 1)
+    (29, 4.1)
+    """
+    point = operate(p, frequency, peak_to_peak)
+    first, second = point.tones, point.second_tones
+    return np.concatenate([first.real, first.imag, second.real, second.imag, [point.velocity]])
+
+
+@lru_cache(maxsize=8)
+def tolerance(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Array:
+    """Return the covariance with which a healthy motor's signature scatters about its model.
+
+    Parameters
+    ----------
+    p : DiaphragmMotorParameters
+        The healthy motor.
+    frequency, peak_to_peak : float
+        Of the drive [Hz], [V].
+
+    Returns
+    -------
+    ndarray, shape (29, 29)
+        Covariance of `Signature.values`.
+    """
+    base = modelled_signature(p, frequency, peak_to_peak)
+    columns: list[Array] = []
+    for name, share in TOLERANCE.items():
+        moved = replace(p, **{name: (1.0 + share) * getattr(p, name)})
+        columns.append(modelled_signature(moved, frequency, peak_to_peak) - base)
+    for i in range(len(ELECTRODES)):
+        own = np.zeros(len(base))
+        own[i : 4 * len(ELECTRODES) : len(ELECTRODES)] = GAIN_TOLERANCE
+        columns.append(own * base)
+    floor = np.full(len(base), FLOOR * float(np.mean(np.hypot(base[:7], base[7:14]))))
+    floor[-1] = FLOOR * max(abs(float(base[-1])), _LEAST_SPEED)
+    spread = np.column_stack(columns)
+    return spread @ spread.T + np.diag(floor**2)
+
+
+def logged_signature(record: Record, start: float = SETTLED) -> Signature:
+    """Return the signature that a log shows after it has settled, over whole cycles, by least squares.
+
+    Parameters
+    ----------
+    record : Record
+        ``drive_voltage_v``, ``electrode_1_v`` to ``electrode_7_v`` and ``position_m``, under a steady sine.
+    start : float
+        From when on the log counts [s].
+
+    Returns
+    -------
+    Signature
+        Its values, and their covariance from what the tones leave.
+
+    Raises
+    ------
+    LogError
+        If a channel or samples are missing, the drive is no steady sine, or the log is too short.
+    """
+    require_channels(record)
+    settled = ceil(start / record.sample_time)
+    drive = steady_drive(record[DRIVE][settled:], record.sample_time)
+    cycles = whole_cycles(len(record) - settled, record.sample_time, drive.frequency)
+    count = int(cycles / drive.frequency / record.sample_time)
+    chosen = slice(settled, settled + count)
+    angle = drive.phase + 2.0 * pi * drive.frequency * record.sample_time * np.arange(count)
+    read = np.column_stack([record[name][chosen] for name in ELECTRODES])
+    position = record[POSITION][chosen]
+    tones, noise = fitted_tones(read, angle, trend=3)
+    path, jitter = fitted_tones(position[:, None], angle, trend=1)
+    velocity = float(path[1, 0]) * 2.0 / (count * record.sample_time)
+    steepest = np.sqrt(12.0 / count) / (count * record.sample_time) * float(jitter[0])
+    fundamental, second = tones[4:6], tones[6:8]
+    values = np.concatenate([*fundamental, *second, [velocity]])
+    variances = np.concatenate([*(2.0 / count * noise**2 for _ in range(4)), [steepest**2]])
+    return Signature(drive, values, np.diag(variances))
+
+
+def steady_drive(voltage: Array, sample_time: float) -> Drive:
+    """Return the steady sine of a drive.
+
+    Parameters
+    ----------
+    voltage : ndarray, shape (n,)
+        Drive [V].
+    sample_time : float
+        Time between samples [s].
+
+    Returns
+    -------
+    Drive
+        Frequency, swing, phase.
+
+    Raises
+    ------
+    LogError
+        If it is no steady sine.
+
+    Examples
+    --------
+    >>> steady_drive(50.0 * np.sin(2 * pi * 123.4 * 1e-4 * np.arange(2000)), 1e-4).frequency.__round__(3)
+    123.4
+    """
+    size = len(voltage)
+    if size < 8 or float(np.ptp(voltage)) <= 0.0:
+        raise LogError(f"{DRIVE} must be a steady sine from {SETTLED:g} s on, got no swing")
+    spectrum = np.abs(np.fft.rfft((voltage - voltage.mean()) * np.hanning(size)))
+    frequency = float(np.argmax(spectrum)) / (size * sample_time)
+    time = sample_time * np.arange(size)
+    halves = (voltage - voltage.mean()) * np.exp(-2j * pi * frequency * time)
+    turn = float(np.angle(halves[size // 2 :].sum() / halves[: size // 2].sum()))
+    frequency += turn / (pi * size * sample_time)
+    for _ in range(_REFINEMENTS):
+        design, found = _sine_fit(voltage, frequency, time)
+        slope = 2.0 * pi * time * (found[0] * design[:, 1] - found[1] * design[:, 0])
+        frequency += float(np.linalg.lstsq(np.column_stack([design, slope]), voltage, rcond=None)[0][3])
+    design, found = _sine_fit(voltage, frequency, time)
+    amplitude = float(np.hypot(found[0], found[1]))
+    left = float(np.sqrt(np.mean((voltage - design @ found) ** 2)))
+    if left > STEADY * amplitude or not 0.0 < frequency <= HIGHEST_FREQUENCY:
+        raise LogError(
+            f"{DRIVE} must be a steady sine of up to {HIGHEST_FREQUENCY:g} Hz from {SETTLED:g} s on, got "
+            f"{100.0 * left / max(amplitude, 1e-12):.3g} % beside a sine of {frequency:.4g} Hz"
+        )
+    if amplitude > HIGHEST_VOLTAGE * (1.0 + STEADY):
+        raise LogError(f"the diaphragms take {HIGHEST_VOLTAGE:g} V of either sign, got {DRIVE} of {amplitude:.4g} V")
+    return Drive(frequency, 2.0 * amplitude, float(np.arctan2(found[1], found[0])))
+
+
+def _sine_fit(voltage: Array, frequency: float, time: Array) -> tuple[Array, Array]:
+    angle = 2.0 * pi * frequency * time
+    design = np.column_stack([np.sin(angle), np.cos(angle), np.ones(len(time))])
+    return design, np.linalg.lstsq(design, voltage, rcond=None)[0]
+
+
+def fitted_tones(values: Array, angle: Array, *, trend: int) -> tuple[Array, Array]:
+    """Fit a trend and the harmonics of a drive to signals.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, channels)
+        Signals [any unit].
+    angle : ndarray, shape (n,)
+        Phase of the drive [rad].
+    trend : int
+        Degree of the trend's polynomial, in time from -1 to 1.
+
+    Returns
+    -------
+    tuple of ndarray, shapes (trend + 1 + 2 harmonics, channels) and (channels,)
+        Coefficients (trend, then sine and cosine of each harmonic), standard deviation of what is left.
+    """
+    line = np.linspace(-1.0, 1.0, len(angle))
+    waves = [wave(k * angle) for k in range(1, HARMONICS + 1) for wave in (np.sin, np.cos)]
+    design = np.column_stack([*(line**k for k in range(trend + 1)), *waves])
+    found = np.linalg.lstsq(design, values, rcond=None)[0]
+    free = max(1, len(angle) - design.shape[1])
+    return found, np.sqrt(np.sum((values - design @ found) ** 2, axis=0) / free)
+
+
+def whole_cycles(samples: int, sample_time: float, frequency: float) -> int:
+    """Return how many whole cycles there are.
+
+    Parameters
+    ----------
+    samples : int
+        Samples.
+    sample_time, frequency : float
+        Time between them [s], frequency [Hz].
+
+    Returns
+    -------
+    int
+        Cycles.
+
+    Raises
+    ------
+    LogError
+        If they are fewer than `FEWEST_CYCLES`.
+    """
+    whole = int(samples * sample_time * frequency + 1e-6)
+    if whole < FEWEST_CYCLES:
+        raise LogError(
+            f"{FEWEST_CYCLES} cycles of {frequency:.4g} Hz are wanted after the first {SETTLED:g} s, got {whole}"
+        )
+    return whole
+
+
+def require_channels(record: Record) -> None:
+    """Refuse a log that lacks a channel or samples, or ends before the motor has settled.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+
+    Raises
+    ------
+    LogError
+        If it does.
+    """
+    for name in (DRIVE, *ELECTRODES, POSITION):
+        if name not in record:
+            raise LogError(f"{name} is wanted, the log has {', '.join(record)}")
+        lost = int(np.sum(~np.isfinite(record[name])))
+        if lost:
+            raise LogError(f"{name} must be whole, got {lost} missing samples")
+    length = len(record) * record.sample_time
+    if length <= SETTLED:
+        raise LogError(f"a log must be longer than the {SETTLED:g} s in which the motor settles, got {length:.3g} s")
+
+
+_REFINEMENTS = 4
+_LEAST_SPEED = 1e-3

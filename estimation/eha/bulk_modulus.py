@@ -1,0 +1,315 @@
+"""`estimate_bulk_modulus(record, parameters)`: a number, an interval, a verdict; or a note instead of a number."""
+
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
+from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide
+from estimation.filters.run import available_channels
+from estimation.finding import Gate, Outcome
+from estimation.fits.flow_fit import FLOW_CHANNELS, REPORTED, fit_flow
+from estimation.fits.form_fit import FormFit
+from estimation.fits.motion_fit import MOTION_CHANNELS, fit_motion
+from estimation.log_checks.clean import CleanLog, clean_log
+from estimation.log_checks.first_belief import START_STD, first_belief, first_load
+from estimation.log_checks.sensor_check import PRESSURE, PRESSURES
+from estimation.models.eha_forms import FORMS
+from estimation.trust.bounds import bulk_modulus_bound
+from estimation.trust.consistency import MISMATCH_NIS
+from plant.eha.model import EhaParameters
+from plant.errors import HydrostateError, LogWarning
+from plant.log.record import Record
+from plant.notes import Note
+
+T = TypeVar("T")
+
+SPEED = "motor_speed_rad_s"
+
+LEAST_SQUARES = "least-squares"
+"""The method of the forms that are fitted."""
+
+FITTED: Mapping[str, tuple[Callable[..., FormFit], tuple[str, ...]]] = {
+    "flow": (fit_flow, FLOW_CHANNELS),
+    "motion": (fit_motion, MOTION_CHANNELS),
+}
+"""The forms that can be fitted, with the channels that they use beside motor speed."""
+
+
+@dataclass(frozen=True)
+class EstimateOptions:
+    """How bulk modulus is estimated.
+
+    Parameters
+    ----------
+    form : str
+        ``"flow"``, ``"motion"``, ``"pressure"``, ``"acceleration"`` (the published one, valid between reversals only,
+        errata E9), or ``"auto"``: flow or motion where their channels are logged, else pressure.
+    method : str
+        ``"least-squares"`` for the forms that can be fitted, flow and motion; a filter of
+        `estimation.filters.run.METHODS`; or ``"auto"``: least squares where the form allows, the log begins at rest,
+        and nothing is asked for that only a filter does, else what `estimation.eha.by_filter.chosen_method` says.
+    start : float, optional
+        First guess [Pa]; the actuator's own if not given.
+    start_std : float
+        Its standard deviation, for the forms that are filtered [Pa].
+    states : tuple of str
+        What a filter estimates beside bulk modulus: ``leakage``, ``friction``, ``air``, or a parameter's name.
+    tuned : bool
+        Whether the filter's noise levels are tuned to the log by likelihood.
+    robust : str
+        How gross outliers count in the filter: ``"none"``, ``"huber"`` or ``"student-t"``.
+    """
+
+    form: str = "auto"
+    method: str = "auto"
+    start: float | None = None
+    start_std: float = START_STD
+    states: tuple[str, ...] = ()
+    tuned: bool = False
+    robust: str = "none"
+
+    @property
+    def filtering(self) -> bool:
+        """Whether something is asked for that only a filter does."""
+        return self.method not in ("auto", LEAST_SQUARES) or self.filter_options != FilterOptions()
+
+    @property
+    def filter_options(self) -> FilterOptions:
+        """The filter's part."""
+        method = "auto" if self.method in ("auto", LEAST_SQUARES) else self.method
+        return FilterOptions(method, self.states, self.tuned, self.robust)
+
+
+DEFAULT_OPTIONS = EstimateOptions()
+"""All automatic."""
+
+
+def estimate_bulk_modulus(
+    record: Record,
+    parameters: EhaParameters,
+    *,
+    uncertainties: Mapping[str, float] | None = None,
+    **options: Any,
+) -> BulkModulusEstimate:
+    """Estimate effective bulk modulus from a log.
+
+    With position and ``differential_pressure_pa`` logged, the flow form fits it with leakage and flow bias, and
+    friction plays no part (`estimation.models.flow`). Without pressure, the motion form fits leakage and friction along
+    with it (`estimation.models.motion`), and the estimate rests on how the piston starts, stops and rings; where it
+    sticks there is nothing to rest on, and the outcome says so instead of giving a number (errata E13). A filter
+    takes leakage and friction as known.
+
+    Bulk modulus enters as ``chamber_volume / bulk_modulus`` alone, so what is not known of the volume, and of the pump
+    and the piston, is not known of bulk modulus either; `uncertainties` carry it into the interval.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    parameters : EhaParameters
+        The actuator; its bulk modulus is where the bound is taken, and the default first guess.
+    uncertainties : Mapping[str, float], optional
+        Relative standard deviation of the actuator's parameters, as a rig file has them [fraction]; none by default.
+    **options
+        The fields of `EstimateOptions`.
+
+    Returns
+    -------
+    BulkModulusEstimate
+        Value, interval, bound and verdict; a filter's value is its mean over the last 20 % of the log.
+
+    Raises
+    ------
+    HydrostateError
+        If the form or method is unknown, or the first guess is not usable.
+    LogError
+        If the log lacks what the form needs.
+
+    Warns
+    -----
+    LogWarning
+        If samples of a channel that is used were left out.
+    """
+    log = clean_log(record, parameters)
+    found = estimate_clean(log, parameters, EstimateOptions(**options), uncertainties)
+    for note in left_out(log, found):
+        warnings.warn(LogWarning(note), stacklevel=2)
+    return found
+
+
+def left_out(log: CleanLog, found: BulkModulusEstimate) -> tuple[Note, ...]:
+    """Return what was left out of the channels that an estimate used.
+
+    Parameters
+    ----------
+    log : CleanLog
+        The log.
+    found : BulkModulusEstimate
+        The estimate.
+
+    Returns
+    -------
+    tuple of Note
+        One a channel at most.
+    """
+    used = {*found.channels, SPEED, *(PRESSURES if PRESSURE in found.channels else ())}
+    return tuple(note for note in log.left_out if note.data["channel"] in used)
+
+
+def estimate_clean(
+    log: CleanLog,
+    parameters: EhaParameters,
+    options: EstimateOptions = DEFAULT_OPTIONS,
+    uncertainties: Mapping[str, float] | None = None,
+) -> BulkModulusEstimate:
+    """Estimate effective bulk modulus from a log whose sensors have been looked at; see `estimate_bulk_modulus`.
+
+    Parameters
+    ----------
+    log : CleanLog
+        The log.
+    parameters : EhaParameters
+        The actuator.
+    options : EstimateOptions
+        How.
+    uncertainties : Mapping[str, float], optional
+        Relative standard deviation of the actuator's parameters [fraction].
+
+    Returns
+    -------
+    BulkModulusEstimate
+        Value, interval, bound and verdict.
+
+    Raises
+    ------
+    HydrostateError
+        If the form or method is unknown, or the first guess is not usable.
+    LogError
+        If the log lacks what the form needs.
+    """
+    known = uncertainties or {}
+    guess = parameters.bulk_modulus if options.start is None else options.start
+    if not (np.isfinite(guess) and guess >= 0.0 and np.isfinite(options.start_std) and options.start_std > 0.0):
+        raise HydrostateError(
+            f"the first guess must be 0 Pa or more, its deviation positive, got {guess}, {options.start_std}"
+        )
+    automatic, filtering = options.form == "auto", options.filtering
+    form = ("pressure" if filtering else _automatic(log.record)) if automatic else options.form
+    if automatic and form == "motion" and (bound := rigid_bound(log, parameters)) > LARGEST_BOUND:
+        return _doubting_sensors(_unseen(bound), log)
+    if form == "flow" and options.method == "auto" and not filtering:
+        filtering = first_load(log.record, log.variances) != 0.0  # a fit begins at rest
+    if form in FITTED and not filtering:
+        fit, channels = FITTED[form]
+        found = _fitted(fit(log.record, parameters, guess, known, log.variances), form, channels)
+    elif form == "flow":
+        found = _with_rig(estimate_by_flow_filter(log, parameters, options.filter_options), known)
+    elif options.method == LEAST_SQUARES or form == "motion":
+        raise HydrostateError(
+            f"the {form} form is {'filtered' if form in FORMS else 'fitted by least squares'}, "
+            f"got method {options.method!r}"
+        )
+    else:
+        model = _chosen(FORMS, form, "form")
+        how = options.filter_options
+        found = _with_rig(estimate_by_filter(log, parameters, model, guess, options.start_std, how), known)
+    return _doubting_sensors(found, log)
+
+
+def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusEstimate:
+    """Return the estimate with the gate shut where a sensor that was used has stopped telling the truth."""
+    said = log.objections_to((*found.channels, SPEED))
+    if not said:
+        return found
+    return replace(found, gate=replace(found.gate, passed=False, reasons=(*said, *found.gate.reasons)))
+
+
+def _automatic(record: Record) -> str:
+    if all(channel in record for channel in FLOW_CHANNELS):
+        return "flow"
+    return "motion" if all(channel in record for channel in MOTION_CHANNELS) else "pressure"
+
+
+def rigid_bound(log: CleanLog, parameters: EhaParameters) -> float:
+    """Return the bound of the pressure form, which knows leakage and friction: no form that must find them does better.
+
+    It takes one pass over the log, and tells a piston that sticks throughout before a fit is tried (errata E13).
+
+    Parameters
+    ----------
+    log : CleanLog
+        The log; its drive and sensors count, not what they show.
+    parameters : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    float
+        Relative Cramér-Rao bound of bulk modulus [fraction].
+    """
+    model = FORMS["pressure"]
+    channels = available_channels(model, log.record)
+    prior = first_belief(model, log.record, parameters.bulk_modulus, START_STD)
+    variances = {channel: log.variances[channel] for channel in channels}
+    std = bulk_modulus_bound(model, prior, log.record, parameters, channels=channels, variances=variances)
+    return std / parameters.bulk_modulus
+
+
+def _unseen(bound: float) -> BulkModulusEstimate:
+    return BulkModulusEstimate(
+        outcome=Outcome.NOT_OBSERVABLE,
+        value=None,
+        std=None,
+        bound=bound,
+        gate=Gate(False, (too_wide(bound),)),
+        form="motion",
+        channels=MOTION_CHANNELS,
+        nis={},
+        others={},
+        estimate=None,
+        first_pass=None,
+    )
+
+
+def _with_rig(found: BulkModulusEstimate, uncertainties: Mapping[str, float]) -> BulkModulusEstimate:
+    """Return a filter's estimate with the chamber volume's uncertainty in its deviation (equation 5.8)."""
+    if found.value is None or found.std is None:
+        return found
+    rig_std = found.value * uncertainties.get("chamber_volume", 0.0)
+    return replace(found, std=float(np.hypot(found.std, rig_std)), rig_std=rig_std)
+
+
+def _fitted(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEstimate:
+    value, std = fit.parameters["bulk_modulus"]
+    rig_std = fit.rig_std["bulk_modulus"]
+    gate = Gate(not fit.reasons, fit.reasons)
+    outcome = Outcome.OK
+    if fit.chi_square >= MISMATCH_NIS:
+        outcome = Outcome.MISMATCH
+    elif fit.bound > LARGEST_BOUND:
+        outcome, gate = Outcome.NOT_OBSERVABLE, Gate(False, (too_wide(fit.bound), *fit.reasons))
+    known = outcome is Outcome.OK
+    return BulkModulusEstimate(
+        outcome=outcome,
+        value=value if known else None,
+        std=float(np.hypot(std, rig_std)) if known else None,
+        bound=fit.bound,
+        gate=gate,
+        form=form,
+        channels=channels,
+        nis={channels[-1]: fit.chi_square},
+        others={name: found for name, found in fit.parameters.items() if known and name in REPORTED},
+        estimate=None,
+        first_pass=None,
+        rig_std=rig_std if known else 0.0,
+    )
+
+
+def _chosen(registry: Mapping[str, T], name: str, what: str) -> T:
+    if name not in registry:
+        raise HydrostateError(f"{what} must be one of {', '.join(registry)}, got {name!r}")
+    return registry[name]

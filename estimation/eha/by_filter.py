@@ -1,0 +1,277 @@
+"""Bulk modulus by a filter: what is known of leakage and friction is believed, or estimated along with it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.eha.by_flow_filter import filter_flow
+from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide
+from estimation.filters.iterated_smoother import LONGEST
+from estimation.filters.run import METHODS, Estimate, available_channels, run_filter
+from estimation.finding import Gate, Outcome
+from estimation.log_checks.clean import CleanLog
+from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, first_belief
+from estimation.log_checks.sensor_check import PRESSURE
+from estimation.models.augment import AUGMENTABLE, augmented, augmented_prior
+from estimation.models.eha_forms import BULK_MODULUS
+from estimation.models.model import ProcessModel
+from estimation.notes import EstimateCode
+from estimation.trust.bounds import at_bulk_modulus, bulk_modulus_bound
+from estimation.trust.consistency import consistency_gate, describes
+from estimation.tuning.tuning import Tuning, tune
+from plant.eha.model import EhaParameters
+from plant.errors import HydrostateError, require_known
+from plant.log.record import Record
+
+GROUPS: Mapping[str, tuple[str, ...]] = {
+    "leakage": ("leakage_coefficient", "flow_bias"),
+    "friction": ("friction_quadratic", "friction_linear", "friction_coulomb"),
+    "air": ("air_fraction",),
+}
+"""Short names for states that belong together."""
+
+WALK = 0.05
+"""Random walk of a further state that lets it follow a change: of its logarithm, in a second [1/s^(1/2)]."""
+
+
+@dataclass(frozen=True)
+class FilterOptions:
+    """How a log is filtered.
+
+    Parameters
+    ----------
+    method : str
+        A filter of `estimation.filters.run.METHODS`, or ``"auto"``: see `chosen_method`.
+    states : tuple of str
+        What is estimated beside bulk modulus: of `AUGMENTABLE`, or of `GROUPS`.
+    tuned : bool
+        Whether the noise levels are tuned to the log by likelihood.
+    robust : str
+        How gross outliers count, see `estimation.filters.run.ROBUST`.
+    """
+
+    method: str = "auto"
+    states: tuple[str, ...] = ()
+    tuned: bool = False
+    robust: str = "none"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The further states, groups spelt out."""
+        for name in self.states:
+            require_known("a further state", name, (*GROUPS, *AUGMENTABLE))
+        return tuple(dict.fromkeys(one for name in self.states for one in GROUPS.get(name, (name,))))
+
+
+def estimate_by_filter(
+    log: CleanLog,
+    parameters: EhaParameters,
+    model: ProcessModel,
+    guess: float,
+    start_std: float,
+    options: FilterOptions,
+) -> BulkModulusEstimate:
+    """Estimate bulk modulus, and whatever else is wanted, with one filter on one process model.
+
+    Parameters
+    ----------
+    log : CleanLog
+        The log.
+    parameters : EhaParameters
+        The actuator; first guesses of what is estimated.
+    model : ProcessModel
+        The process model.
+    guess, start_std : float
+        First guess of bulk modulus and its standard deviation [Pa].
+    options : FilterOptions
+        How.
+
+    Returns
+    -------
+    BulkModulusEstimate
+        Value, interval, bound and verdict; the value is the mean over the last 20 % of the log.
+
+    Raises
+    ------
+    HydrostateError
+        If a name in the options is unknown.
+    """
+    require_known("method", options.method, ["auto", *METHODS])
+    record = log.record
+    method = options.method if options.method != "auto" else chosen_method(record, model, options.tuned)
+    names = options.names
+    wide = augmented(model, names, dict.fromkeys(names, WALK**2))
+    channels = available_channels(model, record)
+    variances = log.variances
+    noise: Mapping[str, float] = {PRESSURE: PRESSURE_NOISE_LOGGED} if PRESSURE in channels else {}
+    found: Tuning | None = None
+    if options.tuned:
+        found = tune(
+            record,
+            model,
+            first_belief(model, record, guess, start_std),
+            parameters,
+            channels=channels,
+            variances=variances,
+            noise=noise,
+        )
+        variances, noise = found.tuned.variances, found.tuned.noise
+        guess = float(found.prior.mean[model.index(BULK_MODULUS)])
+
+    def filtered(first_guess: float) -> Estimate:
+        prior = augmented_prior(wide, first_belief(model, record, first_guess, start_std), parameters)
+        return run_filter(
+            METHODS[method],
+            wide,
+            prior,
+            record,
+            parameters,
+            channels=channels,
+            variances=variances,
+            noise=noise,
+            robust=options.robust,
+            keep_innovations=True,
+        )
+
+    def bound_at(bulk_modulus: float) -> float:
+        prior = first_belief(model, record, bulk_modulus, start_std)
+        actuator = at_bulk_modulus(parameters, bulk_modulus)
+        std = bulk_modulus_bound(model, prior, record, actuator, channels=channels, variances=variances, noise=noise)
+        return std / bulk_modulus
+
+    estimate, first = _settled(filtered, guess)
+    value, _ = estimate.settled(BULK_MODULUS)
+    nominal = parameters.bulk_modulus
+    bound = max(bound_at(nominal), bound_at(max(value, 1e-3 * nominal))) if np.isfinite(value) else float("inf")
+    concluded = conclude(estimate, record, bound, model.name, names)
+    return replace(concluded, first_pass=first, tuning=found, method=method)
+
+
+def chosen_method(record: Record, model: ProcessModel, tuned: bool) -> str:
+    """Return the filter that serves a log best.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    model : ProcessModel
+        The process model.
+    tuned : bool
+        Whether its noise levels are those of the log.
+
+    Returns
+    -------
+    str
+        ``iterated-smoother`` where pressure is a state that is not logged, for a filter may then lose its way while the
+        piston sticks and never know; it presumes the right noise levels, so ``ekf`` where they are not tuned, and for
+        logs that are too long to be held.
+    """
+    unseen = PRESSURE in [state.name for state in model.states] and PRESSURE not in record
+    return "iterated-smoother" if tuned and unseen and len(record) <= LONGEST else "ekf"
+
+
+def estimate_by_flow_filter(log: CleanLog, parameters: EhaParameters, options: FilterOptions) -> BulkModulusEstimate:
+    """Estimate bulk modulus, leakage and flow bias with a bank of flow-form filters.
+
+    Parameters
+    ----------
+    log : CleanLog
+        The log, with position and differential pressure.
+    parameters : EhaParameters
+        Geometry and pump, and the size of the first guesses.
+    options : FilterOptions
+        The method must be ``ekf`` or ``auto``; nothing else can be chosen.
+
+    Returns
+    -------
+    BulkModulusEstimate
+        Value, interval, bound and verdict.
+
+    Raises
+    ------
+    HydrostateError
+        If something else is chosen.
+    """
+    if (
+        replace(options, states=(), method="auto") != FilterOptions()
+        or options.method not in ("auto", "ekf")
+        or any(name != "leakage" for name in options.states)
+    ):
+        raise HydrostateError(
+            "the flow form is filtered by a bank of ekf, which finds leakage along with bulk modulus; "
+            f"it takes no other method, states, tuning or robust update, got {options}"
+        )
+    estimate = filter_flow(log.record, parameters, variances=log.variances)
+    value, std = estimate.settled(BULK_MODULUS, 0.02)
+    bound = std / value if np.isfinite(value) and value > 0.0 else float("inf")
+    found = conclude(estimate, log.record, bound, "flow", ("leakage_coefficient", "flow_bias"), fraction=0.02)
+    return replace(found, method="ekf")
+
+
+def conclude(
+    estimate: Estimate, record: Record, bound: float, form: str, names: tuple[str, ...], fraction: float = 0.2
+) -> BulkModulusEstimate:
+    """Judge a filtered log and put the result in words and numbers.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        The filtered log.
+    record : Record
+        The log.
+    bound : float
+        Relative Cramér-Rao bound of bulk modulus [fraction].
+    form : str
+        What was believed of the actuator.
+    names : tuple of str
+        Further states that are reported.
+    fraction : float
+        Share of the log, at its end, over which values are averaged [fraction].
+
+    Returns
+    -------
+    BulkModulusEstimate
+        The result.
+    """
+    value, std = estimate.settled(BULK_MODULUS, fraction)
+    outcome, gate = _verdict(estimate, record, bool(np.isfinite(value) and np.isfinite(std)), bound)
+    known = outcome is Outcome.OK
+    return BulkModulusEstimate(
+        outcome=outcome,
+        value=value if known else None,
+        std=gate.inflation * std if known else None,
+        bound=bound,
+        gate=gate,
+        form=form,
+        channels=estimate.channels if form != "flow" else ("position_m", *estimate.channels),
+        nis=estimate.nis,
+        others={name: estimate.settled(name, fraction) for name in names if known},
+        estimate=estimate,
+        first_pass=estimate,
+    )
+
+
+def _verdict(estimate: Estimate, record: Record, finite: bool, bound: float) -> tuple[Outcome, Gate]:
+    if not finite:
+        return Outcome.DIVERGED, Gate(False, (EstimateCode.DIVERGED.note(),))
+    if bound > LARGEST_BOUND:
+        return Outcome.NOT_OBSERVABLE, Gate(False, (too_wide(bound),))
+    gate = consistency_gate(estimate, BULK_MODULUS, record if len(estimate.residuals) else None)
+    return (Outcome.OK if describes(estimate, BULK_MODULUS) else Outcome.MISMATCH), gate
+
+
+def _settled(filtered: Callable[[float], Estimate], guess: float) -> tuple[Estimate, Estimate]:
+    """Filter from the first guess; where it was far too low or the gate objects, again from where that ended.
+
+    A first guess far below the truth predicts no motion at all, and the filter may then spend its prior on the wrong
+    side, unnoticed by the gate. The second pass begins near the answer with the same wide prior; the likelier is
+    returned, and with it the first pass.
+    """
+    first = filtered(guess)
+    value, _ = first.settled(BULK_MODULUS)
+    near = guess >= 0.5 * value and consistency_gate(first, BULK_MODULUS).passed
+    if near or not np.isfinite(value):
+        return first, first
+    second = filtered(max(value, 0.0))
+    return (second if second.log_likelihood > first.log_likelihood else first), first

@@ -1,0 +1,147 @@
+"""`estimate_log(record, rig) -> Finding`: what a log of the gear-pump actuator says of its oil and leakage."""
+
+from collections.abc import Mapping
+
+from estimation.eha.bulk_modulus import DEFAULT_OPTIONS, FITTED, EstimateOptions, estimate_clean, left_out
+from estimation.eha.result import BulkModulusEstimate
+from estimation.finding import Finding, Outcome, Quantity
+from estimation.log_checks.clean import CleanLog, clean_log
+from estimation.log_checks.sensor_check import PRESSURE
+from estimation.notes import EstimateCode
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.log.record import Record
+from plant.notes import Note
+from plant.units import notes as parameter_notes
+
+KIND = "eha"
+"""What the registry calls the gear-pump actuator."""
+
+NOT_THE_LOGS = {
+    EstimateCode.BOUND_TOO_WIDE,
+    EstimateCode.POSITION_RESIDUALS_LARGE,
+    EstimateCode.FRICTION_LAWS_DISAGREE,
+}
+"""Reasons of a gate that speak against bulk modulus alone: the log holds too little of it, or it hangs on how the
+piston starts and stops, which decides no condition."""
+
+
+def estimate_log(record: Record, rig: Rig, options: EstimateOptions = DEFAULT_OPTIONS) -> Finding:
+    """Estimate effective bulk modulus, and what is found along with it, from a log.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    rig : Rig
+        The actuator: parameters, and how well they are known.
+    options : EstimateOptions
+        How; all automatic if not given.
+
+    Returns
+    -------
+    Finding
+        Quantities, gate and notes; its evidence is the `BulkModulusEstimate`.
+
+    Raises
+    ------
+    HydrostateError
+        If an option is unknown or not usable.
+    LogError
+        If the log lacks what the form needs.
+    """
+    return finding_of(*estimated(clean_log(record, rig.parameters), rig, options))
+
+
+def estimated(log: CleanLog, rig: Rig, options: EstimateOptions) -> tuple[CleanLog, BulkModulusEstimate]:
+    """Return a log with its estimate.
+
+    Parameters
+    ----------
+    log : CleanLog
+        The log.
+    rig : Rig
+        The actuator.
+    options : EstimateOptions
+        How.
+
+    Returns
+    -------
+    tuple of CleanLog and BulkModulusEstimate
+        Both.
+    """
+    return log, estimate_clean(log, rig.parameters, options, rig.uncertainties)
+
+
+def finding_of(log: CleanLog, found: BulkModulusEstimate) -> Finding:
+    """Return what an estimate says, as a finding.
+
+    Parameters
+    ----------
+    log : CleanLog
+        The log.
+    found : BulkModulusEstimate
+        Its estimate.
+
+    Returns
+    -------
+    Finding
+        Without a condition.
+    """
+    return Finding(
+        actuator=KIND,
+        outcome=found.outcome,
+        quantities={"bulk_modulus": found.quantity, **_others(found.others)},
+        gate=found.gate,
+        channels=found.channels,
+        notes=(*left_out(log, found), *absences(found)),
+        evidence=found,
+    )
+
+
+def _others(found: Mapping[str, tuple[float, float]]) -> dict[str, Quantity]:
+    units = {name: note.unit for name, note in parameter_notes(EhaParameters).items()}
+    return {name: Quantity.normal(value, std, units.get(name, "1")) for name, (value, std) in found.items()}
+
+
+def absences(found: BulkModulusEstimate) -> tuple[Note, ...]:
+    """Return what is lost where differential pressure is not used, nothing where it is.
+
+    Parameters
+    ----------
+    found : BulkModulusEstimate
+        The estimate.
+
+    Returns
+    -------
+    tuple of Note
+        One at most.
+    """
+    if PRESSURE in found.channels:
+        return ()
+    if found.form == "acceleration":
+        return (EstimateCode.PRESSURE_UNUSED.note(),)
+    return (EstimateCode.PRESSURE_ABSENT.note(),)
+
+
+def refused(found: BulkModulusEstimate) -> tuple[Note, ...]:
+    """Return why the fit of a log is refused, so that nothing can be concluded from it.
+
+    A form that is told leakage and friction may be refused because the actuator is not the one that it was told of;
+    that is no objection to the log.
+
+    Parameters
+    ----------
+    found : BulkModulusEstimate
+        The estimate.
+
+    Returns
+    -------
+    tuple of Note
+        Reasons of its gate; none where it passed, or where they speak against bulk modulus alone. A log that is nothing
+        like what the model does is refused for all of them.
+    """
+    if found.form not in FITTED:
+        return ()
+    spared = {EstimateCode.BOUND_TOO_WIDE} if found.outcome is Outcome.MISMATCH else NOT_THE_LOGS
+    return tuple(note for note in found.gate.reasons if note.code not in spared)

@@ -1,0 +1,1 @@
+"""The contract of a filter, the algebra of predict and update, layouts, and the kernels made of them."""

@@ -1,0 +1,306 @@
+"""The algebra of filters, as expressions: a model's scaled step, prediction and update of mean and covariance.
+
+Structural zeros and ones of the Jacobian vanish, symmetric covariances are stored once, and measurements are processed
+one channel at a time, so no matrix is inverted and no absolute jitter is needed. `estimation.engine.kernels` makes a
+compiled filter of a rule, alone or in lanes; a new rule needs no kernel of its own.
+"""
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+from estimation.models.model import OPENING, ProcessModel
+from plant.compiled.elimination import eliminated_jacobian
+from plant.compiled.expression import ZERO, Expression, as_expression, symbol
+from plant.compiled.functions import exp, log, where
+from plant.solvers.steps import parameter_symbols
+
+Covariance: TypeAlias = dict[tuple[int, int], Expression]
+"""Upper triangle: ``P[i, j]`` with i <= j."""
+
+Mean: TypeAlias = Sequence[Expression]
+Outputs: TypeAlias = dict[str, Expression]
+"""New values by the name of the symbol that they replace, and whatever else a rule returns by name."""
+
+
+def entry(P: Covariance, i: int, j: int) -> Expression:
+    """Return an element of a symmetric matrix.
+
+    Parameters
+    ----------
+    P : dict
+        Its upper triangle.
+    i, j : int
+        Row and column.
+
+    Returns
+    -------
+    Expression
+        The element.
+    """
+    return P[min(i, j), max(i, j)]
+
+
+def total(terms: Sequence[Expression]) -> Expression:
+    """Return the sum of terms, in their order.
+
+    Parameters
+    ----------
+    terms : sequence of Expression
+        What to add.
+
+    Returns
+    -------
+    Expression
+        The sum.
+    """
+    return sum(terms, ZERO)
+
+
+def belief_symbols(model: ProcessModel) -> tuple[list[Expression], Covariance]:
+    """Return the symbols of a belief.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+
+    Returns
+    -------
+    tuple of (list of Expression, dict)
+        Mean ``z`` in the filter's units, and upper triangle of the covariance ``P``.
+    """
+    n = model.width
+    return [symbol(f"z{i}") for i in range(n)], {(i, j): symbol(f"P{i}_{j}") for i in range(n) for j in range(i, n)}
+
+
+def belief_names(width: int) -> tuple[str, ...]:
+    """Return the names of a belief's symbols: the mean's, then the upper triangle's, row by row.
+
+    Parameters
+    ----------
+    width : int
+        Count of states.
+
+    Returns
+    -------
+    tuple of str
+        Names.
+    """
+    return (*(f"z{i}" for i in range(width)), *(f"P{i}_{j}" for i in range(width) for j in range(i, width)))
+
+
+def to_physical(model: ProcessModel, mean: Sequence[Expression]) -> tuple[Expression, ...]:
+    """Return a state in SI.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    mean : sequence of Expression
+        The state in the filter's units.
+
+    Returns
+    -------
+    tuple of Expression
+        The state in SI.
+    """
+    return tuple(
+        state.scale * (exp(z) if state.logarithmic else z) for z, state in zip(mean, model.states, strict=True)
+    )
+
+
+def drive_symbols(model: ProcessModel) -> list[tuple[Expression, Expression]]:
+    """Return each drive's value at the start and the end of a sub-step, linear between the samples ``a`` and ``b``.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+
+    Returns
+    -------
+    list of pairs of Expression
+        One pair a drive.
+    """
+    pairs: list[tuple[Expression, Expression]] = []
+    for i in range(len(model.drives)):
+        slope = (symbol(f"b{i}") - symbol(f"a{i}")) * symbol("share")
+        start = symbol(f"a{i}") + symbol("j") * slope
+        pairs.append((start, start + slope))
+    return pairs
+
+
+def moved(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]:
+    """Advance a state by one step of the model, both in the filter's units.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    mean : sequence of Expression
+        The state.
+
+    Returns
+    -------
+    list of Expression
+        The state one step later; one that the step hands through is the same node.
+    """
+    physical = to_physical(model, mean)
+    pairs = drive_symbols(model)
+    drives = pairs if len(model.drives) > 1 else pairs[0]
+    stepped = model.step(physical, drives, parameter_symbols(model.parameters), symbol("h"))
+    result: list[Expression] = []
+    for z, old, new, state in zip(mean, physical, stepped, model.states, strict=True):
+        scaled = as_expression(new) / state.scale
+        result.append(z if new is old else log(scaled) if state.logarithmic else scaled)
+    return result
+
+
+def observed(model: ProcessModel, mean: Sequence[Expression], channels: Sequence[str]) -> list[Expression]:
+    """Return what the model predicts of each channel.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    mean : sequence of Expression
+        The state in the filter's units.
+    channels : sequence of str
+        Measured channels.
+
+    Returns
+    -------
+    list of Expression
+        Predictions in SI.
+    """
+    predicted = model.observe(to_physical(model, mean), parameter_symbols(model.parameters))
+    return [as_expression(predicted[channel]) for channel in channels]
+
+
+def bounded(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]:
+    """Hold the mean to its physical bounds; what is not a number stays so, for a diverged filter must show.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    mean : sequence of Expression
+        The state in the filter's units.
+
+    Returns
+    -------
+    list of Expression
+        The state within its bounds.
+    """
+    held: list[Expression] = []
+    for z, state in zip(mean, model.states, strict=True):
+        lower, upper = state.scaled_bounds
+        low = z if lower == -float("inf") else where(z < lower, lower, z)
+        held.append(low if upper == float("inf") else where(low > upper, upper, low))
+    return held
+
+
+def projected(covariance: Covariance, H: Sequence[Expression]) -> tuple[list[Expression], Expression]:
+    """Return what a covariance says of a channel.
+
+    Parameters
+    ----------
+    covariance : dict
+        Upper triangle.
+    H : sequence of Expression
+        The channel's slopes by the states.
+
+    Returns
+    -------
+    tuple of (list of Expression, Expression)
+        Covariance of each state with it, ``P H'``, and its variance, ``H P H'``.
+    """
+    n = len(H)
+    PH = [total([entry(covariance, i, j) * H[j] for j in range(n)]) for i in range(n)]
+    return PH, total([H[i] * PH[i] for i in range(n)])
+
+
+def corrected(
+    mean: Mean, covariance: Covariance, PH: Sequence[Expression], step: Expression, loss: Expression
+) -> tuple[list[Expression], Covariance]:
+    """Correct a belief along what a channel shows of it.
+
+    Parameters
+    ----------
+    mean : sequence of Expression
+        The state in the filter's units.
+    covariance : dict
+        Upper triangle.
+    PH : sequence of Expression
+        Covariance of each state with the channel.
+    step, loss : Expression
+        How far along it the mean moves, and how much of its square the covariance loses.
+
+    Returns
+    -------
+    tuple of (list of Expression, dict)
+        Mean ``z + P H' step`` and covariance ``P - P H' H P loss``.
+    """
+    moved_on = [z + PH[i] * step for i, z in enumerate(mean)]
+    return moved_on, {(i, j): value - PH[i] * PH[j] * loss for (i, j), value in covariance.items()}
+
+
+def believed(model: ProcessModel, mean: Sequence[Expression], covariance: Covariance) -> Outputs:
+    """Return a belief by the names of its symbols, the mean held to its bounds.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    mean : sequence of Expression
+        The state in the filter's units.
+    covariance : dict
+        Upper triangle.
+
+    Returns
+    -------
+    dict[str, Expression]
+        New value of each mean and covariance symbol.
+    """
+    held = {f"z{i}": z for i, z in enumerate(bounded(model, mean))}
+    return held | {f"P{i}_{j}": value for (i, j), value in covariance.items()}
+
+
+def scaled_step(model: ProcessModel) -> tuple[list[Expression], list[list[Expression]]]:
+    """Trace the model's step in the filter's units.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+
+    Returns
+    -------
+    tuple of (list of Expression, list of list of Expression)
+        The state one step later, and its Jacobian by the state.
+    """
+    mean, _ = belief_symbols(model)
+    stepped = moved(model, mean)
+    return stepped, eliminated_jacobian(stepped, mean)
+
+
+def process_noise(model: ProcessModel, i: int) -> Expression:
+    """Return the variance that one step adds to a state.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    i : int
+        Index of the state.
+
+    Returns
+    -------
+    Expression
+        Density times step, and the step's share of what a gap in the log opens.
+    """
+    variance = symbol(f"q{i}") * symbol("h")
+    opening = OPENING + model.states[i].name
+    if opening not in model.drives:
+        return variance
+    return variance + symbol(f"b{model.drives.index(opening)}") * symbol("share")

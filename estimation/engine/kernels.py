@@ -1,0 +1,97 @@
+"""Compiled filters: a rule on a model for a set of channels, for one filter or for 32 side by side.
+
+What a filter carries, and what it computes from, stands in one flat buffer: all filters' values of one symbol, then
+all of the next. A step loads vectors from there, works through the rule's lines and stores the results. Both kernels
+compute in plain IEEE arithmetic, fused where the lines say so: a filter gives the same bits alone and in a batch.
+"""
+
+from functools import cache
+from types import ModuleType
+
+from estimation.engine import lanes as lanes_loop
+from estimation.engine.lanes import flush, keep, lay_side_by_side, run, steps, take
+from estimation.engine.layout import Halves, halves_of, layout
+from estimation.engine.rule import Rule
+from estimation.models.model import ProcessModel
+from plant.compiled.expression import ordered
+from plant.compiled.intrinsics import native_width
+from plant.compiled.kernel_file import load_kernel
+from plant.compiled.paste import BORROWING, INLINED, kernel_text, pasted
+from plant.compiled.source import INTRINSICS, lines_source, operations_source
+
+LANES = 32
+"""Filters side by side: as many as keep a vector unit busy; fewer leave it waiting, more do not help."""
+
+
+def _width(halves: Halves, lanes: int) -> int:
+    """Return how many filters a step takes: a vector of them, or two where roots would leave the processor waiting."""
+    waits = any(item.operation == "sqrt" for item in ordered(halves.predict.values()))
+    return min(lanes, (2 if waits else 1) * native_width())
+
+
+def kernel_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...], lanes: int) -> str:
+    """Write the kernel that runs so many filters side by side.
+
+    Parameters
+    ----------
+    rule : Rule
+        The filter.
+    model : ProcessModel
+        The model.
+    channels : tuple of str
+        Measured channels.
+    lanes : int
+        One, or `LANES`.
+
+    Returns
+    -------
+    str
+        Source of a module with ``steps``, which filters logs that lie side by side, and for several lanes ``run``,
+        which lays separate logs side by side, `ROWS` samples at a time.
+    """
+    halves, places = halves_of(rule, model, channels), layout(rule, model, channels)
+    d, m, width = len(model.drives), len(channels), _width(halves, lanes)
+    begin = len(places.carried) + len(places.rows) + len(halves.constants)
+    seen = [f"{x}{c}" for c in range(m) for x in "es"] if lanes == 1 else []
+    data = [*(f"a{i}" for i in range(d)), *(f"b{i}" for i in range(d)), *(f"y{c}" for c in range(m))]
+    names = (*places.carried, *places.rows, *halves.constants, *data, *seen)
+    slots = {name: lanes * i for i, name in enumerate(names)}
+    line = 8 * lanes
+    sizes = {"LANES": lanes, "LINE": line, "WIDTH": width, "STATES": model.width, "DRIVES": d, "CHANNELS": m}
+    sizes |= {"BEFORE": line * begin, "AFTER": line * (begin + d), "SAMPLE": line * (begin + 2 * d)}
+    sizes |= {"PRODUCT": slots["product0"], "SEEN": begin + 2 * d + m}
+    settings = {"FLUSH": lanes_loop.FLUSH, "LARGE": lanes_loop.LARGE, "AHEAD": lanes_loop.AHEAD}
+    written = {"prepare": halves.constants, "predict": halves.predict, "update": halves.update}
+    lines = {name: lines_source(name, outputs) for name, outputs in written.items()}
+    parts = (
+        INTRINSICS,
+        operations_source(lines, slots, width),
+        f"both_at = stepping(SLOTS, {width}, predict, update)\nmove = moving({width})",
+        pasted(take, keep, flush, constants={**sizes, **settings}, options=BORROWING),
+        pasted(steps),
+        *([pasted(lay_side_by_side, options=INLINED), pasted(run)] if lanes > 1 else []),
+    )
+    return kernel_text(f"{rule.name} on the {model.name} form, {lanes} side by side", *parts)
+
+
+@cache
+def compile_kernel(rule: Rule, model: ProcessModel, channels: tuple[str, ...], lanes: int = 1) -> ModuleType:
+    """Generate and load the kernel that runs so many filters side by side.
+
+    Parameters
+    ----------
+    rule : Rule
+        The filter.
+    model : ProcessModel
+        The model.
+    channels : tuple of str
+        Measured channels.
+    lanes : int
+        One, or `LANES`.
+
+    Returns
+    -------
+    ModuleType
+        The kernel; `estimation.engine.runner` and `estimation.filters.batch` call it.
+    """
+    return load_kernel(f"{rule.name}_{model.name}_{lanes}", kernel_source(rule, model, channels, lanes))

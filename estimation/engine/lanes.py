@@ -1,0 +1,173 @@
+"""The loop of filters side by side over their logs; a single filter is one lane.
+
+All is addressed in bytes: what filters carry and compute from stands in one flat buffer, the values of one symbol
+in a line, line after line. Several lanes are stepped at a time, where they stand.
+"""
+
+# An intrinsic's first parameter is the compiler's own, and no caller gives it.
+# pyright: reportCallIssue=false
+
+import math
+from collections.abc import Callable
+from typing import Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.compiled.intrinsics import ROWS, transpose
+
+Array: TypeAlias = NDArray[np.float64]
+
+AHEAD = 512
+"""Bytes of each log that are fetched ahead of their use: the memory answers within a few samples of all lanes."""
+
+FLUSH = 8
+"""Samples between looks at the running product of innovation variances: it cannot overflow that fast."""
+
+LARGE = 1e60
+"""A product beyond this goes into the logarithm, and starts again at 1."""
+
+
+class LanesKernel(Protocol):
+    """What the kernel of a filter has, for one log or for logs side by side.
+
+    Attributes
+    ----------
+    LANES, LINE, WIDTH : int
+        Filters side by side, bytes of a line, and how many filters a step takes.
+    STATES, DRIVES, CHANNELS : int
+        Counts of the model's states and drives, and of measured channels.
+    BEFORE, AFTER, SAMPLE : int
+        Where the drives at the last sample and at this one and its measurements stand [bytes].
+    PRODUCT, SEEN : int
+        Where products of innovation variances stand, and a single filter's innovations and variances [numbers].
+    prepare_at, predict_at, update_at, both_at : callable
+        ``predict_at(address, j)``: take filters, from their first symbol on, through sub-step j; likewise the others.
+    move : callable
+        ``move(source, target)``: copy as many numbers as a step takes.
+    """
+
+    LANES: int
+    LINE: int
+    WIDTH: int
+    STATES: int
+    DRIVES: int
+    CHANNELS: int
+    BEFORE: int
+    AFTER: int
+    SAMPLE: int
+    PRODUCT: int
+    SEEN: int
+    prepare_at: Callable[[int, float], None]
+    predict_at: Callable[[int, float], None]
+    update_at: Callable[[int, float], None]
+    both_at: Callable[[int, float], None]
+    move: Callable[[int, int], None]
+
+
+def steps(
+    kernel: LanesKernel,
+    work: Array,
+    drives: int,
+    measured: int,
+    begin: int,
+    first: int,
+    end: int,
+    substeps: int,
+    every: int,
+    track: Array,
+    track_variance: Array,
+    logs: Array,
+    residuals: Array,
+    variances: Array,
+) -> None:
+    """Filter samples ``first`` to ``end`` of logs that lie side by side, sample 0 of which is sample ``begin``."""
+    means, spreads, slots, line = track.ctypes.data, track_variance.ctypes.data, work.ctypes.data, kernel.LINE
+    row = (begin + first + every - 1) // every
+    for i in range(first, end):
+        k = begin + i
+        kept = k == row * every
+        for lane in range(0, line, 8 * kernel.WIDTH):
+            here = slots + lane
+            take(kernel, here, drives + line * kernel.DRIVES * i + lane, measured + line * kernel.CHANNELS * i + lane)
+            if k == 0:
+                kernel.prepare_at(here, 0.0)
+                kernel.update_at(here, 0.0)
+            else:
+                for j in range(substeps - 1):
+                    kernel.predict_at(here, float(j))
+                kernel.both_at(here, float(substeps - 1))
+            if kept:
+                place = line * kernel.STATES * row + lane
+                keep(kernel, here, means + place, spreads + place)
+        if kept:
+            row += 1
+        if k < residuals.shape[0]:  # of a single filter
+            for c in range(kernel.CHANNELS):
+                residuals[k, c], variances[k, c] = work[kernel.SEEN + 2 * c], work[kernel.SEEN + 2 * c + 1]
+        if k % FLUSH == FLUSH - 1:
+            flush(kernel, work, logs)
+
+
+def take(kernel: LanesKernel, here: int, drives: int, sample: int) -> None:
+    """Take a sample's drives and measurements in; the drives that were there become those before."""
+    line, before, after = kernel.LINE, here + kernel.BEFORE, here + kernel.AFTER
+    for c in range(kernel.DRIVES):
+        kernel.move(after + line * c, before + line * c)
+    for c in range(kernel.DRIVES):
+        kernel.move(drives + line * c, after + line * c)
+    for c in range(kernel.CHANNELS):
+        kernel.move(sample + line * c, here + kernel.SAMPLE + line * c)
+
+
+def keep(kernel: LanesKernel, here: int, mean: int, variance: int) -> None:
+    """Keep a belief's mean and variances in the track; variances stand first in an upper triangle's rows."""
+    place, line = kernel.STATES, kernel.LINE
+    for a in range(kernel.STATES):
+        kernel.move(here + line * a, mean + line * a)
+        kernel.move(here + line * place, variance + line * a)
+        place += kernel.STATES - a
+
+
+def flush(kernel: LanesKernel, work: Array, logs: Array) -> None:
+    """Take the logarithm of products of innovation variances that have become large."""
+    for lane in range(kernel.LANES):
+        for c in range(kernel.CHANNELS):
+            place = kernel.PRODUCT + kernel.LANES * c + lane
+            if work[place] > LARGE:
+                logs[c, lane] += math.log(work[place])
+                work[place] = 1.0
+
+
+def run(
+    kernel: LanesKernel,
+    work: Array,
+    drives: NDArray[np.int64],
+    measured: NDArray[np.int64],
+    rows: Array,
+    samples: int,
+    substeps: int,
+    every: int,
+    track: Array,
+    track_variance: Array,
+    logs: Array,
+    residuals: Array,
+    variances: Array,
+) -> None:
+    """Filter separate logs, `ROWS` samples of each at a time; the last time some of them have been there before."""
+    drive, sample = rows.ctypes.data, rows.ctypes.data + kernel.LINE * ROWS * kernel.DRIVES
+    for begin in range(0, samples, ROWS):
+        at = min(begin, samples - ROWS)
+        new = begin - at
+        lay_side_by_side(kernel, drives, at, kernel.DRIVES, drive)
+        lay_side_by_side(kernel, measured, at, kernel.CHANNELS, sample)
+        results = track, track_variance, logs, residuals, variances
+        steps(kernel, work, drive, sample, at, new, ROWS, substeps, every, *results)
+
+
+def lay_side_by_side(kernel: LanesKernel, places: NDArray[np.int64], begin: int, width: int, rows: int) -> None:
+    """Copy `ROWS` samples of each log, of so many numbers, into lines of all lanes."""
+    line = kernel.LINE
+    for lane in range(0, line, 8 * ROWS):
+        for i in range(0, ROWS * width, ROWS):
+            transpose(places.ctypes.data + lane, 8 * (begin * width + i), AHEAD, rows + line * i + lane, line)

@@ -1,0 +1,212 @@
+"""Where a compiled filter keeps what: the names of everything that goes into it and from sample to sample."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.engine.kalman import Outputs, belief_names
+from estimation.engine.rule import Rule
+from estimation.models.model import ProcessModel
+from plant.compiled.expression import ONE, ZERO, Expression, select, symbol, unary
+from plant.compiled.hoist import hoisted
+from plant.compiled.simplify import fused, simplified
+from plant.compiled.source import CALLED, symbols_in
+from plant.errors import HydrostateError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where a kernel keeps what.
+
+    Parameters
+    ----------
+    carried : tuple of str
+        What goes from sample to sample: belief, the rule's memory, then the sums ``nis``, ``count`` and ``product`` of
+        each channel.
+    rows : tuple of str
+        Inputs that stay the same: parameters, process noise ``q``, measurement variances ``r``, settings,
+        ``h``, ``share``.
+    channels : int
+        Count of measured channels.
+    """
+
+    carried: tuple[str, ...]
+    rows: tuple[str, ...]
+    channels: int
+
+    def start(self, mean: Array, covariance: Array) -> Array:
+        """Return what is carried before the first sample.
+
+        Parameters
+        ----------
+        mean : ndarray, shape (n,) or (filters, n)
+            Prior mean in the filter's units [dimensionless].
+        covariance : ndarray, shape (n, n) or (filters, n, n)
+            Prior covariance in the filter's units [dimensionless].
+
+        Returns
+        -------
+        ndarray, shape (carried,) or (carried, filters)
+            Its values.
+        """
+        values = np.zeros((len(self.carried), *mean.shape[:-1]))
+        n = mean.shape[-1]
+        rows, columns = upper_triangle(n)
+        values[:n] = mean.T
+        values[n : n + len(rows)] = covariance[..., rows, columns].T
+        values[-self.channels :] = 1.0
+        return values
+
+    def sums(self, carried: Array, name: str) -> Array:
+        """Return a sum of every channel.
+
+        Parameters
+        ----------
+        carried : ndarray, shape (carried, ...)
+            What a kernel carried [dimensionless].
+        name : str
+            ``nis``, ``count`` or ``product``.
+
+        Returns
+        -------
+        ndarray, shape (channels, ...)
+            The sums.
+        """
+        place = ("nis", "count", "product").index(name) - 3
+        return carried[place * self.channels : (place + 1) * self.channels or None]
+
+
+@cache
+def upper_triangle(n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the indices of a symmetric matrix's upper triangle, row by row.
+
+    Parameters
+    ----------
+    n : int
+        Size of the matrix.
+
+    Returns
+    -------
+    tuple of ndarray, each shape (n (n + 1) / 2,)
+        Rows and columns.
+    """
+    rows, columns = np.triu_indices(n)
+    return rows, columns
+
+
+@cache
+def layout(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> Layout:
+    """Return how the kernel of a rule on a model is laid out.
+
+    Parameters
+    ----------
+    rule : Rule
+        The filter.
+    model : ProcessModel
+        The model.
+    channels : tuple of str
+        Measured channels.
+
+    Returns
+    -------
+    Layout
+        Names by place.
+
+    Raises
+    ------
+    HydrostateError
+        If a parameter of the model has the name of something inside the kernel.
+    """
+    each = (*rule.memory, "nis", "count", "product")
+    carried = (*belief_names(model.width), *(f"{name}{c}" for name in each for c in range(len(channels))))
+    parameters = tuple(field.name for field in fields(model.parameters))
+    noise = tuple(f"q{i}" for i in range(model.width)) + tuple(f"r{c}" for c in range(len(channels)))
+    settings = tuple(setting.name for setting in rule.settings)
+    own = {*carried, *noise, *settings, *CALLED, "h", "share", "j"} | {
+        f"{x}{i}" for x in "abykcdtw" for i in range(9999)
+    }
+    clash = own & set(parameters)
+    if clash:
+        raise HydrostateError(f"{model.name}: a parameter may not be named {sorted(clash)[0]!r}, the kernel uses it")
+    return Layout(carried, (*parameters, *noise, *settings, "h", "share"), len(channels))
+
+
+@dataclass(frozen=True)
+class Halves:
+    """The two halves of a filter as expressions, what does not change from step to step hoisted out of them.
+
+    Parameters
+    ----------
+    constants : dict[str, Expression]
+        What is computed once.
+    predict, update : dict[str, Expression]
+        What is computed at every step of the model and at every sample.
+    """
+
+    constants: Outputs
+    predict: Outputs
+    update: Outputs
+
+
+def score_expressions(outputs: Mapping[str, Expression], channels: Sequence[str]) -> Outputs:
+    """Return the running sums by which a filter is judged.
+
+    Parameters
+    ----------
+    outputs : Mapping[str, Expression]
+        What an update returned.
+    channels : sequence of str
+        Measured channels.
+
+    Returns
+    -------
+    dict[str, Expression]
+        Sums of squared normalised innovations ``nis`` and of samples present ``count``, and the product of the
+        innovations' variances over the sensors' own ``product``, whose logarithm is in the likelihood.
+    """
+    sums: Outputs = {}
+    for c in range(len(channels)):
+        present, e, s = unary("present", symbol(f"y{c}")), outputs[f"e{c}"], outputs[f"s{c}"]
+        weight = select(present, 1.0 / s, ZERO)
+        clean = select(present, e, ZERO)
+        sums[f"nis{c}"] = symbol(f"nis{c}") + clean * clean * weight
+        sums[f"count{c}"] = symbol(f"count{c}") + select(present, ONE, ZERO)
+        sums[f"product{c}"] = symbol(f"product{c}") * select(present, s * (1.0 / symbol(f"r{c}")), ONE)
+    return sums
+
+
+@cache
+def halves_of(rule: Rule, model: ProcessModel, channels: tuple[str, ...], *, scored: bool = True) -> Halves:
+    """Trace a rule on a model.
+
+    Parameters
+    ----------
+    rule : Rule
+        The filter.
+    model : ProcessModel
+        The model.
+    channels : tuple of str
+        Measured channels.
+    scored : bool
+        Whether the score's expressions are among the update's.
+
+    Returns
+    -------
+    Halves
+        Its expressions.
+    """
+    update = rule.update(model, channels)
+    if scored:
+        update |= score_expressions(update, channels)
+    data = {f"{x}{i}" for i in range(len(model.drives)) for x in "ab"} | {f"y{c}" for c in range(len(channels))}
+    predict = rule.predict(model)
+    varying = {*layout(rule, model, channels).carried, *data, "j"}
+    fixed = symbols_in([*predict.values(), *update.values()]) - varying
+    before, predict = hoisted(simplified(predict, fixed), varying, "c")
+    after, update = hoisted(simplified(update, fixed), varying, "d")
+    return Halves(before | after, fused(predict), fused(update))

@@ -1,0 +1,1 @@
+"""One filter or smoother a file, its loop beside it."""

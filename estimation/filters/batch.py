@@ -1,0 +1,169 @@
+"""`filter_batch(rule, problems) -> traces`: thousands of filters, 32 side by side, blocks of them on every core.
+
+Every filter has its own prior, parameters, noise and measurements; what they share is the model, the channels and the
+sampling. A filter gives the same bits here and alone (`estimation.engine.runner.run_rule`).
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.engine.contract import FilterProblem, Trace
+from estimation.engine.kernels import LANES, compile_kernel
+from estimation.engine.layout import layout
+from estimation.engine.rule import Rule, chosen_settings, weighing
+from estimation.engine.runner import constant_rows, read_off, run_rule
+from estimation.filters.ekf import EKF
+from plant.compiled.intrinsics import ROWS
+from plant.errors import HydrostateError
+
+Array = NDArray[np.float64]
+
+FEWEST_IN_LANES = 8
+"""A block of fewer filters is run one after the other: empty lanes cost as much as full ones."""
+
+
+def filter_batch(
+    problems: Iterable[FilterProblem],
+    rule: Rule = EKF,
+    *,
+    workers: int = 1,
+) -> Iterator[Trace]:
+    """Run many filters.
+
+    Parameters
+    ----------
+    problems : iterable of FilterProblem
+        The tasks, in any number; a block of 32 is drawn when it is its turn, so they need not fit in memory together.
+    rule : Rule
+        The filter.
+    workers : int
+        Threads, each running one block at a time.
+
+    Yields
+    ------
+    Trace
+        One a task, in the tasks' order; innovations are not kept.
+
+    Raises
+    ------
+    HydrostateError
+        If the tasks of a block differ in model, channels, sampling, settings or length.
+    """
+    blocks = _blocks(problems)
+    if workers == 1:
+        for block in blocks:
+            yield from _run_block(rule, block)
+        return
+    with ThreadPoolExecutor(max_workers=workers) as executor:
+        while group := list(islice(blocks, workers)):
+            for traces in executor.map(partial(_run_block, rule), group):
+                yield from traces
+
+
+def _blocks(problems: Iterable[FilterProblem]) -> Iterator[list[FilterProblem]]:
+    source = iter(problems)
+    while block := list(islice(source, LANES)):
+        yield block
+
+
+def _run_block(rule: Rule, block: Sequence[FilterProblem]) -> list[Trace]:
+    first = block[0]
+    for problem in block:
+        _require_alike(first, problem)
+    if len(block) < FEWEST_IN_LANES or len(first.measured) < ROWS:
+        return [run_rule(rule, problem) for problem in block]
+    settings, rule = chosen_settings(first, rule.name, rule.settings), weighing(rule, first.robust)
+    lanes = [block[min(lane, len(block) - 1)] for lane in range(LANES)]
+    places, kernel = layout(rule, first.model, first.channels), compile_kernel(rule, first.model, first.channels, LANES)
+    carried = len(places.carried)
+    work = aligned(len(kernel.SLOTS), LANES)
+    work[:carried] = places.start(np.array([one.mean for one in lanes]), np.array([one.covariance for one in lanes]))
+    work[carried : carried + len(places.rows)] = constant_rows(lanes, settings)
+    track = np.empty(((len(first.measured) - 1) // first.every + 1, first.model.width, LANES))
+    track_variance, logs = np.empty_like(track), np.zeros((len(first.channels), LANES))
+    drives = [np.ascontiguousarray(problem.drives, np.float64) for problem in lanes]
+    measured = [np.ascontiguousarray(problem.measured, np.float64) for problem in lanes]
+    nothing = np.empty((0, len(first.channels)))
+    kernel.run(
+        work.ravel(),
+        _places(drives),
+        _places(measured),
+        aligned(len(first.model.drives) + len(first.channels), ROWS, LANES),
+        len(first.measured),
+        first.substeps,
+        first.every,
+        track,
+        track_variance,
+        logs,
+        nothing,
+        nothing,
+    )
+    variances = np.array([one.variances for one in lanes]).T
+    final = read_off(places, first.model.width, work[:carried], logs, variances)
+    tracks, spreads = (np.ascontiguousarray(np.moveaxis(one, -1, 0)) for one in (track, track_variance))
+    return [
+        Trace(
+            mean=final.mean[lane],
+            covariance=final.covariance[lane],
+            track=tracks[lane],
+            track_variance=spreads[lane],
+            nis=final.nis[lane],
+            count=final.count[lane],
+            log_likelihood=float(final.log_likelihood[lane]),
+            residuals=nothing,
+            residual_variances=nothing,
+        )
+        for lane in range(len(block))
+    ]
+
+
+def _places(arrays: Sequence[Array]) -> NDArray[np.int64]:
+    """Return the addresses at which arrays begin."""
+    return np.array([one.ctypes.data for one in arrays])
+
+
+def aligned(*shape: int) -> Array:
+    """Return an array that begins where a cache line does: a vector across two of them takes twice as long.
+
+    Parameters
+    ----------
+    *shape : int
+        Its shape.
+
+    Returns
+    -------
+    ndarray
+        The array, not filled.
+    """
+    size = math.prod(shape)
+    buffer = np.empty(size + 8)
+    begin = -buffer.ctypes.data % 64 // 8
+    return buffer[begin : begin + size].reshape(shape)
+
+
+ALIKE = ("channels", "sample_time", "substeps", "every", "robust", "settings")
+"""What the filters of a block share beside the model."""
+
+
+def _require_alike(first: FilterProblem, problem: FilterProblem) -> None:
+    for name in ALIKE:
+        if getattr(problem, name) != getattr(first, name):
+            raise HydrostateError(
+                f"filters of a batch must agree in {name}, got {getattr(first, name)} and {getattr(problem, name)}"
+            )
+    if problem.model is not first.model:
+        raise HydrostateError(
+            f"filters of a batch must share one model, got {first.model.name} and {problem.model.name}"
+        )
+    lengths = (len(first.measured), len(problem.measured), len(problem.drives))
+    if len(set(lengths)) > 1:
+        raise HydrostateError(
+            f"filters of a batch must have logs of one length, got {lengths[0]} and {lengths[1]}, "
+            f"drives of {lengths[2]}"
+        )

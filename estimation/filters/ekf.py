@@ -1,0 +1,182 @@
+"""The extended Kalman filter: analytic Jacobian, sequential scalar updates, compiled.
+
+Equations: predict and update as in Gadsden (2011), whose notation the EHA paper follows; the measurement noise is
+diagonal, so processing one channel at a time equals the joint update and inverts nothing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from estimation.engine.kalman import (
+    Covariance,
+    Mean,
+    Outputs,
+    belief_symbols,
+    believed,
+    bounded,
+    entry,
+    observed,
+    process_noise,
+    projected,
+    scaled_step,
+    total,
+)
+from estimation.engine.robust import inflation
+from estimation.engine.rule import Rule
+from estimation.engine.runner import run_rule
+from estimation.models.model import ProcessModel
+from plant.compiled.expression import ONE, ZERO, Expression, jacobian, select, symbol, unary
+
+
+def ekf_predict(model: ProcessModel) -> Outputs:
+    """Return the extended Kalman filter's predict step: mean through the model, ``P = F P F' + Q h``.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+
+    Returns
+    -------
+    dict[str, Expression]
+        New value of each mean ``z`` and covariance ``P`` symbol.
+    """
+    n = model.width
+    _, P = belief_symbols(model)
+    mean, F = scaled_step(model)
+    FP = [[total([F[i][k] * entry(P, k, j) for k in range(n)]) for j in range(n)] for i in range(n)]
+    held = bounded(model, mean)
+    # what has not moved is within its bounds: the update before saw to that
+    outputs = {f"z{i}": z if z.operation == "symbol" else held[i] for i, z in enumerate(mean)}
+    for i in range(n):
+        for j in range(i, n):
+            spread = total([FP[i][k] * F[j][k] for k in range(n)])
+            outputs[f"P{i}_{j}"] = spread + process_noise(model, i) if i == j else spread
+    return outputs
+
+
+def ekf_update(model: ProcessModel, channels: Sequence[str], robust: str = "none") -> Outputs:
+    """Return the extended Kalman filter's update by each channel in turn; a missing sample (NaN) changes nothing.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    channels : sequence of str
+        Measured channels, in the order of processing.
+    robust : str
+        How innovations that are too large count, see `estimation.engine.robust`.
+
+    Returns
+    -------
+    dict[str, Expression]
+        New value of each mean and covariance symbol, innovations ``e`` and their variances ``s``.
+    """
+    prior, _ = belief_symbols(model)
+    found = linearised_update(model, channels, prior, noise_symbols(channels), robust)
+    return found.seen | believed(model, found.mean, found.covariance)
+
+
+@dataclass(frozen=True, eq=False)
+class Update:
+    """A belief updated by all channels.
+
+    Parameters
+    ----------
+    mean, covariance : list of Expression, dict
+        The belief; the mean not yet held to its bounds.
+    seen : dict[str, Expression]
+        Innovations ``e`` and their variances ``s``.
+    noise : list of Expression
+        Measurement variances as outliers inflated them [SI squared].
+    gains : list of (row, gain, weight, innovation)
+        What each channel did, in units of its own; weight is one over the innovation's variance, nothing where the
+        sample is missing.
+    """
+
+    mean: list[Expression]
+    covariance: Covariance
+    seen: Outputs
+    noise: list[Expression]
+    gains: list[tuple[list[Expression], list[Expression], Expression, Expression]]
+
+
+def noise_symbols(channels: Sequence[str]) -> list[Expression]:
+    """Return the symbols of measurement variances.
+
+    Parameters
+    ----------
+    channels : sequence of str
+        Measured channels.
+
+    Returns
+    -------
+    list of Expression
+        ``r`` [SI squared].
+    """
+    return [symbol(f"r{c}") for c in range(len(channels))]
+
+
+def linearised_update(
+    model: ProcessModel, channels: Sequence[str], point: Mean, noise: Sequence[Expression], robust: str = "none"
+) -> Update:
+    """Update the prior by each channel in turn, the model linearised at a point.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    channels : sequence of str
+        Measured channels, in the order of processing.
+    point : sequence of Expression
+        Where the model is linearised, in the filter's units: at the prior's mean, or nearer to the truth.
+    noise : sequence of Expression
+        Measurement variances [SI squared].
+    robust : str
+        How innovations that are too large count, see `estimation.engine.robust`.
+
+    Returns
+    -------
+    Update
+        The belief, and what was seen on the way.
+    """
+    mean, covariance = belief_symbols(model)
+    seen, inflated = Outputs(), list[Expression]()
+    gains: list[tuple[list[Expression], list[Expression], Expression, Expression]] = []
+    for c, row in enumerate(jacobian(observed(model, point, channels), point)):
+        unit = _unit(row)
+        H = [ONE if slope is unit else slope for slope in row]
+        present, r = unary("present", symbol(f"y{c}")), noise[c] / unit**2
+        residual = symbol(f"y{c}") / unit - _linearised(model, point, mean, channels, c) / unit
+        PH, spread = projected(covariance, H)
+        r = r * inflation(robust, residual * residual / (spread + r))
+        variance = spread + r
+        weight, clean = select(present, 1.0 / variance, ZERO), select(present, residual, ZERO)
+        gain = [value * weight for value in PH]
+        covariance = {(i, j): value - gain[i] * PH[j] for (i, j), value in covariance.items()}
+        mean = [z + gain[i] * clean for i, z in enumerate(mean)]
+        seen |= {f"e{c}": unit * residual, f"s{c}": unit**2 * variance}
+        inflated.append(unit**2 * r)
+        gains.append((H, gain, weight, clean))
+    return Update(mean, covariance, seen, inflated, gains)
+
+
+def _unit(row: Sequence[Expression]) -> Expression:
+    """Return what a channel shows of one unit of a state, if it shows that state alone; an update then counts in it."""
+    seen = [slope for slope in row if slope is not ZERO]
+    return seen[0] if len(seen) == 1 and seen[0].operation == "constant" else ONE
+
+
+def _linearised(model: ProcessModel, point: Mean, mean: Mean, channels: Sequence[str], c: int) -> Expression:
+    """Return what the model, linearised about a point, predicts of a channel from a mean."""
+    predicted = observed(model, point, channels)[c]
+    row = jacobian([predicted], point)[0]
+    if all(slope.operation == "constant" for slope in row):  # it is linear
+        return observed(model, mean, channels)[c]
+    return predicted + total([slope * (new - old) for slope, new, old in zip(row, mean, point, strict=True)])
+
+
+EKF = Rule("ekf", ekf_predict, ekf_update)
+ekf = partial(run_rule, EKF)
+"""The extended Kalman filter, as a rule and as a method."""

@@ -1,0 +1,189 @@
+"""The interacting multiple model filter: several beliefs about how the plant behaves, mixed at every sample.
+
+Source: Blom and Bar-Shalom (1988); Bar-Shalom, Li and Kirubarajan (2001), section 11.6.6, steps 1 to 5, which
+`estimation.filters.imm_loops` takes in turn: mix, step every mode, weigh, combine. A mode is any `Rule` on any task, as
+long as the states are the same ones. Probabilities are logarithms from end to end and are summed by their largest:
+nothing underflows, and nothing is floored. A mode that stops being finite has no probability, and starts again from the
+others at the next sample.
+
+`imm` runs a bank of extended Kalman filters that differ in the leakage and the friction that they are told, so that a
+log's own need not be known; `estimation.filters.run_imm` runs any bank on a record.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from itertools import product
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.engine.contract import FilterProblem, Trace, empty_trace
+from estimation.engine.layout import upper_triangle
+from estimation.engine.rule import Rule, chosen_settings, positive, weighing
+from estimation.engine.runner import constant_row
+from estimation.filters.ekf import EKF
+from estimation.filters.imm_loops import compile_imm
+from plant.errors import HydrostateError
+
+Array = NDArray[np.float64]
+
+LEAKAGE: Mapping[str, tuple[float, ...]] = {
+    "leakage_coefficient": (1.0, 5.3, 12.6),
+    "flow_bias": (1.0, 5.7, 6.1),
+}
+"""Levels of leakage in the bank, as multiples of what the filter is told: the rows of Table 3 over its first."""
+
+FRICTION: Mapping[str, tuple[float, ...]] = {
+    "friction_quadratic": (1.0, 17.6, 67.7),
+    "friction_linear": (1.0, -3.47, 8.69),
+    "friction_coulomb": (1.0, 1.15, 1.26),
+}
+"""Levels of friction: the rows of Table 4 over its first; a_2 dips (errata E12)."""
+
+IMM_SETTINGS = (positive("dwell_time", 10.0),)
+"""Mean time that a mode lasts [s]: long beside the samples, so that a probability is earned by many of them."""
+
+
+def imm(problem: FilterProblem) -> Trace:
+    """Run extended Kalman filters that take turns, told each level of leakage with each of friction.
+
+    Parameters
+    ----------
+    problem : FilterProblem
+        The task; it may set ``dwell_time`` [s]. What the model estimates itself is not varied.
+
+    Returns
+    -------
+    Trace
+        Moments of the mixture, its innovations and likelihood.
+
+    Raises
+    ------
+    HydrostateError
+        If a setting is not known, or a mode would last no longer than a sample.
+    """
+    settings = chosen_settings(problem, "imm", IMM_SETTINGS)
+    bank = [(EKF, replace(problem, parameters=row, settings={})) for row in bank_parameters(problem)]
+    transitions = log_transitions([settings["dwell_time"]] * len(bank), problem.sample_time)
+    trace, _ = interacting(bank, transitions, np.full(len(bank), -log(len(bank))))
+    return trace
+
+
+def bank_parameters(problem: FilterProblem) -> list[Array]:
+    """Return the rows of parameters of the default bank.
+
+    Parameters
+    ----------
+    problem : FilterProblem
+        The task.
+
+    Returns
+    -------
+    list of ndarray, each shape (parameters,)
+        One a mode, that of the task itself first [SI].
+    """
+    names = [field.name for field in fields(problem.model.parameters)]
+    estimated = {state.name for state in problem.model.states}
+    rows: list[Array] = []
+    for levels in product(range(3), repeat=2):
+        row = problem.parameters.copy()
+        for axis, level in zip((LEAKAGE, FRICTION), levels, strict=True):
+            for name in set(axis).intersection(names) - estimated:
+                row[names.index(name)] *= axis[name][level]
+        if not any(np.array_equal(row, other) for other in rows):
+            rows.append(row)
+    return rows
+
+
+def interacting(
+    bank: Sequence[tuple[Rule, FilterProblem]], transitions: Array, log_probability: Array
+) -> tuple[Trace, Array]:
+    """Run the filters of a bank, mixed before every sample as they may have taken turns.
+
+    Parameters
+    ----------
+    bank : sequence of (Rule, FilterProblem)
+        The modes. They share prior, log and sampling, of which the first one's count, and whether innovations are kept.
+    transitions : ndarray, shape (modes, modes)
+        Logarithm of the probability that a mode is followed by another, from row to column [dimensionless].
+    log_probability : ndarray, shape (modes,)
+        Logarithm of each mode's probability before the first sample [dimensionless]; it receives the last one's.
+
+    Returns
+    -------
+    tuple of (Trace, ndarray of shape (rows, modes))
+        The mixture, and the logarithm of each mode's probability along its track [dimensionless].
+    """
+    first = bank[0][1]
+    each = [(weighing(rule, problem.robust), problem.model) for rule, problem in bank]
+    rows = [constant_row(problem, chosen_settings(problem, rule.name, rule.settings)) for rule, problem in bank]
+    kinds = tuple(dict.fromkeys(each))
+    kernel = compile_imm(kinds, first.channels)
+    packed = np.concatenate([first.mean, first.covariance[upper_triangle(first.model.width)]])
+    states = np.zeros((len(bank), kernel.carried))
+    states[:, : len(packed)] = packed
+    constants = np.zeros((len(bank), max(map(len, rows))))
+    for i, row in enumerate(rows):
+        constants[i, : len(row)] = row
+    trace = empty_trace(first)
+    history = np.empty((len(trace.track), len(bank)))
+    log_likelihood = kernel.run(
+        states,
+        constants,
+        np.array([kinds.index(kind) for kind in each]),
+        transitions,
+        log_probability,
+        first.drives,
+        first.measured,
+        first.substeps,
+        first.every,
+        trace.track,
+        trace.track_variance,
+        history,
+        trace.mean,
+        trace.covariance,
+        trace.nis,
+        trace.count,
+        trace.residuals,
+        trace.residual_variances,
+    )
+    return replace(trace, log_likelihood=log_likelihood), history
+
+
+def log_transitions(dwell_times: Sequence[float], sample_time: float) -> Array:
+    """Return the log of a transition matrix in which each mode lasts some time on average and leads to all others.
+
+    A mode's stay is geometric: it ends at a sample with probability ``sample_time / dwell_time``.
+
+    Parameters
+    ----------
+    dwell_times : sequence of float
+        Mean time that each mode lasts [s]; infinite for one that never ends.
+    sample_time : float
+        Time between samples [s].
+
+    Returns
+    -------
+    ndarray, shape (modes, modes)
+        From row to column [dimensionless].
+
+    Raises
+    ------
+    HydrostateError
+        If a mode lasts no longer than a sample.
+
+    Examples
+    --------
+    >>> np.exp(log_transitions([1.0, 0.5], 0.1)).round(3).tolist()
+    [[0.9, 0.1], [0.2, 0.8]]
+    """
+    count = len(dwell_times)
+    result = np.empty((count, count))
+    for i, dwell_time in enumerate(dwell_times):
+        if not dwell_time > sample_time:
+            raise HydrostateError(f"a mode must last longer than a sample ({sample_time} s), got {dwell_time} s")
+        leaving = sample_time / dwell_time if count > 1 else 0.0
+        result[i] = log(leaving / (count - 1)) if leaving > 0.0 else -np.inf
+        result[i, i] = np.log1p(-leaving)
+    return result

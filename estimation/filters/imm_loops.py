@@ -1,0 +1,273 @@
+"""The compiled loop of the interacting multiple model filter: mix, step every mode, weigh, combine."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.engine.parts import rule_functions
+from estimation.engine.rule import Rule
+from estimation.models.model import ProcessModel
+from plant.compiled.kernel_file import load_kernel
+from plant.compiled.paste import COMPILED, kernel_text, pasted
+from plant.compiled.source import INTRINSICS
+
+Kind = tuple[Rule, ProcessModel]
+"""What modes share: a filter on a model; they differ in parameters."""
+
+Array = NDArray[np.float64]
+
+PrepareMode: TypeAlias = Callable[[int, Array, Array], None]
+PredictMode: TypeAlias = Callable[[int, Array, Array, Array, Array, float], None]
+UpdateMode: TypeAlias = Callable[[int, Array, Array, Array, Array], None]
+"""As `estimation.engine.parts` has them, of the kind that comes first."""
+
+
+def log_sum(terms: Array, shares: Array) -> float:
+    """Return the logarithm of a sum of exponentials, and put the share of each in it."""
+    largest = -np.inf
+    for term in terms:
+        if term > largest:
+            largest = term
+    if largest == -np.inf:
+        shares[:] = 0.0
+        return largest
+    total = 0.0
+    for i in range(terms.shape[0]):
+        shares[i] = math.exp(terms[i] - largest)
+        total += shares[i]
+    for i in range(terms.shape[0]):
+        shares[i] /= total
+    return largest + math.log(total)
+
+
+def blend(states: Array, weights: Array, shift: Array, result: Array, *, WIDTH: int, BELIEF: int) -> None:
+    """Set the moments of a mixture, about its heaviest part: equal parts stay what they are, to the last bit."""
+    best = 0
+    for i in range(weights.shape[0]):
+        if weights[i] > weights[best]:
+            best = i
+    shift[:] = 0.0
+    for i in range(weights.shape[0]):
+        if weights[i] > 0.0 and i != best:
+            for q in range(BELIEF):
+                shift[q] += weights[i] * (states[i, q] - states[best, q])
+    for q in range(BELIEF):
+        result[q] = states[best, q] + shift[q]
+    for i in range(weights.shape[0]):
+        if weights[i] > 0.0:
+            for a in range(WIDTH):
+                shift[a] = states[i, a] - result[a]
+            place = WIDTH
+            for a in range(WIDTH):
+                for b in range(a, WIDTH):
+                    result[place] += weights[i] * shift[a] * shift[b]
+                    place += 1
+
+
+def mix(
+    states: Array,
+    mixed: Array,
+    transitions: Array,
+    log_probability: Array,
+    predicted: Array,
+    terms: Array,
+    weights: Array,
+    shift: Array,
+    *,
+    WIDTH: int,
+    BELIEF: int,
+) -> None:
+    """Start each mode from what it would be if it had just come from the others: their mixture, as likely as each is.
+
+    The mixing of Blom and Bar-Shalom (1988): mode j is where mode i has come from with probability ``p_ji mu_j / c_i``.
+    """
+    modes = states.shape[0]
+    for i in range(modes):
+        for j in range(modes):
+            terms[j] = transitions[j, i] + log_probability[j]
+        predicted[i] = log_sum(terms, weights)
+        mixed[i] = states[i]
+        if predicted[i] > -np.inf:
+            blend(states, weights, shift, mixed[i], WIDTH=WIDTH, BELIEF=BELIEF)
+    states[:] = mixed
+
+
+def log_density(sample: Array, seen: Array, state: Array, *, BELIEF: int) -> float:
+    """Return the log density of a sample under a mode's innovations; none where the mode is not finite any more."""
+    score = 0.0
+    for c in range(sample.shape[0]):
+        if sample[c] == sample[c]:
+            e, s = seen[0, c], seen[1, c]
+            score -= 0.5 * (e * e / s + math.log(2.0 * math.pi * s))
+    for a in range(BELIEF):
+        if not math.isfinite(state[a]):
+            score = -np.inf
+    return score if score == score else -np.inf
+
+
+def innovate(c: int, y: float, seen: Array, shares: Array, believed: float) -> tuple[float, float]:
+    """Return the mixture's innovation of a channel and its variance; not a number where nothing is measured."""
+    e = s = np.nan
+    if y == y and believed > 0.0:
+        e = s = 0.0
+        for i in range(shares.shape[0]):
+            if shares[i] > 0.0:
+                e += shares[i] / believed * seen[i, 0, c]
+        for i in range(shares.shape[0]):
+            if shares[i] > 0.0:
+                s += shares[i] / believed * (seen[i, 1, c] + (seen[i, 0, c] - e) ** 2)
+    return e, s
+
+
+def unpack(belief: Array, mean: Array, covariance: Array, *, WIDTH: int) -> None:
+    """Read a mean and a covariance off a belief."""
+    place = WIDTH
+    for a in range(WIDTH):
+        mean[a] = belief[a]
+        for b in range(a, WIDTH):
+            covariance[a, b] = covariance[b, a] = belief[place]
+            place += 1
+
+
+def run(
+    states: Array,
+    rows: Array,
+    kinds: NDArray[np.int64],
+    transitions: Array,
+    log_probability: Array,
+    drives: Array,
+    measured: Array,
+    substeps: int,
+    every: int,
+    track: Array,
+    track_variance: Array,
+    history: Array,
+    mean: Array,
+    covariance: Array,
+    nis: Array,
+    count: Array,
+    residuals: Array,
+    residual_variances: Array,
+    *,
+    WIDTH: int,
+    BELIEF: int,
+    CONSTANTS: int,
+    prepare: PrepareMode,
+    predict: PredictMode,
+    update: UpdateMode,
+) -> float:
+    """Mix, step every mode, weigh and combine, at every sample; return the log-likelihood."""
+    (n, channels), modes = measured.shape, states.shape[0]
+    keep = residuals.shape[0] == n
+    constants, seen, mixed = np.empty((modes, CONSTANTS)), np.empty((modes, 2, channels)), np.empty_like(states)
+    terms, weights, shares, shift = np.empty(modes), np.empty(modes), np.empty(modes), np.empty(BELIEF)
+    predicted, overall = log_probability.copy(), np.empty(BELIEF)
+    log_likelihood = 0.0
+    for i in range(modes):
+        prepare(kinds[i], rows[i], constants[i])
+    for k in range(n):
+        if k > 0:
+            mix(
+                states,
+                mixed,
+                transitions,
+                log_probability,
+                predicted,
+                terms,
+                weights,
+                shift,
+                WIDTH=WIDTH,
+                BELIEF=BELIEF,
+            )
+            for i in range(modes):
+                for j in range(substeps):
+                    predict(kinds[i], states[i], constants[i], drives[k - 1], drives[k], float(j))
+        for i in range(modes):
+            update(kinds[i], states[i], constants[i], measured[k], seen[i])
+            terms[i] = predicted[i] + log_density(measured[k], seen[i], states[i], BELIEF=BELIEF)
+        total = log_sum(terms, weights)
+        log_likelihood += total
+        believed = 0.0
+        for i in range(modes):
+            log_probability[i] = terms[i] - total
+            shares[i] = math.exp(predicted[i]) if terms[i] > -np.inf else 0.0
+            believed += shares[i]
+        for c in range(channels):
+            e, s = innovate(c, measured[k, c], seen, shares, believed)
+            if e == e:
+                nis[c] += e * e / s
+                count[c] += 1.0
+            if keep:
+                residuals[k, c], residual_variances[k, c] = e, s
+        if k % every == 0 or k == n - 1:
+            if total == -np.inf:
+                overall[:] = np.nan
+            else:
+                blend(states, weights, shift, overall, WIDTH=WIDTH, BELIEF=BELIEF)
+            unpack(overall, mean, covariance, WIDTH=WIDTH)
+        if k % every == 0:
+            history[k // every] = log_probability
+            for a in range(WIDTH):
+                track[k // every, a], track_variance[k // every, a] = mean[a], covariance[a, a]
+    return log_likelihood
+
+
+@dataclass(frozen=True)
+class ImmKernel:
+    """A compiled bank.
+
+    Parameters
+    ----------
+    run : callable
+        The generated loop; `estimation.filters.imm` calls it.
+    carried : int
+        How much each mode carries from sample to sample.
+    """
+
+    run: Callable[..., float]
+    carried: int
+
+
+def _dispatch(name: str, arguments: str, kinds: int) -> str:
+    """Write the choice among the functions of the modes' kinds."""
+    choices = [(f"    if kind == {kind}:", f"        {name}_{kind}({arguments})") for kind in range(kinds)]
+    head = f"@numba.njit({COMPILED}, _nrt=False)\ndef {name}(kind, {arguments}):"
+    return "\n".join([head, *(line for choice in choices for line in choice)])
+
+
+@cache
+def compile_imm(kinds: tuple[Kind, ...], channels: tuple[str, ...]) -> ImmKernel:
+    """Generate and load the loop of a bank.
+
+    Parameters
+    ----------
+    kinds : tuple of (Rule, ProcessModel)
+        The different filters and models in it, of equal states.
+    channels : tuple of str
+        Measured channels.
+
+    Returns
+    -------
+    ImmKernel
+        The loop.
+    """
+    rules = [rule_functions(rule, model, channels, f"_{i}") for i, (rule, model) in enumerate(kinds)]
+    width = kinds[0][1].width
+    sizes = {"WIDTH": width, "BELIEF": width + width * (width + 1) // 2}
+    sizes["CONSTANTS"] = max(rule.constants for rule in rules)
+    parts = (
+        INTRINSICS,
+        *(rule.source for rule in rules),
+        _dispatch("prepare", "rows, constants", len(kinds)),
+        _dispatch("predict", "state, constants, before, after, j", len(kinds)),
+        _dispatch("update", "state, constants, sample, seen", len(kinds)),
+        pasted(log_sum, blend, mix, log_density, innovate, unpack, run, constants=sizes),
+    )
+    names = "_".join(f"{rule.name}_{model.name}" for rule, model in kinds)
+    kernel = load_kernel(f"imm_{names}", kernel_text(f"interacting models, {names}", *parts))
+    return ImmKernel(kernel.run, max(len(rule.carried) for rule in rules))

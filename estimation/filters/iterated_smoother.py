@@ -1,0 +1,220 @@
+"""The iterated extended Kalman smoother: the likeliest trajectory of the whole log, by Gauss and Newton.
+
+A filter linearises where it is before it has seen what comes; where the piston sticks, that is often on the wrong side
+of breaking loose, and what was believed wrongly there is never taken back. Here the model is linearised along a
+trajectory of the whole log, a filter and an adjoint (Bierman 1973, as in `estimation.filters.smoother`) find the best
+correction of it, the model is run again under the corrected noise, and so on until the sum of squares rests. Bell
+(1994) shows that this is the Gauss-Newton method for the likeliest trajectory; the step is shortened until the sum
+falls, so that it ends in a minimum.
+
+A constant such as bulk modulus is a state without noise, and its covariance that of the linearised model at the end:
+with Gaussian noise it attains the Cramér-Rao bound as long as the trajectory is known well enough for the model to be
+linear about it. Outliers are weighed by their residuals from the trajectory, again and again (Holland and Welsch 1977).
+"""
+
+from dataclasses import dataclass, replace
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.engine.contract import FilterProblem, Trace, empty_trace
+from estimation.engine.rule import chosen_settings
+from estimation.engine.runner import constant_row
+from estimation.filters.trajectory_loops import compile_trajectory
+from plant.errors import HydrostateError
+
+Array = NDArray[np.float64]
+
+ITERATIONS = 50
+"""Corrections at most."""
+
+AT_REST = 1e-3
+"""Fall of the sum of squares below which it rests: a thirtieth of a standard deviation [dimensionless]."""
+
+SHORTENED = 0.4
+"""Factor on a step that does not lower the sum of squares."""
+
+SHORTEST = 1e-4
+"""Share of a correction below which the search ends."""
+
+WEIGHINGS = 10
+"""Times that outliers are weighed again at most."""
+
+LONGEST = 1_000_000
+"""Samples at most: the whole linearised log is held in memory, some 300 bytes a sample."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Linearised:
+    """The log linearised along a trajectory, sample by sample [dimensionless; of residual and variance, SI]."""
+
+    F: Array
+    gain: Array
+    slope: Array
+    residual: Array
+    variance: Array
+    kept: Array
+
+    @property
+    def parts(self) -> tuple[Array, ...]:
+        """What the way back reads."""
+        return self.F, self.gain, self.slope, self.residual, self.variance
+
+
+@dataclass(frozen=True, eq=False)
+class _Trajectory:
+    """A run of the model: its adjoint, the states under it, and the sum of squares."""
+
+    adjoint: Array
+    states: Array
+    cost: float
+
+
+class _Search:
+    """One log, the kernel for it, and what does not change while the trajectory does."""
+
+    def __init__(self, problem: FilterProblem) -> None:
+        n, (samples, channels) = problem.model.width, problem.measured.shape
+        self.problem = problem
+        self.kernel: ModuleType = compile_trajectory(problem.model, problem.channels, problem.robust)
+        self.opened = problem.opened + problem.noise * problem.sample_time
+        self.bounds = np.array([state.scaled_bounds for state in problem.model.states])
+        self.spread = np.tile(problem.variances, (samples, 1))
+        drives, measured = (np.ascontiguousarray(one, np.float64) for one in (problem.drives, problem.measured))
+        self.rows = constant_row(problem, {})
+        self.log: tuple[Any, ...] = (self.rows, drives, measured, self.spread, problem.substeps)
+        self.lines = _Linearised(
+            np.empty((samples, n, n)),
+            np.empty((samples, channels, n)),
+            np.empty((samples, channels, n)),
+            np.empty((samples, channels)),
+            np.empty((samples, channels)),
+            np.empty(((samples - 1) // problem.every + 1, n, n)),
+        )
+
+    def run(self, adjoint: Array) -> _Trajectory:
+        """Return the model's run under an adjoint."""
+        states, known = np.empty_like(adjoint), self.problem.covariance @ adjoint[0]
+        start = self.problem.mean + known
+        cost = self.kernel.roll(start, adjoint, self.opened, self.bounds, *self.log, states)
+        return _Trajectory(adjoint, states, float(cost + adjoint[0] @ known))
+
+    def begin(self) -> _Trajectory:
+        """Return the best of a few runs: from the prior's mean, and with each constant a standard deviation off."""
+        samples, n = self.problem.measured.shape[0], self.problem.model.width
+        tried = [self.run(np.zeros((samples, n)))]
+        for i in np.flatnonzero((self.problem.noise == 0.0) & (np.diag(self.problem.covariance) > 0.0)):
+            for sign in (-1.0, 1.0):
+                adjoint = np.zeros((samples, n))
+                adjoint[0, i] = sign / np.sqrt(self.problem.covariance[i, i])
+                tried.append(self.run(adjoint))
+        return min(tried, key=lambda one: one.cost)
+
+    def linearise(self, at: _Trajectory) -> Array:
+        """Linearise along a trajectory, and return the filter's covariance at the end of the log."""
+        P = self.problem.covariance.copy()
+        way = (at.states, at.adjoint, self.opened, *self.log)
+        self.kernel.forward(self.problem.mean, P, *way, *self.lines.parts, self.problem.every, self.lines.kept)
+        return P
+
+    def corrected(self, at: _Trajectory) -> _Trajectory | None:
+        """Return a trajectory with a smaller sum of squares, or None where there is none on the way to the best."""
+        self.linearise(at)
+        wanted = np.empty_like(at.adjoint)
+        self.kernel.backward(*self.lines.parts, wanted)
+        share = 1.0
+        while share > SHORTEST:
+            candidate = self.run(at.adjoint + share * (wanted - at.adjoint))
+            if candidate.cost < at.cost:
+                return candidate
+            share *= SHORTENED
+        return None
+
+    def descend(self, at: _Trajectory) -> _Trajectory:
+        """Correct a trajectory until its sum of squares rests."""
+        for _ in range(ITERATIONS):
+            better = self.corrected(at)
+            if better is None:
+                break
+            at, fallen = better, at.cost - better.cost
+            if fallen < AT_REST:
+                break
+        return at
+
+    def reweigh(self, at: _Trajectory) -> _Trajectory:
+        """Weigh every sample by its residual, and return the same trajectory with its new sum of squares."""
+        _, _, measured, spread, _ = self.log
+        self.kernel.reweigh(at.states, self.rows, measured, self.problem.variances, spread)
+        return self.run(at.adjoint)
+
+
+def iterated_smoother(problem: FilterProblem) -> Trace:
+    """Find the likeliest trajectory of a log, and the covariance along it.
+
+    Parameters
+    ----------
+    problem : FilterProblem
+        The task.
+
+    Returns
+    -------
+    Trace
+        Belief at the end, smoothed track with its variance, and the innovations of the filter that is linearised along
+        the trajectory found; not a number where the model's own run from the prior diverges.
+
+    Raises
+    ------
+    HydrostateError
+        If the user set something, or the log is longer than the memory that is set aside.
+    """
+    chosen_settings(problem, "iterated-smoother")
+    samples = len(problem.measured)
+    if samples > LONGEST:
+        raise HydrostateError(
+            f"the iterated smoother holds the whole log in memory: at most {LONGEST:,} samples, got {samples:,}; "
+            "take a part of the log, or another method"
+        )
+    search = _Search(problem)
+    at = search.begin()
+    if not np.isfinite(at.cost):
+        return _lost(problem)
+    at = search.descend(at)
+    if problem.robust != "none":
+        for _ in range(WEIGHINGS):
+            before = search.reweigh(at)
+            at = search.descend(before)
+            if before.cost - at.cost < AT_REST:
+                break
+    return _reported(search, at)
+
+
+def _lost(problem: FilterProblem) -> Trace:
+    trace = empty_trace(problem)
+    for part in (trace.mean, trace.covariance, trace.track, trace.track_variance, trace.residuals):
+        part.fill(np.nan)
+    trace.residual_variances.fill(np.nan)
+    return replace(trace, log_likelihood=float("nan"))
+
+
+def _reported(search: _Search, at: _Trajectory) -> Trace:
+    """Return the trajectory with the covariances and innovations of the filter linearised along it."""
+    problem, lines = search.problem, search.lines
+    final = search.linearise(at)
+    search.kernel.spread_back(*lines.parts, problem.every, lines.kept)
+    present = np.isfinite(lines.residual)
+    squared = np.where(present, lines.residual**2 / lines.variance, 0.0)
+    logs = np.where(present, np.log(2.0 * np.pi * lines.variance), 0.0)
+    keep = problem.keep_innovations
+    return Trace(
+        mean=at.states[-1].copy(),
+        covariance=final,
+        track=at.states[:: problem.every].copy(),
+        track_variance=np.diagonal(lines.kept, axis1=1, axis2=2).copy(),
+        nis=squared.sum(axis=0),
+        count=present.sum(axis=0).astype(np.float64),
+        log_likelihood=-0.5 * float(np.sum(squared + logs)),
+        residuals=lines.residual if keep else np.empty((0, lines.residual.shape[1])),
+        residual_variances=lines.variance if keep else np.empty((0, lines.residual.shape[1])),
+    )

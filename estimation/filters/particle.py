@@ -1,0 +1,277 @@
+"""A bootstrap particle filter: slow truth for beliefs that are not Gaussian.
+
+Source: Gordon, Salmond and Smith (1993), with the systematic resampling of Kitagawa (1996), at every sample in which
+something is measured. Weights are logarithms. It converges to the exact posterior as particles are added, and that is
+all that it is for: a state without process noise keeps only the values that were drawn at first, so give it noise, and
+a sensor much sharper than the belief needs as many particles as the belief is wider, at least.
+
+As a method of `estimation.filters.run.METHODS` it draws from a seed that is one of its settings, so that it repeats
+itself, and lets constants walk: bulk modulus is then found to a few percent where pressure is logged. Position and
+velocity alone are so sharp that a thousand particles all miss them, and the consistency gate says so.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.engine.contract import FilterProblem, Trace, empty_trace
+from estimation.engine.kalman import belief_symbols, bounded, moved, observed, process_noise
+from estimation.engine.layout import layout
+from estimation.engine.parts import data_places, function_source
+from estimation.engine.rule import Setting, chosen_settings
+from estimation.engine.runner import constant_row
+from estimation.filters.ekf import EKF
+from estimation.models.model import ProcessModel
+from plant.compiled.expression import unary
+from plant.compiled.kernel_file import load_kernel
+from plant.compiled.paste import MERGED, kernel_text, pasted
+from plant.compiled.source import INTRINSICS
+from plant.errors import HydrostateError
+
+Array = NDArray[np.float64]
+
+Move: TypeAlias = Callable[[Array, Array, Array, Array, float], None]
+"""``move(state, rows, before, after, j)``: take sub-step j of the model between samples of the drives."""
+
+Observe: TypeAlias = Callable[[Array, Array, Array], None]
+"""``observe(state, rows, seen)``: what the model predicts of each channel."""
+
+Spread: TypeAlias = Callable[[Array, Array, Array], None]
+"""``spread(rows, after, deviations)``: standard deviation that the noise of a sub-step gives each state."""
+
+
+def run(
+    rng: np.random.Generator,
+    particles: Array,
+    rows: Array,
+    limits: Array,
+    drives: Array,
+    measured: Array,
+    variances: Array,
+    substeps: int,
+    every: int,
+    track: Array,
+    track_variance: Array,
+    mean: Array,
+    covariance: Array,
+    nis: Array,
+    count: Array,
+    residuals: Array,
+    residual_variances: Array,
+    *,
+    WIDTH: int,
+    move: Move,
+    observe: Observe,
+    spread: Spread,
+) -> float:
+    """Run the filter; return its log-likelihood."""
+    n, channels = measured.shape
+    size, keep = particles.shape[0], residuals.shape[0] == n
+    others, weights, seen = np.empty_like(particles), np.empty(size), np.empty((size, channels))
+    deviations = np.empty(WIDTH)
+    log_likelihood = 0.0
+    for k in range(n):
+        if k > 0:
+            spread(rows, drives[k], deviations)
+            for i in range(size):
+                for j in range(substeps):
+                    move(particles[i], rows, drives[k - 1], drives[k], float(j))
+                    for a in range(WIDTH):
+                        if deviations[a] > 0.0:
+                            value = particles[i, a] + deviations[a] * rng.standard_normal()
+                            particles[i, a] = min(max(value, limits[0, a]), limits[1, a])
+        weights[:] = 1.0 / size
+        for i in range(size):
+            observe(particles[i], rows, seen[i])
+        for c in range(channels):
+            e = s = np.nan
+            if measured[k, c] == measured[k, c]:
+                middle, s = predicted(weights, seen[:, c], variances[c])
+                e = measured[k, c] - middle
+                nis[c] += e * e / s
+                count[c] += 1.0
+                log_likelihood += weigh(weights, seen[:, c], measured[k, c], variances[c])
+            if keep:
+                residuals[k, c], residual_variances[k, c] = e, s
+        gather(particles, weights, mean, covariance, WIDTH=WIDTH)
+        if k % every == 0:
+            for a in range(WIDTH):
+                track[k // every, a], track_variance[k // every, a] = mean[a], covariance[a, a]
+        if np.any(measured[k] == measured[k]):
+            resample(rng, particles, weights, others)
+    return log_likelihood
+
+
+def predicted(weights: Array, seen: Array, r: float) -> tuple[float, float]:
+    """Return what the cloud predicts of a channel, and with which variance, the sensor's own included."""
+    middle, s = 0.0, r
+    for i in range(weights.shape[0]):
+        middle += weights[i] * seen[i]
+    for i in range(weights.shape[0]):
+        s += weights[i] * (seen[i] - middle) ** 2
+    return middle, s
+
+
+def weigh(weights: Array, seen: Array, y: float, r: float) -> float:
+    """Weigh each particle by how likely a sample is under it; return the logarithm of the sample's likelihood."""
+    largest, total = -np.inf, 0.0
+    for i in range(weights.shape[0]):
+        weights[i] = math.log(weights[i]) - 0.5 * ((y - seen[i]) ** 2 / r + math.log(2.0 * math.pi * r))
+        largest = max(largest, weights[i])
+    for i in range(weights.shape[0]):
+        weights[i] = math.exp(weights[i] - largest)
+        total += weights[i]
+    for i in range(weights.shape[0]):
+        weights[i] /= total
+    return largest + math.log(total)
+
+
+def gather(particles: Array, weights: Array, mean: Array, covariance: Array, *, WIDTH: int) -> None:
+    """Set the cloud's mean and covariance."""
+    for a in range(WIDTH):
+        mean[a] = 0.0
+        for i in range(weights.shape[0]):
+            mean[a] += weights[i] * particles[i, a]
+    for a in range(WIDTH):
+        for b in range(a, WIDTH):
+            covariance[a, b] = 0.0
+            for i in range(weights.shape[0]):
+                covariance[a, b] += weights[i] * (particles[i, a] - mean[a]) * (particles[i, b] - mean[b])
+            covariance[b, a] = covariance[a, b]
+
+
+def resample(rng: np.random.Generator, particles: Array, weights: Array, others: Array) -> None:
+    """Draw particles anew by their weights, at even distances from one random place (Kitagawa 1996)."""
+    size = weights.shape[0]
+    place = rng.random() / size
+    reached, i = weights[0], 0
+    for m in range(size):
+        while place > reached and i < size - 1:
+            i += 1
+            reached += weights[i]
+        others[m] = particles[i]
+        place += 1.0 / size
+    particles[:] = others
+
+
+PARTICLE_SETTINGS = (
+    Setting("particles", 1000.0, "a whole number, 2 or more", lambda value, _: value >= 2.0 and value.is_integer()),
+    Setting("seed", 0.0, "a whole number, 0 or more", lambda value, _: value >= 0.0 and value.is_integer()),
+    Setting("walk", 0.1, "0 or more", lambda value, _: value >= 0.0),
+)
+"""How many particles are carried, and the seed of all that is drawn [dimensionless]; the random walk of what the model
+takes to be constant, in first standard deviations [1/s^(1/2)], without which all particles soon are copies of one."""
+
+
+@cache
+def compile_particles(model: ProcessModel, channels: tuple[str, ...]) -> Callable[..., float]:
+    """Generate and load the particle filter's kernel.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    channels : tuple of str
+        Measured channels.
+
+    Returns
+    -------
+    callable
+        Its ``run``.
+    """
+    mean, _ = belief_symbols(model)
+    state = {f"z{i}": f"state[{i}]" for i in range(model.width)}
+    rows = {name: f"rows[{i}]" for i, name in enumerate(layout(EKF, model, channels).rows)}
+    reads = {**state, **rows, **data_places(model, channels)}
+    stepped = {f"z{i}": z for i, z in enumerate(bounded(model, moved(model, mean)))}
+    shown = {f"p{c}": value for c, value in enumerate(observed(model, mean, channels))}
+    noise = {f"d{i}": unary("sqrt", process_noise(model, i)) for i in range(model.width)}
+    parts = (
+        INTRINSICS,
+        function_source("move", "state, rows, before, after, j", reads, stepped, state),
+        function_source("observe", "state, rows, seen", reads, shown, {n: f"seen[{n[1:]}]" for n in shown}),
+        function_source("spread", "rows, after, deviations", reads, noise, {n: f"deviations[{n[1:]}]" for n in noise}),
+        pasted(predicted, weigh, gather, resample, options=MERGED),
+        pasted(run, constants={"WIDTH": model.width}),
+    )
+    return load_kernel(f"particles_{model.name}", kernel_text(f"particles on the {model.name} form", *parts)).run
+
+
+def particle(problem: FilterProblem) -> Trace:
+    """Run a bootstrap particle filter in which constants walk.
+
+    Parameters
+    ----------
+    problem : FilterProblem
+        The task; it may set ``particles`` and ``seed`` [dimensionless], and ``walk`` [1/s^(1/2)].
+
+    Returns
+    -------
+    Trace
+        As `particle_filter` returns it.
+
+    Raises
+    ------
+    HydrostateError
+        If a setting is not known or not what it must be, or a robust update is asked for.
+    """
+    settings = chosen_settings(problem, "particle", PARTICLE_SETTINGS)
+    walked = settings["walk"] ** 2 * np.diag(problem.covariance)
+    walking = replace(problem, noise=np.where(problem.noise > 0.0, problem.noise, walked))
+    return particle_filter(walking, int(settings["particles"]), np.random.default_rng(int(settings["seed"])))
+
+
+def particle_filter(problem: FilterProblem, particles: int, rng: np.random.Generator) -> Trace:
+    """Run a bootstrap particle filter.
+
+    Parameters
+    ----------
+    problem : FilterProblem
+        The task.
+    particles : int
+        How many are carried.
+    rng : Generator
+        Where they are drawn from.
+
+    Returns
+    -------
+    Trace
+        Mean and covariance of the weighted particles; innovations and their variances are those of the cloud.
+
+    Raises
+    ------
+    HydrostateError
+        If there are fewer than two particles, or a robust update is asked for.
+    """
+    if particles < 2:
+        raise HydrostateError(f"a particle filter needs at least 2 particles, got {particles}")
+    if problem.robust != "none":
+        raise HydrostateError(f"the particle filter has no robust update, got robust {problem.robust!r}")
+    trace = empty_trace(problem)
+    limits = np.array([state.scaled_bounds for state in problem.model.states]).T.copy()
+    cloud = rng.multivariate_normal(problem.mean, problem.covariance, size=particles, method="eigh")
+    log_likelihood = compile_particles(problem.model, problem.channels)(
+        rng,
+        np.clip(cloud, *limits),
+        constant_row(problem, {}),
+        limits,
+        problem.drives,
+        problem.measured,
+        problem.variances,
+        problem.substeps,
+        problem.every,
+        trace.track,
+        trace.track_variance,
+        trace.mean,
+        trace.covariance,
+        trace.nis,
+        trace.count,
+        trace.residuals,
+        trace.residual_variances,
+    )
+    return replace(trace, log_likelihood=log_likelihood)

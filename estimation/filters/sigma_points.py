@@ -1,0 +1,307 @@
+"""Sigma points as expressions: mean and covariance through a function, without its derivative.
+
+The scaled transform of Julier (2002) with points ``z +- c L_i``, where ``P = L L'`` and
+``c^2 = alpha^2 (n + kappa)``. Its sums are rewritten so that nothing large cancels. With ``A_i`` and ``S_i`` half the
+difference and half the second difference of the function over the points of pair i, over c, and ``d`` the shift of
+the mean from the centre's image::
+
+    d = sum_i S_i / c
+    P = sum_i A_i A_i' + sum_i (S_i - c d / n)(S_i - c d / n)' + (beta + alpha^2 kappa / n) d d'
+
+This is the published sum term by term with no negative weight left: a covariance for every alpha, wherever ``beta +
+alpha^2 kappa / n`` is not negative. What is affine in the state needs no points and gets none: its ``A_i`` is exact and
+its ``S_i`` nothing, so on a linear model the transform is the Kalman filter's, and the rounding of ``f(z + c L) - f(z -
+c L)`` stays out where a belief is a millionth of its mean.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TypeAlias
+
+from estimation.engine.kalman import (
+    Covariance,
+    Outputs,
+    belief_symbols,
+    believed,
+    bounded,
+    corrected,
+    entry,
+    moved,
+    observed,
+    process_noise,
+    total,
+)
+from estimation.engine.robust import inflation
+from estimation.filters.ekf import ekf_update
+from estimation.models.model import ProcessModel
+from plant.compiled.expression import ONE, ZERO, Expression, jacobian, ordered, select, symbol, unary
+from plant.compiled.functions import where
+
+Vector: TypeAlias = list[Expression]
+Matrix: TypeAlias = list[Vector]
+
+SMALLEST_PIVOT = 1e-14
+"""Share of its variance below which what is left of a state, given those before it, is rounding [fraction]."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How far out the points lie, and how much the shift of the mean counts.
+
+    Parameters
+    ----------
+    reach : Expression
+        Distance of the points in standard deviations, ``c`` [dimensionless].
+    shift_weight : Expression
+        Weight of ``d d'`` in the covariance, ``beta + alpha^2 kappa / n`` [dimensionless].
+    """
+
+    reach: Expression
+    shift_weight: Expression
+
+
+SpreadOf: TypeAlias = Callable[[int], Spread]
+"""From the count of states to the spread of the points."""
+
+
+@dataclass(frozen=True)
+class Image:
+    """A function over a belief.
+
+    Parameters
+    ----------
+    mean : list of Expression
+        Mean of each of its components.
+    slopes, bends : list of list of Expression
+        ``A`` and ``S - c d / n``: one row a component, one column a pair of points.
+    shift : list of Expression
+        ``d``.
+    """
+
+    mean: Vector
+    slopes: Matrix
+    bends: Matrix
+    shift: Vector
+
+
+def root(P: Covariance, n: int) -> Matrix:
+    """Return the Cholesky root of a covariance; a state that those before it determine has a column of zeros.
+
+    Parameters
+    ----------
+    P : dict
+        Upper triangle.
+    n : int
+        Count of states.
+
+    Returns
+    -------
+    list of list of Expression
+        Lower triangle, ``ZERO`` above.
+    """
+    L: Matrix = [[ZERO] * n for _ in range(n)]
+    for j in range(n):
+        pivot = P[j, j] - total([L[j][k] * L[j][k] for k in range(j)])
+        empty = pivot <= SMALLEST_PIVOT * P[j, j]  # false of what is not a number, so that it shows
+        L[j][j] = where(empty, 0.0, unary("sqrt", pivot))
+        inverse = where(empty, 0.0, 1.0 / L[j][j])
+        for i in range(j + 1, n):
+            L[i][j] = (entry(P, i, j) - total([L[i][k] * L[j][k] for k in range(j)])) * inverse
+    return L
+
+
+def is_affine(item: Expression, mean: Sequence[Expression]) -> bool:
+    """Return whether an expression is a sum of multiples of states, and of what does not depend on them.
+
+    Parameters
+    ----------
+    item : Expression
+        The expression.
+    mean : sequence of Expression
+        Symbols of the states.
+
+    Returns
+    -------
+    bool
+        Whether it is; a sign or a choice that hangs on a state makes it not so.
+    """
+    states = {id(z) for z in mean}
+    degree: dict[int, int] = {}
+    for part in ordered([item]):
+        below = [degree[id(argument)] for argument in part.arguments]
+        match part.operation:
+            case "symbol":
+                degree[id(part)] = int(id(part) in states)
+            case "+" | "-":
+                degree[id(part)] = max(below)
+            case "*":
+                degree[id(part)] = sum(below)
+            case "/" if below[1] == 0:
+                degree[id(part)] = below[0]
+            case _:
+                degree[id(part)] = 2 if any(below) else 0
+    return degree[id(item)] <= 1
+
+
+def all_affine(model: ProcessModel, channels: Sequence[str]) -> bool:
+    """Return whether a model sees every channel as a sum of multiples of its states.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    channels : sequence of str
+        Measured channels.
+
+    Returns
+    -------
+    bool
+        Whether it does; one pass of the Kalman filter's update is then exact.
+    """
+    at, _ = belief_symbols(model)
+    return all(is_affine(value, at) for value in observed(model, at, channels))
+
+
+def image(function: Callable[[Vector], Vector], at: Vector, mean: Vector, L: Matrix, spread: Spread) -> Image:
+    """Carry a belief through a function.
+
+    Parameters
+    ----------
+    function : callable
+        From a state to components.
+    at : list of Expression
+        Symbols of the states, by which the function's structure is read.
+    mean : list of Expression
+        The belief's mean, in terms of any symbols.
+    L : list of list of Expression
+        Root of its covariance.
+    spread : Spread
+        Of the points.
+
+    Returns
+    -------
+    Image
+        Mean, slopes and bends.
+    """
+    n, c = len(mean), spread.reach
+    traced = function(at)
+    affine = [is_affine(component, at) for component in traced]
+    F = jacobian(traced, at)
+    centre = function(mean)
+    pairs = [[function([z + side * c * L[k][i] for k, z in enumerate(mean)]) for side in (1.0, -1.0)] for i in range(n)]
+    slopes: Matrix = []
+    bends: Matrix = []
+    shift: Vector = []
+    for k in range(len(centre)):
+        if affine[k]:
+            slopes.append([total([F[k][j] * L[j][i] for j in range(n)]) for i in range(n)])
+            bends.append([ZERO] * n)
+            shift.append(ZERO)
+            continue
+        half = 0.5 / c
+        slopes.append([(plus[k] - minus[k]) * half for plus, minus in pairs])
+        second = [((plus[k] - centre[k]) + (minus[k] - centre[k])) * half for plus, minus in pairs]
+        shift.append(total(second) / c)
+        bends.append([S - shift[k] * c / n for S in second])
+    return Image([f + d for f, d in zip(centre, shift, strict=True)], slopes, bends, shift)
+
+
+def covariance_of(found: Image, i: int, j: int, spread: Spread) -> Expression:
+    """Return the covariance of two components of an image.
+
+    Parameters
+    ----------
+    found : Image
+        The image.
+    i, j : int
+        The components.
+    spread : Spread
+        Of the points.
+
+    Returns
+    -------
+    Expression
+        Their covariance.
+    """
+    first = total([a * b for a, b in zip(found.slopes[i], found.slopes[j], strict=True)])
+    second = total([a * b for a, b in zip(found.bends[i], found.bends[j], strict=True)])
+    return first + second + found.shift[i] * found.shift[j] * spread.shift_weight
+
+
+def sigma_predict(model: ProcessModel, spread_of: SpreadOf) -> Outputs:
+    """Return a sigma-point filter's predict step, with additive process noise.
+
+    The model is asked about states within their physical bounds only: a point beyond them is projected onto them
+    (Kandepu, Foss and Imsland 2008, section 3), while a state that the step hands through keeps its own points.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    spread_of : callable
+        Spread of the points.
+
+    Returns
+    -------
+    dict[str, Expression]
+        New value of each mean and covariance symbol.
+    """
+    n = model.width
+    mean, P = belief_symbols(model)
+    spread = spread_of(n)
+    found = image(partial(_moved_within, model), mean, mean, root(P, n), spread)
+    covariance = {(i, j): covariance_of(found, i, j, spread) for i in range(n) for j in range(i, n)}
+    for i in range(n):
+        covariance[i, i] = covariance[i, i] + process_noise(model, i)
+    return believed(model, found.mean, covariance)
+
+
+def _moved_within(model: ProcessModel, point: Vector) -> Vector:
+    held = bounded(model, point) if any(z.operation != "symbol" for z in point) else point
+    stepped = moved(model, held)
+    return [own if new is old else new for new, old, own in zip(stepped, held, point, strict=True)]
+
+
+def sigma_update(model: ProcessModel, channels: Sequence[str], spread_of: SpreadOf, robust: str = "none") -> Outputs:
+    """Return a sigma-point filter's update by each channel in turn, its points drawn anew for each.
+
+    Channels that are all affine in the state, as every model here has them, are updated by the extended Kalman
+    filter's expressions, which the transform then equals.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    channels : sequence of str
+        Measured channels, in the order of processing.
+    spread_of : callable
+        Spread of the points.
+    robust : str
+        How innovations that are too large count, see `estimation.engine.robust.inflation`.
+
+    Returns
+    -------
+    dict[str, Expression]
+        New value of each mean and covariance symbol, innovations ``e`` and their variances ``s``.
+    """
+    if all_affine(model, channels):
+        return ekf_update(model, channels, robust)
+    n = model.width
+    at, covariance = belief_symbols(model)
+    mean, spread, outputs = list(at), spread_of(n), Outputs()
+    for c, channel in enumerate(channels):
+        L = root(covariance, n)
+        seen = image(partial(observed, model, channels=(channel,)), list(at), mean, L, spread)
+        y, r = symbol(f"y{c}"), symbol(f"r{c}")
+        present, residual = unary("present", y), y - seen.mean[0]
+        PH = [total([L[i][k] * seen.slopes[0][k] for k in range(n)]) for i in range(n)]
+        own = covariance_of(seen, 0, 0, spread)
+        variance = own + r
+        if robust != "none":
+            variance = own + r * inflation(robust, residual * residual / variance)
+        weight = select(present, ONE / variance, ZERO)
+        step = weight * select(present, residual, ZERO)
+        mean, covariance = corrected(mean, covariance, PH, step, weight)
+        outputs |= {f"e{c}": residual, f"s{c}": variance}
+    return outputs | believed(model, mean, covariance)

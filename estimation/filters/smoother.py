@@ -1,0 +1,138 @@
+"""The Rauch-Tung-Striebel smoother over the extended Kalman filter: what the whole log says of every sample.
+
+Source: Rauch, Tung and Striebel (1965), in the form that Bierman (1973) calls modified Bryson-Frazier: same means and
+covariances, no matrix inverted. Backwards run an adjoint ``u`` and its information ``U``; at a channel with the row H,
+the gain K, the innovation e and its variance S, and across a step of the model with the Jacobian F::
+
+    u <- (I - K H)' u + H' e / S        U <- (I - K H)' U (I - K H) + H' H / S
+    u <- F' u                           U <- F' U F
+    x_smoothed = x + P u                P_smoothed = P - P U P
+
+U is a sum of squares, and so the smoothed covariance is never above the filter's. Derivatives are those that the filter
+took; sub-steps are smoothed one by one. Where the filter's update ran into a physical bound and was held there, u takes
+``P^-1 (held - found)`` on the way, as in the usual form, which starts from what the filter said.
+
+Memory: the filter runs over the log once and keeps its belief at the beginning of each chunk, the square root of the
+log long; then each chunk, the last one first, is run again and smoothed. A million samples need a few hundred
+kilobytes beside the track.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import isqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.engine.contract import FilterProblem, Trace
+from estimation.engine.kalman import belief_names
+from estimation.engine.rule import chosen_settings
+from estimation.engine.runner import constant_row
+from estimation.filters.ekf import ekf
+from estimation.filters.smoother_loops import compile_smoother
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothedStretch:
+    """Beliefs at every sample of a stretch of a log, in the filter's units.
+
+    Parameters
+    ----------
+    filtered_mean, mean : ndarray, shape (samples, n)
+        Means, of the filter and smoothed [dimensionless].
+    filtered_covariance, covariance : ndarray, shape (samples, n, n)
+        Their covariances [dimensionless].
+    """
+
+    filtered_mean: Array
+    mean: Array
+    filtered_covariance: Array
+    covariance: Array
+
+
+def smoother(problem: FilterProblem) -> Trace:
+    """Run the extended Kalman filter forwards and the smoother backwards.
+
+    Parameters
+    ----------
+    problem : FilterProblem
+        The task.
+
+    Returns
+    -------
+    Trace
+        The filter's final belief, innovations and likelihood, with the track and its variance smoothed.
+
+    Raises
+    ------
+    HydrostateError
+        If the user set something.
+    """
+    chosen_settings(problem, "smoother")
+    trace, n = ekf(problem), problem.model.width
+    diagonal = [belief_names(n).index(f"P{i}_{i}") for i in range(n)]
+    for first, _, smoothed in _chunks(problem):
+        kept = np.arange(-first % problem.every, len(smoothed), problem.every)
+        at = (first + kept) // problem.every
+        trace.track[at], trace.track_variance[at] = smoothed[kept, :n], smoothed[kept][:, diagonal]
+    return trace
+
+
+def smoothed_stretch(problem: FilterProblem, first: int = 0, stop: int | None = None) -> SmoothedStretch:
+    """Return the beliefs at every sample of a stretch, given the whole log.
+
+    Parameters
+    ----------
+    problem : FilterProblem
+        The task.
+    first, stop : int
+        The stretch, from the first sample up to, without it, the last; by default the whole log.
+
+    Returns
+    -------
+    SmoothedStretch
+        Filtered and smoothed beliefs; its memory grows with the stretch.
+    """
+    end, n = len(problem.measured) if stop is None else stop, problem.model.width
+    width = n + n * (n + 1) // 2
+    beliefs = np.empty((2, end - first, width))
+    for start, posteriors, smoothed in _chunks(problem):
+        low, high = max(start, first), min(start + len(smoothed), end)
+        if low < high:
+            beliefs[0, low - first : high - first] = posteriors[low - start : high - start]
+            beliefs[1, low - first : high - first] = smoothed[low - start : high - start]
+        if start <= first:
+            break
+    return SmoothedStretch(beliefs[0, :, :n], beliefs[1, :, :n], _unpacked(beliefs[0], n), _unpacked(beliefs[1], n))
+
+
+def _unpacked(beliefs: Array, n: int) -> Array:
+    covariance = np.empty((len(beliefs), n, n))
+    for (i, j), values in zip(zip(*np.triu_indices(n), strict=True), beliefs[:, n:].T, strict=True):
+        covariance[:, i, j] = covariance[:, j, i] = values
+    return covariance
+
+
+def _chunks(problem: FilterProblem) -> Iterator[tuple[int, Array, Array]]:
+    """Yield first sample, filtered and smoothed beliefs of each chunk, the last chunk first; the arrays are reused."""
+    n, samples = problem.model.width, len(problem.measured)
+    kernel = compile_smoother(problem.model, problem.channels, problem.robust)
+    log = (constant_row(problem, {}), problem.drives, problem.measured, problem.substeps)
+    state = np.concatenate([problem.mean, problem.covariance[np.triu_indices(n)]])
+    length = isqrt(samples - 1) + 1
+    firsts = range(0, samples, length)
+    checkpoints = np.empty((len(firsts), len(state)))
+    nothing, blank = np.empty((0, 0, n)), np.empty((0, len(state)))
+    for i, first in enumerate(firsts):
+        checkpoints[i] = state
+        kernel.forward(state, *log, first, min(first + length, samples), nothing, blank, blank)
+    starts = np.empty((length, problem.substeps, n))
+    priors, posteriors, smoothed = (np.empty((length, len(state))) for _ in range(3))
+    adjoint = np.zeros(len(state))
+    for i, first in reversed(list(enumerate(firsts))):
+        stop = min(first + length, samples)
+        kernel.forward(checkpoints[i], *log, first, stop, starts, priors, posteriors)
+        kernel.backward(adjoint, *log, first, stop, starts, priors, posteriors, smoothed)
+        yield first, posteriors[: stop - first], smoothed[: stop - first]

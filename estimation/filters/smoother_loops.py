@@ -1,0 +1,294 @@
+"""The smoother's algebra backwards, and its compiled loops; `estimation.filters.smoother` says what it computes."""
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from types import ModuleType
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.engine.kalman import (
+    Covariance,
+    Outputs,
+    belief_names,
+    belief_symbols,
+    bounded,
+    entry,
+    scaled_step,
+    total,
+)
+from estimation.engine.layout import layout
+from estimation.engine.parts import Predict, Prepare, data_places, function_source, rule_functions
+from estimation.engine.parts import Update as RuleUpdate
+from estimation.engine.rule import weighing
+from estimation.filters.ekf import EKF, Update, linearised_update, noise_symbols
+from estimation.filters.sigma_points import root
+from estimation.models.model import ProcessModel
+from plant.compiled.expression import ONE, ZERO, Expression, select, symbol
+from plant.compiled.kernel_file import load_kernel
+from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.source import INTRINSICS
+
+Array = NDArray[np.float64]
+
+BackPredict: TypeAlias = Callable[[Array, Array, Array, Array, Array, float], None]
+"""``back_predict(state, adjoint, rows, before, after, j)``: take the adjoint back over a sub-step from a state."""
+
+BackUpdate: TypeAlias = Callable[[Array, Array, Array, Array], None]
+"""``back_update(state, adjoint, rows, sample)``: take the adjoint back over a sample's update of a belief."""
+
+Hold: TypeAlias = Callable[[Array, Array, Array, Array], None]
+"""``hold(state, rows, sample, shift)``: by how much the update of a belief was moved to keep within its bounds."""
+
+OnBelief: TypeAlias = Callable[[Array, Array, Array], None]
+"""``smooth(state, adjoint, smoothed)`` smooths a belief; ``lift(state, shift, adjoint)`` adds what a shift means."""
+
+
+def forward(
+    state: Array,
+    rows: Array,
+    drives: Array,
+    measured: Array,
+    substeps: int,
+    first: int,
+    stop: int,
+    starts: Array,
+    priors: Array,
+    posteriors: Array,
+    *,
+    CONSTANTS: int,
+    prepare: Prepare,
+    predict: Predict,
+    update: RuleUpdate,
+) -> None:
+    """Filter a chunk; keep the states before sub-steps and the beliefs about each sample, unless there is no room."""
+    keep = starts.shape[0] > 0
+    constants = np.empty(CONSTANTS)
+    seen = np.empty((2, measured.shape[1]))
+    prepare(rows, constants)
+    for k in range(first, stop):
+        if k > 0:
+            for j in range(substeps):
+                if keep:
+                    starts[k - first, j] = state[: starts.shape[2]]
+                predict(state, constants, drives[k - 1], drives[k], float(j))
+        if keep:
+            priors[k - first] = state
+        update(state, constants, measured[k], seen)
+        if keep:
+            posteriors[k - first] = state
+
+
+def backward(
+    adjoint: Array,
+    rows: Array,
+    drives: Array,
+    measured: Array,
+    substeps: int,
+    first: int,
+    stop: int,
+    starts: Array,
+    priors: Array,
+    posteriors: Array,
+    smoothed: Array,
+    *,
+    smooth: OnBelief,
+    hold: Hold,
+    lift: OnBelief,
+    back_update: BackUpdate,
+    back_predict: BackPredict,
+) -> None:
+    """Smooth a chunk from its end, and carry the adjoint back to its beginning."""
+    shift = np.zeros(starts.shape[2])
+    for k in range(stop - 1, first - 1, -1):
+        smooth(posteriors[k - first], adjoint, smoothed[k - first])
+        hold(priors[k - first], rows, measured[k], shift)
+        if np.any(shift != 0.0):
+            lift(posteriors[k - first], shift, adjoint)
+        back_update(priors[k - first], adjoint, rows, measured[k])
+        if k > 0:
+            for j in range(substeps - 1, -1, -1):
+                back_predict(starts[k - first, j], adjoint, rows, drives[k - 1], drives[k], float(j))
+
+
+def _adjoint(n: int) -> tuple[list[Expression], Covariance]:
+    return [symbol(f"u{i}") for i in range(n)], {(i, j): symbol(f"U{i}_{j}") for i in range(n) for j in range(i, n)}
+
+
+def _adjoint_outputs(u: Sequence[Expression], U: Covariance) -> Outputs:
+    return {f"u{i}": value for i, value in enumerate(u)} | {f"U{i}_{j}": value for (i, j), value in U.items()}
+
+
+def _filtered(model: ProcessModel, channels: Sequence[str], robust: str) -> Update:
+    """Return what the filter's update does."""
+    prior, _ = belief_symbols(model)
+    return linearised_update(model, channels, prior, noise_symbols(channels), robust)
+
+
+def back_predict_expressions(model: ProcessModel) -> Outputs:
+    """Return the adjoint before a step of the model from the one after it (Bierman 1973).
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+
+    Returns
+    -------
+    dict[str, Expression]
+        New ``u`` and ``U``, in the symbols of both and of the state before the step.
+    """
+    n = model.width
+    u, U = _adjoint(n)
+    _, F = scaled_step(model)
+    UF = [[total([entry(U, i, k) * F[k][j] for k in range(n)]) for j in range(n)] for i in range(n)]
+    earlier = [total([F[k][i] * u[k] for k in range(n)]) for i in range(n)]
+    return _adjoint_outputs(
+        earlier, {(i, j): total([F[k][i] * UF[k][j] for k in range(n)]) for i in range(n) for j in range(i, n)}
+    )
+
+
+def back_update_expressions(model: ProcessModel, channels: Sequence[str], robust: str) -> Outputs:
+    """Return the adjoint before a sample's update from the one after it, the last channel first (Bierman 1973).
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    channels : sequence of str
+        Measured channels, in the order of processing.
+    robust : str
+        How innovations that are too large count, see `estimation.engine.robust.inflation`.
+
+    Returns
+    -------
+    dict[str, Expression]
+        New ``u`` and ``U``, in the symbols of both and of the belief before the update.
+    """
+    n = model.width
+    u, U = _adjoint(n)
+    for H, K, weight, residual in reversed(_filtered(model, channels, robust).gains):
+        seen = weight * residual - total([K[i] * u[i] for i in range(n)])
+        UK = [total([entry(U, i, k) * K[k] for k in range(n)]) for i in range(n)]
+        known = weight + total([K[i] * UK[i] for i in range(n)])
+        u = [value + H[i] * seen for i, value in enumerate(u)]
+        U = {(i, j): old - H[i] * UK[j] - UK[i] * H[j] + H[i] * H[j] * known for (i, j), old in U.items()}  # pyright: ignore[reportConstantRedefinition]
+    return _adjoint_outputs(u, U)
+
+
+def hold_expressions(model: ProcessModel, channels: Sequence[str], robust: str) -> Outputs:
+    """Return by how much the filter's update was moved to keep within physical bounds.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    channels : sequence of str
+        Measured channels, in the order of processing.
+    robust : str
+        How innovations that are too large count.
+
+    Returns
+    -------
+    dict[str, Expression]
+        ``w`` of each state that has bounds, in the symbols of the belief before the update.
+    """
+    found = _filtered(model, channels, robust).mean
+    held = bounded(model, found)
+    return {f"w{i}": to - z for i, (to, z) in enumerate(zip(held, found, strict=True)) if to is not z}
+
+
+def lift_expressions(model: ProcessModel) -> Outputs:
+    """Return the adjoint of a mean that was moved by ``w``: ``u + P^-1 w``.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+
+    Returns
+    -------
+    dict[str, Expression]
+        New ``u``, in the symbols of the belief after the update, of ``u`` and of ``w``.
+    """
+    n = model.width
+    _, covariance = belief_symbols(model)
+    u, _ = _adjoint(n)
+    L = root(covariance, n)
+    inverse = [select(L[i][i] > 0.0, ONE / L[i][i], ZERO) for i in range(n)]
+    lower: list[Expression] = []
+    for i in range(n):
+        lower.append((symbol(f"w{i}") - total([L[i][k] * lower[k] for k in range(i)])) * inverse[i])
+    upper: list[Expression] = [ZERO] * n
+    for i in reversed(range(n)):
+        upper[i] = (lower[i] - total([L[k][i] * upper[k] for k in range(i + 1, n)])) * inverse[i]
+    return {f"u{i}": value + upper[i] for i, value in enumerate(u)}
+
+
+def smooth_expressions(model: ProcessModel) -> Outputs:
+    """Return the smoothed belief from the filter's and the adjoint (Bierman 1973).
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+
+    Returns
+    -------
+    dict[str, Expression]
+        Smoothed ``z``, held to its physical bounds, and ``P``.
+    """
+    n = model.width
+    mean, P = belief_symbols(model)
+    u, U = _adjoint(n)
+    PU = [[total([entry(P, i, k) * entry(U, k, j) for k in range(n)]) for j in range(n)] for i in range(n)]
+    moved = [z + total([entry(P, i, k) * u[k] for k in range(n)]) for i, z in enumerate(mean)]
+    outputs = {f"z{i}": z for i, z in enumerate(bounded(model, moved))}
+    return outputs | {
+        f"P{i}_{j}": old - total([PU[i][k] * entry(P, k, j) for k in range(n)]) for (i, j), old in P.items()
+    }
+
+
+@cache
+def compile_smoother(model: ProcessModel, channels: tuple[str, ...], robust: str) -> ModuleType:
+    """Generate and load the smoother's kernel.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    channels : tuple of str
+        Measured channels.
+    robust : str
+        How innovations that are too large count.
+
+    Returns
+    -------
+    ModuleType
+        ``forward`` and ``backward`` over a chunk.
+    """
+    rule = weighing(EKF, robust)
+    filtering = rule_functions(rule, model, channels)
+    names = belief_names(model.width)
+    belief = {name: f"state[{i}]" for i, name in enumerate(names)}
+    adjoint = {name.replace("z", "u").replace("P", "U"): f"adjoint[{i}]" for i, name in enumerate(names)}
+    rows = {name: f"rows[{i}]" for i, name in enumerate(layout(rule, model, channels).rows)}
+    smoothed = {name: f"smoothed[{i}]" for i, name in enumerate(names)}
+    moved = {f"w{i}": f"shift[{i}]" for i in range(model.width)}
+    reads = {**belief, **adjoint, **rows, **moved, **data_places(model, channels)}
+    back_update, held = (act(model, channels, robust) for act in (back_update_expressions, hold_expressions))
+    generated = (
+        ("back_predict", "state, adjoint, rows, before, after, j", back_predict_expressions(model), adjoint),
+        ("back_update", "state, adjoint, rows, sample", back_update, adjoint),
+        ("hold", "state, rows, sample, shift", held, moved),
+        ("lift", "state, shift, adjoint", lift_expressions(model), adjoint),
+        ("smooth", "state, adjoint, smoothed", smooth_expressions(model), smoothed),
+    )
+    parts = (
+        INTRINSICS,
+        filtering.source,
+        *(function_source(name, arguments, reads, outputs, writes) for name, arguments, outputs, writes in generated),
+        pasted(forward, backward, constants={"CONSTANTS": max(1, filtering.constants)}),
+    )
+    return load_kernel(f"smoother_{model.name}", kernel_text(f"smoother on the {model.name} form", *parts))

@@ -1,0 +1,312 @@
+"""Compiled loops over a whole trajectory: the model's run under pushes, and the best linear correction of it.
+
+A trajectory is ``s_0 = prior + P_0 u_0`` and ``s_k = f(s_{k-1}) + Q_k u_k``: so written, with an adjoint ``u`` in the
+place of the noise, a state that no noise moves and a start that is known exactly need no inverse of a zero variance.
+`estimation.filters.iterated_smoother` says what is done with it.
+"""
+
+import math
+from collections.abc import Callable
+from functools import cache
+from types import ModuleType
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.engine.kalman import belief_symbols, moved, observed, scaled_step
+from estimation.engine.layout import layout
+from estimation.engine.parts import data_places, function_source
+from estimation.engine.robust import inflation
+from estimation.filters.ekf import EKF
+from estimation.models.model import ProcessModel
+from plant.compiled.expression import ONE, ZERO, jacobian, symbol
+from plant.compiled.kernel_file import load_kernel
+from plant.compiled.paste import BORROWING, kernel_text, pasted
+from plant.compiled.source import INTRINSICS
+
+Array = NDArray[np.float64]
+
+Advance: TypeAlias = Callable[[Array, Array, Array, Array, float], None]
+"""``advance(state, rows, before, after, j)``: take sub-step j between samples of the drives."""
+
+Differentiate: TypeAlias = Callable[[Array, Array, Array, Array, float, Array], None]
+"""``differentiate(state, rows, before, after, j, jacobian)``: the same, with the step's Jacobian."""
+
+See: TypeAlias = Callable[[Array, Array, Array, Array], None]
+"""``see(state, rows, seen, slope)``: what the model predicts of each channel, and its derivative by the state."""
+
+
+def roll(
+    start: Array,
+    adjoint: Array,
+    opened: Array,
+    bounds: Array,
+    rows: Array,
+    drives: Array,
+    measured: Array,
+    spread: Array,
+    substeps: int,
+    trajectory: Array,
+    *,
+    WIDTH: int,
+    CHANNELS: int,
+    advance: Advance,
+    see: See,
+) -> float:
+    """Run the model under its pushes, held to the states' bounds, and return the sum of squares.
+
+    It is infinite where the run diverges, or begins out of bounds.
+    """
+    state, seen, slope = start.copy(), np.empty(CHANNELS), np.empty((CHANNELS, WIDTH))
+    cost = 0.0
+    for i in range(WIDTH):
+        if not (bounds[i, 0] <= state[i] <= bounds[i, 1]):
+            return np.inf
+    for k in range(measured.shape[0]):
+        if k > 0:
+            for j in range(substeps):
+                advance(state, rows, drives[k - 1], drives[k], float(j))
+            for i in range(WIDTH):
+                state[i] += opened[k, i] * adjoint[k, i]
+                cost += opened[k, i] * adjoint[k, i] * adjoint[k, i]
+        for i in range(WIDTH):
+            if math.isnan(state[i]):
+                return np.inf
+            state[i] = min(max(state[i], bounds[i, 0]), bounds[i, 1])
+            trajectory[k, i] = state[i]
+        see(state, rows, seen, slope)
+        for c in range(CHANNELS):
+            if not math.isnan(measured[k, c]):
+                cost += (measured[k, c] - seen[c]) ** 2 / spread[k, c]
+    return cost
+
+
+def forward(
+    prior: Array,
+    P: Array,
+    trajectory: Array,
+    adjoint: Array,
+    opened: Array,
+    rows: Array,
+    drives: Array,
+    measured: Array,
+    spread: Array,
+    substeps: int,
+    F: Array,
+    gain: Array,
+    slope: Array,
+    residual: Array,
+    variance: Array,
+    every: int,
+    kept: Array,
+    *,
+    WIDTH: int,
+    CHANNELS: int,
+    differentiate: Differentiate,
+    see: See,
+) -> None:
+    """Filter deviations from the trajectory; leave the filter's last covariance in P, and some on the way in kept."""
+    m, state, before = prior - trajectory[0], np.empty(WIDTH), np.empty(WIDTH)
+    J, product = np.eye(WIDTH), np.empty((WIDTH, WIDTH))
+    seen, PH = np.empty(CHANNELS), np.empty(WIDTH)
+    for k in range(measured.shape[0]):
+        if k > 0:
+            state[:] = trajectory[k - 1]
+            F[k] = np.eye(WIDTH)
+            for j in range(substeps):
+                differentiate(state, rows, drives[k - 1], drives[k], float(j), J)
+                multiply(J, F[k], product, WIDTH=WIDTH)
+                F[k] = product
+            before[:] = m
+            for i in range(WIDTH):
+                m[i] = -opened[k, i] * adjoint[k, i]
+                for j in range(WIDTH):
+                    m[i] += F[k, i, j] * before[j]
+            multiply(F[k], P, product, WIDTH=WIDTH)
+            for i in range(WIDTH):
+                for j in range(i, WIDTH):
+                    total = opened[k, i] if i == j else 0.0
+                    for q in range(WIDTH):
+                        total += product[i, q] * F[k, j, q]
+                    P[i, j] = P[j, i] = total
+        if k % every == 0:
+            kept[k // every] = P
+        see(trajectory[k], rows, seen, slope[k])
+        for c in range(CHANNELS):
+            if math.isnan(measured[k, c]):
+                residual[k, c] = variance[k, c] = np.nan
+                continue
+            residual[k, c], variance[k, c] = measured[k, c] - seen[c], spread[k, c]
+            update(k, c, m, P, PH, slope, gain, residual, variance, WIDTH=WIDTH)
+
+
+def update(
+    k: int,
+    c: int,
+    m: Array,
+    P: Array,
+    PH: Array,
+    slope: Array,
+    gain: Array,
+    residual: Array,
+    variance: Array,
+    *,
+    WIDTH: int,
+) -> None:
+    """Update a deviation and its covariance by channel c of sample k, and finish its residual and variance."""
+    e, s = residual[k, c], variance[k, c]
+    for i in range(WIDTH):
+        PH[i] = 0.0
+        for j in range(WIDTH):
+            PH[i] += P[i, j] * slope[k, c, j]
+    for i in range(WIDTH):
+        e -= slope[k, c, i] * m[i]
+        s += slope[k, c, i] * PH[i]
+    residual[k, c], variance[k, c] = e, s
+    for i in range(WIDTH):
+        gain[k, c, i] = PH[i] / s
+        m[i] += gain[k, c, i] * e
+        for j in range(i, WIDTH):
+            P[i, j] -= PH[i] * PH[j] / s
+            P[j, i] = P[i, j]
+
+
+def multiply(a: Array, b: Array, product: Array, *, WIDTH: int) -> None:
+    """Multiply two matrices into a third."""
+    for i in range(WIDTH):
+        for j in range(WIDTH):
+            total = 0.0
+            for q in range(WIDTH):
+                total += a[i, q] * b[q, j]
+            product[i, j] = total
+
+
+def backward(
+    F: Array, gain: Array, slope: Array, residual: Array, variance: Array, wanted: Array, *, WIDTH: int, CHANNELS: int
+) -> None:
+    """Carry the adjoint back over the log: what pushes the trajectory to where it fits best."""
+    u, earlier = np.zeros(WIDTH), np.empty(WIDTH)
+    for k in range(residual.shape[0] - 1, -1, -1):
+        for c in range(CHANNELS - 1, -1, -1):
+            if not math.isnan(residual[k, c]):
+                known = residual[k, c] / variance[k, c]
+                for i in range(WIDTH):
+                    known -= gain[k, c, i] * u[i]
+                for i in range(WIDTH):
+                    u[i] += slope[k, c, i] * known
+        wanted[k] = u
+        if k > 0:
+            for i in range(WIDTH):
+                earlier[i] = 0.0
+                for j in range(WIDTH):
+                    earlier[i] += F[k, j, i] * u[j]
+            u[:] = earlier
+
+
+def spread_back(
+    F: Array,
+    gain: Array,
+    slope: Array,
+    residual: Array,
+    variance: Array,
+    every: int,
+    kept: Array,
+    *,
+    WIDTH: int,
+    CHANNELS: int,
+) -> None:
+    """Turn the covariances kept on the way, which knew the log up to there, into those that know all of it."""
+    U, half, PU = np.zeros((WIDTH, WIDTH)), np.empty((WIDTH, WIDTH)), np.empty((WIDTH, WIDTH))
+    UK = np.empty(WIDTH)
+    for k in range(residual.shape[0] - 1, -1, -1):
+        for c in range(CHANNELS - 1, -1, -1):
+            if not math.isnan(residual[k, c]):
+                known = 1.0 / variance[k, c]
+                for i in range(WIDTH):
+                    UK[i] = 0.0
+                    for j in range(WIDTH):
+                        UK[i] += U[i, j] * gain[k, c, j]
+                for i in range(WIDTH):
+                    known += gain[k, c, i] * UK[i]
+                for i in range(WIDTH):
+                    for j in range(WIDTH):
+                        H, G = slope[k, c, i], slope[k, c, j]
+                        U[i, j] += H * G * known - H * UK[j] - UK[i] * G
+        if k % every == 0:
+            multiply(kept[k // every], U, PU, WIDTH=WIDTH)
+            multiply(PU, kept[k // every], half, WIDTH=WIDTH)
+            kept[k // every] -= half
+        if k > 0:
+            multiply(U, F[k], half, WIDTH=WIDTH)
+            multiply(np.ascontiguousarray(F[k].T), half, U, WIDTH=WIDTH)
+
+
+def reweigh(
+    trajectory: Array,
+    rows: Array,
+    measured: Array,
+    variances: Array,
+    spread: Array,
+    *,
+    WIDTH: int,
+    CHANNELS: int,
+    see: See,
+    doubt: Callable[[Array], None],
+) -> None:
+    """Set the variances of all samples by how far they lie from the trajectory; ``doubt`` makes a factor of a ratio."""
+    seen, slope, ratio = np.empty(CHANNELS), np.empty((CHANNELS, WIDTH)), np.empty(1)
+    for k in range(measured.shape[0]):
+        see(trajectory[k], rows, seen, slope)
+        for c in range(CHANNELS):
+            ratio[0] = (measured[k, c] - seen[c]) ** 2 / variances[c]
+            doubt(ratio)
+            spread[k, c] = variances[c] * ratio[0] if not math.isnan(measured[k, c]) else variances[c]
+
+
+@cache
+def compile_trajectory(model: ProcessModel, channels: tuple[str, ...], robust: str) -> ModuleType:
+    """Generate and load the loops.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The model.
+    channels : tuple of str
+        Measured channels.
+    robust : str
+        How residuals that are too large count, see `estimation.engine.robust.inflation`.
+
+    Returns
+    -------
+    ModuleType
+        ``roll``, ``forward``, ``backward`` and ``spread_back``; ``reweigh`` where outliers count for less.
+    """
+    n, names = model.width, layout(EKF, model, channels).rows
+    mean, _ = belief_symbols(model)
+    place = {f"z{i}": f"state[{i}]" for i in range(n)}
+    reads = {**place, **data_places(model, channels), **{name: f"rows[{i}]" for i, name in enumerate(names)}}
+    stepped, F = scaled_step(model)
+    slopes = {f"F{i}_{j}": F[i][j] for i in range(n) for j in range(n) if F[i][j] is not (ONE if i == j else ZERO)}
+    new = {f"z{i}": z for i, z in enumerate(moved(model, mean))}
+    written = {**place, **{f"F{i}_{j}": f"jacobian[{i}, {j}]" for i in range(n) for j in range(n)}}
+    seen = observed(model, mean, channels)
+    H = {f"H{c}_{i}": value for c, row in enumerate(jacobian(seen, mean)) for i, value in enumerate(row)}
+    shown = {f"e{c}": value for c, value in enumerate(seen)}
+    places = {name: f"seen[{name[1:]}]" for name in shown} | {
+        name: f"slope[{name[1:].replace('_', ', ')}]" for name in H
+    }
+    linear = {f"z{i}": z for i, z in enumerate(stepped)} | slopes
+    parts = [
+        INTRINSICS,
+        function_source("advance", "state, rows, before, after, j", reads, new, place),
+        function_source("differentiate", "state, rows, before, after, j, jacobian", reads, linear, written),
+        function_source("see", "state, rows, seen, slope", reads, {**shown, **H}, places),
+        pasted(roll, forward, backward, spread_back, constants={"WIDTH": n, "CHANNELS": len(channels)}),
+        pasted(update, multiply, options=BORROWING),
+    ]
+    if robust != "none":
+        doubted = {"factor": inflation(robust, symbol("x"))}
+        parts.append(function_source("doubt", "ratio", {"x": "ratio[0]"}, doubted, {"factor": "ratio[0]"}))
+        parts.append(pasted(reweigh))
+    return load_kernel(f"trajectory_{model.name}", kernel_text(f"trajectories of the {model.name} form", *parts))

@@ -1,0 +1,236 @@
+"""The finding: what a log says of an actuator, once. Estimate, diagnosis, batch, page and stream are views on it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from plant.notes import Note, distinct
+
+if TYPE_CHECKING:
+    from estimation.trust.whiteness import Whiteness
+
+NORMAL_95 = 1.959963984540054
+"""Half-width of a 95 % normal interval, in standard deviations."""
+
+
+def interval_95(value: float, std: float) -> tuple[float, float]:
+    """Return a 95 % normal interval.
+
+    Parameters
+    ----------
+    value : float
+        Its middle [any unit].
+    std : float
+        Standard deviation [the same unit].
+
+    Returns
+    -------
+    tuple of float
+        Lower and upper end.
+    """
+    return value - NORMAL_95 * std, value + NORMAL_95 * std
+
+
+class Outcome(StrEnum):
+    """How a log fared; the words that JSON prints."""
+
+    OK = "ok"
+    NOT_OBSERVABLE = "not_observable"
+    MISMATCH = "mismatch"
+    DIVERGED = "diverged"
+    FAILED = "failed"
+
+
+OUTCOMES: Mapping[Outcome, str] = {
+    Outcome.OK: "The result stands, with the interval and the gate's verdict beside it.",
+    Outcome.NOT_OBSERVABLE: (
+        "This drive and these sensors hold too little about bulk modulus: the Cramér-Rao bound is over 3 %. "
+        "Log differential pressure, or drive with larger, slower steps."
+    ),
+    Outcome.MISMATCH: (
+        "The log is nothing like what the model does, so no number is given: the residuals are ten times larger than "
+        "expected or more, or the estimate ran into its physical bound. Check units, rig and condition; log pressure."
+    ),
+    Outcome.DIVERGED: "The estimate stopped being finite; check units, rig parameters and the form.",
+    Outcome.FAILED: "The log could not be read or used; the message says why.",
+}
+"""What each outcome means, as a sentence for a reader."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One number with its interval.
+
+    Parameters
+    ----------
+    value : float or None
+        The estimate [in its unit]; None where the log does not tell it.
+    unit : str
+        The unit; ``"1"`` for a number without one.
+    ci95 : tuple of float, optional
+        Ends of its 95 % interval [in its unit].
+    std : float, optional
+        Its standard deviation [in its unit].
+    """
+
+    value: float | None
+    unit: str
+    ci95: tuple[float, float] | None = None
+    std: float | None = None
+
+    @staticmethod
+    def normal(value: float, std: float, unit: str) -> "Quantity":
+        """Return a quantity whose interval is that of a normal law.
+
+        Parameters
+        ----------
+        value, std : float
+            Estimate and standard deviation [in that unit].
+        unit : str
+            The unit.
+
+        Returns
+        -------
+        Quantity
+            With its 95 % interval.
+        """
+        return Quantity(value, unit, interval_95(value, std), std)
+
+    def covers(self, truth: float) -> bool:
+        """Return whether the interval holds a value.
+
+        Parameters
+        ----------
+        truth : float
+            The value [in its unit].
+
+        Returns
+        -------
+        bool
+            False too where there is no interval.
+        """
+        return self.ci95 is not None and self.ci95[0] <= truth <= self.ci95[1]
+
+
+@dataclass(frozen=True)
+class Gate:
+    """The verdict on an estimate.
+
+    Parameters
+    ----------
+    passed : bool
+        Whether the estimate and its interval can be believed.
+    reasons : tuple of Note
+        What speaks against it.
+    inflation : float
+        Factor by which the standard deviation has to grow for the structure that is left in the innovations
+        [dimensionless]; 1 where there is none. It is an estimate of magnitude: right within a factor of about two on
+        plants that the model does not describe, where it turns errors of 5 to 400 standard deviations into 0.1 to 3.
+    whiteness : tuple of Whiteness
+        The innovations of each channel; empty where they were not kept.
+    """
+
+    passed: bool
+    reasons: tuple[Note, ...]
+    inflation: float = 1.0
+    whiteness: "tuple[Whiteness, ...]" = ()
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of condition within a log.
+
+    Parameters
+    ----------
+    since : float
+        When [s].
+    ci95 : tuple of float
+        Its 95 % interval [s].
+    before : str
+        Condition up to then.
+    """
+
+    since: float
+    ci95: tuple[float, float]
+    before: str
+
+
+def _nothing() -> Mapping[str, Any]:
+    return MappingProxyType({})
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """What a log says of its actuator, when the log ends.
+
+    Parameters
+    ----------
+    actuator : str
+        Kind of actuator, by its name in the registry.
+    outcome : Outcome
+        How it went.
+    quantities : Mapping[str, Quantity]
+        What was estimated, by name.
+    gate : Gate
+        Whether the quantities can be believed.
+    channels : tuple of str
+        Channels that were used.
+    notes : tuple of Note
+        What else a reader should know: what was left out of the log, what an absent channel costs.
+    condition : str or None
+        The most probable condition or fault; None where none was asked for, or none can be named.
+    alike : tuple of str
+        Conditions that the log does not tell from it.
+    probabilities : Mapping[str, float]
+        Of each condition, should the log be in one of them [probability].
+    unknown : bool
+        Whether something speaks against all of them.
+    against : tuple of Note
+        What.
+    faults : tuple of Note
+        What else is wrong, beside the condition.
+    severities : Mapping[str, Quantity]
+        How bad it is.
+    healthy : Mapping[str, float]
+        The same of the healthy actuator [each in the same unit].
+    not_told : tuple of Note
+        What the log does not determine.
+    since : Change or None
+        When the condition began; None if it did so before the log.
+    advice : tuple of Note
+        What to do or to measure next.
+    evidence : object
+        Results of the engines behind it, of the actuator's own kind.
+    """
+
+    actuator: str
+    outcome: Outcome
+    quantities: Mapping[str, Quantity]
+    gate: Gate
+    channels: tuple[str, ...]
+    notes: tuple[Note, ...] = ()
+    condition: str | None = None
+    alike: tuple[str, ...] = ()
+    probabilities: Mapping[str, float] = field(default_factory=_nothing)
+    unknown: bool = False
+    against: tuple[Note, ...] = ()
+    faults: tuple[Note, ...] = ()
+    severities: Mapping[str, Quantity] = field(default_factory=_nothing)
+    healthy: Mapping[str, float] = field(default_factory=_nothing)
+    not_told: tuple[Note, ...] = ()
+    since: Change | None = None
+    advice: tuple[Note, ...] = ()
+    evidence: Any = None
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The condition and those that are not told from it; empty where none is named."""
+        return () if self.condition is None else (self.condition, *self.alike)
+
+    @property
+    def all_notes(self) -> tuple[Note, ...]:
+        """Every note, each once: of the gate, the class, other faults, what is not told, the log, and the advice."""
+        groups = (self.gate.reasons, self.against, self.faults, self.not_told, self.notes, self.advice)
+        return distinct(note for group in groups for note in group)

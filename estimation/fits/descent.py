@@ -1,0 +1,136 @@
+"""Gauss-Newton steps within a trust region and bounds, for least squares."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.fits.root import root_between
+
+Array = NDArray[np.float64]
+
+FIRST_RADIUS = 30.0
+"""Length of the longest first step, in fitted coordinates: logarithms, or typical sizes [dimensionless]."""
+
+REACH = 30.0
+"""A coordinate by itself steps no farther [dimensionless]: its slope over this is added to its curvature."""
+
+RIDGE = 1e-6
+"""Added to the curvature: an unknown that is not felt stays where it is [dimensionless]."""
+
+LEAST_GAIN = 1e-3
+"""Half the sum of squares that a further step must promise: less moves no unknown by a twentieth of its deviation."""
+
+POOR, GOOD = 0.25, 0.75
+"""Shares of a step's promise below which the radius shrinks to that part of it, and above which it grows."""
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """The misfit at one point of the search.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (unknowns,)
+        Fitted coordinates [dimensionless].
+    cost : float
+        Half the sum of squared normalised residuals, outliers counted linearly, and the prior's part [dimensionless].
+    gradient : ndarray, shape (unknowns,)
+        Of the cost.
+    gram : ndarray, shape (unknowns, unknowns)
+        ``J'J``, each block counted by its weight, and what is known beforehand.
+    """
+
+    theta: Array
+    cost: float
+    gradient: Array
+    gram: Array
+
+
+def descend(
+    at: Callable[[Array], Point],
+    start: Array,
+    evaluations: int,
+    bounds: tuple[Array, Array],
+    least_gain: float = LEAST_GAIN,
+) -> Point:
+    """Return the least cost downhill from a start: Gauss-Newton steps within a trust region and bounds.
+
+    The radius is of the coordinates themselves, mostly logarithms, not of their effects: several unknowns may then move
+    far together where together they change little (Conn, Gould and Toint 2000, Trust-Region Methods, algorithm 6.1.1).
+
+    Parameters
+    ----------
+    at : callable
+        The cost at given coordinates.
+    start : ndarray, shape (unknowns,)
+        Where to begin [dimensionless].
+    evaluations : int
+        How often the cost may be evaluated [evaluations].
+    bounds : tuple of ndarray, shape (unknowns,)
+        Lowest and highest coordinates [dimensionless].
+    least_gain : float
+        Cost that a further step must promise [dimensionless].
+
+    Returns
+    -------
+    Point
+        The best point; further steps promise less than the least gain, unless the evaluations were used up.
+
+    Examples
+    --------
+    >>> def valley(x: Array) -> Point:
+    ...     slopes = np.array([[1.0, 0.0], [-20.0 * x[0], 10.0]])
+    ...     errors = np.array([x[0] - 1.0, 10.0 * (x[1] - x[0] ** 2)])
+    ...     return Point(x, 0.5 * errors @ errors, slopes.T @ errors, slopes.T @ slopes)
+    >>> far = np.full(2, 10.0)
+    >>> descend(valley, np.array([-1.2, 1.0]), 40, (-far, far)).theta.round(1).tolist()
+    [1.0, 1.0]
+    """
+    best, radius = at(np.clip(start, *bounds)), FIRST_RADIUS
+    for _ in range(evaluations - 1):
+        curvature = best.gram + np.diag(np.abs(best.gradient) / REACH)
+        step = _step(best, curvature, radius, bounds)
+        promised = float(-best.gradient @ step - 0.5 * step @ curvature @ step)
+        if promised < least_gain:
+            break
+        tried = at(best.theta + step)
+        gain, length = (best.cost - tried.cost) / promised, float(np.linalg.norm(step))
+        if gain < POOR:
+            radius = POOR * length
+        elif gain > GOOD:
+            radius = max(radius, 2.0 * length)
+        if gain > 0.0:
+            best = tried
+    return best
+
+
+def _step(point: Point, curvature: Array, radius: float, bounds: tuple[Array, Array]) -> Array:
+    """Return the best step by the quadratic model that ends within the radius and within bounds."""
+    lower, upper = (bound - point.theta for bound in bounds)
+    step, free = np.zeros(len(point.theta)), np.ones(len(point.theta), dtype=bool)
+    while free.any():
+        gradient = point.gradient[free] + curvature[np.ix_(free, ~free)] @ step[~free]
+        step[free] = _shortened(curvature[np.ix_(free, free)], gradient, radius)
+        outside = (step < lower) | (step > upper)
+        if not outside.any():
+            break
+        step = np.clip(step, lower, upper)
+        free &= ~outside
+    return step
+
+
+def _shortened(curvature: Array, gradient: Array, radius: float) -> Array:
+    """Return ``-(C + shift)^-1 g``, with the least shift that makes it no longer than the radius."""
+    values, vectors = np.linalg.eigh(curvature)
+    values, along = np.maximum(values, 0.0) + RIDGE, vectors.T @ gradient
+
+    def excess(logarithm: float) -> float:
+        return float(np.linalg.norm(along / (values + np.exp(logarithm)))) - radius
+
+    shift = 0.0
+    if np.linalg.norm(along / values) > radius:
+        longest = float(np.log(np.linalg.norm(along) / radius))
+        shift = float(np.exp(root_between(excess, float(np.log(RIDGE)) - 40.0, longest, 0.01)))
+    return -vectors @ (along / (values + shift))

@@ -1,0 +1,243 @@
+"""`fit_flow(record, parameters, ...) -> FormFit`: bulk modulus, leakage and flow bias of a log, by the flow form."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.fits.descent import descend
+from estimation.fits.form_fit import LONGEST_STEP, FormFit, weighed
+from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, roughly
+from estimation.fits.greybox_problem import GreyBoxLog, Problem, greybox_log, search_bounds
+from estimation.log_checks.bridging import bridged, gaps
+from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.log_checks.outliers import without_outliers
+from estimation.models.flow import FLOW_FORM, MASS_FLOW_FORM, relieving
+from estimation.notes import EstimateCode
+from plant.eha.model import EhaParameters
+from plant.errors import LogError
+from plant.log.record import Record
+from plant.notes import Note
+
+Array = NDArray[np.float64]
+
+FLOW_CHANNELS = ("position_m", "differential_pressure_pa")
+"""Channels that the flow form needs beside motor speed."""
+
+REPORTED = ("leakage_coefficient", "flow_bias")
+"""What is worth telling of the parameters found along with bulk modulus."""
+
+FAULTS_TRIED = ((1.0, 1.0), (5.0, 6.0), (12.5, 6.0))
+"""Leakage and flow bias of the starts, as multiples of the healthy actuator's: the spread of Table 3."""
+
+MAKEUP_TRIED = (1e-9, 1e-13)
+"""Make-up conductances of the starts [m^3/(s Pa)]: a circuit with make-up valves, and one without."""
+
+LEAD_START = 1e-5
+"""First guess of the motor's lead on the straight line between samples [s]."""
+
+OPENING_START = 1e3
+"""First guess of the drop at which a make-up check valve is half open [Pa]."""
+
+LEAST_OPENING, LARGEST_OPENING = 1e2, 1e6
+"""Least and largest of that drop [Pa]; less is a corner that no step of the integrator and no sensor resolves."""
+
+DRAIN_START = 0.05
+"""First guess of the pump's case drain, as a share of the healthy leakage [fraction]."""
+
+PRESUMED_STD = 1.0
+"""Standard deviation of the logarithms of the last two about their first guesses, before the log is seen: where the
+make-up valves never open, no log tells a drain from leakage, and any drain would do [dimensionless]."""
+
+SCREENED_SECONDS = 4.0
+"""Starts are compared on the beginning of the log: it tells a wrong valley from a right one [s]."""
+
+NEAR_RELIEF = 0.97
+"""Share of the relief setting above which the valve is taken to open [fraction]."""
+
+LARGEST_CHI_SQUARE = 1.2
+"""Mean squared normalised residual above which the model is said to leave something out [dimensionless]."""
+
+LARGEST_AUTOCORRELATION = 0.1
+"""Correlation of neighbouring residuals above which the same is said [dimensionless]."""
+
+LEAST_LEAKAGE = 1e-3
+"""Least first guess of a leakage, as a share of the rated pump flow [fraction]; a logarithm cannot start at zero."""
+
+LONG_GAP = 5
+"""Missing speeds in a row after which nothing is concluded from the speeds at the gap's ends [samples]."""
+
+FELT_GAP = 0.1
+"""A gap in speed matters where what it leaves open moves pressure by this share of its noise or more [fraction]."""
+
+UNLIKELY = 36.0
+"""Difference of log-likelihood from which a form of the balance counts for nothing beside the other [dimensionless]."""
+
+
+def fit_flow(
+    record: Record,
+    parameters: EhaParameters,
+    bulk_modulus: float,
+    uncertainties: Mapping[str, float] | None = None,
+    variances: Mapping[str, float] | None = None,
+) -> FormFit:
+    """Fit the flow form to a log, balanced by volume and by mass, and weigh the two.
+
+    Gross outliers are taken out, and what the pump delivered while its speed is missing is read off the pressure after.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with position and differential pressure; it begins at rest.
+    parameters : EhaParameters
+        Geometry and pump are taken from it; leakage and flow bias are first guesses.
+    bulk_modulus : float
+        First guess of effective bulk modulus [Pa].
+    uncertainties : Mapping[str, float], optional
+        Relative standard deviation of the actuator's parameters [fraction]; none by default.
+    variances : Mapping[str, float], optional
+        Measurement variances of the channels of a log whose gross outliers are missing already [SI squared]; both are
+        done here if not given.
+
+    Returns
+    -------
+    FormFit
+        The best of several starts.
+
+    Raises
+    ------
+    LogError
+        If a channel is missing.
+    """
+    lacking = [channel for channel in FLOW_CHANNELS if channel not in record]
+    if lacking:
+        raise LogError(f"the flow form needs {' and '.join(FLOW_CHANNELS)}, the record lacks {', '.join(lacking)}")
+    if variances is None:
+        record, variances = _cleaned(record)
+    pressure = record["differential_pressure_pa"]
+    relieved = float(np.nanmax(np.abs(pressure))) > NEAR_RELIEF * parameters.relief_pressure
+    forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM)]
+    log = _log(record, parameters, uncertainties or {}, variances)
+    starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
+    search = Search(screened=ceil(SCREENED_SECONDS / record.sample_time))
+    limits = {
+        "speed_lead": (0.0, record.sample_time),
+        "makeup_opening": (LEAST_OPENING, LARGEST_OPENING),
+    }
+    guesses = [forms[0].theta(start) for start in starts]
+    bounds = search_bounds(forms[0], guesses, limits)
+    fits: list[GreyBoxFit] = []
+    for form in forms:
+        problem = Problem(form, log)
+        near = roughly(problem, guesses, search, bounds)
+        if not fits or near.cost < fits[0].cost + 2.0 * UNLIKELY:  # which leaves room for the error of long model steps
+            fits.append(concluded(problem, descend(problem.at, near.theta, search.evaluations, bounds)))
+        guesses = [fits[0].theta]
+    best = min(fits, key=lambda fit: fit.cost)
+    found, rig_std = weighed(fits)
+    value, std = found["bulk_modulus"]
+    return FormFit(found, rig_std, std / value, best.chi_square[0], _objections(best))
+
+
+def _cleaned(record: Record) -> tuple[Record, Mapping[str, float]]:
+    """Return the channels of the flow form without gross outliers, and their variances."""
+    channels = (*FLOW_FORM.drives, *FLOW_FORM.outputs)
+    noise = measurement_variances(record, channels)
+    sound = {name: without_outliers(record[name], noise[name] ** 0.5) for name in channels}
+    record = Record(record.sample_time, sound, start_time=record.start_time)
+    return record, measurement_variances(record, channels)
+
+
+def speed_gaps(record: Record, parameters: EhaParameters, noise: float) -> Array:
+    """Return where missing motor speeds leave the pumped volume open by more than the pressure can overlook.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    parameters : EhaParameters
+        The actuator.
+    noise : float
+        Standard deviation of the differential pressure's noise [Pa].
+
+    Returns
+    -------
+    ndarray, shape (gaps, 3)
+        As `GreyBoxLog.gaps`, in pressure [Pa squared].
+    """
+    missing = np.isnan(record["motor_speed_rad_s"])
+    first, after = np.flatnonzero(np.diff(missing, prepend=False, append=False)).reshape(-1, 2).T
+    speed, last, length = bridged(record["motor_speed_rad_s"]), len(missing) - 1, after - first
+    before, further, behind = np.maximum(first - 1, 0), np.maximum(first - 2, 0), np.minimum(after, last)
+    # a straight line is right where the speed goes on as it did before the gap and does after it
+    slopes = 0.5 * (speed[before] - speed[further] + speed[np.minimum(after + 1, last)] - speed[behind])
+    sudden = np.abs(speed[behind] - speed[before] - slopes * (length + 1))
+    sudden = np.where(length < LONG_GAP, sudden, np.maximum(sudden, np.std(speed)))
+    stiffness = parameters.bulk_modulus / parameters.chamber_volume * parameters.pump_displacement
+    open_by = 0.5 * stiffness * sudden * length * record.sample_time
+    open_gaps = np.array([first, behind, open_by**2 / (length + 1)], dtype=np.float64)
+    return np.ascontiguousarray(open_gaps[:, open_by > FELT_GAP * noise].T)
+
+
+def _log(
+    record: Record, parameters: EhaParameters, uncertainties: Mapping[str, float], variances: Mapping[str, float]
+) -> GreyBoxLog:
+    log = greybox_log(
+        FLOW_FORM, record, parameters, longest_step=LONGEST_STEP, variances=variances, uncertainties=uncertainties
+    )
+    return replace(
+        log,
+        # where the piston is within a gap of its position is not known, where it is after it is
+        measured=np.where(_within_gaps(record["position_m"])[:, None], np.nan, log.measured),
+        gaps=speed_gaps(record, parameters, variances["differential_pressure_pa"] ** 0.5),
+        presumed={
+            "case_leakage": (DRAIN_START * _usual_leakage(parameters), PRESUMED_STD),
+            "makeup_opening": (OPENING_START, PRESUMED_STD),
+        },
+    )
+
+
+def _within_gaps(position: Array) -> NDArray[np.bool_]:
+    """Return the samples in gaps of the position, and before its first and after its last."""
+    present = np.flatnonzero(np.isfinite(position))
+    apart, wide = gaps(position)
+    within = np.isnan(position)
+    within[present[0] : present[-1]] &= np.repeat(wide, apart.astype(np.int64))
+    return within
+
+
+def _usual_leakage(p: EhaParameters) -> float:
+    return max(p.leakage_coefficient, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed / p.relief_pressure)
+
+
+def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
+    leakage = _usual_leakage(p)
+    bias = max(p.flow_bias, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed)
+    moduli = sorted({bulk_modulus, p.bulk_modulus})
+    return [
+        {
+            "bulk_modulus": modulus,
+            "leakage_coefficient": worse * leakage,
+            "flow_bias": biased * bias,
+            "makeup_conductance": makeup,
+            "makeup_opening": OPENING_START,
+            "case_leakage": DRAIN_START * leakage,
+            "speed_lead": LEAD_START,
+            "relief_pressure": p.relief_pressure,
+            "relief_conductance": p.relief_conductance,
+        }
+        for worse, biased in FAULTS_TRIED
+        for makeup in MAKEUP_TRIED
+        for modulus in moduli
+    ]
+
+
+def _objections(fit: GreyBoxFit) -> tuple[Note, ...]:
+    reasons: list[Note] = []
+    if fit.chi_square[0] > LARGEST_CHI_SQUARE:
+        reasons.append(EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=fit.chi_square[0] ** 0.5))
+    if abs(fit.autocorrelation[0]) > LARGEST_AUTOCORRELATION:
+        reasons.append(EstimateCode.PRESSURE_RESIDUALS_CORRELATED.note(correlation=fit.autocorrelation[0]))
+    return tuple(reasons)

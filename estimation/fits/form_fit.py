@@ -1,0 +1,72 @@
+"""What a fitted form says of a log, and how forms that explain it alike are weighed."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.fits.greybox_fit import GreyBoxFit
+from plant.notes import Note
+
+LONGEST_STEP = 2.5e-4
+"""Longest step of a form [s]; slower logs are sub-stepped."""
+
+TEMPER = 5.0
+"""What a difference of log-likelihood is divided by before models are weighed. None is exact: on a log of the circuit
+the balance that explained it better by 5.6 put bulk modulus five deviations off, the other one not [dimensionless]."""
+
+
+@dataclass(frozen=True, eq=False)
+class FormFit:
+    """What a fitted form says of a log.
+
+    Parameters
+    ----------
+    parameters : Mapping[str, tuple of float]
+        Value and standard deviation in SI, by parameter name; the deviation is that of the log's noise.
+    rig_std : Mapping[str, float]
+        What the rig's uncertain parameters add to each deviation, in SI.
+    bound : float
+        Relative standard deviation of bulk modulus from the log's noise [fraction].
+    chi_square : float
+        Mean squared residual over the sensor's variance [dimensionless].
+    reasons : tuple of Note
+        What speaks against the fit.
+    """
+
+    parameters: Mapping[str, tuple[float, float]]
+    rig_std: Mapping[str, float]
+    bound: float
+    chi_square: float
+    reasons: tuple[Note, ...]
+
+
+def weighed(fits: Sequence[GreyBoxFit]) -> tuple[Mapping[str, tuple[float, float]], Mapping[str, float]]:
+    """Return values and deviations over several models of one log, each weighed by its likelihood.
+
+    A model that explains the log less well counts by a power of ``exp(-chi^2/2)``, see `TEMPER`; where two explain it
+    alike, what they disagree on goes into the deviation (Hoeting et al. 1999, Statistical Science 14, equations 3 and
+    4, with equal priors).
+
+    Parameters
+    ----------
+    fits : sequence of GreyBoxFit
+        Of the same log, with the same unknowns.
+
+    Returns
+    -------
+    tuple of Mapping
+        Value and deviation by parameter, and the rig's part of the deviation [SI].
+    """
+    costs = np.array([fit.cost for fit in fits])
+    weights = np.exp(-np.minimum((costs - np.min(costs)) / TEMPER, 700.0))
+    weights /= np.sum(weights)
+    best = fits[int(np.argmin(costs))]
+    found: dict[str, tuple[float, float]] = {}
+    for name in best.values:
+        values = np.array([fit.values[name] for fit in fits])
+        stds = np.array([fit.std[name] for fit in fits])
+        mean = float(weights @ values)
+        heavy = weights > np.finfo(np.float64).eps
+        found[name] = mean, float(np.sqrt(weights[heavy] @ (stds[heavy] ** 2 + (values[heavy] - mean) ** 2)))
+    return found, best.rig_std

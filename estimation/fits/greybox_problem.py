@@ -1,0 +1,317 @@
+"""The least-squares problem that a grey-box model and a log make, with the log's noise."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.fits.descent import Point
+from estimation.fits.greybox_loops import compile_kernel
+from estimation.log_checks.bridging import bridged
+from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.models.greybox import GreyBoxModel
+from plant.log.record import Record
+from plant.runs import steps_a_sample
+from plant.solvers.steps import Parameters, parameter_row
+
+Array = NDArray[np.float64]
+
+OUTLIER = 3.0
+"""Residuals beyond this many standard deviations count linearly (Huber 1964) [dimensionless]."""
+
+BLOCK = 1e-3
+"""Length over which residuals are averaged before they are squared [s]."""
+
+UPWARD, DOWNWARD = np.log(1e3), 70.0
+"""How far the logarithm of an unknown may leave its starts: three decades up; down until it is as good as absent."""
+
+
+def _nothing() -> Mapping[str, float]:
+    return MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class OutputNoise:
+    """Noise of an output.
+
+    Parameters
+    ----------
+    variance : float
+        Of its white noise, a sample [SI squared].
+    walk : float
+        Variance that its random walk gathers [SI squared a second]; white noise of a rate, such as measured speed,
+        that the model integrates.
+    """
+
+    variance: float
+    walk: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class GreyBoxLog:
+    """A log, as a fit sees it.
+
+    Parameters
+    ----------
+    drives : ndarray, shape (n, channels)
+        Driving channels in SI, no sample missing.
+    measured : ndarray, shape (n, outputs)
+        Outputs in SI; NaN is missing.
+    parameters : ndarray, shape (parameters,)
+        Row of the actuator's parameters; the unknowns' entries are not used.
+    sample_time : float
+        Seconds between samples [s].
+    steps : ndarray of int, shape (n,)
+        Model steps up to each sample.
+    noise : tuple of OutputNoise
+        Of each output.
+    drive_std : tuple of float
+        Standard deviation of each driving channel's noise, where the outputs' noise does not hold it already [SI].
+    uncertainties : Mapping[str, float]
+        Relative standard deviation of the actuator's parameters [fraction]; those of unknowns are not used.
+    gaps : ndarray, shape (gaps, 3)
+        First and last sample on which a gap in the drives acts, and the variance that it adds to the state from one
+        sample to the next, in units of `GreyBoxModel.jump`; in order of time, none overlapping.
+    presumed : Mapping[str, tuple of float]
+        What is known of positive unknowns before the log is seen: value [SI] and standard deviation of its logarithm.
+    """
+
+    drives: Array
+    measured: Array
+    parameters: Array
+    sample_time: float
+    steps: NDArray[np.int64]
+    noise: tuple[OutputNoise, ...]
+    drive_std: tuple[float, ...] = ()
+    uncertainties: Mapping[str, float] = field(default_factory=_nothing)
+    gaps: Array = field(default_factory=lambda: np.empty((0, 3)))
+    presumed: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
+
+    def beginning(self, samples: int) -> "GreyBoxLog":
+        """Return the log's first part.
+
+        Parameters
+        ----------
+        samples : int
+            How many samples are kept [samples].
+
+        Returns
+        -------
+        GreyBoxLog
+            The shorter log.
+        """
+        return replace(self, drives=self.drives[:samples], measured=self.measured[:samples], steps=self.steps[:samples])
+
+    def coarsened(self) -> "GreyBoxLog":
+        """Return the log with one model step a sample: predicted faster and less exactly.
+
+        Returns
+        -------
+        GreyBoxLog
+            The same log.
+        """
+        return replace(self, steps=np.ones_like(self.steps))
+
+    def softened(self, variance: float, walk: float) -> "GreyBoxLog":
+        """Return the log as if its noise were larger, which makes the way to the optimum smoother.
+
+        Parameters
+        ----------
+        variance, walk : float
+            Factors on the white noise's variance and on the random walk's [dimensionless].
+
+        Returns
+        -------
+        GreyBoxLog
+            The same log under that noise.
+        """
+        return replace(self, noise=tuple(OutputNoise(n.variance * variance, n.walk * walk) for n in self.noise))
+
+
+def greybox_log(
+    model: GreyBoxModel,
+    record: Record,
+    parameters: Parameters,
+    *,
+    longest_step: float,
+    variances: Mapping[str, float] | None = None,
+    uncertainties: Mapping[str, float] | None = None,
+) -> GreyBoxLog:
+    """Return a record as a fit of a model sees it.
+
+    Parameters
+    ----------
+    model : GreyBoxModel
+        The model.
+    record : Record
+        The log, with the model's drives and outputs.
+    parameters : dataclass
+        What is known of the plant, with the fields of the model's parameters.
+    longest_step : float
+        Longest step of the model [s].
+    variances : Mapping[str, float], optional
+        Of the noise of channels [SI squared]; of outputs read off the log by default, of drives none.
+    uncertainties : Mapping[str, float], optional
+        Relative standard deviation of the plant's parameters [fraction]; none by default.
+
+    Returns
+    -------
+    GreyBoxLog
+        The log, its drives without gaps.
+    """
+    noise = {**measurement_variances(record, model.outputs), **(variances or {})}
+    return GreyBoxLog(
+        drives=np.column_stack([bridged(record[channel]) for channel in model.drives]),
+        measured=np.column_stack([record[channel] for channel in model.outputs]),
+        parameters=parameter_row(parameters, model.parameters),
+        sample_time=record.sample_time,
+        steps=np.full(len(record), steps_a_sample(record.sample_time, longest_step)),
+        noise=tuple(OutputNoise(noise[channel]) for channel in model.outputs),
+        drive_std=tuple(noise.get(channel, 0.0) ** 0.5 for channel in model.drives),
+        uncertainties=uncertainties or {},
+    )
+
+
+def search_bounds(
+    model: GreyBoxModel, guesses: Sequence[Array], limits: Mapping[str, tuple[float, float]]
+) -> tuple[Array, Array]:
+    """Return how far the fitted coordinates may go.
+
+    Parameters
+    ----------
+    model : GreyBoxModel
+        The model.
+    guesses : sequence of ndarray, shape (unknowns,)
+        The starts.
+    limits : Mapping[str, tuple of float]
+        Least and largest value of an unknown, where physics gives them [SI].
+
+    Returns
+    -------
+    tuple of ndarray, shape (unknowns,)
+        Lower and upper bounds.
+    """
+    sizes = dict(model.linear)
+    lower, upper = np.min(guesses, axis=0) - DOWNWARD, np.max(guesses, axis=0) + UPWARD
+    for i, name in enumerate(model.unknowns):
+        if name in sizes:
+            lower[i], upper[i] = (limit / sizes[name] for limit in limits.get(name, (-np.inf, np.inf)))
+        elif name in limits:
+            least, largest = limits[name]
+            lower[i], upper[i] = np.log(least) if least > 0.0 else lower[i], np.log(largest)
+    return lower, upper
+
+
+class Problem:
+    """The least-squares problem of one log, on whitened means over blocks of about `BLOCK` seconds.
+
+    Averaging keeps what the log says about unknowns that act more slowly, and makes a 10 kHz log as cheap to judge as a
+    1 kHz one.
+
+    Parameters
+    ----------
+    model : GreyBoxModel
+        The model.
+    log : GreyBoxLog
+        The log.
+
+    Attributes
+    ----------
+    prior : ndarray, shape (unknowns,)
+        One over the variance of each coordinate before the log is seen; zero where nothing is known [dimensionless].
+    """
+
+    def __init__(self, model: GreyBoxModel, log: GreyBoxLog) -> None:
+        self.model, self.log = model, log
+        self._kernel = compile_kernel(model)
+        self._block = max(1, round(BLOCK / log.sample_time))
+        presumed = [log.presumed.get(name, (1.0, np.inf)) for name in model.unknowns]
+        self._presumed = np.array([np.log(value) for value, _ in presumed])
+        self.prior = np.array([deviation**-2.0 for _, deviation in presumed])
+
+    def at(self, theta: Array) -> Point:
+        """Return the misfit at a point.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+
+        Returns
+        -------
+        Point
+            Cost and normal equations; nothing as long as the log is stored.
+        """
+        cost, gradient, gram = self._run(theta, np.empty((0, 0)), np.empty((0, 0, 0)))
+        away = theta - self._presumed
+        cost += 0.5 * float(self.prior @ away**2)
+        return Point(theta, cost, gradient + self.prior * away, gram + np.tril(gram, -1).T + np.diag(self.prior))
+
+    def residuals(self, theta: Array, drives: Array | None = None, parameters: Array | None = None) -> Array:
+        """Return the normalised residuals, predicted less measured.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        drives : ndarray, shape (n, channels), optional
+            Other driving channels than the log's [SI].
+        parameters : ndarray, shape (parameters,), optional
+            Other parameters of the rig than the log's [SI].
+
+        Returns
+        -------
+        ndarray, shape (outputs, blocks)
+            White and of unit variance where the model explains the log; zero where a block is missing [dimensionless].
+        """
+        errors = self._room()
+        self._run(theta, errors, np.empty((0, 0, 0)), drives, parameters)
+        return errors
+
+    def slopes(self, theta: Array) -> Array:
+        """Return the derivatives of the normalised residuals.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+
+        Returns
+        -------
+        ndarray, shape (outputs * blocks, unknowns)
+            Zero where a block is missing [dimensionless].
+        """
+        slopes = self._room(len(theta))
+        self._run(theta, np.empty((0, 0)), slopes)
+        return slopes.reshape(-1, len(theta))
+
+    def _room(self, *columns: int) -> Array:
+        return np.zeros((self.log.measured.shape[1], -(-len(self.log.measured) // self._block), *columns))
+
+    def _run(
+        self,
+        theta: Array,
+        errors: Array,
+        slopes: Array,
+        drives: Array | None = None,
+        parameters: Array | None = None,
+    ) -> tuple[float, Array, Array]:
+        log = self.log
+        with np.errstate(all="ignore"):  # a try that runs away is stepped back from
+            return self._kernel(
+                theta,
+                log.drives if drives is None else drives,
+                log.measured,
+                log.parameters if parameters is None else parameters,
+                log.sample_time,
+                log.steps,
+                self._block,
+                np.array([noise.variance for noise in log.noise]),
+                np.array([noise.walk * self._block * log.sample_time for noise in log.noise]),
+                log.gaps,
+                OUTLIER,
+                errors,
+                slopes,
+            )

@@ -1,0 +1,233 @@
+"""`fit_motion(record, parameters, ...) -> FormFit`: bulk modulus, leakage and friction of a log without pressure."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.fits.descent import Point, descend
+from estimation.fits.flow_fit import DRAIN_START, FAULTS_TRIED, LEAD_START, LEAST_LEAKAGE
+from estimation.fits.form_fit import LONGEST_STEP, FormFit, weighed
+from estimation.fits.greybox_fit import GreyBoxFit, concluded
+from estimation.fits.greybox_problem import GreyBoxLog, OutputNoise, Problem, search_bounds
+from estimation.log_checks.bridging import bridged
+from estimation.log_checks.measurement_noise import measurement_variances, position_variance
+from estimation.models.greybox import GreyBoxModel
+from estimation.models.motion import MOTION_FORMS
+from estimation.notes import EstimateCode
+from plant.eha.model import EhaParameters
+from plant.errors import LogError
+from plant.log.record import Record
+from plant.notes import Note
+from plant.runs import steps_a_sample
+from plant.solvers.steps import parameter_row
+
+Array = NDArray[np.float64]
+
+MOTION_CHANNELS = ("position_m",)
+"""Channels that the motion form needs beside motor speed."""
+
+FRICTION_TRIED = ((1.0, 1.0, 1.0), (18.0, -3.5, 1.15), (68.0, 8.7, 1.25))
+"""Friction coefficients a_1, a_2, a_3 of the starts, as multiples of the healthy actuator's: the spread of Table 4."""
+
+YIELDED = 2e-5
+"""First guess of the deflection at which seals slide [m]; tens of micrometres in the literature on presliding."""
+
+DAMPING_START = 100.0
+"""First guess of the bristle's damping [N s/m]; small beside the oil's."""
+
+FINEST_STEP = 6.25e-5
+"""Longest step while the piston turns, yields or is set off [s]: the bristle's state passes through zero there."""
+
+TURNING = 0.3
+"""Speed under which it counts as turning, over the log's root mean square [fraction]."""
+
+SET_OFF = 1.0
+"""Change of motor speed between samples from which the pump counts as setting the piston off [rad/s]."""
+
+SHORTEST_SAMPLE = 1e-3
+"""Faster logs are averaged to about this sample time [s]: nothing that the model describes is quicker to see."""
+
+MOST_SAMPLES = 30_000
+"""A longer log is fitted on its beginning: the fit's interval is under a percent long before."""
+
+SCREENED = 4_000
+"""Samples on which starts are screened."""
+
+WAYS: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = (((1e2, 1e6), (1.0, 1e3)), ((1.0, 1.0), (1.0, 1.0)))
+"""Ways down to the optimum: factors on variance and random walk of the residual while starts are screened and while
+they are brought near. With the true, small noise the least misfit of leakage piles up into the position and hides other
+ways down; with a larger walk what counts is increments. Failing that, straight down."""
+
+SCREENING, NEARING, FINISHING = 10, 12, 25
+"""Evaluations of the model in the three stages."""
+
+FINALISTS = 3
+"""Starts that are carried on, until one explains the log."""
+
+EXPLAINED = 1.1
+"""Mean squared normalised residual up to which a form explains the log [dimensionless]."""
+
+STRUCTURE = 0.005
+"""Relative standard deviation of bulk modulus from friction being of no known law: on the foreign bench, whose
+presliding is of another make, noise alone explains a tenth to a half of the errors. Judged from that one bench
+[fraction]."""
+
+LARGEST_DISAGREEMENT = 0.05
+"""Relative difference in bulk modulus of two structures of friction that explain the log alike, above which neither
+is believed [fraction]."""
+
+ALIKE = 5.0
+"""Difference of log-likelihood up to which two structures are said to explain a log alike [dimensionless]."""
+
+
+def fit_motion(
+    record: Record,
+    parameters: EhaParameters,
+    bulk_modulus: float,
+    uncertainties: Mapping[str, float] | None = None,
+    variances: Mapping[str, float] | None = None,
+) -> FormFit:
+    """Fit the motion form to a log with either structure of friction, and weigh the two.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with position; it begins at rest.
+    parameters : EhaParameters
+        Geometry, pump and mass are taken from it; leakage, flow bias and friction are first guesses.
+    bulk_modulus : float
+        First guess of effective bulk modulus [Pa].
+    uncertainties : Mapping[str, float], optional
+        Relative standard deviation of the actuator's parameters [fraction]; none by default.
+    variances : Mapping[str, float], optional
+        Measurement variance of motor speed [rad^2/s^2] by its name; read off the log if not given.
+
+    Returns
+    -------
+    FormFit
+        Value, deviations, and what speaks against them.
+
+    Raises
+    ------
+    LogError
+        If position is missing.
+    """
+    if "position_m" not in record:
+        raise LogError("the motion form needs position_m, the record lacks it")
+    noise = (variances or measurement_variances(record, ("motor_speed_rad_s",)))["motor_speed_rad_s"]
+    log = _log(record, parameters, uncertainties or {}, noise)
+    starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
+    first = _searched(MOTION_FORMS[0], log, starts)
+    fits = [first, _compared(MOTION_FORMS[1], log, first, starts)]
+    best = min(fits, key=lambda fit: fit.cost)
+    found, rig_std = weighed(fits)
+    value, std = found["bulk_modulus"]
+    believed = dict(found) | {"bulk_modulus": (value, float(np.hypot(std, STRUCTURE * value)))}
+    return FormFit(believed, rig_std, std / value, best.chi_square[0], _objections(fits, best))
+
+
+def _log(record: Record, p: EhaParameters, uncertainties: Mapping[str, float], speed_variance: float) -> GreyBoxLog:
+    block = max(1, round(SHORTEST_SAMPLE / record.sample_time))
+    sample_time = block * record.sample_time
+    speed, position = (_averaged(record[name], block)[:MOST_SAMPLES] for name in ("motor_speed_rad_s", "position_m"))
+    moved = bridged(position)
+    drives = np.column_stack([bridged(speed), moved])
+    drift = (p.pump_displacement / p.piston_area) ** 2 * speed_variance * record.sample_time
+    return GreyBoxLog(
+        drives=drives,
+        measured=(position - moved[0])[:, None],
+        parameters=parameter_row(p),
+        sample_time=sample_time,
+        steps=_steps(drives, sample_time),
+        noise=(OutputNoise(position_variance(record["position_m"]) / block, drift),),
+        uncertainties=uncertainties,
+    )
+
+
+def _averaged(values: Array, block: int) -> Array:
+    """Return means over whole blocks; one is missing where any of its samples is."""
+    whole = len(values) // block * block
+    return values[:whole].reshape(-1, block).mean(axis=1)
+
+
+def _steps(drives: Array, sample_time: float) -> NDArray[np.int64]:
+    """Return the model steps up to each sample: short ones where the piston turns or is set off."""
+    from scipy.ndimage import uniform_filter1d
+
+    window = 2 * max(1, round(5e-3 / sample_time)) + 1
+    velocity = np.gradient(uniform_filter1d(drives[:, 1], window)) / sample_time
+    turning = np.abs(velocity) < TURNING * np.sqrt(np.mean(velocity**2))
+    set_off = np.abs(np.diff(drives[:, 0], prepend=drives[0, 0])) > SET_OFF
+    fine, coarse = (steps_a_sample(sample_time, step) for step in (FINEST_STEP, LONGEST_STEP))
+    return np.where(turning | set_off, fine, coarse)
+
+
+def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
+    healthy = EhaParameters()
+    leakage = max(p.leakage_coefficient, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed / p.relief_pressure)
+    bias = max(p.flow_bias, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed)
+    quadratic = p.friction_quadratic or healthy.friction_quadratic
+    coulomb = p.friction_coulomb or healthy.friction_coulomb
+    return [
+        {
+            "bulk_modulus": bulk_modulus,
+            "leakage_coefficient": worse * leakage,
+            "flow_bias": biased * bias,
+            "makeup_conductance": p.makeup_conductance or healthy.makeup_conductance,
+            "case_leakage": DRAIN_START * leakage,
+            "speed_lead": LEAD_START,
+            "friction_quadratic": a1 * quadratic,
+            "friction_linear": a2 * p.friction_linear,
+            "friction_coulomb": a3 * coulomb,
+            "bristle_stiffness": a3 * coulomb / YIELDED,
+            "bristle_damping": DAMPING_START,
+        }
+        for worse, biased in FAULTS_TRIED
+        for a1, a2, a3 in FRICTION_TRIED
+    ]
+
+
+def _searched(form: GreyBoxModel, log: GreyBoxLog, starts: list[dict[str, float]]) -> GreyBoxFit:
+    """Return the best of several starts; stop at one that explains the log."""
+    guesses = [form.theta(start) for start in starts]
+    bounds = search_bounds(form, guesses, {"speed_lead": (0.0, 0.5 * log.sample_time)})
+    whole = Problem(form, log)
+    best: Point | None = None
+    for near in _brought_near(form, log, guesses, bounds):
+        found = descend(whole.at, near, FINISHING, bounds)
+        best = found if best is None or found.cost < best.cost else best
+        if 2.0 * best.cost < EXPLAINED * len(log.measured):
+            break
+    return concluded(whole, best or whole.at(guesses[0]))
+
+
+def _brought_near(
+    form: GreyBoxModel, log: GreyBoxLog, guesses: list[Array], bounds: tuple[Array, Array]
+) -> Iterator[Array]:
+    """Yield the likelier starts, brought nearer, one way after another."""
+    for first, second in WAYS:
+        screen = Problem(form, log.softened(*first).beginning(SCREENED))
+        near = Problem(form, log.softened(*second))
+        screened = [descend(screen.at, guess, SCREENING, bounds) for guess in guesses]
+        for candidate in sorted(screened, key=lambda point: point.cost)[:FINALISTS]:
+            yield descend(near.at, candidate.theta, NEARING, bounds).theta
+
+
+def _compared(form: GreyBoxModel, log: GreyBoxLog, other: GreyBoxFit, starts: list[dict[str, float]]) -> GreyBoxFit:
+    """Return the fit of the other structure: from where the first ended, or by itself where that explains nothing."""
+    if other.chi_square[0] > EXPLAINED:
+        return _searched(form, log, starts)
+    bounds = search_bounds(form, [form.theta(start) for start in starts], {"speed_lead": (0.0, 0.5 * log.sample_time)})
+    whole = Problem(form, log)
+    return concluded(whole, descend(whole.at, other.theta, NEARING, bounds))
+
+
+def _objections(fits: list[GreyBoxFit], best: GreyBoxFit) -> tuple[Note, ...]:
+    reasons: list[Note] = []
+    if best.chi_square[0] > EXPLAINED:
+        reasons.append(EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5))
+    values = [fit.values["bulk_modulus"] for fit in fits if fit.cost < best.cost + ALIKE]
+    if max(values) > (1.0 + LARGEST_DISAGREEMENT) * min(values):
+        reasons.append(EstimateCode.FRICTION_LAWS_DISAGREE.note(least_pa=min(values), most_pa=max(values)))
+    return tuple(reasons)

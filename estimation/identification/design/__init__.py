@@ -1,0 +1,1 @@
+"""Inputs to identify with, dead time, and sticking."""

@@ -1,0 +1,1 @@
+"""One structure a file; order, validation and intervals."""

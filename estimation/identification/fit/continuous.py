@@ -1,0 +1,213 @@
+"""Transfer functions in continuous time with dead time, fitted to sampled data whose input is held between samples."""
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from estimation.identification.fit.covariances import covariances
+from estimation.identification.fit.fitted import scaled
+from estimation.identification.fit.output_error import descend_from, jacobian_and_residual, minimise
+from estimation.identification.model.held_input import held_input_model
+from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.search.criterion import Structure
+from estimation.identification.search.descent import stable
+from estimation.identification.search.experiments import (
+    SAMPLES_PER_PARAMETER,
+    Experiments,
+    Signals,
+    data_hash,
+    experiments_from,
+)
+from plant.errors import HydrostateError
+
+DIFFERENCE = 1e-6
+"""Relative step of the derivative of discrete coefficients by continuous ones."""
+
+MOST_EVALUATIONS = 60
+"""Of the simulated output, a start."""
+
+
+def fit_continuous(
+    u: Signals,
+    y: Signals,
+    sample_time: float,
+    *,
+    n_zeros: int,
+    n_poles: int,
+    dead_time: float | None = 0.0,
+    longest_dead_time: float | None = None,
+    input_name: str = "input",
+    output_name: str = "output",
+) -> LinearModel:
+    """Fit ``exp(-dead_time s) B(s)/A(s)`` by output error, the input held between samples.
+
+    Parameters
+    ----------
+    u, y : array_like, shape (n,), or a list of them
+        Input, no gaps; output, NaN where missing.
+    sample_time : float
+        Seconds between samples [s].
+    n_zeros, n_poles : int
+        Degrees of numerator and denominator, ``n_zeros <= n_poles``.
+    dead_time : float or None
+        Known delay of the input [s]; None estimates it.
+    longest_dead_time : float, optional
+        Longest that is looked for [s]; ten samples unless told.
+    input_name, output_name : str
+        Channel names.
+
+    Returns
+    -------
+    LinearModel
+        ``continuous=True``, ``structure="continuous-output-error"``.
+
+    Raises
+    ------
+    HydrostateError
+        As `fit_output_error`.
+    """
+    if not 0 <= n_zeros <= n_poles or n_poles < 1:
+        raise HydrostateError(f"0 <= n_zeros <= n_poles and n_poles >= 1 are wanted, got {n_zeros} and {n_poles}")
+    n_wanted = SAMPLES_PER_PARAMETER * (n_zeros + 2 * n_poles + 2)
+    given = experiments_from(
+        u, y, input_name=input_name, output_name=output_name, n_excited=2 * n_poles, n_wanted=n_wanted
+    )
+    data, u_scale, y_scale = scaled(given)
+    problem = _Problem(data, sample_time, n_zeros, n_poles, dead_time)
+    longest = 10.0 * sample_time if longest_dead_time is None else longest_dead_time
+    found = [problem.descend(start) for start in problem.starts(longest)]
+    values = min(found, key=lambda one: one[0])[1]
+    return problem.result(values, given, (u_scale, y_scale), (input_name, output_name))
+
+
+class _Problem:
+    """One continuous-time fit in scaled time: values are numerator, denominator behind its 1, and dead time if free."""
+
+    def __init__(
+        self, data: Experiments, sample_time: float, n_zeros: int, n_poles: int, dead_time: float | None
+    ) -> None:
+        self.data, self.sample_time = data, sample_time
+        self.n_zeros, self.n_poles, self.dead_time = n_zeros, n_poles, dead_time
+
+    def discrete(self, values: FloatArray) -> tuple[FloatArray, FloatArray, int]:
+        """Return numerator, denominator, delay at one sample a unit of time."""
+        n_b = self.n_zeros + 1
+        late = self.dead_time / self.sample_time if self.dead_time is not None else values[-1]
+        a = np.concatenate([[1.0], values[n_b : n_b + self.n_poles]])
+        return held_input_model(values[:n_b], a, max(float(late), 0.0), 1.0)
+
+    def form(self, values: FloatArray) -> Structure:
+        """Return the discrete structure that holds every dead time between this sample and the next."""
+        b, _, delay = self.discrete(values)
+        return Structure(b.size - delay, self.n_poles, delay)
+
+    def parts(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return Jacobian by continuous values and initial states, and the residual, initial states at their best."""
+        b, f, delay = self.discrete(values)
+        form = Structure(b.size - delay, self.n_poles, delay)
+        theta = np.concatenate([b[delay:], f[1:], np.zeros(form.n_states * self.data.count)])
+        jacobian, residual = jacobian_and_residual(form, theta, self.data)
+        n_main = form.n_numerator + form.n_denominator
+        initial = jacobian[:, n_main:]
+        residual = residual - initial @ np.linalg.lstsq(initial, residual, rcond=None)[0]
+        moved = np.zeros((n_main, values.size))
+        for k in range(values.size):
+            step = DIFFERENCE * max(abs(values[k]), 1e-3 * np.abs(values).max())
+            if k == values.size - 1 and self.dead_time is None:
+                step = 1e-5
+            up = values.copy()
+            up[k] += step
+            other_b, other_f, other_delay = self.discrete(up)
+            length = max(b.size, other_b.size)
+            change = np.pad(other_b, (0, length - other_b.size)) - np.pad(b, (0, length - b.size))
+            del other_delay
+            moved[: b.size - delay, k] = change[delay : b.size] / step
+            moved[b.size - delay :, k] = (other_f[1:] - f[1:]) / step
+        return np.concatenate([jacobian[:, :n_main] @ moved, initial], axis=1), residual
+
+    def descend(self, start: FloatArray) -> tuple[float, FloatArray]:
+        """Return cost and values of the minimum that one start leads to."""
+        refused = np.full(self.data.u.size, 1e3)
+
+        def residual(values: FloatArray) -> FloatArray:
+            if (self.dead_time is None and values[-1] < 0.0) or not stable(self.discrete(values)[1][1:]):
+                return refused
+            return self.parts(values)[1]
+
+        def jacobian(values: FloatArray) -> FloatArray:
+            columns, _ = self.parts(values)
+            free, initial = columns[:, : values.size], columns[:, values.size :]
+            return -(free - initial @ np.linalg.lstsq(initial, free, rcond=None)[0])
+
+        found = least_squares(
+            residual, start, jac=jacobian, method="lm", x_scale="jac", xtol=1e-10, ftol=1e-10, max_nfev=MOST_EVALUATIONS
+        )
+        return float(found.cost), np.asarray(found.x, dtype=np.float64)
+
+    def starts(self, longest: float) -> list[FloatArray]:
+        """Return starts from discrete fits at several dead times: poles by their logarithms, numerator by response."""
+        known = self.dead_time
+        lates = [known] if known is not None else np.linspace(0.0, longest, 7)
+        kept: list[tuple[float, FloatArray]] = []
+        for late in lates:
+            whole = int(np.floor(late / self.sample_time + 1e-9))
+            form = Structure(self.n_poles + 1, self.n_poles, whole + (0 if self.n_zeros == self.n_poles else 1))
+            theta = minimise(form, self.data)
+            cost = descend_from(form, theta, self.data, 1)[0]
+            values = self._from_discrete(form, theta, late / self.sample_time)
+            kept.append((cost, values))
+        return [values for _, values in sorted(kept, key=lambda one: one[0])[:3]]
+
+    def _from_discrete(self, form: Structure, theta: FloatArray, late: float) -> FloatArray:
+        b, f = theta[: form.n_numerator], np.concatenate([[1.0], theta[form.n_numerator :][: self.n_poles]])
+        roots = np.roots(f).astype(np.complex128)
+        # a pole on the negative axis has no real counterpart: it becomes a fast real one
+        roots = np.where((roots.imag == 0.0) & (roots.real <= 0.0), 0.05, roots)
+        a = np.real(np.poly(np.log(roots)))
+        omega = np.geomspace(1e-3, 1.0, 60) * min(np.pi, 3.0 * np.abs(np.log(roots)).max())
+        shift = np.exp(-1j * omega)
+        wanted = np.polyval(b[::-1], shift) * shift**form.delay / np.polyval(f[::-1], shift)
+        s = 1j * omega
+        hold = (1.0 - shift) / s
+        basis = s[:, None] ** np.arange(self.n_zeros, -1, -1) * (hold * np.exp(-late * s) / np.polyval(a, s))[:, None]
+        both = np.concatenate([basis.real, basis.imag])
+        numerator = np.linalg.lstsq(both, np.concatenate([wanted.real, wanted.imag]), rcond=None)[0]
+        values = np.asarray(np.concatenate([numerator, a[1:]]), dtype=np.float64)
+        return values if self.dead_time is not None else np.concatenate([values, [late]])
+
+    def result(
+        self, values: FloatArray, given: Experiments, scales: tuple[float, float], names: tuple[str, str]
+    ) -> LinearModel:
+        """Return the model in seconds and in the data's units."""
+        T, n_b = self.sample_time, self.n_zeros + 1
+        jacobian, residual = self.parts(values)
+        white, robust, _ = covariances(jacobian, residual, self.data)
+        # values are in samples: a coefficient of s^k is multiplied by T^k, relative to the leading 1 of s^n
+        powers_b = np.arange(self.n_zeros, -1, -1)
+        powers_a = np.arange(self.n_poles - 1, -1, -1)
+        unscale = np.concatenate(
+            [T ** (powers_b - self.n_poles) * (scales[1] / scales[0]), T ** (powers_a - self.n_poles)]
+        )
+        n_main = unscale.size
+        spread = np.outer(unscale, unscale)
+        late = self.dead_time if self.dead_time is not None else float(values[-1]) * T
+        rss, n_used = float(residual @ residual), self.data.n_used
+        deviation = self.data.y[self.data.used] - self.data.y[self.data.used].mean()
+        return LinearModel(
+            numerator=values[:n_b] * unscale[:n_b],
+            denominator=np.concatenate([[1.0], values[n_b:n_main] * unscale[n_b:]]),
+            sample_time=T,
+            input_name=names[0],
+            output_name=names[1],
+            covariance=white[:n_main, :n_main] * spread,
+            covariance_white=white[:n_main, :n_main] * spread,
+            covariance_robust=robust[:n_main, :n_main] * spread,
+            fit_percent=100.0 * (1.0 - float(np.sqrt(rss / (deviation @ deviation)))),
+            rmse=float(np.sqrt(rss / n_used)) * scales[1],
+            residual_std=float(np.sqrt(rss / (n_used - jacobian.shape[1]))) * scales[1],
+            n_samples=n_used,
+            data_hash=data_hash(given, T),
+            structure="continuous-output-error",
+            continuous=True,
+            dead_time=late,
+            dead_time_std=float(np.sqrt(white[n_main, n_main])) * T if self.dead_time is None else float("nan"),
+        )

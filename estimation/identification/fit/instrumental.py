@@ -1,0 +1,148 @@
+"""Refined instrumental variables: consistent under output noise, without a search (Young 1976)."""
+
+import numpy as np
+
+from estimation.identification.fit.fitted import CovarianceKind, fitted_model, scaled
+from estimation.identification.fit.output_error import jacobian_and_residual
+from estimation.identification.model.lags import lagged
+from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.model.recursion import filtered
+from estimation.identification.search.criterion import Structure, profile, stabilised
+from estimation.identification.search.experiments import Experiments, Signals, experiments_for
+from estimation.identification.search.noise_model import noise_start
+from estimation.identification.search.starts import least_squares_arx, reduced_high_order_arx
+from plant.errors import HydrostateError
+
+MOST_PASSES = 50
+"""Refinements at most."""
+
+SETTLED = 1e-8
+"""Relative change of the coefficients at which the refinement ends."""
+
+
+def fit_instrumental(
+    u: Signals,
+    y: Signals,
+    sample_time: float,
+    *,
+    n_numerator: int,
+    n_denominator: int,
+    delay: int = 0,
+    n_c: int = 0,
+    n_d: int = 0,
+    covariance: CovarianceKind = "white",
+    input_name: str = "input",
+    output_name: str = "output",
+) -> LinearModel:
+    """Fit ``y = B/F u + C/D e`` by refined instrumental variables; without C and D, the simplified method (SRIV).
+
+    Each pass filters input and output by the present ``D/(C F)`` and takes the noise-free simulated output as the
+    instrument, which removes the bias of ARX. Begun from ARX and from a reduced high-order ARX; the better end counts.
+
+    Parameters
+    ----------
+    u, y : array_like, shape (n,), or a list of them
+        Input and output, no gaps. Of several experiments, the coefficients are fitted to all.
+    sample_time : float
+        Seconds between samples [s].
+    n_numerator, n_denominator : int
+        Free coefficients of B and F.
+    delay : int
+        Dead time [samples].
+    n_c, n_d : int
+        Coefficients of the noise model behind their 1.
+    covariance : {"white", "coloured", "auto"}
+        As `fit_output_error`.
+    input_name, output_name : str
+        Channel names.
+
+    Returns
+    -------
+    LinearModel
+        ``structure="SRIV"``, or ``"RIV"`` with a noise model.
+
+    Raises
+    ------
+    HydrostateError
+        As `fit_output_error`, or if an output is missing.
+    """
+    form = Structure(n_numerator, n_denominator, delay)
+    given = experiments_for(u, y, form, input_name=input_name, output_name=output_name, n_c=n_c, n_d=n_d)
+    if not given.used.all():
+        raise HydrostateError(
+            f"instrumental variables need every sample of {output_name!r}, got {int((~given.used).sum())} missing: "
+            "use fit_output_error"
+        )
+    data, *scales = scaled(given)
+    longest_u, longest_y = max(data.bridged(), key=lambda pair: pair[0].size)
+    starts = [
+        least_squares_arx(n_numerator, n_denominator, delay, longest_u, longest_y)[1],
+        reduced_high_order_arx(n_denominator, longest_u, longest_y),
+    ]
+    found = [_refined(form, stabilised(f, longest_u.size), data, n_c, n_d) for f in starts]
+    theta, noise, jacobian, residual = min(found, key=lambda one: float(one[3] @ one[3]))
+    n_main = n_numerator + n_denominator
+    return fitted_model(
+        (theta[:n_numerator], theta[n_numerator:n_main], theta[n_main : n_main + form.n_states]),
+        jacobian,
+        residual,
+        data,
+        (scales[0], scales[1]),
+        sample_time=sample_time,
+        delay=delay,
+        covariance=covariance,
+        names=(input_name, output_name),
+        structure="RIV" if n_c + n_d else "SRIV",
+        noise=noise if n_c + n_d else None,
+    )
+
+
+def _refined(
+    form: Structure, f: FloatArray, data: Experiments, n_c: int, n_d: int
+) -> tuple[FloatArray, tuple[FloatArray, FloatArray], FloatArray, FloatArray]:
+    """Return values with initial states, noise model, Jacobian and whitened residual of one start."""
+    n_b, n_f = form.n_numerator, form.n_denominator
+    c, d = np.ones(1), np.ones(1)
+    longest = max(data.slices, key=lambda part: part.stop - part.start)
+    theta = _with_initial(form, f, data)
+    for _ in range(MOST_PASSES):
+        before = theta[: n_b + n_f]
+        if n_c + n_d:
+            c, d = noise_start(jacobian_and_residual(form, theta, data)[1][longest], n_c, n_d)
+        values = _pass(form, before, data, c, d)
+        theta = _with_initial(form, stabilised(np.concatenate([[1.0], values[n_b:]]), data.u.size), data)
+        if np.abs(theta[: n_b + n_f] - before).max() <= SETTLED * np.abs(before).max():
+            break
+    jacobian, residual = jacobian_and_residual(form, theta, data)
+    for part in data.slices:
+        jacobian[part] = np.column_stack([filtered(d, c, column) for column in jacobian[part].T])
+        residual[part] = filtered(d, c, residual[part])
+    return theta, (c, d), jacobian, residual
+
+
+def _pass(form: Structure, values: FloatArray, data: Experiments, c: FloatArray, d: FloatArray) -> FloatArray:
+    """Return numerator and denominator of one weighted instrumental step, over all experiments."""
+    n_b, n_f = form.n_numerator, form.n_denominator
+    f = np.concatenate([[1.0], values[n_b:]])
+    b = np.concatenate([np.zeros(form.delay), values[:n_b]])
+    weight = np.convolve(c, f)
+    gram, right = np.zeros((n_b + n_f, n_b + n_f)), np.zeros(n_b + n_f)
+    begin = form.n_states
+    for part in data.slices:
+        inputs = filtered(d, weight, data.u[part])
+        outputs = filtered(d, weight, data.y[part])
+        clean = filtered(b, f, inputs)
+        shared = lagged(inputs, form.delay, n_b)
+        instruments = np.concatenate([shared, -lagged(clean, 1, n_f)], axis=1)[begin:]
+        regressors = np.concatenate([shared, -lagged(outputs, 1, n_f)], axis=1)[begin:]
+        gram += instruments.T @ regressors
+        right += instruments.T @ outputs[begin:]
+    return np.asarray(np.linalg.lstsq(gram, right, rcond=None)[0], dtype=np.float64)
+
+
+def _with_initial(form: Structure, f: FloatArray, data: Experiments) -> FloatArray:
+    """Return the best numerator and initial states for a denominator; the numerator is the longest experiment's."""
+    fits = [profile(form, f, data.u[part], data.y[part], data.used[part])[1] for part in data.slices]
+    n_main = form.n_numerator + form.n_denominator
+    sizes = [part.stop - part.start for part in data.slices]
+    return np.concatenate([fits[int(np.argmax(sizes))][:n_main], *(fit[n_main:] for fit in fits)])

@@ -1,0 +1,171 @@
+"""Intervals of the steady-state gain by profile likelihood, where the Hessian's would lie.
+
+Where a pole nearly cancels a zero the gain is far from linear in the coefficients, and the interval from the covariance
+covers too little: 68 % instead of 95 % on the fourth model of Table 6 at 50 % noise. The profile asks
+instead which gains a fit can be forced to at a cost that chance explains (Venzon and Moolgavkar 1988).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import gammaincinv
+
+from estimation.identification.fit.output_error import descend_from
+from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.search.criterion import Structure
+from estimation.identification.search.descent import normal_equations, stable
+from estimation.identification.search.experiments import Experiments, Signals, experiments_from
+from estimation.identification.search.levenberg import levenberg
+from estimation.identification.search.starts import starting_values
+from plant.errors import HydrostateError
+
+OTHER_STARTS = 6
+"""Basins beside the fitted one that a forced gain may be reached from, where a pole is nearly cancelled; one elsewhere.
+With 2 instead of 6 the interval covers 91 % instead of 96 % on the model named above."""
+
+MOST_STEPS = 40
+"""Evaluations of the forced fit from each start."""
+
+BISECTIONS = 8
+"""Halvings of the bracket around an end of the interval."""
+
+WIDENINGS = 40
+"""Widenings of the first guess before an interval is called unbounded."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    structure: Structure
+    data: Experiments
+
+    @property
+    def sizes(self) -> np.ndarray:
+        form = self.structure
+        return np.array([form.n_numerator, form.n_denominator, form.delay, form.n_initial])
+
+
+def dc_gain_interval(
+    model: LinearModel, u: Signals, y: Signals, *, level: float = 0.95, estimate_initial_state: bool = True
+) -> tuple[float, float]:
+    """Return the interval of the steady-state gain by profile likelihood.
+
+    Where the model's covariance gives the gain another variance than the white one, the threshold is stretched by
+    their ratio. Where a pole is nearly cancelled its place is not determined, the likelihood ratio exceeds
+    that of regular models, and each such pole counts as one more degree of freedom.
+
+    Parameters
+    ----------
+    model : LinearModel
+        An output-error model, fitted to these data.
+    u, y : array_like of shape (n,), or a sequence of them
+        The data, as `fit_output_error` took them.
+    level : float
+        Probability of the interval.
+    estimate_initial_state : bool
+        As the model was fitted.
+
+    Returns
+    -------
+    tuple of float
+        Lowest and highest gain [output unit per input unit]; infinite where the data set no bound.
+
+    Raises
+    ------
+    HydrostateError
+        If the model is no output-error fit, or the level is not between 0 and 1.
+    """
+    if model.structure != "output-error" or not 0.0 < level < 1.0:
+        raise HydrostateError(
+            "a profile interval needs an output-error fit and a level between 0 and 1, "
+            f"got {model.structure!r} and {level}"
+        )
+    n_b = model.numerator.size - model.delay
+    form = Structure(n_b, model.denominator.size - 1, model.delay, estimate_initial_state)
+    data = experiments_from(
+        u, y, input_name=model.input_name, output_name=model.output_name, n_excited=1, n_wanted=form.n_parameters
+    )
+    size_u, size_y = float(np.sqrt(np.mean(data.u**2))), float(np.sqrt(np.sum(data.y**2) / data.n_used))
+    problem = _Problem(form, replace(data, u=data.u / size_u, y=data.y / size_y))
+    unit = size_y / size_u
+    fitted = np.concatenate([model.numerator[model.delay :] / unit, model.denominator[1:]])
+    starts = [fitted, *starting_values(form, problem.data, OTHER_STARTS if model.cancellations else 1)]
+    least, best = min((descend_from(form, start, problem.data, 100) for start in starts), key=lambda found: found[0])
+    variance = least / (data.n_used - best.size)
+    # where a cancelled pole lies is chosen after the fact, among many places: one more degree of freedom each
+    freedom = 1 + len(model.cancellations)
+    quantile = 2.0 * float(gammaincinv(0.5 * freedom, level))  # of chi-square
+    allowed = least + quantile * variance * _stretch(model)
+    gain = float(best[:n_b].sum() / (1.0 + best[n_b : n_b + form.n_denominator].sum()))
+    first = max(model.dc_gain_std / unit, 1e-6 * abs(gain)) * np.sqrt(2.0 * gammaincinv(0.5, level))
+    others = [descend_from(form, start, problem.data, 12)[1] for start in starts[1:]]
+    ends: list[float] = []
+    for side in (-1.0, 1.0):
+        path = [best]
+
+        def excess(value: float, path: list[FloatArray] = path) -> float:
+            cost, theta = min(
+                (_forced(problem, start, value) for start in [path[-1], *others]), key=lambda found: found[0]
+            )
+            path.append(theta)
+            return cost - allowed
+
+        ends.append(_crossing(excess, gain, side * first) * unit)
+    return ends[0], ends[1]
+
+
+def _crossing(excess: Callable[[float], float], gain: float, step: float) -> float:
+    """Return where the excess turns positive, going away from the fitted gain.
+
+    By bisection: another basin may take over between two gains, so the excess is not smooth.
+    """
+    inside = gain
+    for _ in range(WIDENINGS):
+        outside = gain + step
+        if excess(outside) > 0.0:
+            break
+        inside, step = outside, 1.6 * step
+    else:
+        return float(np.copysign(np.inf, step))
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (inside + outside)
+        inside, outside = (inside, middle) if excess(middle) > 0.0 else (middle, outside)
+    return outside
+
+
+def _stretch(model: LinearModel) -> float:
+    """Return the gain's variance over what a white residual would give; 1 where both agree or are not known."""
+    plain = replace(model, covariance=model.covariance_white).dc_gain_std
+    return (model.dc_gain_std / plain) ** 2 if plain > 0.0 and np.isfinite(model.dc_gain_std / plain) else 1.0
+
+
+def _forced(problem: _Problem, start: FloatArray, gain: float) -> tuple[float, FloatArray]:
+    """Return cost and values of the best fit with a given gain; the last numerator coefficient follows from the rest.
+
+    The gain's condition ``sum b = gain (1 + sum f)`` is linear, so sensitivities of the free values are those of all
+    values times one constant matrix.
+    """
+    sizes, data = problem.sizes, problem.data
+    n_b, n_f = int(sizes[0]), int(sizes[1])
+    p = start.size
+    free = np.delete(np.arange(p), n_b - 1)
+    basis = np.eye(p)[:, free]
+    basis[n_b - 1, : n_b - 1] = -1.0
+    basis[n_b - 1, n_b - 1 : n_b - 1 + n_f] = gain
+    weight = data.used.astype(np.float64)
+
+    base = start.copy()
+    base[n_b - 1] = gain * (1.0 + base[n_b : n_b + n_f].sum()) - base[: n_b - 1].sum()
+
+    def at(moved: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        gram, gradient = np.zeros((p, p)), np.zeros(p)
+        theta = base + basis @ moved
+        cost = normal_equations(theta, sizes, data.u, data.y, weight, data.bounds, gram, gradient)
+        whole = gram + np.tril(gram, -1).T
+        return cost, np.ascontiguousarray(basis.T @ whole @ basis), basis.T @ gradient
+
+    def acceptable(moved: FloatArray) -> bool:
+        return stable((base + basis @ moved)[n_b : n_b + n_f])
+
+    cost, moved = levenberg(at, np.zeros(p - 1), acceptable, tolerance=1e-9, most_steps=MOST_STEPS, slower=0.1)
+    return cost, base + basis @ moved

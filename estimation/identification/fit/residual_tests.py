@@ -1,0 +1,229 @@
+"""Chi-square tests of a residual: whether it is white, and whether past inputs are left in it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import chdtrc
+
+from estimation.identification.model.lags import lagged
+from estimation.identification.model.linear_model import FloatArray
+from plant.errors import HydrostateError
+
+DEFAULT_LAGS = 25
+"""Lags that the residual tests look at."""
+
+
+@dataclass(frozen=True)
+class ResidualTest:
+    """A chi-square test of a residual.
+
+    Parameters
+    ----------
+    statistic : float
+        The test statistic [dimensionless].
+    degrees_of_freedom : int
+        Of its chi-square distribution under the null hypothesis.
+    p_value : float
+        Probability of a statistic at least this large if the model is right.
+    """
+
+    statistic: float
+    degrees_of_freedom: int
+    p_value: float
+
+    def passed(self, level: float = 0.05) -> bool:
+        """Return whether the model survives.
+
+        Parameters
+        ----------
+        level : float
+            Significance level [probability].
+
+        Returns
+        -------
+        bool
+            True where the statistic is no surprise.
+        """
+        return self.p_value >= level
+
+
+def ljung_box(residual: ArrayLike, *, n_lags: int = DEFAULT_LAGS, n_parameters: int = 0) -> ResidualTest:
+    """Test whether a residual is white (Ljung and Box, 1978).
+
+    Parameters
+    ----------
+    residual : array_like, shape (n,)
+        NaN where missing.
+    n_lags : int
+        Lags counted.
+    n_parameters : int
+        Parameters of a *noise* model fitted to it; none for output error.
+
+    Returns
+    -------
+    ResidualTest
+        A small p-value says that the residual is coloured: the fit may stand, its white-noise covariance not.
+
+    Raises
+    ------
+    HydrostateError
+        If there are not more samples than lags, or not more lags than parameters.
+    """
+    values = np.asarray(residual, dtype=np.float64)
+    known = np.isfinite(values)
+    n = int(known.sum())
+    if n <= n_lags or n_lags <= n_parameters:
+        raise HydrostateError(
+            f"a whiteness test needs n_parameters < n_lags < samples, got {n_parameters}, {n_lags} and {n}"
+        )
+    centred = np.where(known, values - values[known].mean(), 0.0)
+    weight = known.astype(np.float64)
+    variance = float(centred @ centred) / n
+    lags = np.arange(1, n_lags + 1)
+    pairs = np.maximum([weight[k:] @ weight[:-k] for k in lags], 1.0)
+    correlation = np.array([centred[k:] @ centred[:-k] for k in lags]) / (pairs * variance)
+    # with every sample there, pairs is n - k and this is n (n + 2) sum(r_k^2 / (n - k)), r_k divided by n
+    statistic = float((n + 2.0) / n * np.sum(pairs * correlation**2))
+    return _chi_square(statistic, n_lags - n_parameters)
+
+
+def cross_correlation_test(
+    residual: ArrayLike,
+    u: ArrayLike,
+    *,
+    n_lags: int = DEFAULT_LAGS,
+    jacobian: ArrayLike | None = None,
+) -> ResidualTest:
+    """Test whether past inputs are left in a residual.
+
+    The residual is projected on the lagged inputs, from which what the fit could already absorb (the columns
+    of `jacobian`) has been removed; without that step the usual statistic rejects a right model too often.
+
+    Parameters
+    ----------
+    residual : array_like, shape (n,)
+        White if the model is right; NaN where missing.
+    u : array_like, shape (n,)
+        Input, no gaps.
+    n_lags : int
+        Lags 0 to ``n_lags`` are counted.
+    jacobian : array_like, shape (n, p), optional
+        Sensitivities of the model's output, if the model was fitted to these data.
+
+    Returns
+    -------
+    ResidualTest
+        A small p-value says that a better model exists: another order, delay, or a nonlinearity.
+
+    Raises
+    ------
+    HydrostateError
+        If the arrays do not match, or there are too few samples.
+    """
+    values, inputs = np.asarray(residual, dtype=np.float64), np.asarray(u, dtype=np.float64)
+    if values.shape != inputs.shape:
+        raise HydrostateError(f"residual and input must match, got shapes {values.shape} and {inputs.shape}")
+    known = np.isfinite(values)
+    known[:n_lags] = False
+    absorbed = np.ones((values.size, 1)) if jacobian is None else np.asarray(jacobian, dtype=np.float64)
+    columns = _without(absorbed[known], _unit(lagged(inputs, 0, n_lags + 1)[known]))
+    left, strength, _ = np.linalg.svd(columns, full_matrices=False)
+    rank = int(np.count_nonzero(strength > max(columns.shape) * np.finfo(float).eps * 1e2 * strength[0]))
+    freedom = int(known.sum()) - absorbed.shape[1]
+    if freedom <= rank:
+        raise HydrostateError(f"a cross-correlation test over {n_lags} lags needs more samples, got {known.sum()}")
+    remaining = values[known]
+    if jacobian is None:
+        remaining = remaining - remaining.mean()
+    variance = float(remaining @ remaining) / freedom
+    statistic = float(np.sum((left[:, :rank].T @ remaining) ** 2)) / variance
+    return _chi_square(statistic, rank)
+
+
+def feedback_test(residual: ArrayLike, u: ArrayLike, *, n_lags: int = DEFAULT_LAGS) -> ResidualTest:
+    """Test whether inputs follow what the output's noise did before: whether a loop was closed around the plant.
+
+    The residual is whitened by a long autoregression and freed of past and present inputs, so that neither its colour
+    nor a model that is too simple counts as feedback; then future inputs are looked for in it.
+
+    Parameters
+    ----------
+    residual : array_like, shape (n,)
+        Measured less simulated; NaN where missing.
+    u : array_like, shape (n,)
+        Input, no gaps.
+    n_lags : int
+        Future inputs counted, and past ones removed.
+
+    Returns
+    -------
+    ResidualTest
+        A small p-value says that the input was fed back: output error and spectra are then biased, and models of the
+        noise (ARMAX, Box-Jenkins) needed.
+
+    Raises
+    ------
+    HydrostateError
+        If the arrays do not match, or there are too few samples.
+    """
+    values, inputs = np.asarray(residual, dtype=np.float64), np.asarray(u, dtype=np.float64)
+    if values.shape != inputs.shape or values.size < 8 * n_lags:
+        raise HydrostateError(
+            f"a feedback test needs residual and input of one length, {8 * n_lags} samples or more, "
+            f"got shapes {values.shape} and {inputs.shape}"
+        )
+    known = np.isfinite(values)
+    filled = np.where(known, values, 0.0)
+    past = lagged(filled, 1, n_lags)
+    white = filled - past @ np.linalg.lstsq(past.T @ past, past.T @ filled, rcond=None)[0]
+    white[~known] = np.nan
+    white[:n_lags] = np.nan
+    before = np.concatenate([np.ones((inputs.size, 1)), lagged(inputs, 0, n_lags + 1)], axis=1)
+    return cross_correlation_test(white[::-1], inputs[::-1], n_lags=n_lags, jacobian=before[::-1])
+
+
+def correlations(residual: ArrayLike, other: ArrayLike, lags: ArrayLike) -> FloatArray:
+    """Return the correlation of a residual with another signal, or itself, some samples earlier.
+
+    Parameters
+    ----------
+    residual, other : array_like, shape (n,)
+        Both NaN where missing.
+    lags : array_like of int, shape (k,)
+        How many samples earlier the other is taken; later, where negative.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        From -1 to 1 [dimensionless].
+
+    Examples
+    --------
+    >>> pulse = np.zeros(100)
+    >>> pulse[50] = 1.0
+    >>> correlations(np.roll(pulse, 3), pulse, [0, 3]).round(2).tolist()
+    [-0.01, 1.0]
+    """
+    first, second = (np.asarray(values, dtype=np.float64) for values in (residual, other))
+    first, second = (np.where(np.isfinite(one), one - np.nanmean(one), 0.0) for one in (first, second))
+    size = float(np.linalg.norm(first) * np.linalg.norm(second))
+    n = first.size
+    products = [
+        first[max(k, 0) : n + min(k, 0)] @ second[max(-k, 0) : n - max(k, 0)] for k in np.asarray(lags).tolist()
+    ]
+    return np.array(products) / size
+
+
+def _unit(columns: FloatArray) -> FloatArray:
+    scale = np.linalg.norm(columns, axis=0)
+    return columns / np.where(scale > 0.0, scale, 1.0)
+
+
+def _without(absorbed: FloatArray, columns: FloatArray) -> FloatArray:
+    basis = np.linalg.qr(_unit(absorbed))[0]
+    return columns - basis @ (basis.T @ columns)
+
+
+def _chi_square(statistic: float, freedom: int) -> ResidualTest:
+    return ResidualTest(statistic, freedom, float(chdtrc(freedom, statistic)))

@@ -1,0 +1,157 @@
+"""Whether an identified model may be believed: fit, residual whiteness, what of the input is left in it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from estimation.identification.fit.residual_tests import DEFAULT_LAGS, ResidualTest, cross_correlation_test, ljung_box
+from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.search.criterion import Structure, profile, sensitivities
+from plant.errors import HydrostateError
+
+
+@dataclass(frozen=True)
+class Validation:
+    """How well a model simulates a log.
+
+    Parameters
+    ----------
+    fit_percent : float
+        Normalised fit.
+    rmse : float
+        Root-mean-square residual [output unit].
+    whiteness : ResidualTest
+        Ljung-Box test of the residual against itself.
+    cross_correlation : ResidualTest
+        Test of the residual against the input.
+    """
+
+    fit_percent: float
+    rmse: float
+    whiteness: ResidualTest
+    cross_correlation: ResidualTest
+
+
+def fit_percent(y: ArrayLike, simulated: ArrayLike) -> float:
+    """Return ``100 (1 - |y - yhat| / |y - mean y|)`` over the samples that are there.
+
+    Parameters
+    ----------
+    y : array_like, shape (n,)
+        Measured output; NaN where missing.
+    simulated : array_like, shape (n,)
+        Model output.
+
+    Returns
+    -------
+    float
+        100 is perfect, 0 as good as the mean; negative is worse.
+
+    Examples
+    --------
+    >>> fit_percent([0.0, 1.0, 2.0], [1.0, 1.0, 1.0])
+    0.0
+    """
+    measured, model = _together(y, simulated)
+    return float(100.0 * (1.0 - np.linalg.norm(measured - model) / np.linalg.norm(measured - measured.mean())))
+
+
+def rmse(y: ArrayLike, simulated: ArrayLike) -> float:
+    """Return the root-mean-square difference over the samples that are there.
+
+    Parameters
+    ----------
+    y : array_like, shape (n,)
+        Measured output; NaN where missing.
+    simulated : array_like, shape (n,)
+        Model output.
+
+    Returns
+    -------
+    float
+        In the output's unit.
+
+    Examples
+    --------
+    >>> rmse([0.0, float("nan"), 2.0], [1.0, 1.0, 1.0])
+    1.0
+    """
+    measured, model = _together(y, simulated)
+    return float(np.sqrt(np.mean((measured - model) ** 2)))
+
+
+def estimate_initial_state(model: LinearModel, u: ArrayLike, y: ArrayLike) -> FloatArray:
+    """Return the initial state with which a model simulates a log best.
+
+    Parameters
+    ----------
+    model : LinearModel
+        Held as it is.
+    u : array_like, shape (n,)
+        Input, no gaps.
+    y : array_like, shape (n,)
+        Measured output; NaN where missing.
+
+    Returns
+    -------
+    ndarray, shape (len(model.initial_state),)
+        For ``model.simulate(u, initial=...)``.
+    """
+    outputs = np.asarray(y, dtype=np.float64)
+    missing = outputs - model.simulate(u)
+    # beside a zero input only the initial state is free
+    structure = Structure(1, model.denominator.size - 1, model.initial_state.size)
+    known = np.isfinite(missing)
+    theta = profile(structure, model.denominator, np.zeros(outputs.size), np.where(known, missing, 0.0), known)[1]
+    return theta[model.denominator.size : model.denominator.size + model.initial_state.size]
+
+
+def validate(
+    model: LinearModel, u: ArrayLike, y: ArrayLike, *, fitted: bool = False, n_lags: int = DEFAULT_LAGS
+) -> Validation:
+    """Return how well a model simulates a log, from the initial state that suits it best.
+
+    Parameters
+    ----------
+    model : LinearModel
+        The model.
+    u : array_like, shape (n,)
+        Input, no gaps.
+    y : array_like, shape (n,)
+        Measured output; NaN where missing.
+    fitted : bool
+        Whether the model was fitted to these very data, which the cross-correlation test must know.
+    n_lags : int
+        Lags of both residual tests.
+
+    Returns
+    -------
+    Validation
+        Fit, RMSE and both tests.
+    """
+    inputs, outputs = np.asarray(u, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    state = model.initial_state if fitted else estimate_initial_state(model, inputs, outputs)
+    simulated = model.simulate(inputs, initial=state)
+    jacobian: FloatArray | None = None
+    if fitted:
+        n_b = model.numerator.size - model.delay
+        structure = Structure(n_b, model.denominator.size - 1, model.delay)
+        theta = np.concatenate([model.numerator[model.delay :], model.denominator[1:], state])
+        jacobian = sensitivities(structure, theta, inputs)
+    return Validation(
+        fit_percent(outputs, simulated),
+        rmse(outputs, simulated),
+        ljung_box(outputs - simulated, n_lags=n_lags),
+        cross_correlation_test(outputs - simulated, inputs, n_lags=n_lags, jacobian=jacobian),
+    )
+
+
+def _together(y: ArrayLike, simulated: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    measured, model = np.asarray(y, dtype=np.float64), np.asarray(simulated, dtype=np.float64)
+    if measured.shape != model.shape:
+        raise HydrostateError(f"measured and simulated output must match, got {measured.shape} and {model.shape}")
+    known = np.isfinite(measured)
+    if not known.any():
+        raise HydrostateError("at least one measured sample is wanted, got none")
+    return measured[known], model[known]

@@ -1,0 +1,1 @@
+"""What an identified model is, and what it says."""

@@ -1,0 +1,107 @@
+"""Where a response has fallen by 3 dB, and how surely."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimation.fits.root import root_between
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+NEAR = 1e-5
+"""Relative step of the gain's slope at the corner."""
+
+
+class Response(Protocol):
+    """What a bandwidth is asked of."""
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Poles in z or s."""
+        ...
+
+    @property
+    def continuous(self) -> bool:
+        """Whether they are in s."""
+        ...
+
+    @property
+    def sample_time(self) -> float:
+        """Seconds between samples [s]."""
+        ...
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the coefficients."""
+        ...
+
+    def response_gradient(self, frequency_hz: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """Return the response, and its derivative by the coefficients.
+
+        Parameters
+        ----------
+        frequency_hz : array_like, shape (k,)
+            Frequencies [Hz].
+
+        Returns
+        -------
+        tuple of ndarray
+            Shapes (k,) and (k, p).
+        """
+        ...
+
+
+def bandwidth(model: Response) -> float | None:
+    """Return the lowest frequency at which the gain is 3 dB below that at zero frequency.
+
+    Parameters
+    ----------
+    model : Response
+        Any transfer function.
+
+    Returns
+    -------
+    float or None
+        Frequency [Hz]; None if the gain never falls so far.
+    """
+    top = 100.0 * float(np.abs(model.poles).max()) / (2.0 * np.pi) if model.continuous else 0.5 / model.sample_time
+    grid = top * np.concatenate([[0.0], np.logspace(-5.0, -2.0, 300), np.linspace(0.01, 1.0, 2000)[1:]])
+    gain = np.abs(model.response_gradient(grid)[0])
+    wanted = gain[0] / np.sqrt(2.0)
+    below = np.flatnonzero(gain < wanted)
+    if below.size == 0:
+        return None
+    if below[0] <= 1:
+        return float(grid[1])
+
+    def excess(frequency: float) -> float:
+        return float(np.abs(model.response_gradient([frequency])[0][0]) - wanted)
+
+    return root_between(excess, float(grid[below[0] - 1]), float(grid[below[0]]), 2e-12)
+
+
+def bandwidth_std(model: Response) -> float | None:
+    """Return the standard deviation of the bandwidth, first order in the covariance.
+
+    Parameters
+    ----------
+    model : Response
+        Any transfer function.
+
+    Returns
+    -------
+    float or None
+        Standard deviation [Hz]; None where there is no bandwidth or no covariance.
+    """
+    corner = bandwidth(model)
+    if corner is None:
+        return None
+    response, gradient = model.response_gradient([0.0, corner, corner * (1.0 - NEAR), corner * (1.0 + NEAR)])
+    power = np.real(np.conj(response[:2, None]) * gradient[:2])
+    slope = (np.abs(response[3]) ** 2 - np.abs(response[2]) ** 2) / (4.0 * NEAR * corner)
+    if slope == 0.0 or not np.isfinite(model.covariance).all():
+        return None
+    moved = (power[1] - 0.5 * power[0]) / slope
+    return float(np.sqrt(max(float(moved @ model.covariance @ moved), 0.0)))

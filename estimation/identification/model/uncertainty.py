@@ -1,0 +1,205 @@
+"""How coefficient uncertainty becomes that of poles, zeros, gain and frequency response: the delta method."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+CANCELS = 4.0
+"""A pole and a zero that are closer than this many standard deviations of their distance are near cancellation."""
+
+NEAR = 0.5
+"""And closer than this share of the pole's distance from zero frequency."""
+
+
+@dataclass(frozen=True)
+class Cancellation:
+    """A pole and a zero that the data do not clearly tell apart.
+
+    Parameters
+    ----------
+    pole, zero : complex
+        Their places in the z plane, or s plane [1/s].
+    deviations : float
+        Their distance over its standard deviation [dimensionless].
+    """
+
+    pole: complex
+    zero: complex
+    deviations: float
+
+
+def sorted_roots(coefficients: FloatArray) -> ComplexArray:
+    """Return the roots of a polynomial in descending powers, largest modulus first.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (n + 1,)
+        Descending powers.
+
+    Returns
+    -------
+    ndarray of complex, shape (n,) at most
+        Roots.
+    """
+    roots = np.roots(coefficients).astype(np.complex128)
+    return roots[np.argsort(-np.abs(roots), kind="stable")]
+
+
+def root_gradients(coefficients: FloatArray, roots: ComplexArray) -> ComplexArray:
+    """Return the derivative of each root by each coefficient, ``-r^(n-k) / P'(r)``.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (n + 1,)
+        Descending powers.
+    roots : ndarray of complex, shape (m,)
+        Simple roots; at a multiple root the derivative is infinite.
+
+    Returns
+    -------
+    ndarray of complex, shape (m, n + 1)
+        Derivatives.
+    """
+    degree = coefficients.size - 1
+    slope = np.polyval(np.polyder(coefficients), roots)
+    powers = np.asarray(roots[:, None] ** np.arange(degree, -1, -1), dtype=np.complex128)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return np.asarray(-powers / slope[:, None], dtype=np.complex128)
+
+
+def complex_std(gradients: ComplexArray, covariance: FloatArray) -> ComplexArray:
+    """Return standard deviations of real and imaginary part, as one complex number each.
+
+    Parameters
+    ----------
+    gradients : ndarray of complex, shape (m, p)
+        By the coefficients.
+    covariance : ndarray, shape (p, p)
+        Of the coefficients.
+
+    Returns
+    -------
+    ndarray of complex, shape (m,)
+        ``std(real) + 1j std(imaginary)``.
+    """
+    real = np.einsum("ij,jk,ik->i", gradients.real, covariance, gradients.real)
+    imaginary = np.einsum("ij,jk,ik->i", gradients.imag, covariance, gradients.imag)
+    return np.sqrt(np.maximum(real, 0.0)) + 1j * np.sqrt(np.maximum(imaginary, 0.0))
+
+
+def cancellations(
+    numerator: FloatArray, denominator: FloatArray, covariance: FloatArray, at_rest: complex
+) -> tuple[Cancellation, ...]:
+    """Return the poles that a zero nearly cancels, as far as the data can tell.
+
+    Parameters
+    ----------
+    numerator : ndarray, shape (n_b,)
+        Free coefficients, descending powers.
+    denominator : ndarray, shape (n_f + 1,)
+        Monic, descending powers.
+    covariance : ndarray, shape (n_b + n_f, n_b + n_f)
+        Of both.
+    at_rest : complex
+        Where zero frequency is: 1 in the z plane, 0 in the s plane.
+
+    Returns
+    -------
+    tuple of Cancellation
+        Nearest zero of each pole concerned; one of a conjugate pair.
+    """
+    if not np.isfinite(covariance).all():
+        return ()
+    poles, zeros = sorted_roots(denominator), sorted_roots(numerator)
+    pole_slopes = root_gradients(denominator, poles)[:, 1:]
+    zero_slopes = root_gradients(numerator, zeros)
+    found: list[Cancellation] = []
+    for i, pole in enumerate(poles):
+        if pole.imag < 0.0:
+            continue
+        for j, zero in enumerate(zeros):
+            gradient = np.concatenate([-zero_slopes[j], pole_slopes[i]])
+            both = np.stack([np.real(gradient), np.imag(gradient)])
+            apart = complex(pole) - complex(zero)
+            distance = np.array([apart.real, apart.imag])
+            spread = both @ covariance @ both.T
+            away = _deviations(distance, spread)
+            # a zero far away that is hardly determined is uncertain, but cancels nothing
+            near = abs(pole - zero) < NEAR * abs(pole - at_rest)
+            if near and away < CANCELS and zero.imag >= 0.0:
+                found.append(Cancellation(complex(pole), complex(zero), away))
+    return tuple(sorted(found, key=lambda pair: pair.deviations))
+
+
+def _deviations(distance: FloatArray, spread: FloatArray) -> float:
+    """Return a distance in standard deviations along itself; infinite derivatives say nothing apart."""
+    length = float(np.hypot(distance[0], distance[1]))
+    if length == 0.0 or not np.isfinite(spread).all():
+        return 0.0
+    along = distance / length
+    variance = float(along @ spread @ along)
+    return length / float(np.sqrt(variance)) if variance > 0.0 else float("inf")
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseBand:
+    """A frequency response with what the covariance says of it.
+
+    Parameters
+    ----------
+    frequency_hz : ndarray, shape (k,)
+        Frequencies [Hz].
+    response : ndarray of complex, shape (k,)
+        Output per input [output unit per input unit].
+    gain_std : ndarray, shape (k,)
+        Standard deviation of ``|response|`` [output unit per input unit].
+    phase_std : ndarray, shape (k,)
+        Standard deviation of the phase [rad].
+    gain_low, gain_high : ndarray, shape (k,)
+        Band of the gain, pointwise [output unit per input unit].
+    """
+
+    frequency_hz: FloatArray
+    response: ComplexArray
+    gain_std: FloatArray
+    phase_std: FloatArray
+    gain_low: FloatArray
+    gain_high: FloatArray
+
+
+def response_band(
+    frequency_hz: FloatArray, response: ComplexArray, gradient: ComplexArray, covariance: FloatArray, level: float
+) -> ResponseBand:
+    """Return pointwise bands of gain and phase, first order in the covariance.
+
+    Parameters
+    ----------
+    frequency_hz : ndarray, shape (k,)
+        Frequencies [Hz].
+    response : ndarray of complex, shape (k,)
+        Output per input [output unit per input unit].
+    gradient : ndarray of complex, shape (k, p)
+        By the coefficients.
+    covariance : ndarray, shape (p, p)
+        Of the coefficients.
+    level : float
+        Probability that a band covers.
+
+    Returns
+    -------
+    ResponseBand
+        At each frequency.
+    """
+    from scipy.special import ndtri
+
+    gain = np.abs(response)
+    turned = gradient * np.where(gain > 0.0, np.conj(response) / np.where(gain > 0.0, gain, 1.0), 1.0)[:, None]
+    spread = complex_std(turned, covariance)
+    reach = float(ndtri(0.5 + 0.5 * level)) * spread.real
+    with np.errstate(divide="ignore", invalid="ignore"):
+        phase = spread.imag / gain
+    return ResponseBand(frequency_hz, response, spread.real, phase, np.maximum(gain - reach, 0.0), gain + reach)

@@ -1,0 +1,1 @@
+"""Criterion, first guesses and descent."""

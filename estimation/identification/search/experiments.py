@@ -1,0 +1,244 @@
+"""One or more experiments as a fit takes them, checked at the door with sentences."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimation.identification.model.linear_model import FloatArray
+from estimation.identification.search.criterion import Structure
+from plant.errors import HydrostateError
+
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+
+Signals: TypeAlias = ArrayLike | Sequence[ArrayLike]
+"""One signal, or a list of signals, one an experiment."""
+
+SAMPLES_PER_PARAMETER = 5
+"""Fewest output samples a free value; below that the covariance formula means nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Experiments:
+    """Input and output of one or more experiments, one after the other.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        Input [input unit].
+    y : ndarray, shape (n,)
+        Output; 0 where it is missing [output unit].
+    used : ndarray of bool, shape (n,)
+        Where the output is there.
+    bounds : ndarray of int, shape (count + 1,)
+        Where each experiment begins, and the end.
+    """
+
+    u: FloatArray
+    y: FloatArray
+    used: BoolArray
+    bounds: IntArray
+
+    @property
+    def count(self) -> int:
+        """Number of experiments."""
+        return self.bounds.size - 1
+
+    @property
+    def n_used(self) -> int:
+        """Outputs that are there."""
+        return int(np.count_nonzero(self.used))
+
+    @property
+    def slices(self) -> list[slice]:
+        """Where each experiment stands."""
+        return [slice(int(a), int(b)) for a, b in zip(self.bounds[:-1], self.bounds[1:], strict=True)]
+
+    def measured(self) -> FloatArray:
+        """Return the output with NaN where it is missing, shape (n,)."""
+        return np.where(self.used, self.y, np.nan)
+
+    def bridged(self) -> list[tuple[FloatArray, FloatArray]]:
+        """Return input and output of each experiment, gaps of the output filled by straight lines."""
+        pairs: list[tuple[FloatArray, FloatArray]] = []
+        for part in self.slices:
+            u, y, used = self.u[part], self.y[part], self.used[part]
+            samples = np.arange(u.size)
+            pairs.append((u, y if used.all() else np.interp(samples, samples[used], y[used])))
+        return pairs
+
+
+def experiments_from(
+    u: Signals, y: Signals, *, input_name: str, output_name: str, n_excited: int, n_wanted: int
+) -> Experiments:
+    """Return checked experiments.
+
+    Parameters
+    ----------
+    u, y : array_like of shape (n,), or a sequence of them
+        Input, no gaps; output, NaN where missing.
+    input_name, output_name : str
+        For messages.
+    n_excited : int
+        Coefficients that the input must excite.
+    n_wanted : int
+        Fewest output samples that will do.
+
+    Returns
+    -------
+    Experiments
+        One after the other.
+
+    Raises
+    ------
+    HydrostateError
+        If the signals do not match, hold unusable values, are too short or constant, or the input excites too little.
+    """
+    inputs, outputs = listed(u), listed(y)
+    if len(inputs) != len(outputs):
+        raise HydrostateError(f"as many inputs as outputs are wanted, got {len(inputs)} and {len(outputs)}")
+    for one_u, one_y in zip(inputs, outputs, strict=True):
+        _require_signals(one_u, one_y, input_name, output_name)
+    together = np.concatenate(outputs)
+    used = np.isfinite(together)
+    if int(used.sum()) < n_wanted:
+        raise HydrostateError(
+            f"a fit of so many values needs at least {n_wanted} samples of {output_name!r}, got {int(used.sum())}"
+        )
+    for one_y in outputs:
+        if not np.isfinite(one_y).any():
+            raise HydrostateError(f"every experiment needs samples of {output_name!r}, got one without any")
+    if np.nanmin(together) == np.nanmax(together):
+        raise HydrostateError(f"output {output_name!r} must vary, got {np.nanmin(together):g} throughout")
+    _require_excitation(inputs, n_excited, input_name)
+    bounds = np.concatenate([[0], np.cumsum([one_u.size for one_u in inputs])]).astype(np.int64)
+    return Experiments(np.concatenate(inputs), np.where(used, together, 0.0), used, bounds)
+
+
+def experiments_for(
+    u: Signals, y: Signals, form: Structure, *, input_name: str, output_name: str, n_c: int = 0, n_d: int = 0
+) -> Experiments:
+    """Return checked experiments, long and lively enough for a fit of given orders.
+
+    Parameters
+    ----------
+    u, y : array_like of shape (n,), or a sequence of them
+        Input, no gaps; output, NaN where missing.
+    form : Structure
+        Orders of ``B/F``.
+    input_name, output_name : str
+        For messages.
+    n_c, n_d : int
+        Coefficients of the noise model behind their 1.
+
+    Returns
+    -------
+    Experiments
+        One after the other.
+
+    Raises
+    ------
+    HydrostateError
+        If an order is too small, or as `experiments_from`.
+    """
+    n_b, n_f = form.n_numerator, form.n_denominator
+    if min(n_b, n_f) < 1 or min(form.delay, n_c, n_d) < 0:
+        raise HydrostateError(
+            "n_numerator and n_denominator must be at least 1, delay, n_c and n_d at least 0, "
+            f"got {n_b}, {n_f}, {form.delay}, {n_c} and {n_d}"
+        )
+    return experiments_from(
+        u,
+        y,
+        input_name=input_name,
+        output_name=output_name,
+        n_excited=n_b + n_f,
+        n_wanted=SAMPLES_PER_PARAMETER * (form.n_parameters + n_c + n_d),
+    )
+
+
+def data_hash(data: Experiments, sample_time: float) -> str:
+    """Return the SHA-256 of input, output and sample time as little-endian doubles.
+
+    Parameters
+    ----------
+    data : Experiments
+        The data.
+    sample_time : float
+        Seconds between samples [s].
+
+    Returns
+    -------
+    str
+        Hexadecimal digest.
+    """
+    digest = hashlib.sha256()
+    parts = [data.u, data.measured(), np.array([sample_time])]
+    if data.count > 1:
+        parts.append(data.bounds.astype(np.float64))
+    for values in parts:
+        digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+    return digest.hexdigest()
+
+
+def listed(signals: Signals) -> list[FloatArray]:
+    """Return signals as a list with one array an experiment.
+
+    Parameters
+    ----------
+    signals : array_like of shape (n,), or a sequence of them
+        One signal or several.
+
+    Returns
+    -------
+    list of ndarray
+        One at least.
+    """
+    if isinstance(signals, list | tuple) and len(signals) > 0 and np.ndim(signals[0]) > 0:
+        return [np.asarray(signal, dtype=np.float64) for signal in signals]
+    return [np.asarray(cast("ArrayLike", signals), dtype=np.float64)]
+
+
+def _require_signals(u: FloatArray, y: FloatArray, input_name: str, output_name: str) -> None:
+    if u.ndim != 1 or u.shape != y.shape:
+        raise HydrostateError(
+            f"input {input_name!r} and output {output_name!r} must be one-dimensional and of one length, "
+            f"got shapes {u.shape} and {y.shape}"
+        )
+    n_bad = int(np.count_nonzero(~np.isfinite(u)))
+    if n_bad:
+        raise HydrostateError(
+            f"input {input_name!r} must be known at every sample, got {n_bad} missing or infinite of {u.size}"
+        )
+    if np.isinf(y).any():
+        raise HydrostateError(f"output {output_name!r} must be finite or missing (NaN), got infinite values")
+
+
+def _require_excitation(inputs: list[FloatArray], wanted: int, input_name: str) -> None:
+    if all(u.size == 0 or u.min() == u.max() for u in inputs):
+        level = f"{inputs[0][0]:g}" if inputs[0].size else "nothing"
+        raise HydrostateError(
+            f"input {input_name!r} must excite {wanted} coefficients, got the constant {level}: "
+            "use steps, a chirp or a pseudo-random binary signal"
+        )
+    excited = max(_excited(u, wanted) for u in inputs)
+    if excited < wanted:
+        raise HydrostateError(
+            f"input {input_name!r} must excite {wanted} coefficients, got a signal that excites {excited} "
+            "(a sine excites two): use steps, a chirp or a pseudo-random binary signal"
+        )
+
+
+def _excited(u: FloatArray, wanted: int) -> int:
+    if u.size < 2 * wanted:
+        return 0
+    windows = np.lib.stride_tricks.sliding_window_view(u, wanted)
+    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(windows.T @ windows), 0.0))
+    # eigenvalues of the Gram matrix are exact to eps, their roots to sqrt(eps); below that the factor itself is asked
+    if spread[0] > 1e-7 * spread[-1]:
+        return wanted
+    return int(np.linalg.matrix_rank(windows))

@@ -1,0 +1,203 @@
+"""What a filter must not believe: a straight line in place of samples of its drives that are not there.
+
+Motor speed drives every process model, so where it was not logged it is not known what the pump delivered. Whatever
+volume a straight line leaves open enters the belief as process noise of the states that it moves, sample by sample, and
+what is measured next decides. The same holds for position, where it drives a model: the swept volume is right again
+after a gap, but not what leaked meanwhile, and pressures measured within the gap say nothing.
+"""
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.models.model import OPENING, ProcessModel
+from plant.compiled.functions import Scalar
+from plant.errors import HydrostateError
+from plant.log.record import Record
+from plant.solvers.steps import Parameters
+
+Array = NDArray[np.float64]
+
+POSITION = "position_m"
+
+WIDE = 1.5
+"""Samples farther apart than this many times what is usual for the channel leave a gap [dimensionless]."""
+
+
+def bridged(x: Array) -> Array:
+    """Return the signal with its gaps filled by straight lines, and held beyond its first and last sample.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+        Any signal; NaN where missing.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        No NaN.
+
+    Raises
+    ------
+    HydrostateError
+        If no sample is there.
+    """
+    known = np.isfinite(x)
+    if known.all():
+        return x
+    if not known.any():
+        raise HydrostateError("a signal with at least one finite sample is wanted, got none")
+    samples = np.arange(x.size)
+    return np.interp(samples, samples[known], x[known])
+
+
+def gaps(values: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the gaps of a channel; one that is logged every so many samples throughout is slow, and has none.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        A channel with a sample at least [any unit]; NaN where missing.
+
+    Returns
+    -------
+    tuple of ndarray, shape (present - 1,)
+        Sample times from each sample that is there to the next, and whether a gap lies between them.
+
+    Examples
+    --------
+    >>> gone = np.nan
+    >>> gaps(np.array([1.0, 1.0, 1.0, gone, gone, 1.0]))[1].tolist()
+    [False, False, True]
+    >>> gaps(np.array([gone, 1.0, gone, 1.0, gone, 1.0]))[1].tolist()
+    [False, False]
+    """
+    n = np.diff(np.flatnonzero(np.isfinite(values))).astype(np.float64)
+    return n, n > WIDE * float(np.median(n)) if len(n) else np.zeros(0, dtype=np.bool_)
+
+
+def _per_sample(values: Array, each: Array, before: float, after: float) -> Array:
+    """Return a value for each sample time, from one for each step between samples that are there, and for the ends."""
+    present = np.flatnonzero(np.isfinite(values))
+    ends = np.full(present[0], before), np.full(len(values) - 1 - present[-1], after)
+    return np.concatenate([np.zeros(1), ends[0], np.repeat(each, np.diff(present)), ends[1]])
+
+
+def unknown_angle(speed: Array, sample_time: float) -> Array:
+    """Return the variance of what the pump turned while its speed was not logged.
+
+    A straight line across n sample times is wrong by when a step d from one end's speed to the other's came, which
+    leaves ``d^2 (n^2 - 1) / 12`` of its integral open, in squared sample times. Across a gap the speed may have gone
+    elsewhere meanwhile: the bridge of increments of variance ``s^2`` a sample time leaves ``s^2 n (n^2 - 1) / 12``.
+    The larger one counts. Across a gap at an end of the log the speed is held, which leaves ``s^2 n^3 / 3``. All is
+    spread evenly. A speed that is logged every so many samples throughout has steps, but no gaps.
+
+    Parameters
+    ----------
+    speed : ndarray, shape (n,)
+        Motor speed [rad/s]; NaN where missing.
+    sample_time : float
+        Time between samples [s].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Variance that the sample time up to each sample adds [rad^2].
+
+    Examples
+    --------
+    >>> unknown_angle(np.array([0.0, 0.0, np.nan, 12.0, 12.0, 12.0]), 1.0).round(3).tolist()
+    [0.0, 0.0, 18.0, 18.0, 0.0, 0.0]
+    """
+    present = np.flatnonzero(np.isfinite(speed))
+    if len(present) == len(speed) or len(present) < 2:
+        return np.zeros(len(speed))
+    n, gap = gaps(speed)
+    steps = np.diff(speed[present])
+    walk = float(np.sum(steps**2) / np.sum(n))
+    open_by = np.maximum(steps**2, np.where(gap, walk * n, 0.0)) * (n**2 - 1.0) / 12.0
+    ends = np.array([present[0], len(speed) - 1 - present[-1]], dtype=np.float64)
+    before, after = np.where(ends > float(np.median(n)), walk * ends**2 / 3.0, 0.0)
+    return sample_time**2 * _per_sample(speed, open_by / n, float(before), float(after))
+
+
+def unknown_path(position: Array, sample_time: float) -> Array:
+    """Return the variance of where the piston went while its position was not logged.
+
+    Across a gap of n sample times the velocity may have changed by increments of variance ``s^2`` a sample time, which
+    takes the piston off the straight line by a variance of ``s^2 n^3 / 48`` in the middle, in squared sample times.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n,)
+        Position [m]; NaN where missing.
+    sample_time : float
+        Time between samples [s].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Variance that the sample time up to each sample adds [m^2].
+    """
+    present = np.flatnonzero(np.isfinite(position))
+    n, gap = gaps(position)
+    if not np.any(gap):
+        return np.zeros(len(position))
+    velocity = np.diff(position[present]) / (n * sample_time)
+    walk = float(np.sum(np.diff(velocity) ** 2) / np.sum(n))
+    open_by = np.where(gap, walk * n**3 / 48.0, 0.0)
+    return sample_time**2 * _per_sample(position, open_by / n, 0.0, 0.0)
+
+
+def with_gaps_open(
+    model: ProcessModel, record: Record, parameters: Parameters
+) -> tuple[ProcessModel, Array, NDArray[np.bool_]]:
+    """Return a model and its drives, such that nothing is believed of what straight lines bridge.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The process model.
+    record : Record
+        The log, with the model's drives.
+    parameters : dataclass
+        The plant's parameters.
+
+    Returns
+    -------
+    tuple of (ProcessModel, ndarray of shape (samples, drives), ndarray of bool of shape (samples,))
+        The model, driven also by the variance that each sample opens in its states, where any is; its drives [SI, and
+        the filter's units squared], no sample missing; and at which samples what is measured can be compared with the
+        model.
+    """
+    drives = [bridged(record[drive]) for drive in model.drives]
+    comparable = np.ones(len(record), dtype=np.bool_)
+    if POSITION in model.drives:
+        beside = _per_sample(record[POSITION], gaps(record[POSITION])[1].astype(np.float64), 1.0, 1.0)
+        comparable = np.isfinite(record[POSITION]) | (beside == 0.0)
+    if model.opening is not None:
+        unknown = {
+            drive: (unknown_path if drive == POSITION else unknown_angle)(record[drive], record.sample_time)
+            for drive in model.drives
+        }
+        added, moved = model.opening(parameters, unknown, record.sample_time)
+        if np.any(added > 0.0):
+            opened = [state for state in model.states if state.name in moved]
+            drives += [added * (moved[state.name] / state.scale) ** 2 for state in opened]
+            model = _opened(model, tuple(state.name for state in opened))
+    return model, np.column_stack(drives), comparable
+
+
+@cache
+def _opened(model: ProcessModel, names: tuple[str, ...]) -> ProcessModel:
+    """Return the model with a drive more for each state that gaps open; its step does not use them."""
+    count = len(model.drives)
+
+    def step(state: tuple[Scalar, ...], drives: Any, p: Any, h: Scalar) -> tuple[Scalar, ...]:
+        return model.step(state, drives[:count] if count > 1 else drives[0], p, h)
+
+    drives = (*model.drives, *(OPENING + name for name in names))
+    return replace(model, name=f"{model.name}_gaps", drives=drives, step=step)

@@ -1,0 +1,76 @@
+"""`clean_log(record, parameters)`: a log looked at once, before anything is fitted to it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.log_checks.outliers import without_gross_outliers
+from estimation.log_checks.sensor_check import PRESSURE, PRESSURES, sensor_objections, without_saturated
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from plant.notes import Note
+
+CLEANED = ("motor_speed_rad_s", "position_m", "velocity_m_s", PRESSURE)
+"""Channels whose gross outliers are left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class CleanLog:
+    """A log without the samples that its sensors did not measure.
+
+    Parameters
+    ----------
+    record : Record
+        The log, without gross outliers and clipped pressures.
+    variances : Mapping[str, float]
+        Measurement variance of each of its channels [SI squared].
+    left_out : tuple of Note
+        What was left out of it.
+    objections : tuple of Note
+        Sensors that have stopped telling the truth; each note names its ``channel``.
+    """
+
+    record: Record
+    variances: Mapping[str, float]
+    left_out: tuple[Note, ...]
+    objections: tuple[Note, ...]
+
+    def objections_to(self, channels: tuple[str, ...]) -> tuple[Note, ...]:
+        """Return what speaks against the sensors of some channels.
+
+        Parameters
+        ----------
+        channels : tuple of str
+            The channels that are used.
+
+        Returns
+        -------
+        tuple of Note
+            None for sound sensors.
+        """
+        return tuple(note for note in self.objections if note.data["channel"] in channels)
+
+
+def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
+    """Look at a log's sensors once: noise, outliers, clipping, frozen or dead channels.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    parameters : EhaParameters
+        The actuator, for its relief valve and for what the pump must have moved.
+
+    Returns
+    -------
+    CleanLog
+        The log to fit, and what was found.
+    """
+    sound, outliers = without_gross_outliers(record, CLEANED)
+    clipped: tuple[Note, ...] = ()
+    if PRESSURE in sound:
+        sound, clipped = without_saturated(sound, parameters)
+    known = [name for name in dict.fromkeys((*CLEANED, *PRESSURES)) if name in sound]
+    return CleanLog(
+        sound, measurement_variances(sound, known), (*outliers, *clipped), sensor_objections(sound, parameters)
+    )

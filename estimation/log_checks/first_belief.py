@@ -1,0 +1,86 @@
+"""What a filter believes of a log before its first sample, and the noise that it is given by default."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.models.eha_forms import BULK_MODULUS
+from estimation.models.gaussian import Gaussian
+from estimation.models.model import ProcessModel
+from plant.log.record import Record
+
+PRESSURE_NOISE_LOGGED = 3e8
+"""Process-noise density of differential pressure where it is logged [Pa^2/s]. It stands for the flows that a lumped
+model leaves out (make-up, changing volumes); without the sensor the model's own, small one holds the pressure."""
+
+START_STD = 3e8
+"""Standard deviation of the first guess [Pa]: convergence is driven by it (errata E10)."""
+
+
+AT_REST = 3e4
+"""Differential pressure of an actuator that is taken to be at rest, at most, beside five deviations of noise [Pa]."""
+
+
+def first_belief(model: ProcessModel, record: Record, start: float, start_std: float) -> Gaussian:
+    """Return the belief before the first sample: at the first position, at rest, at the guessed bulk modulus.
+
+    Parameters
+    ----------
+    model : ProcessModel
+        The process model.
+    record : Record
+        The log.
+    start : float
+        First guess of effective bulk modulus [Pa].
+    start_std : float
+        Its standard deviation [Pa].
+
+    Returns
+    -------
+    Gaussian
+        The prior.
+    """
+    firsts = {"position_m": _first(record, "position_m"), BULK_MODULUS: start}
+    firsts["differential_pressure_pa"] = _first(record, "differential_pressure_pa")
+    spreads = {
+        "position_m": 1e-5,
+        "velocity_m_s": 1e-3,
+        "acceleration_m_s2": 10.0,
+        "differential_pressure_pa": 1e5,
+        BULK_MODULUS: start_std,
+    }
+    mean = np.array([firsts.get(state.name, 0.0) for state in model.states])
+    return Gaussian(mean, np.diag([spreads[state.name] ** 2 for state in model.states]))
+
+
+def first_load(record: Record, variances: Mapping[str, float] | None = None) -> float:
+    """Return the differential pressure that a log begins with, zero where that is little enough for rest.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with differential pressure.
+    variances : Mapping[str, float], optional
+        Measurement variances of its channels [SI squared]; read off the log if not given.
+
+    Returns
+    -------
+    float
+        Pressure in chamber A less that in chamber B at the first sample that has it [Pa].
+
+    Examples
+    --------
+    >>> first_load(Record(1e-3, {"differential_pressure_pa": np.array([np.nan, -4e5, -5e5, -6e5])}))
+    -400000.0
+    """
+    channel = "differential_pressure_pa"
+    first, noise = _first(record, channel), (variances or measurement_variances(record, (channel,)))[channel] ** 0.5
+    return first if abs(first) > AT_REST + 5.0 * noise else 0.0
+
+
+def _first(record: Record, channel: str) -> float:
+    if channel not in record:
+        return 0.0
+    present = record[channel][np.isfinite(record[channel])]
+    return float(present[0]) if len(present) else 0.0

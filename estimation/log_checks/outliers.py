@@ -1,0 +1,140 @@
+"""Gross outliers: samples that no motion explains, taken out before anything is fitted or filtered."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from estimation.log_checks.bridging import bridged
+from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.log_checks.sensor_check import PRESSURES
+from estimation.notes import SensorCode
+from plant.log.record import Record
+from plant.notes import Note
+from plant.sensors.sensors import differentiated
+
+Array = NDArray[np.float64]
+
+POSITION, VELOCITY = "position_m", "velocity_m_s"
+
+WINDOWS = ((7, 1), (11, 2))
+"""Samples of the running medians that an outlier stands out from, and how many ranks beside the median show how the
+signal bends. A signal that only rises or only falls is its own median, so a step of the drive is no outlier; three
+outliers within seven samples look like a step, and not within eleven."""
+
+GROSS = 10.0
+"""How far beyond the channel's usual distance from its running median a gross outlier is [dimensionless]."""
+
+BENDS = 3.0
+"""By how many spreads of the window's middle samples it is farther away still: a peak is none [dimensionless]."""
+
+USUAL = 95.0
+"""Share of the samples that are taken to be no outliers [percent]."""
+
+ENDS = 3
+"""Samples at either end of a log that have no other side: there only what leaves the channel's range stands out."""
+
+PART = 16_384
+"""Windows that are sorted at a time: all of a long log's would take much memory."""
+
+CONFIRMING = 5e-3
+"""Span over which motion of the encoder confirms a velocity [s]."""
+
+
+def without_outliers(values: Array, noise: float = 0.0) -> Array:
+    """Return a channel without its gross outliers, which become missing samples (Hampel 1974).
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        A channel [any unit]; NaN where missing.
+    noise : float
+        Standard deviation of its noise [the channel's unit].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        The channel, NaN where it stood out.
+
+    Examples
+    --------
+    >>> step = np.repeat([0.0, 1.0], 10)
+    >>> step[4] = 30.0
+    >>> np.flatnonzero(np.isnan(without_outliers(step))).tolist()
+    [4]
+    """
+    kept = values.copy()
+    for window, ranks in WINDOWS:
+        seen = kept[np.isfinite(kept)]
+        if len(seen) <= 2 * ENDS:
+            break
+        below, distance, spread = _running_ranks(seen, window, [window // 2 + k for k in (-ranks, 0, ranks)])
+        spread -= below  # in place: a long log's channel is large
+        distance -= seen
+        np.abs(distance, out=distance)
+        spread *= BENDS
+        spread += GROSS * (float(np.percentile(distance, USUAL)) + noise)
+        seen[distance > spread] = np.nan
+        kept[np.isfinite(kept)] = _within_range(seen, noise)
+    return kept
+
+
+def _running_ranks(values: Array, window: int, ranks: Sequence[int]) -> Array:
+    """Return order statistics of the window around each sample, a row each; beyond either end its sample is held."""
+    around, out = np.pad(values, window // 2, mode="edge"), np.empty((len(ranks), len(values)))
+    for begin in range(0, len(values), PART):
+        windows = sliding_window_view(around[begin : begin + PART + window - 1], window)
+        out[:, begin : begin + PART] = np.sort(windows)[:, ranks].T
+    return out
+
+
+def _within_range(seen: Array, noise: float) -> Array:
+    """Return a channel without those of its first and last samples that lie a range beyond all that others show."""
+    inner = seen[ENDS:-ENDS]
+    low, high = float(np.nanmin(inner)), float(np.nanmax(inner))
+    reach = high - low + GROSS * noise
+    for end in (seen[:ENDS], seen[-ENDS:]):
+        end[(end < low - reach) | (end > high + reach)] = np.nan
+    return seen
+
+
+def without_gross_outliers(record: Record, channels: Sequence[str]) -> tuple[Record, tuple[Note, ...]]:
+    """Return a log without the gross outliers of its channels.
+
+    A piston that slips shows a velocity for a few samples alone; it is an outlier only where the encoder does not
+    confirm it.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    channels : sequence of str
+        Channels to look at; those that the log lacks are passed over.
+
+    Returns
+    -------
+    tuple of (Record, tuple of Note)
+        The log with its outliers missing, and a note for each channel that lost samples.
+    """
+    said: list[Note] = []
+    for name in [name for name in channels if name in record]:
+        values = record[name]
+        shown = record
+        if name in PRESSURES:  # one that clips shows its noise only while it moves
+            shown = record.replace(**{name: np.where(np.diff(values, prepend=np.nan) == 0.0, np.nan, values)})
+        noise = measurement_variances(shown, (name,))[name] ** 0.5
+        sound = without_outliers(values, noise)
+        if name == VELOCITY and POSITION in record and _missing(sound) > _missing(values):
+            span = max(CONFIRMING, 2.0 * record.sample_time)
+            moved = differentiated(bridged(record[POSITION]), record.sample_time, span)
+            sound = np.where(np.isnan(without_outliers(values - moved, noise)), sound, values)
+        lost = _missing(sound) - _missing(values)
+        if lost:
+            said.append(SensorCode.OUTLIERS_LEFT_OUT.note(channel=name, count=lost, total=len(record)))
+            record = record.replace(**{name: sound})
+    return record, tuple(said)
+
+
+def _missing(values: Array) -> int:
+    return int(np.count_nonzero(np.isnan(values)))

@@ -1,0 +1,344 @@
+"""Sensors that have stopped telling the truth: frozen, dead, or at the end of their range.
+
+A filter believes a frozen encoder like any other, and an innocent chi-square follows: constant samples agree with each
+other. So a log is looked at before it is believed. What is at a stop of the sensor's range is censored, not measured,
+and is taken out (`without_saturated`).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.log_checks.bridging import bridged
+from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.notes import SensorCode
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from plant.notes import Note
+
+Array = NDArray[np.float64]
+
+PRESSURE = "differential_pressure_pa"
+
+PRESSURES = (PRESSURE, "pressure_a_pa", "pressure_b_pa")
+"""Channels of which clipped samples are taken out."""
+
+LONGEST_HOLD = 0.05
+"""A live sensor does not repeat one value for longer while the quantity moves [s]."""
+
+FEWEST_HELD = 20
+"""Repeated samples below which nothing is concluded from a hold, whatever its length."""
+
+USUAL_REPEATS = 0.5
+"""A channel that repeats its last sample more often is coarse: that it holds a value is no sign there [fraction]."""
+
+BY_CHANCE = 1e-9
+"""Probability of as many repetitions of the extreme value, for a sensor that repeats itself as often as this one does
+elsewhere, below which it is at the end of its range [probability]."""
+
+LEAST_RUN = 3
+"""Samples at the largest value that count as one stay there."""
+
+ARRIVING, LEAST_ARRIVAL = 2.0, 0.1
+"""A channel comes to a stay on the move if just before it was farther away than so many of its quanta, or of
+this share of its usual step [dimensionless]."""
+
+AROUND, BAND = 0.01, 4.0
+"""Of a pressure that hovers at the end of the range only the lower half of its noise is seen, so samples so near a
+clipped one [s] and so near its level [standard deviations] are left out with it."""
+
+HEAPED = 2.0
+"""A sensor at the end of its range heaps so many times more samples there than close by [dimensionless]."""
+
+NOISY = 0.3
+"""Noise makes a channel's steps differ from one to the next by more than this share of them [fraction]."""
+
+COARSE = 0.2
+"""A channel that repeats its last sample more often shows no noise, and a relief valve's plateau is flat [fraction]."""
+
+NOISE_SHARE = 0.9
+"""A channel whose white noise is more than this share of all that it shows, shows nothing [fraction]."""
+
+CLIPPED = 0.98
+"""A pressure held above this share of its largest is at the end of its range or at the relief valve [fraction]."""
+
+UNDELIVERED = 5.0
+"""Pumped volume that neither motion nor the oil's compression explains, over what compression can take [fraction]."""
+
+
+def sensor_objections(record: Record, parameters: EhaParameters) -> tuple[Note, ...]:
+    """Return a note for each sensor of a log that cannot be believed.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    parameters : EhaParameters
+        The actuator, to tell what the pump must have moved.
+
+    Returns
+    -------
+    tuple of Note
+        None for a sound log.
+    """
+    accused = {
+        PRESSURE: _frozen_pressure(record, parameters) or _dead_pressure(record),
+        "velocity_m_s": _frozen_velocity(record),
+    }
+    believed = record.replace(**{channel: None for channel, note in accused.items() if note})
+    found = (*accused.values(), _frozen_position(believed, parameters))
+    return tuple(note for note in found if note)
+
+
+def holds(values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return where runs of one repeated value begin, and how long they are; missing samples end a run.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        A channel [any unit].
+
+    Returns
+    -------
+    tuple of ndarray, each shape (runs,)
+        First samples, and counts of samples.
+
+    Examples
+    --------
+    >>> starts, lengths = holds(np.array([1.0, 1.0, 2.0, 3.0, 3.0, 3.0]))
+    >>> starts.tolist(), lengths.tolist()
+    ([0, 2, 3], [2, 1, 3])
+    """
+    changes = np.flatnonzero(np.concatenate([[True], values[1:] != values[:-1]]))
+    return changes.astype(np.int64), np.diff(np.append(changes, len(values))).astype(np.int64)
+
+
+def _longest_hold(values: Array, sample_time: float) -> slice | None:
+    """Return the longest hold, if it is long enough to mean something; samples missing in it do not count."""
+    present = np.flatnonzero(np.isfinite(values))
+    starts, lengths = holds(values[present])
+    if not len(starts):
+        return None
+    longest = int(np.argmax(lengths))
+    first, last = present[starts[longest]], present[starts[longest] + lengths[longest] - 1]
+    long = lengths[longest] > FEWEST_HELD and (last - first) * sample_time >= LONGEST_HOLD
+    return slice(int(first), int(last) + 1) if long else None
+
+
+def _hold_of(record: Record, channel: str) -> slice | None:
+    """Return the longest stretch over which a channel repeats itself although it usually does not."""
+    if channel not in record:
+        return None
+    hold = _longest_hold(record[channel], record.sample_time)
+    if hold is None:
+        return None
+    outside = np.concatenate([record[channel][: hold.start], record[channel][hold.stop :]])
+    outside = outside[np.isfinite(outside)]
+    coarse = np.count_nonzero(outside[1:] == outside[:-1]) > USUAL_REPEATS * len(outside)
+    return None if len(outside) and coarse else hold
+
+
+def _frozen_velocity(record: Record) -> Note | None:
+    """Compare a still velocity sensor with the encoder; a stuck piston's velocity is zero, and its encoder still."""
+    stretch = _hold_of(record, "velocity_m_s")
+    if stretch is None or "position_m" not in record:
+        return None
+    position, velocity = record["position_m"][stretch], float(record["velocity_m_s"][stretch][0])
+    there = np.flatnonzero(np.isfinite(position))
+    if len(there) < FEWEST_HELD:
+        return None
+    position = position[there]
+    travelled, quantum = float(position[-1] - position[0]), _quantum(record["position_m"])
+    said = velocity * record.sample_time * float(there[-1] - there[0])
+    strayed = max(abs(travelled - said), float(np.ptp(position)) - abs(said))
+    return _says_frozen("velocity_m_s", stretch, record) if strayed > UNDELIVERED * max(quantum, 1e-6) else None
+
+
+def _frozen_pressure(record: Record, p: EhaParameters) -> Note | None:
+    """Compare a still pressure with the pump: while that delivers unevenly, pressure is never the same for long."""
+    stretch = _hold_of(record, PRESSURE)
+    if stretch is None or "motor_speed_rad_s" not in record:
+        return None
+    value = record[PRESSURE][stretch.start]
+    if np.all(np.isnan(record[PRESSURE]) | (record[PRESSURE] == value)):
+        return SensorCode.SENSOR_CONSTANT.note(channel=PRESSURE, value=float(value))
+    speed = bridged(record["motor_speed_rad_s"])[stretch]
+    volume = np.cumsum(_pumped(speed, p)) * record.sample_time
+    if np.ptp(speed) == 0.0:
+        return None
+    if abs(value) > CLIPPED * float(np.nanmax(np.abs(record[PRESSURE]))):
+        return None
+    return _says_frozen(PRESSURE, stretch, record) if np.ptp(volume) > 0.0 else None
+
+
+def _pumped(speed: Array, p: EhaParameters) -> Array:
+    ideal = p.pump_displacement * speed
+    return np.sign(ideal) * np.maximum(np.abs(ideal) - p.flow_bias, 0.0)
+
+
+def _says_frozen(channel: str, stretch: slice, record: Record) -> Note:
+    start, length = stretch.start, stretch.stop - stretch.start
+    begin = record.start_time + start * record.sample_time
+    return SensorCode.SENSOR_FROZE.note(
+        channel=channel,
+        value=float(record[channel][start]),
+        begin_s=begin,
+        length_s=length * record.sample_time,
+    )
+
+
+def _frozen_position(record: Record, p: EhaParameters) -> Note | None:
+    """Compare a still encoder with what the other sensors say moved meanwhile.
+
+    A stuck piston is still too; then the pump only compresses oil and feeds the leak, which takes a bounded volume.
+    """
+    if "position_m" not in record:
+        return None
+    stretch = _longest_hold(record["position_m"], record.sample_time)
+    if stretch is None:
+        return None
+    speed = bridged(record["motor_speed_rad_s"])[stretch] if "motor_speed_rad_s" in record else np.zeros(1)
+    pumped = _pumped(speed, p)
+    highest = p.relief_pressure
+    if PRESSURE in record:
+        there = np.isfinite(record[PRESSURE])
+        if np.mean(there[stretch]) > 0.5 * np.mean(there):  # else it may have been any
+            highest = float(np.nanmax(np.abs(record[PRESSURE][stretch])))
+    taken = 2.0 * highest * p.chamber_volume / p.bulk_modulus
+    moved = np.cumsum(pumped - np.sign(pumped) * p.leakage_coefficient * highest) * record.sample_time
+    swing = float(np.max(moved) - np.min(moved))
+    slid = _slid(record, stretch)
+    if swing < UNDELIVERED * taken and not slid:
+        return None
+    return _says_frozen("position_m", stretch, record)
+
+
+def _slid(record: Record, stretch: slice) -> bool:
+    """Return whether measured velocity shows motion over the stretch.
+
+    Velocity may be differentiated from the encoder over a window, so the ends of the stretch do not count.
+    """
+    if "velocity_m_s" not in record:
+        return False
+    quarter = (stretch.stop - stretch.start) // 4
+    velocity = record["velocity_m_s"][stretch.start + quarter : stretch.stop - quarter]
+    velocity = velocity[np.isfinite(velocity)]
+    if len(velocity) < FEWEST_HELD:
+        return False
+    noise = float(np.std(np.diff(velocity))) / 2.0**0.5
+    step = 0.5 * (stretch.stop - stretch.start) * record.sample_time / len(velocity)
+    travelled = np.cumsum(velocity) * step
+    allowed = 6.0 * noise * step * len(velocity) ** 0.5
+    return bool(np.ptp(travelled) > max(allowed, UNDELIVERED * _quantum(record["position_m"])))
+
+
+def _quantum(values: Array) -> float:
+    steps = np.abs(np.diff(values[np.isfinite(values)]))
+    return float(np.min(steps[steps > 0.0], initial=np.inf)) if np.any(steps > 0.0) else 0.0
+
+
+def _dead_pressure(record: Record) -> Note | None:
+    """Look for the load in the pressure: noise and nothing else, while the motor turns, is no live sensor's."""
+    if PRESSURE not in record or "motor_speed_rad_s" not in record:
+        return None
+    pressure = record[PRESSURE][np.isfinite(record[PRESSURE])]
+    if len(pressure) < FEWEST_HELD or np.ptp(pressure) == 0.0 or np.ptp(record["motor_speed_rad_s"]) == 0.0:
+        return None
+    white = 0.5 * float(np.var(np.diff(pressure)))
+    if white < NOISE_SHARE * float(np.var(pressure)):
+        return None
+    return SensorCode.SENSOR_NOISE_ONLY.note(channel=PRESSURE, noise=white**0.5)
+
+
+def without_saturated(record: Record, parameters: EhaParameters) -> tuple[Record, tuple[Note, ...]]:
+    """Take out the samples at which a pressure sensor was at the end of its range.
+
+    A sensor that clips stays at one extreme value, for several samples and more than once, and comes and goes on the
+    move; a pressure that settles creeps there, and one that a relief valve holds is noisy. What a clipped sensor would
+    have shown is not known, so the samples become missing ones, and those of the differential pressure with them where
+    it is the difference of two sensors. Of an absolute pressure only the upper end counts: make-up valves hold the
+    lower.
+
+    Parameters
+    ----------
+    record : Record
+        The log, without gross outliers.
+    parameters : EhaParameters
+        The actuator, for the setting of its relief valve.
+
+    Returns
+    -------
+    tuple of (Record, tuple of Note)
+        The log without them, and a note for each channel that lost samples.
+    """
+    said: list[Note] = []
+    for channel in PRESSURES:
+        if channel not in record:
+            continue
+        values = record[channel]
+        levels = _clipping_levels(values, parameters, both=channel == PRESSURE)
+        if not levels:
+            continue
+        from scipy.ndimage import maximum_filter1d
+
+        clipped = np.isin(values, levels)
+        noise = measurement_variances(record.replace(**{channel: np.where(clipped, np.nan, values)}), (channel,))
+        close = np.min([np.abs(values - level) for level in levels], axis=0) < BAND * noise[channel] ** 0.5
+        around = maximum_filter1d(clipped, 2 * round(AROUND / record.sample_time) + 1)
+        share = 100.0 * np.count_nonzero(clipped) / np.count_nonzero(np.isfinite(values))
+        at = " and ".join(f"{level:.4g}" for level in levels)
+        said.append(SensorCode.SENSOR_CLIPPED.note(channel=channel, levels=at, percent=share))
+        lost = (channel, PRESSURE) if _is_difference(record) else (channel,)
+        left_out = clipped | (close & around)
+        record = record.replace(**{name: np.where(left_out, np.nan, record[name]) for name in lost})
+    return record, tuple(said)
+
+
+def _is_difference(record: Record) -> bool:
+    """Return whether the differential pressure is that of the two chambers' sensors, and no sensor's own."""
+    if any(channel not in record for channel in PRESSURES):
+        return False
+    difference = record["pressure_a_pa"] - record["pressure_b_pa"]
+    there = np.isfinite(difference) & np.isfinite(record[PRESSURE])
+    return bool(np.allclose(record[PRESSURE][there], difference[there]))
+
+
+def _clipping_levels(values: Array, p: EhaParameters, *, both: bool) -> list[float]:
+    """Return the extreme values of a channel at which its sensor was at the end of its range."""
+    seen = values[np.isfinite(values)]
+    if len(seen) < FEWEST_HELD:
+        return []
+    extremes = (float(np.max(seen)), float(np.min(seen)))[: 2 if both else 1]
+    return [level for level in extremes if _is_clipped(seen, level, p)]
+
+
+def _is_clipped(seen: Array, level: float, p: EhaParameters) -> bool:
+    """Return whether a channel without gaps repeats its extreme value as only the end of a sensor's range does."""
+    depth = np.abs(seen - level)
+    count = np.count_nonzero(depth == 0.0)
+    if not LEAST_RUN <= count < len(seen):
+        return False
+    steps = np.abs(np.diff(seen))
+    moved = steps[steps > 0.0]
+    usual = float(np.median(moved))
+    far = ARRIVING * max(float(np.min(moved)), LEAST_ARRIVAL * usual)
+    if count <= HEAPED * (np.count_nonzero(depth <= far) - count):
+        return False
+    elsewhere = steps[(depth[1:] > 0.0) | (depth[:-1] > 0.0)]
+    repeats = (np.count_nonzero(elsewhere == 0.0) + 1.0) / (len(elsewhere) + 1.0)
+    if repeats > COARSE and abs(abs(level) / p.relief_pressure - 1.0) < 1.0 - CLIPPED:
+        return False
+    bends = np.abs(np.diff(seen, 2))[steps[1:] > 0.0]
+    noisy = repeats <= COARSE and len(bends) > 0 and float(np.median(bends)) > NOISY * usual
+    starts, lengths = holds(seen)
+    here = (depth[starts] == 0.0) & (lengths >= LEAST_RUN)
+    again = sum(
+        length - 1
+        for start, length in zip(starts[here], lengths[here], strict=True)
+        if noisy or (_moves(depth[:start][-LEAST_RUN:], far) and _moves(depth[start + length :][:LEAST_RUN], far))
+    )
+    return bool(again * np.log(repeats) < np.log(BY_CHANCE))
+
+
+def _moves(depth: Array, far: float) -> bool:
+    """Return whether a channel comes from, or goes, farther away; the log may begin or end before it does."""
+    return len(depth) < LEAST_RUN or float(np.max(depth)) > far

@@ -1,0 +1,1 @@
+"""Process models: what a filter or a fit believes of an actuator."""

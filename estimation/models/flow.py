@@ -1,0 +1,195 @@
+"""The flow form: bulk modulus and leakage from the pressure balance alone, where differential pressure is logged.
+
+Motor speed and position are both measured, so both flows of equation 5.8 are known: what the pump delivers and what
+the piston sweeps. Differential pressure is then a balance of two chambers with few unknowns, and friction does not
+appear at all.
+"""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+from estimation.models.greybox import GreyBoxModel
+from plant.compiled.functions import Scalar, absolute, maximum, sign, where
+from plant.components.check_valve import check_valve_flow
+from plant.components.oil import ATMOSPHERE
+from plant.components.valves import pumped_flow
+from plant.eha.model import EhaParameters
+
+
+class Delivery(NamedTuple):
+    """What acts on the chambers from outside them.
+
+    Parameters
+    ----------
+    pumped : float or Expression
+        Flow of the pump [m^3/s].
+    velocity : float or Expression
+        Piston velocity [m/s].
+    position : float or Expression
+        Piston position [m].
+    """
+
+    pumped: Scalar
+    velocity: Scalar
+    position: Scalar
+
+
+def delivered_flow(speeds: tuple[Scalar, Scalar], p: SimpleNamespace, step: Scalar, share: Scalar) -> Scalar:
+    """Return the pump's flow within a step (errata E8), the motor being ahead of the straight line between samples.
+
+    The log's speed is linear between samples, the motor's is not: towards its new speed a lagging motor is always
+    ahead of the straight line, by ``T^2 / (12 lag)`` for sample time T, which `speed_lead` takes up.
+
+    Parameters
+    ----------
+    speeds : tuple of float or Expression
+        Motor speed at the start and end of the step [rad/s].
+    p : namespace
+        The actuator's parameters and `speed_lead` [s].
+    step : float or Expression
+        Time step [s].
+    share : float or Expression
+        How far into the step [fraction].
+
+    Returns
+    -------
+    float or Expression
+        Flow [m^3/s].
+    """
+    speed, next_speed = speeds
+    slope = next_speed - speed
+    return pumped_flow(speed + share * slope + p.speed_lead * slope / step, p.pump_displacement, p.flow_bias)
+
+
+def chamber_rates(
+    pressures: tuple[Scalar, Scalar], delivery: Delivery, p: SimpleNamespace, *, by_mass: bool
+) -> tuple[Scalar, Scalar]:
+    """Return how fast the chamber pressures change (equations 5.1 to 5.4 with errata E2, E8 and E17).
+
+    Each chamber holds ``2 V_0`` and the volume that the piston sweeps, so that the two together are the lumped plant's
+    ``V_0`` (errata E2). Balanced by mass, oil that leaves a chamber under pressure is denser than where it arrives by
+    ``(p1 - p2) / beta``, and its tangent stiffness falls as it is compressed; equations 5.1 to 5.4 balance volumes,
+    which loses nothing while pressures are a small part of bulk modulus.
+
+    Parameters
+    ----------
+    pressures : tuple of float or Expression
+        Absolute, of both chambers [Pa].
+    delivery : Delivery
+        Pumped flow, velocity and position [m^3/s, m/s, m].
+    p : namespace
+        The actuator's parameters, `case_leakage` a port to the inner circuit [m^3/(s Pa)], and `makeup_opening`, the
+        drop at which a check valve is half open [Pa].
+    by_mass : bool
+        Whether flows are balanced by mass rather than by volume.
+
+    Returns
+    -------
+    tuple of float or Expression
+        Rates [Pa/s].
+    """
+    p1, p2 = pressures
+    pumped, velocity, position = delivery
+    A, V, beta, supply = p.piston_area, 2.0 * p.chamber_volume, p.bulk_modulus, p.accumulator_pressure
+    dp = p1 - p2
+    relieved = sign(dp) * p.relief_conductance * maximum(absolute(dp) - p.relief_pressure, 0.0)
+    leaked = p.leakage_coefficient * dp + relieved
+    into_1, into_2 = (
+        check_valve_flow(supply - chamber, p.makeup_conductance, p.makeup_opening) - p.case_leakage * (chamber - supply)
+        for chamber in pressures
+    )
+    swelling = dp / beta if by_mass else 0.0
+    # each flow is counted at its outlet for the pump, at its inlet for a leak: the denser side is chamber 1 if dp > 0
+    at_1 = pumped * where(pumped > 0.0, 1.0, 1.0 - swelling) - leaked * where(dp > 0.0, 1.0, 1.0 - swelling)
+    at_2 = pumped * where(pumped > 0.0, 1.0 + swelling, 1.0) - leaked * where(dp > 0.0, 1.0 + swelling, 1.0)
+    stiffness_1 = beta - (p1 - ATMOSPHERE) if by_mass else beta
+    stiffness_2 = beta - (p2 - ATMOSPHERE) if by_mass else beta
+    return (
+        stiffness_1 * (at_1 - A * velocity + into_1) / (V + A * position),
+        stiffness_2 * (A * velocity - at_2 + into_2) / (V - A * position),
+    )
+
+
+def flow_rates(
+    state: tuple[Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar, *, by_mass: bool = False
+) -> tuple[Scalar, Scalar]:
+    """Return the rates of the flow form: both flows are measured.
+
+    Parameters
+    ----------
+    state : tuple of float or Expression
+        Absolute pressures of both chambers [Pa].
+    drives : tuple
+        Motor speed [rad/s] and piston position [m] at the start and end of the step, and its length [s].
+    p : namespace
+        As `chamber_rates` needs them, and `speed_lead` [s].
+    share : float or Expression
+        How far into the step [fraction].
+    by_mass : bool
+        See `chamber_rates`.
+
+    Returns
+    -------
+    tuple of float or Expression
+        Rates [Pa/s].
+    """
+    speeds, (x, next_x), step = drives
+    delivery = Delivery(delivered_flow(speeds, p, step, share), (next_x - x) / step, x + share * (next_x - x))
+    return chamber_rates(state, delivery, p, by_mass=by_mass)
+
+
+def _by_mass(state: tuple[Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, Scalar]:
+    return flow_rates(state, drives, p, share, by_mass=True)
+
+
+def _at_rest(p: SimpleNamespace) -> tuple[Scalar, Scalar]:
+    return p.accumulator_pressure, p.accumulator_pressure
+
+
+def _differential(state: tuple[Scalar, Scalar]) -> tuple[Scalar]:
+    return (state[0] - state[1],)
+
+
+FLOW_FORM = GreyBoxModel(
+    name="flow",
+    drives=("motor_speed_rad_s", "position_m"),
+    outputs=("differential_pressure_pa",),
+    unknowns=(
+        "bulk_modulus",
+        "leakage_coefficient",
+        "flow_bias",
+        "makeup_conductance",
+        "makeup_opening",
+        "case_leakage",
+        "speed_lead",
+    ),
+    initial=_at_rest,
+    rates=flow_rates,
+    observe=_differential,
+    parameters=EhaParameters,
+    linear=(("speed_lead", 1e-5),),
+    jump=(0.5, -0.5),
+)
+"""The flow form with its unknowns, balanced by volume; friction is none of them."""
+
+MASS_FLOW_FORM = replace(FLOW_FORM, name="flow_mass", rates=_by_mass)
+"""The same, balanced by mass."""
+
+
+def relieving(form: GreyBoxModel) -> GreyBoxModel:
+    """Return the form for a log in which the relief valve opens: its setting and slope are then unknown too.
+
+    Parameters
+    ----------
+    form : GreyBoxModel
+        A flow form.
+
+    Returns
+    -------
+    GreyBoxModel
+        The form with two more unknowns.
+    """
+    return replace(
+        form, name=f"{form.name}_relieving", unknowns=(*form.unknowns, "relief_pressure", "relief_conductance")
+    )

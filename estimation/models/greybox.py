@@ -1,0 +1,99 @@
+"""Grey-box models: physics with unknown parameters, to be fitted to a log.
+
+`estimation.fits.greybox_loops` predicts a log with exact sensitivities, `estimation.fits.greybox_fit` finds the
+unknowns.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.compiled.functions import Scalar
+from plant.solvers.steps import Parameters
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GreyBoxModel:
+    """A model whose unknown parameters are fitted to a log.
+
+    Unknowns are fitted as logarithms: they stay positive, and a start that is wrong by a factor is as near as one that
+    is wrong by its inverse. One that may be negative is fitted as it is, in units of a typical size.
+
+    Parameters
+    ----------
+    name : str
+        Name, for the kernel's file.
+    drives : tuple of str
+        Channels that drive the model; linear between samples.
+    outputs : tuple of str
+        Channels that are fitted.
+    unknowns : tuple of str
+        Parameters that are fitted.
+    initial : callable
+        ``initial(parameters)``: the state before the first sample, in SI.
+    rates : callable
+        ``rates(state, drives, parameters, share)`` in SI a second, where drives holds each channel's value at start and
+        end of a step, then the step's length [s], and share is how far into the step [fraction].
+    observe : callable
+        ``observe(state)``: the predicted outputs in SI.
+    parameters : type
+        Frozen dataclass of numbers that the functions read beside the unknowns, which may be fields of it.
+    linear : tuple of (str, float)
+        The unknowns that may be negative, each with a typical size in SI.
+    jump : tuple of float
+        Change of the state in SI that stands for a unit of what a gap in the drives leaves open; none where the model
+        bears no gaps.
+    """
+
+    name: str
+    drives: tuple[str, ...]
+    outputs: tuple[str, ...]
+    unknowns: tuple[str, ...]
+    initial: Callable[[Any], tuple[Scalar, ...]]
+    rates: Callable[[Any, Any, Any, Scalar], tuple[Scalar, ...]]
+    observe: Callable[[Any], tuple[Scalar, ...]]
+    parameters: type[Parameters]
+    linear: tuple[tuple[str, float], ...] = ()
+    jump: tuple[float, ...] = ()
+
+    def theta(self, values: Mapping[str, float]) -> Array:
+        """Return the fitted coordinates of the unknowns.
+
+        Parameters
+        ----------
+        values : Mapping[str, float]
+            The unknowns in SI.
+
+        Returns
+        -------
+        ndarray, shape (unknowns,)
+            Logarithms, or multiples of the typical size [dimensionless].
+        """
+        sizes = dict(self.linear)
+        return np.array(
+            [values[name] / sizes[name] if name in sizes else np.log(values[name]) for name in self.unknowns]
+        )
+
+    def values(self, theta: Array) -> Mapping[str, float]:
+        """Return the unknowns from their fitted coordinates.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Logarithms, or multiples of the typical size [dimensionless].
+
+        Returns
+        -------
+        Mapping[str, float]
+            The unknowns in SI.
+        """
+        sizes = dict(self.linear)
+        return {
+            name: float(t * sizes[name] if name in sizes else np.exp(t))
+            for name, t in zip(self.unknowns, theta, strict=True)
+        }

@@ -1,0 +1,234 @@
+"""`ProcessModel`: what a filter believes about how the state moves and what the sensors see.
+
+To add a model, write its step as plain arithmetic on a tuple of scalars and name its states; kernels, Jacobians and
+every filter follow from that (`estimation.models.eha_forms` has two examples).
+"""
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
+from math import inf, log
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.models.gaussian import Gaussian
+from plant.compiled.functions import Scalar
+from plant.errors import HydrostateError, LogError
+from plant.runs import steps_a_sample
+from plant.solvers.steps import Parameters
+
+Array = NDArray[np.float64]
+
+OPENING = "opening_"
+"""What a drive is called, before a state's name, that holds the variance that a sample adds to the state beside the
+process noise, in the filter's units [dimensionless]: see `estimation.log_checks.bridging`."""
+
+Opening: TypeAlias = Callable[[Any, Mapping[str, Array], float], tuple[Array, Mapping[str, float]]]
+"""``opening(parameters, unknown, sample time [s])``: with the variance of what each drive did within gaps (of position,
+where it was; of any other, its integral), the variance that each sample adds to some quantity, and how far the states
+move with a unit of it."""
+
+
+@dataclass(frozen=True)
+class StateVariable:
+    """One state of a process model.
+
+    Parameters
+    ----------
+    name : str
+        Name with unit suffix, as in log columns.
+    unit : str
+        SI unit.
+    scale : float
+        Size of one unit inside the filter, in SI: the filter's numbers are then of order one (errata E10)
+        [in the state's unit].
+    noise_density : float
+        Random-walk intensity of the process noise [state's unit squared a second].
+    lower, upper : float
+        Physical bounds that the estimate is held to [in the state's unit].
+    logarithmic : bool
+        Whether the filter works on the logarithm of the state over its scale: the state then stays positive, a factor
+        is as near as its inverse, and the noise density is that of the logarithm [1/s].
+    """
+
+    name: str
+    unit: str
+    scale: float
+    noise_density: float
+    lower: float = -inf
+    upper: float = inf
+    logarithmic: bool = False
+
+    @property
+    def scaled_bounds(self) -> tuple[float, float]:
+        """Physical bounds in the filter's units [dimensionless]."""
+        if not self.logarithmic:
+            return self.lower / self.scale, self.upper / self.scale
+        low = log(self.lower / self.scale) if self.lower > 0.0 else -inf
+        return low, log(self.upper / self.scale) if self.upper < inf else inf
+
+
+@dataclass(frozen=True)
+class ProcessModel:
+    """A process model.
+
+    Parameters
+    ----------
+    name : str
+        Name in reports and JSON.
+    states : tuple of StateVariable
+        The states, in the order of the step's tuple.
+    step : callable
+        ``step(state, (speed at start, speed at end), parameters, h)`` in SI; with several drives, one such pair each.
+    observe : callable
+        ``observe(state, parameters)``, which returns the predicted value [SI] of each channel that it can predict.
+    longest_step : float
+        Longest step that the model takes well; slower logs are sub-stepped [s].
+    drives : tuple of str
+        Channels that drive the model; linear between samples.
+    parameters : type
+        Frozen dataclass of floats that `step` and `observe` read.
+    opening : callable, optional
+        What gaps in the drives leave open; if not given, straight lines across them are believed.
+    """
+
+    name: str
+    states: tuple[StateVariable, ...]
+    step: Callable[[Any, Any, Any, Scalar], tuple[Scalar, ...]]
+    observe: Callable[[Any, Any], Mapping[str, Scalar]]
+    longest_step: float
+    drives: tuple[str, ...] = ("motor_speed_rad_s",)
+    parameters: type[Parameters] = field(kw_only=True)
+    opening: Opening | None = field(default=None, kw_only=True)
+
+    def substeps(self, sample_time: float) -> int:
+        """Return how many steps of the model a sample needs.
+
+        Parameters
+        ----------
+        sample_time : float
+            Seconds between samples [s].
+
+        Returns
+        -------
+        int
+            At least 1.
+        """
+        return steps_a_sample(sample_time, self.longest_step)
+
+    @property
+    def width(self) -> int:
+        """Count of states."""
+        return len(self.states)
+
+    def to_filter(self, belief: Gaussian) -> Gaussian:
+        """Return a belief in the filter's units.
+
+        Parameters
+        ----------
+        belief : Gaussian
+            In SI; a logarithmic state's deviation is taken relative to its mean.
+
+        Returns
+        -------
+        Gaussian
+            The same, scaled.
+
+        Raises
+        ------
+        HydrostateError
+            If a logarithmic state's mean is not positive.
+        """
+        mean = belief.mean.copy()
+        slope = np.array([state.scale for state in self.states])
+        for i, state in enumerate(self.states):
+            if state.logarithmic:
+                if mean[i] <= 0.0:
+                    raise HydrostateError(f"the first guess of {state.name} must be positive, got {mean[i]}")
+                slope[i], mean[i] = mean[i], log(mean[i] / state.scale)
+            else:
+                mean[i] /= state.scale
+        return Gaussian(mean, belief.covariance / np.outer(slope, slope))
+
+    def to_si(self, mean: Array) -> tuple[Array, Array]:
+        """Return states in SI, and by how much each moves with the filter's number.
+
+        Parameters
+        ----------
+        mean : ndarray, shape (..., n)
+            States in the filter's units [dimensionless].
+
+        Returns
+        -------
+        tuple of ndarray, each shape (..., n)
+            The states, and the slopes that turn the filter's standard deviations into SI.
+        """
+        scale = np.array([state.scale for state in self.states])
+        rising = np.array([state.logarithmic for state in self.states])
+        with np.errstate(over="ignore", invalid="ignore"):  # a filter that diverges overflows, and must show it
+            grown = scale * np.exp(np.where(rising, mean, 0.0))
+            return np.where(rising, grown, scale * mean), grown
+
+    @property
+    def noise_units(self) -> Array:
+        """What the filter's process-noise densities are counted in, shape (n,) [SI squared; 1 of a logarithm]."""
+        return np.array([1.0 if state.logarithmic else state.scale**2 for state in self.states])
+
+    def noise_densities(self, noise: Mapping[str, float] | None) -> Array:
+        """Return process-noise densities in the filter's units.
+
+        Parameters
+        ----------
+        noise : Mapping[str, float] or None
+            Densities that replace the model's, by state name [SI squared a second]; of a logarithmic state, those of
+            the logarithm [1/s].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            One a state [1/s].
+        """
+        given = noise or {}
+        return np.array([given.get(state.name, state.noise_density) for state in self.states]) / self.noise_units
+
+    def require_drives(self, record: Collection[str]) -> None:
+        """Refuse a record that lacks what drives the model.
+
+        Parameters
+        ----------
+        record : collection of str
+            The record, or the names of its channels.
+
+        Raises
+        ------
+        LogError
+            If it lacks a drive.
+        """
+        missing = [drive for drive in self.drives if drive not in record]
+        if missing:
+            wanted = ", ".join(self.drives)
+            raise LogError(f"the {self.name} form needs {wanted}, the record lacks {', '.join(missing)}")
+
+    def index(self, name: str) -> int:
+        """Return the position of a state.
+
+        Parameters
+        ----------
+        name : str
+            State name.
+
+        Returns
+        -------
+        int
+            Its index.
+
+        Raises
+        ------
+        KeyError
+            If the model has no such state.
+        """
+        for i, state in enumerate(self.states):
+            if state.name == name:
+                return i
+        raise KeyError(f"{self.name} has no state {name!r}, it has {[state.name for state in self.states]}")

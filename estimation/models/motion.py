@@ -1,0 +1,125 @@
+"""The motion form: bulk modulus from motor speed and position alone, where no pressure is logged.
+
+The chambers are those of the flow form, but their pressures are not seen: they push the piston, and what the log shows
+is how it starts, stops and rings. So friction is part of the model, and a bristle that yields before it slides, since
+its stiffness acts beside the oil's. What holds the scale of the pressures is little: the moving mass, and the inner
+circuit's pressure, at which make-up begins.
+"""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+from estimation.models.flow import Delivery, chamber_rates, delivered_flow
+from estimation.models.greybox import GreyBoxModel
+from plant.compiled.functions import Scalar, absolute, maximum
+from plant.eha.model import EhaParameters
+
+Friction = Callable[[Scalar, Scalar, SimpleNamespace], tuple[Scalar, Scalar]]
+"""``friction(velocity [m/s], bristle [fraction of its deflection at a_3], parameters)``, which returns the bristle's
+rate [1/s] and the force against the motion [N]."""
+
+UNKNOWNS = (
+    "bulk_modulus",
+    "leakage_coefficient",
+    "flow_bias",
+    "makeup_conductance",
+    "case_leakage",
+    "speed_lead",
+    "friction_quadratic",
+    "friction_linear",
+    "friction_coulomb",
+    "bristle_stiffness",
+    "bristle_damping",
+)
+"""What is fitted; stiffness in N/m and damping in N s/m, the rest as named in the nomenclature."""
+
+SEATED = 1.0
+"""Drop at which a make-up valve is half open here, where nothing shows it [Pa]: it opens at once."""
+
+TYPICAL_LINEAR_FRICTION = 2e3
+"""Size in which the linear friction a_2 is fitted, which may be negative (errata E12) [N s/m]."""
+
+
+def lagging_friction(velocity: Scalar, bristle: Scalar, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
+    """Return a bristle's rate and force where the bristle carries the whole steady law of equation 5.10.
+
+    Friction then follows a change of speed only after a distance, ``force / stiffness``. Source: Canudas de Wit et al.,
+    IEEE Transactions on Automatic Control 40 (1995), equations 1 to 3, with equation 5.10 as g(v).
+
+    Parameters
+    ----------
+    velocity : float or Expression
+        Piston velocity [m/s].
+    bristle : float or Expression
+        Deflection over that at which it carries a_3 [dimensionless].
+    p : namespace
+        The coefficients of friction and of the bristle.
+
+    Returns
+    -------
+    tuple of float or Expression
+        Rate [1/s] and force [N].
+    """
+    speed = absolute(velocity)
+    law = 1.0 + (p.friction_linear + p.friction_quadratic * speed) * speed / p.friction_coulomb
+    deflection = p.friction_coulomb / p.bristle_stiffness
+    rate = (velocity - speed * bristle / law) / deflection
+    return rate, p.friction_coulomb * bristle + p.bristle_damping * deflection * rate
+
+
+def parallel_friction(velocity: Scalar, bristle: Scalar, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
+    """Return a bristle's rate and force where it carries a_3 alone, and what depends on speed acts beside it.
+
+    What falls with speed stays in the bristle, as in `plant.components.presliding`.
+
+    Parameters
+    ----------
+    velocity : float or Expression
+        Piston velocity [m/s].
+    bristle : float or Expression
+        Deflection over that at which it carries a_3 [dimensionless].
+    p : namespace
+        The coefficients of friction and of the bristle.
+
+    Returns
+    -------
+    tuple of float or Expression
+        Rate [1/s] and force [N].
+    """
+    speed = absolute(velocity)
+    falling = maximum(-p.friction_linear, 0.0)
+    deflection = p.friction_coulomb / p.bristle_stiffness
+    rate = (velocity - speed * bristle * (1.0 + falling * speed / p.friction_coulomb)) / deflection
+    damping = p.bristle_damping * deflection / (1.0 + p.bristle_damping / p.friction_coulomb * speed)
+    rest = p.friction_quadratic - falling * falling / (p.friction_coulomb + falling * speed)
+    beside = (maximum(p.friction_linear, 0.0) + rest * speed) * velocity
+    return rate, p.friction_coulomb * bristle + damping * rate + beside
+
+
+def _form(name: str, friction: Friction) -> GreyBoxModel:
+    def rates(state: Any, drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
+        _, velocity, bristle, p1, p2 = state
+        speeds, (x, next_x), step = drives
+        yielding, force = friction(velocity, bristle, p)
+        delivery = Delivery(delivered_flow(speeds, p, step, share), velocity, x + share * (next_x - x))
+        circuit = SimpleNamespace(**vars(p), makeup_opening=SEATED)
+        pushing = chamber_rates((p1, p2), delivery, circuit, by_mass=False)
+        return velocity, (p.piston_area * (p1 - p2) - force) / p.moving_mass, yielding, *pushing
+
+    return GreyBoxModel(
+        name=name,
+        drives=("motor_speed_rad_s", "position_m"),
+        outputs=("position_m",),
+        unknowns=UNKNOWNS,
+        initial=lambda p: (0.0, 0.0, 0.0, p.accumulator_pressure, p.accumulator_pressure),
+        rates=rates,
+        observe=lambda state: (state[0],),
+        parameters=EhaParameters,
+        linear=(("friction_linear", TYPICAL_LINEAR_FRICTION),),
+    )
+
+
+MOTION_FORMS = (_form("motion_lagging", lagging_friction), _form("motion_parallel", parallel_friction))
+"""The motion form with either structure of friction; position is counted from where the log begins, and the measured
+one sets the chambers' volumes."""

@@ -1,0 +1,104 @@
+"""What checks, fits and filters of the gear-pump actuator may bring up."""
+
+from plant.notes import Code
+
+
+class SensorCode(Code):
+    """Notes on the sensors of a log."""
+
+    SENSOR_FROZE = (
+        "sensor_froze",
+        "{channel} repeats {value:.6g} from {begin_s:.3g} s for {length_s:.3g} s while the others move: "
+        "the sensor froze",
+    )
+    SENSOR_CONSTANT = (
+        "sensor_constant",
+        "{channel} is {value:g} Pa throughout: the sensor is dead, or not connected",
+    )
+    SENSOR_NOISE_ONLY = (
+        "sensor_noise_only",
+        "{channel} shows {noise:.3g} Pa of noise and nothing else while the motor turns: the sensor is dead",
+    )
+    SENSOR_CLIPPED = (
+        "sensor_clipped",
+        "{channel} is at the end of its range, {levels} Pa, in {percent:.2g} % of its samples; they are left out",
+    )
+    OUTLIERS_LEFT_OUT = (
+        "outliers_left_out",
+        "{channel} stands out grossly in {count} of {total} samples; they are left out",
+    )
+    SENSORS_DISAGREE = (
+        "sensors_disagree",
+        "velocity_m_s and the slope of position_m differ by {difference_m_s:.2g} m/s: one of the two sensors is wrong",
+    )
+
+
+class EstimateCode(Code):
+    """Notes on an estimate of bulk modulus: what speaks against it, or what it lacks."""
+
+    NOT_DETERMINED = (
+        "not_determined",
+        "the coefficients are not separately determined by this record (a pole cancels a zero, or the order is too "
+        "high): the covariance is a lower bound",
+    )
+    BOUND_TOO_WIDE = (
+        "bound_too_wide",
+        "the Cramér-Rao bound is {percent:.0f} % of the value, over 3 %: not observable",
+    )
+    DIVERGED = "diverged", "the estimate stopped being finite; check units, rig parameters and the form"
+    PRESSURE_RESIDUALS_LARGE = (
+        "pressure_residuals_large",
+        "the pressure residuals are {ratio:.1f} times larger than the sensor's noise: "
+        "the log does something that the flow balance does not know",
+    )
+    PRESSURE_RESIDUALS_CORRELATED = (
+        "pressure_residuals_correlated",
+        "neighbouring pressure residuals are correlated by {correlation:.2f}: "
+        "the log does something that the flow balance does not know",
+    )
+    POSITION_RESIDUALS_LARGE = (
+        "position_residuals_large",
+        "the position residuals are {ratio:.2f} times larger than the sensors' noise: "
+        "neither structure of friction explains how the piston starts and stops, and bulk modulus may be far off",
+    )
+    FRICTION_LAWS_DISAGREE = (
+        "friction_laws_disagree",
+        "two structures of friction explain the log alike and put bulk modulus at {least_pa:.3g} and {most_pa:.3g} Pa",
+    )
+    INNOVATIONS_LARGE = (
+        "innovations_large",
+        "the residuals of {channel} are {ratio:.1f} times larger than the filter expects (NIS {nis:.1f}, "
+        "1 is expected): model and log disagree, and the interval is too narrow",
+    )
+    INNOVATIONS_FOLLOW_DRIVE = (
+        "innovations_follow_drive",
+        "the residuals of {channel} hold {excess:.3g} times the power of white noise near {frequency_hz:.3g} Hz, where "
+        "the drive is: the model does not answer it as the log does, and the interval is up to {narrow:.2g} times too "
+        "narrow",
+    )
+    INNOVATIONS_BESIDE_DRIVE = (
+        "innovations_beside_drive",
+        "the residuals of {channel} hold {excess:.3g} times the power of white noise near {frequency_hz:.3g} Hz, "
+        "beside the drive: a friction, a valve or a pick-up that the model does not know, and the interval is up to "
+        "{narrow:.2g} times too narrow",
+    )
+    ESTIMATE_WANDERS = (
+        "estimate_wanders",
+        "{state} moved between stretches of the log {ratio:.0f} times as far as its interval allows: they disagree "
+        "about it, and the interval is too narrow",
+    )
+    NOT_SETTLED = (
+        "not_settled",
+        "{state} still moved by {moved:.3g} over the last fifth of the log: it has not settled",
+    )
+    AT_PHYSICAL_BOUND = "at_physical_bound", "{state} ended at its physical bound ({value:.3g} {unit})"
+    PRESSURE_ABSENT = (
+        "pressure_absent",
+        "without differential_pressure_pa the estimate rests on how the piston starts, stops and rings, so on a "
+        "friction model that is right, which no foreign bench grants; while the piston sticks nothing is left "
+        "(errata E13)",
+    )
+    PRESSURE_UNUSED = (
+        "pressure_unused",
+        "the acceleration form does not use differential_pressure_pa, and breaks down at reversals (errata E9)",
+    )

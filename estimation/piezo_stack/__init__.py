@@ -1,0 +1,1 @@
+"""Air, leaks, friction and reeds of the piezo-stack actuator from a log."""

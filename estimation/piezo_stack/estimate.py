@@ -1,0 +1,262 @@
+"""What is wrong inside a piezo-stack actuator, from what its bench logs: output error by least squares.
+
+The drive is known, so the whole run is simulated and fitted to every channel at once, each weighed by its noise. The
+run must begin at rest at the bias pressure.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from math import sqrt
+from types import MappingProxyType, SimpleNamespace
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.finding import interval_95
+from estimation.piezo_stack.runs import COARSE_SLOPE_STEP, COARSE_STEP, STACK_CHANNELS, StackRuns, prepared
+from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS
+from plant.log.record import Record
+from plant.piezo_stack.parameters import LONGEST_STEP, PiezoStackParameters
+from plant.piezo_stack.run import BENCH_SENSORS, StackSensors, checked_voltage
+
+Array: TypeAlias = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StackEstimate:
+    """What a log says of the actuator.
+
+    Parameters
+    ----------
+    values : Mapping[str, float]
+        Estimates by name [SI]; polarisation as a factor.
+    deviations : Mapping[str, float]
+        Standard deviations by name [SI], wider where the residuals are larger than the noise.
+    correlations : ndarray, shape (unknowns, unknowns)
+        Between the scaled estimates.
+    misfit : Mapping[str, float]
+        Root mean square of each channel's residual over its noise; 1 for the right model [dimensionless].
+    evaluations : int
+        Runs that it took.
+    parameters : PiezoStackParameters or namespace
+        The actuator with the estimates in it.
+    """
+
+    values: Mapping[str, float]
+    deviations: Mapping[str, float]
+    correlations: Array
+    misfit: Mapping[str, float]
+    evaluations: int
+    parameters: PiezoStackParameters | SimpleNamespace
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """Return a quantity's 95 % interval.
+
+        Parameters
+        ----------
+        name : str
+            The quantity.
+
+        Returns
+        -------
+        tuple of float
+            Lower and upper end [SI].
+        """
+        return interval_95(self.values[name], self.deviations[name])
+
+
+def estimate_stack(
+    record: Record,
+    healthy: PiezoStackParameters,
+    *,
+    unknowns: Collection[str] = DEFAULT_UNKNOWNS,
+    channels: Collection[str] = STACK_CHANNELS,
+    sensors: StackSensors = BENCH_SENSORS,
+    starts: Sequence[Mapping[str, float]] = STARTS,
+) -> StackEstimate:
+    """Estimate what is wrong inside the actuator from a run that began at rest.
+
+    Parameters
+    ----------
+    record : Record
+        ``drive_voltage_v`` and one or more of `STACK_CHANNELS`.
+    healthy : PiezoStackParameters
+        The actuator as it should be, at the run's bias pressure and load.
+    unknowns : collection of str
+        What is estimated, of `UNKNOWNS`.
+    channels : collection of str
+        What is used of what is logged.
+    sensors : StackSensors
+        Noise of the channels.
+    starts : sequence of Mapping[str, float]
+        First guesses, scaled as in `UNKNOWNS` [dimensionless].
+
+    Returns
+    -------
+    StackEstimate
+        Estimates with intervals.
+
+    Raises
+    ------
+    LogError
+        If the drive or every channel is missing, or samples are.
+    HydrostateError
+        If an unknown is not known, or no first guess is made of them.
+    """
+    runs, measured = prepared(record, healthy, tuple(unknowns), channels, sensors)
+    guesses = runs.ordered(measured, starts)
+
+    theta, residuals, slopes = _descended(runs, measured, guesses[0])
+    for guess in guesses[1:_MOST_GUESSES]:
+        if _spread(residuals, theta) < _UNEXPLAINED:
+            break
+        other = _descended(runs, measured, guess)
+        if float(other[1] @ other[1]) < float(residuals @ residuals):
+            theta, residuals, slopes = other
+    spread = max(1.0, _spread(residuals, theta))
+    return _concluded(runs, theta, residuals, spread * covariance(slopes))
+
+
+def covariance(slopes: Array) -> Array:
+    """Return the covariance of scaled estimates from the slopes of scaled channels: the Cramér-Rao bound.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape (n, unknowns)
+        Slopes of channels over noise.
+
+    Returns
+    -------
+    ndarray, shape (unknowns, unknowns)
+        Covariance [dimensionless]; very large where nothing is known.
+    """
+    size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
+    return np.linalg.pinv((slopes / size).T @ (slopes / size), rcond=1e-14) / np.outer(size, size)
+
+
+def stack_bounds(
+    parameters: PiezoStackParameters,
+    voltage: Array,
+    sample_time: float,
+    *,
+    unknowns: Collection[str] = DEFAULT_UNKNOWNS,
+    channels: Collection[str] = STACK_CHANNELS,
+    sensors: StackSensors = BENCH_SENSORS,
+) -> Mapping[str, float]:
+    """Return how well an experiment could know each quantity: Cramér-Rao bounds, all unknown together.
+
+    Parameters
+    ----------
+    parameters : PiezoStackParameters
+        The actuator.
+    voltage : ndarray, shape (n,)
+        Drive at the samples [V].
+    sample_time : float
+        Seconds between samples [s].
+    unknowns : collection of str
+        What is unknown, of `UNKNOWNS`.
+    channels : collection of str
+        What is logged.
+    sensors : StackSensors
+        Noise of the channels.
+
+    Returns
+    -------
+    Mapping[str, float]
+        Standard deviation by name [SI]; of factors, relative.
+    """
+    noise = {name: value for name, value in asdict(sensors).items() if name in channels}
+    runs = StackRuns(checked_voltage(voltage), sample_time, parameters, tuple(unknowns), noise)
+    deviations = np.sqrt(np.diag(covariance(runs.around(np.zeros(len(runs.names)), LONGEST_STEP)[1])))
+    return {
+        name: (UNKNOWNS[name].scale or 1.0) * float(deviation)
+        for name, deviation in zip(runs.names, deviations, strict=True)
+    }
+
+
+def _descended(runs: StackRuns, measured: Array, start: Array) -> tuple[Array, Array, Array]:
+    """Descend by Levenberg and Marquardt in coarse runs, then by Gauss and Newton in exact ones.
+
+    It ends where a step is a tenth of the standard deviations, which no reader could tell from none.
+    """
+    theta = _coarsely_descended(runs, measured, start)
+    found, slopes = runs.around(theta, LONGEST_STEP)
+    known = covariance(slopes)
+    residuals = found - measured
+    for _ in range(_MOST_EXACT):
+        changes = np.outer(_SHORTENED, -known @ (slopes.T @ residuals))
+        change, tried = _best(runs, measured, theta, changes, LONGEST_STEP)
+        if float(tried @ tried) >= float(residuals @ residuals):
+            break
+        theta, residuals = theta + change, tried
+        if _share(change, known) < _DONE:
+            break
+    return theta, residuals, slopes
+
+
+def _coarsely_descended(runs: StackRuns, measured: Array, start: Array) -> Array:
+    """Descend by Levenberg and Marquardt, several dampings tried side by side."""
+    theta = start
+    found, slopes = runs.around(theta, COARSE_STEP, COARSE_SLOPE_STEP)
+    residuals = found - measured
+    for _ in range(_MOST_STEPS):
+        normal = slopes.T @ slopes
+        own = np.diag(np.diag(normal) + 1e-12)
+        changes = np.array([np.linalg.solve(normal + d * own, -slopes.T @ residuals) for d in _DAMPINGS])
+        if _share(changes[0], covariance(slopes)) < _NEAR:
+            break
+        change, tried = _best(runs, measured, theta, np.asarray(changes, dtype=np.float64), COARSE_STEP)
+        if float(tried @ tried) >= float(residuals @ residuals):
+            break
+        theta = theta + change
+        found, slopes = runs.around(theta, COARSE_STEP, COARSE_SLOPE_STEP)
+        residuals = found - measured
+    return theta
+
+
+def _best(runs: StackRuns, measured: Array, theta: Array, changes: NDArray[Any], step: float) -> tuple[Array, Array]:
+    """Return the change, of several run side by side, that leaves the least, and what it leaves."""
+    tried = runs.scaled([*(theta + changes)], step) - measured
+    best = int(np.argmin(np.sum(tried**2, axis=1)))
+    return changes[best], tried[best]
+
+
+def _share(change: NDArray[Any], known: Array) -> float:
+    """Return the largest change over its standard deviation."""
+    return float(np.max(np.abs(change) / np.sqrt(np.diag(known))))
+
+
+_MOST_STEPS = 30
+_NEAR = 3.0
+_DONE = 0.1
+_SHORTENED = (1.0, 0.5, 0.2)
+_MOST_EXACT = 6
+_DAMPINGS = (1e-6, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 1e2, 1e4)
+_UNEXPLAINED = 1.1
+_MOST_GUESSES = 4
+
+
+def _spread(residuals: Array, theta: Array) -> float:
+    return float(residuals @ residuals) / (len(residuals) - len(theta))
+
+
+def _concluded(runs: StackRuns, theta: Array, residuals: Array, scaled: Array) -> StackEstimate:
+    p = runs.actuator(theta)
+    deviations = np.sqrt(np.diag(scaled))
+    values: dict[str, float] = {}
+    spread: dict[str, float] = {}
+    for i, name in enumerate(runs.names):
+        unknown = UNKNOWNS[name]
+        found = getattr(p, unknown.names[0])
+        values[name] = found / getattr(runs.healthy, unknown.names[0]) if len(unknown.names) > 1 else found
+        spread[name] = float(deviations[i]) * (unknown.scale or values[name])
+    parts = np.split(residuals, len(runs.noise))
+    return StackEstimate(
+        MappingProxyType(values),
+        MappingProxyType(spread),
+        scaled / np.outer(deviations, deviations),
+        {name: sqrt(float(np.mean(part**2))) for name, part in zip(runs.noise, parts, strict=True)},
+        runs.count,
+        p,
+    )

@@ -1,0 +1,159 @@
+"""`stack_finding(record, healthy) -> Finding`: what a log of the piezo-stack actuator says, and what it does not."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.finding import Finding, Gate, Outcome, Quantity
+from estimation.piezo_stack.estimate import StackEstimate, estimate_stack, stack_bounds
+from estimation.piezo_stack.runs import STACK_CHANNELS
+from estimation.piezo_stack.unknowns import UNKNOWNS
+from plant.log.record import Record
+from plant.notes import Code
+from plant.piezo_stack.parameters import PiezoStackParameters
+from plant.piezo_stack.trajectory import NAME
+
+MOST_MISFIT = 1.1
+"""Residual over noise above which the model does not describe a log; with 1000 samples chance leaves 1.05 at most."""
+
+MOST_DEVIATION = 0.30
+"""Standard deviation over the healthy value, or over a small fault's, above which no number is given."""
+
+SMALLEST_FAULT: Mapping[str, float] = {"chamber_leakage": 5e-12, "crossport_leakage": 5e-12, "coulomb_friction": 100.0}
+"""Sizes that leaks and friction are judged by, which are nothing or little when healthy [SI]."""
+
+UNITS: Mapping[str, str] = {
+    "air_fraction": "1",
+    "chamber_leakage": "m^3/(s Pa)",
+    "crossport_leakage": "m^3/(s Pa)",
+    "coulomb_friction": "N",
+    "polarisation": "1",
+    "outlet_reed_stiffness": "N/m",
+    "inlet_reed_stiffness": "N/m",
+    "outlet_reed_gap": "m",
+    "inlet_reed_gap": "m",
+}
+"""Unit of each quantity."""
+
+
+class StackCode(Code):
+    """Notes on an estimate of the piezo-stack actuator."""
+
+    CHANNEL_MISSED = "channel_missed", "{channel} is missed by {ratio:.3g} times its noise"
+    QUANTITIES_NOT_TOLD = "quantities_not_told", "these sensors do not tell {names}"
+
+
+def stack_finding(
+    record: Record, healthy: PiezoStackParameters, *, channels: tuple[str, ...] = STACK_CHANNELS
+) -> Finding:
+    """Estimate air, leaks, friction, polarisation and reeds from a run that began at rest.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    healthy : PiezoStackParameters
+        The actuator as it should be, at the run's bias pressure and load.
+    channels : tuple of str
+        What is used of what is logged.
+
+    Returns
+    -------
+    Finding
+        Its evidence is the `StackEstimate`.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be used.
+    """
+    found = estimate_stack(record, healthy, channels=channels)
+    quantities = stack_quantities(found, healthy)
+    lost = [name for name, one in quantities.items() if one.value is None]
+    reasons = tuple(StackCode.CHANNEL_MISSED.note(channel=name, ratio=ratio) for name, ratio in missed(found).items())
+    if reasons:
+        quantities = {name: Quantity(None, one.unit, None, one.std) for name, one in quantities.items()}
+    told = Outcome.NOT_OBSERVABLE if len(lost) == len(quantities) else Outcome.OK
+    return Finding(
+        actuator=NAME,
+        outcome=Outcome.MISMATCH if reasons else told,
+        quantities=quantities,
+        gate=Gate(not reasons, reasons),
+        channels=tuple(found.misfit),
+        not_told=(StackCode.QUANTITIES_NOT_TOLD.note(names=", ".join(lost)),) if lost else (),
+        evidence=found,
+    )
+
+
+def stack_prospect(
+    actuator: PiezoStackParameters,
+    voltage: NDArray[np.float64],
+    sample_time: float,
+    *,
+    channels: tuple[str, ...] = STACK_CHANNELS,
+) -> Finding:
+    """Say what a run would tell, before it is made: Cramér-Rao bounds, all unknown together.
+
+    Parameters
+    ----------
+    actuator : PiezoStackParameters
+        The actuator, at the run's bias pressure and load.
+    voltage : ndarray, shape (n,)
+        Drive at the samples [V].
+    sample_time : float
+        Seconds between samples [s].
+    channels : tuple of str
+        What would be logged.
+
+    Returns
+    -------
+    Finding
+        The actuator's own values with the least standard deviations that any method could reach.
+    """
+    quantities: dict[str, Quantity] = {}
+    for name, bound in stack_bounds(actuator, voltage, sample_time, channels=channels).items():
+        unknown = UNKNOWNS[name]
+        value = 1.0 if len(unknown.names) > 1 else float(getattr(actuator, name))
+        quantities[name] = Quantity(value, UNITS[name], None, bound if unknown.scale else bound * value)
+    return Finding(NAME, Outcome.OK, quantities, Gate(True, ()), channels)
+
+
+def missed(found: StackEstimate) -> Mapping[str, float]:
+    """Return the channels that the fitted actuator does not describe.
+
+    Parameters
+    ----------
+    found : StackEstimate
+        The estimate.
+
+    Returns
+    -------
+    Mapping[str, float]
+        Residual over noise, by channel [dimensionless].
+    """
+    return {name: ratio for name, ratio in found.misfit.items() if ratio > MOST_MISFIT}
+
+
+def stack_quantities(found: StackEstimate, healthy: PiezoStackParameters) -> dict[str, Quantity]:
+    """Return every quantity with its interval; without a number where the sensors hold too little.
+
+    Parameters
+    ----------
+    found : StackEstimate
+        The estimate.
+    healthy : PiezoStackParameters
+        The actuator as it should be.
+
+    Returns
+    -------
+    dict[str, Quantity]
+        By name.
+    """
+    quantities: dict[str, Quantity] = {}
+    for name, value in found.values.items():
+        size = 1.0 if name == "polarisation" else SMALLEST_FAULT.get(name) or getattr(healthy, name) or 1e-4
+        told = found.deviations[name] < MOST_DEVIATION * size
+        numbers = (value, found.interval(name)) if told else (None, None)
+        quantities[name] = Quantity(numbers[0], UNITS[name], numbers[1], found.deviations[name])
+    return quantities

@@ -1,0 +1,97 @@
+"""What may be wrong inside a piezo-stack actuator, as scaled unknowns of a fit, and where the fit begins."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from math import exp, log
+from types import MappingProxyType, SimpleNamespace
+
+from plant.piezo_stack.parameters import PiezoStackParameters
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A quantity that may be wrong.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Parameters that change with it.
+    scale : float
+        Unit of its change in SI; 0 where it acts as a factor, whose logarithm is fitted.
+    """
+
+    names: tuple[str, ...]
+    scale: float = 0.0
+
+
+UNKNOWNS: Mapping[str, Unknown] = MappingProxyType(
+    {
+        "air_fraction": Unknown(("air_fraction",)),
+        "chamber_leakage": Unknown(("chamber_leakage",), 1e-11),
+        "crossport_leakage": Unknown(("crossport_leakage",), 1e-11),
+        "coulomb_friction": Unknown(("coulomb_friction",), 100.0),
+        "polarisation": Unknown(("free_stroke_a_volt", "hysteresis")),
+        "outlet_reed_stiffness": Unknown(("outlet_reed_stiffness",)),
+        "inlet_reed_stiffness": Unknown(("inlet_reed_stiffness",)),
+        "outlet_reed_gap": Unknown(("outlet_reed_gap",), 1e-4),
+        "inlet_reed_gap": Unknown(("inlet_reed_gap",), 1e-4),
+        "viscous_friction": Unknown(("viscous_friction",)),
+        "delivery_length": Unknown(("delivery_length", "return_length", "intake_length")),
+        "discharge_coefficient": Unknown(("discharge_coefficient",)),
+    }
+)
+"""What can be estimated, by name; the last three calibrate a healthy actuator."""
+
+DEFAULT_UNKNOWNS = tuple(UNKNOWNS)[:7]
+"""What is estimated unless asked otherwise."""
+
+STARTS: Sequence[Mapping[str, float]] = (
+    {},
+    {"air_fraction": log(2.0)},
+    {"air_fraction": log(4.0)},
+    {"chamber_leakage": 0.5},
+    {"chamber_leakage": 2.0},
+    {"crossport_leakage": 1.0},
+    {"crossport_leakage": 2.0},
+    {"coulomb_friction": 1.0},
+    {"coulomb_friction": 2.5},
+    {"crossport_leakage": 0.5, "coulomb_friction": 2.5},
+    {"crossport_leakage": 2.0, "coulomb_friction": 2.5},
+    {"polarisation": log(0.8)},
+    {"outlet_reed_stiffness": log(0.5)},
+    {"inlet_reed_stiffness": log(0.5)},
+    {"outlet_reed_stiffness": log(100.0)},
+    {"inlet_reed_stiffness": log(100.0)},
+)
+"""First guesses, scaled; the one that fits best is descended from."""
+
+
+def changed(healthy: PiezoStackParameters, changes: Mapping[str, float]) -> SimpleNamespace:
+    """Return an actuator with scaled changes, factors as logarithms.
+
+    Parameters
+    ----------
+    healthy : PiezoStackParameters
+        The actuator before.
+    changes : Mapping[str, float]
+        Scaled changes [dimensionless], by names of `UNKNOWNS`.
+
+    Returns
+    -------
+    namespace
+        Its parameters; not checked, so that an estimate may stray.
+
+    Examples
+    --------
+    >>> round(changed(PiezoStackParameters(), {"coulomb_friction": 0.5}).coulomb_friction, 9)
+    70.0
+    """
+    values = asdict(healthy)
+    for name, change in changes.items():
+        unknown = UNKNOWNS[name]
+        for parameter in unknown.names:
+            if unknown.scale:
+                values[parameter] += unknown.scale * change
+            else:
+                values[parameter] *= exp(min(max(change, -5.0), 5.0))
+    return SimpleNamespace(**values)

@@ -1,0 +1,1 @@
+"""May the number be believed: bounds, consistency, whiteness, identifiability."""

@@ -1,0 +1,187 @@
+"""Can an estimate be believed? NEES and NIS with their chi-square bounds, and the gate that every estimate passes.
+
+Source of the tests: Bar-Shalom, Li and Kirubarajan (2001), section 5.4. The gate asks three questions: are innovations
+as large as predicted (NIS), are they without structure where the drive is (`estimation.trust.whiteness`), and does the
+estimate move from stretch to stretch no more than its own shrinking interval allows.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.filters.run import Estimate
+from estimation.finding import Gate
+from estimation.notes import EstimateCode
+from estimation.trust.whiteness import SETTLING, Whiteness, whiteness
+from plant.log.record import Record
+from plant.notes import Note
+
+Array = NDArray[np.float64]
+
+LARGEST_NIS = 2.0
+"""Mean NIS of a channel above which the filter is called overconfident; 1 is expected [dimensionless]."""
+
+MISMATCH_NIS = 100.0
+"""Mean NIS of a channel from which the model is said not to describe the log at all [dimensionless]."""
+
+LARGEST_DRIFT = 0.03
+"""Relative change of the estimate over the last fifths of a run above which it is called unsettled [fraction]."""
+
+LARGEST_WANDER = 9.0
+"""Mean square of the estimate's moves over what its interval allows, above which they are called too large: an interval
+three times too narrow [dimensionless]."""
+
+STRETCHES = 20
+"""Stretches of a log between which an estimate's moves are judged."""
+
+
+def nees(errors: Array, covariances: Array) -> Array:
+    """Return the normalised estimation error squared of each run.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (runs, n)
+        Estimate minus truth, in the belief's units.
+    covariances : ndarray, shape (runs, n, n)
+        Covariances believed.
+
+    Returns
+    -------
+    ndarray, shape (runs,)
+        Chi-square with n degrees of freedom where the filter is consistent.
+
+    Examples
+    --------
+    >>> nees(np.array([[2.0, 0.0]]), np.array([[[4.0, 0.0], [0.0, 1.0]]])).tolist()
+    [1.0]
+    """
+    return np.einsum("ri,ri->r", errors, np.linalg.solve(covariances, errors[..., None])[..., 0])
+
+
+def mean_chi_square_bounds(degrees: int, count: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Return the interval in which the mean of chi-square statistics falls.
+
+    Parameters
+    ----------
+    degrees : int
+        Degrees of freedom of one statistic: states for NEES, channels for NIS.
+    count : int
+        How many statistics are averaged.
+    confidence : float
+        Probability of the interval [probability].
+
+    Returns
+    -------
+    tuple of float
+        Lower and upper bound.
+
+    Examples
+    --------
+    >>> low, high = mean_chi_square_bounds(2, 50)
+    >>> round(low, 2), round(high, 2)
+    (1.48, 2.59)
+    """
+    from scipy.special import gammaincinv
+
+    tail = 0.5 * (1.0 - confidence)
+    low, high = (2.0 * float(gammaincinv(0.5 * degrees * count, p)) / count for p in (tail, 1.0 - tail))  # chi-square's
+    return low, high
+
+
+def consistency_gate(estimate: Estimate, state: str, record: Record | None = None) -> Gate:
+    """Judge whether an estimate of a state can be believed.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        The filtered log; with its innovations kept, their structure counts too.
+    state : str
+        The state in question, constant in time.
+    record : Record, optional
+        The log that was filtered; without it innovations are judged by their size alone.
+
+    Returns
+    -------
+    Gate
+        Passed, or the reasons against it.
+    """
+    channels = () if record is None else whiteness(estimate, record)
+    moves = wander(estimate, state)
+    reasons = [_overconfidence(channel, nis) for channel, nis in estimate.nis.items() if nis > LARGEST_NIS]
+    reasons += [_structure(channel) for channel in channels if channel.exceeded]
+    if moves > LARGEST_WANDER:
+        reasons.append(EstimateCode.ESTIMATE_WANDERS.note(state=state, ratio=moves**0.5))
+    reasons += _unsettled(estimate, state)
+    reasons += _at_a_bound(estimate, state)
+    structure = sum(channel.excess for channel in channels if channel.exceeded)
+    return Gate(not reasons, tuple(reasons), max(1.0, moves + structure) ** 0.5, channels)
+
+
+def wander(estimate: Estimate, state: str) -> float:
+    """Return how far a constant state moves between stretches of a log, squared, over what its variance allows.
+
+    The estimate of a constant is a martingale under its own model: each stretch moves it with the variance by which
+    the stretch reduces its own. Only what comes after settling counts.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        The filtered log.
+    state : str
+        A state that is constant in time.
+
+    Returns
+    -------
+    float
+        Sum of the squared moves over the reduction of the variance [dimensionless]: 1 on average where the filter is
+        consistent, 0 where the variance was not reduced.
+    """
+    mean, std = estimate.track(state)
+    marks = np.linspace(SETTLING * (len(mean) - 1), len(mean) - 1, STRETCHES + 1).astype(int)
+    reduced = float(std[marks[0]] ** 2 - std[marks[-1]] ** 2)
+    if not reduced > 1e-9 * float(std[marks[0]]) ** 2:
+        return 0.0
+    return float(np.sum(np.diff(mean[marks]) ** 2)) / reduced
+
+
+def describes(estimate: Estimate, state: str) -> bool:
+    """Return whether the model describes the log at all, however roughly.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        The filtered log.
+    state : str
+        The state in question.
+
+    Returns
+    -------
+    bool
+        False where a channel's residuals are ten times larger than expected, or the state sits at a physical bound.
+    """
+    return not _at_a_bound(estimate, state) and all(nis < MISMATCH_NIS for nis in estimate.nis.values())
+
+
+def _overconfidence(channel: str, nis: float) -> Note:
+    return EstimateCode.INNOVATIONS_LARGE.note(channel=channel, ratio=nis**0.5, nis=nis)
+
+
+def _structure(found: Whiteness) -> Note:
+    code = EstimateCode.INNOVATIONS_FOLLOW_DRIVE if found.driven else EstimateCode.INNOVATIONS_BESIDE_DRIVE
+    return code.note(channel=found.channel, excess=found.excess, frequency_hz=found.frequency, narrow=found.excess**0.5)
+
+
+def _unsettled(estimate: Estimate, state: str) -> list[Note]:
+    mean, std = estimate.track(state)
+    fifth = max(1, len(mean) // 5)
+    last, before = float(np.mean(mean[-fifth:])), float(np.mean(mean[-2 * fifth : -fifth]))
+    allowed = 3.0 * float(std[-1]) + LARGEST_DRIFT * abs(last)
+    if abs(last - before) <= allowed:
+        return []
+    return [EstimateCode.NOT_SETTLED.note(state=state, moved=last - before)]
+
+
+def _at_a_bound(estimate: Estimate, state: str) -> list[Note]:
+    value, _ = estimate.settled(state)
+    variable = estimate.model.states[estimate.model.index(state)]
+    inside = variable.lower + variable.scale * 1e-3 < value < variable.upper * 0.999
+    return [] if inside else [EstimateCode.AT_PHYSICAL_BOUND.note(state=state, value=value, unit=variable.unit)]

@@ -1,0 +1,229 @@
+"""What a filter's innovations say of its model: how white they are, against each other and against the drive.
+
+With 1e5 samples every test of whiteness rejects every model, so significance is not the question. What counts is by how
+much an interval is too narrow. A parameter is learnt where the drive has its power; innovations that hold r times the
+power of white noise there make its standard deviation too small by up to the root of r, as the sandwich covariance
+has it for a sensitivity in that band (White 1982, theorem 3.2). Less power than white noise means that the filter is
+cautious, and is no objection. All of it is a few Fourier transforms of the kept innovations.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.filters.run import Estimate
+from estimation.log_checks.bridging import bridged
+from plant.log.record import Record
+
+Array = NDArray[np.float64]
+
+SEGMENTS = 8
+"""Stretches whose spectra are averaged: few, so that a line of the drive stands out; enough for a sharp threshold."""
+
+SETTLING = 0.2
+"""Share of the log that a filter is given to settle, before its innovations count [fraction]."""
+
+LAGS = 20
+"""Lags of the Ljung-Box statistic."""
+
+FALSE_ALARMS = 1e-3
+"""Probability with which white innovations of a whole log exceed the threshold [probability]."""
+
+FEWEST = 32 * SEGMENTS
+"""Fewest samples from which anything is said of whiteness."""
+
+DRIVEN_SHARE, DRIVEN_REACH = 0.95, 10.0
+"""The band that counts reaches so many times higher than the frequency below which this share of the drive's power
+lies: friction answers a drive with harmonics, and what is learnt is learnt there."""
+
+
+OFTEN = 1e-3
+"""A channel that repeats itself in this share of its samples or more is quantised [fraction]."""
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """How white the innovations of one channel are.
+
+    Parameters
+    ----------
+    channel : str
+        The channel.
+    count : int
+        Samples present after settling.
+    excess : float
+        Largest power of the innovations within the band that counts, over that of white noise of the predicted
+        variance, less what the channel's quantum can explain [dimensionless]; 1 on average where the filter is
+        consistent.
+    threshold : float
+        Excess that white innovations stay below but with probability `FALSE_ALARMS` [dimensionless].
+    frequency : float
+        Where the largest power is [Hz].
+    driven : bool
+        Whether the drive has at least a tenth of its strongest power there.
+    ljung_box : float
+        Probability of autocorrelations as large as these in white noise (Ljung and Box 1978, equation 3)
+        [probability].
+    autocorrelation : float
+        Largest autocorrelation over `LAGS` lags [dimensionless].
+    crosses : float
+        Largest correlation with the innovation of another channel at the same instant [dimensionless].
+    with_drive : float
+        Share of the innovations' variance that a linear function of the drive's history explains [fraction].
+    """
+
+    channel: str
+    count: int
+    excess: float
+    threshold: float
+    frequency: float
+    driven: bool
+    ljung_box: float
+    autocorrelation: float
+    crosses: float
+    with_drive: float
+
+    @property
+    def exceeded(self) -> bool:
+        """Whether the excess is more than white innovations have."""
+        return self.excess > self.threshold
+
+
+def whiteness(estimate: Estimate, record: Record) -> tuple[Whiteness, ...]:
+    """Judge the innovations that a filter kept.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        The filtered log, its innovations kept.
+    record : Record
+        The log, for its drive and for what its sensors resolve.
+
+    Returns
+    -------
+    tuple of Whiteness
+        One a channel that has samples; none where innovations were not kept or are too few, or the filter diverged.
+    """
+    from scipy.special import chdtri
+
+    first = int(SETTLING * len(estimate.residuals))
+    normal, present = _normalised(estimate, first)
+    kept = [c for c in range(normal.shape[1]) if np.count_nonzero(present[:, c]) >= FEWEST]
+    if not kept or not np.all(np.isfinite(normal)):
+        return ()
+    length = len(normal) // SEGMENTS
+    push = bridged(record[estimate.model.drives[0]])[first:]
+    drive = np.mean(np.abs(_spectra(push - np.mean(push), length)) ** 2, axis=0)
+    band, concentration = _band(drive), float(np.max(drive) / max(np.sum(drive), np.finfo(float).tiny))
+    quantile = float(chdtri(2 * SEGMENTS, FALSE_ALARMS / (len(kept) * band)))
+    found: list[Whiteness] = []
+    for c in kept:
+        values, count = normal[:, c], int(np.count_nonzero(present[:, c]))
+        power = np.mean(np.abs(_spectra(values, length)) ** 2, axis=0)[:band] * (len(values) / count)
+        power[0] *= 0.5  # a mean is real, with half the degrees of freedom, and is held to the same threshold
+        peak = int(np.argmax(power))
+        lags = _autocorrelations(values)
+        pattern = _quantisation(record[estimate.channels[c]]) / float(
+            np.nanmedian(estimate.residual_variances[first:, c])
+        )
+        found.append(
+            Whiteness(
+                channel=estimate.channels[c],
+                count=count,
+                excess=max(0.0, float(power[peak]) - concentration * pattern * length / 2.0),
+                threshold=quantile / (2 * SEGMENTS),
+                frequency=peak / (length * record.sample_time),
+                driven=bool(0.0 < 0.1 * np.max(drive) <= np.max(drive[max(0, peak - 1) : peak + 2])),
+                ljung_box=_ljung_box(lags, count),
+                autocorrelation=float(lags[np.argmax(np.abs(lags))]),
+                crosses=max((_correlation(values, normal[:, o]) for o in kept if o != c), default=0.0, key=abs),
+                with_drive=_explained(values, push - np.mean(push), length),
+            )
+        )
+    return tuple(found)
+
+
+def _normalised(estimate: Estimate, first: int) -> tuple[Array, NDArray[np.bool_]]:
+    """Return innovations over their deviations after settling, 0 where a sample is missing; and which are present."""
+    residuals, variances = estimate.residuals[first:], estimate.residual_variances[first:]
+    present = ~np.isnan(residuals)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # a filter that diverged gives no numbers
+        return np.where(present, residuals / np.sqrt(variances), 0.0), present
+
+
+def _spectra(values: Array, length: int) -> Array:
+    """Return the Fourier transforms of whole segments, scaled so that white noise of variance 1 has power 1."""
+    return np.fft.rfft(values[: SEGMENTS * length].reshape(SEGMENTS, length), axis=1) / np.sqrt(length)
+
+
+def _band(drive: Array) -> int:
+    """Return how many frequencies count, from 0 on; a tenth of them where nothing is driven."""
+    total = np.cumsum(drive)
+    if not total[-1] > 0.0:
+        return max(2, len(drive) // 10)
+    highest = int(np.searchsorted(total, DRIVEN_SHARE * total[-1]))
+    return int(min(len(drive) - 1, max(2.0, DRIVEN_REACH * highest + 1)))
+
+
+def _quantisation(values: Array) -> float:
+    """Return the variance of quantisation while a channel repeats itself: a pattern like the drive's, no noise."""
+    return float(np.mean(np.diff(values) == 0.0)) * quantum(values) ** 2 / 12.0
+
+
+def quantum(values: Array) -> float:
+    """Return what a channel resolves: its smallest step, where it often repeats itself.
+
+    Parameters
+    ----------
+    values : ndarray, shape (samples,)
+        The channel; NaN is missing [any unit].
+
+    Returns
+    -------
+    float
+        The quantum [unit of the channel]; 0 where none shows, infinite where the channel never moved.
+
+    Examples
+    --------
+    >>> quantum(np.array([0.0, 0.5, 0.5, 1.0]))
+    0.5
+    """
+    steps = np.abs(np.diff(values))
+    moved = steps[steps > 0.0]
+    if not len(moved):
+        return float("inf")
+    return float(np.min(moved)) if np.count_nonzero(steps == 0.0) > OFTEN * len(steps) else 0.0
+
+
+def _autocorrelations(values: Array) -> Array:
+    """Return autocorrelations at lags 1 to `LAGS`."""
+    power = float(values @ values)
+    if power == 0.0:
+        return np.zeros(LAGS)
+    return np.array([float(values[lag:] @ values[:-lag]) / power for lag in range(1, LAGS + 1)])
+
+
+def _ljung_box(autocorrelations: Array, count: int) -> float:
+    from scipy.special import chdtrc
+
+    lags = np.arange(1, LAGS + 1)
+    statistic = count * (count + 2.0) * float(np.sum(autocorrelations**2 / (count - lags)))
+    return float(chdtrc(LAGS, statistic))
+
+
+def _correlation(a: Array, b: Array) -> float:
+    spread = float(a @ a) * float(b @ b)
+    return float(a @ b) / spread**0.5 if spread > 0.0 else 0.0
+
+
+def _explained(values: Array, push: Array, length: int) -> float:
+    """Return the share of variance coherent with the drive, less what chance explains in so few segments."""
+    ours, theirs = _spectra(values, length), _spectra(push, length)
+    drive, power = np.mean(np.abs(theirs) ** 2, axis=0), np.mean(np.abs(ours) ** 2, axis=0)
+    driven = drive > 1e-6 * np.max(drive)
+    if not np.any(driven) or not np.any(power > 0.0):
+        return 0.0
+    coherent = np.abs(np.mean(ours * np.conj(theirs), axis=0))[driven] ** 2 / drive[driven]
+    share = np.sum(coherent - power[driven] / SEGMENTS) / np.sum(power) * SEGMENTS / (SEGMENTS - 1.0)
+    return float(np.clip(share, 0.0, 1.0))

@@ -1,0 +1,1 @@
+"""Noise levels by likelihood."""

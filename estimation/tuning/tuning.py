@@ -1,0 +1,229 @@
+"""Noise levels read off the log: process and sensor covariances of greatest likelihood, the published ones beside.
+
+A filter's interval is as good as its Q and R. Both are fitted here by the likelihood of the innovations (Mehra 1970
+asks for the same by their whiteness), each presumed within a factor of twenty of what the model brings, so that a log
+that says nothing about one of them leaves it where it was.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from estimation.engine.contract import FilterProblem, Trace
+from estimation.engine.layout import layout
+from estimation.filters.ekf import EKF, ekf
+from estimation.filters.run import filter_problem
+from estimation.models.gaussian import Gaussian
+from estimation.models.model import ProcessModel
+from estimation.tuning.likelihood import noise_coordinates
+from estimation.tuning.scoring import Coordinate, Maximum, maximise
+from estimation.tuning.sensitivity import Sensitivity, innovation_sensitivity
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+PUBLISHED_STEP = 1e-4
+"""Step for which equation 7.6 gives covariances [s]."""
+
+PUBLISHED_NOISE: Mapping[str, float] = MappingProxyType(
+    {
+        "position_m": 1e-12 / PUBLISHED_STEP,
+        "velocity_m_s": 1e-8 / PUBLISHED_STEP,
+        "acceleration_m_s2": 1e-6 / PUBLISHED_STEP,
+        "bulk_modulus_pa": 1e-12 / PUBLISHED_STEP,
+    }
+)
+"""Q of equation 7.6 as densities, by state name [SI squared a second]; far too small on bulk modulus (errata E10)."""
+
+PUBLISHED_VARIANCES: Mapping[str, float] = MappingProxyType({"position_m": 1e-12, "velocity_m_s": 1e-4})
+"""R of equation 7.7, by channel [SI squared] (errata E11)."""
+
+SCREENED = ((1e3, 1.0), (1.0, 1.0), (1e-1, 1.0), (1e-2, 1.0), (1e-3, 1.0), (1.0, 1e-2), (1e-3, 1e-2))
+"""Factors on all process noise and on all sensor noise between which the search's start is chosen, in this order."""
+
+SCREENED_SAMPLES = 20_000
+"""Beginning of a longer log on which the starts are compared."""
+
+ROUNDS = 3
+"""How often at most the levels are tuned again, each time from where the constants were found."""
+
+MOVED = 1.0
+"""Move of a constant from one round to the next above which there is another [standard deviations]."""
+
+
+@dataclass(frozen=True)
+class NoiseSetting:
+    """Noise levels, and how they fare on a log.
+
+    Parameters
+    ----------
+    noise : Mapping[str, float]
+        Process-noise densities by state name [SI squared a second]; of a logarithmic state, those of its logarithm.
+    variances : Mapping[str, float]
+        Sensor variances by channel [SI squared].
+    log_likelihood : float
+        Log-likelihood of the log [dimensionless].
+    nis : Mapping[str, float]
+        Mean normalised innovation squared by channel [dimensionless]; 1 where the filter believes what the log shows.
+    """
+
+    noise: Mapping[str, float]
+    variances: Mapping[str, float]
+    log_likelihood: float
+    nis: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Noise levels of greatest likelihood, beside those that were there before and those of the paper.
+
+    Parameters
+    ----------
+    tuned : NoiseSetting
+        Of greatest likelihood, in the form that `estimation.filters.run.run_filter` takes as ``noise`` and
+        ``variances``.
+    given : NoiseSetting
+        What the model brings, and the sensors' noise as read off the log.
+    published : NoiseSetting
+        Equations 7.6 and 7.7; what they say nothing about stays as given.
+    spread : Mapping[str, float]
+        Standard deviation of each tuned level's logarithm, by state name and by channel [dimensionless]: 3 is what was
+        presumed, so a level near it is one of which the log says nothing.
+    converged : bool
+        Whether the search came to rest.
+    prior : Gaussian
+        The belief before the first sample from which all three fared as they did [SI]: as wide as the one given, its
+        constants where they were found.
+    """
+
+    tuned: NoiseSetting
+    given: NoiseSetting
+    published: NoiseSetting
+    spread: Mapping[str, float]
+    converged: bool
+    prior: Gaussian
+
+
+def tune(
+    record: Record,
+    model: ProcessModel,
+    prior: Gaussian,
+    parameters: EhaParameters,
+    *,
+    channels: tuple[str, ...] | None = None,
+    variances: Mapping[str, float] | None = None,
+    noise: Mapping[str, float] | None = None,
+) -> Tuning:
+    """Tune a filter's noise levels on a log.
+
+    A state without process noise, such as a constant bulk modulus, stays without. A filter that is certain of its
+    motion and far from the answer locks onto a wrong one and finds that likely, so certainty grows by degrees, and
+    each filter begins where the likeliest before it found the constants.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    model : ProcessModel
+        The process model.
+    prior : Gaussian
+        Belief before the first sample [SI].
+    parameters : EhaParameters
+        The actuator's known parameters.
+    channels : tuple of str, optional
+        Channels to use, as in `estimation.filters.run.run_filter`.
+    variances : Mapping[str, float], optional
+        Sensor variances to begin from, and that of motor speed [SI squared]; by default read off the log.
+    noise : Mapping[str, float], optional
+        Process-noise densities to begin from that replace the model's [SI squared a second].
+
+    Returns
+    -------
+    Tuning
+        The levels found, with their likelihood and NIS, and the published ones beside.
+
+    Raises
+    ------
+    LogError
+        If the record lacks a drive, or has no channel that the model predicts.
+    """
+    problem = filter_problem(model, prior, record, parameters, channels=channels, variances=variances, noise=noise)
+    coordinates = noise_coordinates(problem, record, parameters, (variances or {}).get("motor_speed_rad_s"))
+    problem, guesses = _likeliest_start(problem, coordinates)
+    found = maximise(problem, guesses)
+    for _ in range(ROUNDS):
+        again, moved = _continued(problem, ekf(_tuned(problem, found)))
+        if moved <= MOVED:
+            break
+        problem, found = again, maximise(again, found.coordinates)
+    tuned = _tuned(problem, found)
+    paper = _published(problem)
+    deviations = np.sqrt(np.diag(np.linalg.inv(found.information)))
+    shown = {f"q{i}": state.name for i, state in enumerate(model.states)}
+    shown |= {f"r{c}": f"sensor {channel}" for c, channel in enumerate(problem.channels)}
+    physical, slope = model.to_si(problem.mean)
+    return Tuning(
+        tuned=_setting(tuned, found.sensitivity),
+        given=_setting(problem, _filtered(problem)),
+        published=_setting(paper, _filtered(paper)),
+        spread=MappingProxyType({shown[c.name]: float(std) for c, std in zip(coordinates, deviations, strict=True)}),
+        converged=found.converged,
+        prior=Gaussian(physical, problem.covariance * np.outer(slope, slope)),
+    )
+
+
+def _tuned(problem: FilterProblem, found: Maximum) -> FilterProblem:
+    values = {coordinate.name: coordinate.guess for coordinate in found.coordinates}
+    levels = np.array([values.get(f"q{i}", 0.0) for i in range(problem.model.width)])
+    return replace(problem, noise=levels, variances=np.array([values[f"r{c}"] for c in range(len(problem.channels))]))
+
+
+def _continued(problem: FilterProblem, trace: Trace) -> tuple[FilterProblem, float]:
+    """Return the task with its constants where a filter found them, and their greatest move in standard deviations."""
+    constant = problem.noise == 0.0
+    if not constant.any() or not np.all(np.isfinite(trace.mean)):
+        return problem, 0.0
+    std = np.sqrt(np.diag(trace.covariance)[constant])
+    moved = np.abs(trace.mean[constant] - problem.mean[constant]) / np.maximum(std, np.finfo(float).tiny)
+    return replace(problem, mean=np.where(constant, trace.mean, problem.mean)), float(np.max(moved))
+
+
+def _likeliest_start(
+    problem: FilterProblem, coordinates: Sequence[Coordinate]
+) -> tuple[FilterProblem, list[Coordinate]]:
+    """Return the task and the coordinates with the guesses, among a few, that explain the beginning of the log best."""
+    short = replace(problem, measured=problem.measured[:SCREENED_SAMPLES], drives=problem.drives[:SCREENED_SAMPLES])
+    best, process, sensor = -np.inf, 1.0, 1.0
+    for on_process, on_sensor in SCREENED:
+        trace = ekf(replace(short, noise=on_process * problem.noise, variances=on_sensor * problem.variances))
+        if trace.log_likelihood > best:
+            best, process, sensor = trace.log_likelihood, on_process, on_sensor
+            short, _ = _continued(short, trace)
+    return replace(problem, mean=short.mean), [
+        replace(c, guess=max(c.guess * (process if c.name[0] == "q" else sensor), 1.01 * c.floor)) for c in coordinates
+    ]
+
+
+def _filtered(problem: FilterProblem) -> Sensitivity:
+    rows = layout(EKF, problem.model, problem.channels).rows
+    return innovation_sensitivity(problem, np.zeros((len(rows), 0)))
+
+
+def _published(problem: FilterProblem) -> FilterProblem:
+    noise = problem.noise.copy()
+    for i, state in enumerate(problem.model.states):
+        if state.name in PUBLISHED_NOISE and not state.logarithmic:
+            noise[i] = PUBLISHED_NOISE[state.name] / state.scale**2
+    sensors = [PUBLISHED_VARIANCES.get(name, problem.variances[c]) for c, name in enumerate(problem.channels)]
+    return replace(problem, noise=noise, variances=np.array(sensors))
+
+
+def _setting(problem: FilterProblem, found: Sensitivity) -> NoiseSetting:
+    names = [state.name for state in problem.model.states]
+    return NoiseSetting(
+        noise=MappingProxyType(dict(zip(names, (problem.noise * problem.model.noise_units).tolist(), strict=True))),
+        variances=MappingProxyType(dict(zip(problem.channels, problem.variances.tolist(), strict=True))),
+        log_likelihood=found.log_likelihood,
+        nis=MappingProxyType(dict(zip(problem.channels, found.nis.tolist(), strict=True))),
+    )

@@ -1,0 +1,194 @@
+"""`ActuatorKind`: what a kind of actuator gives; every verb, batch and page works on it (see docs/add-a-plant.md)."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from experiments.command.json_output import Result
+from experiments.log_pages.entries import BLANK, finding_entries
+from experiments.log_pages.screens import quantities_shown
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from estimation.finding import Finding
+    from plant.eha.rig import Rig
+    from plant.log.record import Record
+    from plant.notes import Note
+
+Options: TypeAlias = Mapping[str, Any]
+"""Options of the command line by name, ``sample_time``; those not given stand at the kind's own defaults."""
+
+Screen: TypeAlias = "Callable[[Sequence[Result], Options], Iterable[RenderableType]]"
+"""What a terminal shows of the logs that did not fail."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A simulated log.
+
+    Parameters
+    ----------
+    record : Record
+        What the bench would have logged; its metadata say what made it.
+    about : Mapping[str, Any]
+        The same for the reader: condition, drive, sensors.
+    notes : tuple of Note
+        What a reader should know of the run.
+    """
+
+    record: "Record"
+    about: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    notes: "tuple[Note, ...]" = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulation:
+    """What `hydrostate simulate` does.
+
+    Parameters
+    ----------
+    run : callable
+        ``run(rig, options) -> Run``; ``options["seed"]`` is the seed of all that is random, ``options["plant"]`` the
+        name that was asked for, one of the kind's `ActuatorKind.models` where it has several.
+    options : Options
+        Options that it understands, with what they are where they are not given.
+    """
+
+    run: "Callable[[Rig[Any], Options], Run]"
+    options: Options = field(default_factory=dict[str, Any])
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogVerb:
+    """What `hydrostate estimate` or `hydrostate diagnose` does with a log, and how what it finds is shown.
+
+    Parameters
+    ----------
+    run : callable
+        ``run(record, rig, options) -> Finding``, with rig and options as `prepare` returned them.
+    options : Options
+        Options that it understands, with what they are where they are not given. ``healthy`` comes as a Record.
+    prepare : callable
+        ``prepare(rig, options) -> (rig, options)``, once for all logs: refuses what cannot be used, and may put what
+        the options say of the actuator into the rig.
+    entries : callable
+        From a finding to its JSON entries, ``outcome`` and ``message`` among them.
+    blank : Mapping[str, Any]
+        The entries of a log that could not be used.
+    screen : callable
+        What a terminal shows.
+    page : callable, optional
+        ``page(result, finding, record) -> HTML``; the page of `experiments.log_pages.finding_page` if not given.
+    figure : callable, optional
+        ``figure(finding, log's name, path)`` writes what ``--figure`` asks for.
+    remarks : callable
+        What is said once of all results, on standard error.
+    """
+
+    run: "Callable[[Record, Rig[Any], Any], Finding]"
+    options: Options = field(default_factory=dict[str, Any])
+    prepare: "Callable[[Rig[Any], Options], tuple[Rig[Any], Any]]" = lambda rig, options: (rig, options)
+    entries: "Callable[[Finding], dict[str, Any]]" = finding_entries
+    blank: Result = field(default_factory=BLANK.copy)
+    screen: Screen = quantities_shown
+    page: "Callable[[Result, Finding, Record], str] | None" = None
+    figure: "Callable[[Finding, str, Path], None] | None" = None
+    remarks: Callable[[Sequence[Result]], Iterable[str]] = lambda _: ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """What `hydrostate identifiability` does.
+
+    Parameters
+    ----------
+    run : callable
+        ``run(rig, options) -> findings``: one for each experiment that was looked at, its quantities the healthy
+        values with the least standard deviation that any method could reach.
+    options : Options
+        Options that it understands, with what they are where they are not given.
+    entries : callable
+        From a finding to its JSON entries.
+    screen : callable
+        What a terminal shows.
+    """
+
+    run: "Callable[[Rig[Any], Options], Sequence[Finding]]"
+    options: Options = field(default_factory=dict[str, Any])
+    entries: "Callable[[Finding], dict[str, Any]]" = finding_entries
+    screen: Screen = quantities_shown
+
+
+@dataclass(frozen=True, kw_only=True)
+class ActuatorKind:
+    """A kind of actuator; a verb that it has not is None.
+
+    Parameters
+    ----------
+    name : str
+        What ``--plant`` and rig files call it.
+    description : str
+        What it is, in a line.
+    parameters : type
+        Frozen dataclass of its parameters: every field has an `SI` note and a default, the healthy actuator's.
+    channels : Mapping[str, str]
+        Unit of every channel that a log may hold, by name.
+    required : tuple of str
+        Channels that a log must hold; ``"position_m or velocity_m_s"`` asks for one of the two.
+    conditions : tuple of str
+        What a diagnosis may name, the healthy actuator first.
+    models : tuple of str
+        Names of its models, where `simulate` has several; the kind's own if empty.
+    rig_name : str
+        What the default rig is called.
+    simulate : Simulation or None
+        Runs, with its faults.
+    estimate, diagnose : LogVerb or None
+        What a log says.
+    identifiability : Experiment or None
+        What an experiment would tell.
+    """
+
+    name: str
+    description: str
+    parameters: type[Any]
+    channels: Mapping[str, str]
+    required: tuple[str, ...]
+    conditions: tuple[str, ...] = ()
+    models: tuple[str, ...] = ()
+    rig_name: str = "default"
+    simulate: Simulation | None = None
+    estimate: LogVerb | None = None
+    diagnose: LogVerb | None = None
+    identifiability: Experiment | None = None
+
+    @property
+    def rig(self) -> "Rig[Any]":
+        """The healthy actuator with default parameters."""
+        from plant.eha.rig import Rig
+
+        return Rig(self.rig_name, self.parameters())
+
+    def read_rig(self, path: Path | None) -> "Rig[Any]":
+        """Return the rig of a file, the default one where there is none.
+
+        Parameters
+        ----------
+        path : Path or None
+            The rig file.
+
+        Returns
+        -------
+        Rig
+            The rig.
+
+        Raises
+        ------
+        RigError
+            If the file is not usable, or is of another kind of actuator.
+        """
+        from plant.eha.rig import read_rig
+
+        return self.rig if path is None else read_rig(path, self.parameters, self.name)

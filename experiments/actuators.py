@@ -1,0 +1,104 @@
+"""The kinds of actuator, each registered by one line; they are imported when one is asked for."""
+
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from importlib.metadata import entry_points
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from plant.errors import HydrostateError
+
+if TYPE_CHECKING:
+    from experiments.actuator_kind import ActuatorKind
+
+ACTUATORS: Mapping[str, str] = MappingProxyType(
+    {
+        "eha": "experiments.eha.kind:EHA",
+        "piezo-stack": "experiments.piezo_stack.kind:PIEZO_STACK",
+        "diaphragm-motor": "experiments.diaphragm_motor.kind:DIAPHRAGM_MOTOR",
+    }
+)
+"""Where each kind's `experiments.actuator_kind.ActuatorKind` is, by name."""
+
+DEFAULT = "eha"
+"""The kind where none is named."""
+
+ENTRY_POINTS = "hydrostate.actuators"
+"""Group of entry points by which an installed package registers kinds of its own: ``name = "module:OBJECT"``."""
+
+
+def actuator(name: str) -> "ActuatorKind":
+    """Return the kind of actuator of this name.
+
+    Parameters
+    ----------
+    name : str
+        Of `ACTUATORS` or an installed package; or of one of a kind's models, ``circuit``.
+
+    Returns
+    -------
+    ActuatorKind
+        The kind; its channels are known from here on.
+
+    Raises
+    ------
+    HydrostateError
+        If there is no such kind.
+    """
+    if name in ACTUATORS:
+        return _loaded(name, ACTUATORS[name])
+    for kind in actuators():
+        if name == kind.name or name in kind.models:
+            return kind
+    known = [model for kind in actuators() for model in kind.models or (kind.name,)]
+    raise HydrostateError(f"--plant must be one of {', '.join(known)}, got {name!r}")
+
+
+def actuators() -> "Iterator[ActuatorKind]":
+    """Yield every kind, those that come along first.
+
+    Yields
+    ------
+    ActuatorKind
+        Each kind, imported.
+    """
+    yield from (_loaded(name, place) for name, place in ACTUATORS.items())
+    installed = {one.name: one.value for one in entry_points(group=ENTRY_POINTS)}
+    yield from (_loaded(name, place) for name, place in installed.items() if name not in ACTUATORS)
+
+
+def _loaded(name: str, place: str) -> "ActuatorKind":
+    from plant.log.columns import know_channels
+
+    module, _, attribute = place.partition(":")
+    kind: ActuatorKind = getattr(import_module(module), attribute)
+    if kind.name != name:
+        raise HydrostateError(f"{place} must be called {name!r}, as it is registered, got {kind.name!r}")
+    know_channels(kind.channels)
+    return kind
+
+
+def offered(kind: "ActuatorKind", verb: str) -> Any:
+    """Return what a kind does at a verb.
+
+    Parameters
+    ----------
+    kind : ActuatorKind
+        The kind.
+    verb : str
+        ``simulate``, ``estimate``, ``diagnose`` or ``identifiability``.
+
+    Returns
+    -------
+    Simulation, LogVerb or Experiment
+        What it does.
+
+    Raises
+    ------
+    HydrostateError
+        If it does not.
+    """
+    found = getattr(kind, verb)
+    if found is None:
+        raise HydrostateError(f"{verb} is not there for {kind.name}, {kind.description}")
+    return found

@@ -1,0 +1,106 @@
+"""Cases of a study whose actuator is not the gear-pump one: simulated and found by what its kind registers."""
+
+import json
+from collections.abc import Iterator
+
+from experiments.actuator_kind import ActuatorKind, LogVerb
+from experiments.actuators import offered
+from experiments.batch.rows import Row
+from experiments.batch.series import Simulated
+from experiments.batch.study_file import Runs
+from experiments.log_pages.entries import quantity_entry
+from plant.eha.rig import Rig
+from plant.log.record import Record
+from plant.notes import distinct
+
+
+def simulated_of(kind: ActuatorKind, runs: Runs) -> Iterator[Simulated]:
+    """Yield the series of runs, every condition with every seed.
+
+    Parameters
+    ----------
+    kind : ActuatorKind
+        The kind of actuator.
+    runs : Runs
+        What the study lists.
+
+    Yields
+    ------
+    Simulated
+        Without a drive and severities, which are the gear-pump actuator's.
+    """
+    options = offered(kind, "simulate").options
+    given = {
+        name: getattr(runs, f"{name}_s") for name in ("duration", "sample_time") if f"{name}_s" in runs.model_fields_set
+    }
+    times = {name: float(given.get(name) or options.get(name) or 0.0) for name in ("duration", "sample_time")}
+    healthy = kind.conditions[:1] or ("healthy",)
+    names = runs.conditions or (kind.conditions if "condition" in options else healthy)
+    for sensors in runs.sensors:
+        for name in names:
+            for seed in runs.seed_list:
+                yield Simulated(kind.name, "", sensors, name, 0.0, 0.0, seed, times["duration"], times["sample_time"])
+
+
+def simulated_run(kind: ActuatorKind, series: Simulated, rig: Rig) -> Record:
+    """Return what the bench would have logged.
+
+    Parameters
+    ----------
+    kind : ActuatorKind
+        The kind of actuator.
+    series : Simulated
+        One of `simulated_of`.
+    rig : Rig
+        The healthy actuator.
+
+    Returns
+    -------
+    Record
+        The run.
+    """
+    simulation = offered(kind, "simulate")
+    asked = {
+        "condition": series.condition,
+        "sensors": series.sensors,
+        "duration": series.duration_s or None,
+        "sample_time": series.sample_time_s or None,
+    }
+    options = {**simulation.options, **{name: value for name, value in asked.items() if name in simulation.options}}
+    return simulation.run(rig, {**options, "seed": series.seed, "plant": None}).record
+
+
+def found_of(kind: ActuatorKind, verb: str, record: Record, rig: Rig) -> Row:
+    """Return what a log says.
+
+    Parameters
+    ----------
+    kind : ActuatorKind
+        The kind of actuator.
+    verb : str
+        ``estimate`` or ``diagnose``.
+    record : Record
+        The log.
+    rig : Rig
+        The healthy actuator.
+
+    Returns
+    -------
+    Row
+        Outcome and reason; the condition, where one is named; every quantity.
+    """
+    asked: LogVerb = offered(kind, verb)
+    found = asked.run(record, *asked.prepare(rig, {**asked.options, "seed": 0}))
+    reasons = [str(note) for note in distinct((*found.against, *found.gate.reasons, *found.notes))]
+    shares = sorted(found.probabilities.items(), key=lambda item: -item[1])
+    quantities = {name: quantity_entry(one) for name, one in {**found.quantities, **found.severities}.items()}
+    row: Row = {
+        "outcome": found.outcome.value,
+        "reason": "; ".join(reasons) or None,
+        "trusted": found.gate.passed and not found.unknown,
+        "found_condition": None if found.unknown else " or ".join(found.named) or None,
+        "quantities": json.dumps(quantities),
+    }
+    if len(shares) > 1:
+        row |= {"runner_up": shares[1][0], "margin": shares[0][1] / max(shares[1][1], 1e-300)}
+    return row

@@ -1,0 +1,1 @@
+"""The paper's experiments on the circuit plant: tables, figures, report, command."""

@@ -1,0 +1,246 @@
+"""The paper's dynamic experiments on the circuit plant: Figures 5 to 7, 10 and 11, as tables.
+
+Around a mean a test is a train of passes, see `experiments.circuit.passes`, of up to 0.6 of the stroke each. Without a
+mean the signal itself comes back, see `plant.eha.drives.prbs`.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import fields
+from itertools import product
+from math import ceil
+
+import numpy as np
+import pandas as pd
+
+from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from experiments.circuit.passes import CHANNELS, SAMPLE_TIME, Passes, in_condition, run_passes
+from experiments.nine_conditions.bulk_modulus import Experiment, estimate_entries
+from experiments.nine_conditions.settings import StudySettings
+from experiments.nine_conditions.transfer_functions import measured_response, order_table
+from experiments.running.executors import side_by_side
+from experiments.running.random_streams import stream
+from faults.conditions import CONDITIONS
+from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+AMPLITUDE_V = 1.0
+"""Amplitude around the means [V]."""
+
+MEAN_INPUTS = tuple((float(mean), AMPLITUDE_V) for mean in range(8))
+"""Means and amplitudes of Figure 5 [V]; the last swings to 8 V, the motor's limit."""
+
+AMPLITUDE_INPUTS = tuple((0.0, amplitude) for amplitude in (0.5, 1.0, 2.0, 3.0, 4.0))
+"""Means and amplitudes of Figure 6 [V]."""
+
+HOLD_TIME = 0.02
+"""Time between chances to switch [s]; the signal has no power at 50 Hz."""
+
+LOWEST_FREQUENCY, HIGHEST_FREQUENCY = 1e-9, 40.0
+"""Ends of the response curves [Hz]: above the mean, below where the signal has no power."""
+
+TEST_TIME = 24.0
+"""Least length of a test [s], all passes together."""
+
+LAG_TIME = 0.5
+"""Longest lag of the correlations that responses are taken from [s]."""
+
+CIRCUIT_FORMS = (
+    Experiment("circuit", "flow", "steps", True),
+    Experiment("circuit", "pressure", "steps", True),
+    Experiment("circuit", "acceleration", "sine", False),
+)
+"""The forms that estimate bulk modulus on the circuit: the flow balance alone, condition unknown; the pressure form,
+condition known; the published method (errata E9, E13)."""
+
+ESTIMATE_COLUMNS = (
+    *("form", "drive", "pressure_logged", "condition", "start_pa", "outcome", "value_pa", "ci95_low_pa"),
+    *("ci95_high_pa", "truth_pa", "error_percent", "covered", "bound_percent", "gate_passed", "reasons"),
+)
+"""Columns of the table of estimates."""
+
+_LONGEST_PASS = 4.0
+_SETTLING = 0.3
+_STROKE_SHARE = 0.6
+
+
+def prbs_around(
+    p: CircuitParameters, mean_v: float, amplitude_v: float, rng: np.random.Generator, duration: float = TEST_TIME
+) -> Record:
+    """Return a random binary test around an input mean, as motor speed and velocity about their means.
+
+    Parameters
+    ----------
+    p : CircuitParameters
+        The circuit.
+    mean_v, amplitude_v : float
+        Mean, not negative, and amplitude of the input [V].
+    rng : numpy.random.Generator
+        Source of the signal and of sensor noise.
+    duration : float
+        Least length of all passes together [s].
+
+    Returns
+    -------
+    Record
+        ``motor_speed_rad_s`` and ``velocity_m_s``, the passes one after the other.
+
+    Raises
+    ------
+    DriveError
+        If the motor's limit or the stroke would be exceeded.
+    """
+    swept = p.pump_displacement / p.piston_area * mean_v * p.motor_speed_per_volt
+    longest = min(_LONGEST_PASS, _STROKE_SHARE * p.stroke / swept) if swept > 0.0 else _LONGEST_PASS
+    pass_time = SAMPLE_TIME * round(HOLD_TIME / SAMPLE_TIME) * int(longest / HOLD_TIME)
+    test = Passes(mean_v, amplitude_v, ceil(duration / pass_time), pass_time, HOLD_TIME, _SETTLING)
+    found = run_passes(p, test, rng)
+    return Record(SAMPLE_TIME, {channel: rows.ravel() for channel, rows in zip(CHANNELS, found, strict=True)})
+
+
+def frequency_responses(
+    rig: CircuitParameters, seed: int, inputs: Iterable[tuple[float, float]], condition: str = "normal"
+) -> pd.DataFrame:
+    """Return empirical frequency responses to random binary tests of several means and amplitudes: Figures 5 and 6.
+
+    Parameters
+    ----------
+    rig : CircuitParameters
+        The healthy circuit.
+    seed : int
+        Seed of the signals and of sensor noise.
+    inputs : iterable of tuple of float
+        Mean and amplitude of each input [V], as `MEAN_INPUTS` and `AMPLITUDE_INPUTS`.
+    condition : str
+        Condition name.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns mean_v, amplitude_v, frequency_hz, gain [m/s per rad/s], phase_deg, coherence.
+    """
+    p = in_condition(rig, condition)
+
+    def respond(volts: tuple[float, float]) -> pd.DataFrame:
+        mean, amplitude = volts
+        rng = stream(seed, "circuit response", condition, repr(mean), repr(amplitude))
+        test = prbs_around(p, mean, amplitude, rng)
+        found = measured_response(test, round(LAG_TIME / SAMPLE_TIME), LOWEST_FREQUENCY, HIGHEST_FREQUENCY)
+        return pd.DataFrame({"mean_v": mean, "amplitude_v": amplitude, **found})
+
+    return pd.concat(side_by_side(respond, inputs), ignore_index=True)
+
+
+def low_frequency_gains(responses: pd.DataFrame, by: str) -> pd.Series:
+    """Return the gain at the lowest frequency of each response.
+
+    Parameters
+    ----------
+    responses : pandas.DataFrame
+        Of `frequency_responses`.
+    by : str
+        ``mean_v`` or ``amplitude_v``.
+
+    Returns
+    -------
+    pandas.Series
+        Gains [m/s per rad/s], by that voltage.
+    """
+    return responses.groupby(by)["gain"].first()
+
+
+def order_study(rig: CircuitParameters, seed: int, mean_v: float = 2.0) -> pd.DataFrame:
+    """Return the singular values of the circuit's normal condition with their noise floor: Figure 7.
+
+    Parameters
+    ----------
+    rig : CircuitParameters
+        The healthy circuit.
+    seed : int
+        Seed of the signal, sensor noise, and the floor.
+    mean_v : float
+        Input mean [V]. Moving, the piston does not stick; from 4 V on, quadratic friction damps so much that one
+        value alone stands above the floor.
+
+    Returns
+    -------
+    pandas.DataFrame
+        As `experiments.nine_conditions.transfer_functions.order_table`.
+    """
+    rng = stream(seed, "circuit order")
+    return order_table(prbs_around(rig, mean_v, AMPLITUDE_V, rng), rng)
+
+
+def validation_input(rig: CircuitParameters, settings: StudySettings) -> pd.DataFrame:
+    """Return the nine steps of section 6, the drive alone: Figure 10.
+
+    Parameters
+    ----------
+    rig : CircuitParameters
+        The circuit, for its motor speed a volt.
+    settings : StudySettings
+        Length, sample time and seed.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns time_s, motor_voltage_v, motor_speed_rad_s.
+    """
+    T = settings.classification_sample_time
+    speed = make_drive("steps", settings.duration, T, rig, stream(settings.seed, "circuit validation"))
+    volts = speed / rig.motor_speed_per_volt
+    return pd.DataFrame({"time_s": T * np.arange(len(speed)), "motor_voltage_v": volts, "motor_speed_rad_s": speed})
+
+
+def bulk_modulus_on_circuit(
+    rig: CircuitParameters,
+    settings: StudySettings,
+    conditions: Sequence[str] = tuple(CONDITIONS),
+    experiments: Sequence[Experiment] = CIRCUIT_FORMS,
+) -> pd.DataFrame:
+    """Estimate bulk modulus on the circuit by three forms, in nine conditions, from every first guess: Figure 11.
+
+    The forms believe the lumped actuator. The flow form follows chambers and make-up of its own and finds the truth;
+    the pressure form, whose chambers keep their volume, reads a few percent low.
+
+    Parameters
+    ----------
+    rig : CircuitParameters
+        The healthy circuit; its `bulk_modulus` is the truth.
+    settings : StudySettings
+        First guesses, length, sample time and seed.
+    conditions : sequence of str
+        Condition names.
+    experiments : sequence of Experiment
+        Forms and their drives.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row an estimate: outcome, value, interval, error, whether the interval covers the truth, gate.
+    """
+    truth = rig.bulk_modulus
+
+    def estimate(case: tuple[Experiment, str]) -> list[dict[str, object]]:
+        experiment, name = case
+        p = in_condition(rig, name)
+        record = experiment.record(p, settings, stream(settings.seed, "circuit bulk modulus", experiment.drive, name))
+        known = _believed(rig if experiment.form == "flow" else p)
+        rows: list[dict[str, object]] = []
+        for start in settings.starts:
+            found = estimate_bulk_modulus(record, known, form=experiment.form, start=start)
+            rows.append(
+                {**experiment._asdict(), "condition": name, "start_pa": start, **estimate_entries(found, truth)}
+            )
+        return rows
+
+    rows = [row for rows in side_by_side(estimate, product(experiments, conditions)) for row in rows]
+    frame = pd.DataFrame(rows).assign(truth_pa=truth)
+    covered = (frame["ci95_low_pa"].astype(float) <= truth) & (truth <= frame["ci95_high_pa"].astype(float))
+    return frame.assign(covered=covered)[list(ESTIMATE_COLUMNS)]
+
+
+def _believed(p: CircuitParameters) -> EhaParameters:
+    """Return what the forms know of the circuit: the lumped actuator."""
+    return EhaParameters(**{field.name: getattr(p, field.name) for field in fields(EhaParameters)})

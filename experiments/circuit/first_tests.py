@@ -1,0 +1,195 @@
+"""Section 4's first tests on the circuit plant: what a user of the rig would ask of it first."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from experiments.circuit.curves import steady_runs
+from experiments.circuit.experiments import (
+    AMPLITUDE_INPUTS,
+    MEAN_INPUTS,
+    frequency_responses,
+    low_frequency_gains,
+)
+from experiments.circuit.passes import in_condition
+from experiments.published import SCALARS
+from experiments.running.random_streams import stream
+from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.eha.steady_state import steady_state
+from plant.errors import HydrostateError
+from plant.sensors.sensors import BENCH
+
+LEVELS_V = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
+"""Input levels of the steady-state gain [V]."""
+
+BREAK_MEANS_V = (2.0, 4.0, 7.0)
+"""Input means at which the break frequency is looked for [V]."""
+
+ROOMY_STROKE = 2.0
+"""Stroke in which the piston settles at 8 V [m], as that of `experiments.circuit.curves` at 4 V."""
+
+_COUNTS = 5.0
+_MOVED = 5.0
+_VOLT_RESOLUTION = 0.005
+_STEP_SAMPLE_TIME = 1e-4
+
+
+def first_tests(rig: CircuitParameters, seed: int, levels_v: Iterable[float] = LEVELS_V) -> pd.DataFrame:
+    """Return section 4's first tests: dead time, steady gain, break frequency, linearity, dead zone.
+
+    Dead time is until the encoder leaves its line by five counts, at a step of 4 V from rest, where the pressure that
+    breaks the seals loose has to build up, and from 2 V to 4 V in motion. The break frequency is where the empirical
+    gain is 3 dB below that at its lowest frequency. Linearity is the largest low-frequency gain over the smallest.
+
+    Parameters
+    ----------
+    rig : CircuitParameters
+        The healthy circuit.
+    seed : int
+        Seed of signals and sensor noise.
+    levels_v : iterable of float
+        Input levels of the steady-state gain [V], positive.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns test, at, value, unit, expected, published: expected is what Tables 2 to 4 imply (errata E8 for the
+        dead zone), published what the paper prints; either is NaN where there is none.
+    """
+    rng = stream(seed, "circuit first tests")
+    rows = [_row("dead time", f"{low:g} V to 4 V", dead_time(rig, low, 4.0, rng), "s") for low in (0.0, 2.0)]
+    for volts in levels_v:
+        speed = volts * rig.motor_speed_per_volt
+        (run,) = steady_runs([replace(rig, stroke=ROOMY_STROKE)], speed, BENCH, rng)
+        settled = run["velocity_m_s"][-1000:]
+        implied = steady_state(speed, rig)[0] / speed
+        rows.append(_row("steady-state gain", f"{volts:g} V", float(np.mean(settled)) / speed, "m/rad", implied))
+    means = frequency_responses(rig, seed, MEAN_INPUTS)
+    for mean in BREAK_MEANS_V:
+        found = break_frequency(means[means["mean_v"] == mean])
+        rows.append(_row("break frequency", f"mean {mean:g} V", found, "Hz", published=SCALARS["bandwidth"].si_value))
+    gains = low_frequency_gains(means, "mean_v")
+    rows.append(_row("gain spread", "means from 2 V", _spread(gains[gains.index >= 2.0]), "1"))
+    gains = low_frequency_gains(frequency_responses(rig, seed, AMPLITUDE_INPUTS), "amplitude_v")
+    rows.append(_row("gain spread", "amplitudes from 2 V", _spread(gains[gains.index >= 2.0]), "1"))
+    rows.append(_row("gain spread", "amplitudes from 0.5 V", _spread(gains), "1"))
+    for name in ("normal", "minor_leakage", "major_leakage"):
+        p = in_condition(rig, name)
+        held = p.flow_bias + p.leakage_coefficient * p.friction_coulomb / p.piston_area
+        implied = held / (p.pump_displacement * p.motor_speed_per_volt)
+        rows.append(_row("dead zone", name, dead_zone(p, rng), "V", implied))
+    return pd.DataFrame(rows)
+
+
+def break_frequency(response: pd.DataFrame) -> float:
+    """Return where a response's gain has fallen 3 dB below that at its lowest frequency [Hz].
+
+    Parameters
+    ----------
+    response : pandas.DataFrame
+        Columns frequency_hz, rising, and gain.
+
+    Returns
+    -------
+    float
+        Frequency, by a straight line between its neighbours [Hz]; NaN if the gain stays above.
+
+    Examples
+    --------
+    >>> response = pd.DataFrame({"frequency_hz": [1.0, 2.0, 3.0], "gain": [1.0, 1.0, 2.0**0.5 - 1.0]})
+    >>> round(break_frequency(response), 6)
+    2.5
+    """
+    frequency, gain = response["frequency_hz"].to_numpy(), response["gain"].to_numpy()
+    limit = gain[0] / np.sqrt(2.0)
+    below = np.flatnonzero(gain < limit)
+    if len(below) == 0:
+        return float("nan")
+    pair = [below[0], below[0] - 1]
+    return float(np.interp(limit, gain[pair], frequency[pair]))
+
+
+def dead_zone(p: CircuitParameters, rng: np.random.Generator, highest_v: float = 4.0) -> float:
+    """Return the smallest voltage that moves the piston from rest, by halving.
+
+    It moves if, held as long as `experiments.circuit.curves.steady_runs` does, the encoder shows several times
+    the deflection at which the seals break loose.
+
+    Parameters
+    ----------
+    p : CircuitParameters
+        The circuit.
+    rng : numpy.random.Generator
+        Source of sensor noise.
+    highest_v : float
+        A voltage that does move it [V].
+
+    Returns
+    -------
+    float
+        Voltage [V].
+
+    Raises
+    ------
+    HydrostateError
+        If the highest voltage does not move it.
+    """
+
+    def moves(volts: float) -> bool:
+        (run,) = steady_runs([p], volts * p.motor_speed_per_volt, BENCH, rng)
+        return bool(np.max(run["position_m"]) > _MOVED * p.presliding_displacement)
+
+    if not moves(highest_v):
+        raise HydrostateError(f"highest_v must move the piston, got {highest_v:g} V, which does not")
+    low, high = 0.0, highest_v
+    while high - low > _VOLT_RESOLUTION:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if moves(middle) else (middle, high)
+    return high
+
+
+def dead_time(p: CircuitParameters, from_v: float, to_v: float, rng: np.random.Generator) -> float:
+    """Return how long after a step the encoder leaves its line by five counts.
+
+    Parameters
+    ----------
+    p : CircuitParameters
+        The circuit.
+    from_v, to_v : float
+        Voltage before and after [V]; at 0 V the piston is at rest.
+    rng : numpy.random.Generator
+        Source of sensor noise.
+
+    Returns
+    -------
+    float
+        Time [s].
+
+    Raises
+    ------
+    HydrostateError
+        If it never leaves its line.
+    """
+    before, after, T = round(1.0 / _STEP_SAMPLE_TIME), round(0.2 / _STEP_SAMPLE_TIME), _STEP_SAMPLE_TIME
+    drive = np.repeat(np.array([from_v, to_v]) * p.motor_speed_per_volt, [before, after])
+    position = simulate(CIRCUIT, drive, T, p, sensors=BENCH, rng=rng)["position_m"]
+    time = T * (np.arange(len(drive)) - before)
+    line = slice(before - round(0.1 / T), before)
+    slope, level = np.polyfit(time[line], position[line], 1)
+    off = np.abs(position - level - slope * time)[before:] > _COUNTS * BENCH.position_quantum
+    if not off.any():
+        raise HydrostateError(f"a step must move the piston, got {from_v:g} V to {to_v:g} V, which does not")
+    return float(time[before + int(np.argmax(off))])
+
+
+def _spread(gains: pd.Series) -> float:
+    return float(gains.max() / gains.min())
+
+
+def _row(
+    test: str, at: str, value: float, unit: str, expected: float = float("nan"), published: float = float("nan")
+) -> dict[str, object]:
+    return {"test": test, "at": at, "value": value, "unit": unit, "expected": expected, "published": published}

@@ -1,0 +1,118 @@
+"""The circuit study: every experiment by the name of its table, and how the report shows them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from types import MappingProxyType
+
+import pandas as pd
+
+from experiments.circuit.curves import (
+    FRICTION_SWEEP,
+    LEAKAGE_SWEEP,
+    friction_points,
+    friction_refit,
+    leakage_points,
+    leakage_refit,
+    points_table,
+    throttle_curve,
+)
+from experiments.circuit.experiments import (
+    AMPLITUDE_INPUTS,
+    MEAN_INPUTS,
+    bulk_modulus_on_circuit,
+    frequency_responses,
+    order_study,
+    validation_input,
+)
+from experiments.circuit.figures import CIRCUIT_FIGURES
+from experiments.circuit.first_tests import first_tests
+from experiments.nine_conditions.settings import StudySettings
+from experiments.page.tables import Column, Columns, interval, spaced
+from experiments.running.progress import Track
+from experiments.running.random_streams import stream
+from experiments.running.study import Found, Seeded, Study
+from plant.eha.circuit_parameters import CircuitParameters
+
+
+def circuit_studies(rig: CircuitParameters, seed: int) -> Mapping[str, Callable[[], pd.DataFrame]]:
+    """Return the experiments, by the name of their table.
+
+    Parameters
+    ----------
+    rig : CircuitParameters
+        The healthy circuit.
+    seed : int
+        Seed of every random stream.
+
+    Returns
+    -------
+    Mapping[str, callable]
+        Each returns its table when called.
+    """
+    settings = StudySettings(seed=seed)
+    return {
+        "figure 3 velocity against leakage throttle": lambda: throttle_curve(rig, LEAKAGE_SWEEP),
+        "figure 4 pressure against friction throttle": lambda: throttle_curve(rig, FRICTION_SWEEP),
+        "section 4 first tests": lambda: first_tests(rig, seed),
+        "figure 5 frequency response over input means": lambda: frequency_responses(rig, seed, MEAN_INPUTS),
+        "figure 6 frequency response over input amplitudes": lambda: frequency_responses(rig, seed, AMPLITUDE_INPUTS),
+        "figure 7 singular values": lambda: order_study(rig, seed),
+        "figure 8 leakage points": lambda: points_table(rig, stream(seed, "leakage refit"), leakage_points),
+        "figure 8 leakage flow refitted": lambda: leakage_refit(rig, stream(seed, "leakage refit")),
+        "figure 9 friction points": lambda: points_table(rig, stream(seed, "friction refit"), friction_points),
+        "figure 9 friction refitted": lambda: friction_refit(rig, stream(seed, "friction refit")),
+        "figure 10 validation input": lambda: validation_input(rig, settings),
+        "figure 11 bulk modulus": lambda: bulk_modulus_on_circuit(rig, settings),
+    }
+
+
+def _find(settings: Seeded, track: Track) -> Found:
+    studies = circuit_studies(RIG, settings.seed)
+    return Found({name: run() for name, run in track(studies.items(), description="experiments on the circuit")})
+
+
+RIG = CircuitParameters()
+"""The healthy circuit."""
+
+_SHARES = (
+    Column("percent_of_normal", "circuit", "% of normal", digits=3),
+    Column("published_percent", "published", "% of normal", digits=3),
+)
+_REFIT = (
+    "level",
+    Column("coefficient", words=spaced),
+    "published",
+    "went_in",
+    "refitted",
+    Column("low", "95 % interval", of_row=interval("low", "high")),
+    Column("covered", "covers"),
+)
+
+COLUMNS: Mapping[str, Columns] = MappingProxyType(
+    {
+        "section 4 first tests": (
+            "test",
+            "at",
+            Column("value", "circuit"),
+            Column("expected", "implied by Tables 2 to 4"),
+            "published",
+            "unit",
+        ),
+        "figure 3 velocity against leakage throttle": (
+            Column("throttle_a_v", "throttle A"),
+            Column("velocity_m_s", "settles at"),
+            *_SHARES,
+        ),
+        "figure 4 pressure against friction throttle": (
+            Column("throttle_b_v", "throttle B"),
+            Column("differential_pressure_pa", "settles at"),
+            *_SHARES,
+        ),
+        "figure 8 leakage flow refitted": _REFIT,
+        "figure 9 friction refitted": _REFIT,
+    }
+)
+"""How the report shows its tables."""
+
+CIRCUIT = Study("circuit", "circuit/report.html", _find, CIRCUIT_FIGURES, COLUMNS, asdict(RIG))
+"""The paper's experiments on the circuit plant."""

@@ -1,0 +1,95 @@
+"""The body of `estimate` and `diagnose`, the same for every kind of actuator."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from experiments.command.json_output import Result, prepare_output, write_whole
+from experiments.command.logs import finish, read_log, run_logs
+from experiments.command.options import figure_path, load_actuator, load_columns, require_one_of, understood
+from experiments.command.terminal import clauses, note
+
+if TYPE_CHECKING:
+    from estimation.finding import Finding
+    from experiments.actuator_kind import LogVerb
+    from plant.log.record import Record
+
+COMMON = frozenset({"logs", "plant", "rig", "columns", "report", "out", "seed", "as_json"})
+"""Options of every kind of actuator."""
+
+
+def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[str, Any]) -> None:
+    """Find what logs say, print it, and leave with the exit code.
+
+    Parameters
+    ----------
+    context : typer.Context
+        The command line.
+    verb : str
+        ``estimate`` or ``diagnose``.
+    doing : str
+        What the progress bar says.
+    asked : Mapping[str, Any]
+        The verb's arguments by name.
+
+    Raises
+    ------
+    HydrostateError
+        If an option is unknown, does not go with the kind of actuator, or is not usable.
+    """
+    diagnosing = verb == "diagnose"
+    kind, bench = load_actuator(asked["plant"], asked["rig"])
+    options = understood(context, asked, kind, verb, COMMON | ({"condition"} if diagnosing else set()))
+    chosen: LogVerb = getattr(kind, verb)
+    logs, mapping = asked["logs"], load_columns(asked["columns"])
+    expected: str | None = asked["condition"] if diagnosing else None
+    report: Path | None = asked["report"].with_suffix(".html") if asked.get("report") else None
+    if expected is not None:
+        require_one_of("--condition", expected, kind.conditions)
+
+    def read(path: Path) -> "Record":
+        return read_log(path, bench.columns, mapping, kind.required)
+
+    if options.get("healthy") is not None:
+        options["healthy"] = read(options["healthy"])
+    rig, prepared = chosen.prepare(bench, {**options, "seed": asked["seed"]})
+    prepare_output(asked["out"])
+    about = {"plant": kind.name, "rig": bench.name, "seed": asked["seed"], "expected": expected}
+    about |= {"condition": options["condition"]} if "condition" in options else {}
+
+    def work(log: Path) -> Result:
+        record = read(log)
+        found = chosen.run(record, rig, prepared)
+        result: dict[str, Any] = {**chosen.blank, **about, **chosen.entries(found)}
+        result["message"] = clauses([result["message"], *_agreement(result, found)])
+        figure = figure_path(options.get("figure"), log, len(logs))
+        if figure is not None and chosen.figure is not None:
+            chosen.figure(found, log.name, figure)
+        page = figure_path(report, log, len(logs))
+        if page is not None:
+            write_whole(page, (chosen.page or _default_page)({"file": str(log), **result}, found, record), "--report")
+        return result
+
+    batch = run_logs(logs, work, {**chosen.blank, **about}, doing)
+    for remark in chosen.remarks(batch.results):
+        note(remark)
+
+    def screen(results: Sequence[Result]) -> Any:
+        return chosen.screen(results, options)
+
+    finish(batch, screen, as_json=asked["as_json"], out=asked["out"])
+
+
+def _agreement(result: Result, found: "Finding") -> list[str]:
+    """Return whether the condition is the one that was expected, where one was."""
+    if result["expected"] is None or result["condition"] is None:
+        return []
+    return ["as expected" if result["expected"] in found.named else f"{result['expected']} was expected"]
+
+
+def _default_page(result: Result, found: "Finding", record: "Record") -> str:
+    from experiments.log_pages.finding_page import finding_page
+
+    return finding_page(result, found, record)

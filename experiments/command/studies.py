@@ -1,0 +1,43 @@
+"""What the verbs that run a study share: the option for its folder, and how they end."""
+
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, TypeAlias, TypeVar
+
+import typer
+
+from experiments.command.json_output import json_text
+from experiments.command.terminal import emit
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    from experiments.running.study import Study
+
+Settings = TypeVar("Settings", bound="DataclassInstance")
+
+Folder: TypeAlias = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the report.")]
+
+
+def finish_study(study: "Study[Settings]", settings: Settings, out: Path, *, as_json: bool) -> None:
+    """Run a study with progress on standard error, and say where its result is.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    settings : dataclass
+        Its seed and size.
+    out : Path
+        Folder of the result.
+    as_json : bool
+        Whether what is printed is JSON.
+    """
+    from rich.console import Console
+
+    from experiments.running.study import run_study
+
+    begin = perf_counter()
+    written = run_study(study, settings, out, Console(stderr=True))
+    done = {"outcome": "ok", study.ends_with: str(written), "seconds": perf_counter() - begin}
+    emit(json_text([done]) if as_json else str(written))

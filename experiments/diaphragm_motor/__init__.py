@@ -1,0 +1,1 @@
+"""The diaphragm motor's study: tables, figures, report, command."""

@@ -1,0 +1,22 @@
+"""`hydrostate diaphragm-motor`: the diaphragm motor's study, as a folder with a report."""
+
+from pathlib import Path
+
+import typer
+
+from experiments.command.options import SEED, Json, Seed
+from experiments.command.studies import Folder, finish_study
+
+commands = typer.Typer()
+
+
+@commands.command("diaphragm-motor", epilog="Example: hydrostate diaphragm-motor --out results/diaphragm-motor")
+def diaphragm_motor(out: Folder = Path("results/diaphragm-motor"), seed: Seed = SEED, as_json: Json = False) -> None:
+    """Repeat sections 7.1 to 7.3 of the seven-chamber diaphragm motor's paper; reversal, control, and what fails.
+
+    Takes some ten seconds. The last line of standard output is the manifest's path.
+    """
+    from experiments.diaphragm_motor.study import DIAPHRAGM_MOTOR
+    from experiments.running.study import Seeded
+
+    finish_study(DIAPHRAGM_MOTOR, Seeded(seed), out, as_json=as_json)

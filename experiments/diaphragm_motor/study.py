@@ -1,0 +1,113 @@
+"""The diaphragm motor's study: every table by name, and how the report shows them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from types import MappingProxyType
+
+import pandas as pd
+
+from experiments.diaphragm_motor import sweeps
+from experiments.diaphragm_motor.control import averaged_course, control_runs
+from experiments.diaphragm_motor.figures import MOTOR_FIGURES
+from experiments.diaphragm_motor.quoted import not_reproduced, reproduced
+from experiments.page.frames import parameter_table
+from experiments.page.numbers import number
+from experiments.page.tables import Column, Columns, spaced
+from experiments.running.progress import Track
+from experiments.running.study import Found, Seeded, Study
+from plant.diaphragm_motor.parameters import ROWS, DiaphragmMotorParameters
+
+SWEEPS: Mapping[str, Callable[[DiaphragmMotorParameters], pd.DataFrame]] = MappingProxyType(
+    {
+        "frequency sweep": sweeps.sweep_frequency,
+        "voltage sweep": sweeps.sweep_voltage,
+        "load sweep": sweeps.sweep_load,
+        "load and frequency": sweeps.best_frequencies,
+        "pump cycle": sweeps.pump_cycle,
+        "reversal": sweeps.reversal,
+        "sensitivity": sweeps.sensitivities,
+        "other sets": sweeps.other_sets,
+        "averaged": averaged_course,
+    }
+)
+"""The tables that are simulated, by name."""
+
+
+def _find(settings: Seeded, track: Track) -> Found:
+    tables = {name: sweep(RIG) for name, sweep in track(SWEEPS.items(), description="studies")}
+    tables["control courses"], tables["control"] = control_runs(RIG, settings.seed)
+    tables["dry modes"] = sweeps.dry_modes()
+    tables["reproduced"] = reproduced(tables)
+    tables["not reproduced"] = not_reproduced(RIG, tables)
+    return Found(tables)
+
+
+def _seconds(value: float) -> str:
+    return "never" if value == float("inf") else f"{value:.2f}"
+
+
+def _change(value: float) -> str:
+    return f"{value:+.1f}"
+
+
+def _parameters() -> pd.DataFrame:
+    """Return the parameters as text; what each chamber or valve has of its own is the same for all."""
+    table = parameter_table(RIG)
+    values = [
+        f"{number(value[0])}, each of {ROWS[name]}" if isinstance(value, tuple) else number(value)
+        for name, value in zip(table["parameter"], table["value"], strict=True)
+    ]
+    return table.assign(value=values)
+
+
+RIG = DiaphragmMotorParameters()
+"""The motor."""
+
+_CLAIM = ("section", "claim", "published", "ours")
+_BLOCKING = Column("blocking_n", "blocking force", digits=3)
+
+COLUMNS: Mapping[str, Columns] = MappingProxyType(
+    {
+        "reproduced": (*_CLAIM, "holds"),
+        "not reproduced": (*_CLAIM, "why"),
+        "blocking": ("voltage_v", _BLOCKING, Column("velocity_m_s", "velocity without load", digits=3)),
+        "control": (
+            "run",
+            Column("settling_s", "to 2 mm/s", words=_seconds),
+            Column("rise_s", "to 3.5 mm/s", words=_seconds),
+            Column("recovery_s", "after the load", words=_seconds),
+            Column("velocity_m_s", "true velocity", digits=3),
+            Column("measured_m_s", "reported velocity", digits=3),
+        ),
+        "sensitivity": (
+            *("part", "change"),
+            Column("frequency_hz", "best frequency moves", words=_change),
+            Column("flow_percent", "flow changes", words=_change),
+        ),
+        "dry modes": (
+            Column("diameters", "nodal diameters"),
+            Column("circles", "nodal circles"),
+            Column("root", "λ²"),
+            "frequency_hz",
+        ),
+        "other sets": (
+            "set",
+            Column("frequency_hz", "best frequency", digits=3),
+            Column("flow_m3_s", "peak flow", "ml/min", 6e7),
+            Column("blocking_n", "blocking force at 480 Hz", digits=3),
+        ),
+        "rig": (Column("parameter", "name", words=spaced), *("value", "unit", "meaning", "source")),
+    }
+)
+"""How the report shows its tables."""
+
+
+def _facts(tables: Mapping[str, pd.DataFrame], _: Seeded) -> Mapping[str, pd.DataFrame]:
+    loads = tables["load sweep"]
+    return {"rig": _parameters(), "blocking": loads[loads["load_n"] == 0.0]}
+
+
+DIAPHRAGM_MOTOR = Study(
+    "diaphragm-motor", "diaphragm_motor/report.html", _find, MOTOR_FIGURES, COLUMNS, asdict(RIG), _facts
+)
+"""Sections 7.1 to 7.3 of the diaphragm motor's paper, reversal, control, and what fails."""

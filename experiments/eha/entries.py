@@ -1,0 +1,201 @@
+"""Findings of the gear-pump actuator as entries of the JSON contract; later versions add entries and rename none."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from experiments.command.terminal import clauses
+from experiments.log_pages.entries import NO_GATE, gate_entry
+
+if TYPE_CHECKING:
+    from estimation.eha.result import BulkModulusEstimate
+    from estimation.finding import Finding, Quantity
+    from faults.diagnosis.diagnose import EhaEvidence
+
+NO_QUANTITY: Mapping[str, Any] = {"value": None, "std": None, "ci95": None}
+
+NO_ESTIMATE: Mapping[str, Any] = {
+    "bulk_modulus_pa": NO_QUANTITY,
+    "leakage_coefficient_m3_s_pa": None,
+    "flow_bias_m3_s": None,
+    "states": {},
+    "noise": None,
+    "nis": {},
+    "method": None,
+    "form": None,
+    "gate": NO_GATE,
+    "bound_percent": None,
+    "condition": None,
+    "channels": [],
+    "notes": [],
+}
+"""The entries of a log that could not be estimated."""
+
+NO_DIAGNOSIS: Mapping[str, Any] = {
+    "condition": None,
+    "scores": {},
+    "probabilities": None,
+    "unknown": None,
+    "reasons": [],
+    "severity": None,
+    "not_told": [],
+    "advice": [],
+    "since_s": None,
+    "since_ci95_s": None,
+    "condition_before": None,
+    "gate": None,
+    "bulk_modulus_pa": NO_QUANTITY,
+    "channels": [],
+    "runner_up": None,
+    "margin": None,
+    "transfer_function_scores": None,
+    "transfer_function_condition": None,
+    "notes": [],
+}
+"""The entries of a log that could not be diagnosed."""
+
+COSTS = frozenset({"pressure_absent", "pressure_unused", "pressure_absent_class"})
+"""Codes of what an absent channel costs: of all logs alike, so said once."""
+
+NO_CLASS = frozenset({"models_alike", "models_diverged"})
+"""Codes of why a log is in no class: said as its message, not beside it."""
+
+
+def estimate_entries(found: "Finding") -> dict[str, Any]:
+    """Return what `estimate` says of a log.
+
+    Parameters
+    ----------
+    found : Finding
+        What was found; its evidence is a `BulkModulusEstimate`.
+
+    Returns
+    -------
+    dict[str, Any]
+        The entries of `NO_ESTIMATE`, with outcome, message and warnings.
+    """
+    evidence: BulkModulusEstimate = found.evidence
+    others = {name: _quantity(one) for name, one in found.quantities.items() if name != "bulk_modulus"}
+    tuned = None if evidence.tuning is None else evidence.tuning.tuned
+    return {
+        "outcome": found.outcome.value,
+        "bulk_modulus_pa": _quantity(found.quantities["bulk_modulus"]),
+        "leakage_coefficient_m3_s_pa": others.get("leakage_coefficient"),
+        "flow_bias_m3_s": others.get("flow_bias"),
+        "nis": dict(evidence.nis),
+        "method": evidence.method,
+        "states": others,
+        "noise": None if tuned is None else {**tuned.noise, **tuned.variances},
+        "form": evidence.form,
+        "gate": gate_entry(found.gate),
+        "bound_percent": 100.0 * evidence.bound,
+        "channels": list(found.channels),
+        "message": _estimate_message(found),
+        **_notes(found),
+    }
+
+
+def diagnosis_entries(found: "Finding") -> dict[str, Any]:
+    """Return what `diagnose` says of a log.
+
+    Parameters
+    ----------
+    found : Finding
+        What was found; its evidence is an `EhaEvidence`.
+
+    Returns
+    -------
+    dict[str, Any]
+        The entries of `NO_DIAGNOSIS`, with outcome, message and warnings. Where the condition changed within the log
+        ``since_s``, ``since_ci95_s`` and ``condition_before`` say when; else they are None.
+    """
+    from experiments.eha.verdict_words import headline, models_said
+    from faults.diagnosis.models_verdict import margin, ranked
+
+    evidence: EhaEvidence = found.evidence
+    judged, ratio = bool(found.probabilities), margin(evidence.scores)
+    order = sorted(found.probabilities, key=lambda name: -found.probabilities[name]) if judged else None
+    order = order or [name for name, _ in ranked(evidence.scores)]
+    entries: dict[str, Any] = {
+        "outcome": found.outcome.value,
+        "condition": found.condition,
+        "scores": dict(evidence.scores.by_condition),
+        "channels": list(found.channels),
+        "runner_up": order[1] if found.condition is not None else None,
+        "margin": None if ratio != ratio else ratio,
+        "gate": gate_entry(found.gate),
+        "bulk_modulus_pa": _quantity(found.quantities["bulk_modulus"]),
+        "unknown": None if found.condition is None else found.unknown,
+        "reasons": [str(note) for note in found.against],
+        "advice": [str(note) for note in found.advice],
+        **_transfer_functions(evidence),
+        **_notes(found),
+    }
+    if found.condition is None:
+        return {**entries, "message": clauses(str(note) for note in found.notes if note.code in NO_CLASS)}
+    if not judged:
+        return {**entries, "message": models_said(entries)}
+    since = found.since
+    entries |= {
+        "probabilities": dict(found.probabilities),
+        "severity": {name: _severity(one) for name, one in found.severities.items()},
+        "not_told": [str(note) for note in found.not_told],
+        "since_s": None if since is None else round(since.since, 4),
+        "since_ci95_s": None if since is None else [round(end, 4) for end in since.ci95],
+        "condition_before": None if since is None else since.before,
+    }
+    return {**entries, "message": headline(entries)}
+
+
+def _transfer_functions(evidence: "EhaEvidence") -> dict[str, Any]:
+    others = evidence.transfer_functions
+    return {
+        "transfer_function_scores": None if others is None else dict(others.by_condition),
+        "transfer_function_condition": None if others is None else others.condition,
+    }
+
+
+def _quantity(one: "Quantity") -> dict[str, Any]:
+    return {"value": one.value, "std": one.std, "ci95": one.ci95}
+
+
+def _severity(one: "Quantity") -> dict[str, Any]:
+    return {"value": one.value, "unit": one.unit, "ci95": [None, None] if one.ci95 is None else list(one.ci95)}
+
+
+def _notes(found: "Finding") -> dict[str, Any]:
+    return {
+        "notes": [note.to_dict() for note in found.all_notes],
+        "warnings": [str(note) for note in found.notes if note.code not in COSTS | NO_CLASS],
+    }
+
+
+def _estimate_message(found: "Finding") -> str:
+    from estimation.finding import OUTCOMES
+
+    modulus = found.quantities["bulk_modulus"]
+    if modulus.value is None or modulus.ci95 is None:
+        return clauses([OUTCOMES[found.outcome]])
+    low, high = (1e-6 * end for end in modulus.ci95)
+    said = [f"bulk modulus {1e-6 * modulus.value:.2f} MPa, 95 % interval {low:.2f} to {high:.2f} MPa"]
+    if not found.gate.passed:
+        said.append(f"not to be relied on: {clauses(str(note) for note in found.gate.reasons)}")
+    return clauses(said)
+
+
+def costs(results: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Return what absent channels cost, each sentence with the number of logs that it is true of.
+
+    Parameters
+    ----------
+    results : iterable of Mapping
+        Entries with ``notes``, one a log.
+
+    Returns
+    -------
+    list[str]
+        A sentence a kind of absence.
+    """
+    results = list(results)
+    said = Counter(note["text"] for result in results for note in result["notes"] if note["code"] in COSTS)
+    return [f"{count} of {len(results)} logs: {text}" for text, count in said.items()]

@@ -1,0 +1,245 @@
+"""The gear-pump actuator, servo motor, pump and cylinder, as a kind: the options it understands and what they do."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from experiments.actuator_kind import ActuatorKind, Experiment, LogVerb, Options, Run, Simulation
+from experiments.command.json_output import Result
+from experiments.command.options import PRESSURE, require_one_of, require_positive
+from experiments.command.terminal import note
+from experiments.eha.entries import NO_DIAGNOSIS, NO_ESTIMATE, diagnosis_entries, estimate_entries
+from experiments.eha.identifiability import cards_of, experiment_entries, experiments_shown
+from experiments.eha.screens import diagnoses_shown, estimates_shown
+from faults.conditions import CONDITIONS, LEVELS, find_condition, parameters_for, severity
+from plant.eha.model import EhaParameters
+from plant.errors import HydrostateError
+from plant.log.columns import CHANNELS
+from plant.notes import Code
+
+if TYPE_CHECKING:
+    from estimation.eha.bulk_modulus import EstimateOptions
+    from estimation.finding import Finding
+    from estimation.identification.model.linear_model import LinearModel
+    from plant.eha.rig import Rig
+    from plant.log.record import Record
+
+SENSORS = {"position": "position_m", "velocity": "velocity_m_s", "dp": PRESSURE}
+"""Channels by the names of ``--sensors``."""
+
+ITS_CHANNELS = ("motor_speed_rad_s", *SENSORS.values(), "pressure_a_pa", "pressure_b_pa", "motor_voltage_v")
+
+
+NOT_FAULTY = dict.fromkeys(("condition", "leakage_severity", "friction_severity"))
+AS_THE_LOG_ALLOWS = {"form": "auto", "method": "auto", "sensors": "", "no_pressure": False, "condition": None}
+OF_A_FILTER = {"states": "", "robust": "none", "tune": False, "smooth": False, "figure": None}
+FIRST_GUESS = {"start": None, "start_std": 3e8}
+EXPERIMENT = {"sensors": ",".join(SENSORS), "noise": "bench", "drive": "steps", "seconds": 10.0, "rate": 1000.0}
+"""Options, with what they are where they are not given."""
+
+
+class RunCode(Code):
+    """Notes on a simulated run."""
+
+    PRESSURE_NOT_LOGGED = (
+        "pressure_not_logged",
+        "{channel} is not logged by these sensors: estimate and diagnose will be less certain",
+    )
+
+
+def _simulated(rig: "Rig[Any]", options: Options) -> Run:
+    import numpy as np
+
+    from plant.eha.drives import DRIVES, make_drive
+    from plant.eha.simulate import PLANTS, simulate
+    from plant.sensors.sensors import SENSORS as NOISE
+
+    plant = options["plant"] if options["plant"] in PLANTS else "lumped"
+    drive, sensors, seed = options["drive"], options["sensors"], options["seed"]
+    require_one_of("--drive", drive, list(DRIVES))
+    require_one_of("--sensors", sensors, list(NOISE))
+    parameters, made_of = _faulty(rig.parameters, options)
+    drive_rng, sensor_rng = np.random.default_rng(seed).spawn(2)
+    speed = make_drive(drive, options["duration"], options["sample_time"], parameters, drive_rng)
+    record = simulate(
+        PLANTS[plant], speed, options["sample_time"], parameters, sensors=NOISE[sensors], rng=sensor_rng
+    ).annotate(**made_of, drive=drive, rig=rig.name, seed=seed)
+    said = {"plant": plant, **made_of, "drive": drive, "sensors": sensors, "seed": seed}
+    return Run(record, said, () if PRESSURE in record else (RunCode.PRESSURE_NOT_LOGGED.note(channel=PRESSURE),))
+
+
+def _faulty(rig: EhaParameters, options: Options) -> tuple[EhaParameters, dict[str, Any]]:
+    """Return the faulty actuator, and what made it so."""
+    name, leakage, friction = (options[key] for key in ("condition", "leakage_severity", "friction_severity"))
+    if leakage is None and friction is None:
+        found = find_condition(name or "normal")
+        name, leakage, friction = found.name, float(LEVELS.index(found.leakage)), float(LEVELS.index(found.friction))
+    elif name is not None:
+        raise HydrostateError("a --condition or severities are wanted, got both")
+    leaking, rubbing = leakage or 0.0, friction or 0.0
+    made_of = {"condition": name, "leakage_severity": leaking, "friction_severity": rubbing}
+    return severity(leaking, rubbing, rig), made_of
+
+
+class _Estimation(NamedTuple):
+    """How a log is estimated, and the channels that are not to be used."""
+
+    how: "EstimateOptions"
+    unused: frozenset[str]
+
+
+def _prepared_estimation(rig: "Rig[Any]", options: Options) -> "tuple[Rig[Any], _Estimation]":
+    how, unused = _how(options), _unused(options["sensors"], options["no_pressure"])
+    if options["condition"] is not None:
+        rig = replace(rig, parameters=parameters_for(find_condition(options["condition"]), rig.parameters))
+    return rig, _Estimation(how, unused)
+
+
+def _how(options: Options) -> "EstimateOptions":
+    """Return how a log is to be estimated, checked."""
+    from estimation.eha.bulk_modulus import FITTED, LEAST_SQUARES, EstimateOptions
+    from estimation.eha.by_filter import GROUPS
+    from estimation.filters.run import METHODS, ROBUST
+    from estimation.models.augment import AUGMENTABLE
+    from estimation.models.eha_forms import FORMS
+
+    form, method, robust, start = (options[name] for name in ("form", "method", "robust", "start"))
+    require_one_of("--form", form, ["auto", *FITTED, *FORMS])
+    require_one_of("--method", method, ["auto", LEAST_SQUARES, *METHODS])
+    require_one_of("--robust", robust, list(ROBUST))
+    if options["smooth"] and method not in ("auto", "ekf", "smoother"):
+        raise HydrostateError(f"--smooth smooths the ekf, got --method {method}")
+    wanted = _listed(options["states"])
+    for name in wanted:
+        require_one_of("--states", name, [*GROUPS, *AUGMENTABLE])
+    require_positive("--start-std", options["start_std"], "Pa")
+    if start != 0.0:
+        require_positive("--start", start, "Pa")
+    method = "smoother" if options["smooth"] else method
+    return EstimateOptions(form, method, start, options["start_std"], wanted, options["tune"], robust)
+
+
+def _unused(sensors: str, no_pressure: bool) -> frozenset[str]:
+    """Return the channels that are not to be used."""
+    used = _listed(sensors)
+    for name in used:
+        require_one_of("--sensors", name, list(SENSORS))
+    left_out = {channel for name, channel in SENSORS.items() if used and name not in used}
+    return frozenset(left_out | ({PRESSURE} if no_pressure else set()))
+
+
+def _listed(names: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in names.split(",") if name.strip())
+
+
+def _estimated(record: "Record", rig: "Rig[Any]", asked: _Estimation) -> "Finding":
+    from estimation.eha.estimate import estimate_log
+
+    unused = {channel: None for channel in asked.unused if channel in record}
+    return estimate_log(record.replace(**unused), rig, asked.how)
+
+
+def _innovations(found: "Finding", log: str, path: Path) -> None:
+    """Write the figure of a filtered log."""
+    from experiments.log_pages.innovations import write_innovations
+
+    if found.evidence.estimate is None:
+        note(f"no figure: {log} was not filtered; ask for one with --method ekf")
+        return
+    write_innovations(found.evidence, log, path)
+
+
+def _taken_as_known(results: Sequence[Result]) -> Iterable[str]:
+    if any(one["condition"] is None and one["form"] not in (None, "flow") for one in results):
+        rig = results[0]["rig"]
+        yield f"no --condition: leakage and friction were taken to be those of the rig {rig!r}, healthy"
+
+
+class _Diagnosis(NamedTuple):
+    """Whether pressure is used, and what gives the nine transfer functions, where they are wanted."""
+
+    no_pressure: bool
+    linear: "Callable[[], Mapping[str, LinearModel]] | None"
+
+
+def _prepared_diagnosis(rig: "Rig[Any]", options: Options) -> "tuple[Rig[Any], _Diagnosis]":
+    linear = cache(lambda: _identified(rig.parameters, options["seed"]))
+    return rig, _Diagnosis(options["no_pressure"], linear if options["transfer_functions"] else None)
+
+
+def _identified(parameters: EhaParameters, seed: int) -> "Mapping[str, LinearModel]":
+    import warnings
+
+    import numpy as np
+
+    from faults.eha.bank import identify_bank
+    from plant.errors import LogWarning
+
+    note("identifying nine transfer functions from simulated tests of the rig")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        return identify_bank(parameters, np.random.default_rng(seed))
+
+
+def _diagnosed(record: "Record", rig: "Rig[Any]", asked: _Diagnosis) -> "Finding":
+    from faults.diagnosis.diagnose import diagnose_log
+    from faults.diagnosis.rmse import score_transfer_functions
+
+    if asked.no_pressure:
+        record = record.replace(**{PRESSURE: None})
+    found = diagnose_log(record, rig)
+    if asked.linear is None:
+        return found
+    scores = score_transfer_functions(record, asked.linear())
+    return replace(found, evidence=replace(found.evidence, transfer_functions=scores))
+
+
+def _page(result: Result, found: "Finding", record: "Record") -> str:
+    from experiments.eha.diagnosis_page import diagnosis_page
+    from experiments.log_pages.finding_page import finding_page
+
+    return diagnosis_page(result, found) if found.probabilities else finding_page(result, found, record)
+
+
+EHA = ActuatorKind(
+    name="eha",
+    description="servo motor, gear pump and cylinder, no valve in the power path",
+    parameters=EhaParameters,
+    channels={name: CHANNELS[name] for name in ITS_CHANNELS},
+    required=("motor_speed_rad_s", "position_m or velocity_m_s"),
+    conditions=tuple(CONDITIONS),
+    models=("reduced", "lumped", "circuit"),
+    rig_name="paper",
+    simulate=Simulation(
+        run=_simulated,
+        options=NOT_FAULTY | {"drive": "steps", "duration": 10.0, "sample_time": 1e-4, "sensors": "bench"},
+    ),
+    estimate=LogVerb(
+        run=_estimated,
+        prepare=_prepared_estimation,
+        options=AS_THE_LOG_ALLOWS | OF_A_FILTER | FIRST_GUESS,
+        entries=estimate_entries,
+        blank=NO_ESTIMATE,
+        screen=estimates_shown,
+        figure=_innovations,
+        remarks=_taken_as_known,
+    ),
+    diagnose=LogVerb(
+        run=_diagnosed,
+        prepare=_prepared_diagnosis,
+        options={"no_pressure": False, "scores": False, "transfer_functions": False},
+        entries=diagnosis_entries,
+        blank=NO_DIAGNOSIS,
+        screen=diagnoses_shown,
+        page=_page,
+    ),
+    identifiability=Experiment(
+        run=cards_of,
+        options=EXPERIMENT | {"ranked": False, "condition": None},
+        entries=experiment_entries,
+        screen=experiments_shown,
+    ),
+)
+"""What `experiments.actuators` registers."""

@@ -1,0 +1,119 @@
+"""What a terminal shows of logs of the gear-pump actuator."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from experiments.command.json_output import Result
+from experiments.command.options import PRESSURE
+from experiments.command.terminal import short_names, table
+from experiments.eha.entries import costs
+from experiments.eha.verdict_words import margin_word, verdict_lines
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+MOST_MESSAGES = 3
+"""Up to so many logs, everything that speaks against a result is shown."""
+
+MOST_TABLES = 3
+"""Up to so many logs, every condition's score is shown."""
+
+
+def estimates_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "Iterable[RenderableType]":
+    """Show bulk modulus of each log with its interval and verdict.
+
+    Parameters
+    ----------
+    results : sequence of Result
+        One a log, with the entries of `experiments.eha.entries.NO_ESTIMATE`.
+    options : Mapping[str, Any]
+        As given to the verb; none matters here.
+
+    Yields
+    ------
+    RenderableType
+        For the terminal.
+    """
+    del options
+    shown = table("log", "bulk modulus [MPa]", "95 % interval [MPa]", "bound [%]", "verdict")
+    for name, result in zip(short_names(results), results, strict=True):
+        shown.add_row(name, *_cells(result))
+    yield shown
+    doubtful = [result for result in results if not result["gate"]["passed"]]
+    if len(results) <= MOST_MESSAGES:
+        yield from (f"{result['file']}: {result['message']}" for result in doubtful)
+    elif doubtful:
+        yield f"{len(doubtful)} of {len(results)} logs gave nothing to be relied on; --json and --out give the reasons"
+    yield from costs(results)
+
+
+def _cells(result: Result) -> list[str]:
+    modulus = result["bulk_modulus_pa"]
+    verdict = result["outcome"].replace("_", " ")
+    bound = f"{result['bound_percent']:.2g}"
+    if modulus["value"] is None:
+        return ["-", "-", bound, verdict]
+    low, high = (f"{1e-6 * end:.2f}" for end in modulus["ci95"])
+    trusted = verdict if result["gate"]["passed"] else "doubtful"
+    return [f"{1e-6 * modulus['value']:.2f}", f"{low} to {high}", bound, trusted]
+
+
+def diagnoses_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "Iterable[RenderableType]":
+    """Show what is wrong with each log, a table of all where they are many.
+
+    Parameters
+    ----------
+    results : sequence of Result
+        One a log, with the entries of `experiments.eha.entries.NO_DIAGNOSIS`.
+    options : Mapping[str, Any]
+        As given to the verb: ``scores`` and ``transfer_functions`` ask for a table of errors.
+
+    Yields
+    ------
+    RenderableType
+        For the terminal.
+    """
+    tables = options["scores"] or options["transfer_functions"]
+    detailed = len(results) <= MOST_TABLES
+    if not detailed:
+        yield _summary(results)
+    for result in results:
+        judged = result["probabilities"] is not None
+        if detailed and judged:
+            yield from verdict_lines(result)
+        if tables and detailed:
+            yield _scores_table(result)
+        if not judged or result["outcome"] != "ok" or result["expected"] is not None:
+            yield f"{result['file']}: {result['message']}"
+    yield from costs(results)
+
+
+def _summary(results: Sequence[Result]) -> "RenderableType":
+    shown = table("log", "condition", "probability [%]", "runner-up", "error of runner-up / best", "believe")
+    for name, result in zip(short_names(results), results, strict=True):
+        margin, shares = result["margin"], result["probabilities"]
+        words = "-" if margin is None or result["condition"] is None else f"{margin:.2f}, {margin_word(margin)}"
+        share = "-" if shares is None else f"{100.0 * shares[result['condition']]:.1f}"
+        believe = "UNKNOWN" if result["unknown"] else "-" if shares is None else "yes"
+        shown.add_row(name, result["condition"] or "-", share, result["runner_up"] or "-", words, believe)
+    return shown
+
+
+def _scores_table(result: Result) -> "RenderableType":
+    unit = "1" if PRESSURE in result["channels"] else "m/s"
+    others = result["transfer_function_scores"]
+    headings = ["condition", f"model error [{unit}]", *([] if others is None else ["transfer function [m/s]"]), ""]
+    shown = table(*headings, title=result["file"])
+    for name, score in result["scores"].items():
+        marks = [words for words, best in _winners(result).items() if best == name]
+        cells = [name, f"{score:.4g}", *([] if others is None else [f"{others[name]:.4g}"]), ", ".join(marks)]
+        shown.add_row(*cells, style="bold" if name == result["condition"] else None)
+    return shown
+
+
+def _winners(result: Result) -> dict[str, str | None]:
+    return {
+        "<- best": result["condition"],
+        "runner-up": result["runner_up"],
+        "best transfer function": result["transfer_function_condition"],
+    }

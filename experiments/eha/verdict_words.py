@@ -1,0 +1,226 @@
+"""A diagnosis in words, made of its entries: five lines for a terminal, clauses for a page."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+SHOWN = {
+    "leakage_flow": "leakage at rated pressure",
+    "velocity_lost": "velocity lost",
+    "added_friction": "friction added at rated speed",
+    "pressure_rise": "pressure rise",
+    "bulk_modulus": "bulk modulus",
+    "entrained_air": "entrained air, at most",
+}
+"""What each severity is called."""
+
+MARGINS = ((1.05, "too close to call"), (1.25, "narrow"), (2.0, "clear"), (math.inf, "wide"))
+"""Words for the ratio of the runner-up's score to the best, up to each bound [dimensionless]."""
+
+
+NEAREST = "UNKNOWN, in none of the nine conditions; the nearest: "
+"""How a verdict begins that something speaks against."""
+
+
+def verdict_lines(result: Mapping[str, Any]) -> list[str]:
+    """Return the five lines that a reader gets of a log.
+
+    Parameters
+    ----------
+    result : Mapping
+        Its entries, with a verdict.
+
+    Returns
+    -------
+    list[str]
+        What it is, how bad in leakage, in friction and oil, whether to believe it, and what to measure next.
+    """
+    return [
+        f"{result['file']}: {headline(result)}",
+        f"  leakage   {amounts(result, ('leakage_flow', 'velocity_lost'))}",
+        f"  friction  {amounts(result, ('added_friction', 'pressure_rise', 'bulk_modulus'))}",
+        f"  believe   {believed(result)}",
+        f"  next      {next_step(result)}",
+    ]
+
+
+def headline(result: Mapping[str, Any]) -> str:
+    """Return the verdict in one sentence.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries with a verdict.
+
+    Returns
+    -------
+    str
+        Condition and probability, or that it is unknown; and since when.
+    """
+    ranked = sorted(result["probabilities"].items(), key=lambda item: -item[1])
+    (best, first), (second, other) = ranked[:2]
+    parts = [f"{_said(best)}, probability {_percent(first)}", since(result), f"next {_said(second)}, {_percent(other)}"]
+    named = "; ".join(part for part in parts if part)
+    if result["unknown"]:
+        return f"{NEAREST}{named}"
+    return named
+
+
+def since(result: Mapping[str, Any]) -> str:
+    """Return since when the actuator is in its condition.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries with a verdict.
+
+    Returns
+    -------
+    str
+        A clause; empty for a healthy actuator that was so from the beginning.
+
+    Examples
+    --------
+    >>> since({"condition": "minor_leakage", "since_s": None})
+    'since before the log began'
+    """
+    if result["since_s"] is not None:
+        low, high = result["since_ci95_s"]
+        before = _said(result["condition_before"])
+        return f"since {result['since_s']:.2f} s ({low:.2f} to {high:.2f}), {before} until then"
+    return "" if result["condition"] == "normal" else "since before the log began"
+
+
+def amounts(result: Mapping[str, Any], names: Sequence[str]) -> str:
+    """Return severities with their intervals.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries with a verdict.
+    names : sequence of str
+        Which.
+
+    Returns
+    -------
+    str
+        In the units of a shop.
+    """
+    return "; ".join(f"{SHOWN[name]} {amount(result['severity'][name])}" for name in names)
+
+
+def amount(one: Mapping[str, Any]) -> str:
+    """Return one severity with its interval.
+
+    Parameters
+    ----------
+    one : Mapping
+        ``value``, ``unit`` and ``ci95``.
+
+    Returns
+    -------
+    str
+        Pascals as MPa.
+
+    Examples
+    --------
+    >>> amount({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8]})
+    '207.0 MPa (205.0 to 209.0)'
+    """
+    if any(number is None or not math.isfinite(number) for number in (one["value"], *one["ci95"])):
+        return "not determined"
+    scale, unit = (1e-6, "MPa") if one["unit"] == "Pa" else (1.0, one["unit"])
+    value, low, high = (scale * float(number) for number in (one["value"], *one["ci95"]))
+    decimals = min(max(1 - math.floor(math.log10(high - low)), 0), 4) if high > low else 2
+    return f"{value:.{decimals}f} {unit} ({low:.{decimals}f} to {high:.{decimals}f})"
+
+
+def believed(result: Mapping[str, Any]) -> str:
+    """Return whether the verdict may be believed.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries with a verdict.
+
+    Returns
+    -------
+    str
+        A sentence.
+    """
+    if result["unknown"]:
+        return "no: " + "; ".join(result["reasons"])
+    return "; ".join(["yes: a circuit in one of the nine conditions follows the log", *result["not_told"]])
+
+
+def next_step(result: Mapping[str, Any]) -> str:
+    """Return what to do or to measure next.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries with a verdict.
+
+    Returns
+    -------
+    str
+        A sentence.
+    """
+    return "; ".join(result["advice"])
+
+
+def margin_word(margin: float) -> str:
+    """Return a word for how far the runner-up is behind.
+
+    Parameters
+    ----------
+    margin : float
+        Ratio of its error to the best [dimensionless].
+
+    Returns
+    -------
+    str
+        Of `MARGINS`.
+
+    Examples
+    --------
+    >>> margin_word(1.1)
+    'narrow'
+    """
+    return next(word for bound, word in MARGINS if margin < bound or bound == math.inf)
+
+
+def models_said(result: Mapping[str, Any]) -> str:
+    """Return what nine nominal models alone say of a log, in one sentence.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries with a condition and without probabilities.
+
+    Returns
+    -------
+    str
+        The condition and by what margin.
+    """
+    best, second, margin = result["condition"], result["runner_up"], result["margin"]
+    if margin < MARGINS[0][0]:
+        named = (
+            f"{best}, but {margin_word(margin)}: the error of {second} is only {100.0 * (margin - 1.0):.1f} % larger"
+        )
+    elif not math.isfinite(margin):
+        named = f"{best}, which fits exactly, as {second} does not"
+    else:
+        error = f"{100.0 * (margin - 1.0):.0f} % larger" if margin < 2.0 else f"{margin:.1f} times as large"
+        named = f"{best}, by a {margin_word(margin)} margin: the error of {second} is {error}"
+    return f"{NEAREST}{named}" if result["unknown"] else named
+
+
+def _said(condition: str) -> str:
+    return condition.replace("_", " ")
+
+
+def _percent(probability: float) -> str:
+    if probability > 0.999:
+        return "> 99.9 %"
+    return "< 0.1 %" if probability < 0.001 else f"{100.0 * probability:.1f} %"

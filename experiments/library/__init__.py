@@ -1,0 +1,1 @@
+"""The library of nine transfer functions: tables, figures, report, command."""

@@ -1,0 +1,162 @@
+"""The nine-condition library: its models beside Table 6, four structures compared, and the clock of the test."""
+
+from types import MappingProxyType
+
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from experiments.page.drawing import shaded
+from experiments.page.figure_files import Drawings
+from experiments.page.frames import Tables
+from experiments.page.style import (
+    BESIDE_CONDITIONS,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    Margins,
+    condition_levels,
+    panels,
+    spread_out,
+)
+from experiments.page.words import in_words
+
+MILLI = 1e3
+"""Millimetres a metre."""
+
+STRUCTURE_MARKS = MappingProxyType(
+    {"output-error": (BLUE, "o"), "ARX": (ORANGE, "s"), "ARMAX": (GREEN, "^"), "Box-Jenkins": (PURPLE, "D")}
+)
+"""Colour and mark of each structure."""
+
+COMPARED = MappingProxyType(
+    {
+        "fit_percent": ("running free", "fit [%]"),
+        "one_step_percent": ("one step ahead", "fit [%]"),
+        "weight_above_percent": ("criterion's weight above 25 Hz", "share [%]"),
+    }
+)
+"""Panels of the comparison: column, title and axis."""
+
+
+def draw_structures(tables: Tables) -> Figure:
+    """Draw how the four structures do in each condition, and where each one's criterion looks.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The library's tables.
+
+    Returns
+    -------
+    Figure
+        Three panels, one row a condition, one mark a structure.
+    """
+    found = tables["structures"]
+    margins = Margins(left=BESIDE_CONDITIONS.left, top=0.65)
+    figure, axes = panels("Four structures on passes held back", 1, 3, 4.8, margins, sharey=True)
+    for axis, (column, (title, label)) in zip(axes, COMPARED.items(), strict=True):
+        level = condition_levels(axis, found["condition"])
+        for offset, (name, (colour, mark)) in zip(spread_out(4, 0.5), STRUCTURE_MARKS.items(), strict=True):
+            mine = found["structure"] == name
+            axis.plot(found[column][mine], level[mine] + offset, mark, color=colour, markersize=4.5, label=name)
+        axis.set(xlim=(0.0, 100.0), title=title, xlabel=label)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="upper right", ncols=4, frameon=False)
+    return figure
+
+
+def draw_library(tables: Tables) -> Figure:
+    """Draw the gain of the library's models with 95 % bands over that of Table 6.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The library's tables.
+
+    Returns
+    -------
+    Figure
+        One panel a condition.
+    """
+    responses = tables["responses"]
+    margins = Margins(left=0.75, top=0.65, down=0.35, across=0.25)
+    figure, axes = panels("Gain from motor speed to velocity", 3, 3, 6.4, margins, sharex=True, sharey=True)
+    for axis, (condition, rows) in zip(axes, responses.groupby("condition", sort=False), strict=True):
+        axis.plot(rows["frequency_hz"], MILLI * rows["published_gain"], color=ORANGE, label="Table 6, at 1 ms")
+        low, high = MILLI * rows["gain_low"], MILLI * rows["gain_high"]
+        axis.fill_between(rows["frequency_hz"], low, high, color=BLUE, alpha=0.3, lw=0)
+        axis.plot(rows["frequency_hz"], MILLI * rows["gain"], color=BLUE, label="library, with 95 % band")
+        axis.set(title=in_words(str(condition)))
+    axes[0].set(xscale="log", yscale="log", ylim=(3e-3, 1.0))
+    axes[3].set(ylabel="gain [mm/s per rad/s]")
+    axes[7].set(xlabel="frequency [Hz]")
+    axes[0].legend(loc="lower left")
+    return figure
+
+
+def draw_orders(tables: Tables) -> Figure:
+    """Draw singular values over the noise floor, and what each order adds to the fit.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The library's tables.
+
+    Returns
+    -------
+    Figure
+        Two panels, one row a condition.
+    """
+    orders = tables["orders"]
+    margins = Margins(left=BESIDE_CONDITIONS.left, top=0.65)
+    figure, (values, fits) = panels("What the data say of the order", 1, 2, 4.2, margins, sharey=True)
+    level = condition_levels(values, orders["condition"])
+    condition_levels(fits, orders["condition"])
+    for k, (colour, mark) in enumerate(list(STRUCTURE_MARKS.values())[:3], 1):
+        values.plot(orders[f"value_{k}_over_floor"], level, mark, color=colour, markersize=5, label=f"value {k}")
+    for order, (colour, mark) in enumerate(STRUCTURE_MARKS.values(), 1):
+        gained = orders[f"fit_{order}_percent"] - orders["fit_1_percent"]
+        if order > 1:
+            fits.plot(gained, level, mark, color=colour, markersize=5, label=f"order {order}")
+    values.axvline(1.0, color=GREY, linewidth=1.0, linestyle=(0, (4, 3)), zorder=0)
+    values.set(title="projected singular values: dashed, the floor of noise", xscale="log")
+    values.set(xlabel="value over its noise floor [ratio]")
+    fits.axvline(0.0, color=GREY, linewidth=1.0, linestyle=(0, (4, 3)), zorder=0)
+    fits.set(title="output error of higher order than first", xlabel="fit gained over first order [percentage points]")
+    for axis in (values, fits):
+        axis.legend(loc="best")
+    return figure
+
+
+def draw_clocks(tables: Tables) -> Figure:
+    """Draw how certain each test's clock makes the gain, by frequency.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The library's tables.
+
+    Returns
+    -------
+    Figure
+        One line a test.
+    """
+    clocks = tables["clocks"].sort_values("at_25_hz")
+    columns = [name for name in clocks.columns if name.startswith("at_")]
+    frequencies = [float(name.split("_")[1]) for name in columns]
+    figure, (axis,) = panels("Predicted deviation of the gain after one test", 1, 1, 3.6, Margins(left=0.9, right=2.2))
+    for _, row, colour in shaded(enumerate(clocks.to_dict("records")), 0.9):
+        axis.plot(frequencies, [100.0 * row[name] for name in columns], "o-", color=colour, label=row["input"])
+    axis.set(yscale="log")
+    axis.set_yticks([0.02, 0.05, 0.1, 0.2], ["0.02", "0.05", "0.1", "0.2"])
+    axis.yaxis.set_minor_formatter(NullFormatter())
+    axis.set(xlabel="frequency [Hz]", ylabel="standard deviation [% of gain]")
+    axis.legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
+    return figure
+
+
+LIBRARY_FIGURES: Drawings = MappingProxyType(
+    {"library": draw_library, "structures": draw_structures, "orders": draw_orders, "clocks": draw_clocks}
+)
+"""The figures, by file name, in the report's order."""

@@ -1,0 +1,247 @@
+"""The nine-condition library: transfer functions identified on the circuit plant, with Table 6 beside them.
+
+The paper's nine are printed with four digits, without sample time, unit or uncertainty, and those digits do not
+determine the gain of the first (errata E14, E15). This library is at full precision, with both covariances, and says
+what it was fitted to. It ships as ``experiments/published/transfer_function_library.json``.
+"""
+
+import json
+import warnings
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.identification.fit.output_error import fit_output_error
+from estimation.identification.model.linear_model import LinearModel
+from experiments.circuit.passes import CHANNELS, SAMPLE_TIME, Passes, in_condition, run_passes
+from experiments.nine_conditions.printed_transfer_functions import known, pair, pairs, printed_model
+from experiments.running.random_streams import stream
+from faults.conditions import CONDITIONS
+from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.simulate import CIRCUIT
+from plant.errors import HydrostateError, LogWarning
+
+Array = NDArray[np.float64]
+
+FORMAT = "hydrostate transfer-function library"
+"""What the file says it is."""
+
+VERSION = 1
+"""Of the format; a reader refuses a later one."""
+
+DURATION = 80.0
+"""Length of a test, all passes together [s]."""
+
+HOLD_TIME = 0.05
+"""Time between chances to switch [s]: 10 to 20 ms suit 25 Hz, 200 ms leaves it several times less certain."""
+
+MEAN_V, AMPLITUDE_V = 4.0, 2.0
+"""Mean and amplitude of the test [V]. Without a mean the circuit's piston sticks at every reversal, and a linear model
+explains half of its motion; 2 to 6 V are above the dead zone of every condition (errata E8)."""
+
+PASS_TIME, SETTLING = 4.0, 1.5
+"""Length of a pass, which covers some 0.7 of the stroke, and what is left out after the piston turns round [s]."""
+
+HIGHEST_ORDER = 2
+"""Orders up to this are compared."""
+
+VAGUE = 0.1
+"""A gain known no better than this share is not determined."""
+
+
+def circuit_passes(
+    rig: CircuitParameters, condition: str, rng: np.random.Generator, duration: float = DURATION
+) -> tuple[list[Array], list[Array]]:
+    """Return an identification test of the circuit plant, pass by pass, about the mean of each.
+
+    Each pass is an experiment of its own, with an initial state of its own. Their sample time is that of the models,
+    as inferred for Table 6 (errata E14).
+
+    Parameters
+    ----------
+    rig : CircuitParameters
+        The healthy circuit.
+    condition : str
+        Condition name.
+    rng : numpy.random.Generator
+        Source of the drive and of sensor noise.
+    duration : float
+        Length of all passes [s].
+
+    Returns
+    -------
+    speeds, velocities : list of ndarray
+        Motor speed [rad/s] and velocity [m/s] of each pass, as the bench's sensors see them.
+    """
+    test = Passes(MEAN_V, AMPLITUDE_V, max(1, round(duration / PASS_TIME)), PASS_TIME, HOLD_TIME, SETTLING)
+    speeds, velocities = run_passes(in_condition(rig, condition), test, rng)
+    return list(speeds), list(velocities)
+
+
+def build_library(seed: int, *, duration: float = DURATION) -> dict[str, Any]:
+    """Return the library as JSON values.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of drives and sensor noise.
+    duration : float
+        Length of each test [s].
+
+    Returns
+    -------
+    dict
+        ``format``, ``version``, how it was made, and by condition the model and Table 6.
+    """
+    rig = CircuitParameters()
+
+    def identify(name: str) -> dict[str, Any]:
+        speeds, velocities = circuit_passes(rig, name, stream(seed, "library", name), duration)
+        model = determined_model(speeds, velocities)
+        return {"model": model.to_dict(), **described(model), "table_6": printed_model(name)}
+
+    # one after the other: filters of warnings are the process's, and threads would undo each other's
+    entries = {name: identify(name) for name in CONDITIONS}
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "plant": CIRCUIT.name,
+        "seed": seed,
+        "drive": {
+            "kind": "random binary around a mean, in passes",
+            "mean_v": MEAN_V,
+            "amplitude_v": AMPLITUDE_V,
+            "hold_time_s": HOLD_TIME,
+            "duration_s": duration,
+        },
+        "conditions": entries,
+    }
+
+
+def determined_model(speeds: list[Array], velocities: list[Array]) -> LinearModel:
+    """Return the output-error model that BIC prefers among those the data determine.
+
+    Left out is a model whose pole a zero nearly cancels, decays slower than a pass lasts, or leaves the gain vague:
+    such a pole stands for what the passes' means differ by, and the gain would be that of a drift.
+
+    Parameters
+    ----------
+    speeds, velocities : list of ndarray, shape (n,)
+        As `circuit_passes` returns them.
+
+    Returns
+    -------
+    LinearModel
+        Of order 1 at least, which is always kept.
+    """
+    found: list[tuple[float, LinearModel]] = []
+    for order in range(1, HIGHEST_ORDER + 1):
+        with warnings.catch_warnings():  # of models that are not kept
+            warnings.simplefilter("ignore", LogWarning)
+            model = fit_output_error(
+                speeds,
+                velocities,
+                SAMPLE_TIME,
+                n_numerator=order + 1,
+                n_denominator=order,
+                covariance="coloured",
+                input_name=CHANNELS[0],
+                output_name=CHANNELS[1],
+            )
+        slowest = -SAMPLE_TIME / float(np.log(np.abs(model.poles[0])))
+        known = model.dc_gain_std < VAGUE * abs(model.dc_gain) and slowest < PASS_TIME - SETTLING
+        if order == 1 or (known and not model.cancellations):
+            p = 2 * order + 1 + order * len(speeds)
+            found.append((model.n_samples * float(np.log(model.rmse**2)) + p * float(np.log(model.n_samples)), model))
+    return min(found, key=lambda one: one[0])[1]
+
+
+def described(model: LinearModel) -> dict[str, Any]:
+    """Return poles, zeros, gain and bandwidth of a model, each with its standard deviation.
+
+    Parameters
+    ----------
+    model : LinearModel
+        The model.
+
+    Returns
+    -------
+    dict
+        JSON values; complex numbers as pairs.
+    """
+    return {
+        "poles": pairs(model.poles),
+        "pole_std": pairs(model.pole_std),
+        "zeros": pairs(model.zeros),
+        "zero_std": pairs(model.zero_std),
+        "dc_gain": {"value": model.dc_gain, "std": known(model.dc_gain_std)},
+        "bandwidth_hz": {"value": model.bandwidth_hz, "std": model.bandwidth_std_hz},
+        "cancellations": [[pair(one.pole), pair(one.zero), one.deviations] for one in model.cancellations],
+    }
+
+
+def library_text(library: Mapping[str, Any]) -> str:
+    """Return a library as the text of its file.
+
+    Parameters
+    ----------
+    library : Mapping
+        As `build_library` returns it.
+
+    Returns
+    -------
+    str
+        JSON.
+    """
+    return json.dumps(library, indent=1, allow_nan=False) + "\n"
+
+
+def library_models(library: Mapping[str, Any]) -> dict[str, LinearModel]:
+    """Return the models of a library by condition, equal in every bit to those that went in.
+
+    Parameters
+    ----------
+    library : Mapping
+        As `build_library` returns it.
+
+    Returns
+    -------
+    dict[str, LinearModel]
+        Motor speed [rad/s] to velocity [m/s].
+    """
+    return {name: LinearModel.from_dict(entry["model"]) for name, entry in library["conditions"].items()}
+
+
+def read_library(path: Path | None = None) -> dict[str, LinearModel]:
+    """Return the models of a library's file.
+
+    Parameters
+    ----------
+    path : Path, optional
+        The file; the library that ships with the package unless told.
+
+    Returns
+    -------
+    dict[str, LinearModel]
+        As `library_models`.
+
+    Raises
+    ------
+    HydrostateError
+        If the file is no library, or of a later version.
+    """
+    source = files("experiments.published") / "transfer_function_library.json" if path is None else path
+    try:
+        library = json.loads(source.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise HydrostateError(f"library {source} cannot be read: {error}") from error
+    if not isinstance(library, dict) or library.get("format") != FORMAT or library.get("version", 0) > VERSION:
+        raise HydrostateError(f"library {source} must say format {FORMAT!r} and version {VERSION} or earlier")
+    try:
+        return library_models(library)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise HydrostateError(f"library {source} must hold conditions with a model each, got {error!r}") from error

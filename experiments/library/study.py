@@ -1,0 +1,131 @@
+"""The library's study: it is built, looked at from all sides, and put beside Table 6."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from types import MappingProxyType
+from typing import Any
+
+import pandas as pd
+
+from estimation.identification.design.input_design import Limits
+from experiments.library.figures import LIBRARY_FIGURES
+from experiments.library.library import build_library, library_models, library_text
+from experiments.library.sentences import clock_sentences, order_sentences, structure_sentences
+from experiments.library.structures import clock_table, order_and_bandwidth, structure_table
+from experiments.library.tables import library_table, response_table, root_table
+from experiments.page.frames import Tables
+from experiments.page.numbers import fixed, number
+from experiments.page.tables import Cell, Column, Columns, Row, right
+from experiments.page.words import CONDITION
+from experiments.running.progress import Track, in_one_piece
+from experiments.running.study import Found, Seeded, Study
+from plant.eha.circuit_parameters import CircuitParameters
+
+RIG = CircuitParameters()
+"""The healthy circuit."""
+
+
+def _find(settings: Seeded, track: Track) -> Found:
+    built = in_one_piece(track, "identifying nine conditions", lambda: build_library(settings.seed))
+    models = library_models(built)
+    limits = Limits(RIG.rated_speed, stroke=RIG.stroke)
+    makers = {
+        "library": lambda: library_table(models),
+        "roots": lambda: root_table(models),
+        "responses": lambda: response_table(models),
+        "structures": lambda: structure_table(RIG, models, settings.seed),
+        "orders": lambda: order_and_bandwidth(RIG, models, settings.seed),
+        "clocks": lambda: clock_table(models["major_leakage"], limits, settings.seed).reset_index(),
+    }
+    tables = {name: make() for name, make in track(makers.items(), description="looking at it")}
+    return Found(tables, files={"library.json": library_text(built).encode()})
+
+
+def _facts(tables: Tables, _: Seeded) -> Mapping[str, Any]:
+    """Return the report's sentences, and the roots with one row a condition."""
+    return {
+        "structure_sentences": structure_sentences(tables["structures"]),
+        "order_sentences": order_sentences(tables["orders"]),
+        "clock_sentences": clock_sentences(tables["clocks"]),
+        "roots by condition": _roots(tables["roots"]),
+    }
+
+
+def _roots(frame: pd.DataFrame) -> pd.DataFrame:
+    rows: list[dict[str, str]] = []
+    for condition, of_one in frame.groupby("condition", sort=False):
+        row = {"condition": str(condition)}
+        for (kind, source), roots in of_one.groupby(["kind", "source"]):
+            row[f"{kind}s, {source}"] = "; ".join(_root(root) for root in roots.to_dict("records"))
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _root(root: Row) -> str:
+    text = f"{number(root['real'])} ± {number(root['real_spread'], 1)}"
+    if abs(root["imag"]) > 0.0:
+        text += f", {number(root['imag'])} i ± {number(root['imag_spread'], 1)}"
+    return text
+
+
+def _gain(row: Row) -> Cell:
+    return right(f"{fixed(1e3 * row['dc_gain'], 4)} ± {fixed(1.96e3 * row['dc_gain_std'], 4)}")
+
+
+def _printed_gain(row: Row) -> Cell:
+    return right(f"{fixed(1e3 * row['published_gain_low'], 3)} to {fixed(1e3 * row['published_gain_high'], 3)}")
+
+
+def _behind(row: Row) -> Cell:
+    if row["best"]:
+        return Cell("best", "good")
+    return right(f"{fixed(row['behind_percent'], 2)} ± {fixed(row['behind_std_percent'], 2)}")
+
+
+def _at_frequency(name: str) -> Column | None:
+    if not name.startswith("at_"):
+        return None
+    return Column(name, f"at {name.split('_')[1].removesuffix('.0')} Hz", "% of gain", 100.0, 2)
+
+
+COLUMNS: Mapping[str, Columns] = MappingProxyType(
+    {
+        "library": (
+            CONDITION,
+            Column("dc_gain", "steady gain", "mm/s per rad/s, 95 %", of_row=_gain),
+            Column("published_gain_low", "Table 6", "mm/s per rad/s, by rounding", of_row=_printed_gain),
+            Column("bandwidth_hz", "3 dB down", digits=3),
+            Column("published_bandwidth_hz", "Table 6", digits=3),
+            Column("jump_ratio", "b0 / gain", "ratio", digits=2),
+            Column("published_jump_ratio", "Table 6", "ratio", digits=2),
+            Column("fit_percent", digits=3),
+        ),
+        "roots by condition": (CONDITION, "poles, library", "poles, Table 6", "zeros, library", "zeros, Table 6"),
+        "structures": (
+            *(CONDITION, "order", "structure", Column("fit_percent", "free run")),
+            Column("behind_percent", "behind the best", "points ± standard error", of_row=_behind),
+            Column("one_step_percent", "one step ahead"),
+            Column("weight_above_percent", "weight above 25 Hz", digits=2),
+            Column("dc_gain", "steady gain", "mm/s per rad/s", 1e3),
+        ),
+        "orders": (
+            CONDITION,
+            Column("order_by_values", "order by singular values"),
+            Column("order_by_bic", "order by BIC"),
+            Column("order_of_library", "order kept"),
+            *(Column(f"value_{k}_over_floor", f"value {k}", "over floor", digits=2) for k in (1, 2, 3)),
+            *(Column(f"fit_{order}_percent", f"fit, order {order}") for order in (1, 2, 3, 4)),
+            Column("bandwidth_hz", "3 dB down", digits=3),
+            Column("bandwidth_std_hz", "± one deviation", digits=1),
+        ),
+        "clocks": (
+            *(Column("input", "test"), _at_frequency),
+            Column("steady_state", "steady", "% of gain", 100.0, 2),
+            Column("violations", "what it breaks", words=lambda text: text or "nothing"),
+        ),
+    }
+)
+"""How the report shows its tables."""
+
+LIBRARY = Study("library", "library/report.html", _find, LIBRARY_FIGURES, COLUMNS, asdict(RIG), _facts, "report")
+"""The nine-condition library, and how it was chosen."""

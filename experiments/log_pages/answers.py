@@ -1,0 +1,255 @@
+"""What a log says, in the hands of a Python user: it prints and draws itself, and turns into tables."""
+
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from control import TransferFunction
+    from matplotlib.axes import Axes
+
+    from estimation.finding import Finding, Quantity
+    from estimation.identification.model.linear_model import LinearModel
+
+
+_FIVE = "{:.5g}".format
+"""Five digits."""
+
+
+def no_such(owner: str, name: str, known: Sequence[str]) -> str:
+    """Return the sentence for a name that is not there.
+
+    Parameters
+    ----------
+    owner, name : str
+        Where it was looked for, and the name.
+    known : sequence of str
+        The names that are there.
+
+    Returns
+    -------
+    str
+        With the nearest name, or all of them.
+
+    Examples
+    --------
+    >>> no_such("Log", "estimat", ["estimate", "diagnose"])
+    "Log has no 'estimat'; did you mean 'estimate'?"
+    """
+    near = get_close_matches(name, known, n=1)
+    hint = f"did you mean {near[0]!r}?" if near else f"it has {', '.join(sorted(known))}"
+    return f"{owner} has no {name!r}; {hint}"
+
+
+class Shown:
+    """What prints itself, and says what it has where an attribute is misspelt."""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def __getattr__(self, name: str) -> Any:
+        from plant.errors import NoSuchNameError
+
+        if name.startswith("_"):
+            raise AttributeError(name)
+        names = [one for one in dir(self) if not one.startswith("_")]
+        raise NoSuchNameError(no_such(type(self).__name__, name, names))
+
+
+class Answer(Shown):
+    """What a log says, ready to be printed, drawn and passed on.
+
+    Parameters
+    ----------
+    finding : Finding
+        The finding.
+    entries : Mapping[str, Any]
+        The same by the names of the JSON contract.
+    screen : callable
+        From a list of entries to what a terminal shows.
+    """
+
+    def __init__(self, finding: "Finding", entries: Mapping[str, Any], screen: Any) -> None:
+        self.finding, self._entries, self._screen = finding, entries, screen
+
+    def __getattr__(self, name: str) -> Any:
+        if not name.startswith("_") and name in type(self.finding).__dataclass_fields__:
+            return getattr(self.finding, name)
+        return super().__getattr__(name)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *type(self.finding).__dataclass_fields__]
+
+    @property
+    def bulk_modulus(self) -> "Quantity":
+        """Effective bulk modulus [Pa] with its 95 % interval."""
+        return self.finding.quantities["bulk_modulus"]
+
+    @property
+    def condition(self) -> str | None:
+        """What is wrong: ``"unknown"`` where something speaks against them all, None where none was asked for."""
+        return "unknown" if self.finding.unknown else self.finding.condition
+
+    @property
+    def believed(self) -> bool:
+        """Whether the numbers can be believed."""
+        return self.finding.gate.passed
+
+    def __str__(self) -> str:
+        from experiments.command.terminal import rendered
+
+        about = {"file": "log", "warnings": [], "expected": None, "rig": "", "condition": None}
+        return rendered(*self._screen([{**about, **self.to_dict()}]))
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        notes = "".join(f"<li>{escape(str(note))}</li>" for note in self.finding.all_notes)
+        table = self.to_frame().to_html(float_format=_FIVE)
+        return f"<p>{escape(str(self._entries['message']))}</p>{table}<ul>{notes}</ul>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the entries of the JSON contract.
+
+        Returns
+        -------
+        dict[str, Any]
+            Numbers, text and lists, as ``--json`` prints them.
+        """
+        from experiments.command.json_output import plain
+
+        return plain(self._entries)
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return quantities and severities as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            By name: value, ends of the 95 % interval, unit.
+        """
+        import pandas as pd
+
+        every = {**self.finding.quantities, **self.finding.severities}
+        rows = {name: (one.value, *(one.ci95 or (None, None)), one.unit) for name, one in every.items()}
+        return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "ci95_low", "ci95_high", "unit"])
+
+    def plot(self) -> "list[Axes]":
+        """Draw the probabilities, where there are some, and every quantity with its interval.
+
+        Returns
+        -------
+        list of matplotlib.axes.Axes
+            One for the probabilities, then one a quantity.
+        """
+        import matplotlib.pyplot as plt
+
+        shares, table = self.finding.probabilities, self.to_frame().dropna()
+        rows = [*(["probability"] if shares else []), *table.index]
+        _, axes = plt.subplots(
+            max(len(rows), 1), 1, squeeze=False, figsize=(8.0, 0.8 * len(rows) + 2.0), layout="constrained"
+        )
+        for axis, name in zip(axes[:, 0], rows, strict=False):
+            if name == "probability":
+                axis.barh([one.replace("_", " ") for one in shares], [100.0 * share for share in shares.values()])
+                axis.set_xlabel("probability [%]")
+                continue
+            one = table.loc[name]
+            axis.errorbar(
+                [one["value"]],
+                [0],
+                xerr=[[one["value"] - one["ci95_low"]], [one["ci95_high"] - one["value"]]],
+                fmt="o",
+                capsize=4,
+            )
+            axis.set_yticks([])
+            axis.set_xlabel(f"{name.replace('_', ' ')} [{one['unit']}]")
+        axes[0, 0].set_title(f"{self._entries['message']}"[:100])
+        return list(axes[:, 0])
+
+
+class Model(Shown):
+    """A transfer function that was identified, with everything that `LinearModel` has.
+
+    Parameters
+    ----------
+    model : LinearModel
+        The model.
+    """
+
+    def __init__(self, model: "LinearModel") -> None:
+        self.model = model
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or name == "model" or not hasattr(self.model, name):
+            return super().__getattr__(name)
+        return getattr(self.model, name)
+
+    @cached_property
+    def _title(self) -> str:
+        one = self.model
+        order = one.denominator.size - 1
+        said = f"{one.structure} model of order {order} from {one.input_name} to {one.output_name}"
+        return f"{said}, fit {one.fit_percent:.1f} %"
+
+    def __str__(self) -> str:
+        return f"{self._title}\n{self.to_frame().to_string(float_format=_FIVE)}"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{self._title}</p>{self.to_frame().to_html(float_format=_FIVE)}"
+
+    def to_control(self) -> "TransferFunction":
+        """Return the transfer function for python-control.
+
+        Returns
+        -------
+        control.TransferFunction
+            Discrete, with the model's sample time.
+        """
+        return self.model.to_control()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the model as `LinearModel.from_dict` reads it.
+
+        Returns
+        -------
+        dict[str, Any]
+            Plain numbers, text and lists.
+        """
+        return self.model.to_dict()
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return the model's properties as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Steady gain and bandwidth, with their standard deviations.
+        """
+        import pandas as pd
+
+        one = self.model
+        rows = {"dc_gain": (one.dc_gain, one.dc_gain_std), "bandwidth_hz": (one.bandwidth_hz, one.bandwidth_std_hz)}
+        return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "std"])
+
+    def plot(self) -> "list[Axes]":
+        """Draw gain and phase.
+
+        Returns
+        -------
+        list of matplotlib.axes.Axes
+            Gain [dB] and phase [degrees] over frequency [Hz].
+        """
+        import matplotlib.pyplot as plt
+        import numpy as np
+
+        frequency = np.geomspace(1e-3, 0.5, 400) / self.model.sample_time
+        response = np.asarray(self.to_control()(np.exp(2j * np.pi * frequency * self.model.sample_time)))
+        _, axes = plt.subplots(2, 1, sharex=True, layout="constrained")
+        axes[0].semilogx(frequency, 20.0 * np.log10(np.abs(response)))
+        axes[1].semilogx(frequency, np.degrees(np.unwrap(np.angle(response))))
+        axes[0].set(title=self._title, ylabel="gain [dB]")
+        axes[1].set(ylabel="phase [degrees]", xlabel="frequency [Hz]")
+        return list(axes)

@@ -1,0 +1,119 @@
+"""A finding as entries of the JSON contract, whatever the actuator; later versions add entries and rename none."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from experiments.command.terminal import clauses
+
+if TYPE_CHECKING:
+    from estimation.finding import Finding, Gate, Quantity
+
+NO_GATE: Mapping[str, Any] = {"passed": False, "reasons": []}
+
+BLANK: dict[str, Any] = {
+    "quantities": {},
+    "channels": [],
+    "condition": None,
+    "probabilities": {},
+    "severity": {},
+    "findings": [],
+    "not_told": [],
+    "advice": [],
+    "gate": NO_GATE,
+    "notes": [],
+}
+"""The entries of a log that could not be used."""
+
+ALL_TOLD = "every quantity is told, and the model describes the log"
+
+
+def finding_entries(found: "Finding") -> dict[str, Any]:
+    """Return what a log says.
+
+    Parameters
+    ----------
+    found : Finding
+        What was found.
+
+    Returns
+    -------
+    dict[str, Any]
+        The entries of `BLANK`, with outcome, message and warnings. A condition that something speaks against is not
+        named.
+    """
+    return {
+        "outcome": found.outcome.value,
+        "quantities": {name: quantity_entry(one) for name, one in found.quantities.items()},
+        "channels": list(found.channels),
+        "condition": None if found.unknown else " or ".join(found.named) or None,
+        "probabilities": dict(found.probabilities),
+        "severity": {name: quantity_entry(one) for name, one in found.severities.items()},
+        "findings": [] if found.unknown else [str(note) for note in found.faults],
+        "not_told": [str(note) for note in found.not_told],
+        "advice": [str(note) for note in found.advice],
+        "gate": gate_entry(found.gate),
+        "message": message_of(found),
+        "notes": [note.to_dict() for note in found.all_notes],
+        "warnings": [str(note) for note in found.notes],
+    }
+
+
+def quantity_entry(one: "Quantity") -> dict[str, Any]:
+    """Return a quantity for JSON.
+
+    Parameters
+    ----------
+    one : Quantity
+        The quantity.
+
+    Returns
+    -------
+    dict[str, Any]
+        ``value``, ``unit``, ``std`` and ``ci95``.
+    """
+    return {
+        "value": one.value,
+        "unit": one.unit,
+        "std": one.std,
+        "ci95": None if one.ci95 is None else list(one.ci95),
+    }
+
+
+def gate_entry(gate: "Gate") -> dict[str, Any]:
+    """Return a gate for JSON.
+
+    Parameters
+    ----------
+    gate : Gate
+        The gate.
+
+    Returns
+    -------
+    dict[str, Any]
+        ``passed``, and ``reasons`` in words.
+    """
+    return {"passed": gate.passed, "reasons": [str(note) for note in gate.reasons]}
+
+
+def message_of(found: "Finding") -> str:
+    """Return a finding in one sentence.
+
+    Parameters
+    ----------
+    found : Finding
+        What was found.
+
+    Returns
+    -------
+    str
+        The condition, or why there is none; what is not told; what else is wrong.
+    """
+    from plant.notes import distinct
+
+    doubts = [str(note) for note in distinct((*found.against, *found.gate.reasons))]
+    named = found.condition is not None and not found.unknown
+    said = [" or ".join(found.named)] if named else doubts
+    said += map(str, (*found.not_told, *(() if found.unknown else found.faults)))
+    if named and not found.gate.passed:
+        said.append(f"not to be relied on: {clauses(doubts)}")
+    return clauses(said or [ALL_TOLD])

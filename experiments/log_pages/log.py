@@ -1,0 +1,225 @@
+"""A log in the hands of a Python user: its channels, and the verbs that say what it holds."""
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from experiments.log_pages.answers import Answer, Model, Shown, no_such
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+    from estimation.finding import Finding
+    from plant.eha.rig import Rig
+    from plant.log.record import Record
+
+
+def refuse(message: str) -> NoReturn:
+    """Raise our error.
+
+    Parameters
+    ----------
+    message : str
+        What was wanted and what came.
+
+    Raises
+    ------
+    HydrostateError
+        Always.
+    """
+    from plant.errors import HydrostateError
+
+    raise HydrostateError(message)
+
+
+def known_options(options: Mapping[str, Any], known: Mapping[str, Any], verb: str) -> Mapping[str, Any]:
+    """Return options if a verb has them all, and each is of the kind of its default.
+
+    Parameters
+    ----------
+    options, known : Mapping[str, Any]
+        What was given, and every option with its default.
+    verb : str
+        For the message.
+
+    Returns
+    -------
+    Mapping[str, Any]
+        The same options.
+
+    Raises
+    ------
+    HydrostateError
+        If one is unknown, or text where a number belongs.
+    """
+    for name, value in options.items():
+        if name not in known:
+            refuse(no_such(verb, name, list(known)))
+        default = known[name]
+        if isinstance(default, float) and (isinstance(value, bool) or not isinstance(value, int | float)):
+            refuse(f"{name} must be a number, got {value!r}")
+        if isinstance(default, str) and not isinstance(value, str):
+            refuse(f"{name} must be a text such as {default!r}, got {value!r}")
+    return options
+
+
+class Log(Shown):
+    """A log of one actuator.
+
+    Parameters
+    ----------
+    record : Record
+        The channels on a uniform clock.
+    rig : Rig
+        The actuator.
+    plant : str
+        Kind of actuator.
+    """
+
+    def __init__(self, record: "Record", rig: "Rig[Any]", plant: str = "eha") -> None:
+        self.record, self.rig, self.plant = record, rig, plant
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels."""
+        return tuple(self.record)
+
+    @property
+    def sample_time(self) -> float:
+        """Time between samples [s]."""
+        return self.record.sample_time
+
+    @property
+    def duration(self) -> float:
+        """Length of the log [s]."""
+        return self.record.duration
+
+    def __getitem__(self, channel: str) -> "np.ndarray[Any, Any]":
+        return self.record[channel]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.record)
+
+    def __len__(self) -> int:
+        return len(self.record)
+
+    def __str__(self) -> str:
+        said = f"Log of {self.plant}: {self.duration:g} s at {1.0 / self.sample_time:g} Hz"
+        return f"{said}, {', '.join(self.channels)}; rig {self.rig.name!r}"
+
+    def between(self, begin: float, end: float) -> "Log":
+        """Return a part of the log.
+
+        Parameters
+        ----------
+        begin, end : float
+            From when to when [s].
+
+        Returns
+        -------
+        Log
+            The part.
+        """
+        first, last = (round((at - self.record.start_time) / self.sample_time) for at in (begin, end))
+        if not 0 <= first < last:
+            refuse(f"a part of the log is wanted from an earlier to a later time, got {begin:g} s to {end:g} s")
+        return Log(self.record.slice(first, last + 1), self.rig, self.plant)
+
+    def estimate(self, **options: Any) -> "Answer":
+        """Estimate what cannot be measured: effective bulk modulus, leakage, and what the actuator's kind adds.
+
+        Parameters
+        ----------
+        **options
+            As `hydrostate estimate` takes them: ``method="ekf"``, ``no_pressure=True``.
+
+        Returns
+        -------
+        Answer
+            Quantities with 95 % intervals, and whether to believe them.
+        """
+        return self._asked("estimate", options)
+
+    def diagnose(self, **options: Any) -> "Answer":
+        """Say what is wrong: which condition, how probable, how bad, or that it is none of them.
+
+        Parameters
+        ----------
+        **options
+            As `hydrostate diagnose` takes them: ``no_pressure=True``.
+
+        Returns
+        -------
+        Answer
+            Condition, probabilities, severities with 95 % intervals, and whether to believe them.
+        """
+        return self._asked("diagnose", options)
+
+    def identify(self, **options: Any) -> "Model":
+        """Identify a discrete transfer function, from motor speed to velocity if nothing else is asked for.
+
+        Parameters
+        ----------
+        **options
+            As `estimation.identification.from_record.identify_record` takes them: ``input="motor_voltage_v"``,
+            ``n_denominator=3``.
+
+        Returns
+        -------
+        Model
+            The transfer function with its uncertainty.
+        """
+        import inspect
+
+        from estimation.identification.from_record import identify_record
+
+        known = {name: one.default for name, one in inspect.signature(identify_record).parameters.items()}
+        return Model(
+            identify_record(
+                self.record, **known_options(options, {k: v for k, v in known.items() if k != "record"}, "identify")
+            )
+        )
+
+    def _asked(self, verb: str, options: Mapping[str, Any]) -> "Answer":
+        from experiments.actuators import actuator, offered
+
+        chosen = offered(actuator(self.plant), verb)
+        asked = {**chosen.options, **known_options(options, chosen.options, verb)}
+        if isinstance(asked.get("healthy"), Log):
+            asked["healthy"] = asked["healthy"].record
+        rig, prepared = chosen.prepare(self.rig, {**asked, "seed": 2024})
+        found: Finding = chosen.run(self.record, rig, prepared)
+        return Answer(found, {**chosen.blank, **chosen.entries(found)}, lambda rows: chosen.screen(rows, asked))
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return the channels as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row a sample, by time [s]; one column a channel, in SI.
+        """
+        import pandas as pd
+
+        return pd.DataFrame(dict(self.record.channels), index=pd.Index(self.record.time, name="time_s"))
+
+    def plot(self) -> "list[Axes]":
+        """Draw every channel over time.
+
+        Returns
+        -------
+        list of matplotlib.axes.Axes
+            One a channel.
+        """
+        import matplotlib.pyplot as plt
+
+        _, axes = plt.subplots(
+            len(self.channels), 1, sharex=True, squeeze=False, figsize=(8.0, 1.8 * len(self.channels))
+        )
+        for axis, name in zip(axes[:, 0], self.channels, strict=True):
+            axis.plot(self.record.time, self.record[name], lw=0.8)
+            axis.set_ylabel(name.replace("_", " "), fontsize=8)
+        axes[0, 0].set_title(str(self))
+        axes[-1, 0].set_xlabel("time [s]")
+        return list(axes[:, 0])

@@ -1,0 +1,23 @@
+"""`hydrostate motor-paper`: the diaphragm-motor paper's tables, regression and linear models, checked."""
+
+from pathlib import Path
+
+import typer
+
+from experiments.command.options import SEED, Json, Seed
+from experiments.command.studies import Folder, finish_study
+
+commands = typer.Typer()
+
+
+@commands.command("motor-paper", epilog="Example: hydrostate motor-paper --out results/motor-paper")
+def motor_paper(out: Folder = Path("results/motor-paper"), seed: Seed = SEED, as_json: Json = False) -> None:
+    """Check the diaphragm-motor paper: Tables 1, 2, 4, 5, its regression (Figure 12), its linear models and hysteresis.
+
+    Says what holds, what holds in one reading only, and what does not. Takes some seconds.
+    The last line of standard output is the manifest's path.
+    """
+    from experiments.motor_paper.study import MOTOR_PAPER
+    from experiments.running.study import Seeded
+
+    finish_study(MOTOR_PAPER, Seeded(seed), out, as_json=as_json)

@@ -1,0 +1,111 @@
+"""The diaphragm-motor paper's hysteresis, equations 20 and 21: loops by both laws, and the linear model about them."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from experiments.motor_paper.vibration import response_rows
+from plant.motor_paper.hysteresis_model import (
+    HysteresisParameters,
+    describing_function,
+    harmonics,
+    hysteresis_loop,
+    linearised,
+    loop_area,
+    total_harmonic_distortion,
+)
+
+LOOP_FREQUENCIES, LOOP_AMPLITUDE = (1.0, 10.0, 100.0, 480.0), 100.0
+"""Of the hysteresis loops [Hz, V]."""
+
+
+def hysteresis_loops(p: HysteresisParameters) -> pd.DataFrame:
+    """Return the loops of Figures 27 and 34, by the law with rates and as printed (errata M21).
+
+    Parameters
+    ----------
+    p : HysteresisParameters
+        The diaphragm, moved slowly: displacement is ``d (u - h)``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns law, frequency_hz, voltage_v, hysteresis_v, displacement_m.
+    """
+    parts: list[pd.DataFrame] = []
+    for law in ("mended", "printed"):
+        for frequency in LOOP_FREQUENCIES:
+            voltage, hysteresis = hysteresis_loop(p, LOOP_AMPLITUDE, frequency, law=law)
+            displacement = p.stroke_a_volt * (voltage - hysteresis)
+            columns = {"voltage_v": voltage, "hysteresis_v": hysteresis, "displacement_m": displacement}
+            parts.append(pd.DataFrame({"law": law, "frequency_hz": frequency, **columns}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def hysteresis_table(loops: pd.DataFrame) -> pd.DataFrame:
+    """Return what each loop amounts to.
+
+    Parameters
+    ----------
+    loops : pandas.DataFrame
+        As `hysteresis_loops` returns them.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns law, frequency_hz, area_v2, width_percent (at no voltage, of the stroke), gain and lag_deg of the
+        displacement's first harmonic over that without hysteresis, distortion_percent.
+    """
+    rows: list[dict[str, Any]] = []
+    for (law, frequency), loop in loops.groupby(["law", "frequency_hz"]):
+        voltage, hysteresis = loop["voltage_v"].to_numpy(), loop["hysteresis_v"].to_numpy()
+        left = voltage - hysteresis
+        passed = 1.0 - describing_function(voltage, hysteresis)
+        rows.append(
+            {
+                "law": law,
+                "frequency_hz": frequency,
+                "area_v2": loop_area(voltage, hysteresis),
+                "width_percent": 100.0 * abs(left[0] - left[len(left) // 2]) / np.ptp(left),
+                "gain": abs(passed),
+                "lag_deg": -np.degrees(np.angle(passed)),
+                "distortion_percent": 100.0 * total_harmonic_distortion(harmonics(left, 9)),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def impulse_table(p: HysteresisParameters) -> pd.DataFrame:
+    """Return the impulse response of the linearised equation 20, Figure 35.
+
+    Parameters
+    ----------
+    p : HysteresisParameters
+        The diaphragm.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns time_s and displacement_m_per_v_s, after an impulse of 1 V s.
+    """
+    import control
+
+    response = control.impulse_response(linearised(p), np.linspace(0.0, 4e-3, 2001))
+    return pd.DataFrame({"time_s": response.time, "displacement_m_per_v_s": np.asarray(response.outputs).ravel()})
+
+
+def hysteresis_response(p: HysteresisParameters) -> pd.DataFrame:
+    """Return the frequency response of the linearised equation 20, Figures 31 and 32.
+
+    Parameters
+    ----------
+    p : HysteresisParameters
+        The diaphragm.
+
+    Returns
+    -------
+    pandas.DataFrame
+        As `response_table`.
+    """
+    return response_rows("equation 20, small voltages", linearised(p))

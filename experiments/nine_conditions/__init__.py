@@ -1,0 +1,1 @@
+"""The study of nine conditions: tables, figures, report, command."""

@@ -1,0 +1,223 @@
+"""How the report shows the study's tables: which columns a reader sees, in which units and words."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from functools import partial
+from platform import python_version
+from types import MappingProxyType
+from typing import Any
+
+import pandas as pd
+from markupsafe import Markup
+
+from experiments.nine_conditions.bulk_modulus import Experiment
+from experiments.nine_conditions.findings import (
+    bank_in_words,
+    by_experiment,
+    class_accuracies,
+    experiment_in_words,
+    recoveries,
+)
+from experiments.nine_conditions.settings import StudySettings
+from experiments.page.frames import Tables
+from experiments.page.numbers import MINUS, MISSING, exact, fixed, number, pretty_unit
+from experiments.page.tables import Cell, Column, Columns, Row, as_given, decimals, right, spaced
+from experiments.page.words import CONDITION, in_words
+from experiments.running.study import versions
+
+TENTH_GIGA_PASCAL = 1e-8
+"""From Pa to 1e8 Pa."""
+
+COEFFICIENTS = ("b0", "b1", "b2", "a1", "a2")
+
+SCALAR_UNITS: Mapping[str, tuple[str, float]] = {"1": ("%", 100.0), "Hz": ("Hz", 1.0), "Pa": ("Pa", 1.0)}
+"""How a scalar is shown, by its SI unit."""
+
+SETTING_UNITS: Mapping[str, str] = {
+    "starts": " [Pa]",
+    "duration": " [s]",
+    "sample_time": " [s]",
+    "identification_duration": " [s]",
+    "classification_sample_time": " [s]",
+    "seeds": " [count]",
+}
+"""Units of the study's settings."""
+
+
+def report_frames(tables: Tables, settings: StudySettings) -> Tables:
+    """Return the tables that the report alone shows: what several of the study's amount to.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The study's tables.
+    settings : StudySettings
+        Its size and seed.
+
+    Returns
+    -------
+    Mapping[str, pandas.DataFrame]
+        By name.
+    """
+    named = {f"{spaced(name)}{SETTING_UNITS.get(name, '')}": value for name, value in asdict(settings).items()}
+    return {
+        "recoveries": pd.DataFrame([asdict(entry) for entry in recoveries(tables["bulk_modulus"]).values()]),
+        "estimates by condition": _estimates(tables["bulk_modulus"]),
+        "models": _models(tables["transfer_functions"]),
+        "class accuracies": pd.DataFrame([asdict(entry) for entry in class_accuracies(tables)]),
+        "settings of this run": _pairs(named),
+        "versions that ran it": _pairs({"python": python_version(), **versions()}),
+    }
+
+
+def _estimates(frame: pd.DataFrame) -> pd.DataFrame:
+    rows: dict[str, dict[str, object]] = {}
+    for key, found in by_experiment(frame):
+        for condition, cell in found.groupby("condition", sort=False):
+            row = rows.setdefault(str(condition), {"condition": str(condition)})
+            row[experiment_in_words(key)] = _estimate(cell, key)
+    return pd.DataFrame(list(rows.values()), dtype=object)
+
+
+def _estimate(rows: pd.DataFrame, key: Experiment) -> Cell:
+    values = rows["value_pa"].astype(float).dropna()
+    if values.empty:
+        bound = float(rows["bound_percent"].min())
+        outcome = spaced(str(rows["outcome"].iloc[0]))
+        return Cell(f"{outcome} (bound {number(bound, 2)} %)" if math.isfinite(bound) else outcome, "none")
+    digits = 4 if key.form in {"pressure", "flow"} or key.plant == "reduced" else 2
+    low, high = (number(TENTH_GIGA_PASCAL * value, digits) for value in (values.min(), values.max()))
+    worst = number(float(rows["error_percent"].astype(float).abs().max()), 2)
+    spread = low if low == high else f"{low} to {high}"
+    return Cell(f"{spread}, {worst} %", "" if bool(rows["gate_passed"].all()) else "bad")
+
+
+def _models(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return two rows a condition: ours, and as Table 6 prints it."""
+    rows: list[dict[str, object]] = []
+    for row in frame.to_dict("records"):
+        gain, std = 1e3 * row["dc_gain"], 1.96e3 * row["dc_gain_std"]
+        low, high = 1e3 * row["published_dc_gain_low"], 1e3 * row["published_dc_gain_high"]
+        ours: dict[str, object] = {"condition": in_words(str(row["condition"])), "source": "ours"}
+        ours |= {name: number(row[name]) for name in COEFFICIENTS}
+        ours |= {"gain": f"{fixed(gain, 4)} ± {fixed(std, 4)}", "bandwidth": fixed(row["bandwidth_hz"], 1)}
+        ours |= {"fit": fixed(row["fit_percent"], 1), "jump": fixed(row["jump_ratio"], 2)}
+        printed: dict[str, object] = {"condition": "", "source": "Table 6"}
+        printed |= {name: exact(row[f"published_{name}"]) for name in COEFFICIENTS}
+        printed |= {
+            "gain": f"{fixed(low, 3)} to {fixed(high, 3)}",
+            **dict.fromkeys(("bandwidth", "fit", "jump"), MISSING),
+        }
+        rows += [ours, printed]
+    return pd.DataFrame(rows)
+
+
+def _pairs(values: Mapping[str, Any]) -> pd.DataFrame:
+    return pd.DataFrame([{"name": name, "value": _plainly(value)} for name, value in values.items()], dtype=object)
+
+
+def _plainly(value: object) -> str:
+    if isinstance(value, tuple | list):
+        return ", ".join(_plainly(entry) for entry in value)
+    return exact(value) if isinstance(value, float) else str(value)
+
+
+def _recovered(row: Row) -> Cell:
+    text = f"{row['recovered']} of {row['conditions']}"
+    return Cell(text, "good" if row["recovered"] == row["conditions"] else "bad" if row["missed"] else "none")
+
+
+def _published(row: Row) -> Cell:
+    return right(exact(float(f"{SCALAR_UNITS[row['unit']][1] * row['published']:.6g}")))
+
+
+def _ours(row: Row) -> Cell:
+    return right(number(SCALAR_UNITS[row["unit"]][1] * row["ours"]))
+
+
+def _difference(row: Row) -> Cell:
+    return right(number(100.0 * (row["ours"] / row["published"] - 1.0), 2))
+
+
+_exactly = partial(Column, words=as_given)
+
+COLUMNS: Mapping[str, Columns] = MappingProxyType(
+    {
+        "parameters": (
+            Column("meaning", "parameter"),
+            Column("value", words=as_given),
+            Column("unit", words=pretty_unit),
+            "source",
+            Column("parameter", "name in the code", words=lambda name: Markup("<code>{}</code>").format(name)),
+        ),
+        "conditions": (
+            CONDITION,
+            _exactly("throttle_a_v", "throttle A"),
+            _exactly("throttle_b_v", "throttle B"),
+            _exactly("leakage_coefficient_m3_s_pa", "leakage", "m³/(s Pa)"),
+            _exactly("flow_bias_m3_s", "flow bias", "m³/s"),
+            _exactly("friction_quadratic_n_s2_m2", "friction a₁", "N s²/m²"),
+            _exactly("friction_linear_n_s_m", "friction a₂", "N s/m"),
+            _exactly("friction_coulomb_n", "friction a₃"),
+            Column("steady_velocity_m_s", "velocity at 4 V", digits=3),
+            Column("velocity_percent_of_normal", "of normal", "%", digits=3),
+            Column("steady_pressure_pa", "dp at 4 V", "kPa", 1e-3),
+            Column("pressure_percent_of_normal", "of normal", "%", digits=3),
+        ),
+        "recoveries": (
+            Column("key", "experiment", words=experiment_in_words),
+            Column("claim", "what it shows"),
+            Column("recovered", "conditions recovered", of_row=_recovered),
+            Column("mean_pa", "mean estimate", "1e8 Pa", TENTH_GIGA_PASCAL),
+            Column("worst_error_percent", digits=2),
+            Column("wanted_percent", "error allowed", digits=1),
+            Column("unobservable", "conditions not observable", words=lambda names: right(str(len(names)))),
+            Column("missed", "conditions missed", words=lambda names: "; ".join(names) or "none"),
+        ),
+        "estimates by condition": (CONDITION, lambda name: Column(name, name, "1e8 Pa, worst error")),
+        "models": (
+            Column("condition", words=lambda name: Cell(name, "name")),
+            Column("source", "model", words=lambda source: Cell(source, "name")),
+            *(Column(name, words=right) for name in COEFFICIENTS),
+            Column("gain", "steady gain", "mm/s per rad/s, 95 %", words=right),
+            Column("bandwidth", f"{MINUS}3 dB", "Hz", words=right),
+            Column("fit", unit="%", words=right),
+            Column("jump", "b0 / gain", "ratio", words=right),
+        ),
+        "filtering": (
+            Column("variant", "zero-phase filter"),
+            Column("pole_frequency_hz", digits=3),
+            Column("damping", unit="ratio", digits=3),
+            Column("dc_gain", "steady gain", "ratio"),
+            Column("jump_ratio", "b0 / gain", "ratio", words=decimals(3)),
+        ),
+        "validation_rmse": (
+            CONDITION,
+            Column("rmse_transfer_function_m_s", "transfer function, ours", digits=3),
+            Column("rmse_mathematical_m_s", "mathematical model, ours", digits=3),
+            Column("published_rmse_transfer_function_m_s", "transfer function, Table 5", digits=2),
+            Column("published_rmse_mathematical_m_s", "mathematical model, Table 5", digits=2),
+            Column("mathematical_is_better", "mathematical model better, ours"),
+        ),
+        "class accuracies": (
+            Column("bank", "models", words=bank_in_words),
+            Column("variant", "parameters"),
+            Column("runs", unit="count"),
+            Column("percent", "class right", "%"),
+            Column("likeliest_error", "most frequent error", words=lambda error: error or "none"),
+        ),
+        "scalars": (
+            "quantity",
+            Column("published", of_row=_published),
+            Column("ours", of_row=_ours),
+            Column("unit", words=lambda unit: SCALAR_UNITS[unit][0]),
+            Column("ours", "difference", "% of published", of_row=_difference),
+            Column("where", "where in the paper"),
+            Column("note", "what differs and why"),
+        ),
+        "settings of this run": ("name", "value"),
+        "versions that ran it": ("name", "value"),
+    }
+)
+"""By the names of the tables."""

@@ -1,0 +1,257 @@
+"""What a study's tables amount to: which experiment recovered bulk modulus where, and which classes were found."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import cast
+
+import numpy as np
+import pandas as pd
+
+from estimation.finding import Outcome
+from experiments.nine_conditions.bulk_modulus import (
+    POSITION_STEPS,
+    PRESSURE_SINE,
+    PRESSURE_STEPS,
+    PUBLISHED_WAY,
+    Experiment,
+)
+from experiments.nine_conditions.validation import WITHOUT_PRESSURE
+from experiments.page.frames import Tables, cell
+from experiments.page.words import in_words
+
+WANTED_PERCENT: Mapping[Experiment, float] = MappingProxyType(
+    {PUBLISHED_WAY: 3.0, PRESSURE_SINE: 1.0, PRESSURE_STEPS: 1.0, POSITION_STEPS: 3.0}
+)
+"""The largest error that each experiment may have [percent]; those not listed show a limit and promise nothing."""
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """How one experiment fared over all conditions and first guesses.
+
+    Parameters
+    ----------
+    key : Experiment
+        Which experiment.
+    claim : str
+        What it shows.
+    estimates, conditions : int
+        Counts of rows, and of conditions among them.
+    recovered : int
+        Conditions whose every estimate is a number within `wanted_percent`, or where nothing is wanted, within 3 %.
+    unobservable : tuple of str
+        Conditions in which bulk modulus is not observable, from any first guess.
+    missed : tuple of str
+        The other conditions, in words, with the error or the outcome.
+    wanted_percent : float or None
+        The largest error that is wanted [percent].
+    mean_pa, worst_error_percent : float or None
+        Mean of the numbers [Pa] and the largest absolute error [percent]; None without a number.
+    lowest_bound_percent, highest_bound_percent : float
+        Range of the relative Cramér-Rao bound [percent].
+    settled_low_pa, settled_high_pa : float
+        Where the filter settles, whether or not that is reported [Pa].
+    """
+
+    key: Experiment
+    claim: str
+    estimates: int
+    conditions: int
+    recovered: int
+    unobservable: tuple[str, ...]
+    missed: tuple[str, ...]
+    wanted_percent: float | None
+    mean_pa: float | None
+    worst_error_percent: float | None
+    lowest_bound_percent: float
+    highest_bound_percent: float
+    settled_low_pa: float
+    settled_high_pa: float
+
+
+@dataclass(frozen=True)
+class ClassAccuracy:
+    """How one bank of models classified.
+
+    Parameters
+    ----------
+    bank, variant : str
+        The bank, and whether parameters were nominal or spread.
+    runs : int
+        Runs classified.
+    percent : float
+        Share that was right [percent].
+    likeliest_error : str
+        The most frequent confusion in words; empty if there was none.
+    """
+
+    bank: str
+    variant: str
+    runs: int
+    percent: float
+    likeliest_error: str
+
+
+def truth_of(tables: Tables) -> float:
+    """Return the simulated bulk modulus.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The study's tables.
+
+    Returns
+    -------
+    float
+        Of the table ``parameters`` [Pa].
+    """
+    return cell(tables["parameters"].set_index("parameter"), "bulk_modulus", "value")
+
+
+def by_experiment(estimates: pd.DataFrame) -> Iterator[tuple[Experiment, pd.DataFrame]]:
+    """Split the table of estimates into its experiments, in the study's order.
+
+    Parameters
+    ----------
+    estimates : pandas.DataFrame
+        The table ``bulk_modulus``.
+
+    Yields
+    ------
+    tuple of Experiment and pandas.DataFrame
+        An experiment and its rows.
+    """
+    for key, rows in estimates.groupby(list(Experiment._fields), sort=False):
+        plant, form, drive, logged = cast(tuple[str, str, str, bool], key)
+        yield Experiment(plant, form, drive, bool(logged)), rows
+
+
+def experiment_in_words(key: Experiment) -> str:
+    """Return an experiment's name for a reader.
+
+    Parameters
+    ----------
+    key : Experiment
+        Which experiment.
+
+    Returns
+    -------
+    str
+        What was believed, on which plant, and which drive and sensors it had, parted by commas.
+
+    Examples
+    --------
+    >>> experiment_in_words(PRESSURE_STEPS)
+    'pressure form, plant sticks, nine steps, dp logged'
+    """
+    plants = {"reduced": "never sticks", "lumped": "sticks"}
+    drives = {"sine": "10 Hz sine", "steps": "nine steps"}
+    sensors = "dp logged" if key.pressure_logged else "dp not logged"
+    return f"{key.form} form, plant {plants.get(key.plant, key.plant)}, {drives.get(key.drive, key.drive)}, {sensors}"
+
+
+def recoveries(estimates: pd.DataFrame) -> Mapping[Experiment, Recovery]:
+    """Sum up every experiment on bulk modulus.
+
+    Parameters
+    ----------
+    estimates : pandas.DataFrame
+        The table ``bulk_modulus``.
+
+    Returns
+    -------
+    Mapping[Experiment, Recovery]
+        One summary an experiment, in the study's order.
+    """
+    return {key: _recovery(key, rows) for key, rows in by_experiment(estimates)}
+
+
+def _recovery(key: Experiment, rows: pd.DataFrame) -> Recovery:
+    wanted = WANTED_PERCENT.get(key)
+    limit = max(WANTED_PERCENT.values()) if wanted is None else wanted
+    unobservable: list[str] = []
+    missed: list[str] = []
+    groups = list(rows.groupby("condition", sort=False))
+    for name, found in groups:
+        errors = found["error_percent"].astype(float)
+        worst = float(errors.abs().max())
+        outcomes = [str(outcome).replace("_", " ") for outcome in found["outcome"][errors.isna()].unique()]
+        if (found["outcome"] == Outcome.NOT_OBSERVABLE.value).all():
+            unobservable.append(in_words(str(name)))
+        elif outcomes or worst > limit:
+            why = [*outcomes, *([f"{worst:.3g} % off"] if np.isfinite(worst) else [])]
+            missed.append(f"{in_words(str(name))} ({', '.join(why)})")
+    values = rows["value_pa"].astype(float).dropna()
+    return Recovery(
+        key=key,
+        claim=str(rows["claim"].iloc[0]),
+        estimates=len(rows),
+        conditions=len(groups),
+        recovered=len(groups) - len(unobservable) - len(missed),
+        unobservable=tuple(unobservable),
+        missed=tuple(missed),
+        wanted_percent=wanted,
+        mean_pa=float(values.mean()) if len(values) else None,
+        worst_error_percent=float(rows["error_percent"].astype(float).abs().max()) if len(values) else None,
+        lowest_bound_percent=float(rows["bound_percent"].min()),
+        highest_bound_percent=float(rows["bound_percent"].max()),
+        settled_low_pa=float(rows["filter_settled_at_pa"].min()),
+        settled_high_pa=float(rows["filter_settled_at_pa"].max()),
+    )
+
+
+def class_accuracies(tables: Tables) -> tuple[ClassAccuracy, ...]:
+    """Sum up the classification, bank by bank.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The study's tables.
+
+    Returns
+    -------
+    tuple of ClassAccuracy
+        One a row of the table ``classification``.
+    """
+    return tuple(
+        ClassAccuracy(
+            bank=str(row["bank"]),
+            variant=str(row["variant"]),
+            runs=int(row["runs"]),
+            percent=100.0 * float(row["accuracy"]),
+            likeliest_error=_likeliest_error(tables[f"confusion {row['bank']} {row['variant']}"]),
+        )
+        for _, row in tables["classification"].iterrows()
+    )
+
+
+def _likeliest_error(confusion: pd.DataFrame) -> str:
+    counts = confusion.to_numpy(dtype=np.int64)
+    wrong = np.where(np.eye(len(counts), dtype=bool), 0, counts)
+    true, found = np.unravel_index(int(wrong.argmax()), wrong.shape)
+    if wrong[true, found] == 0:
+        return ""
+    names = [in_words(str(name)) for name in confusion.columns]
+    return f"{names[true]} taken for {names[found]}, {wrong[true, found]} of {counts[true].sum()}"
+
+
+def bank_in_words(bank: str) -> str:
+    """Return a classifier's name for a reader.
+
+    Parameters
+    ----------
+    bank : str
+        Name in results.
+
+    Returns
+    -------
+    str
+        The same, saying what was not logged.
+
+    Examples
+    --------
+    >>> bank_in_words("mathematical")
+    'mathematical, velocity alone'
+    """
+    return f"{bank}, velocity alone" if bank == WITHOUT_PRESSURE else bank

@@ -1,0 +1,74 @@
+"""The study's outcome in three sentences."""
+
+from collections.abc import Mapping
+
+from experiments.nine_conditions.bulk_modulus import (
+    POSITION_SINE,
+    POSITION_STEPS,
+    PRESSURE_SINE,
+    PRESSURE_STEPS,
+    PUBLISHED_WAY_STUCK,
+    Experiment,
+)
+from experiments.nine_conditions.findings import ClassAccuracy, Recovery, class_accuracies, recoveries, truth_of
+from experiments.nine_conditions.validation import BANKS, TRANSFER_FUNCTIONS, WITH_PRESSURE, WITHOUT_PRESSURE
+from experiments.page.frames import Tables
+
+
+def verdict(tables: Tables) -> tuple[str, str, str]:
+    """Say in three sentences what a study found.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The study's tables.
+
+    Returns
+    -------
+    tuple of str
+        On the bulk modulus, on the fault classes, and on what cannot be observed.
+    """
+    found = recoveries(tables["bulk_modulus"])
+    return (
+        _bulk_modulus_sentence(found, truth_of(tables)),
+        _class_sentence(class_accuracies(tables)),
+        _limit_sentence(found[POSITION_SINE], found[PUBLISHED_WAY_STUCK]),
+    )
+
+
+def _bulk_modulus_sentence(found: Mapping[Experiment, Recovery], truth: float) -> str:
+    sine, steps, alone = found[PRESSURE_SINE], found[PRESSURE_STEPS], found[POSITION_STEPS]
+    if sine.mean_pa is None or steps.mean_pa is None:
+        return "With differential pressure logged, no bulk modulus was recovered: see the table of estimates."
+    mean = (sine.mean_pa + steps.mean_pa) / 2.0
+    worst = max(sine.worst_error_percent or 0.0, steps.worst_error_percent or 0.0)
+    conditions = min(sine.recovered, steps.recovered)
+    second = (
+        ""
+        if alone.worst_error_percent is None
+        else f", and {alone.worst_error_percent:.2g} % with position and velocity alone on the nine steps"
+    )
+    return (
+        f"With differential pressure logged, effective bulk modulus comes back in {conditions} of {sine.conditions} "
+        f"conditions from every first guess: {mean / 1e8:.3f}e8 Pa on average, the truth being {truth / 1e8:.3f}e8 Pa, "
+        f"and the worst of {sine.estimates + steps.estimates} estimates is {worst:.2g} % off{second}."
+    )
+
+
+def _class_sentence(classes: tuple[ClassAccuracy, ...]) -> str:
+    percent = {bank: tuple(f"{entry.percent:.3g} %" for entry in classes if entry.bank == bank) for bank in BANKS}
+    nominal, spread = percent[WITH_PRESSURE]
+    return (
+        f"The fault class is right in {nominal} of {classes[0].runs} runs with the tables' parameters, and in {spread} "
+        "with parameters spread around them, by mathematical models with pressure logged; without pressure these are "
+        f"{' and '.join(percent[WITHOUT_PRESSURE])}, by transfer functions {' and '.join(percent[TRANSFER_FUNCTIONS])}."
+    )
+
+
+def _limit_sentence(stuck: Recovery, published: Recovery) -> str:
+    return (
+        f"Where the 10 Hz sine moves a piston that sticks and no pressure is logged, bulk modulus is not observable in "
+        f"{len(stuck.unobservable)} of {stuck.conditions} conditions, and the published filter recovers it in "
+        f"{published.recovered} of {published.conditions}: log differential pressure, or drive with larger, slower "
+        f"steps."
+    )

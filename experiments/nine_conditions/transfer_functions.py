@@ -1,0 +1,272 @@
+"""Section 4: nine transfer functions, the empirical frequency response, the order, and what filtering does."""
+
+import warnings
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+
+from estimation.identification.fit.order import order_test
+from estimation.identification.fit.output_error import fit_output_error
+from estimation.identification.from_record import identify_record
+from estimation.identification.model.linear_model import LinearModel
+from estimation.identification.signals.etfe import etfe
+from estimation.identification.signals.preprocess import zero_phase_filter
+from experiments.nine_conditions.settings import StudySettings
+from experiments.page.frames import cell
+from experiments.published import load
+from experiments.running.executors import side_by_side
+from experiments.running.progress import Track, untracked
+from experiments.running.random_streams import stream
+from faults.conditions import CONDITIONS
+from faults.eha.bank import IDENTIFICATION_TIME, identification_run
+from plant.eha.model import EhaParameters
+from plant.errors import LogWarning
+from plant.log.record import Record
+
+ROUNDING = 0.5
+"""Half a unit of the last printed digit: what Table 6 leaves open."""
+
+RESPONSE_FREQUENCIES = np.geomspace(0.5, 100.0, 80)
+"""Frequencies of the response curves [Hz]."""
+
+
+def identification_study(
+    rig: EhaParameters, settings: StudySettings, track: Track = untracked
+) -> tuple[Mapping[str, LinearModel], Mapping[str, Record]]:
+    """Simulate the nine identification tests and fit their transfer functions.
+
+    Parameters
+    ----------
+    rig : EhaParameters
+        The healthy actuator.
+    settings : StudySettings
+        Size and seed.
+    track : callable
+        Shows how far it has come.
+
+    Returns
+    -------
+    tuple of Mapping
+        Models and test records, by condition.
+    """
+
+    def identify(name: str) -> tuple[LinearModel, Record]:
+        rng = stream(settings.seed, "identification", name)
+        record = identification_run(rig, CONDITIONS[name], rng, duration=settings.identification_duration)
+        return identify_record(record, sample_time=IDENTIFICATION_TIME), record
+
+    done = track(side_by_side(identify, CONDITIONS), len(CONDITIONS), description="identifying transfer functions")
+    models, records = zip(*done, strict=True)
+    return dict(zip(CONDITIONS, models, strict=True)), dict(zip(CONDITIONS, records, strict=True))
+
+
+def transfer_function_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
+    """Return the library beside Table 6.
+
+    Parameters
+    ----------
+    models : Mapping[str, LinearModel]
+        Identified transfer functions by condition.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row a condition: coefficients with standard deviations, gain, bandwidth, fit; the published coefficients,
+        and the gain they leave open by rounding (errata E14).
+    """
+    published = load("transfer_functions").set_index("condition")
+    rows: list[dict[str, object]] = []
+    for name, model in models.items():
+        names = ["b0", "b1", "b2", "a1", "a2"]
+        values = [*model.numerator, *model.denominator[1:]]
+        row: dict[str, object] = {"condition": name}
+        row |= dict(zip(names, values, strict=True))
+        row |= {f"{key}_std": std for key, std in zip(names, model.coefficient_std, strict=True)}
+        low, high = printed_gain_interval([repr(cell(published, name, key)) for key in names])
+        row |= {
+            "dc_gain": model.dc_gain,
+            "dc_gain_std": model.dc_gain_std,
+            "bandwidth_hz": model.bandwidth_hz,
+            "fit_percent": model.fit_percent,
+            "jump_ratio": values[0] / model.dc_gain,
+        }
+        row |= {f"published_{key}": cell(published, name, key) for key in names}
+        row |= {"published_dc_gain_low": low, "published_dc_gain_high": high}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def printed_gain_interval(printed: list[str]) -> tuple[float, float]:
+    """Return the gains at zero frequency that a printed model's rounding allows (errata E14).
+
+    Parameters
+    ----------
+    printed : list of str
+        b0, b1, b2, a1, a2 as printed, four significant digits.
+
+    Returns
+    -------
+    tuple of float
+        Lowest and highest gain.
+
+    Examples
+    --------
+    >>> low, high = printed_gain_interval(["0.0001977", "-0.000361", "0.0001635", "-1.893", "0.894"])
+    >>> f"{low:.1e} {high:.1e}"
+    '3.2e-05 7.8e-04'
+    """
+    values = [float(text) for text in printed]
+    half = [ROUNDING * 10.0 ** (np.floor(np.log10(abs(value))) - 3.0) for value in values]
+    top, bottom = sum(values[:3]), 1.0 + sum(values[3:])
+    top_half, bottom_half = sum(half[:3]), sum(half[3:])
+    corners = [(top + s * top_half) / (bottom + r * bottom_half) for s in (-1.0, 1.0) for r in (-1.0, 1.0)]
+    return float(min(corners)), float(max(corners))
+
+
+def response_curves(models: Mapping[str, LinearModel], records: Mapping[str, Record]) -> pd.DataFrame:
+    """Return the models' frequency responses and the empirical ones, in long form.
+
+    Parameters
+    ----------
+    models : Mapping[str, LinearModel]
+        Transfer functions by condition.
+    records : Mapping[str, Record]
+        The tests they were fitted to.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns condition, source (``model`` or ``etfe``), frequency_hz, gain, phase_deg, coherence.
+    """
+    lowest, highest = RESPONSE_FREQUENCIES[[0, -1]]
+    parts: list[pd.DataFrame] = []
+    for name, model in models.items():
+        response = model.frequency_response(RESPONSE_FREQUENCIES)
+        fitted = response_columns(RESPONSE_FREQUENCIES, response, np.ones(len(response)))
+        measured = measured_response(records[name], 1000, lowest, highest)
+        parts.append(pd.DataFrame({"condition": name, "source": "model", **fitted}))
+        parts.append(pd.DataFrame({"condition": name, "source": "etfe", **measured}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def measured_response(record: Record, lag_window: int, lowest: float, highest: float) -> dict[str, np.ndarray]:
+    """Return the empirical frequency response of a test, within a band.
+
+    Parameters
+    ----------
+    record : Record
+        Motor speed and velocity.
+    lag_window : int
+        Longest lag of the correlations that it is taken from [count].
+    lowest, highest : float
+        Ends of the band [Hz].
+
+    Returns
+    -------
+    dict[str, ndarray]
+        As `response_columns`.
+    """
+    found = etfe(record["motor_speed_rad_s"], record["velocity_m_s"], record.sample_time, lag_window=lag_window)
+    inside = (found.frequency_hz >= lowest) & (found.frequency_hz <= highest)
+    return response_columns(found.frequency_hz[inside], found.response[inside], found.coherence[inside])
+
+
+def response_columns(frequency: np.ndarray, response: np.ndarray, coherence: np.ndarray) -> dict[str, np.ndarray]:
+    """Return a frequency response as columns of a table.
+
+    Parameters
+    ----------
+    frequency : ndarray, shape (n,)
+        Frequencies [Hz].
+    response : ndarray of complex, shape (n,)
+        The response [m/s per rad/s].
+    coherence : ndarray, shape (n,)
+        Between 0 and 1 [dimensionless].
+
+    Returns
+    -------
+    dict[str, ndarray]
+        ``frequency_hz``, ``gain``, ``phase_deg``, ``coherence``.
+    """
+    phase = np.degrees(np.unwrap(np.angle(response)))
+    return {"frequency_hz": frequency, "gain": np.abs(response), "phase_deg": phase, "coherence": coherence}
+
+
+def order_table(record: Record, rng: np.random.Generator) -> pd.DataFrame:
+    """Return singular values against their noise floor, for Figure 7.
+
+    Parameters
+    ----------
+    record : Record
+        The identification test of the normal condition.
+    rng : numpy.random.Generator
+        Draws the floor's noise records.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns index, hankel, hankel_floor, projected, projected_floor.
+    """
+    test = order_test(record["motor_speed_rad_s"], record["velocity_m_s"], rng=rng)
+    count = min(len(test.hankel_singular_values), len(test.projected_singular_values), 12)
+    return pd.DataFrame(
+        {
+            "index": np.arange(1, count + 1),
+            "hankel": test.hankel_singular_values[:count],
+            "hankel_floor": test.hankel_noise_floor,
+            "projected": test.projected_singular_values[:count],
+            "projected_floor": test.projected_noise_floor,
+            "suggested_order": test.suggested_order,
+        }
+    )
+
+
+def filtering_table(rng: np.random.Generator, duration: float) -> pd.DataFrame:
+    """Return what zero-phase filtering of the output alone does to a fit, on a plant whose poles are known.
+
+    Section 4 filters the output only. The plant here is a strictly proper 30 Hz resonance with damping 0.6, driven as
+    in section 4 with 5 % noise (errata E15).
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Draws drive and noise.
+    duration : float
+        Length of the test [s].
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row a variant: pole frequency, damping, gain, jump ratio.
+    """
+    frequency, damping, T = 2.0 * np.pi * 30.0, 0.6, IDENTIFICATION_TIME
+    decay, turn = np.exp(-damping * frequency * T), frequency * np.sqrt(1.0 - damping**2) * T
+    f = np.array([1.0, -2.0 * decay * np.cos(turn), decay**2])
+    b = np.array([0.0, 0.5, 0.5]) * f.sum()
+    plant = LinearModel(b, f, T, "motor_speed_rad_s", "velocity_m_s", delay=0)
+    u = np.repeat(rng.choice([-1.0, 1.0], size=round(duration / 0.05)), 50)
+    y = plant.simulate(u)
+    y = y + 0.05 * np.std(y) * rng.standard_normal(len(y))
+    rows = [_pole_row("truth", plant), _pole_row("neither filtered", _fit(u, y))]
+    rows.append(_pole_row("both filtered", _fit(*zero_phase_filter(u, y, T))))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        only_output = zero_phase_filter(u, y, T, filter_input=False)
+    rows.append(_pole_row("output only, as in section 4", _fit(*only_output)))
+    return pd.DataFrame(rows)
+
+
+def _fit(u: np.ndarray, y: np.ndarray) -> LinearModel:
+    return fit_output_error(u, y, IDENTIFICATION_TIME, n_numerator=3, n_denominator=2)
+
+
+def _pole_row(variant: str, model: LinearModel) -> dict[str, object]:
+    pole = np.log(model.poles[np.argmax(model.poles.imag)]) / model.sample_time
+    return {
+        "variant": variant,
+        "pole_frequency_hz": abs(pole) / (2.0 * np.pi),
+        "damping": -pole.real / abs(pole),
+        "dc_gain": model.dc_gain,
+        "jump_ratio": model.numerator[0] / model.dc_gain,
+    }

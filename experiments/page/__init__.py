@@ -1,0 +1,1 @@
+"""One page renderer, one figure style, one result folder."""

@@ -1,0 +1,59 @@
+"""The errata in one line each, ``errata.txt``, for reports; told in full, with reasons, in ``docs/errata.md``."""
+
+import re
+from collections.abc import Mapping
+from importlib.resources import files
+from types import MappingProxyType
+
+from markupsafe import Markup, escape
+
+_LINES = files("experiments.page").joinpath("errata.txt").read_text(encoding="utf-8").splitlines()
+
+ERRATA: Mapping[str, str] = MappingProxyType(dict(line.split(": ", 1) for line in _LINES))
+"""One sentence an erratum, by number."""
+
+_NUMBER_OR_TAG = re.compile(r"<[^>]*>|\b[EPM]\d{1,2}\b")
+_LINK = re.compile(r'href="#([EPM]\d{1,2})"')
+
+
+def linked(text: str) -> Markup:
+    """Return a text or a part of a page with its errata numbers linked to the report's list.
+
+    Parameters
+    ----------
+    text : str
+        Plain text, or markup whose tags stay as they are.
+
+    Returns
+    -------
+    Markup
+        The same, escaped, each number of `ERRATA` a link.
+
+    Examples
+    --------
+    >>> linked("sticks (errata E9) & stays")
+    Markup('sticks (errata <a href="#E9">E9</a>) &amp; stays')
+    """
+
+    def link(found: re.Match[str]) -> str:
+        number = found[0]
+        return f'<a href="#{number}">{number}</a>' if number in ERRATA else number
+
+    return Markup(_NUMBER_OR_TAG.sub(link, str(escape(text))))  # noqa: S704 - escaped just before, or markup
+
+
+def linked_errata(html: str) -> Mapping[str, str]:
+    """Return the errata that a page links to, in order of number.
+
+    Parameters
+    ----------
+    html : str
+        A page with links made by `linked`.
+
+    Returns
+    -------
+    Mapping[str, str]
+        The one-line text by number.
+    """
+    found = set(_LINK.findall(html))
+    return {number: text for number, text in ERRATA.items() if number in found}

@@ -1,0 +1,61 @@
+"""Figures that are drawn from named tables, as the files that they become."""
+
+from collections.abc import Callable, Mapping
+from io import BytesIO
+from typing import TypeAlias
+
+from matplotlib.figure import Figure
+
+from experiments.page.frames import Tables
+from experiments.page.style import styled
+
+Drawings: TypeAlias = Mapping[str, Callable[[Tables], Figure]]
+"""From a study's tables to its figures, by file name."""
+
+PNG_DOTS_PER_INCH = 150
+"""Resolution of the PNG figures; 1500 pixels wide."""
+
+
+def figure_files(drawings: Drawings, tables: Tables) -> dict[str, bytes]:
+    """Return figures as SVG and PNG files.
+
+    Parameters
+    ----------
+    drawings : Mapping[str, callable]
+        The figures, by name.
+    tables : Mapping[str, pandas.DataFrame]
+        What they are drawn from.
+
+    Returns
+    -------
+    dict[str, bytes]
+        By path within a result folder: ``figures/name.svg``, ``figures/name.png``.
+    """
+    files: dict[str, bytes] = {}
+    with styled():
+        for name, draw in drawings.items():
+            figure = draw(tables)
+            files[f"figures/{name}.svg"] = svg_of(figure)
+            pixels = BytesIO()
+            figure.savefig(pixels, format="png", dpi=PNG_DOTS_PER_INCH)
+            files[f"figures/{name}.png"] = pixels.getvalue()
+    return files
+
+
+def svg_of(figure: Figure) -> bytes:
+    """Return a figure as an SVG file that is the same at every run.
+
+    Parameters
+    ----------
+    figure : Figure
+        Drawn in the project's look.
+
+    Returns
+    -------
+    bytes
+        The file.
+    """
+    buffer = BytesIO()
+    with styled():
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    return buffer.getvalue()

@@ -1,0 +1,199 @@
+"""One result folder a study, written whole or not at all."""
+
+import json
+import os
+import shutil
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from secrets import token_hex
+from types import MappingProxyType
+from typing import Any
+
+import pandas as pd
+
+from experiments.page.frames import Tables
+from plant.errors import HydrostateError
+
+SERIES_FORMAT = "%.9g"
+"""Digits of the curves; tables keep all."""
+
+DESKTOP_FILES = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
+"""Files that file managers leave behind, which are nobody's work."""
+
+
+def write_tables(
+    tables: Tables,
+    manifest: Mapping[str, Any],
+    folder: Path,
+    files: Mapping[str, bytes] = MappingProxyType({}),
+    series: Tables = MappingProxyType({}),
+) -> Path:
+    """Write a study's tables, and what was made of them, as one folder, replacing an earlier study's.
+
+    All is written beside the folder first and takes its name at the end: an earlier result stays whole until then.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        What was found, by name.
+    manifest : Mapping[str, Any]
+        What it takes to run it again; its ``study`` names it.
+    folder : Path
+        The folder; new, empty, or an earlier study's result.
+    files : Mapping[str, bytes]
+        Report, figures and others, by their path within the folder.
+    series : Mapping[str, pandas.DataFrame]
+        Curves, which keep nine digits.
+
+    Returns
+    -------
+    Path
+        The manifest, ``manifest.json``.
+
+    Raises
+    ------
+    HydrostateError
+        If the folder holds anything that no study wrote, or cannot be written.
+    """
+    target = check_target(folder)
+    contents = {**csv_files("tables", tables), **csv_files("series", series, SERIES_FORMAT), **files}
+    contents["manifest.json"] = json_file({**manifest, "files": sorted([*contents, "manifest.json"])})
+    temporary = target.with_name(f".{target.name}.{token_hex(4)}.tmp")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with _removed_on_failure(temporary):
+            for name, content in contents.items():
+                (temporary / name).parent.mkdir(parents=True, exist_ok=True)
+                (temporary / name).write_bytes(content)
+            _swap(temporary, target)
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+    return folder / "manifest.json"
+
+
+def csv_files(place: str, frames: Tables, float_format: str | None = None) -> dict[str, bytes]:
+    """Return data frames as CSV files.
+
+    Parameters
+    ----------
+    place : str
+        Folder within the result.
+    frames : Mapping[str, pandas.DataFrame]
+        By name; rows that have a name are conditions.
+    float_format : str, optional
+        How numbers are written; all their digits unless told.
+
+    Returns
+    -------
+    dict[str, bytes]
+        By path within the result folder.
+    """
+    files: dict[str, bytes] = {}
+    for name, frame in frames.items():
+        numbered = pd.api.types.is_integer_dtype(frame.index)
+        rows = frame if numbered else frame.rename_axis(index="condition").reset_index()
+        path = f"{place}/{name.replace(',', '').replace(' ', '_')}.csv"
+        files[path] = rows.to_csv(index=False, float_format=float_format).encode()
+    return files
+
+
+def json_file(values: Mapping[str, Any]) -> bytes:
+    """Return values as a JSON file.
+
+    Parameters
+    ----------
+    values : Mapping[str, Any]
+        Plain values, all finite.
+
+    Returns
+    -------
+    bytes
+        The file.
+    """
+    return (json.dumps(values, indent=2, allow_nan=False) + "\n").encode()
+
+
+def check_target(folder: Path) -> Path:
+    """Tell whether a study may be written to a folder, before the study is run.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the result shall go.
+
+    Returns
+    -------
+    Path
+        The folder without symbolic links.
+
+    Raises
+    ------
+    HydrostateError
+        If it is a file, is or holds the current folder, or holds anything that no study wrote, or if nothing can be
+        written there.
+    """
+    try:
+        return _checked(folder)
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+
+
+def _checked(folder: Path) -> Path:
+    target = folder.resolve()
+    if Path.cwd().is_relative_to(target):
+        raise HydrostateError(
+            f"result folder must be one of its own, got {folder}, which is or holds the current folder"
+        )
+    if target.exists() and not target.is_dir():
+        raise HydrostateError(f"result folder must be a folder or not exist yet, got the file {folder}")
+    strangers = sorted(_strangers(target)) if target.exists() else []
+    if strangers:
+        raise HydrostateError(
+            f"result folder must be new, empty, or an earlier study's result, got {folder}, "
+            f"which holds {strangers[0]}: choose another folder"
+        )
+    nearest = next(parent for parent in target.parents if parent.exists())
+    if not (nearest.is_dir() and os.access(nearest, os.W_OK | os.X_OK)):
+        raise HydrostateError(f"result folder {folder} must be in a place that can be written, got {nearest}")
+    return target
+
+
+def _unwritable(folder: Path, error: OSError) -> HydrostateError:
+    return HydrostateError(
+        f"result folder {folder} must be in a place that can be written, got: {error.strerror or error}"
+    )
+
+
+def _strangers(folder: Path) -> set[str]:
+    """Return the files in a folder that no study wrote."""
+    present = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir()}
+    try:
+        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+        written = set(manifest["files"]) if "study" in manifest else set[str]()
+    except (FileNotFoundError, ValueError, TypeError, KeyError):
+        written = set[str]()
+    return {name for name in present - written if Path(name).name not in DESKTOP_FILES}
+
+
+@contextmanager
+def _removed_on_failure(folder: Path) -> Generator[None]:
+    try:
+        yield
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+def _swap(temporary: Path, target: Path) -> None:
+    if not target.exists():
+        temporary.rename(target)
+        return
+    old = target.with_name(f".{target.name}.{token_hex(4)}.old")
+    target.rename(old)
+    try:
+        temporary.rename(target)
+    except BaseException:
+        old.rename(target)
+        raise
+    shutil.rmtree(old, ignore_errors=True)

@@ -1,0 +1,59 @@
+"""Tables by name, single numbers out of them, and the table of a rig's parameters."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from typing import Any, SupportsFloat, TypeAlias, cast
+
+import pandas as pd
+
+from plant.units import notes
+
+Tables: TypeAlias = Mapping[str, pd.DataFrame]
+"""What a study found, by name."""
+
+
+def cell(frame: pd.DataFrame, row: object, column: str) -> float:
+    """Return one number of a table.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        A table with unique row labels.
+    row : object
+        Row label.
+    column : str
+        Column name, which carries the unit.
+
+    Returns
+    -------
+    float
+        The number, in the column's unit.
+
+    Examples
+    --------
+    >>> cell(pd.DataFrame({"speed_rpm": [1200]}, index=["rated"]), "rated", "speed_rpm")
+    1200.0
+    """
+    return float(cast("SupportsFloat", frame.at[row, column]))
+
+
+def parameter_table(parameters: Any) -> pd.DataFrame:
+    """Return parameters with the notes that the code carries.
+
+    Parameters
+    ----------
+    parameters : dataclass
+        A rig whose fields carry `plant.units.SI` notes.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row a parameter: parameter, value, unit, meaning, source.
+    """
+    noted = notes(type(parameters))
+    return pd.DataFrame(
+        [
+            {"parameter": field.name, "value": getattr(parameters, field.name), **asdict(noted[field.name])}
+            for field in fields(parameters)
+        ]
+    )

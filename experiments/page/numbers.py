@@ -1,0 +1,115 @@
+"""Numbers as a reader wants them: sensible digits, exponents in threes, raised units."""
+
+import math
+
+MISSING = "\N{EN DASH}"
+"""What stands where there is no number."""
+
+MINUS, TIMES = "\N{MINUS SIGN}", " \N{MULTIPLICATION SIGN} "
+
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+PLAIN_FROM, PLAIN_TO = 1e-3, 1e5
+"""Between these magnitudes a number is written without an exponent."""
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """Write a number as an engineer does: exponents in threes, no more digits than are asked for.
+
+    Parameters
+    ----------
+    value : float or None
+        The number [any unit].
+    digits : int
+        Significant digits.
+
+    Returns
+    -------
+    str
+        The number, or a dash where there is none.
+
+    Examples
+    --------
+    >>> number(4.784e-12), number(2.07e8, 3), number(0.04311), number(0.0), number(None)
+    ('4.784 × 10⁻¹²', '207 × 10⁶', '0.04311', '0', '–')
+    """
+    if value is None or not math.isfinite(value):
+        return MISSING
+    if value == 0.0:
+        return "0"
+    rounded = float(f"{value:.{digits - 1}e}")
+    magnitude = math.floor(math.log10(abs(rounded)))
+    if PLAIN_FROM <= abs(rounded) < PLAIN_TO:
+        return f"{rounded:.{max(0, digits - 1 - magnitude)}f}".replace("-", MINUS)
+    exponent = 3 * (magnitude // 3)
+    mantissa = f"{rounded / 10.0**exponent:.{max(0, digits - 1 - (magnitude - exponent))}f}".replace("-", MINUS)
+    return f"{mantissa}{TIMES}10{str(exponent).translate(SUPERSCRIPTS)}"
+
+
+def fixed(value: float | None, decimals: int) -> str:
+    """Write a number with so many decimals, for columns that are compared.
+
+    Parameters
+    ----------
+    value : float or None
+        The number [any unit].
+    decimals : int
+        Digits behind the point.
+
+    Returns
+    -------
+    str
+        The number, or a dash where there is none; zero has no sign.
+
+    Examples
+    --------
+    >>> fixed(0.2714, 2), fixed(-0.0002, 2), fixed(None, 2)
+    ('0.27', '0.00', '–')
+    """
+    if value is None or not math.isfinite(value):
+        return MISSING
+    return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", MINUS)
+
+
+def exact(value: float) -> str:
+    """Write a number as it was given, for parameters and settings.
+
+    Parameters
+    ----------
+    value : float
+        The number [any unit].
+
+    Returns
+    -------
+    str
+        The shortest decimals that give it back to ten digits, with exponents in threes.
+
+    Examples
+    --------
+    >>> exact(1.52e-3), exact(436.0), exact(2.07e8), exact(1e-8)
+    ('0.00152', '436', '207 × 10⁶', '10 × 10⁻⁹')
+    """
+    shown, times, power = number(value, 10).partition(TIMES)
+    return (shown.rstrip("0").rstrip(".") if "." in shown else shown) + times + power
+
+
+def pretty_unit(unit: str) -> str:
+    """Return a unit with raised exponents.
+
+    Parameters
+    ----------
+    unit : str
+        As in the parameters' notes.
+
+    Returns
+    -------
+    str
+        As shown.
+
+    Examples
+    --------
+    >>> pretty_unit("N s^2/m^2")
+    'N s²/m²'
+    """
+    head, *rest = unit.split("^")
+    return head + "".join(part[:1].translate(SUPERSCRIPTS) + part[1:] for part in rest)

@@ -1,0 +1,201 @@
+"""One look for all figures: Okabe-Ito colours, small type, no state outside the figure itself."""
+
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.typing import RcKeyType
+from numpy.typing import NDArray
+
+from experiments.page.words import in_words
+
+BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
+    "#000000",
+    "#E69F00",
+    "#56B4E9",
+    "#009E73",
+    "#F0E442",
+    "#0072B2",
+    "#D55E00",
+    "#CC79A7",
+)
+"""The palette of Okabe and Ito, which the colour-blind can tell apart."""
+
+GREY = "#6b6b6b"
+"""For what stands behind the data."""
+
+WIDTH_INCHES = 10.0
+"""Width of every figure; the report shows them at about the same size."""
+
+STYLE: Mapping[RcKeyType, Any] = MappingProxyType(
+    {
+        "font.family": "DejaVu Sans",
+        "font.size": 9.0,
+        "axes.titlesize": 9.5,
+        "axes.titleweight": "normal",
+        "axes.titlelocation": "left",
+        "axes.labelsize": 9.0,
+        "xtick.labelsize": 8.5,
+        "ytick.labelsize": 8.5,
+        "figure.titlesize": 11.5,
+        "figure.titleweight": "bold",
+        "figure.facecolor": "white",
+        "savefig.facecolor": "white",
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.grid": True,
+        "axes.axisbelow": True,
+        "grid.color": "#e3e3e3",
+        "grid.linewidth": 0.6,
+        "lines.linewidth": 1.3,
+        "legend.frameon": False,
+        "hatch.linewidth": 0.6,
+        "svg.fonttype": "path",
+        "svg.hashsalt": "hydrostate",
+    }
+)
+"""Matplotlib settings, in force while a figure is drawn and while it is saved."""
+
+
+@contextmanager
+def styled() -> Generator[None]:
+    """Draw and save figures in the project's look inside this block."""
+    with mpl.rc_context(dict(STYLE)):
+        yield
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Room around and between panels. Fixed, since finding it for every figure takes as long as drawing.
+
+    Parameters
+    ----------
+    left, right, top, bottom : float
+        From the figure's edge to the outer panels [inch].
+    across, down : float
+        Between panels side by side, and one above the other [inch].
+    """
+
+    left: float = 0.6
+    right: float = 0.1
+    top: float = 0.55
+    bottom: float = 0.5
+    across: float = 0.2
+    down: float = 0.3
+
+
+BESIDE_CONDITIONS = Margins(left=2.0, top=0.4)
+"""Room for the conditions' names on the left."""
+
+
+def panels(
+    title: str, rows: int, columns: int, height_inches: float, margins: Margins, **options: Any
+) -> tuple[Figure, list[Axes]]:
+    """Return a titled figure and its axes, row by row.
+
+    Parameters
+    ----------
+    title : str
+        Title of the whole figure.
+    rows, columns : int
+        Counts of axes.
+    height_inches : float
+        Height [inch].
+    margins : Margins
+        Room around the axes.
+    **options : Any
+        Passed to `matplotlib.figure.Figure.subplots`: shared axes, ratios.
+
+    Returns
+    -------
+    tuple of Figure and list of Axes
+        The figure, and its axes in reading order.
+    """
+    figure = Figure(figsize=(WIDTH_INCHES, height_inches))
+    figure.suptitle(title, x=0.01, y=1.0 - 0.08 / height_inches, ha="left", va="top")
+    width = (WIDTH_INCHES - margins.left - margins.right - (columns - 1) * margins.across) / columns
+    height = (height_inches - margins.top - margins.bottom - (rows - 1) * margins.down) / rows
+    placed = {
+        "left": margins.left / WIDTH_INCHES,
+        "right": 1.0 - margins.right / WIDTH_INCHES,
+        "top": 1.0 - margins.top / height_inches,
+        "bottom": margins.bottom / height_inches,
+        "wspace": margins.across / width,
+        "hspace": margins.down / height,
+    }
+    axes = figure.subplots(rows, columns, squeeze=False, gridspec_kw=placed, **options)
+    return figure, [axis for row in axes for axis in row]
+
+
+def condition_rows(axis: Axes, conditions: Sequence[str]) -> Mapping[str, float]:
+    """Lay conditions on the vertical axis, the first on top, and return where each stands.
+
+    Parameters
+    ----------
+    axis : Axes
+        The axes to label.
+    conditions : sequence of str
+        Names in results, from the top.
+
+    Returns
+    -------
+    Mapping[str, float]
+        Height of each condition's row [count].
+    """
+    heights = {name: float(len(conditions) - 1 - place) for place, name in enumerate(conditions)}
+    axis.set_yticks(list(heights.values()), [in_words(name) for name in conditions])
+    axis.set_ylim(-0.6, len(conditions) - 0.4)
+    axis.tick_params(axis="y", length=0)
+    axis.grid(visible=False, axis="y")
+    return heights
+
+
+def condition_levels(axis: Axes, conditions: Iterable[str]) -> NDArray[np.float64]:
+    """Lay the conditions of a table on the vertical axis, the first on top, and return where each row stands.
+
+    Parameters
+    ----------
+    axis : Axes
+        The axes to label.
+    conditions : iterable of str
+        Names in results, one a row.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Height of each row [count].
+    """
+    names = list(conditions)
+    heights = condition_rows(axis, list(dict.fromkeys(names)))
+    return np.array([heights[name] for name in names])
+
+
+def spread_out(count: int, span: float) -> list[float]:
+    """Return offsets that keep the marks of one row apart.
+
+    Parameters
+    ----------
+    count : int
+        Marks in the row.
+    span : float
+        Distance from the first to the last [any unit].
+
+    Returns
+    -------
+    list of float
+        Offsets around zero, in the span's unit.
+
+    Examples
+    --------
+    >>> spread_out(3, 0.4)
+    [0.2, 0.0, -0.2]
+    """
+    if count == 1:
+        return [0.0]
+    return [float(offset) for offset in np.linspace(0.5 * span, -0.5 * span, count)]

@@ -1,0 +1,260 @@
+"""Tables for a reader: columns with their units in the header, cells by what they hold."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any, TypeAlias
+
+import pandas as pd
+from markupsafe import Markup
+
+from experiments.page.numbers import MINUS, exact, fixed, number
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell that says more than a number.
+
+    Parameters
+    ----------
+    text : str
+        What is written.
+    tone : str
+        Class of the cell: ``"good"``, ``"bad"``, ``"none"``, or empty.
+    """
+
+    text: str
+    tone: str = ""
+
+
+Shown: TypeAlias = "str | Cell | Markup"
+"""What may stand in a cell."""
+
+Row: TypeAlias = Mapping[Any, Any]
+"""One row of a table, by column."""
+
+UNITS: Mapping[str, tuple[str, float]] = MappingProxyType(
+    {
+        "_m_s": ("mm/s", 1e3),
+        "_hz": ("Hz", 1.0),
+        "_kg": ("kg", 1.0),
+        "_pa": ("MPa", 1e-6),
+        "_percent": ("%", 1.0),
+        "_deg": ("°", 1.0),
+        "_n": ("N", 1.0),
+        "_s": ("s", 1.0),
+        "_v": ("V", 1.0),
+        "_w": ("W", 1.0),
+    }
+)
+"""Endings of column names: the unit that a reader gets, and the factor from the name's."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """How one column of a data frame is shown.
+
+    Parameters
+    ----------
+    source : str
+        Name in the data frame.
+    header : str, optional
+        Heading; the name in words without its unit, unless told.
+    unit : str, optional
+        Unit as shown, after scaling; that of the name's ending in `UNITS` unless told.
+    scale : float, optional
+        Factor from the name's unit to the unit shown [dimensionless]; goes with `unit`.
+    digits : int
+        Significant digits.
+    words : callable, optional
+        From a value to what is written, instead of a number.
+    of_row : callable, optional
+        From a row to what is written, where one value does not say it.
+    """
+
+    source: str
+    header: str | None = None
+    unit: str | None = None
+    scale: float = 1.0
+    digits: int = 4
+    words: Callable[[Any], Shown] | None = None
+    of_row: Callable[[Row], Shown] | None = None
+
+    def in_full(self) -> "Column":
+        """Return the column with heading, unit and scale, those of its name where none were told."""
+        ending = next((ending for ending in UNITS if self.source.endswith(ending)), "")
+        header = self.source.removesuffix(ending).replace("_", " ") if self.header is None else self.header
+        if self.unit is not None:
+            return replace(self, header=header)
+        unit, scale = UNITS.get(ending, ("", self.scale))
+        return replace(self, header=header, unit=unit, scale=scale)
+
+
+Columns: TypeAlias = Sequence[Column | str | Callable[[str], Column | None]]
+"""Columns of a table: a name alone is shown as its type asks for; a function is given every column that is not named
+beside it, and returns how it is shown, or None."""
+
+
+def yes_or_no(good: bool) -> Cell:
+    """Return a cell that says yes, or no as what a reader should see.
+
+    Parameters
+    ----------
+    good : bool
+        Which.
+
+    Returns
+    -------
+    Cell
+        The word in its tone.
+    """
+    return Cell("yes", "good") if good else Cell("no", "bad")
+
+
+def right(text: str) -> Cell:
+    """Return a cell that stands to the right, as numbers do.
+
+    Parameters
+    ----------
+    text : str
+        What is written.
+
+    Returns
+    -------
+    Cell
+        The text among numbers.
+    """
+    return Cell(text, "number")
+
+
+def as_given(value: float) -> Cell:
+    """Return a cell with a number as it was given.
+
+    Parameters
+    ----------
+    value : float
+        The number [any unit].
+
+    Returns
+    -------
+    Cell
+        As `exact` writes it.
+    """
+    return right(exact(float(value)))
+
+
+def decimals(count: int) -> Callable[[float | None], Cell]:
+    """Return a writer of cells with so many decimals.
+
+    Parameters
+    ----------
+    count : int
+        Digits behind the point.
+
+    Returns
+    -------
+    callable
+        From a number to its cell, as `fixed` writes it.
+    """
+    return lambda value: right(fixed(value, count))
+
+
+def spaced(name: str) -> str:
+    """Return a name in words.
+
+    Parameters
+    ----------
+    name : str
+        With underscores.
+
+    Returns
+    -------
+    str
+        With spaces.
+    """
+    return name.replace("_", " ")
+
+
+def interval(low: str, high: str, digits: int = 4) -> Callable[[Row], str]:
+    """Return a writer of cells with both ends of an interval.
+
+    Parameters
+    ----------
+    low, high : str
+        Their columns.
+    digits : int
+        Significant digits.
+
+    Returns
+    -------
+    callable
+        From a row to its cell.
+    """
+    return lambda row: f"{number(row[low], digits)} to {number(row[high], digits)}"
+
+
+def html_table(frame: pd.DataFrame, columns: Columns, caption: str) -> Markup:
+    """Return a data frame as an HTML table in a box that scrolls sideways.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        The rows.
+    columns : sequence of Column, str or callable
+        What is shown of them, and how.
+    caption : str
+        What the table holds.
+
+    Returns
+    -------
+    Markup
+        Escaped HTML.
+    """
+    shown = [column.in_full() for column in _named(frame, columns)]
+    body = [[_cell(column, row) for column in shown] for row in frame.to_dict("records")]
+    head = Markup("").join(
+        Markup('<th scope="col" class="{}">{}{}</th>').format(
+            "number" if all('class="number"' in cell for cell in cells) else "",
+            column.header,
+            Markup("<small>{}</small>").format(column.unit) if column.unit else "",
+        )
+        for column, *cells in zip(shown, *body, strict=True)
+    )
+    rows = Markup("\n").join(Markup("<tr>{}</tr>").format(Markup("").join(cells)) for cells in body)
+    return Markup(
+        '<div class="scroll"><table>\n<caption>{}</caption>\n'
+        "<thead><tr>{}</tr></thead>\n<tbody>\n{}\n</tbody></table></div>"
+    ).format(caption, head, rows)
+
+
+def _named(frame: pd.DataFrame, columns: Columns) -> Iterator[Column]:
+    told = {entry.source if isinstance(entry, Column) else entry for entry in columns}
+    for entry in columns:
+        if callable(entry):
+            others = (entry(str(name)) for name in frame.columns if name not in told)
+            yield from (column for column in others if column is not None)
+        else:
+            yield Column(entry) if isinstance(entry, str) else entry
+
+
+def _cell(column: Column, row: Row) -> Markup:
+    value = row[column.source]
+    if column.of_row is not None:
+        shown = column.of_row(row)
+    elif column.words is not None:
+        shown = column.words(value)
+    else:
+        shown = _by_type(column, value)
+    if isinstance(shown, Cell):
+        return Markup('<td class="{}">{}</td>').format(shown.tone, shown.text)
+    return Markup("<td>{}</td>").format(shown)
+
+
+def _by_type(column: Column, value: Any) -> Shown:
+    if isinstance(value, str | Cell):
+        return value
+    if isinstance(value, bool):
+        return yes_or_no(value)
+    if isinstance(value, int) and column.scale == 1.0:
+        return right(str(value).replace("-", MINUS))
+    return right(number(None if value is None else column.scale * float(value), column.digits))

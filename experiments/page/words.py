@@ -1,0 +1,52 @@
+"""Names in results as a reader wants them."""
+
+from experiments.page.tables import Cell, Column
+
+
+def in_words(condition: str) -> str:
+    """Return a condition's name for a reader.
+
+    Parameters
+    ----------
+    condition : str
+        Name in results.
+
+    Returns
+    -------
+    str
+        The same with spaces, both faults joined by a plus.
+
+    Examples
+    --------
+    >>> in_words("minor_leakage_major_friction")
+    'minor leakage + major friction'
+    """
+    return condition.replace("leakage_", "leakage + ").replace("_", " ")
+
+
+def in_short(condition: str) -> str:
+    """Return a condition's name for a crowded axis.
+
+    Parameters
+    ----------
+    condition : str
+        Name in results.
+
+    Returns
+    -------
+    str
+        The words shortened.
+
+    Examples
+    --------
+    >>> in_short("minor_leakage_major_friction")
+    'min. leak. + maj. fric.'
+    """
+    short = in_words(condition)
+    for word, shortened in (("minor", "min."), ("major", "maj."), ("leakage", "leak."), ("friction", "fric.")):
+        short = short.replace(word, shortened)
+    return short
+
+
+CONDITION = Column("condition", words=lambda name: Cell(in_words(name), "name"))
+"""The column of conditions in a report's table."""

@@ -1,0 +1,1 @@
+"""The piezo-stack actuator's study: tables, figures, report, command."""

@@ -1,0 +1,50 @@
+"""What a bench's sensors can tell of a piezo-stack actuator, before anything is measured."""
+
+import pandas as pd
+
+from estimation.piezo_stack.estimate import stack_bounds
+from estimation.piezo_stack.finding import SMALLEST_FAULT
+from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS
+from plant.piezo_stack.parameters import PiezoStackParameters
+from plant.piezo_stack.run import SAMPLE_TIME, sine_drive
+
+SENSOR_SETS = {
+    "position": ("position_m",),
+    "pressure": ("chamber_pressure_pa",),
+    "stack displacement": ("stack_displacement_m",),
+    "stack displacement, position": ("stack_displacement_m", "position_m"),
+    "all four": ("stack_displacement_m", "stack_force_n", "position_m", "chamber_pressure_pa"),
+}
+"""Channels beside the drive, by what the card calls them."""
+
+FREQUENCIES = (100.0, 275.0)
+"""Drives that are looked at [Hz]."""
+
+DURATION = 0.1
+"""Length of the experiment [s]."""
+
+
+def identifiability_card(healthy: PiezoStackParameters) -> pd.DataFrame:
+    """Return Cramér-Rao bounds of every quantity, all unknown together, by sensors and drive.
+
+    Parameters
+    ----------
+    healthy : PiezoStackParameters
+        The actuator, with its load.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns frequency_hz, sensors, and for each quantity its standard deviation in percent: of a minor fault for
+        leaks and friction, of itself for the others.
+    """
+    rows: list[dict[str, object]] = []
+    for frequency in FREQUENCIES:
+        drive = sine_drive(frequency, 140.0, DURATION, SAMPLE_TIME)
+        for name, channels in SENSOR_SETS.items():
+            bounds = stack_bounds(healthy, drive, SAMPLE_TIME, channels=channels)
+            percent = {
+                unknown: 100.0 * bounds[unknown] / SMALLEST_FAULT.get(unknown, 1.0) for unknown in DEFAULT_UNKNOWNS
+            }
+            rows.append({"frequency_hz": frequency, "sensors": name, **percent})
+    return pd.DataFrame(rows)

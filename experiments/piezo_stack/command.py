@@ -1,0 +1,36 @@
+"""`hydrostate piezo-stack`: the piezo-stack actuator's flow study, as a folder with a report."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from experiments.command.options import SEED, Json, Seed, require_positive
+from experiments.command.studies import Folder, finish_study
+
+commands = typer.Typer()
+
+
+@commands.command("piezo-stack", epilog="Example: hydrostate piezo-stack --out results/piezo-stack --quick")
+def piezo_stack(
+    out: Folder = Path("results/piezo-stack"),
+    quick: Annotated[bool, typer.Option("--quick", help="A small design map, in seconds.")] = False,
+    voltage_limit: Annotated[
+        float, typer.Option(metavar="V", help="Largest swing of the best operating points [V].")
+    ] = 140.0,
+    power_limit: Annotated[
+        float, typer.Option(metavar="W", help="Largest power of the stack at the best operating points [W].")
+    ] = 30.0,
+    seed: Seed = SEED,
+    as_json: Json = False,
+) -> None:
+    """Repeat the flow experiments of the piezo-stack paper (Figures 10 to 14); maps, limits and best operating points.
+
+    Also what identifies the stack's hysteresis, and what does not. Takes about a minute.
+    The last line of standard output is the manifest's path.
+    """
+    require_positive("--voltage-limit", voltage_limit, "V")
+    require_positive("--power-limit", power_limit, "W")
+    from experiments.piezo_stack.study import PIEZO_STACK, StackSettings
+
+    finish_study(PIEZO_STACK, StackSettings(seed, quick, voltage_limit, power_limit), out, as_json=as_json)

@@ -1,0 +1,118 @@
+"""Bouc-Wen parameters of a simulated stack: the paper's procedure as printed, and ours (errata P14)."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from estimation.piezo_stack.bouc_wen import LOOP, fit_stack_loop, loop_bounds
+from estimation.piezo_stack.bouc_wen_printed import printed_fit
+from experiments.running.random_streams import stream
+from plant.piezo_stack.free import run_free_stack
+from plant.piezo_stack.parameters import PiezoStackParameters
+from plant.piezo_stack.run import SAMPLE_TIME, sine_drive
+
+SLOW = 0.1
+"""Frequency at which the stack's lag moves it by a nanometre only [Hz]."""
+
+SAMPLES = round(1.0 / (SLOW * SAMPLE_TIME))
+"""Samples in a cycle, as the bench logs them."""
+
+FEW_SAMPLES = 5000
+"""Samples in a cycle of a slow logger."""
+
+CYCLES = 3
+"""Cycles from rest until a loop has closed: the last is the one that is logged."""
+
+NOISE = 2e-8
+"""Noise of the displacement sensor [m]."""
+
+SMALL, LARGE = 5.0, 100.0
+"""Swings of the small and of the large experiment [V]."""
+
+
+def hysteresis_table(p: PiezoStackParameters, seed: int) -> pd.DataFrame:
+    """Return what the printed procedure and the fit make of one closed loop of 100 V.
+
+    Parameters
+    ----------
+    p : PiezoStackParameters
+        The stack that is measured.
+    seed : int
+        Seed of the sensor noise; the printed procedure is given noiseless signals, or it fails sooner.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns parameter, truth, printed, fitted, low, high, error_percent, covered.
+    """
+    voltage, displacement = slow_loop(p, LARGE)
+    noisy = displacement + NOISE * stream(seed, "stack loop").standard_normal(len(displacement))
+    fit = fit_stack_loop(voltage, noisy, from_rest=False)
+    small = slow_loop(p, SMALL)
+    settled = run_free_stack(p, np.append(0.0, np.full(400, SMALL)), 1e-5)[-1]
+    printed = printed_fit((SMALL, float(settled)), small, (voltage, displacement))
+    rows = []
+    for name in LOOP:
+        truth, (low, high) = float(getattr(p, name)), fit.interval(name)
+        rows.append(
+            {
+                "parameter": name,
+                "truth": truth,
+                "printed": printed.values[name],
+                "fitted": fit.values[name],
+                "low": low,
+                "high": high,
+                "error_percent": 100.0 * (fit.values[name] / truth - 1.0),
+                "covered": low <= truth <= high,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def loop_card(p: PiezoStackParameters) -> pd.DataFrame:
+    """Return what no estimate from a slow loop of 100 V can beat, by how the loop was run and how often sampled.
+
+    Parameters
+    ----------
+    p : PiezoStackParameters
+        The stack.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns loop, samples, and for each parameter its standard deviation in percent; infinite where the loop cannot
+        tell it.
+    """
+    rows = []
+    for samples in (FEW_SAMPLES, SAMPLES):
+        for loop, cycles, from_rest in (
+            ("one, the first from rest", 1, True),
+            ("one, gone round before", 1, False),
+            ("three from rest", CYCLES, True),
+        ):
+            voltage = 0.5 * LARGE * (1.0 - np.cos(2.0 * np.pi * np.arange(cycles * samples + 1) / samples))
+            bounds = loop_bounds(p, voltage, NOISE, from_rest=from_rest)
+            rows.append({"loop": loop, "samples": samples, **{name: 100.0 * bound for name, bound in bounds.items()}})
+    return pd.DataFrame(rows)
+
+
+def slow_loop(p: PiezoStackParameters, swing: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return voltage and displacement of one slow cycle, after the stack has been cycled until its loop closed.
+
+    Parameters
+    ----------
+    p : PiezoStackParameters
+        The stack; its own vibration is damped, which at this frequency nobody sees.
+    swing : float
+        Swing of the drive [V].
+
+    Returns
+    -------
+    tuple of ndarray, shape (n,)
+        Voltage [V], displacement [m].
+    """
+    voltage = sine_drive(SLOW, swing, CYCLES / SLOW, SAMPLE_TIME)
+    heavy = replace(p, stack_mass=100.0 * p.stack_mass, stack_damping=10.0 * p.stack_damping)
+    displacement = run_free_stack(heavy, voltage, SAMPLE_TIME)
+    return voltage[-SAMPLES - 1 :], displacement[-SAMPLES - 1 :]

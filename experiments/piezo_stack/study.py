@@ -1,0 +1,127 @@
+"""The piezo-stack study: every table by name, and how the report shows them."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+import pandas as pd
+
+from experiments.page.frames import parameter_table
+from experiments.page.numbers import number
+from experiments.page.tables import Cell, Column, Columns, interval, spaced
+from experiments.piezo_stack import flow
+from experiments.piezo_stack.card import identifiability_card
+from experiments.piezo_stack.figures import STACK_FIGURES
+from experiments.piezo_stack.hysteresis import hysteresis_table, loop_card
+from experiments.piezo_stack.quoted import quoted_numbers
+from experiments.running.progress import Track
+from experiments.running.study import Found, Study
+from plant.piezo_stack.parameters import PiezoStackParameters
+from plant.units import LITRE_PER_MINUTE
+
+
+@dataclass(frozen=True)
+class StackSettings:
+    """Settings of the piezo-stack study.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the sensor noise.
+    quick : bool
+        Whether the design map is a small one.
+    voltage_limit_v : float
+        Largest swing of the best operating points [V].
+    power_limit_w : float
+        Largest power of the stack at the best operating points [W].
+    """
+
+    seed: int
+    quick: bool
+    voltage_limit_v: float
+    power_limit_w: float
+
+
+def _find(settings: StackSettings, track: Track) -> Found:
+    wanted = {**flow.figure_points(), "design map": (flow.QUICK_GRID if settings.quick else flow.DESIGN_GRID).points()}
+    points = [point for some in wanted.values() for point in some]
+    rows = iter(track(flow.sweep(RIG, points), len(points), description="operating points"))
+    tables = {name: pd.DataFrame([next(rows) for _ in some]) for name, some in wanted.items()}
+    tables["figure 10 loops"] = flow.stack_loops(RIG)
+    tables["figure 10 loop widths"] = flow.loop_widths(tables["figure 10 loops"])
+    tables["pump cycle"] = flow.pump_cycle(RIG, flow.OperatingPoint(50.0, flow.HIGH_VOLTAGE, flow.HIGH_BIAS, 20.0))
+    tables["what limits the flow"] = flow.sensitivities(RIG)
+    tables["best operating points"] = flow.best_points(
+        tables["design map"], settings.voltage_limit_v, settings.power_limit_w
+    )
+    tables["hysteresis parameters"] = hysteresis_table(RIG, settings.seed)
+    tables["what loops tell"] = loop_card(RIG)
+    tables["identifiability"] = identifiability_card(replace(RIG, load_mass=10.0))
+    tables["quoted numbers"] = quoted_numbers(tables)
+    return Found(tables)
+
+
+def _told(percent: float) -> Cell | str:
+    return number(percent, 2) if np.isfinite(percent) else Cell("not told", "bad")
+
+
+RIG = PiezoStackParameters()
+"""The actuator."""
+
+COLUMNS: Mapping[str, Columns] = MappingProxyType(
+    {
+        "quoted numbers": (
+            *("figure", "claim", "published", Column("ours", digits=3)),
+            Column("unit", words=lambda unit: "" if unit == "1" else unit),
+            Column("holds", "reproduced"),
+        ),
+        "figure 10 loop widths": (
+            "frequency_hz",
+            Column("stroke_m", "stroke", "µm", 1e6),
+            Column("width_percent", unit="% of stroke", digits=3),
+        ),
+        "best operating points": (
+            *("bias_pressure_pa", "load_kg", "frequency_hz", "voltage_v"),
+            Column("flow_m3_s", "flow", "L/min", 1.0 / LITRE_PER_MINUTE, 3),
+            Column("stack_power_w", "stack's power", digits=3),
+            Column("output_power_w", "lifting power", digits=3),
+        ),
+        "hysteresis parameters": (
+            Column("parameter", words=spaced),
+            "truth",
+            Column("printed", "as printed", digits=3),
+            "fitted",
+            Column("low", "95 % interval", of_row=interval("low", "high", 3)),
+            Column("error_percent", digits=2),
+            Column("covered", "covers"),
+        ),
+        "what loops tell": (
+            "loop",
+            Column("samples", "samples a cycle", words=lambda count: f"{count:,}"),
+            lambda name: Column(name, f"{spaced(name)} [%]", words=_told),
+        ),
+        "identifiability": (
+            Column("frequency_hz", "drive"),
+            "sensors",
+            lambda name: Column(name, unit="%", digits=2),
+        ),
+        "rig": (
+            Column("parameter", "name", words=spaced),
+            Column("value", words=number),
+            *("unit", "meaning", "source"),
+        ),
+    }
+)
+"""How the report shows its tables."""
+
+PIEZO_STACK = Study(
+    "piezo-stack",
+    "piezo_stack/report.html",
+    _find,
+    STACK_FIGURES,
+    COLUMNS,
+    asdict(RIG),
+    facts=lambda *_: {"rig": parameter_table(RIG)},
+)
+"""The flow of the piezo-stack actuator, its hysteresis, and what its sensors tell."""

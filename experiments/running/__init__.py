@@ -1,0 +1,1 @@
+"""Executors and random streams of studies."""

@@ -1,0 +1,63 @@
+"""How far a study has come: what shows it, and what does not."""
+
+from collections.abc import Callable, Iterable
+from typing import Protocol, TypeVar
+
+Piece = TypeVar("Piece")
+
+
+class Track(Protocol):
+    """Shows how far a study has come, as `rich.progress.Progress.track` does."""
+
+    def __call__(
+        self, sequence: Iterable[Piece], total: float | None = None, *, description: str = ...
+    ) -> Iterable[Piece]:
+        """Return the pieces, and move a bar as each is taken."""
+        ...
+
+
+def untracked(sequence: Iterable[Piece], total: float | None = None, *, description: str = "") -> Iterable[Piece]:
+    """Return the pieces and show nothing.
+
+    Parameters
+    ----------
+    sequence : iterable
+        Pieces of work.
+    total : float, optional
+        How many [count].
+    description : str
+        What is done.
+
+    Returns
+    -------
+    iterable
+        The pieces.
+    """
+    del total, description
+    return sequence
+
+
+def in_one_piece(track: Track, description: str, make: Callable[[], Piece]) -> Piece:
+    """Do one thing that shows no progress of its own.
+
+    Parameters
+    ----------
+    track : callable
+        Shows when it is done.
+    description : str
+        What is done.
+    make : callable
+        Does it.
+
+    Returns
+    -------
+    object
+        What was made.
+
+    Examples
+    --------
+    >>> in_one_piece(untracked, "adding", lambda: 1 + 1)
+    2
+    """
+    (done,) = [make() for _ in track([make], description=description)]
+    return done

@@ -1,0 +1,195 @@
+"""A study: what it finds, what it draws and what its page says. One runner makes a result folder of any."""
+
+import platform
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
+
+import pandas as pd
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from experiments.page.figure_files import Drawings, figure_files
+from experiments.page.folder import check_target, write_tables
+from experiments.page.frames import Tables
+from experiments.page.render import render_page
+from experiments.page.tables import Columns
+from experiments.running.progress import Track, in_one_piece
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+PACKAGES = ("hydrostate", "numpy", "scipy", "numba", "pandas", "control", "filterpy", "matplotlib")
+"""Whose versions a result keeps."""
+
+Settings = TypeVar("Settings", bound="DataclassInstance", contravariant=True)
+
+
+@dataclass(frozen=True)
+class Seeded:
+    """Settings of a study that has no others.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of all that is random.
+    """
+
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a study found.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        Results to read, by name.
+    series : Mapping[str, pandas.DataFrame]
+        Curves to draw, in long form, by name; their files keep nine digits.
+    files : Mapping[str, bytes]
+        What else goes into the folder, by path.
+    """
+
+    tables: Tables
+    series: Tables = field(default_factory=dict[str, pd.DataFrame])
+    files: Mapping[str, bytes] = field(default_factory=dict[str, bytes])
+
+    @property
+    def frames(self) -> Tables:
+        """Tables and series together, which figures and page read."""
+        return {**self.tables, **self.series}
+
+
+def _no_facts(_: Tables, __: object) -> Mapping[str, Any]:
+    return {}
+
+
+@dataclass(frozen=True, eq=False)
+class Study(Generic[Settings]):
+    """A study of one question. It knows nothing of files and processes; `run_study` makes its folder.
+
+    Parameters
+    ----------
+    name : str
+        What its manifest calls it.
+    template : str
+        The words of its page, by their path below ``experiments``.
+    find : callable
+        From settings, and what shows the progress, to what is found.
+    figures : Mapping[str, callable]
+        From what was found to the figures, by file name. They compute nothing.
+    columns : Mapping[str, Columns]
+        How the page shows its tables, by name.
+    parameters : Mapping[str, Any]
+        Of what is studied, for the manifest.
+    facts : callable
+        From what was found, and the settings, to what else the page's words and tables need.
+    ends_with : {"manifest", "report"}
+        Whose path the command prints.
+    """
+
+    name: str
+    template: str
+    find: Callable[[Settings, Track], Found]
+    figures: Drawings
+    columns: Mapping[str, Columns]
+    parameters: Mapping[str, Any]
+    facts: Callable[[Tables, Settings], Mapping[str, Any]] = _no_facts
+    ends_with: Literal["manifest", "report"] = "manifest"
+
+
+def run_study(study: Study[Settings], settings: Settings, out: Path, console: Console) -> Path:
+    """Run a study and write its tables, figures and report as one folder, whole or not at all.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    settings : dataclass
+        Its seed and size.
+    out : Path
+        Folder of the result; replaced whole if it holds an earlier study.
+    console : rich.console.Console
+        Where progress goes.
+
+    Returns
+    -------
+    Path
+        The manifest or the report, by the study's `ends_with`.
+
+    Raises
+    ------
+    HydrostateError
+        If the folder cannot be written, or holds something that is not a study.
+    """
+    check_target(out)
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console) as progress:
+        found = study.find(settings, progress.track)
+        in_one_piece(progress.track, "drawing and writing", lambda: write_result(study, settings, found, out))
+    return out / {"manifest": "manifest.json", "report": "report.html"}[study.ends_with]
+
+
+def write_result(study: Study[Settings], settings: Settings, found: Found, out: Path) -> None:
+    """Write what a study found, with its figures and its report, as one folder.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    settings : dataclass
+        Its seed and size.
+    found : Found
+        What it found.
+    out : Path
+        Folder of the result; replaced whole if it holds an earlier study.
+
+    Raises
+    ------
+    HydrostateError
+        If the folder cannot be written, or holds something that is not a study.
+    """
+    manifest = manifest_of(study, settings)
+    files = figure_files(study.figures, found.frames)
+    facts = {**manifest, **found.frames, **study.facts(found.frames, settings)}
+    files["report.html"] = render_page(study.template, facts, study.columns, files).encode()
+    write_tables(found.tables, manifest, out, {**found.files, **files}, found.series)
+
+
+def manifest_of(study: Study[Settings], settings: Settings) -> Mapping[str, Any]:
+    """Return what it takes to run a study again.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    settings : dataclass
+        Its seed and size.
+
+    Returns
+    -------
+    Mapping[str, Any]
+        Name, settings, parameters, versions.
+    """
+    return {
+        "study": study.name,
+        "settings": asdict(settings),
+        "parameters": study.parameters,
+        "python": platform.python_version(),
+        "versions": versions(),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what a result was made with, by package."""
+    return {package: version(package) for package in PACKAGES}

@@ -1,0 +1,1 @@
+"""From a log to probabilities, severities and a verdict."""

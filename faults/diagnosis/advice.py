@@ -1,0 +1,129 @@
+"""What to do or to measure next, computed from what a log holds and from what it left open."""
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from estimation.log_checks.sensor_check import PRESSURE
+from estimation.notes import EstimateCode, SensorCode
+from faults.notes import AdviceCode, AgainstCode, ClassCode
+from plant.log.record import Record
+from plant.notes import Note
+
+SURE = 0.9
+"""Probability from which one condition is taken to be told [probability]."""
+
+LONG_ENOUGH = 10.0
+"""Length of a log from which more of the same is no help [s]."""
+
+STRETCH, FEWEST = 0.05, 4
+"""Stretches over which a speed is held or is not [s], and samples in one at least."""
+
+LEVEL = 0.05
+"""Speeds closer than this share of the largest are one [fraction]."""
+
+DRIFT = 0.005
+"""A speed is held where its means over the halves of a stretch differ by less, as a share of the largest [fraction]."""
+
+WIDE = 0.2
+"""Neighbouring speeds that reach farther than this share of the largest are more than one [fraction]."""
+
+HELD = 0.02
+"""A speed counts if this share of the log is spent at it [fraction]."""
+
+
+def speeds_held(record: Record) -> int:
+    """Return how many different motor speeds a log holds, regardless of the direction.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+
+    Returns
+    -------
+    int
+        Speeds, other than rest, at which the motor stays without accelerating, from about 0.1 s on; 0 for a drive that
+        never settles. Speeds that it creeps through are two, however many they are.
+
+    Examples
+    --------
+    >>> steps = np.repeat([0.0, 50.0, -50.0, 100.0], 100)
+    >>> speeds_held(Record(1e-3, {"motor_speed_rad_s": steps}))
+    2
+    """
+    speed = record["motor_speed_rad_s"]
+    there = np.abs(speed[np.isfinite(speed)])
+    largest = float(np.max(there, initial=0.0))
+    length = max(FEWEST, round(STRETCH / record.sample_time * len(there) / len(speed)))
+    stretches = there[: len(there) // length * length].reshape(-1, length)
+    if largest == 0.0 or not len(stretches):
+        return 0
+    first, second = stretches[:, : length // 2], stretches[:, length // 2 :]
+    drift = np.abs(np.mean(second, axis=1) - np.mean(first, axis=1)) / largest
+    mean, spread = np.mean(stretches, axis=1) / largest, np.std(stretches, axis=1) / largest
+    held = np.sort(mean[(drift < DRIFT) & (spread < LEVEL) & (mean > LEVEL)])
+    groups = np.split(held, np.flatnonzero(np.diff(held) > LEVEL) + 1)
+    return sum(2 if np.ptp(group) > WIDE else 1 for group in groups if len(group) > HELD * len(stretches))
+
+
+def advice_for(
+    record: Record,
+    probabilities: Mapping[str, float],
+    against: Iterable[Note],
+    not_told: Iterable[Note],
+    channels: Iterable[str],
+) -> tuple[Note, ...]:
+    """Return what to do or to measure next.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    probabilities : Mapping[str, float]
+        Of each condition [probability]; empty where there are none.
+    against : iterable of Note
+        What speaks against all of them.
+    not_told : iterable of Note
+        What the log does not determine.
+    channels : iterable of str
+        Channels that were used.
+
+    Returns
+    -------
+    tuple of Note
+        The most useful first.
+    """
+    doubts, unclear = list(against), {note.code for note in not_told}
+    if doubts:
+        return _mended(doubts)
+    found: list[Note] = []
+    if PRESSURE not in channels:
+        found.append(AdviceCode.LOG_PRESSURE.note())
+    if ClassCode.FRICTION_NOT_VISIBLE in unclear:
+        found.append(AdviceCode.MOVE_PISTON.note())
+    if ClassCode.LEAKAGE_AND_BIAS_ALIKE in unclear:
+        speeds = speeds_held(record)
+        found.append((AdviceCode.MORE_SPEEDS if speeds < 2 else AdviceCode.CLOSER_SPEEDS).note(speeds=speeds))
+    if probabilities and max(probabilities.values()) < SURE:
+        short = record.duration < LONG_ENOUGH
+        found.append(
+            AdviceCode.LOG_LONGER.note(duration_s=record.duration) if short else AdviceCode.CONDITIONS_OPEN.note()
+        )
+    return tuple(found) or ((AdviceCode.NOTHING.note(),) if probabilities else ())
+
+
+def _mended(doubts: list[Note]) -> tuple[Note, ...]:
+    """Return what to mend before the next log: the sensors that are accused, else rig file and units."""
+    accused = dict.fromkeys(str(note.data["channel"]) for note in doubts if "channel" in note.data and _of_sensor(note))
+    if any(note.code == SensorCode.SENSORS_DISAGREE for note in doubts):
+        accused |= {"position_m": None, "velocity_m_s": None}
+    if accused:
+        return (AdviceCode.CHECK_SENSOR.note(channels=" and ".join(accused)),)
+    if any(isinstance(note.code, EstimateCode) or note.code == AgainstCode.NONE_FITS for note in doubts):
+        return (AdviceCode.FIT_DOUBTED.note(),)
+    return (AdviceCode.CHECK_RIG.note(),)
+
+
+def _of_sensor(note: Note) -> bool:
+    return isinstance(note.code, SensorCode)

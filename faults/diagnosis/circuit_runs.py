@@ -1,0 +1,272 @@
+"""Circuits run under a log's motor speed, and what is compared with the log: mean velocity and pressure over blocks.
+
+What is compared is coarse on purpose: the mean velocity and the mean pressure over blocks of 10 ms, whatever the log's
+sample rate, so that encoder, differentiation and pressure noise hardly count and the log's length alone sets the cost.
+Eight circuits run side by side in one kernel, so a Gauss-Newton step with all its derivatives costs one of them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.log_checks.bridging import bridged
+from estimation.log_checks.measurement_noise import measurement_variances, position_variance
+from plant.components.oil import oil_pressure
+from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT
+from plant.errors import LogError
+from plant.log.record import Record
+from plant.solvers.adaptive import ErrorControl, controlled_run
+from plant.solvers.steps import parameter_row
+
+Array = NDArray[np.float64]
+
+COORDINATES = ("leakage", "bias", "friction_rest", "friction_quadratic", "friction_rated", "bulk_modulus", "pump")
+"""What is fitted, as logarithms of: leakage coefficient, flow bias, friction force at rest, its quadratic part at rated
+velocity, all of it at rated velocity, bulk modulus, pump displacement."""
+
+BLOCK = 0.01
+"""Time over which velocity and pressure are averaged [s]."""
+
+SETTLING = 0.1
+"""Time at the start that does not count [s]: the circuit starts at rest, a log need not."""
+
+LONGEST = 30.0
+"""Longest stretch of a log that is simulated [s]."""
+
+RATE = 1e-3
+"""Sample time to which faster logs are averaged [s]."""
+
+TOLERANCE, DRIVE_TOLERANCE = 1e-4, 2e-3
+"""Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_run`: far below what is
+compared."""
+
+_CONTROL = cast("ErrorControl", CIRCUIT.control)
+
+_COLUMN = {field.name: i for i, field in enumerate(fields(CircuitParameters))}
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """A log as it is compared with a model.
+
+    Parameters
+    ----------
+    speed : ndarray, shape (samples,)
+        Motor speed [rad/s], whole.
+    sample_time : float
+        Time between its samples [s].
+    block : int
+        Samples in a block.
+    velocity : ndarray, shape (n,)
+        Mean velocity over each block [m/s]; NaN where unknown.
+    pressure : ndarray, shape (n,), or None
+        Mean differential pressure over each block [Pa], None where it is not logged.
+    noise : ndarray, shape (outputs,)
+        Standard deviation of what the sensors add to velocity [m/s] and pressure [Pa].
+    earlier : tuple of int and ndarray, shape (parameters,), or None
+        Another circuit that ran up to a sample, as a row of parameters; None if one ran throughout.
+    """
+
+    speed: Array
+    sample_time: float
+    block: int
+    velocity: Array
+    pressure: Array | None
+    noise: Array
+    earlier: tuple[int, Array] | None = None
+
+    @property
+    def outputs(self) -> Array:
+        """What is measured, shape (n, outputs): velocity [m/s], and pressure [Pa] if there is one."""
+        return np.column_stack([self.velocity] if self.pressure is None else [self.velocity, self.pressure])
+
+    @property
+    def travel(self) -> float:
+        """How far the piston moves to and fro [m]."""
+        return float(np.ptp(np.cumsum(np.nan_to_num(self.velocity)))) * self.block * self.sample_time
+
+    @property
+    def first(self) -> int:
+        """First block that counts."""
+        return round(SETTLING / (self.block * self.sample_time))
+
+
+def blocks_of(record: Record) -> Blocks:
+    """Return a log in blocks.
+
+    Parameters
+    ----------
+    record : Record
+        A log with motor speed, and position or velocity.
+
+    Returns
+    -------
+    Blocks
+        Means over `BLOCK`, of `LONGEST` at most.
+
+    Raises
+    ------
+    LogError
+        If neither position nor velocity is logged, or the log is shorter than `SETTLING` and a few blocks.
+    """
+    pooled = max(1, round(RATE / record.sample_time))
+    record = record.slice(0, round(LONGEST / record.sample_time) + 1)
+    sample_time = pooled * record.sample_time
+    block = max(2, round(BLOCK / sample_time))
+    count = (len(record) // pooled - 1) // block
+    if count * block * sample_time < 2.0 * SETTLING or count < 8:
+        raise LogError(
+            f"a diagnosis needs a log of 8 blocks of {block * sample_time:g} s or more, got {record.duration:g} s"
+        )
+    whole = {name: _pooled(record[name], pooled)[: count * block + 1] for name in record if name in _NEEDED}
+    if "position_m" in whole and np.any(np.isfinite(whole["position_m"])):
+        velocity = np.diff(bridged(whole["position_m"])[::block]) / (block * sample_time)
+    elif "velocity_m_s" in whole:
+        velocity = _mean(whole["velocity_m_s"], block)
+    else:
+        raise LogError(f"velocity_m_s or position_m is wanted, the log has {', '.join(record)}")
+    pressure = whole.get("differential_pressure_pa")
+    if pressure is not None:
+        pressure = _mean(pressure, block)
+    speed = bridged(whole["motor_speed_rad_s"])
+    return Blocks(speed, sample_time, block, velocity, pressure, _noise(whole, block, sample_time))
+
+
+def _noise(whole: Mapping[str, Array], block: int, sample_time: float) -> Array:
+    """Return the white noise of the channels as it is left in the blocks."""
+    record, velocity, pressure = Record(sample_time, whole), "velocity_m_s", "differential_pressure_pa"
+    if "position_m" in whole:
+        noise = [(2.0 * position_variance(whole["position_m"])) ** 0.5 / (block * sample_time)]
+    else:
+        noise = [(measurement_variances(record, [velocity])[velocity] / block) ** 0.5]
+    if pressure in whole:
+        noise.append((measurement_variances(record, [pressure])[pressure] / block) ** 0.5)
+    return np.array(noise)
+
+
+_NEEDED = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa")
+
+
+def _pooled(values: Array, pooled: int) -> Array:
+    return values if pooled == 1 else _mean(values, pooled, spare=0)
+
+
+def _mean(values: Array, block: int, spare: int = 1) -> Array:
+    """Return the means of blocks over the samples that are there; NaN where there is none."""
+    count = (len(values) - spare) // block
+    parts = values[: count * block].reshape(count, block)
+    there = np.isfinite(parts)
+    if np.all(there):
+        return parts.mean(axis=1)
+    seen = there.sum(axis=1)
+    return np.where(seen > 0, np.where(there, parts, 0.0).sum(axis=1) / np.maximum(seen, 1), np.nan)
+
+
+def coordinates_of(p: EhaParameters, rated: float) -> Array:
+    """Return a circuit's coordinates.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+    rated : float
+        Rated velocity [m/s].
+
+    Returns
+    -------
+    ndarray, shape (7,)
+        In the order of `COORDINATES`.
+    """
+    a1, a2, a3 = p.friction_quadratic, p.friction_linear, p.friction_coulomb
+    forces = a3, a1 * rated**2, a3 + a2 * rated + a1 * rated**2
+    return np.log([p.leakage_coefficient, p.flow_bias, *forces, p.bulk_modulus, p.pump_displacement])
+
+
+def parameter_rows(points: Array, rig: CircuitParameters, rated: float) -> Array:
+    """Return the circuits at coordinates, as rows of parameters.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 7)
+        Coordinates.
+    rig : CircuitParameters
+        The circuit around them.
+    rated : float
+        Rated velocity [m/s].
+
+    Returns
+    -------
+    ndarray, shape (n, parameters)
+        Rows for the circuit plant; the motor follows the logged speed at once.
+    """
+    leakage, bias, rest, bent, full, modulus, pump = np.exp(points.T)
+    linear = np.maximum(full - rest - bent, -1.9 * np.sqrt(bent * rest))  # friction must oppose motion at every speed
+    rows = np.tile(parameter_row(replace(rig, motor_lag=0.0)), (len(points), 1))
+    for name, values in (
+        ("leakage_coefficient", leakage),
+        ("flow_bias", bias),
+        ("friction_quadratic", bent / rated**2),
+        ("friction_linear", linear / rated),
+        ("friction_coulomb", rest),
+        ("bulk_modulus", modulus),
+        ("pump_displacement", pump),
+    ):
+        rows[:, _COLUMN[name]] = values
+    share = np.minimum(1.0, leakage / rig.leakage_coefficient) if rig.leakage_coefficient > 0.0 else np.ones(len(rows))
+    for name in ("pump_crossport_leakage", "pump_case_leakage"):
+        rows[:, _COLUMN[name]] *= share
+    return rows
+
+
+def predicted(blocks: Blocks, rows: Array) -> Array:
+    """Return what circuits do under the logged motor speed.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    rows : ndarray, shape (m, parameters) or (samples, m, parameters)
+        The circuits; what they are at each sample, if they change.
+
+    Returns
+    -------
+    ndarray, shape (m, n, outputs)
+        Mean velocity [m/s] over each block, and mean pressure [Pa] where it is logged.
+    """
+    rows = rows[None] if rows.ndim == 2 else rows
+    if blocks.earlier is not None:
+        until, row = blocks.earlier
+        rows = np.where(np.arange(len(blocks.speed))[:, None, None] < until, row, rows)
+    starts = np.array([CIRCUIT.start(row) for row in rows[0]])
+    runs = controlled_run(
+        CIRCUIT.name,
+        _CONTROL,
+        starts,
+        blocks.speed,
+        rows,
+        blocks.sample_time,
+        CIRCUIT.parameter_class,
+        tolerance=TOLERANCE,
+        drive_tolerance=DRIVE_TOLERANCE,
+    )
+    return np.array([_outputs(blocks, states, rows[:, i]) for i, states in enumerate(runs)])
+
+
+def _outputs(blocks: Blocks, states: Array, row: Array) -> Array:
+    velocity = np.diff(states[:: blocks.block, 2]) / (blocks.block * blocks.sample_time)
+    if blocks.pressure is None:
+        return velocity[:, None]
+    position, oil = states[:, 2], states[:, 4:6]
+    area, volume, modulus, air, vapour = (row[:, _COLUMN[n]] for n in _PRESSURE_OF)
+    swept = area * position
+    high = oil_pressure(oil[:, 0], 2 * volume + swept, modulus, air, vapour)
+    low = oil_pressure(oil[:, 1], 2 * volume - swept, modulus, air, vapour)
+    return np.column_stack([velocity, _mean(high - low, blocks.block)])
+
+
+_PRESSURE_OF = ("piston_area", "chamber_volume", "bulk_modulus", "air_fraction", "vapour_pressure")

@@ -1,0 +1,255 @@
+"""A circuit fitted to a log, with a prior so weak that the log decides wherever it can."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.circuit_runs import COORDINATES, Blocks, coordinates_of, parameter_rows, predicted
+from plant.eha.circuit_parameters import CircuitParameters, circuit_of
+from plant.eha.model import EhaParameters
+from plant.eha.steady_state import steady_state
+
+Array = NDArray[np.float64]
+
+STEP = 0.02
+"""Step of the finite differences in the logarithms [dimensionless]."""
+
+ROUNDS = 12
+"""Gauss-Newton steps at most."""
+
+STARTS = 3
+"""Conditions from which a fit begins at most: the nearest, and those that are nearly as near."""
+
+FARTHEST = 0.7
+"""Longest step in a logarithm [dimensionless]."""
+
+GAINED = 0.5
+"""Gain in log-likelihood below which the search ends [dimensionless]."""
+
+LEAST_SCALE = 1e-3
+"""Share of an output's root mean square that a residual counts as in any case [dimensionless]: no model is exact."""
+
+LASTING = 30.0
+"""Blocks over which a model's error lasts [dimensionless]: 0.3 s, a few reversals."""
+
+KNOWN = 1e-3
+"""Standard deviation of the logarithm of what is known [dimensionless]: the pump's displacement."""
+
+
+def _prior(each: Sequence[float], rubbing_alike: float) -> Array:
+    """Return a covariance in the coordinates; the quadratic part of friction and the whole rise together too."""
+    covariance = np.diag(np.square(each))
+    rubbing = [COORDINATES.index(name) for name in ("friction_quadratic", "friction_rated")]
+    covariance[np.ix_(rubbing, rubbing)] += rubbing_alike**2
+    return covariance
+
+
+WITHIN = _prior((0.12, 0.12, 0.12, 0.10, 0.08, 0.2, KNOWN), 0.08)
+"""How actuators in one condition differ: covariance of the logarithms, shape (7, 7) [dimensionless]."""
+
+WEAK = _prior((0.5, 0.5, 0.3, 0.3, 0.2, 0.3, KNOWN), 0.5)
+"""What is believed of an actuator in no known condition, about the nearest one: covariance, shape (7, 7)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Actuator:
+    """A healthy actuator and its nine conditions as points.
+
+    Parameters
+    ----------
+    circuit : CircuitParameters
+        The healthy circuit.
+    rated : float
+        Its velocity at rated speed [m/s].
+    conditions : ndarray, shape (9, 7)
+        Coordinates of the nine nominal circuits, in the order of `CONDITIONS`.
+    """
+
+    circuit: CircuitParameters
+    rated: float
+    conditions: Array
+
+    @staticmethod
+    def of(rig: EhaParameters) -> "Actuator":
+        """Return the actuator of a rig.
+
+        Parameters
+        ----------
+        rig : EhaParameters
+            The healthy actuator.
+
+        Returns
+        -------
+        Actuator
+            It, and its conditions.
+
+        Raises
+        ------
+        RigError
+            If no circuit fits around it.
+        """
+        rated = steady_state(rig.rated_speed, rig)[0]
+        points = [coordinates_of(parameters_for(condition, rig), rated) for condition in CONDITIONS.values()]
+        return Actuator(circuit_of(rig), rated, np.array(points))
+
+
+@dataclass(frozen=True, eq=False)
+class PointFit:
+    """A circuit fitted to a log.
+
+    Parameters
+    ----------
+    coordinates : ndarray, shape (7,)
+        Where, in `COORDINATES`.
+    cost : float
+        Minus its log-posterior [dimensionless], up to a constant of the log.
+    information : ndarray, shape (7, 7)
+        What the log says about the coordinates: the inverse of their covariance without a prior.
+    scales : ndarray, shape (outputs,)
+        Root mean square of the residuals [m/s, Pa], the least that counts.
+    fitted : ndarray, shape (n, outputs)
+        What the circuit does [m/s, Pa].
+    slopes : ndarray, shape (7, n, outputs)
+        Its derivatives with respect to the coordinates.
+    """
+
+    coordinates: Array
+    cost: float
+    information: Array
+    scales: Array
+    fitted: Array
+    slopes: Array
+
+
+def nominal_runs(blocks: Blocks, actuator: Actuator) -> Array:
+    """Return what the nine nominal circuits do under a log's motor speed.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (9, n, outputs)
+        Velocity [m/s] and pressure [Pa].
+    """
+    return predicted(blocks, parameter_rows(actuator.conditions, actuator.circuit, actuator.rated))
+
+
+def scales_of(blocks: Blocks, fitted: Array) -> Array:
+    """Return the root mean square of what a model leaves of a log.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    fitted : ndarray, shape (n, outputs)
+        The model.
+
+    Returns
+    -------
+    ndarray, shape (outputs,)
+        Residuals [m/s, Pa], not below the sensors' noise and `LEAST_SCALE`.
+    """
+    left = blocks.outputs[blocks.first :] - fitted[blocks.first :]
+    return np.maximum(np.sqrt(np.nanmean(left**2, axis=0)), least_scales(blocks))
+
+
+def least_scales(blocks: Blocks) -> Array:
+    """Return what a model leaves of a log at the least.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+
+    Returns
+    -------
+    ndarray, shape (outputs,)
+        The sensors' noise, and not below `LEAST_SCALE` of the signal [m/s, Pa].
+    """
+    size = np.sqrt(np.nanmean(blocks.outputs[blocks.first :] ** 2, axis=0))
+    return np.maximum(blocks.noise, LEAST_SCALE * size)
+
+
+def misfit(blocks: Blocks, fitted: Array) -> float:
+    """Return minus the log-likelihood of a model with noise of its residuals' own size.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    fitted : ndarray, shape (n, outputs)
+        The model.
+
+    Returns
+    -------
+    float
+        Up to a constant of the log [dimensionless]; infinite where the model ran away.
+    """
+    if not np.all(np.isfinite(fitted)):
+        return float("inf")
+    counts = np.sum(np.isfinite(blocks.outputs[blocks.first :]), axis=0)
+    return float(counts @ np.log(scales_of(blocks, fitted)))
+
+
+def fit_freely(blocks: Blocks, actuator: Actuator, condition: str) -> PointFit:
+    """Fit the circuit to a log with next to no prior.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    actuator : Actuator
+        The healthy actuator.
+    condition : str
+        The nearest condition: where the search begins, and about which the weak prior lies.
+
+    Returns
+    -------
+    PointFit
+        The best circuit.
+    """
+    centre = actuator.conditions[list(CONDITIONS).index(condition)]
+    pull = np.asarray(LASTING * np.linalg.inv(WEAK), dtype=np.float64)
+    best, step, reach = _at(blocks, actuator, centre, centre, pull), np.zeros(len(centre)), 0.0
+    for _ in range(ROUNDS):  # a step that gains nothing is taken a third as long
+        if reach == 0.0:
+            step, reach = _step(blocks, best, centre, pull), 1.0
+        point = best.coordinates + reach * step
+        there = _at(blocks, actuator, centre, point, pull)
+        if there.cost < best.cost:
+            gain, best, reach = best.cost - there.cost, there, 0.0
+            if gain < GAINED:
+                break
+        else:
+            reach *= 0.3
+            if reach < 0.02:
+                break
+    return best
+
+
+def _at(blocks: Blocks, actuator: Actuator, centre: Array, point: Array, pull: Array) -> PointFit:
+    around = np.vstack([point, point + STEP * np.eye(len(point))])
+    runs = predicted(blocks, parameter_rows(around, actuator.circuit, actuator.rated))
+    scales = scales_of(blocks, runs[0])
+    slopes = (runs[1:] - runs[0]) / STEP
+    seen = np.isfinite(blocks.outputs[blocks.first :])
+    weighted = np.where(seen, slopes[:, blocks.first :] / scales, 0.0).reshape(len(point), -1)
+    information = weighted @ weighted.T
+    off = point - centre
+    cost = misfit(blocks, runs[0]) + 0.5 * float(off @ pull @ off)
+    return PointFit(point, cost, information, scales, runs[0], slopes)
+
+
+def _step(blocks: Blocks, fit: PointFit, centre: Array, pull: Array) -> Array:
+    left = np.nan_to_num((blocks.outputs - fit.fitted)[blocks.first :]) / fit.scales**2
+    slope = np.einsum("ink,nk->i", fit.slopes[:, blocks.first :], left) - pull @ (fit.coordinates - centre)
+    step = np.linalg.solve(fit.information + pull, slope)
+    return step * min(1.0, FARTHEST / float(np.max(np.abs(step))))

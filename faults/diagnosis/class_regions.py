@@ -1,0 +1,250 @@
+"""How well does each condition explain a log? Fitted circuits are laid beside the conditions' regions.
+
+In a condition leakage, flow bias, friction and bulk modulus differ from the nominal ones as actuators of one kind do, a
+Gaussian region; integrating the likelihood over it in closed form (Laplace's method: MacKay, Information Theory, 2003,
+chapter 27) scores the condition. What a log says nothing of, as friction beyond what a stuck piston is pushed with,
+counts for none.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from faults.conditions import CONDITIONS
+from faults.diagnosis.circuit_runs import COORDINATES, Blocks
+from faults.diagnosis.class_fit import (
+    LASTING,
+    STARTS,
+    WEAK,
+    WITHIN,
+    Actuator,
+    PointFit,
+    fit_freely,
+    least_scales,
+    misfit,
+    nominal_runs,
+    scales_of,
+)
+
+Array = NDArray[np.float64]
+
+YIELDING = 5.0
+"""Travel in presliding displacements below which a piston counts as stuck [dimensionless]."""
+
+STRUCTURAL = 100.0
+"""By how much a residual that no sensor makes widens what is believed [dimensionless], in variance: it lasts, and it is
+not what the derivatives say that it is."""
+
+AVERAGED = 10
+"""Blocks over which residuals are averaged to see what lasts of them [dimensionless]: a tenth of a second."""
+
+ALIKE, ALIKE_COUNT = 0.25, 1.0
+"""Squared deviation of actuators of one kind, in units of `WITHIN`, before a log is seen, and how many deviations that
+belief counts as [dimensionless]: 0.25 are some 10 % in leakage and friction."""
+
+_NO_FRICTION = np.array([0.0 if name.startswith("friction") else 1.0 for name in COORDINATES])
+
+PRESSURE_SCALE = np.array([-1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
+"""Direction in which all pressures scale and no motion changes [dimensionless]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClassFits:
+    """What the circuit model says about a log.
+
+    Parameters
+    ----------
+    best : PointFit
+        The circuit that fits best.
+    information : ndarray, shape (7, 7)
+        What is believed to be known of its coordinates: inverse covariance without a prior.
+    nominal : ndarray, shape (9,)
+        Misfit of each condition's nominal circuit [dimensionless].
+    nominal_scales : ndarray, shape (9, outputs)
+        Root mean square of what it leaves [m/s, Pa].
+    scores : ndarray, shape (9,)
+        How well each condition's region holds the fitted circuits: log-likelihoods [dimensionless].
+    spread : ndarray, shape (7, 7)
+        Covariance of the coordinates for intervals, see `spread_of` [dimensionless].
+    """
+
+    best: PointFit
+    information: Array
+    nominal: Array
+    nominal_scales: Array
+    scores: Array
+    spread: Array
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the coordinates under the weak prior, shape (7, 7) [dimensionless]."""
+        return np.asarray(np.linalg.inv(self.information + np.linalg.inv(WEAK)), dtype=np.float64)
+
+
+def fit_classes(blocks: Blocks, actuator: Actuator) -> ClassFits:
+    """Fit circuits to a log from the nearest conditions and weigh all nine.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ClassFits
+        The best circuit, and the conditions' scores.
+    """
+    runs = nominal_runs(blocks, actuator)
+    nominal = np.array([misfit(blocks, run) for run in runs])
+    order = np.argsort(nominal)[:STARTS]
+    near = [int(i) for i in order if nominal[i] <= nominal[order[0]] + len(blocks.velocity)]
+    fits = [fit_freely(blocks, actuator, list(CONDITIONS)[i]) for i in near or [int(order[0])]]
+    stuck = is_stuck(blocks, actuator)
+    known = [believed_information(fit, blocks, stuck=stuck) for fit in fits]
+    scores = [
+        region_scores(fit, information, actuator) - misfit(blocks, fit.fitted) / LASTING
+        for fit, information in zip(fits, known, strict=True)
+    ]
+    least, held = int(np.argmin([fit.cost for fit in fits])), np.max(scores, axis=0)
+    centre = actuator.conditions[np.argmax(held)]
+    best = fits[least] if blocks.pressure is not None else _scaled(fits[least], centre)
+    spread = spread_of(best, known[least], blocks, centre)
+    return ClassFits(best, known[least], nominal, np.array([scales_of(blocks, run) for run in runs]), held, spread)
+
+
+def _scaled(fit: PointFit, centre: Array) -> PointFit:
+    """Return a fit without pressure at the scale that is the most likely within a condition."""
+    pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
+    shift = float(pull @ (centre - fit.coordinates)) / float(pull @ PRESSURE_SCALE)
+    return replace(fit, coordinates=fit.coordinates + shift * PRESSURE_SCALE)
+
+
+def spread_of(fit: PointFit, information: Array, blocks: Blocks, centre: Array) -> Array:
+    """Return the covariance of a fit's coordinates, for intervals that know how well the model describes this log.
+
+    What is left of a log that the model describes is the sensors' noise, which averages away; the error of a wrong
+    model lasts. So variances grow with what is left after averaging over a tenth of a second, over what white noise
+    would leave. Without pressure the common scale is known only as far as actuators of one kind are alike, and an
+    actuator that differs much from its kind in what its log tells is taken to do so in what it does not tell.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    information : ndarray, shape (7, 7)
+        What is believed of it, see `believed_information`.
+    blocks : Blocks
+        Its log.
+    centre : ndarray, shape (7,)
+        Coordinates of the condition that it is in.
+
+    Returns
+    -------
+    ndarray, shape (7, 7)
+        Covariance under the weak prior [dimensionless].
+    """
+    known = information / max(1.0, lasting_misfit(fit.fitted, blocks)) + np.linalg.inv(WEAK)
+    if blocks.pressure is None:
+        weight = information @ np.linalg.inv(np.eye(len(WITHIN)) + WITHIN @ information)
+        off, told = fit.coordinates - centre, float(np.trace(WITHIN @ weight))
+        unlike = (ALIKE_COUNT * ALIKE + float(off @ weight @ off)) / (ALIKE_COUNT + told)
+        pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
+        known = known + np.outer(pull, pull) / (unlike * float(pull @ PRESSURE_SCALE))
+    return np.asarray(np.linalg.inv(known), dtype=np.float64)
+
+
+def lasting_misfit(fitted: Array, blocks: Blocks) -> float:
+    """Return how far what a model leaves of a log, averaged over `AVERAGED` blocks, exceeds white noise of the sensors.
+
+    Parameters
+    ----------
+    fitted : ndarray, shape (n, outputs)
+        What the model does [m/s, Pa].
+    blocks : Blocks
+        Its log.
+
+    Returns
+    -------
+    float
+        Ratio of root mean squares, the larger of the outputs' [dimensionless]: 1 or less where noise alone is left.
+    """
+    left = (blocks.outputs - fitted)[blocks.first :]
+    size = min(AVERAGED, len(left))
+    left = left[: len(left) // size * size].reshape(-1, size, left.shape[1])
+    there = np.sum(np.isfinite(left), axis=(0, 1))
+    power = np.sum(np.nansum(left, axis=1) ** 2, axis=0) / np.maximum(there, 1)
+    return float(np.max(np.sqrt(power) / least_scales(blocks)))
+
+
+def is_stuck(blocks: Blocks, actuator: Actuator) -> bool:
+    """Return whether the piston only yields on its seals.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    bool
+        Whether it moves no more than a few presliding displacements.
+    """
+    return blocks.travel < YIELDING * actuator.circuit.presliding_displacement
+
+
+def believed_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) -> Array:
+    """Return what a fit may be believed to know: residuals beyond the sensors' noise are a model error that lasts.
+
+    Without pressure nothing is believed of `PRESSURE_SCALE`: motion is the same at twice the pressure, with half the
+    leakage and twice the friction and bulk modulus, but for the inertia, which is less than a model's error.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    blocks : Blocks
+        Its log.
+    stuck : bool
+        Whether the piston sticks: then nothing is believed of friction, as what moves is the seals' unknown stiffness.
+
+    Returns
+    -------
+    ndarray, shape (7, 7)
+        Inverse covariance of the coordinates, without a prior.
+    """
+    unexplained = float(np.max(1.0 - (blocks.noise / fit.scales) ** 2))
+    believed = fit.information / (1.0 + STRUCTURAL * max(unexplained, 0.0))
+    if stuck:
+        believed = believed * np.outer(_NO_FRICTION, _NO_FRICTION)
+    if blocks.pressure is not None:
+        return believed
+    along = believed @ PRESSURE_SCALE
+    curvature = float(PRESSURE_SCALE @ along)
+    return believed - np.outer(along, along) / curvature if curvature > 0.0 else believed
+
+
+def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Array:
+    """Return how well each condition's region holds a fitted circuit: the log of the likelihood over the region.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The circuit.
+    information : ndarray, shape (7, 7)
+        Inverse covariance of its coordinates; directions of which a log says nothing do not count.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (9,)
+        Log-likelihoods [dimensionless] up to a constant.
+    """
+    off = fit.coordinates - actuator.conditions
+    weight = information @ np.linalg.inv(np.eye(len(information)) + WITHIN @ information)
+    return -0.5 * np.einsum("ci,ij,cj->c", off, weight, off)

@@ -1,0 +1,239 @@
+"""`diagnose_log(record, rig) -> Finding`: which condition, how probable, how bad, or "unknown" and why.
+
+The same pass as `estimation.eha.estimate.estimate_log`, carried on: the log is looked at once, bulk modulus is
+estimated once, and where its gate refuses the fit the class is unknown for the same reasons.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from estimation.eha.bulk_modulus import EstimateOptions
+from estimation.eha.estimate import estimated, finding_of, refused
+from estimation.eha.result import BulkModulusEstimate
+from estimation.finding import Finding, Outcome, Quantity
+from estimation.identification.model.linear_model import LinearModel
+from estimation.log_checks.clean import CleanLog, clean_log
+from estimation.log_checks.sensor_check import PRESSURE
+from faults.diagnosis.advice import advice_for
+from faults.diagnosis.calibration import Calibration, shipped_calibration
+from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.class_regions import region_scores
+from faults.diagnosis.evidence import Scoreboard, weigh
+from faults.diagnosis.models_verdict import models_verdict, ranked
+from faults.diagnosis.out_of_model import reasons_against, sensors_disagree
+from faults.diagnosis.rmse import Scores, score_mathematical
+from faults.diagnosis.severity import severities, severities_at, what_is_not_told, with_bulk_modulus
+from faults.eha.bank import mathematical_bank
+from faults.notes import ClassCode
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.errors import LogError, RigError
+from plant.log.record import Record
+from plant.notes import Note, distinct
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What the fitted circuit and the banks say of a log, when the log ends.
+
+    Parameters
+    ----------
+    condition : str
+        The most probable of the nine conditions.
+    probabilities : Mapping[str, float]
+        Of each, should the log be in one of them [probability].
+    against : tuple of Note
+        What speaks against all nine.
+    severity : Mapping[str, Quantity]
+        How bad, by the names of `faults.diagnosis.severity.UNITS` [each in the unit given there].
+    healthy : Mapping[str, float]
+        The same of the healthy actuator [each in the same unit].
+    not_told : tuple of Note
+        What the log does not determine.
+    scoreboard : Scoreboard
+        The evidences, and the circuit that was fitted.
+    """
+
+    condition: str
+    probabilities: Mapping[str, float]
+    against: tuple[Note, ...]
+    severity: Mapping[str, Quantity]
+    healthy: Mapping[str, float]
+    not_told: tuple[Note, ...]
+    scoreboard: Scoreboard
+
+    @property
+    def unknown(self) -> bool:
+        """Whether something speaks against all nine."""
+        return bool(self.against)
+
+
+@dataclass(frozen=True, eq=False)
+class EhaEvidence:
+    """What the engines say of a log, behind a finding.
+
+    Parameters
+    ----------
+    estimate : BulkModulusEstimate
+        Bulk modulus, and what was found with it.
+    scores : Scores
+        Errors of the nine nominal models.
+    diagnosis : Diagnosis or None
+        The fitted circuit and its classes; None where no circuit fits around the rig, or the log is too short.
+    transfer_functions : Scores or None
+        Errors of nine transfer functions, where they were asked for.
+    """
+
+    estimate: BulkModulusEstimate
+    scores: Scores
+    diagnosis: Diagnosis | None
+    transfer_functions: Scores | None = None
+
+
+def diagnose_log(record: Record, rig: Rig) -> Finding:
+    """Diagnose a log: bulk modulus, its gate, the condition, and how bad it is.
+
+    Parameters
+    ----------
+    record : Record
+        Motor speed, and position or velocity; differential pressure where it is logged.
+    rig : Rig
+        The healthy actuator.
+
+    Returns
+    -------
+    Finding
+        Its evidence is an `EhaEvidence`. Where the log tells the conditions apart but no circuit fits around the rig,
+        there is a condition without probabilities.
+
+    Raises
+    ------
+    LogError
+        If the log has neither position nor velocity, or cannot be estimated.
+    """
+    log = clean_log(record, rig.parameters)
+    estimate = estimated(log, rig, EstimateOptions())[1]
+    scores = score_mathematical(log.record, mathematical_bank(rig.parameters))
+    verdict = models_verdict(scores, log.record)
+    found = finding_of(log, estimate)
+    absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
+    notes = (*log.left_out, *verdict.notes, *absent)
+    found = replace(found, outcome=verdict.outcome, notes=notes, channels=scores.channels)
+    if verdict.outcome is not Outcome.OK:
+        return replace(found, evidence=EhaEvidence(estimate, scores, None))
+    doubts = (*refused(estimate), *log.objections)
+    try:
+        diagnosis = diagnose_clean(log, actuator_of(rig.parameters))
+    except RigError as error:
+        said = ClassCode.NO_CIRCUIT.note(reason=str(error))
+        return _without_circuit(found, log, scores, (*doubts, *verdict.against), said)
+    except LogError as error:
+        said = ClassCode.NO_PROBABILITIES.note(reason=error.message)
+        return _without_circuit(found, log, scores, (*doubts, *verdict.against), said)
+    against = distinct((*doubts, *diagnosis.against))
+    if against:  # nominal models alone are no judges of a circuit with another oil, but they say what is off
+        against = distinct((*against, *verdict.against))
+    return replace(
+        found,
+        condition=diagnosis.condition,
+        probabilities=diagnosis.probabilities,
+        unknown=bool(against),
+        against=against,
+        severities=with_bulk_modulus(diagnosis.severity, estimate.quantity, actuator_of(rig.parameters)),
+        healthy=diagnosis.healthy,
+        not_told=diagnosis.not_told,
+        since=diagnosis.scoreboard.onset,
+        advice=advice_for(log.record, diagnosis.probabilities, against, diagnosis.not_told, scores.channels),
+        evidence=EhaEvidence(estimate, scores, diagnosis),
+    )
+
+
+def _without_circuit(found: Finding, log: CleanLog, scores: Scores, doubts: tuple[Note, ...], why: Note) -> Finding:
+    """Return a finding whose condition is that of the nearest nominal model."""
+    estimate: BulkModulusEstimate = found.evidence
+    against = distinct(doubts)
+    return replace(
+        found,
+        condition=ranked(scores)[0][0],
+        unknown=bool(against),
+        against=against,
+        advice=advice_for(log.record, {}, against, (), scores.channels),
+        notes=(*found.notes, why),
+        evidence=EhaEvidence(estimate, scores, None),
+    )
+
+
+def diagnose_clean(
+    log: CleanLog,
+    actuator: Actuator,
+    library: Mapping[str, LinearModel] | None = None,
+    calibration: Calibration | None = None,
+) -> Diagnosis:
+    """Diagnose a log whose sensors have been looked at, by all evidences, without its estimate of bulk modulus.
+
+    Parameters
+    ----------
+    log : CleanLog
+        Motor speed, and position or velocity; differential pressure where it is logged.
+    actuator : Actuator
+        The healthy actuator.
+    library : Mapping[str, LinearModel], optional
+        Its transfer functions, by condition.
+    calibration : Calibration, optional
+        Fitted numbers; those shipped if not given.
+
+    Returns
+    -------
+    Diagnosis
+        What speaks for each class, and against all.
+
+    Raises
+    ------
+    LogError
+        If the log has neither position nor velocity, or is too short.
+    """
+    numbers = shipped_calibration() if calibration is None else calibration
+    board = weigh(log.record, actuator, library)
+    pressure = board.blocks.pressure is not None
+    probabilities = board.probabilities(numbers)
+    region = float(np.max(region_scores(board.fits.best, board.fits.information, actuator)))
+    against = (
+        *log.objections,
+        *sensors_disagree(board.window, board.blocks),
+        *reasons_against(board.blocks, board.fits, region, actuator),
+    )
+    found = severities(board.fits, actuator, numbers.widths(pressure))
+    return Diagnosis(
+        max(probabilities, key=lambda name: probabilities[name]),
+        probabilities,
+        against,
+        found,
+        severities_at(actuator.conditions[0], actuator),
+        tuple(what_is_not_told(board.fits, found, pressure=pressure)),
+        board,
+    )
+
+
+@lru_cache(maxsize=8)
+def actuator_of(parameters: EhaParameters) -> Actuator:
+    """Return the actuator of a rig with its nine conditions, kept for the next log.
+
+    Parameters
+    ----------
+    parameters : EhaParameters
+        The healthy actuator.
+
+    Returns
+    -------
+    Actuator
+        It, and its conditions.
+
+    Raises
+    ------
+    RigError
+        If no circuit fits around it.
+    """
+    return Actuator.of(parameters)

@@ -1,0 +1,165 @@
+"""Four evidences on one log, one scoreboard: transfer functions, models, innovations, estimated parameters."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.finding import Change
+from estimation.identification.model.linear_model import LinearModel
+from faults.conditions import CONDITIONS
+from faults.diagnosis.calibration import Calibration
+from faults.diagnosis.circuit_runs import COORDINATES, Blocks
+from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.class_regions import ClassFits, is_stuck
+from faults.diagnosis.innovation_bank import innovation_scores
+from faults.diagnosis.onset import last_part
+from faults.diagnosis.rmse import score_transfer_functions
+from plant.log.record import Record
+
+Array = NDArray[np.float64]
+
+EVIDENCES = ("transfer_functions", "models", "innovations", "parameters")
+"""The evidences, in the order of the scoreboard's rows."""
+
+FARTHEST = 30.0
+"""Log-odds beyond which an evidence says no more [dimensionless]: no model is sure of more."""
+
+YIELDS = 1.2
+"""By how much the breakaway force may differ between actuators of one kind [dimensionless]."""
+
+SAMPLES = 20.0
+"""How many independent samples a root-mean-square error counts as [dimensionless]; the weights scale it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scoreboard:
+    """What the evidences say of a log.
+
+    Parameters
+    ----------
+    log_odds : Mapping[str, ndarray of shape (9,)]
+        By evidence, each condition's score below the best [dimensionless], 0 for the best; an evidence that could not
+        be had is absent.
+    blocks : Blocks
+        The log as it was compared.
+    fits : ClassFits
+        The circuits that were fitted.
+    window : Record
+        The stretch of the log that was looked at.
+    onset : Change or None
+        When the condition began, which alone is judged; None if it did so before the log.
+    """
+
+    log_odds: Mapping[str, Array]
+    blocks: Blocks
+    fits: ClassFits
+    window: Record
+    onset: Change | None
+
+    def choice(self, evidence: str) -> str:
+        """Return the condition that one evidence alone names.
+
+        Parameters
+        ----------
+        evidence : str
+            One of those in `log_odds`.
+
+        Returns
+        -------
+        str
+            The condition.
+        """
+        return list(CONDITIONS)[int(np.argmax(self.log_odds[evidence]))]
+
+    def probabilities(self, calibration: Calibration) -> Mapping[str, float]:
+        """Return the probability of each condition: a multinomial model on the evidences' log-odds.
+
+        Parameters
+        ----------
+        calibration : Calibration
+            Weights of the evidences.
+
+        Returns
+        -------
+        Mapping[str, float]
+            Probability by condition [probability]; they sum to 1.
+        """
+        weights = calibration.weights(self.blocks.pressure is not None)
+        total = np.sum([weights[name] * odds for name, odds in self.log_odds.items()], axis=0)
+        shares = np.exp(total - np.max(total))
+        return dict(zip(CONDITIONS, (float(share) for share in shares / np.sum(shares)), strict=True))
+
+
+def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel] | None = None) -> Scoreboard:
+    """Return what the evidences say of a log, of the condition in which it ends.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    actuator : Actuator
+        The healthy actuator.
+    library : Mapping[str, LinearModel], optional
+        Transfer functions of the nine conditions of this actuator; without it that evidence is absent.
+
+    Returns
+    -------
+    Scoreboard
+        All of them.
+
+    Raises
+    ------
+    LogError
+        If the log has neither position nor velocity, or is too short.
+    """
+    part = last_part(record, actuator)
+    record, blocks, fits = part.record, part.blocks, part.fits
+    found = {
+        "models": -SAMPLES * np.sum(np.log(fits.nominal_scales), axis=1),
+        "innovations": innovation_scores(record, actuator.circuit) / blocks.block,
+        "parameters": fits.scores,
+    }
+    if library is not None:
+        table = score_transfer_functions(record, library).by_condition
+        found["transfer_functions"] = -SAMPLES * np.log([table[name] for name in CONDITIONS])
+    if is_stuck(blocks, actuator):
+        found = {name: _friction_left_open(scores, blocks, actuator) for name, scores in found.items()}
+    odds = {name: bounded(found[name]) for name in EVIDENCES if name in found}
+    return Scoreboard(odds, blocks, fits, part.window, part.onset)
+
+
+def _friction_left_open(scores: Array, blocks: Blocks, actuator: Actuator) -> Array:
+    """Score the friction levels that would hold the piston alike: a stuck piston tells none from the other."""
+    reached = (
+        0.0 if blocks.pressure is None else actuator.circuit.piston_area * float(np.nanmax(np.abs(blocks.pressure)))
+    )
+    holding = np.exp(actuator.conditions[:, COORDINATES.index("friction_rest")]) * YIELDS > reached
+    leakage = np.array([condition.leakage for condition in CONDITIONS.values()])
+    alike = [np.max(scores[holding & (leakage == level)], initial=-np.inf) for level in leakage]
+    return np.where(holding, alike, scores)
+
+
+def bounded(scores: Array) -> Array:
+    """Return log-odds to the best, bent so that none falls below `FARTHEST` under it.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (n,)
+        Log-likelihoods [dimensionless].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Between ``-FARTHEST`` and 0 [dimensionless].
+
+    Examples
+    --------
+    >>> bounded(np.array([1.0, 0.0, -np.inf])).round(2).tolist()
+    [0.0, -0.98, -30.0]
+    """
+    scores = np.where(np.isnan(scores), -np.inf, scores)
+    if not np.any(np.isfinite(scores)):
+        return np.zeros(len(scores))
+    return FARTHEST * np.expm1((scores - np.max(scores)) / FARTHEST)

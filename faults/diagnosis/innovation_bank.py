@@ -1,0 +1,49 @@
+"""Nine filters on one log, one a condition: how likely each found its innovations."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.filters.batch import filter_batch
+from estimation.filters.run import filter_problem
+from estimation.log_checks.first_belief import first_belief
+from estimation.models.eha_forms import PRESSURE_FORM
+from faults.conditions import CONDITIONS, parameters_for
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+Array = NDArray[np.float64]
+
+STEP = 2e-3
+"""Longest step of the filters [s]: their implicit step is stable at any, and what they tell apart is slower."""
+
+SPREAD = 0.3
+"""Standard deviation of the first guess of bulk modulus, as a share of it [dimensionless]."""
+
+
+def innovation_scores(record: Record, rig: EhaParameters) -> Array:
+    """Return the log-likelihood of a log's innovations under each condition.
+
+    Each filter is the pressure form with the nominal leakage and friction of a condition; bulk modulus is a state. A
+    condition does not change within a log, so the filters do not mix (an interacting bank would only bound by how much
+    they may differ).
+
+    Parameters
+    ----------
+    record : Record
+        The log, with position or velocity.
+    rig : EhaParameters
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (9,)
+        Natural logarithms [dimensionless], in the order of `CONDITIONS`; minus infinity where a filter ran away.
+    """
+    model = replace(PRESSURE_FORM, longest_step=STEP)
+    slow = record.slice(0, None, max(1, round(STEP / record.sample_time)))
+    prior = first_belief(model, slow, rig.bulk_modulus, SPREAD * rig.bulk_modulus)
+    problems = [filter_problem(model, prior, slow, parameters_for(condition, rig)) for condition in CONDITIONS.values()]
+    found = np.array([trace.log_likelihood for trace in filter_batch(problems)])
+    return np.where(np.isfinite(found), found, -np.inf)

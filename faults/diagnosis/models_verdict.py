@@ -1,0 +1,99 @@
+"""What the errors of nine nominal models alone say of a log: an outcome, a ranking, and whether any of them fits."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.finding import Outcome
+from faults.diagnosis.rmse import Scores, measured_velocity
+from faults.notes import AgainstCode, ClassCode
+from plant.log.record import Record
+from plant.notes import Note
+
+TOLD_APART = 1.001
+"""Least ratio of the runner-up's score to the best at which a class is named [dimensionless]."""
+
+POOR_FIT = 0.5
+"""Share of the signal that the best model may leave unexplained [fraction]."""
+
+
+class ModelsVerdict(NamedTuple):
+    """What the nine models say.
+
+    Parameters
+    ----------
+    outcome : Outcome
+        Not observable where all models move alike.
+    notes : tuple of Note
+        Why there is no class, where there is none.
+    against : tuple of Note
+        What speaks against all nine.
+    """
+
+    outcome: Outcome
+    notes: tuple[Note, ...]
+    against: tuple[Note, ...]
+
+
+def ranked(scores: Scores) -> list[tuple[str, float]]:
+    """Return the conditions, the least error first.
+
+    Parameters
+    ----------
+    scores : Scores
+        Errors of the nine models.
+
+    Returns
+    -------
+    list of tuple
+        Condition, and score in its unit; one that ran away comes last.
+    """
+    return sorted(scores.by_condition.items(), key=lambda item: item[1] if math.isfinite(item[1]) else math.inf)
+
+
+def margin(scores: Scores) -> float:
+    """Return how many times larger the runner-up's error is than the best.
+
+    Parameters
+    ----------
+    scores : Scores
+        Errors of the nine models.
+
+    Returns
+    -------
+    float
+        The ratio [dimensionless]; 1 where both are zero, NaN where no model stayed finite.
+    """
+    (_, least), (_, next_least) = ranked(scores)[:2]
+    if not math.isfinite(least):
+        return math.nan
+    return next_least / least if least > 0.0 else (math.inf if next_least > 0.0 else 1.0)
+
+
+def models_verdict(scores: Scores, record: Record) -> ModelsVerdict:
+    """Judge a log by the errors of nine models.
+
+    Parameters
+    ----------
+    scores : Scores
+        The errors.
+    record : Record
+        The log.
+
+    Returns
+    -------
+    ModelsVerdict
+        The outcome, and why.
+    """
+    ratio = margin(scores)
+    if math.isnan(ratio):
+        return ModelsVerdict(Outcome.DIVERGED, (ClassCode.MODELS_DIVERGED.note(),), ())
+    if ratio < TOLD_APART:
+        return ModelsVerdict(Outcome.NOT_OBSERVABLE, (ClassCode.MODELS_ALIKE.note(),), ())
+    unexplained = min(scores.by_condition.values())
+    if len(scores.channels) == 1:
+        size = float(np.sqrt(np.nanmean(measured_velocity(record) ** 2)))
+        unexplained = unexplained / size if size > 0.0 else 0.0
+    poor = unexplained > POOR_FIT
+    return ModelsVerdict(Outcome.OK, (), (AgainstCode.NONE_FITS.note(percent=100.0 * unexplained),) if poor else ())

@@ -1,0 +1,240 @@
+"""Did the condition change within a log, and when? Two circuits, one before and one after, against one for all.
+
+The derivatives of a fit give, for every time of change at once, what two circuits would explain more than one (the
+generalised likelihood ratio, linearised: Basseville and Nikiforov, Detection of Abrupt Changes, 1993, section 2.4.3).
+Where that is much, both are fitted; it is a change if they are in different conditions.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.finding import Change
+from faults.conditions import CONDITIONS
+from faults.diagnosis.circuit_runs import LONGEST, Blocks, blocks_of, parameter_rows, predicted
+from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, least_scales, misfit
+from faults.diagnosis.class_regions import ClassFits, fit_classes, lasting_misfit
+from faults.watch.events import Alarm
+from faults.watch.watch import LEAST_LEARNING, SLOWEST, watch_record
+from plant.log.record import Record
+from plant.solvers.adaptive import LANES
+
+Array = NDArray[np.float64]
+
+EDGE = 1.0
+"""What a log must hold before a change and after it [s]."""
+
+GAIN = 10.0
+"""Log-likelihood that two circuits must gain on one, in `LASTING` blocks that count as one [dimensionless]."""
+
+LATE, EARLY = 0.8, 0.1
+"""How much later, or earlier, than it came a change may be seen [s]."""
+
+MOST_ALARMS = 3
+"""Alarms of a watch that are looked into, from the last."""
+
+LIKELY = 1.92
+"""Log-likelihood below the best up to which a time is in the 95 % interval [dimensionless]: half of chi-squared's."""
+
+
+@dataclass(frozen=True, eq=False)
+class LastPart:
+    """A log, as far as it is in the condition in which it ends.
+
+    Parameters
+    ----------
+    window : Record
+        The stretch that was looked at.
+    record : Record
+        What of it is in the last condition.
+    blocks : Blocks
+        The stretch in blocks; what is in another condition is missing.
+    fits : ClassFits
+        Circuits fitted to them.
+    onset : Change or None
+        When the condition began; None if it did so before the log.
+    """
+
+    window: Record
+    record: Record
+    blocks: Blocks
+    fits: ClassFits
+    onset: Change | None
+
+
+def last_part(record: Record, actuator: Actuator) -> LastPart:
+    """Return the part of a log that is in the condition in which it ends.
+
+    Parameters
+    ----------
+    record : Record
+        The log. Of one longer than `LONGEST` the stretch about the last change that `watch_record` finds is looked at,
+        or its beginning if there is none.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    LastPart
+        The part, fitted.
+
+    Raises
+    ------
+    LogError
+        If the log has neither position nor velocity, or is too short.
+    """
+    for window in _about_alarms(record, actuator):
+        found = _last_of(window, actuator)
+        if found.onset is not None:
+            return found
+    return _last_of(record, actuator)
+
+
+def _last_of(window: Record, actuator: Actuator) -> LastPart:
+    blocks = blocks_of(window)
+    fits = fit_classes(blocks, actuator)
+    found = find_onset(blocks, fits, actuator)
+    if found is None:
+        return LastPart(window, window, blocks, fits, None)
+    onset, blocks, fits = found
+    rest = window.slice(round(onset.since / window.sample_time), None)
+    ends = onset.ci95[0] + window.start_time, onset.ci95[1] + window.start_time
+    return LastPart(window, rest, blocks, fits, Change(onset.since + window.start_time, ends, onset.before))
+
+
+def _about_alarms(record: Record, actuator: Actuator) -> Iterator[Record]:
+    """Yield stretches about the last alarms of a watch, the last first, of logs too long to be fitted whole."""
+    if record.duration <= LONGEST + LEAST_LEARNING or record.sample_time > SLOWEST:
+        return
+    events = watch_record(record, actuator.circuit, learning=LEAST_LEARNING)
+    changes = [event.since - record.start_time for event in events if isinstance(event, Alarm)]
+    for since in changes[: -MOST_ALARMS - 1 : -1]:
+        first = round(max(since - 0.5 * LONGEST, 0.0) / record.sample_time)
+        yield record.slice(first, first + round(LONGEST / record.sample_time) + 1)
+
+
+def find_onset(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Change, Blocks, ClassFits] | None:
+    """Return when the condition changed, and the part of the log after that.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    fits : ClassFits
+        The circuits fitted to all of it.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    tuple of Change, Blocks and ClassFits, or None
+        The change, the log with all before it taken as missing, and the circuits that fit the rest, which go on from
+        where the circuit before had brought the piston; None for a log in one condition throughout.
+    """
+    place = likeliest_split(blocks, fits.best)
+    if place is None:
+        return None
+    parts = part_of(blocks, 0, place), part_of(blocks, place, len(blocks.velocity))
+    found = [fit_classes(part, actuator) for part in parts]
+    gain = misfit(blocks, fits.best.fitted) - sum(
+        misfit(part, one.best.fitted) for part, one in zip(parts, found, strict=True)
+    )
+    first, last = (int(np.argmax(one.scores)) for one in found)
+    if gain < GAIN * LASTING or first == last:
+        return None
+    before = parameter_rows(found[0].best.coordinates[None], actuator.circuit, actuator.rated)[0]
+    low, best, high = _when(blocks, before, found[1].best.coordinates, place, actuator)
+    step = blocks.block * blocks.sample_time
+    onset = Change(best * step, (low * step, high * step), list(CONDITIONS)[first])
+    rest = replace(part_of(blocks, best, len(blocks.velocity)), earlier=(best * blocks.block, before))
+    return onset, rest, fit_classes(rest, actuator)
+
+
+def part_of(blocks: Blocks, begin: int, end: int) -> Blocks:
+    """Return a log with all but some of its blocks taken as missing; the drive stays whole.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    begin, end : int
+        First block that stays, and the one after the last.
+
+    Returns
+    -------
+    Blocks
+        The part.
+    """
+    there = np.arange(len(blocks.velocity))
+    away = (there < begin) | (there >= end)
+    pressure = None if blocks.pressure is None else np.where(away, np.nan, blocks.pressure)
+    return replace(blocks, velocity=np.where(away, np.nan, blocks.velocity), pressure=pressure)
+
+
+def likeliest_split(blocks: Blocks, fit: PointFit) -> int | None:
+    """Return the block at which one circuit most likely gave way to another, if that explains much more.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    fit : PointFit
+        The circuit fitted to all of it.
+
+    Returns
+    -------
+    int or None
+        The first block of the second circuit; None if one circuit will do.
+    """
+    first, edge = blocks.first, round(EDGE / (blocks.block * blocks.sample_time))
+    left = (blocks.outputs - fit.fitted)[first:] / fit.scales
+    seen = np.isfinite(left)
+    left = np.where(seen, left, 0.0)
+    slopes = np.where(seen, fit.slopes[:, first:] / fit.scales, 0.0)
+    places = np.arange(edge, len(left) - edge)
+    if len(places) == 0:
+        return None
+    scores = np.cumsum(np.einsum("ink,nk->ni", slopes, left), axis=0)
+    known = np.cumsum(np.einsum("ink,jnk->nij", slopes, slopes), axis=0)
+    weak = np.linalg.inv(WEAK)
+    moved = np.linalg.solve(known[places] + weak, scores[places, :, None])[..., 0]
+    moved_on = np.linalg.solve(known[-1] - known[places] + weak, (scores[-1] - scores[places])[..., None])[..., 0]
+    gains = np.einsum("ti,ti->t", scores[places], moved) + np.einsum("ti,ti->t", scores[-1] - scores[places], moved_on)
+    best = int(np.argmax(gains))
+    split = int(places[best])
+    explained = np.concatenate(
+        [
+            np.einsum("ink,i->nk", slopes[:, :split], moved[best]),
+            np.einsum("ink,i->nk", slopes[:, split:], moved_on[best]),
+        ]
+    )
+    before, after = (np.sum(one**2, axis=0) for one in (left, left - explained))
+    tiny = np.finfo(float).tiny
+    gain = 0.5 * float(np.sum(seen, axis=0) @ np.log(np.maximum(before, tiny) / np.maximum(after, tiny)))
+    return first + split if gain >= GAIN * LASTING else None
+
+
+def _when(blocks: Blocks, before: Array, after: Array, place: int, actuator: Actuator) -> tuple[int, int, int]:
+    """Return the likeliest block of the change, between the ends of its 95 % interval: both circuits in one run.
+
+    A circuit takes its time to show what changed, so most candidates lie before the place at which it was seen.
+    """
+    step = blocks.block * blocks.sample_time
+    first = max(place - round(LATE / step), blocks.first)
+    candidates = np.arange(first, min(place + round(EARLY / step), len(blocks.velocity) - 1))
+    (row,) = parameter_rows(after[None], actuator.circuit, actuator.rated)
+    sample = np.arange(len(blocks.speed))[:, None, None]
+    costs: list[float] = []
+    least, best = np.inf, before
+    for some in np.array_split(candidates, range(LANES, len(candidates), LANES)):
+        paths = np.where(sample < blocks.block * some[:, None], before, row)
+        for run in predicted(blocks, paths):
+            left = (blocks.outputs - run)[blocks.first :] / least_scales(blocks)
+            costs.append(0.5 * float(np.nansum(left**2)))
+            if costs[-1] < least:
+                least, best = costs[-1], run
+    room = LIKELY * max(1.0, lasting_misfit(best, blocks) ** 2)
+    likely = candidates[np.array(costs) <= least + room]
+    return int(likely[0]) - 1, int(candidates[int(np.argmin(costs))]), int(likely[-1]) + 1

@@ -1,0 +1,178 @@
+"""Is the log one that the nine conditions can explain? Else the verdict is "unknown", with what speaks against.
+
+A log is looked at from five sides: do its sensors work, do position and velocity agree, does any circuit follow it,
+does the circuit that does lie in or between the conditions' regions, and would a sensor's bias or another pump explain
+it better. The limits leave room for rigs that no circuit describes to the last digit.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.notes import SensorCode
+from faults.conditions import severity
+from faults.diagnosis.circuit_runs import COORDINATES, Blocks, blocks_of, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.class_fit import WEAK, Actuator
+from faults.diagnosis.class_regions import ClassFits, region_scores
+from faults.notes import AgainstCode
+from plant.log.record import Record
+from plant.notes import Note
+
+Array = NDArray[np.float64]
+
+UNEXPLAINED = (0.12, 0.08)
+"""Share of velocity and of pressure, root mean square, that the best circuit may leave [dimensionless]."""
+
+FARTHEST_OUT = 7.0
+"""Least log-likelihood of the nearest condition's region, below its centre's [dimensionless]."""
+
+SOFT = 0.55
+"""Share of the rig's bulk modulus below which the oil holds air [dimensionless]; it is too stiff above the inverse."""
+
+STANDARD_ERRORS = 2.0
+"""Standard errors from zero at which a bias is believed [dimensionless]; they hold the model's error already."""
+
+LEAST_BIAS = {"pump": 0.08, "differential_pressure_pa": 0.05, "motor_speed_rad_s": 0.03}
+"""Biases that matter: of the pump's flow a radian, of pressure and of motor speed over their root mean square."""
+
+GRID = 9
+"""Severities of leakage, and of friction, between none and major that are tried."""
+
+FREE_PUMP = 0.3
+"""Standard deviation of the pump's displacement where a fit may change it [dimensionless]."""
+
+AGREEMENT = 0.05
+"""Share by which velocity and the slope of position may differ, root mean square [dimensionless]."""
+
+BREAK = 3.0
+"""Standard deviations of its noise by which velocity may differ from the slope of position in any case."""
+
+
+def reasons_against(blocks: Blocks, fits: ClassFits, region: float, actuator: Actuator) -> list[Note]:
+    """Return what speaks against a log being in any of the nine conditions.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks.
+    fits : ClassFits
+        The circuits fitted to it.
+    region : float
+        Log-likelihood of the nearest condition's region, relative to its centre [dimensionless].
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    list[Note]
+        None for a log that fits.
+    """
+    return [*_unexplained(blocks, fits), *_biases(blocks, fits, actuator), *_outside(fits, region, actuator)]
+
+
+def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
+    """Compare a velocity sensor with the encoder, over the blocks.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    blocks : Blocks
+        The same in blocks.
+
+    Returns
+    -------
+    tuple of Note
+        One where they differ by more than their noise and `AGREEMENT`.
+    """
+    if "velocity_m_s" not in record or "position_m" not in record:
+        return ()
+    other = blocks_of(record.replace(position_m=None))
+    apart = (other.velocity - blocks.velocity)[blocks.first :]
+    there = np.isfinite(apart)
+    size = float(np.sqrt(np.nanmean(blocks.velocity**2)))
+    allowed = max(AGREEMENT * size, BREAK * float(np.hypot(blocks.noise[0], other.noise[0])))
+    differs = float(np.sqrt(np.mean(apart[there] ** 2))) if np.any(there) else 0.0
+    return () if differs <= allowed else (SensorCode.SENSORS_DISAGREE.note(difference_m_s=differs),)
+
+
+def _unexplained(blocks: Blocks, fits: ClassFits) -> list[Note]:
+    sizes = np.sqrt(np.nanmean(blocks.outputs[blocks.first :] ** 2, axis=0))
+    shares = fits.best.scales / np.maximum(sizes, np.finfo(float).tiny)
+    heard = fits.best.scales > 2.0 * blocks.noise
+    names = ("velocity", "differential pressure")
+    return [
+        AgainstCode.UNEXPLAINED.note(percent=100.0 * share, channel=name)
+        for name, share, limit, loud in zip(names, shares, UNEXPLAINED, heard, strict=False)
+        if share > limit and loud
+    ]
+
+
+def _biases(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
+    """Add a bias of each sensor and the pump's displacement to the fit, in one linear step."""
+    fit, first = fits.best, blocks.first
+    rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
+    size = float(np.sqrt(np.mean(blocks.speed**2)))
+    if size == 0.0:
+        return []
+    nudge = 0.01 * size
+    faster = predicted(replace(blocks, speed=blocks.speed + nudge), rows)[0]
+    columns = [*fit.slopes, (faster - fit.fitted) / nudge]
+    names = ["motor_speed_rad_s"]
+    if blocks.pressure is not None:
+        columns.append(np.column_stack([np.zeros(len(blocks.velocity)), np.ones(len(blocks.velocity))]))
+        names.append("differential_pressure_pa")
+    seen = np.isfinite(blocks.outputs[first:])
+    weighted = np.where(seen, np.array(columns)[:, first:] / fit.scales, 0.0).reshape(len(columns), -1)
+    left = np.where(seen, (blocks.outputs - fit.fitted)[first:] / fit.scales, 0.0).ravel()
+    trust = float(np.trace(fits.information) / np.trace(fit.information))
+    pull = np.zeros((len(columns), len(columns)))
+    prior = WEAK.copy()
+    pump = COORDINATES.index("pump")
+    prior[pump, pump] = FREE_PUMP**2
+    pull[: len(WEAK), : len(WEAK)] = np.linalg.inv(prior)
+    covariance = np.linalg.pinv(trust * weighted @ weighted.T + pull)
+    found = covariance @ (trust * weighted @ left)
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    sizes = {"pump": 1.0, "motor_speed_rad_s": size}
+    if blocks.pressure is not None:
+        sizes["differential_pressure_pa"] = float(np.sqrt(np.nanmean(blocks.pressure**2)))
+    said: list[Note] = []
+    for name, place in [("pump", pump), *((name, len(WEAK) + i) for i, name in enumerate(names))]:
+        value, error = float(found[place]), float(errors[place])
+        if abs(value) > max(STANDARD_ERRORS * error, LEAST_BIAS[name] * sizes[name]):
+            said.append(_bias(name, value))
+    return said
+
+
+def _bias(name: str, value: float) -> Note:
+    if name == "pump":
+        return AgainstCode.PUMP_OFF.note(percent=100.0 * value)
+    if name == "motor_speed_rad_s":
+        return AgainstCode.SPEED_BIAS.note(bias_rad_s=-value)
+    return AgainstCode.PRESSURE_BIAS.note(bias_pa=value)
+
+
+def _outside(fits: ClassFits, region: float, actuator: Actuator) -> list[Note]:
+    stiffness = float(np.exp(fits.best.coordinates[COORDINATES.index("bulk_modulus")]))
+    share = stiffness / actuator.circuit.bulk_modulus
+    known = fits.covariance[5, 5] ** 0.5
+    if share < SOFT * np.exp(-2.0 * known) or share > np.exp(2.0 * known) / SOFT:
+        return [(AgainstCode.OIL_SOFT if share < 1.0 else AgainstCode.OIL_STIFF).note(share=share)]
+    if region >= -FARTHEST_OUT:
+        return []
+    leakage, friction, between = _nearest_severity(fits, actuator)
+    if between < -FARTHEST_OUT:
+        return [AgainstCode.OUTSIDE_CONDITIONS.note()]
+    return [AgainstCode.BETWEEN_CONDITIONS.note(leakage=leakage, friction=friction)]
+
+
+def _nearest_severity(fits: ClassFits, actuator: Actuator) -> tuple[float, float, float]:
+    """Return severities of leakage and friction whose region holds the circuit best, and how well."""
+    levels = np.linspace(0.0, 2.0, GRID)
+    each = [(float(leakage), float(friction)) for leakage in levels for friction in levels]
+    points = [coordinates_of(severity(*pair, actuator.circuit), actuator.rated) for pair in each]
+    scores = region_scores(fits.best, fits.information, replace(actuator, conditions=np.array(points)))
+    best = int(np.argmax(scores))
+    return (*each[best], float(scores[best]))

@@ -1,0 +1,201 @@
+"""How bad is it? A fitted circuit in the units of a shop, each number with a 95 % interval."""
+
+from collections.abc import Mapping
+from types import SimpleNamespace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.finding import Quantity
+from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows
+from faults.diagnosis.class_fit import WEAK, Actuator
+from faults.diagnosis.class_regions import ClassFits
+from faults.notes import ClassCode
+from plant.components.friction import quadratic_friction
+from plant.components.oil import ATMOSPHERE
+from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.steady_state import steady_state
+from plant.notes import Note
+
+Array = NDArray[np.float64]
+
+DRAWS = 200
+"""Circuits drawn from what a fit believes, for the intervals."""
+
+OF_KIND = 0.2
+"""How far bulk modulus differs between sound actuators of one kind [dimensionless]: what is less may be air."""
+
+BLIND = 0.9
+"""A log that narrows a coefficient to no less than this share of the prior says nothing of it [dimensionless]."""
+
+VAGUE = 3.0
+"""Ratio of relative widths from which a combination is known and its parts are not [dimensionless]."""
+
+
+UNITS: Mapping[str, str] = {
+    "leakage_flow": "L/min",
+    "velocity_lost": "%",
+    "added_friction": "N",
+    "pressure_rise": "%",
+    "bulk_modulus": "Pa",
+    "entrained_air": "%",
+}
+"""The severities: leakage flow and bias at rated pressure (the relief setting); velocity lost and pressure rise in the
+steady state at rated speed, relative to the healthy actuator; friction at its rated velocity over the healthy; bulk
+modulus; the air at atmospheric pressure that would make the oil so soft."""
+
+
+def severities_at(point: Array, actuator: Actuator) -> Mapping[str, float]:
+    """Return the severities of a circuit.
+
+    Parameters
+    ----------
+    point : ndarray, shape (7,)
+        Its coordinates.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    Mapping[str, float]
+        In the units of `UNITS`.
+    """
+    healthy = actuator.circuit
+    (row,) = parameter_rows(point[None], healthy, actuator.rated)
+    p = SimpleNamespace(**dict(zip(CircuitParameters.__dataclass_fields__, row.tolist(), strict=True)))
+    velocity, pressure = steady_state(healthy.rated_speed, p)
+    sound_velocity, sound_pressure = steady_state(healthy.rated_speed, healthy)
+    rubbing, sound = (
+        float(quadratic_friction(actuator.rated, 1.0, q.friction_quadratic, q.friction_linear, q.friction_coulomb))
+        for q in (p, healthy)
+    )
+    return {
+        "leakage_flow": 6e4 * (p.leakage_coefficient * healthy.relief_pressure + p.flow_bias),
+        "velocity_lost": 100.0 * (1.0 - velocity / sound_velocity),
+        "added_friction": rubbing - sound,
+        "pressure_rise": 100.0 * (pressure / sound_pressure - 1.0) if sound_pressure > 0.0 else 0.0,
+        "bulk_modulus": p.bulk_modulus,
+        "entrained_air": _air(p.bulk_modulus, actuator),
+    }
+
+
+def severities(
+    fits: ClassFits, actuator: Actuator, widths: Mapping[str, float] | None = None
+) -> Mapping[str, Quantity]:
+    """Return the severities of a fitted circuit with their intervals.
+
+    Parameters
+    ----------
+    fits : ClassFits
+        The fit.
+    actuator : Actuator
+        The healthy actuator.
+    widths : Mapping[str, float], optional
+        By what each interval is stretched [dimensionless]; 1 if not given.
+
+    Returns
+    -------
+    Mapping[str, Quantity]
+        By the names of `UNITS`.
+    """
+    rng = np.random.default_rng(0)
+    centre = fits.best.coordinates
+    drawn = rng.multivariate_normal(centre, fits.spread, DRAWS, method="cholesky")
+    with np.errstate(all="ignore"):  # friction that falls faster than leakage holds has no steady state
+        table, best = [severities_at(point, actuator) for point in drawn], severities_at(centre, actuator)
+    found: dict[str, Quantity] = {}
+    for name, value in best.items():
+        if not np.isfinite(value):
+            found[name] = Quantity(None, UNITS[name])
+            continue
+        low, high = (float(end) for end in np.nanpercentile([row[name] for row in table], (2.5, 97.5)))
+        stretch = 1.0 if widths is None else widths.get(name, 1.0)
+        ends = value - stretch * (value - low), value + stretch * (high - value)
+        found[name] = Quantity(value, UNITS[name], ends)
+    return found | {"entrained_air": _with_air(found["entrained_air"], found["bulk_modulus"], actuator)}
+
+
+def with_bulk_modulus(found: Mapping[str, Quantity], estimated: Quantity, actuator: Actuator) -> Mapping[str, Quantity]:
+    """Return severities with the bulk modulus that was estimated in place of the circuit's, and the air that follows.
+
+    Parameters
+    ----------
+    found : Mapping[str, Quantity]
+        Severities of a circuit.
+    estimated : Quantity
+        Effective bulk modulus [Pa]; without a value where the log does not tell it.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    Mapping[str, Quantity]
+        By the names of `UNITS`.
+    """
+    if estimated.value is None or estimated.ci95 is None:
+        return {**found, "bulk_modulus": estimated, "entrained_air": Quantity(None, UNITS["entrained_air"])}
+    low, high = (max(end, 1.0) for end in estimated.ci95)
+    air = Quantity(_air(estimated.value, actuator), UNITS["entrained_air"], (_air(high, actuator), _air(low, actuator)))
+    return {**found, "bulk_modulus": estimated, "entrained_air": _with_air(air, estimated, actuator)}
+
+
+def _air(bulk_modulus: float, actuator: Actuator) -> float:
+    """Return the air at atmospheric pressure that would make the oil so soft [%]."""
+    healthy = actuator.circuit
+    softness = 1.0 / bulk_modulus - 1.0 / healthy.bulk_modulus
+    return 100.0 * max(0.0, softness * healthy.accumulator_pressure**2 / ATMOSPHERE)
+
+
+def _with_air(air: Quantity, modulus: Quantity, actuator: Actuator) -> Quantity:
+    """Return the air with an interval that begins at none where bulk modulus is that of some sound actuator."""
+    if air.ci95 is None or modulus.ci95 is None:
+        return air
+    unlike = actuator.circuit.bulk_modulus * (1.0 - OF_KIND)
+    lowest = air.ci95[0] if modulus.ci95[1] < unlike else 0.0
+    return Quantity(air.value, air.unit, (max(0.0, lowest), air.ci95[1]))
+
+
+def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure: bool) -> list[Note]:
+    """Return a note for each thing that the log does not determine.
+
+    Parameters
+    ----------
+    fits : ClassFits
+        The fit.
+    found : Mapping[str, Quantity]
+        Its severities [each in its unit].
+    pressure : bool
+        Whether differential pressure is logged.
+
+    Returns
+    -------
+    list[Note]
+        None for a log that tells all.
+    """
+    known, believed = np.sqrt(np.diag(fits.covariance)), np.sqrt(np.diag(WEAK))
+    blind = {name for name, k, b in zip(COORDINATES, known, believed, strict=True) if k > BLIND * b}
+    said: list[Note] = []
+    if "friction_rated" in blind and "friction_rest" in blind:
+        said.append(ClassCode.FRICTION_NOT_VISIBLE.note())
+    if "bulk_modulus" in blind:
+        said.append(ClassCode.BULK_MODULUS_NOT_VISIBLE.note())
+    flow, speed = found["leakage_flow"], found["velocity_lost"]
+    if not pressure:
+        said += [ClassCode.ONE_SCALE.note(), *_velocity_lost(speed)]
+    elif _width(flow) > VAGUE * _extent(speed) / 100.0 and _width(flow) > 0.3:
+        said += [ClassCode.LEAKAGE_AND_BIAS_ALIKE.note(), *_velocity_lost(speed)]
+    return said
+
+
+def _velocity_lost(speed: Quantity) -> list[Note]:
+    if speed.value is None or speed.ci95 is None:
+        return []
+    return [ClassCode.VELOCITY_LOST_TOLD.note(percent=speed.value, low=speed.ci95[0], high=speed.ci95[1])]
+
+
+def _extent(one: Quantity) -> float:
+    return float("nan") if one.ci95 is None else one.ci95[1] - one.ci95[0]
+
+
+def _width(one: Quantity) -> float:
+    return _extent(one) / abs(one.value) if one.value else float("inf")

@@ -1,0 +1,1 @@
+"""Faults of the diaphragm motor, and which a log shows."""

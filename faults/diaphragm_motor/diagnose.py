@@ -1,0 +1,315 @@
+"""Which fault a log of the diaphragm motor shows: its signature laid beside every fault's curve of signatures.
+
+Each fault of `faults.diaphragm_motor.faults` draws a curve through the 29 numbers of a signature as its severity rises.
+The nearest point of each curve by generalised least squares gives its severity and chi-square; the curves' evidence, by
+Laplace's rule, its probability. Faults that one bench cannot tell apart share the probability and are named together.
+Where no curve comes near, the fault is unknown.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from math import log, pi, sqrt
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import minimize_scalar
+from scipy.special import chdtri
+
+from estimation.diaphragm_motor.signature import Signature, logged_signature, modelled_signature, tolerance
+from estimation.finding import interval_95
+from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS, MotorFault, motor_with_fault
+from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
+from plant.errors import LogError
+from plant.log.record import Record
+
+Array: TypeAlias = NDArray[np.floating[Any]]
+
+UNKNOWN_BELOW = 1e-3
+"""Probability of so large a chi-square, under the best fault, below which the fault is called unknown."""
+
+NAMED_TOGETHER = 0.05
+"""Probability from which a fault is named beside the most probable one."""
+
+PRIOR_HEALTHY = 0.5
+"""Probability of a healthy motor before the log is seen; kinds of fault share the rest alike."""
+
+TOLD_APART = 3.0
+"""Standard deviations from which two faults count as told apart."""
+
+
+LOOKS_ALIKE = 0.99
+"""Cosine between two faults' changes of the electrodes' fundamentals from which they look alike [dimensionless]."""
+
+
+@dataclass(frozen=True)
+class Match:
+    """The nearest point of a fault's curve.
+
+    Parameters
+    ----------
+    name : str
+        The fault, or ``healthy``.
+    severity : float
+        Severity there [the fault's unit].
+    deviation : float
+        Its standard deviation [the fault's unit].
+    chi_square : float
+        Squared distance in standard deviations [dimensionless].
+    probability : float
+        Of the fault after the log was seen [fraction].
+    """
+
+    name: str
+    severity: float
+    deviation: float
+    chi_square: float
+    probability: float
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The severity's 95 % interval."""
+        return interval_95(self.severity, self.deviation)
+
+
+@dataclass(frozen=True)
+class MotorDiagnosis:
+    """What is wrong with the motor.
+
+    Parameters
+    ----------
+    matches : tuple of Match
+        Every hypothesis, the most probable first.
+    unknown : bool
+        Whether none of them fits.
+    freedom : int
+        Degrees of freedom of the best one's chi-square.
+    signature : Signature
+        What the log showed, as the model's own motor would have if there is a calibration.
+    expected : ndarray, shape (29,)
+        What a healthy motor shows.
+    lookalikes : tuple of str
+        Faults that bend the electrodes' fundamentals the same way as the best one. Those that are not of the group are
+        told from it by velocity, second harmonics and the last few percent, so only as far as the model is exact.
+    """
+
+    matches: tuple[Match, ...]
+    unknown: bool
+    freedom: int
+    signature: Signature
+    expected: Array
+    lookalikes: tuple[str, ...]
+
+    @property
+    def best(self) -> Match:
+        """The most probable hypothesis."""
+        return self.matches[0]
+
+    @property
+    def group(self) -> tuple[Match, ...]:
+        """All that the log leaves probable, the most probable first."""
+        return (self.best, *(match for match in self.matches[1:] if match.probability >= NAMED_TOGETHER))
+
+
+class _Curve:
+    """A fault's signatures over its severity, whitened."""
+
+    def __init__(self, fault: MotorFault, signatures: Array, whitening: Array) -> None:
+        self.fault = fault
+        self.at = PchipInterpolator(fault.severities, signatures @ whitening.T, axis=0)
+        self.slope = self.at.derivative()
+        least, most = fault.severities[0], fault.severities[-1]
+        self.grid = np.linspace(least, most, _GRID)
+        self.points = self.at(self.grid)
+
+    def nearest(self, seen: Array) -> tuple[float, float, float]:
+        """Return the severity nearest to what was seen, its standard deviation, and the squared distance."""
+        nearest = int(np.argmin(np.sum((self.points - seen) ** 2, axis=1)))
+        between = self.grid[max(nearest - 1, 0)], self.grid[min(nearest + 1, _GRID - 1)]
+        reach = between[1] - between[0]
+        found = minimize_scalar(
+            lambda share: float(np.sum((self.at(between[0] + share * reach) - seen) ** 2)),
+            bounds=(0.0, 1.0),
+            method="bounded",
+            options={"xatol": 1e-4},
+        )
+        severity = float(between[0] + found.x * reach)
+        steepness = float(np.linalg.norm(self.slope(severity)))
+        return severity, 1.0 / max(steepness, 1e-3 / (self.grid[-1] - self.grid[0])), float(found.fun)
+
+
+@lru_cache(maxsize=4)
+def _simulated(healthy: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Mapping[str, Array]:
+    """Return every fault's signatures at its severities, and the healthy one, by the model."""
+
+    def shown(name: str, severity: float) -> Array:
+        return modelled_signature(motor_with_fault(healthy, name, severity), frequency, peak_to_peak)
+
+    curves = {name: np.array([shown(name, s) for s in fault.severities]) for name, fault in MOTOR_FAULTS.items()}
+    return curves | {HEALTHY: modelled_signature(healthy, frequency, peak_to_peak)}
+
+
+def diagnose_motor(
+    record: Record, healthy: DiaphragmMotorParameters, *, calibration: Signature | None = None
+) -> MotorDiagnosis:
+    """Say which fault a run under a steady sine shows, how bad it is, and what it cannot be told from.
+
+    Parameters
+    ----------
+    record : Record
+        Drive, seven electrodes, position.
+    healthy : DiaphragmMotorParameters
+        The motor as it should be, at the run's load.
+    calibration : Signature, optional
+        Of this motor when it was healthy, under the same drive and load; what it differs by from the model is taken
+        to stay.
+
+    Returns
+    -------
+    MotorDiagnosis
+        Hypotheses by probability.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be used, or the calibration is of another drive.
+    """
+    seen = logged_signature(record)
+    return diagnose_signature(seen if calibration is None else _calibrated(seen, calibration, healthy), healthy)
+
+
+def diagnose_signature(seen: Signature, healthy: DiaphragmMotorParameters) -> MotorDiagnosis:
+    """Lay a signature beside every fault's curve (`diagnose_motor`).
+
+    Parameters
+    ----------
+    seen : Signature
+        What the log shows.
+    healthy : DiaphragmMotorParameters
+        The motor as it should be.
+
+    Returns
+    -------
+    MotorDiagnosis
+        Hypotheses by probability.
+    """
+    point = _operating_point(seen)
+    simulated = _simulated(healthy, *point)
+    whitening = _whitening(tolerance(healthy, *point) + seen.covariance)
+    white = whitening @ seen.values
+    found = [(HEALTHY, 0.0, 0.0, float(np.sum((white - whitening @ simulated[HEALTHY]) ** 2)), log(PRIOR_HEALTHY))]
+    for name, fault in MOTOR_FAULTS.items():
+        curve = _Curve(fault, simulated[name], whitening)
+        severity, deviation, distance = curve.nearest(white)
+        occam = min(1.0, sqrt(2.0 * pi) * deviation / float(curve.grid[-1] - curve.grid[0]))
+        found.append((name, severity, deviation, distance, log(_PRIORS[name] * occam)))
+    evidence = np.array([prior - 0.5 * distance for *_, distance, prior in found])
+    shares = np.exp(evidence - evidence.max())
+    shares /= shares.sum()
+    matches = sorted(
+        (Match(*one[:4], float(share)) for one, share in zip(found, shares, strict=True)),
+        key=lambda match: -match.probability,
+    )
+    freedom = len(white) - (matches[0].name != HEALTHY)
+    unknown = min(match.chi_square for match in matches) > float(chdtri(freedom, UNKNOWN_BELOW))
+    alike = _lookalikes(matches[0], healthy, point)
+    return MotorDiagnosis(tuple(matches), unknown, freedom, seen, simulated[HEALTHY], alike)
+
+
+def separations(
+    healthy: DiaphragmMotorParameters, frequency: float, peak_to_peak: float, sizes: Mapping[str, float]
+) -> Mapping[str, Mapping[str, float]]:
+    """Return how far faults are from the nearest point of every other curve: below `TOLD_APART` they look alike.
+
+    Parameters
+    ----------
+    healthy : DiaphragmMotorParameters
+        The healthy motor.
+    frequency, peak_to_peak : float
+        Of the drive [Hz], [V].
+    sizes : Mapping[str, float]
+        Severity of each fault that is asked for [the fault's unit].
+
+    Returns
+    -------
+    Mapping[str, Mapping[str, float]]
+        Distance in standard deviations, by fault and by other fault.
+    """
+    simulated = _simulated(healthy, frequency, peak_to_peak)
+    whitening = _whitening(tolerance(healthy, frequency, peak_to_peak))
+    curves = [_Curve(fault, simulated[name], whitening) for name, fault in MOTOR_FAULTS.items()]
+    apart: dict[str, dict[str, float]] = {}
+    for name, size in sizes.items():
+        shown = modelled_signature(motor_with_fault(healthy, name, size), frequency, peak_to_peak)
+        apart[name] = {
+            curve.fault.name: sqrt(curve.nearest(whitening @ shown)[2]) for curve in curves if curve.fault.name != name
+        }
+        apart[name][HEALTHY] = float(np.linalg.norm(whitening @ (shown - simulated[HEALTHY])))
+    return apart
+
+
+def _whitening(covariance: Array) -> Array:
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), np.float64)
+
+
+def _lookalikes(best: Match, healthy: DiaphragmMotorParameters, point: tuple[float, float]) -> tuple[str, ...]:
+    """Return the faults whose change of the fundamentals points the same way as the best one's, the nearest first."""
+    if best.name == HEALTHY:
+        return ()
+    simulated = _simulated(healthy, *point)
+
+    def bent(values: Array) -> Array:
+        change = (values - simulated[HEALTHY])[..., :_FUNDAMENTALS]
+        return change / np.maximum(np.linalg.norm(change, axis=-1, keepdims=True), _LEAST_CHANGE)
+
+    curve = PchipInterpolator(MOTOR_FAULTS[best.name].severities, simulated[best.name], axis=0)
+    own = bent(np.asarray(curve(best.severity)))
+    cosines = {name: float(np.max(bent(simulated[name]) @ own)) for name in MOTOR_FAULTS if name != best.name}
+    return tuple(name for name in sorted(cosines, key=lambda one: -cosines[one]) if cosines[name] >= LOOKS_ALIKE)
+
+
+def _operating_point(seen: Signature) -> tuple[float, float]:
+    """Return frequency and swing, rounded so that logs of one operating point share its simulations."""
+    return round(seen.drive.frequency, 2), round(seen.drive.peak_to_peak, 1)
+
+
+def _calibrated(seen: Signature, calibration: Signature, healthy: DiaphragmMotorParameters) -> Signature:
+    """Return what a log would show on the model's own motor: fundamentals by ratio, all else by difference."""
+    was, drive = calibration.drive, seen.drive
+    if abs(was.frequency / drive.frequency - 1.0) > _SAME or abs(was.peak_to_peak / drive.peak_to_peak - 1.0) > _SAME:
+        raise LogError(
+            f"the healthy run must be under the log's drive, {drive.frequency:.4g} Hz and {drive.peak_to_peak:.4g} V "
+            f"peak to peak, got {was.frequency:.4g} Hz and {was.peak_to_peak:.4g} V"
+        )
+    if float(np.min(np.abs(calibration.tones))) < _LEAST_TONE:
+        raise LogError(f"the healthy run has an electrode below {_LEAST_TONE:g} V: it is not of a healthy motor")
+    model = modelled_signature(healthy, *_operating_point(calibration))
+    turn = (model[:7] + 1j * model[7:_FUNDAMENTALS]) / calibration.tones
+    gain = np.tile(np.abs(turn), 2)
+    first = seen.tones * turn
+    second = slice(_FUNDAMENTALS, 2 * _FUNDAMENTALS)
+    values = np.concatenate(
+        [
+            first.real,
+            first.imag,
+            model[second] + gain * (seen.values - calibration.values)[second],
+            [model[-1] + seen.velocity - calibration.velocity],
+        ]
+    )
+    return replace(seen, values=values, covariance=seen.covariance + calibration.covariance)
+
+
+def _priors() -> dict[str, float]:
+    kinds = [fault.kind for fault in MOTOR_FAULTS.values()]
+    share = (1.0 - PRIOR_HEALTHY) / len(set(kinds))
+    return {name: share / kinds.count(fault.kind) for name, fault in MOTOR_FAULTS.items()}
+
+
+_PRIORS = _priors()
+_GRID = 201
+_FUNDAMENTALS = 14
+_LEAST_CHANGE = 1e-3
+_LEAST_TONE = 0.1
+_SAME = 0.005

@@ -1,0 +1,114 @@
+"""`motor_fault_finding(record, motor) -> Finding`: which fault a log of the diaphragm motor shows, and how bad."""
+
+from estimation.diaphragm_motor.signature import DRIVE, POSITION, Signature
+from estimation.finding import Finding, Gate, Outcome, Quantity
+from faults.diaphragm_motor.diagnose import Match, MotorDiagnosis, diagnose_motor
+from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS
+from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
+from plant.diaphragm_motor.run import ELECTRODES, NAME
+from plant.log.record import Record
+from plant.notes import Code, Note
+
+STANDING = 1e-4
+"""Velocity below which the rod counts as standing [m/s]."""
+
+
+class MotorFaultCode(Code):
+    """Notes on a diagnosis of the diaphragm motor."""
+
+    NO_FAULT_FITS = "no_fault_fits", "unknown: no fault of the catalogue looks like this"
+    NEAREST_MISSES = (
+        "nearest_misses",
+        "the nearest, {fault}, leaves a chi-square of {chi_square:.3g} for {freedom} degrees of freedom: another motor "
+        "or load, or several faults; calibrate on a healthy run",
+    )
+    ROD_STANDS = "rod_stands", "the rod moves at {velocity_mm_s:.2g} mm/s: stalled, or at its end"
+    LOOKS_LIKE = "looks_like", "by the electrodes' fundamentals alone it looks like {faults} too"
+    FAULT_FOUND = "fault_found", "{fault}: {meaning}: {severity:.3g}{unit}, 95 % interval {low:.3g} to {high:.3g}{unit}"
+
+
+def motor_fault_finding(
+    record: Record, healthy: DiaphragmMotorParameters, *, calibration: Signature | None = None
+) -> Finding:
+    """Say which fault a run under a steady sine shows, how bad it is, and what it cannot be told from.
+
+    Parameters
+    ----------
+    record : Record
+        Drive, seven electrodes, position.
+    healthy : DiaphragmMotorParameters
+        The motor as it should be, at the run's load.
+    calibration : Signature, optional
+        Of this motor when it was healthy, under the same drive and load.
+
+    Returns
+    -------
+    Finding
+        Its evidence is the `MotorDiagnosis`.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be used, or the calibration is of another drive.
+    """
+    found = diagnose_motor(record, healthy, calibration=calibration)
+    reasons = _against(found)
+    named = [match.name for match in found.group]
+    others = [name for name in found.lookalikes if name not in named]
+    nameless = found.unknown or found.best.name == HEALTHY
+    return Finding(
+        actuator=NAME,
+        outcome=Outcome.MISMATCH if found.unknown else Outcome.OK,
+        quantities={} if nameless else {found.best.name: severity_of(found.best)},
+        gate=Gate(not reasons, reasons),
+        channels=(DRIVE, *ELECTRODES, POSITION),
+        condition=named[0],
+        alike=tuple(named[1:]),
+        probabilities={match.name: match.probability for match in found.matches},
+        unknown=found.unknown,
+        against=(MotorFaultCode.NO_FAULT_FITS.note(),) if found.unknown else (),
+        faults=tuple(_fault(match) for match in found.group if match.name != HEALTHY and not found.unknown),
+        not_told=(MotorFaultCode.LOOKS_LIKE.note(faults=" or ".join(others)),) if others and not found.unknown else (),
+        evidence=found,
+    )
+
+
+def severity_of(match: Match) -> Quantity:
+    """Return how bad a fault is.
+
+    Parameters
+    ----------
+    match : Match
+        The nearest point of the fault's curve; not that of a healthy motor.
+
+    Returns
+    -------
+    Quantity
+        Its severity, in the fault's unit.
+    """
+    return Quantity.normal(match.severity, match.deviation, MOTOR_FAULTS[match.name].unit)
+
+
+def _against(found: MotorDiagnosis) -> tuple[Note, ...]:
+    reasons: list[Note] = []
+    if found.unknown:
+        best = found.best
+        reasons.append(
+            MotorFaultCode.NEAREST_MISSES.note(fault=best.name, chi_square=best.chi_square, freedom=found.freedom)
+        )
+    if abs(found.signature.velocity) < STANDING:
+        reasons.append(MotorFaultCode.ROD_STANDS.note(velocity_mm_s=1e3 * found.signature.velocity))
+    return tuple(reasons)
+
+
+def _fault(match: Match) -> Note:
+    fault = MOTOR_FAULTS[match.name]
+    low, high = match.interval
+    return MotorFaultCode.FAULT_FOUND.note(
+        fault=match.name.replace("_", " "),
+        meaning=fault.meaning,
+        severity=match.severity,
+        low=low,
+        high=high,
+        unit="" if fault.unit == "1" else f" {fault.unit}",
+    )

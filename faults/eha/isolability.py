@@ -1,0 +1,268 @@
+"""Which faults could be told apart, before any experiment: by structure, and by Kullback-Leibler distance a second."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from estimation.trust.identifiability import SENSED
+from faults.eha.bank import mathematical_bank, predict_run
+from plant.eha.model import EhaParameters
+from plant.errors import HydrostateError
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH, Sensors, noise_variances
+
+Array = NDArray[np.float64]
+
+EQUATIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "flow balance": ("speed", "position", "velocity", "dp"),
+        "force balance": ("velocity", "dp"),
+        "kinematics": ("position", "velocity"),
+        "motor_speed_rad_s": ("speed",),
+        "position_m": ("position",),
+        "velocity_m_s": ("velocity",),
+        "differential_pressure_pa": ("dp",),
+    }
+)
+"""Equations 5.8 and 5.9 and the sensors, each with what it holds of what is not known; a rate counts as its state."""
+
+FAULTS: Mapping[str, str] = MappingProxyType(
+    {
+        "leakage": "flow balance",
+        "air": "flow balance",
+        "friction": "force balance",
+        "speed sensor": "motor_speed_rad_s",
+        "position sensor": "position_m",
+        "velocity sensor": "velocity_m_s",
+        "pressure sensor": "differential_pressure_pa",
+    }
+)
+"""The equation that each fault breaks."""
+
+SPREAD: Mapping[str, float] = MappingProxyType(
+    {
+        "bulk_modulus": 0.2,
+        "leakage_coefficient": 0.1,
+        "flow_bias": 0.1,
+        "friction_quadratic": 0.1,
+        "friction_linear": 0.1,
+        "friction_coulomb": 0.1,
+    }
+)
+"""Relative standard deviations within a class [fraction]."""
+
+MODEL_ERROR = 0.05
+"""What the lumped plant leaves out, as a share of each channel's deviation, judged [fraction]."""
+
+LASTING = 0.05
+"""How long such an error lasts before it is another, judged [s]."""
+
+STEP = 1e-3
+"""Relative step of the numerical derivatives [fraction]."""
+
+ERROR = 0.01
+"""Share of wrong verdicts between two conditions at which they are told apart [fraction]."""
+
+
+def structural_isolability(channels: Sequence[str]) -> Mapping[str, tuple[str, ...] | None]:
+    """Return from which other faults each fault cannot be told, if a fault may be any signal.
+
+    A fault is detectable if its equation is in the overdetermined part of the model, and isolable from another if it
+    stays there once the other's equation is taken out (Krysander and Frisk, IEEE Transactions on Systems, Man and
+    Cybernetics A 38, 2008, page 197, after Dulmage and Mendelsohn).
+
+    Parameters
+    ----------
+    channels : sequence of str
+        Channels logged beside motor speed.
+
+    Returns
+    -------
+    Mapping[str, tuple of str or None]
+        By fault, those that it cannot be told from; None where it cannot even be detected. Faults of sensors that are
+        not there are left out.
+
+    Examples
+    --------
+    >>> structural_isolability(["position_m", "velocity_m_s"])["leakage"]
+    ('air', 'friction', 'speed sensor')
+    >>> structural_isolability(["position_m", "differential_pressure_pa"])["friction"]
+    ()
+    """
+    sensors = {"motor_speed_rad_s", *channels}
+    present = {name for name in EQUATIONS if name in sensors or not name.endswith(("_s", "_m", "_pa"))}
+    faults = {fault: broken for fault, broken in FAULTS.items() if broken in present}
+    whole = overdetermined(present)
+    found: dict[str, tuple[str, ...] | None] = {}
+    for fault, broken in faults.items():
+        if broken not in whole:
+            found[fault] = None
+            continue
+        rivals = ((other, overdetermined(present - {removed})) for other, removed in faults.items() if other != fault)
+        found[fault] = tuple(other for other, rest in rivals if broken not in rest)
+    return MappingProxyType(found)
+
+
+def overdetermined(equations: set[str]) -> set[str]:
+    """Return the equations that could be checked against others: the overdetermined part.
+
+    Parameters
+    ----------
+    equations : set of str
+        Names in `EQUATIONS`.
+
+    Returns
+    -------
+    set of str
+        Those that an alternating path joins to an equation without an unknown of its own in a maximum matching.
+    """
+    owner: dict[str, str] = {}
+
+    def matched(equation: str, tried: set[str]) -> bool:
+        for unknown in EQUATIONS[equation]:
+            if unknown not in tried:
+                tried.add(unknown)
+                if unknown not in owner or matched(owner[unknown], tried):
+                    owner[unknown] = equation
+                    return True
+        return False
+
+    ordered = [name for name in EQUATIONS if name in equations]
+    reached = {name for name in ordered if not matched(name, set())}
+    while grown := {owner[unknown] for name in reached for unknown in EQUATIONS[name]} - reached:
+        reached |= grown
+    return reached
+
+
+@dataclass(frozen=True, eq=False)
+class Distances:
+    """How far apart the conditions are after an experiment.
+
+    Parameters
+    ----------
+    conditions : tuple of str
+        The conditions.
+    nats : ndarray, shape (conditions, conditions)
+        Kullback-Leibler distance of the row's condition to the column's class [dimensionless].
+    seconds : float
+        Length of the experiment [s].
+    """
+
+    conditions: tuple[str, ...]
+    nats: Array
+    seconds: float
+
+    @property
+    def mutual(self) -> Array:
+        """The smaller distance of both directions, infinite on the diagonal, shape (conditions, conditions)."""
+        both = np.minimum(self.nats, self.nats.T)
+        np.fill_diagonal(both, inf)
+        return both
+
+    @property
+    def hardest(self) -> tuple[str, str]:
+        """The two conditions that are nearest to each other."""
+        row, column = np.unravel_index(int(self.mutual.argmin()), self.nats.shape)
+        return self.conditions[row], self.conditions[column]
+
+    @property
+    def least(self) -> float:
+        """Their distance [dimensionless], by which drives are ranked."""
+        return float(self.mutual.min())
+
+
+def wrong_verdicts(nats: float) -> float:
+    """Return the least share of wrong verdicts between two conditions: ``Phi(-sqrt(K / 2))`` for a distance K.
+
+    Parameters
+    ----------
+    nats : float
+        Kullback-Leibler distance [dimensionless].
+
+    Returns
+    -------
+    float
+        For Gaussian processes of like covariance, both conditions being as likely [fraction].
+
+    Examples
+    --------
+    >>> round(wrong_verdicts(10.8), 3)
+    0.01
+    """
+    return float(ndtr(-((0.5 * nats) ** 0.5)))
+
+
+def condition_distances(
+    parameters: EhaParameters,
+    speed: Array,
+    sample_time: float,
+    channels: Sequence[str] = SENSED,
+    sensors: Sensors = BENCH,
+) -> Distances:
+    """Return how far apart the nine conditions are under a drive, each being a class of actuators and not one.
+
+    The noiseless run of one condition is explained as well as another's model can, its bulk modulus, leakage, bias and
+    friction moved within `SPREAD` (linearised); half the weighted sum of what is left and of the moves is the
+    Kullback-Leibler distance. Noise is that of the sensors and what the model leaves out (`MODEL_ERROR`): without the
+    latter, an encoder of a micrometre would tell any two conditions apart in a millisecond. Motor speed's own noise
+    moves the position by micrometres and is left out beside it.
+
+    Parameters
+    ----------
+    parameters : EhaParameters
+        The healthy actuator.
+    speed : ndarray, shape (n,)
+        Motor speed that would drive it from rest [rad/s].
+    sample_time : float
+        Time between samples [s].
+    channels : sequence of str
+        Channels logged beside motor speed.
+    sensors : Sensors
+        Their noise.
+
+    Returns
+    -------
+    Distances
+        Of all pairs.
+
+    Raises
+    ------
+    HydrostateError
+        If a channel is not one of `estimation.trust.identifiability.SENSED`, or has no noise.
+    """
+    noise = noise_variances(sensors)
+    for channel in channels:
+        if channel not in SENSED or not noise.get(channel, 0.0) > 0.0:
+            raise HydrostateError(f"a channel must be one of {', '.join(SENSED)} and have noise, got {channel!r}")
+    drive = Record(sample_time, {"motor_speed_rad_s": speed})
+    healthy = predict_run(drive, parameters)
+    lasting = MODEL_ERROR**2 * max(1.0, LASTING / sample_time)
+    sizes = {name: (noise[name] + lasting * float(np.var(healthy[name]))) ** 0.5 for name in channels}
+
+    def seen(model: EhaParameters) -> Array:
+        run = predict_run(drive, model)
+        return np.concatenate([run[name] / size for name, size in sizes.items()])
+
+    bank = mathematical_bank(parameters)
+    runs = {name: seen(model) for name, model in bank.items()}
+    distances = np.zeros((len(bank), len(bank)))
+    for column, (name, model) in enumerate(bank.items()):
+        moves = np.column_stack([_slope(seen, model, runs[name], moved) for moved in SPREAD])
+        normal = moves.T @ moves + np.eye(len(SPREAD))
+        for row, true in enumerate(runs.values()):
+            away = true - runs[name]
+            explained = moves.T @ away
+            # rounding leaves a share of the power where both runs are alike
+            distances[row, column] = 0.5 * max(away @ away - explained @ np.linalg.solve(normal, explained), 0.0)
+    return Distances(tuple(bank), distances, sample_time * len(speed))
+
+
+def _slope(seen: Callable[[EhaParameters], Array], model: EhaParameters, run: Array, moved: str) -> Array:
+    """Return by how much the weighed channels change for one standard deviation of a parameter."""
+    changed = replace(model, **{moved: getattr(model, moved) * (1.0 + STEP)})
+    return (seen(changed) - run) * (SPREAD[moved] / STEP)

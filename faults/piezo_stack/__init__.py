@@ -1,0 +1,1 @@
+"""Faults of the piezo-stack actuator, and which a log shows."""

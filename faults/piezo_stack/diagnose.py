@@ -1,0 +1,175 @@
+"""From what a piezo-stack log says to a class: the nine conditions, and every other fault by name and size."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from estimation.finding import Finding, Gate, Outcome
+from estimation.piezo_stack.estimate import StackEstimate, estimate_stack
+from estimation.piezo_stack.finding import missed, stack_quantities
+from estimation.piezo_stack.runs import STACK_CHANNELS
+from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS
+from faults.conditions import CONDITIONS
+from faults.piezo_stack.faults import ADDED_FRICTION, CROSSPORT_LEAKAGE
+from plant.log.record import Record
+from plant.notes import Code, Note
+from plant.piezo_stack.parameters import PiezoStackParameters
+from plant.piezo_stack.trajectory import NAME
+
+GAPS = ("outlet_reed_gap", "inlet_reed_gap")
+"""Unknowns that are tried where the others leave a misfit."""
+
+GAP_STARTS: tuple[Mapping[str, float], ...] = (
+    {},
+    {"outlet_reed_gap": 0.3},
+    {"inlet_reed_gap": 0.3},
+    {"outlet_reed_gap": 1.5},
+    {"inlet_reed_gap": 1.5},
+)
+"""First guesses for them, scaled as `estimation.piezo_stack.estimate.UNKNOWNS`."""
+
+CALIBRATED = (
+    "air_fraction",
+    "coulomb_friction",
+    "polarisation",
+    "outlet_reed_stiffness",
+    "inlet_reed_stiffness",
+    "viscous_friction",
+    "delivery_length",
+    "discharge_coefficient",
+)
+"""What a healthy run calibrates: with leaks known to be none, friction is told from lines and reeds."""
+
+
+class StackFaultCode(Code):
+    """Notes on a diagnosis of the piezo-stack actuator."""
+
+    ANOTHER_ACTUATOR = (
+        "another_actuator",
+        "{channel} is missed by {ratio:.3g} times its noise: this is another actuator, calibrate on a healthy run",
+    )
+    LEAKAGE_AND_FRICTION = (
+        "leakage_and_friction",
+        "the sensors hold too little to tell leakage from friction: log the stack's displacement",
+    )
+    AIR_IN_OIL = "air_in_oil", "air in the oil: {percent:.2f} %, {ratio:.3g} times the healthy share"
+    CHAMBER_LEAKS = "chamber_leaks", "the pump chamber leaks: {leakage:.2g} m^3/(s Pa)"
+    STACK_DEPOLARISED = "stack_depolarised", "the stack is depolarised: {percent:.0f} % of its stroke is lost"
+    REED_SOFT = "reed_soft", "{reed} reed soft: {ratio:.3g} times"
+    REED_STIFF = "reed_stiff", "{reed} reed stiff or jammed: {ratio:.3g} times"
+    REED_OPEN = "reed_open", "{reed} reed does not shut: a gap of {gap_um:.0f} um"
+
+
+def diagnose_stack(
+    record: Record, healthy: PiezoStackParameters, *, channels: tuple[str, ...] = STACK_CHANNELS
+) -> Finding:
+    """Say which of the nine conditions a run shows, and what else is wrong.
+
+    Parameters
+    ----------
+    record : Record
+        A run that began at rest.
+    healthy : PiezoStackParameters
+        The actuator as it should be, at the run's bias pressure and load.
+    channels : tuple of str
+        What is used of what is logged.
+
+    Returns
+    -------
+    Finding
+        Condition, other faults, and what speaks against them; its evidence is the `StackEstimate`.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be used.
+    """
+    found = estimate_stack(record, healthy, channels=channels)
+    if missed(found):
+        wider = estimate_stack(
+            record,
+            healthy,
+            unknowns=(*DEFAULT_UNKNOWNS, *GAPS),
+            channels=channels,
+            starts=(*STARTS, *GAP_STARTS),
+        )
+        if _worst(wider) < _worst(found):
+            found = wider
+    against = tuple(
+        StackFaultCode.ANOTHER_ACTUATOR.note(channel=name, ratio=ratio) for name, ratio in missed(found).items()
+    )
+    leakage = _level(found, "crossport_leakage", healthy.crossport_leakage, CROSSPORT_LEAKAGE)
+    friction = _level(found, "coulomb_friction", healthy.coulomb_friction, ADDED_FRICTION)
+    condition = next((n for n, c in CONDITIONS.items() if (c.leakage, c.friction) == (leakage, friction)), None)
+    reasons = against if condition is not None else (*against, StackFaultCode.LEAKAGE_AND_FRICTION.note())
+    told = Outcome.NOT_OBSERVABLE if condition is None else Outcome.OK
+    faults = () if reasons else (_fault(name, found, healthy) for name in found.values)
+    return Finding(
+        actuator=NAME,
+        outcome=Outcome.MISMATCH if against else told,
+        quantities=stack_quantities(found, healthy),
+        gate=Gate(not reasons, reasons),
+        channels=tuple(found.misfit),
+        condition=condition,
+        unknown=bool(against),
+        against=against,
+        faults=tuple(note for note in faults if note is not None),
+        evidence=found,
+    )
+
+
+def _worst(found: StackEstimate) -> float:
+    return max(found.misfit.values())
+
+
+def _level(found: StackEstimate, name: str, healthy: float, levels: Mapping[str, float]) -> str | None:
+    """Return the nearest level, None where two standard deviations span half the least step between levels."""
+    if 2.0 * found.deviations[name] > 0.5 * levels["minor"]:
+        return None
+    above = found.values[name] - healthy
+    return min(levels, key=lambda level: abs(above - levels[level]))
+
+
+def _fault(name: str, found: StackEstimate, healthy: PiezoStackParameters) -> Note | None:
+    """Return what a quantity says of a fault; None where it says nothing, or not for sure."""
+    value, sure = found.values[name], 3.0 * found.deviations[name]
+    base = 1.0 if name == "polarisation" else float(getattr(healthy, name))
+    reed, _, part = name.partition("_reed_")
+    if name == "air_fraction" and value - base > max(0.3 * base, sure):
+        return StackFaultCode.AIR_IN_OIL.note(percent=100.0 * value, ratio=value / base)
+    if name == "chamber_leakage" and value - base > max(1e-12, sure):
+        return StackFaultCode.CHAMBER_LEAKS.note(leakage=value)
+    if name == "polarisation" and base - value > max(0.05, sure):
+        return StackFaultCode.STACK_DEPOLARISED.note(percent=100.0 * (1.0 - value))
+    if part == "stiffness" and abs(value - base) > max(0.2 * base, sure):
+        code = StackFaultCode.REED_SOFT if value < base else StackFaultCode.REED_STIFF
+        return code.note(reed=reed, ratio=value / base)
+    if part == "gap" and value - base > max(5e-6, sure):
+        return StackFaultCode.REED_OPEN.note(reed=reed, gap_um=1e6 * value)
+    return None
+
+
+def calibrated_stack(record: Record, nominal: PiezoStackParameters) -> PiezoStackParameters:
+    """Return the actuator as a healthy run shows it: the nominal one with `CALIBRATED` fitted.
+
+    Parameters
+    ----------
+    record : Record
+        A run of the healthy actuator that began at rest.
+    nominal : PiezoStackParameters
+        The actuator as designed, at the run's bias pressure and load.
+
+    Returns
+    -------
+    PiezoStackParameters
+        The actuator to compare later runs with.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be used.
+    RigError
+        If what fits is no actuator.
+    """
+    found = estimate_stack(record, nominal, unknowns=CALIBRATED, starts=({},))
+    changed = [name for name in vars(found.parameters) if getattr(found.parameters, name) != getattr(nominal, name)]
+    return replace(nominal, **{name: getattr(found.parameters, name) for name in changed})

@@ -1,0 +1,1 @@
+"""Sudden changes in a stream of samples."""

@@ -1,0 +1,62 @@
+"""The CUSUM of Page (Biometrika 41, 1954, page 100) on a balance's log NIS, and the threshold for a rate of alarms.
+
+The logarithm of a block's NIS is standardised by its running mean and variance. `faults.watch.watch` says why the
+threshold follows from the peaks of the sum's excursions.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MEAN, VARIANCE, COUNT, SUM, PEAK, THRESHOLD, SQUARES = range(7)
+"""Places in a balance's score: running mean and variance of its log NIS and blocks in them; the CUSUM, the peak of its
+excursion and its threshold [standard deviations]; squared innovations of the block under way."""
+
+
+def accumulate(score: Array, peaks: Array, u: float, allowance: float, width: float) -> None:
+    """Add a block's score to the CUSUM; when an excursion ends, count its peak by levels of a width."""
+    score[SUM] = max(0.0, score[SUM] + u - allowance)
+    if score[SUM] > 0.0:
+        score[PEAK] = max(score[PEAK], score[SUM])
+    elif score[PEAK] > 0.0:
+        peaks[min(int(score[PEAK] / width), peaks.shape[0] - 1)] += 1.0
+        score[PEAK] = 0.0
+
+
+def standardise(score: Array, away: float, memory: float) -> None:
+    """Move the running mean and variance by how far a block's log NIS lay from the mean."""
+    score[COUNT] += 1.0
+    share = 1.0 / min(score[COUNT], memory)
+    score[MEAN] += share * away
+    score[VARIANCE] += share * (away * away * (1.0 - share) - score[VARIANCE])
+
+
+def threshold(peaks: Array, alarms: float, width: float, expected: float) -> float:
+    """Return the level that peaks are expected to pass `expected` times in the time that they were gathered."""
+    total = alarms
+    for count in peaks:
+        total += count
+    wanted = max(20.0, total ** (2.0 / 3.0))
+    above, place = alarms, len(peaks)
+    while place > 0 and above < wanted:
+        place -= 1
+        above += peaks[place]
+    below = alarms
+    excess = 0.0
+    for i in range(place, len(peaks)):
+        excess += peaks[i] * (i - place + 0.5) * width
+    gathered = above - below
+    if gathered < 1.0:
+        return math.inf
+    if above <= expected:
+        return place * width
+    mean = excess / gathered
+    if below > 0.0:
+        # an alarm ends its excursion at the threshold: its peak is at least that (censored exponential)
+        for _ in range(3):
+            level = gathered * mean * ((above / expected) ** (1.0 / gathered) - 1.0)
+            mean = (excess + below * level) / gathered
+    return place * width + gathered * mean * ((above / expected) ** (1.0 / gathered) - 1.0)

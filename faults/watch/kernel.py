@@ -1,0 +1,184 @@
+"""The compiled watch: samples to intervals, intervals to blocks, and what each block says.
+
+Samples are averaged over *intervals* of some milliseconds, from which `faults.watch.balances` learns. The squared
+innovations of a *block* of intervals are its NIS, which feeds the CUSUM of `faults.watch.cusum`.
+"""
+
+import math
+from functools import cache
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from faults.watch import balances, cusum
+from faults.watch.balances import FEATURES, count_gains, learn, regress, shift, solve
+from faults.watch.cusum import MEAN, PEAK, SQUARES, SUM, THRESHOLD, VARIANCE, accumulate, standardise, threshold
+from plant.compiled.kernel_file import load_kernel
+from plant.compiled.paste import BORROWING, kernel_text, pasted
+
+Array = NDArray[np.float64]
+
+INTERVALS = 10
+"""Intervals a block."""
+
+RECENT = 512
+"""Blocks whose scores and gains are remembered for the change estimate."""
+
+LEVELS = 4096
+"""Levels at which the peaks of the CUSUM are counted."""
+
+PARTIAL, CLOCK, SCORE = 7, 4, 7
+"""Lengths of the kernel's arrays: the interval under way, the clock, and a balance's score."""
+
+NOTHING, READY = -1, 100
+"""What a block may say, beside which balance raises an alarm: nothing, and that the thresholds have been learnt."""
+
+REFRESHED = 200
+"""Blocks from one look at the thresholds to the next."""
+
+
+def advance(
+    rows: Array,
+    first: int,
+    setting: Array,
+    sizes: Array,
+    partial: Array,
+    clock: Array,
+    lags: Array,
+    information: Array,
+    moment: Array,
+    found: Array,
+    score: Array,
+    peaks: Array,
+    scores: Array,
+    gains: Array,
+) -> tuple[int, int]:
+    """Take samples from `first` on, up to the end of them or of a block with news; return where, and the news."""
+    samples, intervals = int(sizes[0]), int(sizes[2])
+    features, target, factor = np.empty((2, FEATURES)), np.empty(score.shape[0]), np.empty((FEATURES, FEATURES))
+    for k in range(first, rows.shape[0]):
+        partial[0] += 1.0
+        partial[1] += rows[k, 0]
+        partial[2] += rows[k, 2]
+        if partial[0] < samples:
+            continue
+        w = partial[1] / (samples * setting[7])
+        p = partial[2] / (samples * setting[9])
+        v = (rows[k, 1] - partial[3]) / (samples * setting[8])
+        partial[0] = partial[1] = partial[2] = 0.0
+        partial[3] = rows[k, 1]
+        sound = math.isfinite(w) and math.isfinite(v) and math.isfinite(p)
+        partial[4] = partial[4] + 1.0 if sound else 0.0
+        if sound:
+            regress(w, v, p, lags, features, target)
+            if partial[4] > 3.0 and abs(w) + abs(lags[2]) + abs(v) > setting[5]:
+                partial[5] += 1.0
+                for c in range(score.shape[0]):
+                    error = learn(c, features, target, setting[0], information, moment, found)
+                    score[c, SQUARES] += error * error
+                count_gains(w, v, p, int(clock[0]) % scores.shape[1], gains)
+            shift(w, v, p, lags)
+        partial[6] += 1.0
+        if partial[6] < intervals:
+            continue
+        news = end_block(
+            setting, sizes, partial, clock, information, moment, found, factor, score, peaks, scores, gains
+        )
+        if news != NOTHING:
+            return k + 1, news
+    return rows.shape[0], NOTHING
+
+
+def end_block(
+    setting: Array,
+    sizes: Array,
+    partial: Array,
+    clock: Array,
+    information: Array,
+    moment: Array,
+    found: Array,
+    factor: Array,
+    score: Array,
+    peaks: Array,
+    scores: Array,
+    gains: Array,
+) -> int:
+    """Judge a whole block; return what it says."""
+    usable, recent, learning, resume = partial[5], scores.shape[1], sizes[4], sizes[5]
+    partial[5] = partial[6] = 0.0
+    place = int(clock[0]) % recent
+    clock[0] += 1.0
+    gains[int(clock[0]) % recent, :] = 0.0
+    if 2.0 * usable < sizes[2]:
+        scores[:, place] = np.nan
+        score[:, SQUARES] = 0.0
+        return NOTHING
+    clock[1] += 1.0
+    since = clock[1] - clock[2]
+    news = NOTHING
+    for c in range(score.shape[0]):
+        value = math.log(score[c, SQUARES] / usable + 1e-30)
+        score[c, SQUARES] = 0.0
+        solve(information[c], moment[c], found[c], factor)
+        scores[c, place] = judge(value, since, setting, sizes, score[c], peaks[c])
+        if (
+            score[c, SUM] > score[c, THRESHOLD]
+            and clock[1] > learning
+            and (news < 0 or score[c, SUM] / score[c, THRESHOLD] > score[news, SUM] / score[news, THRESHOLD])
+        ):
+            news = c
+    if since > resume:
+        clock[3] += 1.0
+    if clock[1] >= learning and (int(clock[1]) % REFRESHED == 0 or clock[1] == learning):
+        for c in range(score.shape[0]):
+            expected = setting[6] * clock[3] / score.shape[0]
+            score[c, THRESHOLD] = threshold(peaks[c, :-1], peaks[c, peaks.shape[1] - 1], setting[4], expected)
+        if clock[1] == learning:
+            score[:, SUM : PEAK + 1] = 0.0
+            return READY
+    if news >= 0:
+        peaks[news, peaks.shape[1] - 1] += 1.0
+    return news
+
+
+def judge(value: float, since: float, setting: Array, sizes: Array, score: Array, peaks: Array) -> float:
+    """Return a block's standardised score, 0 while it is learnt what is usual; add it to the CUSUM."""
+    settle, resume = sizes[3], sizes[5]
+    if since <= settle:
+        return 0.0
+    away, u = value - score[MEAN], 0.0
+    if since > 2.0 * settle:
+        u = min(away / math.sqrt(score[VARIANCE] + 1e-12), setting[3])
+        if since > resume:
+            accumulate(score, peaks, u, setting[2], setting[4])
+    standardise(score, away, setting[1])
+    return u
+
+
+def begin_again(clock: Array, information: Array, moment: Array, score: Array) -> None:
+    """Forget most of what the balances were, after an alarm: they are learnt again, what the peaks said is kept."""
+    clock[2] = clock[1]
+    information *= 0.01
+    moment *= 0.01
+    score[:, : PEAK + 1] = 0.0
+    score[:, SQUARES] = 0.0
+
+
+@cache
+def watch_kernel() -> ModuleType:
+    """Return the compiled kernel: `advance`, `begin_again` and `threshold`.
+
+    Returns
+    -------
+    ModuleType
+        The kernel.
+    """
+    named = ("MEAN", "VARIANCE", "COUNT", "SUM", "PEAK", "THRESHOLD", "SQUARES")
+    constants = {name: getattr(cusum, name) for name in named}
+    constants |= {"FEATURES": FEATURES, "BENT": balances.BENT}
+    constants |= {"NOTHING": NOTHING, "READY": READY, "REFRESHED": REFRESHED}
+    parts = (regress, shift, learn, count_gains, solve, accumulate, standardise, judge, end_block)
+    small = pasted(*parts, constants=constants, options=BORROWING)
+    large = pasted(threshold, advance, begin_again)
+    return load_kernel("watch", kernel_text("the watch over flow and force balances", small, large))

@@ -1,0 +1,304 @@
+"""`Watch(...).take(samples)`: that something changed inside an actuator, at a set rate of false alarms.
+
+With differential pressure there are two balances: flow (what the pump delivers and the piston sweeps, equation 5.8) and
+force (pressure and what friction and mass take, equation 5.9). Without it one of motion remains. Each raises an alarm
+when the CUSUM of its log NIS passes a threshold.
+
+The threshold follows from the rate: the CUSUM of a healthy stream rises from zero and returns, and the peaks of these
+excursions have an exponential tail whatever the dependence from block to block (Cramér and Lundberg; Asmussen, Applied
+Probability and Queues, 2003, chapter XIII.5). Its scale is learnt from the highest peaks so far, about the two-thirds
+power of their number, and extrapolated. With scale and count uncertain, the expected rate at a level h above the lowest
+of k peaks is ``k (1 + h / (k s))^-k`` (a Pareto predictive law), which is set to what the user asked for.
+"""
+
+from math import exp, isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from faults.watch.balances import FEATURES, GAINS
+from faults.watch.cusum import SUM, THRESHOLD
+from faults.watch.events import Alarm, Change, Event, Ready, change_time
+from faults.watch.kernel import CLOCK, INTERVALS, LEVELS, PARTIAL, READY, RECENT, SCORE, watch_kernel
+from faults.watch.samples import watched_samples
+from plant.eha.model import EhaParameters
+from plant.errors import HydrostateError
+from plant.log.record import Record
+
+Array = NDArray[np.float64]
+
+INTERVAL = 5e-3
+"""Time over which samples are averaged [s], or one sample where they are further apart."""
+
+SLOWEST = 0.05
+"""Longest time between samples that can be watched [s]: slower, a reversal is over between two."""
+
+MEMORY = 30.0
+"""Fading memory of the balances [s]."""
+
+SCORE_MEMORY = 60.0
+"""Fading memory of the score's mean and deviation [s]."""
+
+SETTLE = 10.0
+"""What the balances learn from before their innovations count, and then before their deviation does [s]."""
+
+ALLOWANCE = 0.5
+"""What a block's score must exceed for the CUSUM to rise [standard deviations]."""
+
+LARGEST_SCORE = 8.0
+"""Cap of a block's score [standard deviations]: no single block decides."""
+
+LEVEL = 0.02
+"""Distance of the levels at which peaks are counted [standard deviations]."""
+
+MOVING = 0.05
+"""Share of rated speed below which the actuator is at rest, and nothing is learnt or judged [fraction]."""
+
+LEARNING = 120.0
+"""Healthy running before alarms can be raised [s]."""
+
+LEAST_LEARNING = 60.0
+"""The same, at the least [s]."""
+
+AFTER = 2.0
+"""Running after an alarm from which the change of the gains is told [s]."""
+
+BUILD_UP = 3
+"""Blocks before the first one that shows a change in which it may have come: some drive must make it felt."""
+
+BALANCES = ("flow", "force")
+"""The balances with differential pressure."""
+
+
+class Watch:
+    """A stream under watch; its memory does not grow.
+
+    Parameters
+    ----------
+    parameters : EhaParameters
+        The actuator; what it contributes are sizes, the balances are learnt.
+    sample_time : float
+        Time between samples [s].
+    pressure : bool
+        Whether differential pressure is logged.
+    false_alarms : float
+        Rate at which a healthy stream may raise alarms [1/h], of moving time.
+    learning : float
+        Healthy running before alarms can be raised [s].
+    start : float
+        Time of the first sample [s].
+
+    Raises
+    ------
+    HydrostateError
+        If a rate or time is not usable.
+    """
+
+    def __init__(
+        self,
+        parameters: EhaParameters,
+        sample_time: float,
+        *,
+        pressure: bool = True,
+        false_alarms: float = 1.0,
+        learning: float = LEARNING,
+        start: float = 0.0,
+    ) -> None:
+        if not 0.0 < sample_time <= SLOWEST:
+            raise HydrostateError(f"a watch needs a sample at least every {SLOWEST:g} s, got one in {sample_time:g} s")
+        if not (isfinite(false_alarms) and 0.0 < false_alarms <= 60.0):
+            raise HydrostateError(f"false alarms must be over 0 and at most 60 an hour, got {false_alarms:g}")
+        if not (isfinite(learning) and learning >= LEAST_LEARNING):
+            raise HydrostateError(f"learning must take at least {LEAST_LEARNING:g} s, got {learning:g} s")
+        self.balances = BALANCES if pressure else ("motion",)
+        self.sample_time, self.start = sample_time, start
+        samples = max(1, round(INTERVAL / sample_time))
+        self.block = samples * INTERVALS
+        """Samples a block."""
+        duration = self.block * sample_time
+        rated_velocity = parameters.pump_displacement * parameters.rated_speed / parameters.piston_area
+        self._setting = np.array(
+            [
+                exp(-samples * sample_time / MEMORY),
+                SCORE_MEMORY / duration,
+                ALLOWANCE,
+                LARGEST_SCORE,
+                LEVEL,
+                MOVING,
+                false_alarms * duration / 3600.0,
+                parameters.rated_speed,
+                rated_velocity * sample_time,
+                parameters.relief_pressure,
+            ]
+        )
+        settle = round(SETTLE / duration)
+        self._sizes = np.array(
+            [samples, len(self.balances), INTERVALS, settle, round(learning / duration), 3 * settle], dtype=np.float64
+        )
+        wide = len(self.balances)
+        self._score = np.zeros((wide, SCORE))
+        self._score[:, THRESHOLD] = np.inf
+        self._scores, self._gains = np.zeros((wide, RECENT)), np.zeros((RECENT, GAINS))
+        self._peaks = np.zeros((wide, LEVELS + 1))
+        self._partial, self._clock, self._lags = np.zeros(PARTIAL), np.zeros(CLOCK), np.zeros(8)
+        self._partial[3] = np.nan
+        self._balance = np.zeros((wide, FEATURES, FEATURES)), np.zeros((wide, FEATURES)), np.zeros((wide, FEATURES))
+        self._open: tuple[Alarm, int, int] | None = None
+
+    @property
+    def time(self) -> float:
+        """End of the last whole block [s]."""
+        return self.start + float(self._clock[0]) * self.block * self.sample_time
+
+    @property
+    def last(self) -> float:
+        """Time up to which samples have been taken [s]."""
+        return self.start + self._taken * self.sample_time
+
+    @property
+    def thresholds(self) -> tuple[float, ...]:
+        """Thresholds of the balances [dimensionless]; infinite while they are learnt."""
+        return tuple(float(value) for value in self._score[:, THRESHOLD])
+
+    def take(self, samples: Array) -> list[Event]:
+        """Take samples, one or many: what comes of them does not depend on how they are cut.
+
+        Parameters
+        ----------
+        samples : ndarray, shape (n, 3)
+            Motor speed [rad/s], position [m], differential pressure [Pa]; NaN where missing, and anything finite for
+            a pressure that is not logged.
+
+        Returns
+        -------
+        list of Ready, Alarm or Change
+            What happened, in order.
+        """
+        kernel, rows = watch_kernel(), np.ascontiguousarray(samples, dtype=np.float64)
+        events: list[Event] = []
+        place = 0
+        while place < len(rows):
+            stop = len(rows)
+            if self._open is not None:
+                due = self._open[2] * self.block - self._taken
+                stop = min(stop, place + max(due, 1))
+            place, news = kernel.advance(
+                rows[:stop],
+                place,
+                self._setting,
+                self._sizes,
+                self._partial,
+                self._clock,
+                self._lags,
+                *self._balance,
+                self._score,
+                self._peaks,
+                self._scores,
+                self._gains,
+            )
+            if news == READY:
+                events.append(Ready(self.time, self.thresholds))
+            elif news >= 0:
+                events.append(self._raise(news))
+            if self._open is not None and self._clock[0] >= self._open[2]:
+                events += self._told()
+        return events
+
+    def clock_reads(self, time: float) -> None:
+        """Set the clock: a stream's own time stamps go before counting its samples.
+
+        Parameters
+        ----------
+        time : float
+            Time of the next sample [s].
+        """
+        self.start = time - self._taken * self.sample_time
+
+    def interrupt(self) -> None:
+        """Say that the next sample does not follow on the last: another log, or a gap in time."""
+        self._clock[0] += 1.0 if self._taken > self._clock[0] * self.block else 0.0
+        self._partial[:] = 0.0
+        self._partial[3] = np.nan
+        self._begin_again()
+
+    def _begin_again(self) -> None:
+        watch_kernel().begin_again(self._clock, self._balance[0], self._balance[1], self._score)
+
+    @property
+    def _taken(self) -> int:
+        """Samples taken, those of the block under way included."""
+        intervals = int(self._clock[0]) * INTERVALS + int(self._partial[6])
+        return intervals * (self.block // INTERVALS) + int(self._partial[0])
+
+    def _raise(self, which: int) -> Alarm:
+        found, likely = change_time(self._recent_scores(which))
+        duration = self.block * self.sample_time
+        alarm = Alarm(
+            self.time,
+            self.balances[which],
+            self.time - found * duration,
+            (self.time - (likely[1] + BUILD_UP) * duration, self.time - (likely[0] - 1) * duration),
+            float(self._score[which, SUM]),
+            float(self._score[which, THRESHOLD]),
+        )
+        now = int(self._clock[0])
+        self._open = alarm, now - found, now + round(AFTER / duration)
+        self._begin_again()
+        return alarm
+
+    def _recent_scores(self, which: int) -> Array:
+        """Return the last scores, the newest first, those of blocks at rest left out as zero."""
+        now, usable = int(self._clock[0]), min(int(self._clock[1] - self._clock[2]), RECENT // 2)
+        return np.nan_to_num(self._scores[which, (now - 1 - np.arange(usable)) % RECENT])
+
+    def _told(self) -> list[Event]:
+        if self._open is None:
+            return []
+        alarm, changed, now = self._open
+        self._open = None
+        span = RECENT - 1 - (now - changed)
+        before = self._gains[np.arange(changed - min(span, changed), changed) % RECENT].sum(axis=0)
+        after = self._gains[np.arange(changed + 1, now) % RECENT].sum(axis=0)
+        if len(self.balances) < len(BALANCES) or min(before[1], before[3], after[1], after[3]) <= 0.0:
+            return [Change(self.time, alarm, None, None)]
+        lost = float(before[0] / before[1]), float(after[0] / after[1])
+        resisted = float(after[2] / after[3] / (before[2] / before[3]) - 1.0)
+        return [Change(self.time, alarm, lost, resisted)]
+
+
+def watch_record(
+    record: Record, parameters: EhaParameters, *, false_alarms: float = 1.0, learning: float = LEARNING
+) -> list[Event]:
+    """Watch a log from its beginning to its end.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with motor speed, position or velocity, and differential pressure where there is one.
+    parameters : EhaParameters
+        The actuator.
+    false_alarms : float
+        Rate at which a healthy log may raise alarms [1/h].
+    learning : float
+        Healthy running at its beginning [s].
+
+    Returns
+    -------
+    list of Ready, Alarm or Change
+        What happened.
+
+    Raises
+    ------
+    HydrostateError
+        If a channel is missing, or a rate or time is not usable.
+    """
+    samples, pressure = watched_samples({name: record[name] for name in record}, record.sample_time)
+    watch = Watch(
+        parameters,
+        record.sample_time,
+        pressure=pressure,
+        false_alarms=false_alarms,
+        learning=learning,
+        start=record.start_time,
+    )
+    return watch.take(samples)

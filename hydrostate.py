@@ -1,0 +1,239 @@
+"""Hydrostate: what is wrong inside a hydrostatic actuator, from the signals that a bench already logs.
+
+>>> import hydrostate as hs
+>>> log = hs.simulate("minor_leakage", duration=2.0, sample_time=1e-3, seed=7)
+>>> log.channels
+('motor_speed_rad_s', 'position_m', 'velocity_m_s', 'differential_pressure_pa')
+
+`read` or `simulate` give a `Log`; `Log.estimate`, `Log.diagnose` and `Log.identify` say what it holds. What they return
+prints itself, and turns into pandas, matplotlib, python-control or plain dictionaries.
+"""
+
+from collections.abc import Mapping
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from estimation.finding import Finding as Finding
+    from estimation.identification.model.linear_model import LinearModel as LinearModel
+    from experiments.published import load as published_table
+    from faults.conditions import CONDITIONS as conditions  # noqa: N811 - a face has plain names
+    from faults.conditions import Condition as Condition
+    from plant.eha.rig import Rig as Rig
+    from plant.eha.rig import read_rig as read_rig
+    from plant.errors import HydrostateError as HydrostateError
+    from plant.errors import LogError as LogError
+    from plant.errors import RigError as RigError
+    from plant.log.record import Record as Record
+
+    __version__: str
+
+PACKAGES = ("plant", "estimation", "faults", "experiments")
+
+LATE: Mapping[str, str] = {
+    "Condition": "faults.conditions",
+    "Finding": "estimation.finding",
+    "HydrostateError": "plant.errors",
+    "LinearModel": "estimation.identification.model.linear_model",
+    "LogError": "plant.errors",
+    "Record": "plant.log.record",
+    "Rig": "plant.eha.rig",
+    "RigError": "plant.errors",
+    "published_table": "experiments.published:load",
+    "read_rig": "plant.eha.rig",
+}
+"""Names that are imported when they are first asked for, and where they are."""
+
+__all__ = [
+    "Answer",
+    "Condition",
+    "Finding",
+    "HydrostateError",
+    "LinearModel",
+    "Log",
+    "LogError",
+    "Model",
+    "Record",
+    "Rig",
+    "RigError",
+    "__version__",
+    "actuators",
+    "conditions",
+    "published_table",
+    "read",
+    "read_rig",
+    "simulate",
+]
+
+
+def _refuse_shadows() -> None:
+    """Refuse packages of the same names that stand in front of ours."""
+    home = Path(__file__).resolve().parent
+    for name in PACKAGES:
+        found = find_spec(name)
+        places = [] if found is None else [Path(place).resolve() for place in found.submodule_search_locations or ()]
+        if not places and found is not None and found.origin:
+            places = [Path(found.origin).resolve()]
+        if home / name not in places:
+            where = places[0] if places else "nowhere"
+            raise ImportError(
+                f"hydrostate needs its own package {name!r} in {home}, but Python finds {where}; rename or remove that "
+                "one, or use an environment of its own for hydrostate"
+            )
+
+
+_refuse_shadows()
+
+from experiments.log_pages.answers import Answer, Model, no_such  # noqa: E402 - after the check
+from experiments.log_pages.log import Log, known_options, refuse  # noqa: E402 - likewise
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name when it is first asked for."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("hydrostate")
+    if name == "conditions":
+        return import_module("faults.conditions").CONDITIONS
+    if name in LATE:
+        module, _, renamed = LATE[name].partition(":")
+        return getattr(import_module(module), renamed or name)
+    if name.startswith("_"):
+        raise AttributeError(name)
+    from plant.errors import NoSuchNameError
+
+    raise NoSuchNameError(no_such("hydrostate", name, __all__))
+
+
+def __dir__() -> list[str]:
+    return list(__all__)
+
+
+def actuators() -> Mapping[str, str]:
+    """Return the kinds of actuator, each with a line that says what it is.
+
+    Returns
+    -------
+    Mapping[str, str]
+        Description by name; the names are what ``plant=`` takes.
+
+    Examples
+    --------
+    >>> list(actuators())
+    ['eha', 'piezo-stack', 'diaphragm-motor']
+    """
+    from experiments.actuators import actuators as kinds
+
+    return {kind.name: kind.description for kind in kinds()}
+
+
+def read(
+    path: "str | Path",
+    *,
+    rig: "Rig[Any] | str | Path | None" = None,
+    columns: Mapping[str, str] | None = None,
+    plant: str = "eha",
+) -> "Log":
+    """Read a log.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV, Parquet or MAT, with ``time_s`` and the actuator's channels.
+    rig : Rig, str or Path, optional
+        The actuator, or its rig file; the paper's if not given.
+    columns : Mapping[str, str], optional
+        Columns under other names, with their units: ``{"position_m": "POS_MM:mm"}``.
+    plant : str
+        Kind of actuator, one of `actuators`.
+
+    Returns
+    -------
+    Log
+        The log.
+
+    Raises
+    ------
+    LogError
+        If the file cannot be read or trusted.
+    HydrostateError
+        If the rig or the kind of actuator is not usable.
+
+    Examples
+    --------
+    >>> read("none.csv")
+    Traceback (most recent call last):
+    plant.errors.LogError: none.csv: there is no such file
+    """
+    from experiments.actuators import actuator
+    from experiments.command.logs import read_log
+
+    kind = actuator(plant)
+    bench = _rig(rig, kind)
+    if not isinstance(path, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance] -- likewise
+        refuse(f"the path of a log is wanted, got {path!r}")
+    if columns is not None and not isinstance(columns, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
+        refuse(f"columns must be a mapping such as {{'position_m': 'POS_MM:mm'}}, got {columns!r}")
+    return Log(read_log(Path(path), bench.columns, dict(columns or {}), kind.required), bench, kind.name)
+
+
+def simulate(
+    condition: str | None = None,
+    *,
+    rig: "Rig[Any] | str | Path | None" = None,
+    plant: str = "eha",
+    seed: int = 2024,
+    **options: Any,
+) -> "Log":
+    """Simulate a run and return it as its sensors would have logged it.
+
+    Parameters
+    ----------
+    condition : str, optional
+        What is wrong with the actuator, one of `conditions`; the healthy one if not given.
+    rig : Rig, str or Path, optional
+        The actuator, or its rig file.
+    plant : str
+        Kind of actuator, or one of its models: ``"circuit"``.
+    seed : int
+        Seed of all that is random.
+    **options
+        As `hydrostate simulate` takes them, ``drive="prbs"``, ``duration=10.0`` [s], ``sample_time=1e-3`` [s],
+        ``sensors="rig"``.
+
+    Returns
+    -------
+    Log
+        The run; `Log.record` holds what made it in its metadata.
+
+    Raises
+    ------
+    HydrostateError
+        If the condition or an option is unknown or not usable.
+    """
+    from experiments.actuators import actuator, offered
+
+    kind = actuator(plant)
+    bench = _rig(rig, kind)
+    simulation = offered(kind, "simulate")
+    if condition is not None:
+        options["condition" if "condition" in simulation.options else "fault"] = condition
+    asked = {**simulation.options, **known_options(options, simulation.options, "simulate")}
+    return Log(simulation.run(bench, {**asked, "seed": seed, "plant": plant}).record, bench, kind.name)
+
+
+def _rig(rig: Any, kind: Any) -> "Rig[Any]":
+    """Return a rig of this kind of actuator."""
+    if isinstance(rig, str | Path) and not Path(rig).is_file():
+        refuse(f"rig {str(rig)!r}: there is no such file; `hydrostate rig init FILE` writes one to edit, or pass a Rig")
+    if rig is None or isinstance(rig, str | Path):
+        return kind.read_rig(None if rig is None else Path(rig))
+    if not isinstance(getattr(rig, "parameters", None), kind.parameters):
+        refuse(
+            f"rig must be a Rig of {kind.name}, or the path of its rig file (hydrostate rig init), "
+            f"got {type(rig).__name__}"
+        )
+    return rig

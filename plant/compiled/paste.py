@@ -1,0 +1,161 @@
+"""Pastes functions into a kernel file: loops that linters, type checkers and tests see as ordinary Python.
+
+A kernel file contains all that it calls (`plant.compiled.kernel_file`). So its loops are written as functions of a
+module, and their source is copied; what tracing a model generates stands beside them, under the names by which they
+call it. In its own module such a name is a declaration, a keyword-only parameter without default, or an attribute of a
+parameter ``kernel``, which stands for the file: whoever runs the function as it is, in Python, passes them.
+"""
+
+import ast
+import inspect
+from collections.abc import Callable, Mapping
+from functools import cache
+
+COMPILED = 'cache=True, nogil=True, error_model="numpy"'
+"""How Numba compiles a pasted function, unless told otherwise."""
+
+REORDERED = COMPILED + ', fastmath={"reassoc", "contract", "nsz"}'
+"""The same, where sums may be reordered and fused; NaN and infinity keep their meaning."""
+
+KERNEL = "kernel"
+"""Name of the parameter that stands for a kernel file."""
+
+INLINED = 'forceinline=True, error_model="numpy"'
+"""How it compiles a function that becomes a part of whoever calls it."""
+
+MERGED = 'inline="always", error_model="numpy"'
+"""The same, before its types are inferred, which saves compiling it by itself."""
+
+BORROWING = INLINED + ", _nrt=False"
+"""How it compiles one that is inlined and makes no array: Numba does not count who holds those that it is given, which
+would take longer than a short function's work."""
+
+
+def pasted(
+    *functions: Callable[..., object], constants: Mapping[str, object] | None = None, options: str = COMPILED
+) -> str:
+    """Return the text of functions, for a kernel file that imports ``numba`` and what else they name.
+
+    Annotations, docstrings and comments stay behind: who edits one of them has nothing to compile anew.
+
+    Parameters
+    ----------
+    *functions : callable
+        Functions of a module, without decorators. They may call each other, in any order.
+    constants : Mapping[str, object], optional
+        Values of names that the functions read, bound above them.
+    options : str
+        Arguments of ``numba.njit``.
+
+    Returns
+    -------
+    str
+        The text.
+
+    Examples
+    --------
+    >>> def grown(size: float) -> float:
+    ...     return SHARE * size
+    >>> print(pasted(grown, constants={"SHARE": 0.5}, options="cache=True"))
+    SHARE = 0.5
+    <BLANKLINE>
+    <BLANKLINE>
+    @numba.njit(cache=True)
+    def grown(size):
+        return SHARE * size
+    """
+    bound = [f"{name} = {value!r}" for name, value in (constants or {}).items()]
+    texts = [f"@numba.njit({options})\n{bare_text(function)}" for function in functions]
+    return "\n\n\n".join(["\n".join(bound), *texts] if bound else texts)
+
+
+def kernel_text(title: str, *parts: str) -> str:
+    """Return the text of a kernel file.
+
+    Parameters
+    ----------
+    title : str
+        What the kernel does, for its docstring.
+    *parts : str
+        Functions and constants, in any order, but for what runs when the file is imported.
+
+    Returns
+    -------
+    str
+        The text: ``math``, ``numba`` and ``numpy`` are imported, then the parts follow.
+    """
+    return (
+        "\n\n\n".join([f'"""Generated: {title}."""\n\nimport math\n\nimport numba\nimport numpy as np', *parts]) + "\n"
+    )
+
+
+@cache
+def bare_text(function: Callable[..., object]) -> str:
+    """Return a function's source without annotations, docstring and comments.
+
+    A keyword-only parameter without default becomes a name of the file, and so does what a parameter ``kernel`` has;
+    no call hands them on any more.
+
+    Parameters
+    ----------
+    function : callable
+        A function of a module.
+
+    Returns
+    -------
+    str
+        Its text.
+
+    Examples
+    --------
+    >>> def middle(low: float, high: float) -> float:
+    ...     return 0.5 * (low + high)  # left out
+    >>> print(bare_text(middle))
+    def middle(low, high):
+        return 0.5 * (low + high)
+    >>> def scaled(low: float, high: float, *, SHARE: float) -> float:
+    ...     return SHARE * middle(low, high)
+    >>> print(bare_text(scaled))
+    def scaled(low, high):
+        return SHARE * middle(low, high)
+    >>> def shifted(kernel, low, high):
+    ...     return kernel.SHIFT + middle(low, high)
+    >>> print(bare_text(shifted))
+    def shifted(low, high):
+        return SHIFT + middle(low, high)
+    """
+    definition = ast.parse(inspect.getsource(function)).body[0]
+    if not isinstance(definition, ast.FunctionDef):
+        raise TypeError(f"only a function that is written with def can be pasted, got {function!r}")
+    if ast.get_docstring(definition) is not None:
+        definition.body = definition.body[1:] or [ast.Pass()]
+    definition.returns = None
+    arguments = definition.args
+    arguments.args = [argument for argument in arguments.args if argument.arg != KERNEL]
+    for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
+        argument.annotation = None
+    keywords = list(zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True))
+    bound = {argument.arg for argument, default in keywords if default is None}
+    arguments.kwonlyargs = [argument for argument, default in keywords if default is not None]
+    arguments.kw_defaults = [default for _, default in keywords if default is not None]
+    for node in ast.walk(definition):
+        if isinstance(node, ast.Call):
+            node.keywords = [keyword for keyword in node.keywords if keyword.arg not in bound]
+    return ast.unparse(_OfTheFile().visit(definition))
+
+
+class _OfTheFile(ast.NodeTransformer):
+    """Turns what a kernel has into names, and hands no kernel on."""
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        self.generic_visit(node)
+        return ast.Name(node.attr, node.ctx) if _is_kernel(node.value) else node
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        self.generic_visit(node)
+        node.args = [argument for argument in node.args if not _is_kernel(argument)]
+        return node
+
+
+def _is_kernel(node: ast.expr) -> bool:
+    return isinstance(node, ast.Name) and node.id == KERNEL

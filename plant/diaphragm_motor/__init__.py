@@ -1,0 +1,1 @@
+"""The seven-chamber piezo diaphragm motor: parameters, flow, plate, run."""

@@ -1,0 +1,289 @@
+"""A piezo diaphragm as a composite thin plate: what pressure and voltage bend, and how it would ring dry.
+
+In place of the diaphragm-motor paper's finite elements and of its equation 14, a bimorph's formula (errata M14): a
+brass disc clamped at its rim with a smaller ceramic disc on it, Table 1. Thin-plate theory with stretching and bending
+coupled where the ceramic lies; within each of the two regions the solution is in closed form, and six constants join
+them. Source: Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 2nd edition, sections 15 to 17; Reddy,
+Mechanics of Laminated Composite Plates and Shells, 2nd edition, section 3.3.
+"""
+
+from dataclasses import dataclass
+from math import pi, sqrt
+from typing import Annotated, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.special import iv, jv
+
+from plant.errors import RigError
+from plant.units import SI, require_numbers
+
+Array: TypeAlias = NDArray[np.float64]
+
+TABLE_1 = "Table 1"
+PZT_5H = "PZT-5H; Erturk and Inman, Piezoelectric Energy Harvesting (2011), appendix E"
+HANDBOOK = "handbook value, errata M22"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlateParameters:
+    """A brass disc with a ceramic disc on one face, clamped at a radius; the motor's by default.
+
+    Raises
+    ------
+    RigError
+        If a value is not finite and positive (the ceramic's thickness may be 0), or the ceramic reaches the clamp.
+
+    Examples
+    --------
+    >>> round(1e3 * PlateParameters().thickness, 1)
+    0.6
+    """
+
+    clamp_radius: Annotated[float, SI("m", "radius a at which the brass is held", "calibrated, errata M22")] = 14e-3
+    ceramic_radius: Annotated[float, SI("m", "radius of the ceramic", TABLE_1)] = 12.5e-3
+    brass_thickness: Annotated[float, SI("m", "thickness of the brass", TABLE_1)] = 0.4e-3
+    ceramic_thickness: Annotated[float, SI("m", "thickness of the ceramic", TABLE_1)] = 0.2e-3
+    brass_modulus: Annotated[float, SI("Pa", "Young's modulus of brass", HANDBOOK)] = 100e9
+    ceramic_compliance: Annotated[float, SI("1/Pa", "compliance s_11 at constant field", PZT_5H)] = 16.5e-12
+    poisson_ratio: Annotated[float, SI("1", "Poisson's ratio of both", HANDBOOK)] = 0.35
+    brass_density: Annotated[float, SI("kg/m^3", "density of brass", HANDBOOK)] = 8500.0
+    ceramic_density: Annotated[float, SI("kg/m^3", "density of the ceramic", PZT_5H)] = 7500.0
+    charge_constant: Annotated[float, SI("m/V", "size of the piezoelectric constant d_31", PZT_5H)] = 274e-12
+
+    def __post_init__(self) -> None:
+        require_numbers(self, zero=("ceramic_thickness",))
+        if self.ceramic_radius >= self.clamp_radius:
+            raise RigError(
+                f"ceramic_radius must be below {self.clamp_radius:g} m, the clamp, got {self.ceramic_radius:g}"
+            )
+
+    @property
+    def thickness(self) -> float:
+        """Thickness of both discs together [m]."""
+        return self.brass_thickness + self.ceramic_thickness
+
+
+class PlateCoefficients(NamedTuple):
+    """What a diaphragm gives its chamber.
+
+    Parameters
+    ----------
+    compliance : float
+        Volume a pascal, C_d [m^3/Pa].
+    volume_a_volt : float
+        Volume a volt without pressure, d_V [m^3/V].
+    deflection_a_pascal : float
+        Deflection of the centre a pascal, w_p [m/Pa].
+    deflection_a_volt : float
+        Deflection of the centre a volt without pressure, w_V [m/V].
+    """
+
+    compliance: float
+    volume_a_volt: float
+    deflection_a_pascal: float
+    deflection_a_volt: float
+
+
+class PlateMode(NamedTuple):
+    """A mode of a clamped round plate.
+
+    Parameters
+    ----------
+    diameters, circles : int
+        Nodal diameters, nodal circles without the rim.
+    root : float
+        lambda^2 of ``f = lambda^2 / (2 pi a^2) sqrt(D / m)`` [dimensionless].
+    frequency : float
+        Natural frequency without liquid [Hz].
+    """
+
+    diameters: int
+    circles: int
+    root: float
+    frequency: float
+
+
+class _Region(NamedTuple):
+    """Stretching, coupling and bending stiffness about the brass's middle plane, and a volt's force and moment."""
+
+    stretch: float
+    couple: float
+    bend: float
+    force: float
+    moment: float
+
+
+def _regions(p: PlateParameters) -> tuple[_Region, _Region]:
+    plane = 1.0 - p.poisson_ratio**2
+    brass, half = p.brass_modulus / plane, 0.5 * p.brass_thickness
+    ceramic, top = 1.0 / p.ceramic_compliance / plane, half + p.ceramic_thickness
+    bare = _Region(2.0 * half * brass, 0.0, 2.0 * half**3 / 3.0 * brass, 0.0, 0.0)
+    drawn = p.charge_constant / (p.ceramic_compliance * (1.0 - p.poisson_ratio)) if p.ceramic_thickness > 0.0 else 0.0
+    covered = _Region(
+        bare.stretch + ceramic * p.ceramic_thickness,
+        0.5 * ceramic * (top**2 - half**2),
+        bare.bend + ceramic * (top**3 - half**3) / 3.0,
+        drawn,
+        drawn * 0.5 * (top + half),
+    )
+    return covered, bare
+
+
+def _shares(region: _Region, nu: float, r: float, pressure: float) -> tuple[Array, Array, Array]:
+    """Return, at a radius, (u, slope, N, M) for the constants (c r, c/r, d r, d/r), for pressure, and for a volt.
+
+    Slope is -w'; pressure adds the slope ``-p r^3 / (16 D*)`` and the stretch that coupling asks for.
+    """
+    a, b, d = region.stretch, region.couple, region.bend
+    swell, shrink = 1.0 + nu, -(1.0 - nu) / r**2
+    constants = np.array(
+        [
+            [0.0, 0.0, r, 1.0 / r],
+            [r, 1.0 / r, 0.0, 0.0],
+            [b * swell, b * shrink, a * swell, a * shrink],
+            [d * swell, d * shrink, b * swell, b * shrink],
+        ]
+    )
+    turned = -pressure / (16.0 * (d - b * b / a))
+    bowed = turned * r**2 * (3.0 + nu)
+    loaded = np.array([-b / a * turned * r**3, turned * r**3, 0.0, (d - b * b / a) * bowed])
+    return constants, loaded, np.array([0.0, 0.0, -region.force, -region.moment])
+
+
+def _bent(p: PlateParameters, pressure: float, volts: float) -> tuple[float, float]:
+    """Return volume [m^3] and deflection of the centre [m] under pressure on the ceramic's side and voltage."""
+    covered, bare = _regions(p)
+    nu, b, a = p.poisson_ratio, p.ceramic_radius, p.clamp_radius
+    inner, inner_load, inner_volt = _shares(covered, nu, b, pressure)
+    outer, outer_load, _ = _shares(bare, nu, b, pressure)
+    rim, rim_load, _ = _shares(bare, nu, a, pressure)
+    matrix, right = np.zeros((6, 6)), np.zeros(6)
+    matrix[:4, :2], matrix[:4, 2:] = inner[:, [0, 2]], -outer
+    right[:4] = outer_load - inner_load - volts * inner_volt
+    matrix[4:, 2:], right[4:] = rim[:2], -rim_load[:2]
+    scale = np.abs(matrix).max(axis=1)
+    columns = np.abs(matrix / scale[:, None]).max(axis=0)
+    c_in, _, c, c_inverse, _, _ = np.linalg.solve(matrix / scale[:, None] / columns, right / scale) / columns
+    turned_in, turned_out = (-pressure / (16.0 * (x.bend - x.couple**2 / x.stretch)) for x in (covered, bare))
+
+    # w is the slope's integral from the rim inwards; the volume is pi times the integral of slope r^2
+    rise = 0.5 * c * (a**2 - b**2) + c_inverse * np.log(a / b) + 0.25 * turned_out * (a**4 - b**4)
+    rise += 0.5 * c_in * b**2 + 0.25 * turned_in * b**4
+    volume = 0.25 * c * (a**4 - b**4) + 0.5 * c_inverse * (a**2 - b**2) + turned_out * (a**6 - b**6) / 6.0
+    volume += 0.25 * c_in * b**4 + turned_in * b**6 / 6.0
+    return pi * float(volume), float(rise)
+
+
+def plate_coefficients(p: PlateParameters) -> PlateCoefficients:
+    """Return what a diaphragm gives its chamber, by composite thin-plate theory (Table 1, errata M14).
+
+    Parameters
+    ----------
+    p : PlateParameters
+        The diaphragm.
+
+    Returns
+    -------
+    PlateCoefficients
+        C_d, d_V, w_p and w_V, all positive.
+
+    Examples
+    --------
+    >>> found = plate_coefficients(PlateParameters())
+    >>> [float(f"{value:.3g}") for value in found]
+    [1.17e-13, 2.31e-11, 5.19e-10, 8.38e-08]
+    """
+    volume, rise = _bent(p, 1.0, 0.0)
+    pumped, lifted = _bent(p, 0.0, 1.0)
+    return PlateCoefficients(abs(volume), abs(pumped), abs(rise), abs(lifted))
+
+
+def clamped_plate_roots(count: int) -> list[tuple[int, int, float]]:
+    """Return the lowest roots of a clamped round plate, ``J_n I_n' - J_n' I_n = 0`` at lambda (Source: Leissa 1969).
+
+    Parameters
+    ----------
+    count : int
+        How many.
+
+    Returns
+    -------
+    list of tuple of int, int and float
+        Nodal diameters, nodal circles, lambda^2; rising.
+
+    Examples
+    --------
+    >>> [round(root, 3) for _, _, root in clamped_plate_roots(6)]
+    [10.216, 21.26, 34.877, 39.771, 51.03, 60.829]
+    """
+    found: list[tuple[int, int, float]] = []
+    for diameters in range(count):
+        n = diameters
+
+        def clamp(x: float, n: int = n) -> float:
+            return float(jv(n, x) * iv(n + 1, x) + iv(n, x) * jv(n + 1, x)) / float(iv(n, x))
+
+        grid = np.arange(1.0, 4.0 + 2.0 * count + diameters, 0.1)
+        signs = np.sign([clamp(x) for x in grid])
+        crossings = np.flatnonzero(signs[:-1] * signs[1:] < 0.0)
+        found += [(diameters, circles, brentq(clamp, grid[k], grid[k + 1]) ** 2) for circles, k in enumerate(crossings)]
+    return sorted(found, key=lambda mode: mode[2])[:count]
+
+
+def plate_modes(p: PlateParameters, count: int = 6) -> list[PlateMode]:
+    """Return the first modes of the dry diaphragm, as a uniform plate of its static stiffness and its mean mass.
+
+    In place of the paper's finite-element figures; liquid lowers them all. Source: Leissa, Vibration of Plates (1969),
+    section 2.1.
+
+    Parameters
+    ----------
+    p : PlateParameters
+        The diaphragm.
+    count : int
+        How many modes.
+
+    Returns
+    -------
+    list of PlateMode
+        Modes by rising frequency.
+
+    Examples
+    --------
+    >>> [round(mode.frequency, -2) for mode in plate_modes(PlateParameters(), 3)]
+    [4000.0, 8300.0, 13500.0]
+    """
+    a = p.clamp_radius
+    stiffness = pi * a**6 / (192.0 * plate_coefficients(p).compliance)
+    covered = (p.ceramic_radius / a) ** 2
+    mass = p.brass_density * p.brass_thickness + covered * p.ceramic_density * p.ceramic_thickness
+    rate = sqrt(stiffness / mass) / (2.0 * pi * a**2)
+    return [PlateMode(n, s, root, root * rate) for n, s, root in clamped_plate_roots(count)]
+
+
+def mode_shape(mode: PlateMode, radius: Array, angle: Array) -> Array:
+    """Return a mode's shape, largest deflection 1 (Source: Leissa 1969, equation 2.1).
+
+    Parameters
+    ----------
+    mode : PlateMode
+        The mode.
+    radius : ndarray, shape (n,)
+        Radius over the clamp's [dimensionless].
+    angle : ndarray, shape (n,)
+        Angle [rad].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Deflection [dimensionless].
+    """
+    n, x = mode.diameters, sqrt(mode.root)
+
+    def radial(r: Array) -> Array:
+        return np.asarray(jv(n, x * r) - jv(n, x) / iv(n, x) * iv(n, x * r))
+
+    largest = float(np.max(np.abs(radial(np.linspace(0.0, 1.0, 401)))))
+    return radial(radius) / largest * np.cos(n * angle)

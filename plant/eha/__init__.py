@@ -1,0 +1,1 @@
+"""The gear-pump electro-hydrostatic actuator: parameters, three plants, rig file, drives, `simulate`."""

@@ -1,0 +1,206 @@
+"""Parameters of the circuit-level plant: those of the actuator, and what the lumped plant leaves out."""
+
+from dataclasses import asdict, dataclass, fields
+from typing import Annotated
+
+from plant.components.oil import ATMOSPHERE, specific_volume
+from plant.eha.model import EhaParameters
+from plant.errors import RigError
+from plant.units import SI, require_number
+
+
+@dataclass(frozen=True, kw_only=True)
+class CircuitParameters(EhaParameters):
+    """Parameters of the whole circuit of Figures 1 and 2, normal condition by default.
+
+    ``leakage_coefficient`` stays the lumped L_t of all paths; what the pump and the drain do not take flows inside the
+    cylinder and through throttle A (`cylinder_leakage`, errata E17). Each chamber's volume is twice ``chamber_volume``,
+    so that this is the same actuator as the lumped one (errata E2).
+
+    Raises
+    ------
+    RigError
+        If a value is not a finite number or out of range, the pump and the drain leak more than L_t, the stroke
+        is longer than the chambers, friction is negative at some velocity, or the accumulator is too small.
+
+    Examples
+    --------
+    >>> CircuitParameters().cylinder_leakage
+    2.2724e-12
+    """
+
+    pump_crossport_leakage: Annotated[
+        float, SI("m^3/(s Pa)", "cross-port leakage xi of the pump", "judged: half of Table 3's L_t when normal")
+    ] = 2.392e-12
+    pump_case_leakage: Annotated[
+        float, SI("m^3/(s Pa)", "case leakage C_ep a port", "judged: a twentieth of Table 3's L_t when normal")
+    ] = 2.392e-13
+    cylinder_drain_leakage: Annotated[
+        float, SI("m^3/(s Pa)", "external leakage L_out a chamber, drained", "judged: equation 5.3 gives no value")
+    ] = 0.0
+    bypass_conductance: Annotated[
+        float, SI("m^3/(s Pa)", "bypass valve, port to port; shut at 0", "section 2: the pump's fail-safe")
+    ] = 0.0
+    air_fraction: Annotated[
+        float, SI("1", "entrained air at atmospheric pressure", "piezo-stack paper, equation 6")
+    ] = 0.0
+    vapour_pressure: Annotated[float, SI("Pa", "absolute pressure of the vapour", "judged, errata P5")] = 2e3
+    makeup_opening: Annotated[float, SI("Pa", "drop at which a make-up check valve is half open", "judged: 1 psi")] = (
+        7e3
+    )
+    accumulator_gas: Annotated[
+        float, SI("m^3", "gas volume of the accumulator at its pressure", "judged: the paper gives none")
+    ] = 1e-3
+    accumulator_oil: Annotated[
+        float, SI("m^3", "oil in the accumulator at its pressure", "judged: the paper gives none")
+    ] = 1e-3
+    throttle_rated_flow: Annotated[float, SI("m^3/s", "rated flow of a throttle, fully open", "section 3")] = 2.57e-3
+    throttle_rated_pressure: Annotated[
+        float, SI("Pa", "pressure drop at the rated flow", "judged: 50 psi, the paper gives none")
+    ] = 3.4475e5
+    motor_lag: Annotated[float, SI("s", "time constant of the motor's speed", "judged: the paper gives none")] = 2e-3
+    presliding_displacement: Annotated[
+        float, SI("m", "deflection at which the seals break loose", "judged: the paper gives none")
+    ] = 2e-5
+    presliding_damping: Annotated[
+        float, SI("1", "damping ratio of the mass on the seals' stiffness", "judged: the paper gives none")
+    ] = 0.2
+    end_stop_stiffness: Annotated[float, SI("N/m", "stiffness of the cylinder's ends", "judged")] = 1e8
+    end_stop_damping: Annotated[
+        float, SI("s/m", "damping over spring force at the ends, a unit of velocity", "judged")
+    ] = 20.0
+
+    @property
+    def cylinder_leakage(self) -> float:
+        """Leakage L_in inside the cylinder and through throttle A, what is left of L_t by errata E17 [m^3/(s Pa)]."""
+        drained = self.pump_case_leakage + self.cylinder_drain_leakage
+        return self.leakage_coefficient - self.pump_crossport_leakage - 0.5 * drained
+
+    @property
+    def settled_leakage(self) -> float:
+        """Leakage in the steady state [m^3/(s Pa)], what equation 5.7 measures.
+
+        Errata E17's halves hold while both chambers float. Make-up holds the low one at the accumulator's pressure
+        before long, and then the drain takes its whole from the high one.
+        """
+        return self.leakage_coefficient + 0.5 * (self.pump_case_leakage + self.cylinder_drain_leakage)
+
+    def __post_init__(self) -> None:
+        EhaParameters(**{field.name: getattr(self, field.name) for field in fields(EhaParameters)})
+        for name in _OWN:
+            require_number(name, getattr(self, name), zero=name not in _POSITIVE)
+        if self.cylinder_leakage < -_ROUNDING * self.leakage_coefficient:
+            raise RigError(
+                "leakage_coefficient must cover what pump and drain leak (errata E17), "
+                f"got {self.leakage_coefficient:g} and a rest of {self.cylinder_leakage:g} m^3/(s Pa)"
+            )
+        swept, volume = 0.5 * self.piston_area * self.stroke, 2.0 * self.chamber_volume
+        if swept > _FULLEST * volume:
+            raise RigError(
+                f"stroke must leave room in a chamber of {volume:g} m^3, got {self.stroke:g} m, half of which sweeps "
+                f"{swept:g} m^3"
+            )
+        if self.air_fraction > MOST_AIR:
+            raise RigError(f"air_fraction must be at most {MOST_AIR:g}, got {self.air_fraction!r}")
+        falling = max(-self.friction_linear, 0.0)
+        if falling**2 > 4.0 * self.friction_quadratic * self.friction_coulomb:
+            raise RigError(
+                "friction must oppose motion at every speed: a negative friction_linear may be at most "
+                f"2 sqrt(friction_quadratic friction_coulomb) in size, got {self.friction_linear!r} N s/m"
+            )
+        if not self.vapour_pressure < min(self.accumulator_pressure, ATMOSPHERE):
+            raise RigError(
+                f"vapour_pressure must be below {min(self.accumulator_pressure, ATMOSPHERE):g} Pa, "
+                f"got {self.vapour_pressure!r} Pa"
+            )
+        needed = oil_demand(self)
+        if self.accumulator_oil < needed:
+            raise RigError(
+                f"accumulator_oil must fill both chambers up to the relief pressure, {needed:.3g} m^3, "
+                f"got {self.accumulator_oil:g} m^3"
+            )
+
+
+MOST_AIR = 0.5
+"""Largest air fraction that still makes an oil with bubbles of it rather than a foam."""
+
+_FULLEST = 0.95
+"""Largest share of a chamber that the piston may sweep: past the end stop there is still volume."""
+
+_ROUNDING = 1e-9
+"""Share of L_t by which rounding may leave the cylinder's part below zero."""
+
+_OWN = tuple(field.name for field in fields(CircuitParameters) if field.name not in EhaParameters.__dataclass_fields__)
+
+_POSITIVE = frozenset(
+    {
+        "vapour_pressure",
+        "makeup_opening",
+        "accumulator_gas",
+        "accumulator_oil",
+        "throttle_rated_flow",
+        "throttle_rated_pressure",
+        "presliding_displacement",
+        "end_stop_stiffness",
+    }
+)
+
+
+def oil_demand(p: CircuitParameters) -> float:
+    """Return the oil that both chambers take up from the accumulator's pressure to one relief pressure above it.
+
+    Parameters
+    ----------
+    p : CircuitParameters
+        The circuit.
+
+    Returns
+    -------
+    float
+        Oil, as its volume at atmospheric pressure [m^3].
+    """
+    low, high = (
+        specific_volume(pressure, p.bulk_modulus, p.air_fraction, p.vapour_pressure)
+        for pressure in (p.accumulator_pressure, p.accumulator_pressure + p.relief_pressure)
+    )
+    return 4.0 * p.chamber_volume * (1.0 / high - 1.0 / low) if high > 0.0 else float("inf")
+
+
+def circuit_of(p: EhaParameters) -> CircuitParameters:
+    """Return the circuit around an actuator: itself if it is one, else with the paper's rest, scaled to fit.
+
+    Leakage of the pump is at most its share of L_t; the accumulator grows with the compliance of the chambers.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    CircuitParameters
+        The circuit; all that the actuator has of its own is kept.
+
+    Raises
+    ------
+    RigError
+        If no circuit fits, see `CircuitParameters`.
+
+    Examples
+    --------
+    >>> circuit_of(EhaParameters(leakage_coefficient=0.0)).pump_crossport_leakage
+    0.0
+    """
+    if isinstance(p, CircuitParameters):
+        return p
+    paper = CircuitParameters()
+    share = min(1.0, p.leakage_coefficient / paper.leakage_coefficient)
+    compliance = p.chamber_volume / p.bulk_modulus * paper.bulk_modulus / paper.chamber_volume
+    size = max(1.0, compliance * max(1.0, p.relief_pressure / paper.relief_pressure))
+    return CircuitParameters(
+        **asdict(p),
+        pump_crossport_leakage=share * paper.pump_crossport_leakage,
+        pump_case_leakage=share * paper.pump_case_leakage,
+        accumulator_gas=size * paper.accumulator_gas,
+        accumulator_oil=size * paper.accumulator_oil,
+    )

@@ -1,0 +1,246 @@
+"""The gear-pump electro-hydrostatic actuator: its parameters, and its reduced and lumped models.
+
+Level 1, *reduced*, is equation 5.14 solved for the third derivative of position: the plant that the paper's own
+filter assumes. Level 2, *lumped*, keeps the flow balance 5.8 and the force balance 5.9 apart, with differential
+pressure as a state, so that friction enters undifferentiated and the piston really sticks (errata E9).
+"""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Annotated, TypeAlias
+
+from plant.compiled.functions import Scalar, absolute, sign, where
+from plant.components.friction import quadratic_friction, velocity_under_friction
+from plant.components.valves import pumped_flow, relief_flow
+from plant.solvers.steps import GAMMA, parameter_names
+from plant.units import SI, require_numbers
+
+
+@dataclass(frozen=True, kw_only=True)
+class EhaParameters:
+    """Parameters of the actuator, Tables 2 to 4, normal condition by default.
+
+    Bulk modulus is in the convention of equation 5.8: the compression flow is
+    ``chamber_volume / bulk_modulus`` times the rate of the *differential* pressure (errata E2).
+
+    Raises
+    ------
+    RigError
+        If a value is not a finite number, or a quantity that must be positive is not.
+
+    Examples
+    --------
+    >>> EhaParameters().piston_area
+    0.00152
+    """
+
+    pump_displacement: Annotated[float, SI("m^3/rad", "pump displacement D_p", "Table 2, errata E1")] = 5.57e-7
+    piston_area: Annotated[float, SI("m^2", "effective piston area A", "Table 2")] = 1.52e-3
+    chamber_volume: Annotated[float, SI("m^3", "mean chamber volume V_0", "Table 2, errata E2")] = 1.08e-3
+    moving_mass: Annotated[float, SI("kg", "moving mass M", "section 5")] = 7.376
+    bulk_modulus: Annotated[float, SI("Pa", "effective bulk modulus beta", "section 7, errata E2, E20")] = 2.07e8
+    leakage_coefficient: Annotated[float, SI("m^3/(s Pa)", "lumped leakage L_t", "Table 3, errata E5")] = 4.784e-12
+    flow_bias: Annotated[float, SI("m^3/s", "flow bias Q_b", "Table 3, errata E8")] = 2.413e-6
+    friction_quadratic: Annotated[float, SI("N s^2/m^2", "quadratic friction a_1", "Table 4")] = 6.589e4
+    friction_linear: Annotated[float, SI("N s/m", "linear friction a_2", "Table 4, errata E12")] = 2.144e3
+    friction_coulomb: Annotated[float, SI("N", "Coulomb friction a_3", "Table 4")] = 436.0
+    relief_pressure: Annotated[float, SI("Pa", "relief setting, either direction", "sections 2, 3: 500 psi")] = 3.4475e6
+    relief_conductance: Annotated[
+        float,
+        SI("m^3/(s Pa)", "relief flow a pascal above the setting", "judged: rated pump flow within 7 kPa"),
+    ] = 1e-8
+    accumulator_pressure: Annotated[float, SI("Pa", "inner circuit, absolute", "section 2: 40 psi")] = 2.758e5
+    makeup_conductance: Annotated[
+        float, SI("m^3/(s Pa)", "make-up flow a pascal below the inner circuit", "judged: the paper gives none")
+    ] = 1e-9
+    motor_speed_per_volt: Annotated[
+        float, SI("rad/(s V)", "motor speed a volt of command", "section 7: 4 V is 1200 rpm, errata E1")
+    ] = 31.41592653589793
+    motor_speed_limit: Annotated[float, SI("rad/s", "highest motor speed", "section 4: 8 V input mean")] = 251.4
+    stroke: Annotated[float, SI("m", "full stroke of the piston", "judged: the paper gives none")] = 0.25
+
+    def __post_init__(self) -> None:
+        require_numbers(self, signed=("friction_linear",), zero=MAY_BE_ZERO)
+
+    @property
+    def rated_speed(self) -> float:
+        """Motor speed at the paper's 4 V [rad/s]."""
+        return 4.0 * self.motor_speed_per_volt
+
+
+MAY_BE_ZERO = frozenset(
+    {
+        "leakage_coefficient",
+        "flow_bias",
+        "friction_quadratic",
+        "friction_coulomb",
+        "relief_conductance",
+        "makeup_conductance",
+    }
+)
+"""Parameters that a healthy or idealised actuator may have at exactly zero."""
+
+
+PARAMETER_NAMES = parameter_names(EhaParameters)
+"""Order of the columns of a parameter row."""
+
+EhaValues: TypeAlias = EhaParameters | SimpleNamespace
+"""What the models read: the parameters, or a namespace of the same names holding expressions."""
+
+
+def reduced_derivative(
+    state: tuple[Scalar, Scalar, Scalar], speed: Scalar, p: EhaValues
+) -> tuple[Scalar, Scalar, Scalar]:
+    """Return the rates of the reduced model, equation 5.14 with errata E3, E8 and E19.
+
+    Valid between reversals only: it holds the sign of the velocity constant where equation 5.13 differentiates
+    the Coulomb force (errata E9).
+
+    Parameters
+    ----------
+    state : tuple of float or Expression
+        Position [m], velocity [m/s], acceleration [m/s^2].
+    speed : float or Expression
+        Motor speed [rad/s].
+    p : EhaParameters or namespace of Expression
+        The actuator.
+
+    Returns
+    -------
+    tuple of float or Expression
+        Velocity [m/s], acceleration [m/s^2], jerk [m/s^3].
+    """
+    _, v, a = state
+    A, V0, M, beta, L = p.piston_area, p.chamber_volume, p.moving_mass, p.bulk_modulus, p.leakage_coefficient
+    a1, a2, a3 = p.friction_quadratic, p.friction_linear, p.friction_coulomb
+    direction = sign(v)
+    pumped = pumped_flow(speed, p.pump_displacement, p.flow_bias)
+    swept = A * v
+    leaked = L / A * quadratic_friction(v, direction, a1, a2, a3) + L * M / A * a
+    damping = (a2 + 2.0 * a1 * v * direction) / M * a
+    return v, a, A * beta / (M * V0) * (pumped - swept - leaked) - damping
+
+
+def lumped_derivative(
+    state: tuple[Scalar, Scalar, Scalar], speed: Scalar, direction: Scalar, p: EhaValues
+) -> tuple[Scalar, Scalar, Scalar]:
+    """Return the rates of the lumped model while it slides, equations 5.8 to 5.10 with errata E2 and E8.
+
+    Parameters
+    ----------
+    state : tuple of float or Expression
+        Position [m], velocity [m/s], differential pressure [Pa].
+    speed : float or Expression
+        Motor speed [rad/s].
+    direction : float or Expression
+        Sense of sliding, -1 or 1 [dimensionless].
+    p : EhaParameters or namespace of Expression
+        The actuator.
+
+    Returns
+    -------
+    tuple of float or Expression
+        Velocity [m/s], acceleration [m/s^2], rate of pressure [Pa/s].
+    """
+    _, v, dp = state
+    A = p.piston_area
+    friction = quadratic_friction(v, direction, p.friction_quadratic, p.friction_linear, p.friction_coulomb)
+    return v, (A * dp - friction) / p.moving_mass, pressure_rate(v, dp, speed, p)
+
+
+def pressure_rate(velocity: Scalar, pressure: Scalar, speed: Scalar, p: EhaValues) -> Scalar:
+    """Return the rate of differential pressure from the flow balance 5.8, with relief (errata E2, E8).
+
+    Parameters
+    ----------
+    velocity : float or Expression
+        Piston velocity [m/s].
+    pressure : float or Expression
+        Differential pressure [Pa].
+    speed : float or Expression
+        Motor speed [rad/s].
+    p : EhaParameters or namespace of Expression
+        The actuator.
+
+    Returns
+    -------
+    float or Expression
+        Rate of differential pressure [Pa/s].
+    """
+    pumped = pumped_flow(speed, p.pump_displacement, p.flow_bias)
+    swept = p.piston_area * velocity
+    leaked = p.leakage_coefficient * pressure
+    relieved = relief_flow(pressure, p.relief_pressure, p.relief_conductance)
+    return p.bulk_modulus / p.chamber_volume * (pumped - swept - leaked - relieved)
+
+
+def lumped_step(
+    state: tuple[Scalar, Scalar, Scalar], speeds: tuple[Scalar, Scalar], p: EhaValues, step: Scalar
+) -> tuple[Scalar, Scalar, Scalar]:
+    """Advance the lumped model by one L-stable implicit step, with friction as a set-valued law (errata E9).
+
+    Each of the two stages of the SDIRK2 scheme is an implicit Euler step, which for these equations is a quadratic
+    in the new velocity and solved in closed form (`velocity_under_friction`). When the first stage ends stuck, the
+    second starts from rest: friction has absorbed the momentum.
+
+    Parameters
+    ----------
+    state : tuple of float or Expression
+        Position [m], velocity [m/s], differential pressure [Pa].
+    speeds : tuple of float or Expression
+        Motor speed at the start and at the end of the step [rad/s], linear between.
+    p : EhaParameters or namespace of Expression
+        The actuator.
+    step : float or Expression
+        Time step [s].
+
+    Returns
+    -------
+    tuple of float or Expression
+        The state one step later.
+
+    Examples
+    --------
+    >>> x, v, dp = lumped_step((0.0, 0.0, 0.0), (125.66, 125.66), EhaParameters(), 1e-4)
+    >>> float(v), round(float(dp))
+    (0.0, 1295)
+    """
+    start, end = speeds
+    h = GAMMA * step
+    first = _implicit_stage(state, start + GAMMA * (end - start), p, h)
+    ratio = (1.0 - GAMMA) / GAMMA
+    x, v, dp = (y + ratio * (y1 - y) for y, y1 in zip(state, first, strict=True))
+    moving = absolute(first[1]) > 0.0
+    return _implicit_stage((x, where(moving, v, 0.0), dp), end, p, h)
+
+
+def _implicit_stage(
+    base: tuple[Scalar, Scalar, Scalar], speed: Scalar, p: EhaValues, h: Scalar
+) -> tuple[Scalar, Scalar, Scalar]:
+    """Solve ``y = base + h f(y)`` of the lumped model, with the relief valve shut, then open if the answer says so."""
+    _, _, shut = _stage_with_relief(base, speed, p, h, 0.0, 0.0)
+    opens = absolute(shut) > p.relief_pressure
+    conductance = where(opens, p.relief_conductance, 0.0)
+    return _stage_with_relief(base, speed, p, h, conductance, sign(shut) * conductance * p.relief_pressure)
+
+
+def _stage_with_relief(
+    base: tuple[Scalar, Scalar, Scalar],
+    speed: Scalar,
+    p: EhaValues,
+    h: Scalar,
+    conductance: Scalar,
+    offset: Scalar,
+) -> tuple[Scalar, Scalar, Scalar]:
+    """Solve the stage with relief flow ``conductance * dp - offset``."""
+    x, v, dp = base
+    A, M = p.piston_area, p.moving_mass
+    pumped = pumped_flow(speed, p.pump_displacement, p.flow_bias)
+    stiffness = h * p.bulk_modulus / p.chamber_volume
+    held = 1.0 + stiffness * (p.leakage_coefficient + conductance)
+    blocked_pressure = (dp + stiffness * (pumped + offset)) / held
+    pressure_drop = stiffness * A / held
+    push = M / h * v + A * blocked_pressure
+    resistance = M / h + p.friction_linear + A * pressure_drop
+    new_v = velocity_under_friction(push, resistance, p.friction_quadratic, p.friction_coulomb)
+    return x + h * new_v, new_v, blocked_pressure - pressure_drop * new_v

@@ -1,0 +1,275 @@
+"""The rig file: an actuator's parameters, how well they are known, and what its logs call the channels.
+
+A rig is of any kind of actuator: its parameters are a frozen dataclass whose fields carry `SI` notes.
+"""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from difflib import get_close_matches
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, Generic
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from typing_extensions import TypeVar
+
+from plant.atomic import replacing
+from plant.eha.model import EhaParameters
+from plant.errors import RigError
+from plant.log.columns import check_columns
+from plant.units import notes
+
+_EXAMPLES: Mapping[str, str] = MappingProxyType(
+    {
+        "time_s": "T_MS:ms",
+        "motor_speed_rad_s": "RPM:rpm",
+        "position_m": "POS_MM:mm",
+        "velocity_m_s": "VEL_MM_S:mm/s",
+        "differential_pressure_pa": "DP_BAR:bar",
+        "pressure_a_pa": "PA_BAR:bar",
+        "pressure_b_pa": "PB_BAR:bar",
+        "motor_voltage_v": "U_MOTOR:V",
+    }
+)
+
+
+EHA = "eha"
+"""What a rig file calls the gear-pump actuator; one that names no plant is taken for what is wanted."""
+
+P = TypeVar("P", default=EhaParameters)
+
+
+def _nothing() -> Mapping[str, Any]:
+    return MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Rig(Generic[P]):
+    """An actuator on its bench.
+
+    Parameters
+    ----------
+    name : str
+        What reports call it.
+    parameters : dataclass
+        Its parameters, SI; the paper's gear-pump actuator by default.
+    uncertainties : Mapping[str, float]
+        Relative standard deviation by parameter, a fraction, 0.3 for 30 %; a parameter without one is taken as known.
+    columns : Mapping[str, str]
+        Foreign log columns by channel: ``{"position_m": "POS_MM:mm"}``.
+
+    Raises
+    ------
+    RigError
+        If an uncertainty is of no parameter or negative, or a column's channel or unit is unknown.
+
+    Examples
+    --------
+    >>> Rig("bench 2", EhaParameters(piston_area=3.04e-3), {"bulk_modulus": 0.3}).parameters.piston_area
+    0.00304
+    """
+
+    name: str = "paper"
+    parameters: P = field(default_factory=EhaParameters)  # pyright: ignore[reportAssignmentType] -- P's own default
+    uncertainties: Mapping[str, float] = field(default_factory=_nothing)
+    columns: Mapping[str, str] = field(default_factory=_nothing)
+
+    def __post_init__(self) -> None:
+        _known(self.uncertainties, _names(type(self.parameters)), "uncertainty")
+        for name, value in self.uncertainties.items():
+            if not 0.0 <= value < float("inf"):
+                raise RigError(f"uncertainty.{name} must be 0 or more and finite, got {value!r}")
+        object.__setattr__(self, "uncertainties", MappingProxyType(dict(self.uncertainties)))
+        object.__setattr__(self, "columns", MappingProxyType(check_columns(self.columns)))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return Rig, (self.name, self.parameters, dict(self.uncertainties), dict(self.columns))
+
+
+Strict = Annotated[float, Field(strict=True)]
+
+
+class _RigFile(BaseModel):
+    """What a rig file may hold."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: Annotated[str, Field(strict=True)] = "rig"
+    plant: Annotated[str, Field(strict=True)] | None = None
+    parameters: dict[str, Any] = {}
+    uncertainty: dict[str, Strict] = {}
+    columns: dict[str, Annotated[str, Field(strict=True)]] = {}
+
+
+def read_rig(path: str | Path, parameter_class: type[Any] = EhaParameters, plant: str = EHA) -> Rig[Any]:
+    """Read a rig file; a parameter that it leaves out keeps the default.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file as `rig_template` writes it.
+    parameter_class : type
+        What holds the parameters of the actuator that is wanted.
+    plant : str
+        What that actuator is called.
+
+    Returns
+    -------
+    Rig
+        The rig.
+
+    Raises
+    ------
+    RigError
+        If the file cannot be read or is no TOML, is of another kind of actuator, or an entry is unknown, of the wrong
+        kind, or out of range.
+    """
+    content = _content(Path(path))
+    try:
+        return _rig(content, parameter_class, plant)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        wanted = first["msg"].removeprefix("Input should be ")
+        raise RigError(f"{path}: {where} must be {wanted}, got {first['input']!r}") from error
+    except RigError as error:
+        raise RigError(f"{path}: {error}") from error
+
+
+def plant_of(path: str | Path) -> str | None:
+    """Return which kind of actuator a rig file says that it describes.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    str or None
+        Its ``plant``; None where it names none.
+
+    Raises
+    ------
+    RigError
+        If the file cannot be read or is no TOML.
+    """
+    plant = _content(Path(path)).get("plant")
+    return plant if isinstance(plant, str) else None
+
+
+def _content(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        raise RigError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise RigError(f"{path}: a TOML file is wanted: {error}") from error
+
+
+def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> Rig[Any]:
+    _known(content, _RigFile.model_fields, "")
+    file = _RigFile.model_validate(content)
+    if file.plant not in (None, plant):
+        raise RigError(f"a rig of plant {plant!r} is wanted here, got one of {file.plant!r}")
+    _known(file.parameters, _names(parameter_class), "parameters")
+    values = _values(file.parameters, parameter_class)
+    return Rig(file.name, parameter_class(**values), file.uncertainty, file.columns)
+
+
+def _values(given: Mapping[str, Any], parameter_class: type[Any]) -> dict[str, Any]:
+    """Return the parameters that a file gives as numbers, or rows of numbers where the class has rows."""
+    rows = {name: isinstance(getattr(parameter_class, name, None), tuple) for name in given}
+    kinds: dict[str, Any] = {name: (tuple[Strict, ...] if row else Strict, ...) for name, row in rows.items()}
+    wanted = create_model("Wanted", parameters=(create_model("Parameters", **kinds), ...))
+    return wanted.model_validate({"parameters": given}).model_dump()["parameters"]
+
+
+def _names(parameter_class: type[Any]) -> list[str]:
+    return [one.name for one in fields(parameter_class)]
+
+
+def _known(given: Iterable[str], known: Iterable[str], section: str) -> None:
+    names = list(known)
+    for name in given:
+        if name not in names:
+            near = get_close_matches(name, names, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"wanted one of {', '.join(names)}"
+            raise RigError(f"{f'{section}.{name}' if section else name} is unknown, {hint}")
+
+
+def rig_template(
+    parameter_class: type[Any] = EhaParameters, plant: str = EHA, columns: Mapping[str, str] = _EXAMPLES
+) -> str:
+    """Return a commented rig file that describes an actuator with default parameters, in TOML.
+
+    Parameters
+    ----------
+    parameter_class : type
+        What holds them; the paper's gear-pump actuator by default.
+    plant : str
+        What the kind of actuator is called.
+    columns : Mapping[str, str]
+        An example of a foreign column by channel.
+
+    Returns
+    -------
+    str
+        The text; `read_rig` makes default parameters of it.
+
+    Examples
+    --------
+    >>> print(rig_template().splitlines()[0])
+    # A rig: an actuator's parameters, how well they are known, and what its logs call the channels.
+    """
+    parameters = parameter_class()
+    lines = [
+        "# A rig: an actuator's parameters, how well they are known, and what its logs call the channels.",
+        "# All values are SI. A parameter that is left out keeps the value shown here.",
+        "",
+        *(['name = "paper"'] if plant == EHA else [f'name = "{plant}"', f'plant = "{plant}"']),
+        "",
+        "[parameters]",
+    ]
+    for name, note in notes(parameter_class).items():
+        value = getattr(parameters, name)
+        lines.append(f"# {note.meaning} [{note.unit}]; source: {note.source}")
+        lines.append(f"{name} = {list(value) if isinstance(value, tuple) else value!r}")
+    first = next(iter(notes(parameter_class))) if plant != EHA else "bulk_modulus"
+    lines += [
+        "",
+        "[uncertainty]",
+        "# Relative standard deviation of a parameter: 0.3 is 30 %. What is not named is taken as known.",
+        f"# {first} = 0.3",
+        "",
+        "[columns]",
+        '# Log columns under other names, with their unit after a colon: channel = "NAME:UNIT".',
+    ]
+    lines += [f'# {channel} = "{example}"' for channel, example in columns.items()]
+    return "\n".join(lines) + "\n"
+
+
+def write_rig_template(path: str | Path, template: str | None = None) -> None:
+    """Write a commented rig file, unless a file of that name is there.
+
+    Parameters
+    ----------
+    path : str or Path
+        Where to.
+    template : str, optional
+        As `rig_template` gives it; that of the paper's actuator if not given.
+
+    Raises
+    ------
+    RigError
+        If the file exists or cannot be written.
+    """
+    path = Path(path)
+    if path.exists() or path.is_symlink():
+        raise RigError(f"{path}: there is such a file already, and it is not overwritten")
+    try:
+        with replacing(path) as file:
+            file.write((rig_template() if template is None else template).encode())
+    except OSError as error:
+        raise RigError(f"{path}: cannot be written: {error.strerror or error}") from error

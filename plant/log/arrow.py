@@ -1,0 +1,63 @@
+"""Columns between NumPy and Arrow; Arrow's own ways would import pandas, which takes longer than reading a log."""
+
+from typing import Any, cast
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+Values = NDArray[np.float64]
+
+
+def from_arrow(column: "pa.ChunkedArray[Any]") -> Values:
+    """Return a column of Arrow's as an array of its own, NaN where it has no value.
+
+    Parameters
+    ----------
+    column : pyarrow.ChunkedArray
+        Of type float64.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Its values.
+
+    Examples
+    --------
+    >>> from_arrow(pa.chunked_array([[1.0, None], [2.0]])).tolist()
+    [1.0, nan, 2.0]
+    """
+    out, end = np.empty(len(column)), 0
+    for chunk in column.chunks:
+        begin, end = end, end + len(chunk)
+        there, values = (cast("Any", one) for one in chunk.buffers())  # of the buffer protocol, as stubs do not say
+        if values is not None:
+            out[begin:end] = np.frombuffer(values, dtype=np.float64)[chunk.offset : chunk.offset + len(chunk)]
+        if chunk.null_count and there is not None:
+            bits = np.unpackbits(np.frombuffer(there, dtype=np.uint8), bitorder="little")
+            out[begin:end][bits[chunk.offset : chunk.offset + len(chunk)] == 0] = np.nan
+    return out
+
+
+def to_arrow(values: Values) -> "pa.Array[Any]":
+    """Return an array as a column of Arrow's, without a value where it is NaN.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Any column.
+
+    Returns
+    -------
+    pyarrow.Array
+        Of type float64.
+
+    Examples
+    --------
+    >>> to_arrow(np.array([1.0, np.nan])).to_pylist()
+    [1.0, None]
+    """
+    there: Any = np.packbits(~np.isnan(values), bitorder="little")
+    numbers: Any = np.ascontiguousarray(values, dtype=np.float64)
+    buffers: list[pa.Buffer | None] = [pa.py_buffer(there), pa.py_buffer(numbers)]
+    return pa.Array.from_buffers(pa.float64(), len(values), buffers)

@@ -1,0 +1,90 @@
+"""Cells of a log as numbers: what is one, what says that nothing was measured, and what is refused."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.errors import LogError
+
+MISSING = ("", "NaN", "nan", "-NaN", "-nan", "NA", "N/A", "n/a", "#N/A", "NULL", "null", "None")
+"""Cells that say that nothing was measured."""
+
+
+def number(text: str) -> float:
+    """Return a cell of text as a number, NaN if it is empty or says that nothing was measured.
+
+    Parameters
+    ----------
+    text : str
+        The cell.
+
+    Returns
+    -------
+    float
+        Its value.
+
+    Raises
+    ------
+    ValueError
+        If the text is not a number.
+    """
+    cell = text.strip()
+    if cell in MISSING:
+        return float("nan")
+    if "_" in cell:  # Python reads 1_000, no logger writes it
+        raise ValueError(cell)
+    return float(cell)
+
+
+def numbers(values: NDArray[Any], name: str, source: str) -> NDArray[np.float64]:
+    """Return a column as floats, shape (n,), NaN where it says that nothing was measured.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Numbers, or objects and text that may be numbers.
+    name, source : str
+        The column and the log, for messages.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        The numbers.
+
+    Raises
+    ------
+    LogError
+        If the column is not one-dimensional, or a value is not a real number; it names the first.
+    """
+    if values.ndim != 1:
+        raise LogError(f"column {name!r} must be one-dimensional, got shape {values.shape}", source)
+    if values.dtype.kind in "fiub":
+        return np.ascontiguousarray(values, dtype=np.float64)
+    out = np.empty(len(values))
+    for row, value in enumerate(values):
+        try:
+            out[row] = np.nan if value is None else number(value) if isinstance(value, str) else float(value)
+        except (TypeError, ValueError) as error:
+            raise not_a_number(source, name, row, value) from error
+    return out
+
+
+def not_a_number(source: str, name: str, row: int, value: object) -> LogError:
+    """Return the error for a cell that is not a number.
+
+    Parameters
+    ----------
+    source, name : str
+        The log and the column.
+    row : int
+        The row from 0; the sentence counts from 1, without the header.
+    value : object
+        What stands there.
+
+    Returns
+    -------
+    LogError
+        The error.
+    """
+    return LogError(f"column {name!r} must hold numbers, got {str(value)[:40]!r} in row {row + 1}", source)

@@ -1,0 +1,292 @@
+"""Which column of a log is which channel, and in what unit: canonical names, unit suffixes, foreign names."""
+
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.errors import HydrostateError, LogError, MissingColumnError, RigError
+from plant.units import conversion_to
+
+CHANNELS: Mapping[str, str] = MappingProxyType(
+    {
+        "motor_speed_rad_s": "rad/s",
+        "position_m": "m",
+        "velocity_m_s": "m/s",
+        "differential_pressure_pa": "Pa",
+        "pressure_a_pa": "Pa",
+        "pressure_b_pa": "Pa",
+        "motor_voltage_v": "V",
+        "drive_voltage_v": "V",
+        "stack_displacement_m": "m",
+        "stack_force_n": "N",
+        "chamber_pressure_pa": "Pa",
+        **{f"electrode_{i}_v": "V" for i in range(1, 8)},
+    }
+)
+"""Every channel that the project reads, with its unit. `time_s` is implied by `Record.sample_time`."""
+
+TIME = "time_s"
+"""The column that says when; it becomes the record's clock."""
+
+TRUTH = "true_"
+"""Columns that begin so hold simulated truth, and are kept as they are."""
+
+_units: dict[str, str] = {}
+_stems: dict[str, str] = {}
+
+UNITS: Mapping[str, str] = MappingProxyType(_units)
+"""Unit of every column that is known, `CHANNELS` and those that other actuators brought with `know_channels`."""
+
+STEMS: Mapping[str, str] = MappingProxyType(_stems)
+"""Channel by its name without the unit."""
+
+
+def know_channels(units: Mapping[str, str]) -> None:
+    """Let logs have further channels, as a kind of actuator that is not among the shipped ones brings them.
+
+    Parameters
+    ----------
+    units : Mapping[str, str]
+        Unit by channel; a channel's name ends in its unit, ``spool_position_m``.
+
+    Raises
+    ------
+    HydrostateError
+        If a channel is known in another unit, or its name does not end in it.
+    """
+    for name, unit in units.items():
+        ending = "_" + unit.replace("/", "_").replace("^", "").lower()
+        if UNITS.get(name, unit) != unit or not name.endswith(ending):
+            raise HydrostateError(f"channel {name!r} in {unit!r} must end in {ending!r} and be known in no other unit")
+        _units[name] = unit
+        _stems[name.removesuffix(ending) + "_"] = name
+
+
+know_channels({TIME: "s", **CHANNELS})
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a log that becomes a channel.
+
+    Parameters
+    ----------
+    position : int
+        Where it stands in the log, from 0.
+    name : str
+        Its name in the log.
+    channel : str
+        The channel that it becomes, or ``time_s``.
+    factor, offset : float
+        ``value * factor + offset`` is in the channel's SI unit.
+    """
+
+    position: int
+    name: str
+    channel: str
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+def resolve_columns(names: Sequence[str], mapping: Mapping[str, str] | None, source: str) -> tuple[Column, ...]:
+    """Return the columns of a log that become channels; all others are left unread.
+
+    Parameters
+    ----------
+    names : Sequence[str]
+        Column names, in the order of the log.
+    mapping : Mapping[str, str] or None
+        Foreign names by channel, with a unit after a colon where it is not SI: ``"POS_MM:mm"``. A mapped
+        channel is taken from there alone, whatever the other columns are called.
+    source : str
+        What messages call the log.
+
+    Returns
+    -------
+    tuple[Column, ...]
+        One column for each channel found.
+
+    Raises
+    ------
+    LogError
+        If a mapped column is missing, a channel or a unit is unknown, or two columns give one channel.
+
+    Examples
+    --------
+    >>> [column.channel for column in resolve_columns(["time_ms", "note", "position_mm"], None, "a.csv")]
+    ['time_s', 'position_m']
+    """
+    clean = [name.strip().removeprefix("\ufeff").strip() for name in names]
+    found = {channel: _foreign(clean, channel, spec, source) for channel, spec in (mapping or {}).items()}
+    taken = {column.position for column in found.values()}
+    strange: list[tuple[str, LogError]] = []
+    for position, name in enumerate(clean):
+        if position in taken:
+            continue
+        channel = _channel_of(name)
+        if channel is None or channel in (mapping or {}):
+            continue
+        try:
+            column = _by_suffix(position, name, channel, source)
+        except LogError as error:
+            strange.append((channel, error))
+            continue
+        if channel in found:
+            raise LogError(
+                f"columns {found[channel].name!r} and {name!r} both give {channel}, wanted one; "
+                f"name the right one as {channel}=NAME:UNIT",
+                source,
+            )
+        found[channel] = column
+    for channel, error in strange:
+        if channel not in found:
+            raise error
+    return tuple(found.values())
+
+
+def _channel_of(name: str) -> str | None:
+    if name in UNITS or (name.startswith(TRUTH) and name != TRUTH):
+        return name
+    stems = [stem for stem in STEMS if name.startswith(stem)]
+    return STEMS[max(stems, key=len)] if stems else None
+
+
+def _by_suffix(position: int, name: str, channel: str, source: str) -> Column:
+    if name == channel:
+        return Column(position, name, channel)
+    stem = next(stem for stem, owner in STEMS.items() if owner == channel)
+    suffix = name.removeprefix(stem)
+    unit = re.sub(r"([A-Za-z])([234])(?![0-9])", r"\1^\2", suffix.replace("_per_", "/").replace("_", "/"))
+    factor, offset = _conversion(unit, channel, name, source)
+    return Column(position, name, channel, factor, offset)
+
+
+def _foreign(names: Sequence[str], channel: str, spec: str, source: str) -> Column:
+    _known_channel(channel, lambda message: LogError(message, source))
+    name, unit = _name_and_unit(spec)
+    if spec in names:
+        name, unit = spec, None
+    positions = [position for position, other in enumerate(names) if other == name]
+    if not positions:
+        raise MissingColumnError(channel, name, _listed(names), source)
+    if len(positions) > 1:
+        raise LogError(f"column {name!r} is wanted once for {channel}, the log has it {len(positions)} times", source)
+    if unit is None or channel.startswith(TRUTH):
+        return Column(positions[0], name, channel)
+    return Column(positions[0], name, channel, *_conversion(unit, channel, name, source))
+
+
+def _name_and_unit(spec: str) -> tuple[str, str | None]:
+    name, colon, unit = spec.rpartition(":")
+    return (name.strip(), unit.strip()) if colon else (spec.strip(), None)
+
+
+def _conversion(unit: str, channel: str, name: str, source: str) -> tuple[float, float]:
+    try:
+        return conversion_to(unit, UNITS[channel])
+    except ValueError as error:
+        raise LogError(f"column {name!r} cannot become {channel}: {error}", source) from error
+
+
+def _known_channel(channel: str, error: Callable[[str], HydrostateError]) -> None:
+    if channel in UNITS or channel.startswith(TRUTH):
+        return
+    near = get_close_matches(channel, UNITS, n=1)
+    hint = f"did you mean {near[0]!r}?" if near else f"wanted one of {', '.join(UNITS)}"
+    raise error(f"channel {channel!r} is unknown, {hint}")
+
+
+def _listed(names: Collection[str], limit: int = 12) -> str:
+    shown = ", ".join(repr(name[:40]) for name in list(names)[:limit])
+    return (shown or "no columns") + (f" and {len(names) - limit} more" if len(names) > limit else "")
+
+
+def check_columns(mapping: Mapping[str, str]) -> dict[str, str]:
+    """Return a mapping of channels to foreign columns, after checking its channels and units.
+
+    Parameters
+    ----------
+    mapping : Mapping[str, str]
+        ``{"position_m": "POS_MM:mm"}``.
+
+    Returns
+    -------
+    dict[str, str]
+        The same mapping.
+
+    Raises
+    ------
+    RigError
+        If a channel is unknown, a column has no name, or a unit does not convert to the channel's.
+    """
+    for channel, spec in mapping.items():
+        _known_channel(channel, RigError)
+        name, unit = _name_and_unit(spec)
+        if not name:
+            raise RigError(f"{channel} wants a column as NAME or NAME:UNIT, got {spec!r}")
+        if unit is not None and channel in UNITS:
+            try:
+                conversion_to(unit, UNITS[channel])
+            except ValueError as error:
+                raise RigError(f"{channel}={spec}: {error}") from error
+    return dict(mapping)
+
+
+def parse_columns(texts: Sequence[str]) -> dict[str, str]:
+    """Return ``CHANNEL=NAME:UNIT`` texts, as a command line gives them, as a mapping.
+
+    Parameters
+    ----------
+    texts : Sequence[str]
+        One channel each, the unit optional: ``["position_m=POS_MM:mm"]``.
+
+    Returns
+    -------
+    dict[str, str]
+        Foreign column, with its unit, by channel.
+
+    Raises
+    ------
+    RigError
+        If a text has another shape, a channel comes twice or is unknown, or a unit does not convert.
+
+    Examples
+    --------
+    >>> parse_columns(["position_m=POS_MM:mm", "motor_speed_rad_s=RPM:rpm"])
+    {'position_m': 'POS_MM:mm', 'motor_speed_rad_s': 'RPM:rpm'}
+    """
+    mapping: dict[str, str] = {}
+    for text in texts:
+        channel, equals, spec = (part.strip() for part in text.partition("="))
+        if not (channel and equals and spec):
+            raise RigError(f"columns are wanted as CHANNEL=NAME:UNIT (position_m=POS_MM:mm), got {text!r}")
+        if channel in mapping:
+            raise RigError(f"channel {channel!r} is wanted once, got {mapping[channel]!r} and {spec!r}")
+        mapping[channel] = spec
+    return check_columns(mapping)
+
+
+def converted(raw: Mapping[Column, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+    """Return columns as channels in SI.
+
+    Parameters
+    ----------
+    raw : Mapping[Column, ndarray, shape (n,)]
+        Values in the units of the log.
+
+    Returns
+    -------
+    dict[str, ndarray, shape (n,)]
+        Values in SI by channel.
+    """
+    return {
+        column.channel: values
+        if (column.factor, column.offset) == (1.0, 0.0)
+        else values * column.factor + column.offset
+        for column, values in raw.items()
+    }

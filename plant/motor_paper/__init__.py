@@ -1,0 +1,1 @@
+"""Linear models of the diaphragm motor's paper: vibration, hysteresis, control loops."""

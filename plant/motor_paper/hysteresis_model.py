@@ -1,0 +1,219 @@
+"""The diaphragm-motor paper's stack with hysteresis, equations 20 and 21: its loop, and the linear model about it.
+
+``m x'' + b x' + k x = k d (u - h)``, where h is Bouc-Wen's, in volts (errata M20, M21). For small voltages h is a share
+of u; at an amplitude its first harmonic is one too, with a phase that no frequency changes: the describing function.
+"""
+
+from dataclasses import dataclass
+from math import pi, sqrt
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.compiled.functions import Scalar
+from plant.components.bouc_wen import power_bouc_wen_rate
+from plant.errors import RigError
+from plant.solvers.steps import rk4_step
+from plant.units import SI, require_numbers
+
+if TYPE_CHECKING:
+    import control
+
+Array: TypeAlias = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HysteresisParameters:
+    """A diaphragm's centre as mass, damper and spring, with hysteresis in volts.
+
+    Raises
+    ------
+    RigError
+        If a value is not finite, mass, damping or stiffness are not positive, or the exponent is below 1.
+
+    Examples
+    --------
+    >>> round(HysteresisParameters().natural_frequency)
+    3985
+    """
+
+    mass: Annotated[float, SI("kg", "mass m", "judged: a fifth of the diaphragm inside the clamp")] = 5.2e-4
+    damping: Annotated[float, SI("N s/m", "damping b", "judged: two percent of critical")] = 0.52
+    stiffness: Annotated[float, SI("N/m", "stiffness k", "first mode of Table 1's composite plate, dry")] = 3.26e5
+    stroke_a_volt: Annotated[float, SI("m/V", "d: displacement a volt without hysteresis", "composite plate")] = 8.38e-8
+    alpha: Annotated[float, SI("1", "alpha of equation 21: share of hysteresis at small voltage", "judged")] = 0.30
+    beta: Annotated[float, SI("1/V", "beta of equation 21, for exponent 1", "judged: a loop 11 % wide at 100 V")] = (
+        0.006
+    )
+    gamma: Annotated[float, SI("1/V", "gamma of equation 21, for exponent 1", "judged")] = 0.002
+    exponent: Annotated[float, SI("1", "exponent n of equation 21", "judged")] = 1.0
+
+    def __post_init__(self) -> None:
+        require_numbers(self, signed=("stroke_a_volt", "alpha", "beta", "gamma", "exponent"))
+        if self.exponent < 1.0:
+            raise RigError(f"exponent must be at least 1, got {self.exponent!r}")
+
+    @property
+    def natural_frequency(self) -> float:
+        """Natural frequency, equation 20 [Hz]."""
+        return sqrt(self.stiffness / self.mass) / (2.0 * pi)
+
+
+def hysteresis_loop(
+    p: HysteresisParameters,
+    amplitude: float,
+    frequency: float,
+    samples: int = 1000,
+    law: Literal["mended", "printed"] = "mended",
+) -> tuple[Array, Array]:
+    """Return voltage and hysteresis over the fourth cycle of a sine from rest, equation 21 (errata M21).
+
+    Parameters
+    ----------
+    p : HysteresisParameters
+        Shape of the loop.
+    amplitude : float
+        Amplitude of the voltage [V].
+    frequency : float
+        Its frequency [Hz].
+    samples : int
+        Steps a cycle.
+    law : {"mended", "printed"}
+        ``alpha u' - beta abs(u') h abs(h)^(n-1) - gamma u' abs(h)^n``; printed, u' is u in the first and last term.
+
+    Returns
+    -------
+    tuple of ndarray, each of shape (samples + 1,)
+        Voltage [V] and hysteresis [V]; the last sample is where the next cycle begins.
+
+    Examples
+    --------
+    >>> voltage, hysteresis = hysteresis_loop(HysteresisParameters(), 100.0, 480.0)
+    >>> round(loop_area(voltage, hysteresis))
+    2069
+    """
+    angle = 2.0 * pi * np.arange(4 * samples + 1) / samples
+    voltage, rate = amplitude * np.sin(angle), 2.0 * pi * frequency * amplitude * np.cos(angle)
+
+    def mended(state: tuple[Scalar, ...], speed: Scalar, _p: object) -> tuple[Scalar, ...]:
+        return (power_bouc_wen_rate(speed, state[0], p.alpha, p.beta, p.gamma, p.exponent),)
+
+    step = rk4_step(mended)
+    seconds = 1.0 / (frequency * samples)
+    hysteresis = np.zeros(angle.shape[0])
+    h = 0.0
+    for k in range(angle.shape[0] - 1):
+        if law == "mended":
+            h = step((h,), (rate[k], rate[k + 1]), p, seconds)[0]
+        else:
+            u, speed = 0.5 * (voltage[k] + voltage[k + 1]), abs(0.5 * (rate[k] + rate[k + 1]))
+            yielding = (p.beta * speed + p.gamma * u * np.sign(h)) * abs(h) ** (p.exponent - 1.0)
+            h = (h + seconds * p.alpha * u) / (1.0 + seconds * yielding)
+        hysteresis[k + 1] = h
+    return voltage[-samples - 1 :], hysteresis[-samples - 1 :]
+
+
+def loop_area(voltage: Array, hysteresis: Array) -> float:
+    """Return the area of a closed loop, by trapezia: what equation 20 turns into heat, over k d.
+
+    Parameters
+    ----------
+    voltage : ndarray, shape (n,)
+        Voltage [V].
+    hysteresis : ndarray, shape (n,)
+        Hysteresis [V].
+
+    Returns
+    -------
+    float
+        Area [V^2].
+    """
+    return abs(float(np.trapezoid(hysteresis, voltage)))
+
+
+def describing_function(voltage: Array, hysteresis: Array) -> complex:
+    """Return the first harmonic of the hysteresis over that of its sine of voltage.
+
+    Parameters
+    ----------
+    voltage : ndarray, shape (n,)
+        One cycle [V], its last sample the next one's first.
+    hysteresis : ndarray, shape (n,)
+        The same of the hysteresis [V].
+
+    Returns
+    -------
+    complex
+        Its real part is the share in phase with the voltage, its imaginary part times pi a^2 the loop's area.
+    """
+    return complex(harmonics(hysteresis, 1)[1] / harmonics(voltage, 1)[1])
+
+
+def harmonics(cycle: Array, count: int, cycles: int = 1) -> NDArray[np.complex128]:
+    """Return mean and harmonics of whole cycles of a periodic signal, Figures 19 to 21 and 30.
+
+    Parameters
+    ----------
+    cycle : ndarray, shape (n,)
+        Whole cycles [any unit], the last sample the next one's first.
+    count : int
+        Harmonics wanted, the first included.
+    cycles : int
+        Cycles that the signal holds.
+
+    Returns
+    -------
+    ndarray of complex, shape (count + 1,)
+        Mean, then amplitudes with phase, in the signal's unit.
+
+    Examples
+    --------
+    >>> angle = np.linspace(0.0, 2.0 * np.pi, 65)
+    >>> np.abs(harmonics(1.0 + 3.0 * np.sin(angle) + 0.5 * np.cos(2.0 * angle), 3)).round(6).tolist()
+    [1.0, 3.0, 0.5, 0.0]
+    """
+    lines = np.fft.rfft(cycle[:-1]) / (cycle.shape[0] - 1)
+    found = lines[: count * cycles + 1 : cycles]
+    return np.concatenate([found[:1], 2.0 * found[1:]])
+
+
+def total_harmonic_distortion(lines: NDArray[np.complex128]) -> float:
+    """Return the harmonics above the first over the first, Figure 21.
+
+    Parameters
+    ----------
+    lines : ndarray of complex, shape (n,)
+        As `harmonics` returns them [any unit].
+
+    Returns
+    -------
+    float
+        Root of their summed squares over the first's size [dimensionless].
+
+    Examples
+    --------
+    >>> total_harmonic_distortion(np.array([0.0, 10.0, 0.3, 0.4], dtype=complex))
+    0.05
+    """
+    return float(np.linalg.norm(lines[2:]) / abs(lines[1]))
+
+
+def linearised(p: HysteresisParameters) -> "control.TransferFunction":
+    """Return the model for small voltages, ``k d (1 - alpha)/(m s^2 + b s + k)``, equation 20 linearised (errata M20).
+
+    Parameters
+    ----------
+    p : HysteresisParameters
+        The diaphragm.
+
+    Returns
+    -------
+    control.TransferFunction
+        From voltage [V] to displacement [m].
+    """
+    import control  # slow to import, and few callers need it
+
+    gain = p.stiffness * p.stroke_a_volt * (1.0 - p.alpha)
+    names = {"inputs": ["voltage_v"], "outputs": ["displacement_m"]}
+    return control.TransferFunction([gain], [p.mass, p.damping, p.stiffness], **names)

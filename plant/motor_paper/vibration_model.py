@@ -1,0 +1,258 @@
+"""The diaphragm-motor paper's linear vibration model, equations 1 to 4, with its signs mended and as printed.
+
+Two masses and three springs: the diaphragms, the fluid and the load at the cylinder (errata M1 to M4, M13). It gives
+the alternating motion and its resonance only. Valves rectify nothing here, so there is no mean velocity: that is the
+diaphragm-motor plant's.
+"""
+
+from dataclasses import dataclass
+from math import pi, sqrt
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.errors import RigError
+from plant.motor_paper.fractional import oustaloup_states
+from plant.units import SI, require_numbers
+
+if TYPE_CHECKING:
+    import control
+
+Array: TypeAlias = NDArray[np.float64]
+Matrices: TypeAlias = tuple[Array, Array, Array, Array]
+"""A, B, C, D of equation 13."""
+
+Signs: TypeAlias = Literal["mended", "printed"]
+
+OUSTALOUP_BAND_HZ, OUSTALOUP_STATES = (1.0, 1e5), 9
+"""Where and by how many states a fractional damping is imitated in a linear model."""
+
+CALIBRATED = "calibrated: first mode at 480 Hz"
+
+
+@dataclass(frozen=True, kw_only=True)
+class VibrationParameters:
+    """Masses, springs and dampers of equations 1 and 2; without cubic spring and fractional damping by default.
+
+    Raises
+    ------
+    RigError
+        If a value is not finite or of the wrong sign, or the order is not from 0 to below 2.
+    """
+
+    diaphragm_mass: Annotated[float, SI("kg", "mass M_1 of the diaphragms", CALIBRATED)] = 1.96e-3
+    cylinder_mass: Annotated[float, SI("kg", "mass M_2 of piston and liquid", CALIBRATED)] = 3.22e-2
+    diaphragm_stiffness: Annotated[
+        float, SI("N/m", "stiffness k_1 of the diaphragms", "A_c^2/C_d, composite plate of Table 1")
+    ] = 1.226e6
+    fluid_stiffness: Annotated[
+        float, SI("N/m", "stiffness k_2 of fluid and line", "A_c^2/(C_line + V_A/beta), judged")
+    ] = 3.51e5
+    load_stiffness: Annotated[float, SI("N/m", "stiffness k_3 at the cylinder", "judged")] = 2e4
+    cubic_stiffness: Annotated[float, SI("N/m^3", "cubic spring k_4 at the cylinder, errata M2", "judged")] = 0.0
+    damping: Annotated[float, SI("N s/m", "viscous damping c", "judged: a tenth of critical")] = 19.4
+    fractional_damping: Annotated[
+        float, SI("N/m", "fractional damping c_f, times s to the power of the order, errata M5", "judged")
+    ] = 0.0
+    fractional_order: Annotated[float, SI("1", "order a of the fractional damping, errata M5", "judged")] = 1.0
+
+    def __post_init__(self) -> None:
+        require_numbers(
+            self,
+            zero=("load_stiffness", "cubic_stiffness", "damping", "fractional_damping", "fractional_order"),
+        )
+        if self.fractional_order >= 2.0:
+            raise RigError(f"fractional_order must be below 2, which is a mass, got {self.fractional_order!r}")
+
+    @property
+    def natural_frequency(self) -> float:
+        """First natural frequency without M_1 and damping, equation 4 mended (errata M4) [Hz]."""
+        return sqrt(reduced_stiffness(self) / self.cylinder_mass) / (2.0 * pi)
+
+
+def reduced_stiffness(
+    p: VibrationParameters, equation: Literal["mended", "printed", "printed_1_to_3"] = "mended"
+) -> float:
+    """Return the linear stiffness on x_2 after x_1 is eliminated, equation 4 (errata M3, M4).
+
+    Parameters
+    ----------
+    p : VibrationParameters
+        Springs.
+    equation : {"mended", "printed", "printed_1_to_3"}
+        With restoring springs; as equation 4 prints it; or as equations 1 to 3 as printed would give it.
+
+    Returns
+    -------
+    float
+        Stiffness [N/m].
+
+    Examples
+    --------
+    >>> p = VibrationParameters(diaphragm_stiffness=1.0, fluid_stiffness=2.0, load_stiffness=0.1)
+    >>> [round(reduced_stiffness(p, name), 3) for name in ("mended", "printed", "printed_1_to_3")]
+    [0.767, 2.2, -2.1]
+    """
+    k1, k2, k3 = p.diaphragm_stiffness, p.fluid_stiffness, p.load_stiffness
+    if equation == "mended":
+        return k1 * k2 / (k1 + k2) + k3
+    if equation == "printed":
+        return k2 * (k1 - k3 - k2) / (k1 - k2)
+    return (k1 * k2 - k1 * k3 + k2 * k3) / (k1 - k2)
+
+
+def mechanical_matrices(p: VibrationParameters, signs: Signs = "mended") -> Matrices:
+    """Return the state space from force to x_2, without fractional damping (equations 1, 2 and 13, errata M1, M2, M13).
+
+    Parameters
+    ----------
+    p : VibrationParameters
+        Masses, springs, damper.
+    signs : {"mended", "printed"}
+        Whose signs. Printed, equation 1 has ``-k_2 (x_1 - x_2)`` and equation 2 ``-k_3 x_2 - c x_2'``.
+
+    Returns
+    -------
+    tuple of ndarray
+        A of shape (4, 4) on x_1 [m], x_1' [m/s], x_2 [m], x_2' [m/s]; B (4, 1), C (1, 4), D (1, 1).
+    """
+    M1, M2, k1, k2 = p.diaphragm_mass, p.cylinder_mass, p.diaphragm_stiffness, p.fluid_stiffness
+    pull, restoring = (1.0, 1.0) if signs == "mended" else (-1.0, -1.0)
+    A = np.array(
+        [
+            [0.0, 1.0, 0.0, 0.0],
+            [-(k1 + pull * k2) / M1, 0.0, pull * k2 / M1, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+            [k2 / M2, 0.0, -(k2 + restoring * p.load_stiffness) / M2, -restoring * p.damping / M2],
+        ]
+    )
+    B = np.array([[0.0], [1.0 / M1], [0.0], [0.0]])
+    return A, B, np.array([[0.0, 0.0, 1.0, 0.0]]), np.zeros((1, 1))
+
+
+def massless_matrices(p: VibrationParameters) -> Matrices:
+    """Return the state space of equation 4: M_1 left out, signs mended (errata M3, M4).
+
+    Parameters
+    ----------
+    p : VibrationParameters
+        Mass, springs, damper.
+
+    Returns
+    -------
+    tuple of ndarray
+        A of shape (2, 2) on x_2 [m], x_2' [m/s]; B (2, 1), C (1, 2), D (1, 1).
+    """
+    M2, k1, k2 = p.cylinder_mass, p.diaphragm_stiffness, p.fluid_stiffness
+    A = np.array([[0.0, 1.0], [-reduced_stiffness(p) / M2, -p.damping / M2]])
+    B = np.array([[0.0], [k2 / (k1 + k2) / M2]])
+    return A, B, np.array([[1.0, 0.0]]), np.zeros((1, 1))
+
+
+def with_fractional_damping(matrices: Matrices, p: VibrationParameters) -> Matrices:
+    """Return a state space with ``-c_f D^a x_2`` on the cylinder's mass, by Oustaloup's states (errata M2, M5).
+
+    Parameters
+    ----------
+    matrices : tuple of ndarray
+        As `mechanical_matrices` or `massless_matrices` return them: x_2 and x_2' are the last two states.
+    p : VibrationParameters
+        Damping, order and mass.
+
+    Returns
+    -------
+    tuple of ndarray
+        The same with Oustaloup's states behind; unchanged if there is no fractional damping.
+    """
+    if p.fractional_damping == 0.0:
+        return matrices
+    A, B, C, D = matrices
+    states = oustaloup_states(p.fractional_order, *OUSTALOUP_BAND_HZ, OUSTALOUP_STATES)
+    n, m = A.shape[0], states.B.shape[0]
+    source = n - 1 if states.on_velocity else n - 2
+    strength = p.fractional_damping / p.cylinder_mass
+    wide = np.zeros((n + m, n + m))
+    wide[:n, :n], wide[n:, n:] = A, states.A
+    wide[n - 1, source] -= strength * states.D
+    wide[n - 1, n:] = -strength * states.C
+    wide[n:, source] = states.B
+    return wide, np.vstack([B, np.zeros((m, 1))]), np.hstack([C, np.zeros((1, m))]), D
+
+
+def state_space(p: VibrationParameters, *, massless: bool = False, signs: Signs = "mended") -> "control.StateSpace":
+    """Return the model as a state space of python-control, from force [N] to displacement x_2 [m], equation 13.
+
+    Parameters
+    ----------
+    p : VibrationParameters
+        The model; its fractional damping becomes Oustaloup's states, its cubic spring is left out.
+    massless : bool
+        Whether M_1 is left out, as in equation 4.
+    signs : {"mended", "printed"}
+        Whose signs; the printed ones only with both masses and without fractional damping.
+
+    Returns
+    -------
+    control.StateSpace
+        For Bode, Nyquist, poles and zeros.
+    """
+    import control  # slow to import, and few callers need it
+
+    matrices = massless_matrices(p) if massless else mechanical_matrices(p, signs)
+    if signs == "mended":
+        matrices = with_fractional_damping(matrices, p)
+    return control.StateSpace(*matrices, inputs=["force_n"], outputs=["displacement_m"])
+
+
+def first_mode(poles: NDArray[np.complex128]) -> complex:
+    """Return the slowest oscillating pole, of positive frequency.
+
+    Parameters
+    ----------
+    poles : ndarray of complex, shape (n,)
+        Of a linear model [rad/s].
+
+    Returns
+    -------
+    complex
+        The pole [rad/s].
+
+    Raises
+    ------
+    RigError
+        If nothing oscillates.
+
+    Examples
+    --------
+    >>> pole = first_mode(np.linalg.eigvals(massless_matrices(VibrationParameters())[0]))
+    >>> round(abs(pole) / (2.0 * pi), 1)
+    480.0
+    """
+    swinging = [complex(pole) for pole in poles if pole.imag > 1e-6 * abs(pole)]
+    if not swinging:
+        raise RigError("the model must oscillate to have a first mode, got real poles only")
+    return min(swinging, key=abs)
+
+
+def exact_response(p: VibrationParameters, frequency: Array) -> NDArray[np.complex128]:
+    """Return the response from force to x_2 with the fractional damping as it is, ``c_f (i omega)^a`` (errata M2, M5).
+
+    Parameters
+    ----------
+    p : VibrationParameters
+        The model, both masses; its cubic spring is left out.
+    frequency : ndarray, shape (n,)
+        Frequencies [Hz].
+
+    Returns
+    -------
+    ndarray of complex, shape (n,)
+        Displacement over force [m/N].
+    """
+    s = 2j * pi * frequency
+    k1, k2 = p.diaphragm_stiffness, p.fluid_stiffness
+    first = p.diaphragm_mass * s**2 + k1 + k2
+    damper = p.damping * s + p.fractional_damping * s**p.fractional_order
+    second = p.cylinder_mass * s**2 + damper + k2 + p.load_stiffness
+    return k2 / (first * second - k2**2)

@@ -1,0 +1,105 @@
+"""Notes: what a reader should know of a log or a result, as a code with data; sentences are made of it at the edge.
+
+A code is a member of an enum that stands beside the method that raises it, and carries one sentence template.
+Programs decide by code and data alone; no sentence is read back.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Any
+
+
+class Code(StrEnum):
+    """A kind of note; each layer and each actuator has an enum of its own, without members in common.
+
+    A member is written ``NAME = "code", "sentence with {fields}"``; the fields are filled from a note's data.
+
+    Examples
+    --------
+    >>> class Colour(Code):
+    ...     FADED = "faded", "the colour is {share:.0f} % of what it was"
+    >>> str(Colour.FADED.note(share=40.0))
+    'the colour is 40 % of what it was'
+    """
+
+    template: str
+
+    def __new__(cls, code: str, template: str) -> "Code":
+        """Keep the template beside the code."""
+        member = str.__new__(cls, code)
+        member._value_ = code
+        member.template = template
+        return member
+
+    def note(self, **data: Any) -> "Note":
+        """Return a note of this kind.
+
+        Parameters
+        ----------
+        **data : float, int, str, bool or None
+            What the template's fields are filled with, in SI where the template does not say otherwise.
+
+        Returns
+        -------
+        Note
+            The note.
+        """
+        return Note(self, MappingProxyType(data))
+
+
+@dataclass(frozen=True)
+class Note:
+    """One thing that a reader should know.
+
+    Parameters
+    ----------
+    code : Code
+        What kind of thing.
+    data : Mapping[str, float | int | str | bool | None]
+        Its numbers and names, by the fields of the code's template.
+    """
+
+    code: Code
+    data: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __str__(self) -> str:
+        return self.code.template.format(**self.data)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _note, (self.code, dict(self.data))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the note for JSON.
+
+        Returns
+        -------
+        dict[str, Any]
+            ``code``, ``data`` and ``text``, the sentence.
+        """
+        return {"code": self.code.value, "data": dict(self.data), "text": str(self)}
+
+
+def _note(code: Code, data: Mapping[str, Any]) -> Note:
+    return Note(code, MappingProxyType(dict(data)))
+
+
+def distinct(notes: Iterable[Note]) -> tuple[Note, ...]:
+    """Return notes in order, each once.
+
+    Parameters
+    ----------
+    notes : iterable of Note
+        The notes.
+
+    Returns
+    -------
+    tuple of Note
+        Those that are equal to none before them.
+    """
+    kept: list[Note] = []
+    for one in notes:
+        if one not in kept:
+            kept.append(one)
+    return tuple(kept)

@@ -1,0 +1,1 @@
+"""The piezo-stack electro-hydrostatic actuator: parameters, flow, run."""

@@ -1,0 +1,143 @@
+"""The stack alone, free to move: what the displacement experiment of the piezo-stack paper drives (equation 2)."""
+
+from math import ceil, pi, sqrt
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.compiled.functions import Scalar
+from plant.components.bouc_wen import asymmetric_bouc_wen_rate
+from plant.components.piezo_stack import lagged_force_rate, stack_force
+from plant.piezo_stack.parameters import PiezoStackParameters
+from plant.piezo_stack.run import sine_drive
+from plant.piezo_stack.trajectory import stack_row
+from plant.solvers.steps import rk4_step
+from plant.solvers.trajectory import compile_trajectory
+
+Array: TypeAlias = NDArray[np.float64]
+
+FREE_STATES = ("stack_displacement_m", "stack_velocity_m_s", "linear_force_n", "hysteresis_m")
+"""States of the free stack."""
+
+_STEPS_A_PERIOD = 30.0
+"""Steps in a period of the stack's own vibration."""
+
+
+def free_stack_derivative(state: tuple[Scalar, ...], voltage: Scalar, rate: Scalar, p: Any) -> tuple[Scalar, ...]:
+    """Return the rates of a stack without load, equations 1 and 2 with errata P1 and P2.
+
+    Parameters
+    ----------
+    state : tuple of float or Expression
+        As named in `FREE_STATES`, in SI.
+    voltage, rate : float or Expression
+        Drive [V] and its rate [V/s].
+    p : PiezoStackParameters or namespace of Expression
+        The stack.
+
+    Returns
+    -------
+    tuple of float or Expression
+        Rates, each a second.
+    """
+    x, v, driven, h = state
+    shape = p.hysteresis_phi_1, p.hysteresis_phi_2, p.hysteresis_phi_3, p.hysteresis_gamma
+    return (
+        v,
+        stack_force(driven, h, x, v, p.stack_stiffness, p.stack_damping) / p.stack_mass,
+        lagged_force_rate(driven, voltage, p.free_stroke_a_volt * p.stack_stiffness, p.stack_lag),
+        asymmetric_bouc_wen_rate(rate, h, p.hysteresis, *shape),
+    )
+
+
+def _free_step(state: tuple[Scalar, ...], voltages: tuple[Scalar, Scalar], p: object, h: Scalar) -> tuple[Scalar, ...]:
+    rate = (voltages[1] - voltages[0]) / h
+    return rk4_step(lambda x, u, q: free_stack_derivative(x, u, rate, q))(state, voltages, p, h)
+
+
+def run_free_stack(parameters: PiezoStackParameters, voltage: Array, sample_time: float) -> Array:
+    """Return the displacement of a stack without load, from rest without hysteresis (equations 1 and 2).
+
+    Parameters
+    ----------
+    parameters : PiezoStackParameters
+        The stack.
+    voltage : ndarray, shape (n,)
+        Drive at the samples [V], linear between.
+    sample_time : float
+        Seconds between samples [s].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Displacement [m].
+
+    Examples
+    --------
+    >>> x = run_free_stack(PiezoStackParameters(), np.full(200, 50.0), 1e-5)
+    >>> round(1e6 * float(x[-1]), 3)
+    16.635
+    """
+    p = parameters
+    run = compile_trajectory("free_stack", _free_step, len(FREE_STATES), PiezoStackParameters)
+    period = 2.0 * pi * sqrt(p.stack_mass / p.stack_stiffness)
+    substeps = ceil(_STEPS_A_PERIOD * sample_time / period)
+    driven = p.free_stroke_a_volt * p.stack_stiffness * float(voltage[0])
+    start = np.array([driven / p.stack_stiffness, 0.0, driven, 0.0])
+    return run(start, voltage, stack_row(p)[None], sample_time, substeps)[:, 0]
+
+
+def stack_loop(
+    parameters: PiezoStackParameters, frequency: float, peak_to_peak: float, samples: int = 400
+) -> tuple[Array, Array]:
+    """Return a closed loop of voltage and displacement, the third cycle from rest (equation 2).
+
+    Parameters
+    ----------
+    parameters : PiezoStackParameters
+        The stack.
+    frequency : float
+        Of the drive [Hz].
+    peak_to_peak : float
+        Swing of the drive [V], on half of it as bias.
+    samples : int
+        Samples in a cycle.
+
+    Returns
+    -------
+    tuple of ndarray, shape (samples + 1,)
+        Voltage [V], displacement [m].
+    """
+    cycles = 3
+    sample_time = 1.0 / (frequency * samples)
+    voltage = sine_drive(frequency, peak_to_peak, cycles / frequency, sample_time)
+    displacement = run_free_stack(parameters, voltage, sample_time)
+    return voltage[-samples - 1 :], displacement[-samples - 1 :]
+
+
+def loop_width(voltage: Array, displacement: Array) -> float:
+    """Return a loop's width at its middle voltage as a share of its stroke (equation 2).
+
+    Parameters
+    ----------
+    voltage : ndarray, shape (n,)
+        One cycle from trough to trough [V].
+    displacement : ndarray, shape (n,)
+        Over that cycle [m].
+
+    Returns
+    -------
+    float
+        Width over stroke [dimensionless].
+
+    Examples
+    --------
+    >>> round(loop_width(*stack_loop(PiezoStackParameters(), 1.0, 100.0)), 3)
+    0.078
+    """
+    top = int(np.argmax(voltage))
+    middle = 0.5 * (float(voltage[0]) + float(voltage[top]))
+    rising = float(np.interp(middle, voltage[: top + 1], displacement[: top + 1]))
+    falling = float(np.interp(middle, voltage[top:][::-1], displacement[top:][::-1]))
+    return (falling - rising) / float(np.ptp(displacement))

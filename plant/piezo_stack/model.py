@@ -1,0 +1,293 @@
+"""The piezo-stack electro-hydrostatic actuator: stack, pump chamber, two reeds, three lines, accumulator, cylinder.
+
+Equations 1 to 22 of the piezo-stack paper with errata P1 to P13 and P16. Oil is counted by mass, as its volume at
+atmospheric pressure, in six places: pressure follows from `plant.components.oil`, whose stiffness is equation 5, so
+that no mass is lost and the accumulator can be shut (errata P16).
+"""
+
+from types import SimpleNamespace
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.compiled.functions import Scalar, sqrt, where
+from plant.components.bouc_wen import asymmetric_bouc_wen_rate
+from plant.components.end_stop import end_stop_force
+from plant.components.gas_compliance import compliant_oil_pressure
+from plant.components.line import line_flow_rate
+from plant.components.oil import oil_pressure, specific_volume
+from plant.components.piezo_stack import lagged_force_rate, stack_force
+from plant.components.reed_valve import contact_force, reed_flow
+from plant.piezo_stack.parameters import PiezoStackParameters
+from plant.solvers.steps import StepFunction, rk4_step
+
+StackValues: TypeAlias = PiezoStackParameters | SimpleNamespace
+"""What the model reads: the parameters, or a namespace of the same names holding expressions or arrays."""
+
+STATES = (
+    "stack_displacement_m",
+    "stack_velocity_m_s",
+    "linear_force_n",
+    "hysteresis_m",
+    "oil_chamber_m3",
+    "outlet_reed_m",
+    "outlet_reed_velocity_m_s",
+    "inlet_reed_m",
+    "inlet_reed_velocity_m_s",
+    "oil_delivery_port_m3",
+    "delivery_flow_m3_s",
+    "oil_high_side_m3",
+    "position_m",
+    "velocity_m_s",
+    "oil_low_side_m3",
+    "return_flow_m3_s",
+    "oil_accumulator_m3",
+    "intake_flow_m3_s",
+    "oil_intake_port_m3",
+)
+"""The states; oil as its volume at atmospheric pressure."""
+
+OIL = tuple(i for i, name in enumerate(STATES) if name.startswith("oil_"))
+"""Which states hold oil: their sum does not change."""
+
+SOFT_CONTACT = 1e-6
+"""Depth over which a seat's damping grows [m], a sixth of how far a closing reed presses in."""
+
+GRAVITY = 9.81
+"""Acceleration of gravity [m/s^2]."""
+
+END_STIFFNESS, END_DAMPING = 1e7, 20.0
+"""Of the cylinder's ends [N/m], [s/m]; no run that counts reaches them."""
+
+
+class StackPressures(NamedTuple):
+    """Absolute pressures at the six places that hold oil.
+
+    Parameters
+    ----------
+    chamber : float, ndarray or Expression
+        Pump chamber, p_c [Pa].
+    delivery : float, ndarray or Expression
+        Between outlet reed and delivery line, p_th [Pa].
+    high, low : float, ndarray or Expression
+        The cylinder's two sides, p_ch and p_cl [Pa].
+    accumulator : float, ndarray or Expression
+        Accumulator's port [Pa].
+    intake : float, ndarray or Expression
+        Between intake line and inlet reed, p_tl [Pa].
+    """
+
+    chamber: Scalar
+    delivery: Scalar
+    high: Scalar
+    low: Scalar
+    accumulator: Scalar
+    intake: Scalar
+
+
+def volumes(displacement: Scalar, position: Scalar, p: StackValues) -> tuple[Scalar, Scalar, Scalar]:
+    """Return the volumes of pump chamber, high side and low side: equation 8 with errata P6, 18 with errata P11.
+
+    Parameters
+    ----------
+    displacement : float, ndarray or Expression
+        Piston of the pump, x_p [m].
+    position : float, ndarray or Expression
+        Rod of the cylinder, from its start [m].
+    p : PiezoStackParameters or namespace
+        The actuator.
+
+    Returns
+    -------
+    tuple of float, ndarray or Expression
+        Volumes [m^3].
+    """
+    chamber = p.piston_area * (p.chamber_height - displacement) + p.dead_volume
+    high = p.cylinder_area * (p.cylinder_start + position)
+    low = p.cylinder_area * (p.cylinder_length - p.cylinder_start - position)
+    return chamber, high, low
+
+
+def stack_pressures(state: tuple[Scalar, ...], p: StackValues) -> StackPressures:
+    """Return the pressures, from where the oil is and the pistons stand: equation 5 with errata P4, P5 and P16.
+
+    Parameters
+    ----------
+    state : tuple of float, ndarray or Expression
+        As named in `STATES`, in SI.
+    p : PiezoStackParameters or namespace
+        The actuator.
+
+    Returns
+    -------
+    StackPressures
+        Absolute pressures [Pa].
+    """
+    oil = p.bulk_modulus, p.air_fraction, p.vapour_pressure
+    chamber, high, low = volumes(state[0], state[12], p)
+    compliance = p.accumulator_gas / (p.gas_exponent * p.bias_pressure)
+    return StackPressures(
+        oil_pressure(state[4], chamber, *oil),
+        oil_pressure(state[9], p.port_volume, *oil),
+        oil_pressure(state[11], high, *oil),
+        oil_pressure(state[14], low, *oil),
+        compliant_oil_pressure(state[16], p.accumulator_volume, compliance, p.bias_pressure, oil),
+        oil_pressure(state[18], p.port_volume, *oil),
+    )
+
+
+def _reed_acceleration(
+    drop: Scalar, opening: Scalar, velocity: Scalar, stiffness: Scalar, gap: Scalar, p: StackValues
+) -> Scalar:
+    """Equation 13 with seat and stop, errata P7."""
+    depth = gap - opening
+    seat = contact_force(depth, -velocity, p.seat_stiffness, p.seat_damping, SOFT_CONTACT)
+    stop = contact_force(opening - p.reed_lift, velocity, p.seat_stiffness, p.seat_damping, SOFT_CONTACT)
+    push = p.reed_area * drop - p.reed_damping * velocity - stiffness * opening
+    return (push + seat - stop) / p.reed_mass
+
+
+def stack_derivative(state: tuple[Scalar, ...], voltage: Scalar, rate: Scalar, p: StackValues) -> tuple[Scalar, ...]:
+    """Return the rates of the actuator: equations 1 to 3, 8, 11, 13 to 15, 17 to 22 with errata P1 to P13 and P16.
+
+    Every flow carries the density of the side it comes from.
+
+    Parameters
+    ----------
+    state : tuple of float or Expression
+        As named in `STATES`, in SI.
+    voltage : float or Expression
+        Drive u [V].
+    rate : float or Expression
+        Its rate [V/s].
+    p : PiezoStackParameters or namespace of Expression
+        The actuator.
+
+    Returns
+    -------
+    tuple of float or Expression
+        Rates of the states, each a second.
+    """
+    x, v, driven, h, n_c, x_out, v_out, x_in, v_in, n_th, q_h, n_ch, position, speed, n_cl, q_1, _, q_2, n_tl = state
+    pressure = stack_pressures(state, p)
+    chamber, high, low = volumes(x, position, p)
+    filled = n_c / chamber
+    density_th, density_tl = n_th / p.port_volume, n_tl / p.port_volume
+    density_high, density_low = n_ch / high, n_cl / low
+    density_acc = 1.0 / specific_volume(pressure.accumulator, p.bulk_modulus, p.air_fraction, p.vapour_pressure)
+
+    def past_reed(drop: Scalar, opening: Scalar) -> Scalar:
+        return reed_flow(drop, opening, p.reed_perimeter, p.discharge_coefficient, p.density, p.laminar_drop)
+
+    def along_line(drop: Scalar, flow: Scalar, length: Scalar) -> Scalar:
+        return line_flow_rate(drop, flow, length, p.line_area, p.density, p.viscosity, p.minor_losses)
+
+    out_drop, in_drop = pressure.chamber - pressure.delivery, pressure.intake - pressure.chamber
+    out = past_reed(out_drop, x_out)
+    into = past_reed(in_drop, x_in)
+    out = out * where(out_drop > 0.0, filled, density_th)
+    into = into * where(in_drop > 0.0, density_tl, filled)
+    lost = p.chamber_leakage * (pressure.chamber - pressure.accumulator) * filled
+    crossed = p.crossport_leakage * (pressure.high - pressure.low) * density_high
+    delivered = q_h * where(q_h > 0.0, density_th, density_high)
+    returned = q_1 * where(q_1 > 0.0, density_low, density_acc)
+    drawn = q_2 * where(q_2 > 0.0, density_acc, density_tl)
+
+    pushed = stack_force(driven, h, x, v, p.stack_stiffness, p.stack_damping)
+    held = p.head_stiffness * x + p.head_damping * v + pressure.chamber * p.piston_area
+    lifted = p.carriage_mass + p.load_mass
+    friction = p.viscous_friction * speed + p.coulomb_friction * speed / sqrt(
+        speed * speed + p.friction_speed * p.friction_speed
+    )
+    middle = 0.5 * p.cylinder_length - p.cylinder_start
+    stopped = end_stop_force(
+        position - middle, speed, 0.5 * p.cylinder_length - p.end_clearance, END_STIFFNESS, END_DAMPING
+    )
+    push = (pressure.high - pressure.low) * p.cylinder_area - friction - lifted * GRAVITY + stopped
+    return (
+        v,
+        (pushed - held) / (p.stack_mass + p.head_mass),
+        lagged_force_rate(driven, voltage, p.free_stroke_a_volt * p.stack_stiffness, p.stack_lag),
+        asymmetric_bouc_wen_rate(
+            rate,
+            h,
+            p.hysteresis,
+            p.hysteresis_phi_1,
+            p.hysteresis_phi_2,
+            p.hysteresis_phi_3,
+            p.hysteresis_gamma,
+        ),
+        into - out - lost,
+        v_out,
+        _reed_acceleration(out_drop, x_out, v_out, p.outlet_reed_stiffness, p.outlet_reed_gap, p),
+        v_in,
+        _reed_acceleration(in_drop, x_in, v_in, p.inlet_reed_stiffness, p.inlet_reed_gap, p),
+        out - delivered,
+        along_line(pressure.delivery - pressure.high, q_h, p.delivery_length),
+        delivered - crossed,
+        speed,
+        push / lifted,
+        crossed - returned,
+        along_line(pressure.low - pressure.accumulator, q_1, p.return_length),
+        returned - drawn + lost,
+        along_line(pressure.accumulator - pressure.intake, q_2, p.intake_length),
+        drawn - into,
+    )
+
+
+def stack_step(
+    state: tuple[Scalar, ...], voltages: tuple[Scalar, Scalar], p: StackValues, h: Scalar
+) -> tuple[Scalar, ...]:
+    """Return the state after a classical Runge-Kutta step of `stack_derivative`, equations 1 to 22.
+
+    Parameters
+    ----------
+    state : tuple of Expression
+        As named in `STATES`, in SI.
+    voltages : tuple of Expression
+        Drive at the step's start and end [V], linear between.
+    p : namespace of Expression
+        The actuator.
+    h : Expression
+        Step [s].
+
+    Returns
+    -------
+    tuple of Expression
+        The next state.
+    """
+    start, end = voltages
+    rate = (end - start) / h
+    step: StepFunction = rk4_step(lambda x, u, q: stack_derivative(x, u, rate, q))
+    return step(state, voltages, p, h)
+
+
+def at_bias(p: StackValues, voltage: float = 0.0) -> NDArray[np.float64]:
+    """Return the state at rest at the bias pressure, the stack pressed in by it (equation 3, errata P3).
+
+    Parameters
+    ----------
+    p : PiezoStackParameters
+        The actuator.
+    voltage : float
+        Drive at the start [V]; the stack has settled to it, without hysteresis.
+
+    Returns
+    -------
+    ndarray, shape (19,)
+        As named in `STATES`, in SI.
+
+    Examples
+    --------
+    >>> round(1e6 * float(at_bias(PiezoStackParameters())[0]), 2)
+    -17.61
+    """
+    driven = p.free_stroke_a_volt * p.stack_stiffness * voltage
+    x = (driven - p.bias_pressure * p.piston_area) / (p.stack_stiffness + p.head_stiffness)
+    chamber, high, low = volumes(x, 0.0, p)
+    density = 1.0 / specific_volume(p.bias_pressure, p.bulk_modulus, p.air_fraction, p.vapour_pressure)
+    state = np.zeros(len(STATES))
+    state[0], state[2] = x, driven
+    state[list(OIL)] = density * np.array([chamber, p.port_volume, high, low, p.accumulator_volume, p.port_volume])
+    return state

@@ -1,0 +1,1 @@
+"""What a bench would have measured: noise, quantisation, rate, and sensors that fail."""

@@ -1,0 +1,1 @@
+"""Steps and runs of any plant: fixed-step, adaptive, and a reference."""

@@ -1,0 +1,188 @@
+"""Runs in steps of controlled error: short ones at corners, long ones where all is quiet; many runs side by side."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.runs import require_finite
+from plant.solvers.adaptive_kernel import compile_adaptive
+from plant.solvers.steps import Derivative, Parameters, parameter_row
+
+Array: TypeAlias = NDArray[np.float64]
+
+LANES = 8
+"""Trajectories side by side in one kernel, as many as a vector register of 512 bits holds."""
+
+TOLERANCE = 2e-6
+"""Error of a step, root mean square over the states relative to their sizes; whole runs stay within 1e-4 by it."""
+
+SMOOTH = 10.0
+"""Multiple of the tolerance by which a drive may leave the parabola that one step follows, relative to its size:
+what it leaves swings about that parabola, and next to nothing of it remains over a step."""
+
+
+@dataclass(frozen=True)
+class ErrorControl:
+    """What error-controlled steps need of a plant.
+
+    Parameters
+    ----------
+    derivative : callable
+        ``derivative(state, speed, parameters)``.
+    scales : callable
+        ``scales(parameter row)``: the size of each state that errors are relative to [its SI unit]. Of several runs
+        side by side the first one's hold.
+    drive_scale : callable
+        ``drive_scale(parameter row)``: the size of the drive [its SI unit].
+    shortest : callable
+        ``shortest(parameter rows)``: step [s] that is taken whatever its error.
+    """
+
+    derivative: Derivative
+    scales: Callable[[Array], Array]
+    drive_scale: Callable[[Array], float]
+    shortest: Callable[[Array], float]
+
+
+def controlled_run(
+    name: str,
+    control: ErrorControl,
+    starts: Array,
+    speed: Array,
+    parameters: Array,
+    sample_time: float,
+    parameter_class: type[Parameters],
+    *,
+    tolerance: float = TOLERANCE,
+    drive_tolerance: float | None = None,
+    longest: float = np.inf,
+) -> Array:
+    """Run a plant along a drive in steps of controlled error, for one or many sets of parameters side by side.
+
+    The steps are common to up to `LANES` trajectories: as short as the hardest of them asks.
+
+    Parameters
+    ----------
+    name : str
+        The plant's name.
+    control : ErrorControl
+        Its rates and sizes.
+    starts : ndarray, shape (runs, states)
+        Initial states in SI.
+    speed : ndarray, shape (n,)
+        Drive at the samples [its SI unit], linear between.
+    parameters : ndarray, shape (1 or n, runs, parameters)
+        Parameter rows, each of which holds until the next sample.
+    sample_time : float
+        Seconds between samples [s].
+    parameter_class : type
+        What the parameter rows hold.
+    tolerance : float
+        Error of a step relative to the states' sizes [dimensionless].
+    drive_tolerance : float, optional
+        By how much steps may smooth the drive, relative to its size [dimensionless]; `SMOOTH` times the
+        tolerance if not given.
+    longest : float
+        Longest step [s].
+
+    Returns
+    -------
+    ndarray, shape (runs, n, states)
+        States at the samples.
+    """
+    runs, width = starts.shape
+    bend = SMOOTH * tolerance if drive_tolerance is None else drive_tolerance
+    scales = control.scales(parameters[0, 0])
+    shortest = control.shortest(parameters.reshape(-1, parameters.shape[2])) / sample_time
+    states = np.empty((len(speed), width, runs))
+    for first in range(0, runs, LANES):
+        block = list(range(first, min(first + LANES, runs)))
+        lanes = 1 if len(block) == 1 else LANES
+        filled = block + [first] * (lanes - len(block))
+        run = compile_adaptive(name, control.derivative, width, parameter_class, lanes)
+        run(
+            np.ascontiguousarray(starts[filled].T),
+            speed,
+            np.ascontiguousarray(parameters[:, filled]),
+            sample_time,
+            1.0 / (tolerance * scales),
+            bend * control.drive_scale(parameters[0, 0]),
+            min(longest / sample_time, float(len(speed))),
+            min(shortest, longest / sample_time),
+            states[:, :, first : first + LANES],
+        )
+    return np.moveaxis(states, 2, 0)
+
+
+def controlled_trajectory(
+    name: str,
+    derivative: Derivative,
+    start: Array,
+    drive: Array,
+    parameters: Parameters,
+    sample_time: float,
+    *,
+    scales: Array,
+    drive_scale: float,
+    tolerance: float = TOLERANCE,
+    shortest: float | None = None,
+) -> Array:
+    """Run any plant along a drive in steps of controlled error, L-stable: for what is stiff, or sticks and slips.
+
+    Parameters
+    ----------
+    name : str
+        The plant's name.
+    derivative : callable
+        ``derivative(state, drive, parameters)``.
+    start : ndarray, shape (states,)
+        Initial state in SI.
+    drive : ndarray, shape (n,)
+        Drive at the samples [its SI unit], linear between.
+    parameters : dataclass
+        The plant's parameters.
+    sample_time : float
+        Seconds between samples [s].
+    scales : ndarray, shape (states,)
+        Size of each state that errors are relative to [its SI unit].
+    drive_scale : float
+        Size of the drive [its SI unit].
+    tolerance : float
+        Error of a step relative to the states' sizes [dimensionless].
+    shortest : float, optional
+        Step that is taken whatever its error; a thousandth of a sample time if not given [s].
+
+    Returns
+    -------
+    ndarray, shape (n, states)
+        States at the samples.
+
+    Raises
+    ------
+    HydrostateError
+        If the state stops being finite.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Lag:
+    ...     time_constant: float = 0.5
+    >>> def rates(state, drive, p):
+    ...     return ((drive - state[0]) / p.time_constant,)
+    >>> options = {"scales": np.ones(1), "drive_scale": 1.0}
+    >>> states = controlled_trajectory("lag", rates, np.zeros(1), np.ones(101), Lag(), 0.01, **options)
+    >>> states[[0, 50, 100], 0].round(4).tolist()
+    [0.0, 0.6321, 0.8647]
+    """
+    least = 1e-3 * sample_time if shortest is None else shortest
+    control = ErrorControl(derivative, lambda _: scales, lambda _: drive_scale, lambda _: least)
+    row = parameter_row(parameters)[None, None]
+    (states,) = controlled_run(
+        name, control, start[None], drive, row, sample_time, type(parameters), tolerance=tolerance
+    )
+    require_finite(states, sample_time, name)
+    return states

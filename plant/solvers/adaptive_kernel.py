@@ -1,0 +1,163 @@
+"""The kernel of error-controlled steps, compiled from a plant's readable rates.
+
+The scheme is RODAS3: four stages on three evaluations of the rates, third order, L-stable, with an embedded second
+order (Sandu et al. 1997, Atmospheric Environment 31, 3459). Samples within a step lie on the cubic through states and
+rates at both ends. A drive is linear between samples; a step spans several of them where they stand on one line.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.compiled.elimination import eliminated_jacobian
+from plant.compiled.expression import ONE, ZERO, Expression, as_expression, symbol
+from plant.compiled.functions import Scalar
+from plant.compiled.hoist import hoisted
+from plant.compiled.intrinsics import native_width
+from plant.compiled.kernel_file import load_kernel
+from plant.compiled.paste import MERGED, kernel_text, pasted
+from plant.compiled.simplify import fused, share_ratios, simplified
+from plant.compiled.source import INTRINSICS, lines_source, operations_source
+from plant.solvers.adaptive_loop import INNER, ROUNDEST, TINY, run_controlled, smooth
+from plant.solvers.steps import Derivative, Parameters, State, parameter_names, parameter_symbols, solve_linear
+
+Array: TypeAlias = NDArray[np.float64]
+
+Kernel: TypeAlias = Callable[[Array, Array, Array, float, Array, float, float, float, Array], None]
+"""``run(starts, speed, parameter rows, sample time, weights, bend, longest, shortest, states)``, which fills states."""
+
+
+def rodas3_stages(
+    derivative: Derivative, state: State, speeds: tuple[Scalar, Scalar, Scalar], p: object, h: Scalar
+) -> list[list[Expression]]:
+    """Return the four stages of a RODAS3 step, in the variables of Hairer and Wanner (Stiff ODEs, equation IV.7.25).
+
+    Parameters
+    ----------
+    derivative : callable
+        ``derivative(state, speed, parameters)``.
+    state : tuple of Expression
+        State at the start [any unit].
+    speeds : tuple of Expression
+        Motor speed at the start and at the end of the step, and what it would gain at its first rate [rad/s].
+    p : namespace of Expression
+        The parameters.
+    h : Expression
+        Step size [s].
+
+    Returns
+    -------
+    list of list of Expression
+        Stages u_1 to u_4, each in the units of the states. The new state is ``x + 2 u_1 + u_3 + u_4``, its error u_4.
+    """
+    start, end, rise = speeds
+    rates = derivative(state, start, p)
+    slopes = eliminated_jacobian([as_expression(rate) for rate in rates], [*state, start])
+    drift = [row[-1] * rise for row in slopes]
+    scale = ONE / as_expression(h)
+    n = len(state)
+    matrix = [[(2.0 * scale if i == j else ZERO) - slopes[i][j] for j in range(n)] for i in range(n)]
+    u1 = solve_linear(matrix, [f + 0.5 * d for f, d in zip(rates, drift, strict=True)])
+    u2 = solve_linear(matrix, [f + 4.0 * scale * a + 1.5 * d for f, a, d in zip(rates, u1, drift, strict=True)])
+    ahead = tuple(x + 2.0 * a for x, a in zip(state, u1, strict=True))
+    u3 = solve_linear(matrix, [f + scale * (a - b) for f, a, b in zip(derivative(ahead, end, p), u1, u2, strict=True)])
+    nearly = tuple(x + c for x, c in zip(ahead, u3, strict=True))
+    u4 = solve_linear(
+        matrix,
+        [
+            f + scale * (a - b - 8.0 / 3.0 * c)
+            for f, a, b, c in zip(derivative(nearly, end, p), u1, u2, u3, strict=True)
+        ],
+    )
+    return [[as_expression(u) for u in stage] for stage in (u1, u2, u3, u4)]
+
+
+_SHARED = ("u_start", "u_end", "u_rise", "h", "pace")
+"""Motor speed at a step's start and end and its rise at the first rate [rad/s], the step and the one before [s]."""
+
+
+def _named(letter: str, values: Sequence[Expression]) -> dict[str, Expression]:
+    return {f"{letter}{i}": value for i, value in enumerate(values)}
+
+
+def _outputs(derivative: Derivative, width: int, p: object) -> dict[str, Expression]:
+    """Return new states ``n``, rates at the start ``r`` and the mean squared error of a step."""
+    state = tuple(symbol(f"x{i}") for i in range(width))
+    u1, _, u3, u4 = rodas3_stages(
+        derivative, state, (symbol("u_start"), symbol("u_end"), symbol("u_rise")), p, symbol("h")
+    )
+    error: Expression = ZERO
+    for i, u in enumerate(u4):
+        weighted = u * symbol(f"w{i}")
+        error = error + weighted * weighted
+    outputs = _named("n", [x + 2.0 * a + c + d for x, a, c, d in zip(state, u1, u3, u4, strict=True)])
+    outputs |= _named("r", [as_expression(rate) for rate in derivative(state, symbol("u_start"), p)])
+    return outputs | {"error": error * (1.0 / width)}
+
+
+def _between(width: int) -> dict[str, Expression]:
+    """Return the state ``y`` at a share ``j`` of the step before: the cubic through states and rates at both ends."""
+    part, pace = symbol("j"), symbol("pace")
+    result: dict[str, Expression] = {}
+    for i in range(width):
+        old = symbol(f"o{i}")
+        rise = symbol(f"x{i}") - old
+        first, last = symbol(f"s{i}") * pace, symbol(f"r{i}") * pace
+        curve = 3.0 * rise - 2.0 * first - last + part * (first + last - 2.0 * rise)
+        result[f"y{i}"] = old + part * (first + part * curve)
+    return result
+
+
+@cache
+def compile_adaptive(
+    name: str, derivative: Derivative, width: int, parameter_class: type[Parameters], lanes: int
+) -> Kernel:
+    """Generate the kernel that runs a plant along a drive in steps of controlled error.
+
+    Parameters
+    ----------
+    name : str
+        What the kernel is, for its file's name.
+    derivative : callable
+        ``derivative(state, speed, parameters)``, written for symbols.
+    width : int
+        Count of states.
+    parameter_class : type
+        What the parameter rows hold, field by field.
+    lanes : int
+        Trajectories side by side.
+
+    Returns
+    -------
+    callable
+        ``run(starts (states, lanes), speed (n,) [rad/s], parameters (1 or n, lanes, parameters), sample time [s],
+        weights (states,), bend [rad/s], longest and shortest step [samples], states (n, states, up to lanes))``.
+    """
+    names = parameter_names(parameter_class)
+    outputs = _outputs(derivative, width, parameter_symbols(parameter_class))
+    outputs = simplified(share_ratios(outputs), set(names))
+    moving = {f"{letter}{i}" for letter in "xw" for i in range(width)} | {*_SHARED}
+    fixed, stages = hoisted(outputs, moving, "c")
+    span = range(width)
+    parts = [[f"{letter}{i}" for i in span] for letter in "xnrosyw"]
+    parts += [["error"], [*_SHARED], [*names], [*fixed]]
+    every = [name for part in parts for name in part]
+    slots = {name: lanes * i for i, name in enumerate(every)}
+    vector = min(lanes, native_width())
+    lines = {
+        "settle": lines_source("settle", fixed),
+        "stages": lines_source("stages", fused(stages)),
+        "between": lines_source("between", fused(_between(width))),
+    }
+    sizes = {"LANES": lanes, "VECTOR": vector, "WIDTH": width, "COLUMNS": len(names), "NUMBERS": lanes * len(every)}
+    parts = (
+        INTRINSICS,
+        operations_source(lines, slots, vector) + f"\nmove = moving({lanes})",
+        pasted(*INNER, constants={**sizes, "TINY": TINY, "ROUNDEST": ROUNDEST}, options=MERGED),
+        pasted(smooth, run_controlled),
+    )
+    title = f"trajectories of the {name} plant in steps of controlled error, {lanes} side by side"
+    return load_kernel(f"{name}_adaptive_{lanes}", kernel_text(title, *parts)).run_controlled

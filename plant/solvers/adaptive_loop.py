@@ -1,0 +1,315 @@
+"""The loop of error-controlled steps, as plain functions: `plant.solvers.adaptive_kernel` pastes them into a kernel."""
+
+from collections.abc import Callable
+from typing import Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.solvers.fixed_step_loops import Operation, SideBySide, lay, share
+
+Array: TypeAlias = NDArray[np.float64]
+
+TINY = 1e-6
+"""Share of a sample time within which a step ends at a sample."""
+
+ROUNDEST = 100.0
+"""A drive that bends by more than this many times what a step may smooth has a corner there."""
+
+
+class ControlledKernel(SideBySide, Protocol):
+    """What the kernel of error-controlled steps has.
+
+    In memory stand, `LANES` numbers each: the states, the new states of a step, rates, old states and their rates, the
+    states between, weights of the errors, the error, five numbers that all runs share (drive at a step's start and
+    end, its rise at the first rate, the step and the one before), the parameters, and what `settle_at` makes of them.
+
+    Attributes
+    ----------
+    stages_at, between_at : callable
+        A step; and the state a share ``j`` of the last step after its start.
+    move : callable
+        ``move(from, to)``: copies as many numbers as there are lanes.
+    """
+
+    stages_at: Operation
+    between_at: Operation
+    move: Callable[[int, int], None]
+
+
+def run_controlled(
+    kernel: ControlledKernel,
+    initial: Array,
+    drive: Array,
+    parameters: Array,
+    sample_time: float,
+    weights: Array,
+    bend: float,
+    longest: float,
+    shortest: float,
+    states: Array,
+) -> None:
+    """Fill in the states of runs side by side at their samples.
+
+    Parameters
+    ----------
+    kernel : ControlledKernel
+        Operations and sizes.
+    initial : ndarray, shape (states, lanes)
+        Initial states in SI.
+    drive : ndarray, shape (n,)
+        Drive at the samples [its SI unit], linear between.
+    parameters : ndarray, shape (1 or n, lanes, parameters)
+        Parameter rows, each of which holds until the next sample.
+    sample_time : float
+        Seconds between samples [s].
+    weights : ndarray, shape (states,)
+        One over the error of a step that each state may have [one over its unit].
+    bend : float
+        By how much a step may smooth the drive [the drive's unit].
+    longest, shortest : float
+        Steps [count of samples].
+    states : ndarray, shape (n, states, up to lanes)
+        Room for the states.
+    """
+    n, block = states.shape[0], kernel.WIDTH * kernel.LANES
+    shared = 7 * block + kernel.LANES
+    room = np.empty(kernel.NUMBERS + 8)
+    work = room[-room.ctypes.data % 64 // 8 :]  # a vector across two cache lines takes twice as long
+    slots, vectors = work.ctypes.data, range(0, 8 * kernel.LANES, 8 * kernel.VECTOR)
+    lay(kernel, work, 0, initial, kernel.WIDTH)
+    share(kernel, work, 6 * block, weights)
+    keep(kernel, work, 0, states, 0)
+    begin = end = 0
+    start = reach = place = lift = ramp = curvature = 0.0
+    size, taken, row, sample = longest, 1.0, -1, 1
+    while True:
+        if place >= reach and end < n - 1:
+            begin, place = end, 0.0
+            end, lift, ramp, curvature = smooth(drive, parameters, begin, bend)
+            reach = float(end - begin)
+            if row < 0 or parameters.shape[0] > 1:
+                row = min(begin, parameters.shape[0] - 1)
+                lay(kernel, work, shared + 5 * kernel.LANES, parameters[row].T, kernel.COLUMNS)
+                for first in vectors:
+                    kernel.settle_at(slots + first, 0.0)
+        left = reach - place
+        size = within(size, left, longest, shortest)
+        driven = along(lift, ramp, curvature, place, reach, size)
+        share(kernel, work, shared, (*driven, size * sample_time, taken * sample_time))
+        for first in vectors:
+            kernel.stages_at(slots + first, 0.0)
+        here = begin + place
+        while sample < here - TINY:
+            for first in vectors:
+                kernel.between_at(slots + first, (sample - start) / taken)
+            keep(kernel, work, 5 * block, states, sample)
+            sample += 1
+        if left <= 0.0:
+            break
+        error = largest(kernel, work, 7 * block)
+        if not error <= 1.0 and size > shortest:
+            size = max(size * (0.5 if error < 64.0 else 0.25), shortest)
+            continue
+        start, taken = here, size
+        place = reach if size == left else place + size
+        accept(work, block)
+        near = begin + int(place + 0.5)
+        if abs(begin + place - near) < TINY:
+            keep(kernel, work, 0, states, near)
+            if sample == near:
+                sample += 1
+        size = max(size * growth(error), shortest)
+
+
+def smooth(drive: Array, parameters: Array, begin: int, bend: float) -> tuple[int, float, float, float]:
+    """Return how far the drive follows one parabola from a sample on, and that parabola.
+
+    Parameters
+    ----------
+    drive : ndarray, shape (n,)
+        Drive at the samples [its SI unit].
+    parameters : ndarray, shape (1 or n, lanes, parameters)
+        Parameter rows; where they change, a piece ends.
+    begin : int
+        The sample.
+    bend : float
+        By how much it may leave the parabola [the drive's unit].
+
+    Returns
+    -------
+    tuple of (int, float, float, float)
+        Last sample of the piece; where the parabola begins, its mean rise a sample, its curvature [the drive's unit].
+    """
+    n = drive.shape[0]
+    end = begin + 1
+    low, high = np.inf, -np.inf
+    while end < n - 1 and (parameters.shape[0] == 1 or same(parameters[end], parameters[begin])):
+        curvature = drive[end + 1] - 2.0 * drive[end] + drive[end - 1]
+        lower, upper = min(low, curvature), max(high, curvature)
+        length = end + 1 - begin
+        if (upper - lower) * length * length > 16.0 * bend or max(-lower, upper) > ROUNDEST * bend:
+            break
+        low, high = lower, upper
+        end += 1
+    curvature = 0.5 * (low + high) if end > begin + 1 else 0.0
+    return end, drive[begin] + curvature / 12.0, (drive[end] - drive[begin]) / (end - begin), curvature
+
+
+def same(one: Array, other: Array) -> bool:
+    """Return whether two matrices are equal.
+
+    Parameters
+    ----------
+    one, other : ndarray, shape (n, m)
+        The matrices [any unit].
+
+    Returns
+    -------
+    bool
+        Whether every element is.
+    """
+    for i in range(one.shape[0]):
+        for j in range(one.shape[1]):
+            if one[i, j] != other[i, j]:
+                return False
+    return True
+
+
+def within(size: float, left: float, longest: float, shortest: float) -> float:
+    """Return a step that ends with its piece of the drive, or leaves enough of it for another.
+
+    Parameters
+    ----------
+    size : float
+        Step that the error allows [count of samples].
+    left : float
+        What is left of the piece; nothing at the end of the run [count of samples].
+    longest, shortest : float
+        Bounds [count of samples].
+
+    Returns
+    -------
+    float
+        The step [count of samples].
+    """
+    size = min(size, longest)
+    if size > 0.999999 * left:
+        return left if left > 0.0 else shortest
+    return 0.5 * left if size > 0.5 * left else size
+
+
+def along(
+    lift: float, ramp: float, curvature: float, place: float, reach: float, size: float
+) -> tuple[float, float, float]:
+    """Return the drive at a step's start and end, and its rise at the first rate, along a piece of a parabola.
+
+    Parameters
+    ----------
+    lift, ramp, curvature : float
+        The piece: where it begins, its mean rise a sample, its curvature [the drive's unit].
+    place, reach : float
+        How far into it the step starts, and its length [count of samples].
+    size : float
+        The step [count of samples].
+
+    Returns
+    -------
+    tuple of float
+        The three [the drive's unit].
+    """
+    slope = ramp + curvature * (place - 0.5 * reach)
+    start = lift + place * (ramp - 0.5 * curvature * (reach - place))
+    return start, start + size * (slope + 0.5 * curvature * size), size * slope
+
+
+def growth(error: float) -> float:
+    """Return by how much the next step is longer, for a scheme of third order.
+
+    Parameters
+    ----------
+    error : float
+        Mean square of the weighted errors [dimensionless].
+
+    Returns
+    -------
+    float
+        The factor [dimensionless].
+    """
+    if error < 1.2e-4:
+        return 4.0
+    if error < 8e-3:
+        return 2.0
+    if error < 0.03:
+        return 1.6
+    if error < 0.13:
+        return 1.25
+    return 0.9 if error > 0.5 else 1.0
+
+
+def largest(kernel: ControlledKernel, work: Array, place: int) -> float:
+    """Return the largest error of the runs, or one that is not a number.
+
+    Parameters
+    ----------
+    kernel : ControlledKernel
+        Sizes.
+    work : ndarray, shape (numbers,)
+        All numbers.
+    place : int
+        Where the errors stand.
+
+    Returns
+    -------
+    float
+        The error [dimensionless].
+    """
+    error = 0.0
+    for lane in range(kernel.LANES):
+        error = error if error >= work[place + lane] else work[place + lane]
+    return error
+
+
+def accept(work: Array, block: int) -> None:
+    """Make a step's new states the states, and those before with their rates the old ones.
+
+    Parameters
+    ----------
+    work : ndarray, shape (numbers,)
+        All numbers.
+    block : int
+        How many numbers the states are.
+    """
+    for i in range(block):
+        work[3 * block + i] = work[i]
+        work[4 * block + i] = work[2 * block + i]
+        work[i] = work[block + i]
+
+
+def keep(kernel: ControlledKernel, work: Array, place: int, states: Array, sample: int) -> None:
+    """Copy states to a sample's row.
+
+    Parameters
+    ----------
+    kernel : ControlledKernel
+        Sizes, and how lanes are copied.
+    work : ndarray, shape (numbers,)
+        All numbers.
+    place : int
+        Where the states stand.
+    states : ndarray, shape (n, states, up to lanes)
+        Room for them.
+    sample : int
+        The row.
+    """
+    count = states.shape[2]
+    for i in range(kernel.WIDTH):
+        if count == kernel.LANES:
+            kernel.move(work.ctypes.data + 8 * (place + kernel.LANES * i), states[sample, i].ctypes.data)
+        else:
+            for lane in range(count):
+                states[sample, i, lane] = work[place + kernel.LANES * i + lane]
+
+
+INNER = (lay, share, same, within, along, growth, largest, accept, keep)
+"""Parts of the loop and of `smooth`, compiled as if they stood there."""

@@ -1,0 +1,224 @@
+"""The loops of fixed-step runs, as plain functions: a plant's step, generated beside them, goes along a drive.
+
+`plant.solvers.trajectory` and `plant.solvers.fixed_step_kernel` paste them into kernel files. What they find in such a
+file is their parameter `kernel`.
+"""
+
+from collections.abc import Callable
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+
+Operation: TypeAlias = Callable[[int, float], None]
+"""``operation(address, j)``: works on numbers in memory from an address on (`plant.compiled.intrinsics.stepping`)."""
+
+Advance: TypeAlias = Callable[[Any, int], Any]
+"""``advance(numbers, address)``: a tuple of one and of numbers in memory (`plant.compiled.intrinsics.advancing`)."""
+
+
+class RunKernel(Protocol):
+    """What the kernel of one run has.
+
+    In memory stand the states at the last sample, the step's length, the parameters, and what `settle_at` makes of
+    the two; from step to step the state is a tuple.
+
+    Attributes
+    ----------
+    WIDTH, COLUMNS, NUMBERS : int
+        Count of states, of parameters, and of the numbers in memory.
+    load, store : callable
+        ``load(address)`` and ``store(state, address)``: a state out of memory, and into it.
+    settle_at : callable
+        What is the same at every step.
+    advance : callable
+        The step, from the state and the drive at its start and end.
+    """
+
+    WIDTH: int
+    COLUMNS: int
+    NUMBERS: int
+    load: Callable[[int], Any]
+    store: Callable[[Any, int], None]
+    settle_at: Operation
+    advance: Advance
+
+
+class SideBySide(Protocol):
+    """What every kernel of runs side by side has.
+
+    Attributes
+    ----------
+    LANES, VECTOR : int
+        Runs side by side, and how many of them are stepped at a time.
+    WIDTH, COLUMNS, NUMBERS : int
+        Count of states, of parameters, and of the numbers in memory.
+    settle_at : callable
+        What is the same at every step.
+    """
+
+    LANES: int
+    VECTOR: int
+    WIDTH: int
+    COLUMNS: int
+    NUMBERS: int
+    settle_at: Operation
+
+
+class LanesKernel(SideBySide, Protocol):
+    """What the kernel of fixed steps side by side has.
+
+    In memory stand, `LANES` numbers each, the states, the drive at the last sample and its rise in a step, the step's
+    length, the parameters, and what `settle_at` makes of them.
+
+    Attributes
+    ----------
+    step_at : callable
+        The step with the number ``j`` after the last sample.
+    """
+
+    step_at: Operation
+
+
+def run_alone(
+    kernel: RunKernel, initial: Array, drive: Array, parameters: Array, sample_time: float, substeps: int
+) -> Array:
+    """Return the states of one run at its samples.
+
+    Parameters
+    ----------
+    kernel : RunKernel
+        Operations and sizes.
+    initial : ndarray, shape (states,)
+        Initial state in SI.
+    drive : ndarray, shape (n,)
+        Drive at the samples [its SI unit], linear between.
+    parameters : ndarray, shape (1 or n, parameters)
+        Parameter rows, each of which holds until the next sample.
+    sample_time : float
+        Seconds between samples [s].
+    substeps : int
+        Steps a sample.
+
+    Returns
+    -------
+    ndarray, shape (n, states)
+        The states.
+    """
+    n, last_row = drive.shape[0], parameters.shape[0] - 1
+    states, work = np.empty((n, kernel.WIDTH)), np.empty(kernel.NUMBERS)
+    slots = work.ctypes.data
+    for i in range(kernel.WIDTH):
+        work[i] = initial[i]
+    work[kernel.WIDTH] = sample_time / substeps
+    state = kernel.load(slots)
+    for k in range(n):
+        for i in range(kernel.WIDTH):
+            states[k, i] = work[i]
+        if k == n - 1:
+            break
+        if k == 0 or last_row > 0:
+            for i in range(kernel.COLUMNS):
+                work[kernel.WIDTH + 1 + i] = parameters[min(k, last_row), i]
+            kernel.settle_at(slots, 0.0)
+        rise = (drive[k + 1] - drive[k]) / substeps
+        for j in range(substeps):
+            start = drive[k] + j * rise
+            state = kernel.advance((*state, start, start + rise), slots)
+        kernel.store(state, slots)
+    return states
+
+
+def run_side_by_side(
+    kernel: LanesKernel,
+    initial: Array,
+    drive: Array,
+    parameters: Array,
+    sample_time: float,
+    substeps: int,
+    states: Array,
+) -> None:
+    """Fill in the states of runs side by side at their samples.
+
+    Parameters
+    ----------
+    kernel : LanesKernel
+        Operations and sizes.
+    initial : ndarray, shape (states, lanes)
+        Initial states in SI.
+    drive : ndarray, shape (n, lanes)
+        Drives at the samples [their SI unit], linear between.
+    parameters : ndarray, shape (lanes, parameters)
+        Parameter rows.
+    sample_time : float
+        Seconds between samples [s].
+    substeps : int
+        Steps a sample.
+    states : ndarray, shape (n, states, up to lanes)
+        Room for the states.
+    """
+    room = np.empty(kernel.NUMBERS + 8)
+    work = room[-room.ctypes.data % 64 // 8 :]  # a vector across two cache lines takes twice as long
+    slots = work.ctypes.data
+    drives = kernel.WIDTH * kernel.LANES
+    rises, paces, known = drives + kernel.LANES, drives + 2 * kernel.LANES, drives + 3 * kernel.LANES
+    lay(kernel, work, 0, initial, kernel.WIDTH)
+    share(kernel, work, paces, (sample_time / substeps,))
+    lay(kernel, work, known, parameters.T, kernel.COLUMNS)
+    for first in range(0, 8 * kernel.LANES, 8 * kernel.VECTOR):
+        kernel.settle_at(slots + first, 0.0)
+    n, _, count = states.shape
+    for k in range(n):
+        for i in range(kernel.WIDTH):
+            for lane in range(count):
+                states[k, i, lane] = work[i * kernel.LANES + lane]
+        if k == n - 1:
+            break
+        for lane in range(kernel.LANES):
+            work[drives + lane] = drive[k, lane]
+            work[rises + lane] = (drive[k + 1, lane] - drive[k, lane]) / substeps
+        for j in range(substeps):
+            for first in range(0, 8 * kernel.LANES, 8 * kernel.VECTOR):
+                kernel.step_at(slots + first, float(j))
+
+
+def lay(kernel: SideBySide, work: Array, place: int, values: Array, count: int) -> None:
+    """Put numbers of runs side by side in their places.
+
+    Parameters
+    ----------
+    kernel : SideBySide
+        Sizes.
+    work : ndarray, shape (numbers,)
+        All numbers.
+    place : int
+        Where they stand.
+    values : ndarray, shape (count or more, lanes)
+        The numbers [any unit].
+    count : int
+        How many of each run.
+    """
+    for i in range(count):
+        for lane in range(kernel.LANES):
+            work[place + i * kernel.LANES + lane] = values[i, lane]
+
+
+def share(kernel: SideBySide, work: Array, place: int, values: Array | tuple[float, ...]) -> None:
+    """Put numbers that all runs share in their places.
+
+    Parameters
+    ----------
+    kernel : SideBySide
+        Sizes.
+    work : ndarray, shape (numbers,)
+        All numbers.
+    place : int
+        Where they stand.
+    values : ndarray, shape (count,), or tuple of float
+        The numbers [any unit].
+    """
+    for i in range(len(values)):
+        for lane in range(kernel.LANES):
+            work[place + i * kernel.LANES + lane] = values[i]

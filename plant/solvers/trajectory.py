@@ -1,0 +1,121 @@
+"""Runs in fixed steps: `trajectory` for any plant and its parameters, and the kernel that it compiles."""
+
+from collections.abc import Callable
+from functools import cache
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.compiled.expression import as_expression, symbol
+from plant.compiled.hoist import hoisted
+from plant.compiled.kernel_file import load_kernel
+from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.source import INTRINSICS, lines_source, operations_source
+from plant.runs import require_finite, steps_a_sample
+from plant.solvers.fixed_step_loops import run_alone
+from plant.solvers.steps import Parameters, StepFunction, parameter_names, parameter_row, parameter_symbols
+
+Array: TypeAlias = NDArray[np.float64]
+
+Trajectory: TypeAlias = Callable[[Array, Array, Array, float, int], Array]
+"""``run(initial state, drive, parameter rows, sample time, substeps) -> states, shape (n, states)``."""
+
+
+def trajectory(
+    name: str,
+    step: StepFunction,
+    start: Array,
+    drive: Array,
+    parameters: Parameters,
+    sample_time: float,
+    *,
+    longest_step: float,
+) -> Array:
+    """Run any plant along a drive in fixed steps.
+
+    Parameters
+    ----------
+    name : str
+        The plant's name.
+    step : callable
+        ``step(state, drives, parameters, h)``, written for symbols: of a plant's rates ``derivative(state, drive,
+        parameters)`` take `plant.solvers.steps.ros2_step`, which is L-stable, or `plant.solvers.steps.rk4_step`.
+    start : ndarray, shape (states,)
+        Initial state in SI.
+    drive : ndarray, shape (n,)
+        Drive at the samples [its SI unit], linear between.
+    parameters : dataclass
+        The plant's parameters.
+    sample_time : float
+        Seconds between samples [s].
+    longest_step : float
+        Longest step [s].
+
+    Returns
+    -------
+    ndarray, shape (n, states)
+        States at the samples.
+
+    Raises
+    ------
+    HydrostateError
+        If the state stops being finite.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> from plant.solvers.steps import ros2_step
+    >>> @dataclass(frozen=True)
+    ... class Lag:
+    ...     time_constant: float = 0.5
+    >>> def rates(state, drive, p):
+    ...     return ((drive - state[0]) / p.time_constant,)
+    >>> states = trajectory("lag", ros2_step(rates), np.zeros(1), np.ones(101), Lag(), 0.01, longest_step=0.001)
+    >>> states[[0, 50, 100], 0].round(4).tolist()
+    [0.0, 0.6321, 0.8647]
+    """
+    run = compile_trajectory(name, step, len(start), type(parameters))
+    row = parameter_row(parameters)[None]
+    states = run(start, drive, row, sample_time, steps_a_sample(sample_time, longest_step))
+    require_finite(states, sample_time, name)
+    return states
+
+
+@cache
+def compile_trajectory(name: str, step: StepFunction, width: int, parameter_class: type[Parameters]) -> Trajectory:
+    """Generate the kernel that runs a step function along a drive.
+
+    Parameters
+    ----------
+    name : str
+        What the kernel is, for its file's name.
+    step : callable
+        ``step(state, speeds, parameters, h)``, written for symbols.
+    width : int
+        Count of states.
+    parameter_class : type
+        What the parameter rows hold, field by field.
+
+    Returns
+    -------
+    callable
+        ``run(initial (states,), speed (n,), parameter rows (1 or n, parameters), sample time [s], substeps)``, which
+        returns the states at the samples, shape (n, states).
+    """
+    given = [*(f"x{i}" for i in range(width)), "u_start", "u_end"]
+    *state, start, end = map(symbol, given)
+    result = step(tuple(state), (start, end), parameter_symbols(parameter_class), symbol("h"))
+    outputs = {x: as_expression(value) for x, value in zip(given, result, strict=False)}
+    fixed, stepped = hoisted(outputs, {*given}, "c")
+    names = parameter_names(parameter_class)
+    every = [*given[:width], "h", *names, *fixed]
+    slots = {name: i for i, name in enumerate(every)}
+    parts = (
+        INTRINSICS,
+        operations_source({"settle": lines_source("settle", fixed)}, slots, 1),
+        lines_source("step", stepped),
+        f"load = loading({width})\nadvance = advancing({given}, SLOTS, step, {width})",
+        pasted(run_alone, constants={"WIDTH": width, "COLUMNS": len(names), "NUMBERS": len(every)}),
+    )
+    return load_kernel(name, kernel_text(f"trajectory of the {name} plant", *parts)).run_alone

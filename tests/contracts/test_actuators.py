@@ -1,0 +1,197 @@
+"""What every kind of actuator of the registry promises, whichever it is (docs/add-a-plant.md)."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from estimation.finding import Finding, Gate, Outcome
+from experiments import actuators as registry
+from experiments.actuator_kind import ActuatorKind, Run
+from experiments.actuators import actuator, actuators
+from experiments.cli import app
+from experiments.command.json_output import json_text
+from experiments.log_pages.finding_page import finding_page
+from plant.eha.rig import read_rig, rig_template
+from plant.errors import HydrostateError
+from plant.log.columns import UNITS
+from plant.log.files import read_record, write_record
+from plant.log.record import Record
+from plant.notes import Note
+from plant.units import notes, unit_registry
+
+KINDS = {kind.name: kind for kind in actuators()}
+EVERY_KIND = pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+
+SHORT: Mapping[str, Mapping[str, Any]] = {"eha": {"duration": 4.0, "sample_time": 1e-3}}
+"""What makes a run short, where the kind's own is long."""
+
+FOREIGN = {"eha": ("--load", "3")}
+"""An option that a kind does not understand."""
+
+
+def run_of(kind: ActuatorKind, seed: int = 3) -> Run:
+    assert kind.simulate is not None
+    options = {**kind.simulate.options, **SHORT.get(kind.name, {}), "seed": seed, "plant": kind.name}
+    return kind.simulate.run(kind.rig, options)
+
+
+@dataclass(frozen=True)
+class Looked:
+    """What a kind says of a log of its healthy actuator, as read from its file."""
+
+    kind: ActuatorKind
+    log: Path
+    record: Record
+    findings: Mapping[str, Finding]
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def looked(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Looked:
+    kind = KINDS[request.param]
+    log = tmp_path_factory.mktemp(kind.name) / "healthy.csv"
+    write_record(run_of(kind).record, log)
+    record = read_record(log, required=kind.required)
+    findings: dict[str, Finding] = {}
+    for name, verb in (("estimate", kind.estimate), ("diagnose", kind.diagnose)):
+        if verb is not None:
+            findings[name] = verb.run(record, *verb.prepare(kind.rig, {**verb.options, "seed": 0}))
+    return Looked(kind, log, record, findings)
+
+
+@EVERY_KIND
+def test_it_is_found_by_its_name_and_by_its_models(kind: ActuatorKind) -> None:
+    assert all(actuator(name) is kind for name in (kind.name, *kind.models))
+    assert kind.description
+    assert kind.simulate
+    assert kind.estimate
+    assert kind.diagnose
+
+
+@EVERY_KIND
+def test_its_parameters_have_notes_and_a_rig_file_gives_them_back(kind: ActuatorKind, tmp_path: Path) -> None:
+    assert list(notes(kind.parameters)) == [one.name for one in fields(kind.parameters)]
+    path = tmp_path / "rig.toml"
+    path.write_text(rig_template(kind.parameters, kind.name, {}), encoding="utf-8")
+    assert kind.read_rig(path).parameters == kind.rig.parameters == kind.parameters()
+    other = next(one for one in KINDS.values() if one is not kind)
+    text = f'plant = "{other.name}"\n'
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(
+        HydrostateError, match=f"a rig of plant '{kind.name}' is wanted here, got one of '{other.name}'"
+    ):
+        read_rig(path, kind.parameters, kind.name)
+
+
+@EVERY_KIND
+def test_its_channels_are_known_and_those_required_are_among_them(kind: ActuatorKind) -> None:
+    assert {name: UNITS[name] for name in kind.channels} == dict(kind.channels)
+    assert {name for wanted in kind.required for name in wanted.split(" or ")} <= set(kind.channels)
+    assert kind.required
+
+
+@EVERY_KIND
+def test_a_seed_decides_the_whole_run_and_all_that_is_required_is_logged(kind: ActuatorKind) -> None:
+    first, again, other = (run_of(kind, seed).record for seed in (3, 3, 4))
+    assert all(np.array_equal(first[name], again[name]) for name in first)
+    assert not all(np.array_equal(first[name], other[name]) for name in first)
+    assert all(any(name in first for name in wanted.split(" or ")) for wanted in kind.required)
+    assert set(first) <= set(kind.channels)
+    assert json.loads(json.dumps(dict(first.metadata)))["plant"]
+
+
+def test_a_finding_is_whole(looked: Looked) -> None:
+    for found in looked.findings.values():
+        assert found.actuator == looked.kind.name
+        assert isinstance(found.outcome, Outcome)
+        assert isinstance(found.gate, Gate)
+        assert set(found.channels) <= set(looked.record)
+        assert found.channels
+        assert all(isinstance(note, Note) and str(note) for note in found.all_notes)
+        for one in {**found.quantities, **found.severities}.values():
+            unit_registry().parse_units(one.unit)
+            assert one.ci95 is None or one.value is not None
+            if one.value is not None and one.ci95 is not None and all(map(math.isfinite, one.ci95)):
+                assert one.ci95[0] <= one.value <= one.ci95[1]
+
+
+def test_its_own_healthy_log_is_estimated_and_called_healthy(looked: Looked) -> None:
+    estimate, diagnosis = looked.findings["estimate"], looked.findings["diagnose"]
+    assert estimate.outcome is Outcome.OK
+    assert estimate.gate.passed
+    assert any(one.value is not None and one.ci95 is not None for one in estimate.quantities.values())
+    assert (diagnosis.condition, diagnosis.unknown) == (looked.kind.conditions[0], False)
+    assert set(diagnosis.probabilities) <= set(looked.kind.conditions)
+    assert sum(diagnosis.probabilities.values()) == pytest.approx(1.0 if diagnosis.probabilities else 0.0)
+
+
+def test_entries_are_those_of_a_log_that_failed_and_go_into_json(looked: Looked) -> None:
+    for name, found in looked.findings.items():
+        verb = getattr(looked.kind, name)
+        entries = verb.entries(found)
+        about = {"outcome", "message", "warnings", "condition", "expected", "rig", "seed", "plant"}
+        assert set(verb.blank) - set(entries) <= about
+        assert set(entries) - set(verb.blank) <= about
+        assert json.loads(json_text([entries]))[0]["outcome"] == found.outcome.value
+
+
+def test_the_page_says_what_was_found(looked: Looked) -> None:
+    for name, found in looked.findings.items():
+        result = {"file": "run.csv", "rig": "mine", **getattr(looked.kind, name).entries(found)}
+        page = finding_page(result, found, looked.record)
+        assert all(one.replace("_", " ") in page for one in found.quantities)
+        assert found.channels[0] in page
+        assert "Rig: mine." in page
+
+
+def test_the_command_says_the_same(looked: Looked) -> None:
+    done = CliRunner().invoke(app, ["diagnose", "--plant", looked.kind.name, "--json", str(looked.log)])
+    assert done.exit_code == 0, done.output
+    (entries,) = json.loads(done.stdout)
+    assert entries["condition"] == looked.kind.conditions[0]
+    assert entries["plant"] == looked.kind.name
+
+
+@EVERY_KIND
+def test_what_it_does_not_take_is_refused_in_one_sentence(kind: ActuatorKind, tmp_path: Path) -> None:
+    run = run_of(kind)
+    lacking = next(name for wanted in kind.required for name in wanted.split(" or "))
+    log = tmp_path / "log.csv"
+    write_record(run.record.replace(**{lacking: None}), log)
+    option = FOREIGN.get(kind.name, ("--form", "flow"))
+    for words, said in ((option, f"{option[0]} needs --plant"), ((), f"column {lacking} is missing")):
+        done = CliRunner().invoke(app, ["estimate", "--plant", kind.name, *words, str(log)])
+        assert done.exit_code == 2
+        assert said in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_verb_that_a_kind_has_not_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    bare = replace(KINDS["piezo-stack"], estimate=None)
+    monkeypatch.setattr(registry, "actuator", lambda _: bare)
+    done = CliRunner().invoke(app, ["estimate", "--plant", "piezo-stack", str(tmp_path / "log.csv")])
+    assert done.exit_code == 2
+    assert "estimate is not there for piezo-stack" in done.stderr
+
+
+def test_an_unknown_kind_is_refused_with_those_that_are_known() -> None:
+    with pytest.raises(HydrostateError, match="--plant must be one of reduced, lumped, circuit, piezo-stack"):
+        actuator("toy")
+
+
+def test_a_rig_file_names_its_kind(tmp_path: Path) -> None:
+    rig, out = tmp_path / "rig.toml", tmp_path / "run.csv"
+    run = CliRunner()
+    assert run.invoke(app, ["rig", "init", str(rig), "--plant", "diaphragm-motor"]).exit_code == 0
+    done = run.invoke(app, ["simulate", "--rig", str(rig), "--duration", "0.02", "--out", str(out), "--json"])
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)[0]["plant"] == "diaphragm-motor"
+    refused = run.invoke(app, ["identify", "--rig", str(rig), str(out)])
+    assert refused.exit_code == 2
+    assert "a rig of plant 'eha' is wanted here" in refused.stderr

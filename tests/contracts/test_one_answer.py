@@ -1,0 +1,69 @@
+"""One log, one answer: estimate and diagnose give the same bulk modulus, interval and gate."""
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from estimation.eha.estimate import estimate_log
+from estimation.finding import Outcome
+from experiments.command.json_output import plain
+from experiments.command.logs import read_log
+from experiments.eha.entries import diagnosis_entries, estimate_entries
+from faults.diagnosis.diagnose import diagnose_log
+from plant.eha.rig import Rig, read_rig
+from plant.errors import LogWarning
+from plant.log.columns import parse_columns
+
+FEW = ("bench/run002.csv", "strange/soft_oil/run000.csv", "strange/pressure_lags_2_ms/run000.csv")
+"""A sound log, one of which the class alone is doubted, and one whose fit is refused."""
+
+
+def foreign(shared: Path) -> list[str]:
+    """Return the logs of the bench and of the strange sets, by their places in the folder."""
+    sets = [shared / "bench", *sorted(folder for folder in (shared / "strange").iterdir() if folder.is_dir())]
+    return [path.relative_to(shared).as_posix() for folder in sets for path in sorted(folder.glob("run*.csv"))]
+
+
+def answers(log: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return what the two verbs print of a log, with the rig and columns that its set names."""
+    truth = pd.read_csv(log.parent / "truth.csv", dtype=str, keep_default_na=False)
+    row = truth[truth["file"] == log.name].iloc[0]
+    rig = read_rig(log.parent / row["rig"]) if row.get("rig") else Rig()
+    columns = parse_columns(row["columns"].split(",")) if row.get("columns") else {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        record = read_log(log, rig.columns, columns)
+    return plain(estimate_entries(estimate_log(record, rig))), plain(diagnosis_entries(diagnose_log(record, rig)))
+
+
+def disagreement(log: Path) -> str:
+    """Say in what the verbs differ on a log; nothing where they agree."""
+    estimated, diagnosed = answers(log)
+    said = [name for name in ("bulk_modulus_pa", "gate") if estimated[name] != diagnosed[name]]
+    modulus = estimated["bulk_modulus_pa"]
+    shown = {"value": modulus["value"], "unit": "Pa", "ci95": modulus["ci95"] or [None, None]}
+    if diagnosed.get("severity", {}).get("bulk_modulus", shown) != shown:
+        said.append("severity.bulk_modulus")
+    refused = estimated["outcome"] in (Outcome.OK, Outcome.MISMATCH) and not estimated["gate"]["passed"]
+    if refused and not diagnosed["unknown"]:
+        said.append("the gate refuses the fit and a class is named")
+    return f"{log}: {', '.join(said)}" if said else ""
+
+
+@pytest.mark.parametrize("place", FEW)
+def test_estimate_and_diagnose_give_one_answer(place: str, shared: Path) -> None:
+    estimated, diagnosed = answers(shared / place)
+    assert disagreement(shared / place) == ""
+    assert estimated["bulk_modulus_pa"]["value"] is not None
+    assert estimated["gate"]["passed"] == (place != FEW[2])
+    assert diagnosed["unknown"] == (place != FEW[0])
+
+
+@pytest.mark.slow
+def test_estimate_and_diagnose_give_one_answer_on_every_foreign_log(shared: Path) -> None:
+    places = foreign(shared)
+    assert len(places) >= 18 + 22 * 3
+    assert [said for said in (disagreement(shared / place) for place in places) if said] == []

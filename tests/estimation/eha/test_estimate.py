@@ -1,0 +1,170 @@
+"""What a log says of its oil, as a finding; and that its sensors are looked at once."""
+
+import sys
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from estimation.eha.bulk_modulus import EstimateOptions, estimate_bulk_modulus, estimate_clean
+from estimation.eha.estimate import estimate_log, refused
+from estimation.eha.result import BulkModulusEstimate
+from estimation.finding import Gate, Outcome
+from estimation.log_checks import measurement_noise
+from estimation.log_checks.clean import clean_log
+from estimation.notes import EstimateCode, SensorCode
+from faults.conditions import CONDITIONS, parameters_for
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.eha.simulate import LUMPED, simulate
+from plant.log.record import Record
+from plant.notes import Note
+from plant.sensors.faults import SensorFault, with_fault
+from plant.sensors.sensors import BENCH
+
+HEALTHY = EhaParameters()
+PRESSURE = "differential_pressure_pa"
+PACKAGES = ("plant", "estimation", "faults", "experiments")
+
+
+def log(condition: str = "minor_leakage", drive: str = "steps", duration: float = 3.0) -> Record:
+    p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(8)
+    return simulate(LUMPED, make_drive(drive, duration, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+
+
+def with_outliers(record: Record, channel: str, count: int = 20) -> Record:
+    values = record[channel].copy()
+    hit = np.random.default_rng(3).choice(len(record), count, replace=False)
+    values[hit] += 20.0 * np.std(values)
+    return record.replace(**{channel: values})
+
+
+def test_a_finding_holds_what_the_estimate_found_with_units_and_intervals() -> None:
+    found = estimate_log(log(), Rig())
+    alone = estimate_bulk_modulus(log(), HEALTHY)
+    assert (found.actuator, found.outcome, found.channels) == ("eha", Outcome.OK, ("position_m", PRESSURE))
+    assert found.quantities["bulk_modulus"] == alone.quantity
+    assert found.gate == alone.gate
+    assert {name: one.unit for name, one in found.quantities.items()} == {
+        "bulk_modulus": "Pa",
+        "leakage_coefficient": "m^3/(s Pa)",
+        "flow_bias": "m^3/s",
+    }
+    for name, (value, std) in alone.others.items():
+        one = found.quantities[name]
+        assert (one.value, one.std) == (value, std)
+        assert one.ci95 == pytest.approx((value - 1.96 * std, value + 1.96 * std), rel=1e-4)
+    assert (found.condition, found.probabilities, found.advice) == (None, {}, ())
+    assert found.all_notes == ()
+
+
+def test_what_is_not_known_of_the_rig_widens_the_interval() -> None:
+    exact, vague = (estimate_log(log(), Rig(uncertainties=given)) for given in ({}, {"chamber_volume": 0.05}))
+    stds = [found.quantities["bulk_modulus"].std for found in (exact, vague)]
+    assert stds[1] > 3.0 * stds[0]
+
+
+def test_only_what_the_estimate_used_is_said_to_be_left_out() -> None:
+    unused, used = (
+        estimate_log(with_outliers(log(), channel), Rig()) for channel in ("velocity_m_s", "motor_speed_rad_s")
+    )
+    assert unused.notes == ()
+    (note,) = used.notes
+    assert note == SensorCode.OUTLIERS_LEFT_OUT.note(channel="motor_speed_rad_s", count=20, total=3000)
+
+
+@pytest.mark.parametrize("form", ["pressure", "acceleration"])
+def test_what_it_costs_not_to_use_the_pressure_is_noted(form: str) -> None:
+    record = log(duration=1.0)
+    seen = record if form == "acceleration" else record.replace(**{PRESSURE: None})
+    found = estimate_log(seen, Rig(), EstimateOptions(form=form))
+    cost = EstimateCode.PRESSURE_UNUSED if form == "acceleration" else EstimateCode.PRESSURE_ABSENT
+    assert [note.code for note in found.notes] == [cost]
+    assert {EstimateCode.PRESSURE_UNUSED, EstimateCode.PRESSURE_ABSENT}.isdisjoint(
+        note.code for note in estimate_log(record, Rig()).notes
+    )
+
+
+def test_a_fit_is_refused_for_what_speaks_against_its_model_and_not_for_a_wide_bound() -> None:
+    frozen = with_fault(log(), SensorFault(channel="position_m", kind="freeze", start=1.5))
+    found = estimate_log(frozen, Rig())
+    assert SensorCode.SENSOR_FROZE in [note.code for note in refused(found.evidence)]
+    stuck = log("major_friction", "sine").replace(**{PRESSURE: None})
+    unseen = estimate_log(stuck, Rig())
+    assert unseen.outcome is Outcome.NOT_OBSERVABLE
+    assert [note.code for note in unseen.gate.reasons] == [EstimateCode.BOUND_TOO_WIDE]
+    assert refused(unseen.evidence) == ()
+
+
+def test_a_form_that_is_told_leakage_and_friction_refuses_no_log() -> None:
+    found = estimate_log(log("major_leakage_minor_friction"), Rig(), EstimateOptions(form="pressure"))
+    assert EstimateCode.INNOVATIONS_LARGE in [note.code for note in found.gate.reasons]
+    assert refused(found.evidence) == ()
+
+
+def refused_with(form: str, outcome: Outcome, *reasons: Note) -> list[str]:
+    gate = Gate(False, reasons)
+    found = BulkModulusEstimate(outcome, None, None, 0.01, gate, form, (), {}, {}, None, None)
+    return [note.code for note in refused(found)]
+
+
+def test_without_pressure_a_fit_that_is_near_speaks_against_bulk_modulus_alone() -> None:
+    near, laws = (
+        EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=1.9),
+        EstimateCode.FRICTION_LAWS_DISAGREE.note(least_pa=1e8, most_pa=2e8),
+    )
+    froze = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.0, begin_s=0.0, length_s=1.0)
+    wide = EstimateCode.BOUND_TOO_WIDE.note(percent=5.0)
+    assert refused_with("motion", Outcome.OK, near, laws) == []
+    assert refused_with("motion", Outcome.NOT_OBSERVABLE, froze, wide, near) == [SensorCode.SENSOR_FROZE]
+    far = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=38.0)
+    assert refused_with("motion", Outcome.MISMATCH, wide, far) == [EstimateCode.POSITION_RESIDUALS_LARGE]
+    large = EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=1.9)
+    assert refused_with("flow", Outcome.OK, large) == [EstimateCode.PRESSURE_RESIDUALS_LARGE]
+
+
+@pytest.fixture
+def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Record, tuple[str, ...]]]:
+    """Count how often the noise of a log is measured, wherever the function was imported."""
+    calls: list[tuple[Record, tuple[str, ...]]] = []
+    original = measurement_noise.measurement_variances
+
+    def counting(record: Record, channels: Sequence[str]) -> object:
+        calls.append((record, tuple(channels)))
+        return original(record, channels)
+
+    for name, module in list(sys.modules.items()):
+        if name.split(".")[0] in PACKAGES and vars(module).get("measurement_variances") is original:
+            monkeypatch.setattr(module, "measurement_variances", counting)
+    return calls
+
+
+WAYS = {
+    "the flow form, fitted": EstimateOptions(),
+    "the flow form, filtered": EstimateOptions(form="flow", method="ekf"),
+    "the pressure form": EstimateOptions(form="pressure"),
+    "the pressure form, smoothed": EstimateOptions(method="smoother"),
+    "the pressure form, tuned": EstimateOptions(tuned=True),
+    "the acceleration form": EstimateOptions(form="acceleration"),
+    "the motion form": EstimateOptions(form="motion"),
+}
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        pytest.param(way, marks=pytest.mark.slow) if "tuned" in way or "smoothed" in way or "motion" in way else way
+        for way in WAYS
+    ],
+)
+def test_the_noise_of_a_cleaned_log_is_measured_once(way: str, measured: list[tuple[Record, tuple[str, ...]]]) -> None:
+    record = log(duration=1.0)
+    for channel in ("motor_speed_rad_s", "position_m", "velocity_m_s", PRESSURE):
+        record = with_outliers(record, channel, 5)
+    cleaned = clean_log(record, HEALTHY)
+    assert [channels for seen, channels in measured if seen is cleaned.record] == [tuple(cleaned.variances)]
+    assert set(cleaned.variances) == {"motor_speed_rad_s", "position_m", "velocity_m_s", PRESSURE}
+    measured.clear()
+    estimate_clean(cleaned, HEALTHY, WAYS[way])
+    assert measured == []

@@ -1,0 +1,64 @@
+"""The unrolled covariance algebra is the matrix algebra."""
+
+import numpy as np
+import pytest
+
+from estimation.engine.kalman import scaled_step
+from estimation.engine.kernels import LANES, compile_kernel, kernel_source
+from estimation.engine.layout import halves_of
+from estimation.filters.ekf import EKF, ekf, ekf_predict, ekf_update
+from estimation.filters.run import run_filter
+from estimation.models.eha_forms import ACCELERATION_FORM, FORMS, PRESSURE_FORM
+from estimation.models.gaussian import Gaussian
+from estimation.models.model import ProcessModel
+from plant.compiled.expression import ONE, ZERO, ordered
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+CHANNELS = ("position_m", "velocity_m_s")
+
+
+def test_bulk_modulus_is_a_constant_row_that_costs_nothing() -> None:
+    moved, slopes = scaled_step(PRESSURE_FORM)
+    assert moved[3].operation == "symbol"
+    assert all(slope is ZERO for slope in slopes[3][:3])
+    assert slopes[3][3] is ONE
+
+
+@pytest.mark.parametrize("model", FORMS.values(), ids=FORMS)
+def test_predict_and_update_give_every_mean_and_the_upper_triangle(model: ProcessModel) -> None:
+    n = model.width
+    wanted = {f"z{i}" for i in range(n)} | {f"P{i}_{j}" for i in range(n) for j in range(i, n)}
+    assert set(ekf_predict(model)) == wanted
+    assert set(ekf_update(model, ("position_m",))) == wanted | {"e0", "s0"}
+
+
+def test_no_update_divides_more_often_than_it_has_channels() -> None:
+    channels = ("position_m", "velocity_m_s", "differential_pressure_pa")
+    items = ordered(halves_of(EKF, PRESSURE_FORM, channels).update.values())
+    assert sum(item.operation == "/" for item in items) == len(channels)
+
+
+def test_a_rule_is_the_same_straight_lines_for_one_filter_and_for_many() -> None:
+    one, many = (kernel_source(EKF, ACCELERATION_FORM, CHANNELS, lanes) for lanes in (1, LANES))
+    lines = one.split("def prepare(")[1].split("SLOTS = ")[0]
+    assert lines == many.split("def prepare(")[1].split("SLOTS = ")[0]
+    assert not {"for", "if", "while"} & set(lines.split())
+
+
+def test_the_same_model_and_channels_are_compiled_once() -> None:
+    assert compile_kernel(EKF, PRESSURE_FORM, CHANNELS) is compile_kernel(EKF, PRESSURE_FORM, CHANNELS)
+
+
+def test_the_order_of_channels_does_not_change_the_belief(linear: ProcessModel) -> None:
+    rng = np.random.default_rng(0)
+    root = 1e-2 * rng.normal(size=(3, 3))
+    prior = Gaussian(np.zeros(3), root @ root.T)
+    record = Record(1e-2, {n: rng.normal(size=50) for n in ("motor_speed_rad_s", "position_m", "velocity_m_s")})
+    variances = {"position_m": 1e-4, "velocity_m_s": 1e-2}
+    forth, back = (
+        run_filter(ekf, linear, prior, record, EhaParameters(), channels=channels, variances=variances).belief
+        for channels in (("position_m", "velocity_m_s"), ("velocity_m_s", "position_m"))
+    )
+    np.testing.assert_allclose(forth.mean, back.mean, rtol=1e-9)
+    np.testing.assert_allclose(forth.covariance, back.covariance, rtol=1e-9)

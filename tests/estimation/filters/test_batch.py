@@ -1,0 +1,148 @@
+"""A filter gives the same bits alone and in a batch, whatever its rule and its neighbours."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.engine.contract import FilterProblem, Trace
+from estimation.engine.rule import Rule
+from estimation.engine.runner import run_rule
+from estimation.filters.batch import filter_batch
+from estimation.filters.ckf import CKF
+from estimation.filters.ekf import EKF
+from estimation.filters.iekf import IEKF
+from estimation.filters.run import filter_problem
+from estimation.filters.sif import SIF
+from estimation.filters.svsf import SVSF
+from estimation.filters.ukf import UKF
+from estimation.models.eha_forms import FORMS
+from estimation.models.gaussian import Gaussian
+from estimation.models.model import ProcessModel
+from plant.eha.drives import sine
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import LUMPED, simulate
+from plant.errors import HydrostateError
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+RULES: dict[str, tuple[Rule, str]] = {
+    "ekf": (EKF, "none"),
+    "ekf-huber": (EKF, "huber"),
+    "ekf-student-t": (EKF, "student-t"),
+    "iekf": (IEKF, "none"),
+    "ukf": (UKF, "none"),
+    "ckf": (CKF, "none"),
+    "svsf": (SVSF, "none"),
+    "sif": (SIF, "none"),
+}
+EVERY_RULE = pytest.mark.parametrize(("rule", "robust"), RULES.values(), ids=RULES)
+SAMPLES = 701  # not a whole count of what the batch lays side by side at a time
+
+
+def problems(model: ProcessModel, count: int, samples: int = SAMPLES, robust: str = "none") -> list[FilterProblem]:
+    """Filters of one log with priors, noise and measurements of their own, one sample in ten missing."""
+    rig = EhaParameters()
+    drive = sine(samples * 1e-4, 1e-4, rig.rated_speed, 5.0)
+    record = simulate(LUMPED, drive, 1e-4, rig, sensors=BENCH, rng=np.random.default_rng(0))
+    start = np.array([0.1 * state.scale for state in model.states])
+    prior = Gaussian(start, np.diag(start**2))
+    base = replace(filter_problem(model, prior, record, rig), robust=robust)
+    rng = np.random.default_rng(1)
+    made: list[FilterProblem] = []
+    for _ in range(count):
+        noise = np.sqrt(base.variances) * rng.normal(size=base.measured.shape)
+        measured = np.where(rng.random(base.measured.shape) < 0.1, np.nan, base.measured + noise)
+        mean = base.mean * rng.uniform(0.5, 2.0, size=base.mean.shape)
+        made.append(replace(base, mean=mean, measured=measured, noise=base.noise * rng.uniform(0.5, 2.0)))
+    return made
+
+
+def assert_same_bits(traces: Sequence[Trace], alone: Sequence[Trace]) -> None:
+    assert len(traces) == len(alone)
+    for one, other in zip(traces, alone, strict=True):
+        for name in ("mean", "covariance", "track", "track_variance", "nis", "count", "log_likelihood"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+
+
+def assert_batch_is_alone(rule: Rule, tasks: list[FilterProblem], workers: int = 1) -> None:
+    together = list(filter_batch(tasks, rule, workers=workers))
+    assert_same_bits(together, [run_rule(rule, task) for task in tasks])
+    assert np.all(np.isfinite([trace.mean for trace in together]))
+
+
+@EVERY_RULE
+@pytest.mark.parametrize("count", [33, 40])
+def test_every_rule_gives_the_same_bits_alone_and_in_a_batch(
+    linear: ProcessModel, rule: Rule, robust: str, count: int
+) -> None:
+    assert_batch_is_alone(rule, problems(linear, count, robust=robust))
+
+
+@pytest.mark.slow
+@EVERY_RULE
+@pytest.mark.parametrize("form", FORMS)
+def test_every_rule_does_so_on_every_form(form: str, rule: Rule, robust: str) -> None:
+    assert_batch_is_alone(rule, problems(FORMS[form], 33, robust=robust))
+
+
+def test_threads_change_no_bit_and_no_order(linear: ProcessModel) -> None:
+    assert_batch_is_alone(SVSF, problems(linear, 100), workers=2)
+
+
+def test_problems_are_drawn_a_block_at_a_time(linear: ProcessModel) -> None:
+    drawn: list[int] = []
+    tasks = problems(linear, 96, samples=20)
+    traces = filter_batch((drawn.append(i) or task for i, task in enumerate(tasks)), EKF)
+    next(traces)
+    assert len(drawn) == 32
+
+
+@pytest.mark.parametrize("samples", [2, 7, 8, 9, 16])
+def test_short_logs_are_filtered_as_alone(linear: ProcessModel, samples: int) -> None:
+    assert_batch_is_alone(EKF, problems(linear, 33, samples))
+
+
+def test_however_a_log_lies_in_memory_it_is_filtered_as_alone(linear: ProcessModel) -> None:
+    tasks = problems(linear, 40, samples=50)
+    measured = np.concatenate([task.measured for task in tasks], axis=1)
+    measured.flags.writeable = False
+    lying = [replace(task, measured=measured[:, 2 * k : 2 * k + 2]) for k, task in enumerate(tasks)]
+    assert_same_bits(list(filter_batch(lying)), [run_rule(EKF, task) for task in tasks])
+
+
+def test_the_track_of_every_sample_is_kept_as_alone(linear: ProcessModel) -> None:
+    assert_batch_is_alone(EKF, [replace(task, every=1) for task in problems(linear, 33, samples=50)])
+
+
+def test_no_problem_is_no_trace() -> None:
+    assert list(filter_batch([], EKF)) == []
+
+
+def test_filters_of_another_model_or_sampling_are_refused(linear: ProcessModel) -> None:
+    first, second = problems(linear, 2, samples=20)
+    with pytest.raises(HydrostateError, match="must share one model, got linear and pressure"):
+        list(filter_batch([first, replace(second, model=FORMS["pressure"])]))
+    with pytest.raises(HydrostateError, match=r"must agree in sample_time, got 0\.0001 and 0\.001"):
+        list(filter_batch([first, replace(second, sample_time=1e-3)]))
+    with pytest.raises(HydrostateError, match="must agree in robust, got none and huber"):
+        list(filter_batch([first, replace(second, robust="huber")]))
+
+
+def test_logs_of_another_length_are_refused(linear: ProcessModel) -> None:
+    first, second = problems(linear, 2, samples=20)
+    with pytest.raises(HydrostateError, match="one length, got 20 and 19, drives of 19"):
+        list(filter_batch([first, replace(second, measured=second.measured[:-1], drives=second.drives[:-1])]))
+    with pytest.raises(HydrostateError, match="one length, got 20 and 20, drives of 19"):
+        list(filter_batch([first, replace(second, drives=second.drives[:-1])]))
+
+
+def test_a_record_is_left_alone(linear: ProcessModel) -> None:
+    rng = np.random.default_rng(0)
+    names = ("motor_speed_rad_s", "position_m", "velocity_m_s")
+    record = Record(1e-3, {name: rng.normal(size=50) for name in names})
+    task = filter_problem(linear, Gaussian(np.zeros(3), np.eye(3)), record, EhaParameters())
+    before = task.measured.copy()
+    list(filter_batch([task] * 40))
+    np.testing.assert_array_equal(task.measured, before)

@@ -1,0 +1,99 @@
+"""The iterated filter is the plain one where the sensors are linear, and finds the most probable state where not."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from estimation.engine.contract import Method
+from estimation.engine.rule import weighing
+from estimation.filters.ekf import EKF, ekf
+from estimation.filters.iekf import IEKF, iekf
+from estimation.filters.run import Estimate, run_filter
+from estimation.models.eha_forms import FORMS
+from estimation.models.gaussian import Gaussian
+from estimation.models.model import ProcessModel, StateVariable
+from plant.compiled.functions import Scalar, sqrt
+from plant.eha.model import EhaParameters, EhaValues
+from plant.log.record import Record
+
+Array = NDArray[np.float64]
+CHANNELS = ("position_m", "velocity_m_s")
+PRIOR = Gaussian(np.array([0.5, 2.0]), np.array([[1.0, 0.3], [0.3, 1.0]]))
+VARIANCES = {"position_m": 1e-2, "velocity_m_s": 4e-2}
+MEASURED = np.array([2.2, 0.4])
+
+
+def _still(state: tuple[Scalar, ...], speeds: tuple[Scalar, Scalar], p: EhaValues, h: Scalar) -> tuple[Scalar, ...]:
+    del speeds, p, h
+    return state
+
+
+def _range_and_product(state: tuple[Scalar, ...], p: EhaValues) -> Mapping[str, Scalar]:
+    del p
+    return {"position_m": sqrt(state[0] ** 2 + state[1] ** 2), "velocity_m_s": state[0] * state[1]}
+
+
+BENT = ProcessModel(
+    "bent",
+    (StateVariable("position_m", "m", 0.5, 0.0), StateVariable("velocity_m_s", "m/s", 2.0, 0.0)),
+    _still,
+    _range_and_product,
+    1.0,
+    parameters=EhaParameters,
+)
+
+
+def updated(method: Method, measured: Array, robust: str = "none") -> Estimate:
+    channels = {name: measured[i : i + 1] for i, name in enumerate(CHANNELS)}
+    record = Record(1e-3, {"motor_speed_rad_s": np.zeros(1), **channels})
+    return run_filter(method, BENT, PRIOR, record, EhaParameters(), variances=VARIANCES, robust=robust)
+
+
+def most_probable() -> Array:
+    def cost(state: Array) -> float:
+        predicted = np.array([np.hypot(*state), np.prod(state)])
+        off = state - PRIOR.mean
+        return float(off @ np.linalg.solve(PRIOR.covariance, off) + np.sum((MEASURED - predicted) ** 2 / [1e-2, 4e-2]))
+
+    return minimize(cost, PRIOR.mean, method="Nelder-Mead", options={"xatol": 1e-12, "fatol": 1e-15}).x
+
+
+@pytest.mark.parametrize("robust", ["none", "huber"])
+@pytest.mark.parametrize("model", FORMS.values(), ids=FORMS)
+def test_where_the_sensors_are_linear_its_update_is_the_extended_filters_node_by_node(
+    model: ProcessModel, robust: str
+) -> None:
+    plain, iterated = (weighing(rule, robust).update(model, CHANNELS) for rule in (EKF, IEKF))
+    assert plain.keys() == iterated.keys()
+    assert all(plain[name] is iterated[name] for name in plain)
+
+
+def test_where_they_bend_it_finds_the_most_probable_state() -> None:
+    found = updated(iekf, MEASURED).belief.mean
+    np.testing.assert_allclose(found, most_probable(), rtol=2e-3)
+    off = np.abs(updated(ekf, MEASURED).belief.mean - most_probable())
+    assert np.max(off) > 20.0 * np.max(np.abs(found - most_probable()))
+
+
+def test_its_innovations_are_those_of_the_prediction() -> None:
+    assert updated(iekf, MEASURED).log_likelihood == pytest.approx(updated(ekf, MEASURED).log_likelihood, rel=1e-12)
+
+
+def test_missing_samples_change_nothing() -> None:
+    belief = updated(iekf, np.full(2, np.nan)).belief
+    np.testing.assert_allclose(belief.mean, PRIOR.mean, rtol=1e-15)
+    np.testing.assert_allclose(belief.covariance, PRIOR.covariance, rtol=1e-15)
+
+
+def test_a_gross_outlier_counts_for_less_in_every_pass() -> None:
+    outlier = np.array([40.0, 0.4])
+    plain, robust = (updated(iekf, outlier, robust).belief.mean for robust in ("none", "student-t"))
+    assert np.linalg.norm(robust) < 0.9 * np.linalg.norm(plain)
+
+
+def test_the_plain_rule_is_the_rule_without_robust_updates() -> None:
+    assert weighing(IEKF, "none") is IEKF
+    assert IEKF.predict is EKF.predict

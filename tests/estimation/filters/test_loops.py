@@ -1,0 +1,91 @@
+"""Loops are Python: run as they are written they give, to the last bit, what the kernels pasted from them give."""
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.engine.contract import FilterProblem, Trace
+from estimation.filters import imm, imm_loops, iterated_smoother, particle, smoother, smoother_loops, trajectory_loops
+from estimation.filters.run import filter_problem
+from estimation.filters.run_imm import Mode, MultipleModelEstimate, run_imm
+from estimation.models.gaussian import Gaussian
+from estimation.models.model import ProcessModel
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+AsPython = Callable[..., Callable[..., Any]]
+PRIOR = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1e-4, 1e-3, 1.0]))
+
+
+def record(samples: int = 40) -> Record:
+    rng = np.random.default_rng(4)
+    names = ("position_m", "velocity_m_s")
+    seen = {name: np.where(rng.random(samples) < 0.2, np.nan, rng.normal(size=samples)) for name in names}
+    return Record(1e-3, {"motor_speed_rad_s": rng.normal(size=samples), **seen})
+
+
+def task(model: ProcessModel) -> FilterProblem:
+    variances = {"position_m": 1e-2, "velocity_m_s": 0.1}
+    bounds = (replace(model.states[0], upper=0.12), *model.states[1:])
+    problem = filter_problem(replace(model, states=bounds), PRIOR, record(), EhaParameters(), variances=variances)
+    return replace(problem, keep_innovations=True)
+
+
+def assert_same(plain: Trace, compiled: Trace) -> None:
+    for field in fields(compiled):
+        np.testing.assert_array_equal(getattr(plain, field.name), getattr(compiled, field.name), err_msg=field.name)
+
+
+def test_the_smoother(linear: ProcessModel, as_python: AsPython, monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = task(linear)
+    compiled = smoother.smoother(problem)
+    kernel = smoother.compile_smoother(problem.model, problem.channels, "none")
+    loops = {name: as_python(getattr(smoother_loops, name), getattr(kernel, name)) for name in ("forward", "backward")}
+    monkeypatch.setattr(smoother, "compile_smoother", lambda *_: SimpleNamespace(**loops))
+    assert_same(smoother.smoother(problem), compiled)
+
+
+def test_the_iterated_smoother(linear: ProcessModel, as_python: AsPython, monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = replace(task(linear), robust="huber")
+    compiled = iterated_smoother.iterated_smoother(problem)
+    kernel = iterated_smoother.compile_trajectory(problem.model, problem.channels, "huber")
+    names = ("roll", "forward", "backward", "spread_back", "reweigh")
+    loops = {name: as_python(getattr(trajectory_loops, name), getattr(kernel, name)) for name in names}
+    monkeypatch.setattr(iterated_smoother, "compile_trajectory", lambda *_: SimpleNamespace(**loops))
+    assert_same(iterated_smoother.iterated_smoother(problem), compiled)
+
+
+def bank(model: ProcessModel) -> MultipleModelEstimate:
+    modes = [Mode(name, model, EhaParameters(), noise={"force_n": q}) for name, q in (("calm", 1e-2), ("rough", 1e4))]
+    return run_imm(modes, PRIOR, record(), dwell_time=0.01, keep_innovations=True)
+
+
+def test_the_bank_of_interacting_models(
+    linear: ProcessModel, as_python: AsPython, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiled, compile_imm = bank(linear), imm.compile_imm
+
+    def in_python(*what: Any) -> imm_loops.ImmKernel:
+        kernel = compile_imm(*what)
+        return replace(kernel, run=as_python(imm_loops.run, kernel.run))
+
+    monkeypatch.setattr(imm, "compile_imm", in_python)
+    plain = bank(linear)
+    np.testing.assert_array_equal(plain.log_probability, compiled.log_probability)
+    assert plain.estimate.log_likelihood == compiled.estimate.log_likelihood
+    for name in ("mean", "variance", "residuals", "residual_variances"):
+        np.testing.assert_array_equal(getattr(plain.estimate, name), getattr(compiled.estimate, name), err_msg=name)
+
+
+def test_the_particle_filter(linear: ProcessModel, as_python: AsPython, monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = task(linear)
+    compiled = particle.particle_filter(problem, 20, np.random.default_rng(1))
+    run = as_python(particle.run, particle.compile_particles(problem.model, problem.channels))
+    monkeypatch.setattr(particle, "compile_particles", lambda *_: run)
+    plain = particle.particle_filter(problem, 20, np.random.default_rng(1))
+    for field in fields(compiled):  # powers and exponentials of Python may round the other way
+        np.testing.assert_allclose(getattr(plain, field.name), getattr(compiled, field.name), 1e-11, err_msg=field.name)

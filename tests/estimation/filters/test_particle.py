@@ -1,0 +1,138 @@
+"""Particles agree with the Kalman filter where it is exact, within what their number allows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from estimation.engine.contract import FilterProblem
+from estimation.filters.ekf import ekf
+from estimation.filters.particle import particle, particle_filter
+from estimation.filters.run import METHODS, filter_problem
+from estimation.models.gaussian import Gaussian
+from estimation.models.model import ProcessModel
+from plant.eha.model import EhaParameters
+from plant.errors import HydrostateError
+from plant.log.record import Record
+
+SEEDS, PARTICLES = 12, 1000
+
+
+def task(linear: ProcessModel, samples: int = 40) -> FilterProblem:
+    """The linear model with enough noise in every state, one sample in five missing."""
+    rng = np.random.default_rng(4)
+    channels = {
+        name: np.where(rng.random(samples) < 0.2, np.nan, rng.normal(0.0, size, samples))
+        for name, size in (("position_m", 0.05), ("velocity_m_s", 0.3))
+    }
+    model = replace(linear, name="coarse", longest_step=0.005)
+    speed = rng.normal(0.0, 1e3, samples)
+    speed[samples // 2 : samples // 2 + 3] = np.nan
+    record = Record(0.01, {"motor_speed_rad_s": speed, **channels})
+    prior = Gaussian(np.array([0.0, 0.0, 0.5]), np.diag([1e-3, 1e-2, 1.0]))
+    problem = filter_problem(
+        model,
+        prior,
+        record,
+        EhaParameters(),
+        variances={"position_m": 2e-3, "velocity_m_s": 0.1},
+        noise={"position_m": 1e-2, "velocity_m_s": 1e-1, "force_n": 10.0},
+    )
+    return replace(problem, keep_innovations=True)
+
+
+def test_it_agrees_with_the_kalman_filter_within_monte_carlo_error(linear: ProcessModel) -> None:
+    problem = task(linear)
+    exact = ekf(problem)
+    runs = [particle_filter(problem, PARTICLES, np.random.default_rng(seed)) for seed in range(SEEDS)]
+    for name in ("track", "track_variance"):
+        values = np.array([getattr(run, name) for run in runs])
+        error = np.std(values, axis=0, ddof=1) / np.sqrt(SEEDS)
+        off = (np.mean(values, axis=0) - getattr(exact, name)) / error
+        assert np.mean(off**2) < 3.0, name  # a t statistic of 11 degrees has 1.2
+    likelihoods = np.array([run.log_likelihood for run in runs])
+    error = np.std(likelihoods, ddof=1) / np.sqrt(SEEDS)
+    assert abs(np.mean(likelihoods) - exact.log_likelihood) < 5.0 * error
+    assert np.std(likelihoods) < 2.0
+
+
+def test_its_error_falls_with_the_root_of_their_number(linear: ProcessModel) -> None:
+    problem = task(linear, 20)
+    exact = ekf(problem).track
+
+    def error(particles: int) -> float:
+        tracks = [particle_filter(problem, particles, np.random.default_rng(seed)).track for seed in range(SEEDS)]
+        return float(np.sqrt(np.mean(((np.array(tracks) - exact) / np.std(exact, axis=0)) ** 2)))
+
+    assert 2.0 < error(100) / error(1600) < 8.0  # 4 is expected
+
+
+def test_one_stream_is_one_answer(linear: ProcessModel) -> None:
+    problem = task(linear)
+    first, again, other = (particle_filter(problem, 50, np.random.default_rng(seed)) for seed in (7, 7, 8))
+    np.testing.assert_array_equal(first.track, again.track)
+    assert not np.array_equal(first.track, other.track)
+
+
+def test_what_is_missing_has_no_innovation(linear: ProcessModel) -> None:
+    problem = task(linear)
+    trace = particle_filter(problem, 50, np.random.default_rng(0))
+    np.testing.assert_array_equal(np.isnan(trace.residuals), np.isnan(problem.measured))
+    assert trace.count.tolist() == np.sum(np.isfinite(problem.measured), axis=0).tolist()
+
+
+def test_every_particle_keeps_to_the_physical_bounds(linear: ProcessModel) -> None:
+    force = replace(linear.states[2], lower=0.0, upper=1.0)
+    held = replace(linear, states=(*linear.states[:2], force))
+    problem = task(held)
+    trace = particle_filter(problem, 200, np.random.default_rng(0))
+    low, high = force.scaled_bounds
+    assert np.all((trace.track[:, 2] >= low) & (trace.track[:, 2] <= high))
+    assert trace.mean[2] > low
+
+
+def test_what_it_cannot_do_is_refused(linear: ProcessModel) -> None:
+    with pytest.raises(HydrostateError, match="at least 2 particles, got 1"):
+        particle_filter(task(linear), 1, np.random.default_rng(0))
+    with pytest.raises(HydrostateError, match="no robust update, got robust 'huber'"):
+        particle_filter(replace(task(linear), robust="huber"), 10, np.random.default_rng(0))
+
+
+def test_as_a_method_it_draws_from_its_seed(linear: ProcessModel) -> None:
+    problem = task(linear)
+    first, again, other = (
+        METHODS["particle"](replace(problem, settings={"particles": 50.0, "seed": seed})) for seed in (7.0, 7.0, 8.0)
+    )
+    np.testing.assert_array_equal(first.track, again.track)
+    assert not np.array_equal(first.track, other.track)
+    drawn = particle_filter(problem, 50, np.random.default_rng(7))
+    np.testing.assert_array_equal(first.track, drawn.track)  # every state of this model has noise of its own
+
+
+def test_as_a_method_it_lets_constants_walk_or_collapses(linear: ProcessModel) -> None:
+    still = replace(task(linear, 200), noise=np.array([1e4, 1e2, 0.0]))
+    alive, collapsed = (particle(replace(still, settings={"walk": walk})).track_variance[-1, 2] for walk in (0.1, 0.0))
+    assert alive > 1e-3 * still.covariance[2, 2]
+    assert collapsed < 0.1 * alive
+
+
+def test_with_nothing_measured_its_cloud_stays_the_prior_within_bounds(linear: ProcessModel) -> None:
+    force = replace(linear.states[2], lower=0.0)
+    problem = task(replace(linear, states=(*linear.states[:2], force)))
+    blind = replace(problem, measured=np.full_like(problem.measured, np.nan), settings={"walk": 0.0})
+    trace = particle(replace(blind, noise=np.array([*blind.noise[:2], 0.0])))
+    m, s = blind.mean[2], np.sqrt(blind.covariance[2, 2])
+    believed = m * norm.cdf(m / s) + s * norm.pdf(m / s)  # what is below zero lies at zero
+    assert trace.mean[2] == pytest.approx(believed, abs=5.0 * s / np.sqrt(1000.0))
+    assert trace.log_likelihood == 0.0
+
+
+def test_what_it_may_not_be_set_to_is_refused(linear: ProcessModel) -> None:
+    for settings, message in (
+        ({"particles": 1.5}, r"particles must be a whole number, 2 or more, got 1\.5"),
+        ({"seed": -1.0}, r"seed must be a whole number, 0 or more, got -1\.0"),
+        ({"count": 5.0}, "particle can be set particles, seed, walk, got 'count'"),
+    ):
+        with pytest.raises(HydrostateError, match=message):
+            particle(replace(task(linear), settings=settings))

@@ -1,0 +1,34 @@
+import numpy as np
+
+from estimation.fits.descent import Point, descend
+
+FAR = np.full(3, 10.0)
+
+
+def bowl(x: np.ndarray) -> Point:
+    """Return a least-squares problem of two coordinates that act together, and a third that is not felt."""
+    slopes = np.array([[1.0, 1.0, 0.0], [0.0, 1e-2, 0.0], [0.0, 0.0, 0.0]])
+    errors = slopes @ (x - np.array([2.0, 3.0, 0.0]))
+    return Point(x, 0.5 * float(errors @ errors), slopes.T @ errors, slopes.T @ slopes)
+
+
+def test_the_least_cost_is_found_and_what_is_not_felt_stays() -> None:
+    found = descend(bowl, np.array([-5.0, 4.0, 1.5]), 60, (-FAR, FAR), 1e-12)
+    np.testing.assert_allclose(found.theta, [2.0, 3.0, 1.5], atol=1e-3)
+
+
+def test_the_least_cost_within_bounds_is_found_at_a_bound() -> None:
+    lower = np.array([-10.0, 4.0, -10.0])
+    found = descend(bowl, np.array([-5.0, 6.0, 0.0]), 60, (lower, FAR), 1e-12)
+    np.testing.assert_allclose(found.theta[:2], [1.0, 4.0], atol=2e-3)
+
+
+def test_the_cost_is_evaluated_no_more_often_than_allowed() -> None:
+    tried: list[np.ndarray] = []
+
+    def counted(x: np.ndarray) -> Point:
+        tried.append(x)
+        return bowl(x)
+
+    descend(counted, np.array([-5.0, 6.0, 0.0]), 3, (-FAR, FAR), 0.0)
+    assert len(tried) == 3

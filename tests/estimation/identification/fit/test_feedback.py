@@ -1,0 +1,50 @@
+import numpy as np
+import pytest
+
+from estimation.identification import LinearModel, fit_output_error, identify_record
+from estimation.identification.fit.residual_tests import feedback_test
+from estimation.identification.notes import IdentificationCode
+from plant.errors import HydrostateError, LogWarning
+from plant.log.record import Record
+
+
+def closed_loop(rng: np.random.Generator, n: int, gain: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return input and output of y = 0.2 / (1 - 0.8 q^-1) q^-1 u + noise, with u = reference - gain y."""
+    reference, noise = np.repeat(rng.choice([-1.0, 1.0], n // 10), 10), 0.1 * rng.standard_normal(n)
+    u, y, x = np.zeros(n), np.zeros(n), 0.0
+    for t in range(n):
+        y[t] = x + noise[t]
+        u[t] = reference[t] - gain * (y[t - 1] if t else 0.0)
+        x = 0.8 * x + 0.2 * u[t]
+    return u, y
+
+
+def test_inputs_that_follow_the_noise_are_found() -> None:
+    u, y = closed_loop(np.random.default_rng(1), 4_000, 0.8)
+    model = fit_output_error(u, y, 1e-3, n_numerator=1, n_denominator=1, delay=1)
+    assert feedback_test(y - model.simulate(u), u).p_value < 1e-9
+
+
+def test_the_size_in_open_loop_is_right_for_coloured_noise_too() -> None:
+    rejected = []
+    for seed in range(200):
+        rng = np.random.default_rng([3, seed])
+        u = np.repeat(rng.choice([-1.0, 1.0], 200), 10)
+        noise = np.convolve(rng.standard_normal(2_100), 0.9 ** np.arange(60))[:2_000]
+        rejected.append(not feedback_test(noise, u).passed())
+    assert 0.01 < np.mean(rejected) < 0.10
+
+
+def test_a_log_from_a_closed_loop_warns() -> None:
+    u, y = closed_loop(np.random.default_rng(2), 4_000, 0.8)
+    record = Record(1e-3, {"motor_speed_rad_s": u, "velocity_m_s": y})
+    with pytest.warns(LogWarning) as caught:
+        identify_record(record, n_numerator=1, n_denominator=1, delay=1)
+    (note,) = [one.message.note for one in caught if one.message.note.code == IdentificationCode.FEEDBACK]
+    assert (note.data["input"], note.data["output"]) == ("motor_speed_rad_s", "velocity_m_s")
+    assert note.data["p_value"] < 1e-3
+
+
+def test_a_short_residual_is_refused(plant_30hz: LinearModel) -> None:
+    with pytest.raises(HydrostateError, match="200 samples or more"):
+        feedback_test(plant_30hz.simulate(np.ones(50)), np.ones(50))

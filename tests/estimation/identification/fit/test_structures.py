@@ -1,0 +1,171 @@
+"""ARX, ARMAX, Box-Jenkins, instrumental variables, subspace and continuous time on systems whose truth is known."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from estimation.identification import (
+    LinearModel,
+    choose_model,
+    estimate_delay,
+    fit_armax,
+    fit_arx,
+    fit_box_jenkins,
+    fit_continuous,
+    fit_instrumental,
+    fit_subspace,
+)
+from estimation.identification.notes import IdentificationCode
+from plant.errors import HydrostateError, LogWarning
+
+FORM = {"n_numerator": 2, "n_denominator": 2, "delay": 1}
+
+
+def record(
+    plant: LinearModel, c: list[float], d: list[float], share: float, seed: int, n: int = 6_000
+) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], n // 10), 10)
+    clean = plant.simulate(u)
+    noise = np.asarray(lfilter(c, d, rng.standard_normal(n)))
+    return u, clean + share * clean.std() * noise / noise.std()
+
+
+def deviations(fitted: LinearModel, truth: LinearModel) -> np.ndarray:
+    error = np.concatenate(
+        [fitted.free_numerator - truth.free_numerator, fitted.denominator[1:] - truth.denominator[1:]]
+    )
+    return np.abs(error) / fitted.coefficient_std
+
+
+def test_arx_comes_back_where_noise_enters_inside_the_loop(plant_30hz: LinearModel) -> None:
+    u, y = record(plant_30hz, [1.0], plant_30hz.denominator.tolist(), 0.1, 1)
+    fitted = fit_arx(u, y, 1e-3, **FORM)
+    assert (deviations(fitted, plant_30hz) < 3.0).all()
+    np.testing.assert_array_equal(fitted.noise_denominator, fitted.denominator)
+
+
+def test_arx_leaves_out_rows_that_miss_an_output(plant_30hz: LinearModel) -> None:
+    u, y = record(plant_30hz, [1.0], plant_30hz.denominator.tolist(), 0.1, 2)
+    y[100:140:4] = np.nan
+    fitted = fit_arx(u, y, 1e-3, **FORM)
+    assert fitted.n_samples < 6_000 - 2 * 10
+    assert (deviations(fitted, plant_30hz) < 3.0).all()
+
+
+def test_armax_finds_the_noise_numerator(plant_30hz: LinearModel) -> None:
+    u, y = record(plant_30hz, [1.0, -0.6], plant_30hz.denominator.tolist(), 0.1, 3)
+    fitted = fit_armax(u, y, 1e-3, **FORM, n_c=1)
+    assert (deviations(fitted, plant_30hz) < 3.0).all()
+    assert fitted.noise_numerator[1] == pytest.approx(-0.6, abs=0.05)
+
+
+def test_box_jenkins_finds_system_and_noise_apart_and_bears_gaps(plant_30hz: LinearModel) -> None:
+    u, y = record(plant_30hz, [1.0, 0.5], [1.0, -0.9], 0.1, 4)
+    y[::50] = np.nan
+    fitted = fit_box_jenkins(u, y, 1e-3, **FORM, n_c=1, n_d=1)
+    assert (deviations(fitted, plant_30hz) < 3.0).all()
+    assert fitted.noise_numerator[1] == pytest.approx(0.5, abs=0.06)
+    assert fitted.noise_denominator[1] == pytest.approx(-0.9, abs=0.04)
+
+
+def test_box_jenkins_is_more_accurate_than_it_is_without_a_noise_model(plant_30hz: LinearModel) -> None:
+    u, y = record(plant_30hz, [1.0], [1.0, -0.97], 0.2, 5)
+    coloured = fit_box_jenkins(u, y, 1e-3, **FORM, n_c=0, n_d=1)
+    plain = fit_box_jenkins(u, y, 1e-3, **FORM, n_c=0, n_d=0, covariance="coloured")
+    assert coloured.rmse < 0.5 * plain.rmse
+    assert coloured.pole_std[0].real < plain.pole_std[0].real
+
+
+def test_refined_instruments_are_as_good_as_output_error(plant_30hz: LinearModel) -> None:
+    u, y = record(plant_30hz, [1.0], [1.0], 0.2, 6)
+    fitted = fit_instrumental(u, y, 1e-3, **FORM)
+    assert fitted.structure == "SRIV"
+    assert (deviations(fitted, plant_30hz) < 3.0).all()
+
+
+def test_refined_instruments_take_a_noise_model(plant_30hz: LinearModel) -> None:
+    u, y = record(plant_30hz, [1.0], [1.0, -0.9], 0.2, 7)
+    fitted = fit_instrumental(u, y, 1e-3, **FORM, n_d=1)
+    assert fitted.structure == "RIV"
+    assert (deviations(fitted, plant_30hz) < 3.0).all()
+    assert fitted.noise_denominator[1] == pytest.approx(-0.9, abs=0.03)
+
+
+def test_a_subspace_fit_reads_its_order_off_the_noise_floor(table6: dict[str, LinearModel]) -> None:
+    truth = table6["major_leakage"]
+    rng = np.random.default_rng(8)
+    u = np.repeat(rng.choice([-1.0, 1.0], 400), 50)
+    clean = truth.simulate(u)
+    found = fit_subspace(u, clean + 0.05 * clean.std() * rng.standard_normal(u.size), 1e-3)
+    assert found.model.denominator.size == 3
+    assert found.singular_values[1] > found.noise_floor > found.singular_values[2]
+    np.testing.assert_allclose(np.sort_complex(found.model.poles), np.sort_complex(truth.poles), atol=0.003)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.0023])
+def test_a_continuous_model_comes_back_with_its_dead_time(late: float) -> None:
+    w = 2.0 * np.pi * 30.0
+    truth = LinearModel(
+        np.array([w * w]), np.array([1.0, 1.2 * w, w * w]), 1e-3, "u", "y", continuous=True, dead_time=late
+    )
+    u, y = record(truth, [1.0], [1.0], 0.1, 9)
+    fitted = fit_continuous(u, y, 1e-3, n_zeros=0, n_poles=2, dead_time=None if late else 0.0)
+    assert (deviations(fitted, truth) < 3.0).all()
+    assert fitted.dc_gain == pytest.approx(1.0, abs=4.0 * fitted.dc_gain_std)
+    if late:
+        assert abs(fitted.dead_time - late) < 3.0 * fitted.dead_time_std < 2e-4
+
+
+def test_a_held_input_makes_continuous_and_discrete_the_same() -> None:
+    late = LinearModel(np.array([2.0]), np.array([1.0, 2.0]), 0.1, "u", "y", continuous=True, dead_time=0.25)
+    time = 0.1 * np.arange(30)
+    wanted = np.where(time > 0.25, 1.0 - np.exp(-2.0 * np.maximum(time - 0.25, 0.0)), 0.0)
+    np.testing.assert_allclose(late.step(2.9)[1], wanted, atol=1e-12)
+
+
+def test_the_delay_is_estimated(plant_30hz: LinearModel) -> None:
+    u, y = record(plant_30hz, [1.0], [1.0], 0.05, 10, n=3_000)
+    late = np.concatenate([np.zeros(4), y[:-4]])
+    assert estimate_delay(u, late, most=8) == 5
+
+
+def test_order_and_structure_are_chosen(plant_30hz: LinearModel) -> None:
+    u, y = record(plant_30hz, [1.0], [1.0], 0.1, 11)
+    choice = choose_model(u, y, 1e-3, orders=(1, 2, 3), delay=1)
+    assert choice.model.denominator.size == 3
+    assert list(choice.structures.index) == ["ARX", "ARMAX", "output-error", "Box-Jenkins"]
+    # noise at the output is what ARX cannot describe
+    assert choice.structures["fit_percent"].idxmin() == "ARX"
+    assert {"aic", "aicc", "bic", "fpe", "cancellations"} <= set(choice.orders.columns)
+
+
+def test_an_unstable_model_warns() -> None:
+    rng = np.random.default_rng(12)
+    u = rng.standard_normal(300)
+    y = np.asarray(lfilter([0.0, 1.0], [1.0, -1.01], u)) + 0.01 * rng.standard_normal(300)
+    with pytest.warns(LogWarning) as caught:
+        assert not fit_arx(u, y, 1.0, n_numerator=1, n_denominator=1, delay=1).is_stable
+    (note,) = [one.message.note for one in caught]
+    assert (note.code, note.data["structure"]) == (IdentificationCode.UNSTABLE, "ARX")
+    assert note.data["modulus"] == pytest.approx(1.01, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("fit", "message"),
+    [
+        (lambda u, y: fit_instrumental(u, y, 1.0, n_numerator=1, n_denominator=1), "need every sample"),
+        (lambda u, y: fit_subspace(u, y, 1.0), "needs every sample"),
+        (lambda u, y: fit_continuous(u, y, 1.0, n_zeros=2, n_poles=1), "n_zeros <= n_poles"),
+        (lambda u, y: fit_armax(u, y, 1.0, n_numerator=1, n_denominator=0, n_c=1), "at least 1"),
+        (lambda u, y: choose_model(u, y, 1.0, structures=("OE",)), "structures must be among"),  # pyright: ignore
+    ],
+)
+def test_what_cannot_be_fitted_is_refused(fit: Callable[[np.ndarray, np.ndarray], object], message: str) -> None:
+    u = np.random.default_rng(13).standard_normal(400)
+    y = u.copy()
+    y[7] = np.nan
+    with pytest.raises(HydrostateError, match=message):
+        fit(u, y)

@@ -1,0 +1,122 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+from estimation.identification import LinearModel, dc_gain_interval, fit_output_error
+from estimation.identification.notes import IdentificationCode
+from plant.errors import CovarianceWarning, HydrostateError
+
+FORM = {"n_numerator": 3, "n_denominator": 2}
+
+
+@pytest.fixture(scope="module")
+def fitted(table6: dict[str, LinearModel]) -> LinearModel:
+    rng = np.random.default_rng(1)
+    u = 125.66 * np.repeat(rng.choice([-1.0, 1.0], 400), 50)
+    clean = table6["major_leakage"].simulate(u)
+    return fit_output_error(u, clean + 0.1 * clean.std() * rng.standard_normal(u.size), 1e-3, **FORM)
+
+
+def spread_over_draws(model: LinearModel, quantity: str) -> np.ndarray:
+    rng = np.random.default_rng(2)
+    centre = np.concatenate([model.numerator, model.denominator[1:]])
+    draws = rng.multivariate_normal(centre, model.covariance, size=2_000)
+    found = [getattr(LinearModel(t[:3], np.array([1.0, *t[3:]]), 1e-3, "u", "y"), quantity) for t in draws]
+    return np.array([np.sort_complex(np.atleast_1d(value)) for value in found])
+
+
+@pytest.mark.parametrize(("quantity", "std"), [("dc_gain", "dc_gain_std"), ("bandwidth_hz", "bandwidth_std_hz")])
+def test_deviations_are_those_of_coefficients_drawn_from_the_covariance(
+    quantity: str, std: str, fitted: LinearModel
+) -> None:
+    assert getattr(fitted, std) == pytest.approx(spread_over_draws(fitted, quantity).real.std(), rel=0.08)
+
+
+def test_poles_and_zeros_have_deviations_of_both_parts(fitted: LinearModel) -> None:
+    for quantity, std in (("poles", fitted.pole_std), ("zeros", fitted.zero_std)):
+        drawn = spread_over_draws(fitted, quantity)
+        assert std[0].real == pytest.approx(drawn.real.std(axis=0)[0], rel=0.08)
+        assert std[0].imag == pytest.approx(drawn.imag.std(axis=0)[0], rel=0.08)
+
+
+def test_a_band_of_the_response_contains_the_response(fitted: LinearModel) -> None:
+    band = fitted.frequency_response([0.0, 1.0, 25.0], ci=0.95)
+    gain = np.abs(fitted.frequency_response([0.0, 1.0, 25.0]))
+    assert ((band.gain_low < gain) & (gain < band.gain_high)).all()
+    assert band.gain_std[0] == fitted.dc_gain_std
+    np.testing.assert_allclose(band.gain_high - gain, 1.959964 * band.gain_std, rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_a_pole_that_a_zero_nearly_cancels_is_flagged_and_its_profile_interval_is_wider(
+    table6: dict[str, LinearModel],
+) -> None:
+    truth = table6["minor_leakage"]
+    rng = np.random.default_rng(3)
+    u = 125.66 * np.repeat(rng.choice([-1.0, 1.0], 400), 50)
+    clean = truth.simulate(u)
+    y = clean + 0.5 * clean.std() * rng.standard_normal(u.size)
+    with pytest.warns(CovarianceWarning) as caught:
+        model = fit_output_error(u, y, 1e-3, **FORM)
+    (note,) = [one.message.note for one in caught]
+    assert note.code == IdentificationCode.NEARLY_CANCEL
+    assert note.data["deviations"] == model.cancellations[0].deviations
+    assert model.cancellations
+    low, high = dc_gain_interval(model, u, y)
+    assert low < truth.dc_gain < high
+    assert low < model.dc_gain < high
+
+
+def test_where_nothing_cancels_the_profile_interval_is_that_of_the_covariance(
+    table6: dict[str, LinearModel],
+) -> None:
+    rng = np.random.default_rng(4)
+    u = 125.66 * np.repeat(rng.choice([-1.0, 1.0], 100), 50)
+    clean = table6["major_leakage"].simulate(u)
+    y = clean + 0.05 * clean.std() * rng.standard_normal(u.size)
+    model = fit_output_error(u, y, 1e-3, **FORM)
+    assert not model.cancellations
+    low, high = dc_gain_interval(model, u, y)
+    assert high - low == pytest.approx(2.0 * 1.96 * model.dc_gain_std, rel=0.03)
+
+
+def test_a_profile_is_for_output_error_only(table6: dict[str, LinearModel]) -> None:
+    with pytest.raises(HydrostateError, match="needs an output-error fit"):
+        dc_gain_interval(table6["normal"], np.ones(3), np.ones(3))
+
+
+def test_json_and_mat_keep_every_bit(fitted: LinearModel, tmp_path: Path) -> None:
+    again = LinearModel.from_dict(json.loads(json.dumps(fitted.to_dict())))
+    assert again.to_dict() == fitted.to_dict()
+    np.testing.assert_array_equal(again.covariance_robust, fitted.covariance_robust)
+    fitted.to_mat(tmp_path / "model.mat")
+    stored = loadmat(tmp_path / "model.mat", squeeze_me=True)
+    np.testing.assert_array_equal(stored["denominator"], fitted.denominator)
+    np.testing.assert_array_equal(stored["covariance_robust"], fitted.covariance_robust)
+    assert str(stored["structure"]) == "output-error"
+
+
+def test_an_older_file_without_the_newer_entries_is_read(fitted: LinearModel) -> None:
+    newer = {"structure", "noise_numerator", "noise_denominator", "continuous", "dead_time_s", "dead_time_std_s"}
+    old = {key: value for key, value in fitted.to_dict().items() if key not in newer | {"covariance_robust"}}
+    assert LinearModel.from_dict(old).dc_gain == fitted.dc_gain
+
+
+def test_the_state_space_has_the_same_response_and_state(fitted: LinearModel) -> None:
+    space = fitted.to_ss()
+    assert space.dt == 1e-3
+    u = np.random.default_rng(5).standard_normal(50)
+    x, output = fitted.initial_state.copy(), []
+    for value in u:
+        output.append((space.C @ x)[0] + space.D[0, 0] * value)
+        x = space.A @ x + space.B[:, 0] * value
+    np.testing.assert_allclose(output, fitted.simulate(u, initial=fitted.initial_state), rtol=1e-9, atol=1e-15)
+
+
+def test_a_step_response_settles_at_the_gain(fitted: LinearModel) -> None:
+    time, response = fitted.step(1.0)
+    assert time[-1] == pytest.approx(1.0)
+    assert response[-1] == pytest.approx(fitted.dc_gain, rel=1e-6)

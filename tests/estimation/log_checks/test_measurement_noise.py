@@ -1,0 +1,77 @@
+"""The noise of a channel is read off the log, whatever moves beneath it (errata E11)."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances, position_variance
+from faults.conditions import CONDITIONS, Condition, parameters_for
+from plant.eha.drives import make_drive
+from plant.eha.simulate import LUMPED, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH, drop_samples, noise_variances
+
+NOISY = ("velocity_m_s", "differential_pressure_pa")
+
+
+def variance_of(channel: str, values: np.ndarray) -> float:
+    return measurement_variances(Record(1e-3, {channel: values}), [channel])[channel]
+
+
+@pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
+def test_the_bench_noise_is_found_while_the_piston_moves(condition: Condition) -> None:
+    p = parameters_for(condition)
+    rng = np.random.default_rng(1)
+    drive = make_drive("steps", 10.0, 1e-3, p, rng)
+    record = simulate(LUMPED, drive, 1e-3, p, sensors=BENCH, rng=rng)
+    found, true = measurement_variances(record, NOISY), noise_variances(BENCH)
+    for channel in NOISY:
+        assert found[channel] == pytest.approx(true[channel], rel=0.1)
+
+
+@given(st.floats(1e-3, 1e3))
+def test_the_estimate_scales_with_the_unit(factor: float) -> None:
+    noise = np.random.default_rng(2).normal(0.0, 1e-2, 2_000)
+    assert variance_of("velocity_m_s", factor * noise) == pytest.approx(
+        factor**2 * variance_of("velocity_m_s", noise), rel=1e-9
+    )
+
+
+def test_a_few_jumps_and_a_trend_do_not_count() -> None:
+    rng = np.random.default_rng(3)
+    noise = rng.normal(0.0, 1e-3, 20_000)
+    jumps = np.cumsum(np.where(rng.random(20_000) < 1e-3, 0.1, 0.0))
+    assert variance_of("velocity_m_s", noise + jumps + np.linspace(0.0, 5.0, 20_000)) == pytest.approx(1e-6, rel=0.05)
+
+
+def test_missing_samples_do_not_count() -> None:
+    record = Record(1e-3, {"velocity_m_s": np.random.default_rng(4).normal(0.0, 1e-3, 20_000)})
+    gappy = drop_samples(record, 0.05, np.random.default_rng(5))
+    assert variance_of("velocity_m_s", gappy["velocity_m_s"]) == pytest.approx(1e-6, rel=0.05)
+
+
+@pytest.mark.parametrize("channel", SMALLEST_VARIANCE)
+@pytest.mark.parametrize("values", [np.zeros(100), np.full(100, 3.0), np.full(100, np.nan), np.arange(2.0)])
+def test_a_silent_channel_gets_the_smallest_variance_and_not_zero(channel: str, values: np.ndarray) -> None:
+    assert variance_of(channel, values) == SMALLEST_VARIANCE[channel]
+
+
+def test_a_coarse_quantum_counts_although_most_samples_repeat() -> None:
+    pressure = 4e5 * np.sin(2.0 * np.pi * np.arange(10_000) / 5_000.0)
+    quantised = 1e4 * np.round(pressure / 1e4)
+    assert variance_of("differential_pressure_pa", quantised) == pytest.approx(1e8 / 12.0, rel=1e-9)
+
+
+def test_a_noiseless_ramp_is_not_taken_for_quantised() -> None:
+    assert variance_of("position_m", 4e-5 * np.arange(1_000)) == SMALLEST_VARIANCE["position_m"]
+
+
+def test_a_slow_sensor_has_the_noise_of_the_samples_that_it_has() -> None:
+    noise = np.random.default_rng(2).normal(0.0, 5e3, 2_000)
+    slow = np.full(20_000, np.nan)
+    slow[7::10] = noise
+    assert variance_of("differential_pressure_pa", slow) == variance_of("differential_pressure_pa", noise)
+    steps = np.round(np.linspace(0.0, 1e-3, 2_000) / 1e-6) * 1e-6
+    slow[7::10] = steps
+    assert position_variance(slow) == position_variance(steps)

@@ -1,0 +1,84 @@
+"""Gross outliers are taken out, alone, in threes and at the ends; what moves is not."""
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.log_checks.outliers import without_gross_outliers, without_outliers
+from estimation.notes import SensorCode
+from faults.conditions import CONDITIONS, parameters_for
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import make_drive
+from plant.eha.simulate import CIRCUIT, LUMPED, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH, RIG, Sensors
+
+CHANNELS = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa")
+
+
+def log(condition: str, drive: str, sample_time: float = 1e-3, sensors: Sensors = BENCH) -> Record:
+    p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(15)
+    speed = make_drive(drive, 5.0, sample_time, p, rng)
+    return simulate(LUMPED, speed, sample_time, p, sensors=sensors, rng=rng)
+
+
+@pytest.mark.parametrize("drive", ["steps", "prbs", "sine"])
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_a_sound_log_has_no_outliers(condition: str, drive: str) -> None:
+    assert without_gross_outliers(log(condition, drive), CHANNELS)[1] == ()
+
+
+@pytest.mark.parametrize("sample_time", [2e-3, 1e-4, 5e-5])
+def test_a_sound_log_has_none_whatever_its_rate(sample_time: float) -> None:
+    for condition, drive in (("normal", "prbs"), ("major_friction", "sine"), ("major_leakage", "steps")):
+        assert without_gross_outliers(log(condition, drive, sample_time), CHANNELS)[1] == ()
+
+
+@pytest.mark.parametrize("condition", ["normal", "major_friction"])
+def test_a_piston_that_slips_for_a_few_samples_is_none(condition: str) -> None:
+    record = log(condition, "prbs", sensors=RIG)
+    noise = measurement_variances(record, ("velocity_m_s",))["velocity_m_s"] ** 0.5
+    assert np.any(np.isnan(without_outliers(record["velocity_m_s"], noise)))
+    assert without_gross_outliers(record, CHANNELS)[1] == ()
+
+
+def test_a_sound_log_of_the_circuit_has_none() -> None:
+    p, rng = circuit_of(parameters_for(CONDITIONS["minor_friction"])), np.random.default_rng(6)
+    record = simulate(CIRCUIT, make_drive("steps", 5.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    assert without_gross_outliers(record, CHANNELS)[1] == ()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_gross_outlier_is_taken_out_and_nothing_else(seed: int) -> None:
+    record, rng = log("normal", "prbs"), np.random.default_rng(seed)
+    hits = {name: rng.choice(len(record), len(record) // 100, replace=False) for name in CHANNELS}
+    spoilt = {name: record[name].copy() for name in CHANNELS}
+    for name, hit in hits.items():
+        spoilt[name][hit] += 20.0 * np.std(record[name]) * rng.choice((-1.0, 1.0), len(hit))
+    cleaned, said = without_gross_outliers(record.replace(**spoilt), CHANNELS)
+    for name, hit in hits.items():
+        assert set(np.flatnonzero(np.isnan(cleaned[name]))) == set(hit), name
+    assert [note.code for note in said] == [SensorCode.OUTLIERS_LEFT_OUT] * len(CHANNELS)
+    assert [dict(note.data) for note in said] == [{"channel": name, "count": 50, "total": 5000} for name in CHANNELS]
+
+
+def test_three_outliers_among_four_samples_are_no_step() -> None:
+    speed = log("normal", "prbs")["motor_speed_rad_s"].copy()
+    speed[[1000, 1001, 1003]] += 2500.0
+    assert np.flatnonzero(np.isnan(without_outliers(speed))).tolist() == [1000, 1001, 1003]
+
+
+@pytest.mark.parametrize("place", [0, 2, -3, -1])
+def test_an_outlier_at_an_end_is_found_there(place: int) -> None:
+    position = log("normal", "steps")["position_m"].copy()
+    position[place] -= 1.0
+    assert np.flatnonzero(np.isnan(without_outliers(position))).tolist() == [place % len(position)]
+
+
+def test_missing_samples_stay_missing_and_are_not_counted() -> None:
+    record = log("normal", "steps")
+    speed = record["motor_speed_rad_s"].copy()
+    speed[100:200] = np.nan
+    cleaned, said = without_gross_outliers(record.replace(motor_speed_rad_s=speed), CHANNELS)
+    assert said == ()
+    np.testing.assert_array_equal(cleaned["motor_speed_rad_s"], speed)

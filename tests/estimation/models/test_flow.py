@@ -1,0 +1,91 @@
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from estimation.models.flow import FLOW_FORM, Delivery, chamber_rates, delivered_flow, flow_rates, relieving
+from plant.components.oil import ATMOSPHERE
+from plant.eha.model import PARAMETER_NAMES, EhaParameters
+
+P = EhaParameters()
+
+
+def values(**changes: float) -> SimpleNamespace:
+    beside = {"speed_lead": 0.0, "case_leakage": 0.0, "makeup_opening": 1.0}
+    return SimpleNamespace(**{name: getattr(P, name) for name in PARAMETER_NAMES} | beside | changes)
+
+
+def settle(p: SimpleNamespace, speed: float, seconds: float) -> tuple[float, float]:
+    """Chamber pressures of a blocked piston, by explicit Euler: fine enough for what settles."""
+    p1, p2 = P.accumulator_pressure, P.accumulator_pressure
+    for _ in range(round(seconds / 1e-4)):
+        rates = flow_rates((p1, p2), ((speed, speed), (0.0, 0.0), 1e-4), p, 0.0)
+        p1, p2 = p1 + 1e-4 * float(rates[0]), p2 + 1e-4 * float(rates[1])
+    return p1, p2
+
+
+def test_a_blocked_piston_settles_where_leakage_takes_the_pumped_flow() -> None:
+    p = values(relief_pressure=1e9, leakage_coefficient=2.523e-11, flow_bias=1.382e-5)
+    p1, p2 = settle(p, 60.0, 6.0)
+    assert p1 - p2 == pytest.approx((60.0 * P.pump_displacement - 1.382e-5) / 2.523e-11, rel=1e-6)
+
+
+def test_nothing_moves_inside_the_dead_zone() -> None:
+    assert settle(values(flow_bias=1e-5), 10.0, 0.1) == (P.accumulator_pressure, P.accumulator_pressure)
+
+
+def test_the_relief_valve_limits_the_pressure_either_way() -> None:
+    for speed in (200.0, -200.0):
+        p1, p2 = settle(values(), speed, 1.0)
+        assert P.relief_pressure < abs(p1 - p2) < 1.01 * P.relief_pressure
+
+
+def test_make_up_holds_the_low_chamber_near_the_inner_circuit() -> None:
+    _, with_makeup = settle(values(makeup_conductance=1e-8, leakage_coefficient=2.5e-11), 60.0, 2.0)
+    _, without = settle(values(makeup_conductance=0.0, leakage_coefficient=2.5e-11), 60.0, 2.0)
+    assert with_makeup > 0.9 * P.accumulator_pressure
+    assert without < 0.0
+
+
+def test_two_chambers_without_make_up_are_the_lumped_capacitance() -> None:
+    p = values(makeup_conductance=0.0, leakage_coefficient=0.0, flow_bias=0.0)
+    p1, p2 = settle(p, 50.0, 0.01)
+    pumped = 50.0 * P.pump_displacement * 0.01
+    assert p1 - p2 == pytest.approx(P.bulk_modulus / P.chamber_volume * pumped, rel=1e-9)
+
+
+@given(pumped=st.floats(-1e-4, 1e-4), velocity=st.floats(-0.1, 0.1), p1=st.floats(3e5, 4e6), p2=st.floats(3e5, 4e6))
+def test_without_make_up_one_chamber_gains_what_the_other_loses(
+    pumped: float, velocity: float, p1: float, p2: float
+) -> None:
+    a, b = chamber_rates((p1, p2), Delivery(pumped, velocity, 0.01), values(), by_mass=False)
+    stored = (2.0 * P.chamber_volume + 0.01 * P.piston_area) * float(a)
+    drawn = (2.0 * P.chamber_volume - 0.01 * P.piston_area) * float(b)
+    assert abs(stored + drawn) <= 1e-9 * (abs(stored) + abs(drawn))
+
+
+@given(pumped=st.floats(-1e-4, 1e-4), p1=st.floats(3e5, 4e6), p2=st.floats(3e5, 4e6))
+def test_balanced_by_mass_no_oil_is_lost(pumped: float, p1: float, p2: float) -> None:
+    p = values()
+    a, b = chamber_rates((p1, p2), Delivery(pumped, 0.0, 0.0), p, by_mass=True)
+    densities = [1.0 / (1.0 - (chamber - ATMOSPHERE) / P.bulk_modulus) for chamber in (p1, p2)]
+    gained, lost = (float(rate) * density**2 for rate, density in zip((a, b), densities, strict=True))
+    flow = pumped - p.leakage_coefficient * (p1 - p2)
+    assert abs(gained + lost) <= 5e-4 * (abs(gained) + abs(lost)) + 1e-9 * abs(flow)
+
+
+def test_a_case_drain_takes_oil_from_both_chambers() -> None:
+    p = values(case_leakage=1e-11, leakage_coefficient=0.0)
+    a, b = chamber_rates((1e6, 1e6), Delivery(0.0, 0.0, 0.0), p, by_mass=False)
+    expected = P.bulk_modulus / (2.0 * P.chamber_volume) * 1e-11 * (1e6 - P.accumulator_pressure)
+    assert float(a) == float(b) == pytest.approx(-expected, rel=1e-12)
+
+
+def test_a_lead_shifts_the_delivered_flow_in_time() -> None:
+    ahead = delivered_flow((50.0, 60.0), values(speed_lead=2e-5), 1e-4, 0.5)
+    assert float(ahead) == pytest.approx(float(delivered_flow((52.0, 62.0), values(), 1e-4, 0.5)), rel=1e-12)
+
+
+def test_the_form_for_a_relieving_log_has_the_valve_among_its_unknowns() -> None:
+    assert set(relieving(FLOW_FORM).unknowns) - set(FLOW_FORM.unknowns) == {"relief_pressure", "relief_conductance"}

@@ -1,0 +1,61 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from estimation.fits.greybox_problem import GreyBoxLog, OutputNoise, Problem
+from estimation.models.motion import MOTION_FORMS, lagging_friction, parallel_friction
+from plant.components.friction import quadratic_friction
+from plant.eha.model import EhaParameters
+from plant.solvers.steps import parameter_row
+
+P = EhaParameters()
+LAWS = ((6.589e4, 2.144e3, 436.0), (1.162e6, -7.44e3, 500.0), (4.462e6, 1.863e4, 551.0))
+
+
+def coefficients(law: tuple[float, float, float]) -> SimpleNamespace:
+    return SimpleNamespace(
+        friction_quadratic=law[0],
+        friction_linear=law[1],
+        friction_coulomb=law[2],
+        bristle_stiffness=2e7,
+        bristle_damping=100.0,
+    )
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("friction", [lagging_friction, parallel_friction])
+@pytest.mark.parametrize("velocity", [-0.03, -0.002, 0.001, 0.02])
+def test_sliding_steadily_friction_is_equation_5_10(friction, law: tuple[float, float, float], velocity: float) -> None:
+    p = coefficients(law)
+    low, high = -50.0, 50.0
+    for _ in range(200):  # the bristle at which nothing yields any more, by bisection
+        middle = 0.5 * (low + high)
+        falling = float(friction(velocity, middle, p)[0]) * np.sign(velocity)
+        low, high = (middle, high) if (falling > 0.0) == (velocity > 0.0) else (low, middle)
+    _, force = friction(velocity, 0.5 * (low + high), p)
+    expected = quadratic_friction(velocity, np.sign(velocity), *law)
+    assert float(force) == pytest.approx(float(expected), rel=1e-6)
+
+
+@pytest.mark.parametrize("friction", [lagging_friction, parallel_friction])
+def test_at_rest_the_bristle_holds_without_yielding(friction) -> None:
+    rate, force = friction(0.0, 0.5, coefficients(LAWS[0]))
+    assert (float(rate), float(force)) == (0.0, 218.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", MOTION_FORMS, ids=lambda form: form.name)
+def test_sensitivities_are_the_derivatives_of_the_motion(form) -> None:
+    n = 300
+    drives = np.column_stack([np.full(n, 100.0), np.zeros(n)])
+    beside = {"speed_lead": 2e-5, "case_leakage": 1e-13, "bristle_stiffness": 2e7, "bristle_damping": 100.0}
+    theta = form.theta({name: beside[name] if name in beside else getattr(P, name) for name in form.unknowns})
+    log = GreyBoxLog(drives, np.zeros((n, 1)), parameter_row(P), 1e-3, np.full(n, 8), (OutputNoise(1.0),))
+    problem = Problem(form, log)
+    slopes = problem.slopes(theta)
+    for j in range(len(theta)):
+        nudge = np.eye(len(theta))[j] * 1e-5
+        ahead, behind = (problem.residuals(theta + side * nudge)[0] for side in (1.0, -1.0))
+        scale = np.abs(slopes[:, j]).max()
+        assert np.abs((ahead - behind) / 2e-5 - slopes[:, j]).max() <= 1e-2 * scale + 1e-12

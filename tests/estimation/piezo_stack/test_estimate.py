@@ -1,0 +1,86 @@
+"""What a log of the piezo-stack actuator says, and how sure."""
+
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from estimation.piezo_stack.estimate import estimate_stack, stack_bounds
+from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, UNKNOWNS
+from plant.errors import HydrostateError, LogError
+from plant.log.record import Record
+from plant.piezo_stack.parameters import PiezoStackParameters
+from plant.piezo_stack.run import BENCH_SENSORS, simulate_stack, sine_drive
+
+HEALTHY = PiezoStackParameters(load_mass=10.0)
+WORN = replace(
+    HEALTHY,
+    air_fraction=2.0 * HEALTHY.air_fraction,
+    chamber_leakage=3e-12,
+    crossport_leakage=3e-12,
+    coulomb_friction=45.0,
+)
+SAMPLE_TIME = 5e-5
+DRIVE = sine_drive(275.0, 140.0, 0.05, SAMPLE_TIME)
+
+
+def log_of(p: PiezoStackParameters, seed: int) -> Record:
+    return simulate_stack(p, DRIVE, SAMPLE_TIME, sensors=BENCH_SENSORS, rng=np.random.default_rng(seed))
+
+
+@pytest.fixture(scope="module")
+def worn() -> Record:
+    return log_of(WORN, 3)
+
+
+def test_air_leaks_and_friction_are_found_together_with_true_intervals(worn: Record) -> None:
+    found = estimate_stack(worn, HEALTHY)
+    for name, most in (
+        ("air_fraction", 0.01),
+        ("chamber_leakage", 0.1),
+        ("crossport_leakage", 0.1),
+        ("coulomb_friction", 0.05),
+    ):
+        truth = getattr(WORN, name)
+        assert found.values[name] == pytest.approx(truth, rel=most)
+        assert abs(found.values[name] - truth) < 4.0 * found.deviations[name]
+    assert max(found.misfit.values()) < 1.1
+    bounds = stack_bounds(WORN, DRIVE, SAMPLE_TIME)
+    friction = found.deviations["coulomb_friction"]
+    assert friction == pytest.approx(bounds["coulomb_friction"], rel=0.25)
+
+
+def test_an_actuator_that_is_not_the_models_leaves_a_misfit() -> None:
+    longer = replace(HEALTHY, delivery_length=1.05 * HEALTHY.delivery_length)
+    found = estimate_stack(log_of(longer, 4), HEALTHY, unknowns=("coulomb_friction",), starts=({},))
+    assert max(found.misfit.values()) > 1.5
+
+
+def test_position_alone_tells_far_less_than_the_stack_does() -> None:
+    alone, stack = (
+        stack_bounds(WORN, DRIVE, SAMPLE_TIME, channels=(channel,))
+        for channel in ("position_m", "stack_displacement_m")
+    )
+    assert all(alone[name] > 10.0 * stack[name] for name in DEFAULT_UNKNOWNS)
+
+
+def test_every_unknown_is_a_parameter_and_every_channel_a_sensor() -> None:
+    known = set(asdict(HEALTHY))
+    assert all(set(unknown.names) <= known for unknown in UNKNOWNS.values())
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"drive_voltage_v": None}, "drive_voltage_v is wanted"),
+        ({"stack_displacement_m": np.append(np.nan, np.zeros(len(DRIVE) - 1))}, "must be whole, got 1 missing"),
+    ],
+)
+def test_a_log_that_cannot_be_used_is_refused(worn: Record, change: dict[str, np.ndarray | None], said: str) -> None:
+    with pytest.raises(LogError, match=said):
+        estimate_stack(worn.replace(**change), HEALTHY)
+
+
+def test_an_unknown_that_is_not_known_is_refused(worn: Record) -> None:
+    with pytest.raises(HydrostateError, match="an unknown must be one of"):
+        estimate_stack(worn, HEALTHY, unknowns=("colour",))

@@ -1,0 +1,153 @@
+"""The card says before the experiment what the fit finds after it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from estimation.trust.card import Card, percent, rank_drives, sentences
+from estimation.trust.identifiability import SENSED, identifiability_card
+from estimation.tuning.likelihood import fit_likelihood
+from faults.conditions import CONDITIONS, Condition, parameters_for
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import LUMPED, simulate
+from plant.errors import HydrostateError
+from plant.sensors.sensors import BENCH, PAPER
+
+Array = NDArray[np.float64]
+RIG = EhaParameters()
+MOTION = SENSED[:2]
+EVERY_CONDITION = pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
+
+
+def speed(drive: str, parameters: EhaParameters = RIG, duration: float = 10.0) -> Array:
+    return make_drive(drive, duration, 1e-3, parameters, np.random.default_rng(0))
+
+
+@pytest.fixture(scope="module")
+def steps() -> Card:
+    return identifiability_card(RIG, speed("steps"), 1e-3)
+
+
+@pytest.fixture(scope="module")
+def sine() -> Card:
+    return identifiability_card(RIG, speed("sine"), 1e-3, MOTION)
+
+
+@pytest.mark.slow
+@EVERY_CONDITION
+def test_the_papers_sine_without_pressure_tells_no_bulk_modulus(condition: Condition) -> None:
+    parameters = parameters_for(condition)
+    card = identifiability_card(parameters, speed("sine", parameters), 1e-3, MOTION)
+    assert card.relative_std["bulk_modulus"] > 0.03  # errata E13
+    assert card.stuck > 0.5
+    said = " ".join(sentences(card))
+    assert "not observable from this drive and these sensors, worse than 3 %: bulk modulus" in said
+    assert "while it sticks, position and velocity hold nothing about bulk modulus (errata E13): log diff" in said
+
+
+def test_where_nothing_moves_nothing_is_learnt() -> None:
+    parameters = parameters_for(CONDITIONS["major_leakage"])
+    card = identifiability_card(parameters, speed("sine", parameters), 1e-3, MOTION)
+    assert card.stuck == 1.0
+    assert all(std == pytest.approx(1.0, rel=1e-3) for std in card.relative_std.values())
+
+
+def test_pressure_turns_tens_of_percent_into_fractions(sine: Card) -> None:
+    logged = identifiability_card(RIG, speed("sine"), 1e-3)
+    for name in ("bulk_modulus", "leakage_coefficient", "friction_coulomb"):
+        assert logged.relative_std[name] < 0.05 * sine.relative_std[name]
+    assert logged.friction_force < 2e-3 < 0.05 < sine.friction_force
+
+
+@EVERY_CONDITION
+def test_a_further_sensor_and_a_longer_log_never_tell_less(condition: Condition) -> None:
+    parameters = parameters_for(condition)
+    long, short = speed("steps", parameters), speed("steps", parameters)[:4000]
+    whole = identifiability_card(parameters, long, 1e-3).relative_std
+    for poorer in (
+        identifiability_card(parameters, long, 1e-3, MOTION),
+        identifiability_card(parameters, long, 1e-3, ["position_m"]),
+        identifiability_card(parameters, short, 1e-3),
+    ):
+        assert all(whole[name] <= std * (1.0 + 1e-6) for name, std in poorer.relative_std.items())
+
+
+def test_the_volumes_uncertainty_is_bulk_modulus_own(steps: Card) -> None:
+    card = identifiability_card(RIG, speed("steps"), 1e-3, uncertainties={"chamber_volume": 0.02})
+    expected = (steps.relative_std["bulk_modulus"] ** 2 + 0.02**2) ** 0.5
+    assert card.relative_std["bulk_modulus"] == pytest.approx(expected, rel=1e-3)
+    assert card.known_exactly["bulk_modulus"] == pytest.approx(steps.relative_std["bulk_modulus"], rel=1e-9)
+    assert card.relative_std["friction_coulomb"] == pytest.approx(steps.relative_std["friction_coulomb"], rel=1e-3)
+    assert "(chamber volume 2 %) its bound is 2 %, without" in " ".join(sentences(card))
+    assert "the rig file gives the volume no uncertainty" in " ".join(sentences(steps))
+
+
+def test_the_pumps_uncertainty_goes_to_the_flow_bias_more_than_to_the_friction(steps: Card) -> None:
+    card = identifiability_card(RIG, speed("steps"), 1e-3, uncertainties={"pump_displacement": 0.01})
+    widened = {name: std / steps.relative_std[name] for name, std in card.relative_std.items()}
+    assert widened["flow_bias"] > 1.5
+    assert widened["flow_bias"] > widened["friction_coulomb"]
+
+
+def test_what_the_drive_cannot_separate_is_named() -> None:
+    card = identifiability_card(RIG, speed("prbs"), 1e-3)
+    i, j = card.unknowns.index("leakage_coefficient"), card.unknowns.index("flow_bias")
+    assert card.correlation[i, j] < -0.95
+    assert "leakage coefficient and flow bias are hard to tell apart (correlation -" in " ".join(sentences(card))
+
+
+def test_what_is_known_need_not_be_learnt(steps: Card) -> None:
+    card = identifiability_card(RIG, speed("steps"), 1e-3, unknowns=["bulk_modulus"])
+    assert card.relative_std["bulk_modulus"] < steps.relative_std["bulk_modulus"]
+    assert card.friction_force == 0.0
+
+
+def test_the_noisier_sensor_tells_less(steps: Card) -> None:
+    noisy = replace(BENCH, speed_noise=0.5, pressure_noise=5e4)
+    card = identifiability_card(RIG, speed("steps"), 1e-3, sensors=noisy)
+    assert all(card.relative_std[name] > std for name, std in steps.relative_std.items())
+
+
+def test_drives_are_ranked_by_what_they_tell(steps: Card, sine: Card) -> None:
+    cards = {"sine": sine, "steps": steps}
+    assert rank_drives(cards) == ["steps", "sine"]
+    assert rank_drives(cards, "bulk_modulus") == ["steps", "sine"]
+    assert steps.overall < sine.overall
+
+
+@pytest.mark.slow
+def test_the_fit_is_as_sure_as_the_card_says(steps: Card) -> None:
+    rng = np.random.default_rng(0)
+    sensors = replace(BENCH, position_noise=1e-6 / 12**0.5, position_quantum=0.0)
+    record = simulate(LUMPED, speed("steps"), 1e-3, RIG, sensors=sensors, rng=rng)
+    fit = fit_likelihood(record, RIG)
+    sizes = {name: abs(value) for name, (value, _) in fit.parameters.items()}
+    for name, bound in steps.relative_std.items():
+        assert fit.parameters[name][1] / sizes[name] == pytest.approx(bound, rel=0.4), name
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"channels": []}, "a channel is wanted"),
+        ({"channels": ["pressure_a_pa"]}, "a channel must be one of position_m"),
+        ({"channels": ["position_m", "position_m"]}, "once, got 'position_m'"),
+        ({"unknowns": ["stroke"]}, "an unknown must be one of bulk_modulus, .* got 'stroke'"),
+        ({"sensors": PAPER}, "these sensors give differential_pressure_pa no noise"),
+    ],
+)
+def test_what_a_card_cannot_have_is_refused(wrong: dict[str, object], said: str) -> None:
+    with pytest.raises(HydrostateError, match=said):
+        identifiability_card(RIG, np.zeros(10), 1e-3, **wrong)
+
+
+def test_an_actuator_without_leakage_has_none_to_be_relative_to() -> None:
+    with pytest.raises(HydrostateError, match="a card tells leakage_coefficient relative to its value"):
+        identifiability_card(replace(RIG, leakage_coefficient=0.0), np.zeros(10), 1e-3)
+
+
+def test_percentages_have_two_digits_and_never_round_to_certainty() -> None:
+    assert [percent(value) for value in (1e-5, 0.0304, 0.994, 1.0)] == ["0.001 %", "3 %", "over 99 %", "100 %"]

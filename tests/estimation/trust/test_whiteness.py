@@ -1,0 +1,120 @@
+"""White innovations are called white; structure where the drive is, is found, named and sized; caution is no fault."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from estimation.filters.run import Estimate
+from estimation.models.model import ProcessModel
+from estimation.trust.whiteness import Whiteness, quantum, whiteness
+from plant.log.record import Record
+
+Array = NDArray[np.float64]
+SAMPLES, SAMPLE_TIME, FREQUENCY = 10_000, 1e-3, 5.0
+CHANNELS = ("position_m", "velocity_m_s")
+TIME = SAMPLE_TIME * np.arange(SAMPLES)
+DRIVE = np.sign(np.sin(2.0 * np.pi * FREQUENCY * TIME + 1e-6))
+
+
+def judged(
+    model: ProcessModel, residuals: Array, variance: float = 1.0, position: Array | None = None
+) -> list[Whiteness]:
+    moving = np.cumsum(np.ones(SAMPLES)) * np.pi if position is None else position
+    record = Record(
+        SAMPLE_TIME, {"motor_speed_rad_s": 100.0 * DRIVE, "position_m": moving, "velocity_m_s": moving**1.01}
+    )
+    estimate = Estimate(
+        model, CHANNELS, TIME, np.zeros((SAMPLES, 3)), np.ones((SAMPLES, 3)), None, {}, 0.0,
+        residuals, np.full(residuals.shape, variance),
+    )  # fmt: skip
+    return list(whiteness(estimate, record))
+
+
+def white(seed: int) -> Array:
+    return np.random.default_rng(seed).standard_normal((SAMPLES, 2))
+
+
+def test_white_innovations_are_objected_to_less_than_once_in_a_hundred_logs(linear: ProcessModel) -> None:
+    objections = sum(any(channel.exceeded for channel in judged(linear, white(seed))) for seed in range(200))
+    assert objections <= 2
+
+
+def test_innovations_smaller_than_predicted_are_caution_and_no_objection(linear: ProcessModel) -> None:
+    coloured = np.cumsum(white(0), axis=0) * 1e-3
+    for channel in judged(linear, coloured + 0.3 * white(1)):
+        assert not channel.exceeded
+        assert channel.ljung_box < 0.05 or abs(channel.autocorrelation) > 0.02
+
+
+def test_a_line_of_the_drive_is_found_named_and_sized(linear: ProcessModel) -> None:
+    residuals = white(2)
+    residuals[:, 0] += 0.2 * np.sin(2.0 * np.pi * FREQUENCY * TIME)
+    position, velocity = judged(linear, residuals)
+    assert position.exceeded
+    assert not velocity.exceeded
+    assert position.frequency == pytest.approx(FREQUENCY, abs=1.0)
+    assert position.driven
+    assert position.excess == pytest.approx(1.0 + 0.2**2 / 4.0 * SAMPLES * 0.8 / 8.0, rel=0.4)
+    assert position.with_drive == pytest.approx(0.2**2 / 2.0, rel=0.5)
+    assert velocity.with_drive < 0.005
+
+
+def test_a_disturbance_beside_the_drive_is_said_to_be_so(linear: ProcessModel) -> None:
+    residuals = white(3)
+    residuals[:, 1] += 0.3 * np.sin(2.0 * np.pi * 17.0 * TIME)
+    _, velocity = judged(linear, residuals)
+    assert velocity.exceeded
+    assert not velocity.driven
+
+
+def test_what_lies_far_above_the_drives_band_does_not_count(linear: ProcessModel) -> None:
+    residuals = white(4)
+    residuals[:, 0] += 0.5 * np.sin(2.0 * np.pi * 480.0 * TIME)
+    assert not judged(linear, residuals)[0].exceeded
+
+
+def test_a_drift_counts(linear: ProcessModel) -> None:
+    residuals = white(5)
+    residuals[:, 0] += 0.1
+    assert judged(linear, residuals)[0].exceeded
+    assert judged(linear, residuals)[0].frequency == 0.0
+
+
+def test_channels_that_fail_together_are_correlated(linear: ProcessModel) -> None:
+    residuals = white(6)
+    residuals[:, 1] = 0.8 * residuals[:, 0] + 0.6 * residuals[:, 1]
+    assert [channel.crosses for channel in judged(linear, residuals)] == pytest.approx([0.8, 0.8], abs=0.02)
+    assert abs(judged(linear, white(6))[0].crosses) < 0.05
+
+
+def test_missing_samples_change_nothing_but_the_count(linear: ProcessModel) -> None:
+    residuals = white(7)
+    residuals[np.random.default_rng(8).random(SAMPLES) < 0.4, 0] = np.nan
+    position, velocity = judged(linear, residuals)
+    assert position.count == pytest.approx(0.48 * SAMPLES, rel=0.03)
+    assert velocity.count == 0.8 * SAMPLES
+    assert not position.exceeded
+
+
+def test_a_pattern_within_the_quantum_of_a_stuck_sensor_is_no_objection(linear: ProcessModel) -> None:
+    residuals = white(9)
+    residuals[:, 0] += 0.2 * np.sin(2.0 * np.pi * FREQUENCY * TIME)
+    coarse = np.round(0.3 * DRIVE + 0.3)
+    assert quantum(coarse) == 1.0
+    assert not judged(linear, residuals, position=coarse)[0].exceeded
+
+
+def test_what_never_moves_cannot_be_judged(linear: ProcessModel) -> None:
+    residuals = white(10)
+    residuals[:, 0] += 5.0
+    assert quantum(np.zeros(5)) == float("inf")
+    assert judged(linear, residuals, position=np.zeros(SAMPLES))[0].excess == 0.0
+
+
+def test_noise_has_no_quantum() -> None:
+    assert quantum(np.random.default_rng(0).standard_normal(1000)) == 0.0
+
+
+def test_a_log_of_a_few_samples_or_none_kept_says_nothing(linear: ProcessModel) -> None:
+    assert judged(linear, np.empty((0, 2))) == []
+    assert judged(linear, white(0)[:200]) == []

@@ -1,0 +1,73 @@
+"""Section 4's first tests on the circuit say what Tables 2 to 4 and errata E8 imply."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.circuit.first_tests import break_frequency, dead_time, dead_zone, first_tests
+from experiments.circuit.passes import in_condition
+from experiments.page.frames import cell
+from plant.eha.circuit_parameters import CircuitParameters
+from plant.errors import HydrostateError
+
+RIG = CircuitParameters()
+
+
+@pytest.fixture(scope="module")
+def table() -> pd.DataFrame:
+    return first_tests(RIG, 1, levels_v=(2.0, 4.0, 8.0))
+
+
+def of(table: pd.DataFrame, test: str) -> pd.DataFrame:
+    return table[table["test"] == test].set_index("at")
+
+
+def test_the_dead_zones_are_those_of_errata_e8(table: pd.DataFrame) -> None:
+    zones = of(table, "dead zone")
+    assert cell(zones, "minor_leakage", "value") == pytest.approx(1.20, abs=0.01)
+    assert cell(zones, "major_leakage", "value") == pytest.approx(1.82, abs=0.01)
+    assert (abs(zones["value"] - zones["expected"]) < 0.01).all()
+
+
+def test_the_steady_gain_is_that_of_the_tables_over_the_whole_range(table: pd.DataFrame) -> None:
+    gains = of(table, "steady-state gain")
+    assert list(gains.index) == ["2 V", "4 V", "8 V"]
+    assert (abs(gains["value"] / gains["expected"] - 1.0) < 0.01).all()
+    assert (gains["value"].diff().dropna() > 0.0).all()
+
+
+def test_the_break_frequency_falls_with_the_mean_from_below_the_published_one(table: pd.DataFrame) -> None:
+    found = of(table, "break frequency")
+    assert (found["published"] == 25.0).all()
+    assert (found["value"].diff().dropna() < 0.0).all()
+    assert found["value"].max() < 25.0
+
+
+def test_breaking_loose_delays_the_start(table: pd.DataFrame) -> None:
+    at_rest, moving = (cell(of(table, "dead time"), step, "value") for step in ("0 V to 4 V", "2 V to 4 V"))
+    assert 0.0 < moving < at_rest < 0.02
+
+
+def test_the_actuator_is_linear_in_the_mean_and_not_in_the_amplitude(table: pd.DataFrame) -> None:
+    spreads = of(table, "gain spread")
+    over_means, over_amplitudes, with_small_signals = (
+        cell(spreads, at, "value") for at in ("means from 2 V", "amplitudes from 2 V", "amplitudes from 0.5 V")
+    )
+    assert over_means < over_amplitudes < with_small_signals
+
+
+def test_a_voltage_inside_the_dead_zone_is_refused() -> None:
+    p = in_condition(RIG, "major_leakage")
+    with pytest.raises(HydrostateError, match="highest_v must move the piston, got 1 V"):
+        dead_zone(p, np.random.default_rng(1), 1.0)
+
+
+def test_a_step_inside_the_dead_zone_is_refused() -> None:
+    p = in_condition(RIG, "major_leakage")
+    with pytest.raises(HydrostateError, match="a step must move the piston"):
+        dead_time(p, 0.0, 0.0, np.random.default_rng(1))
+
+
+def test_a_flat_response_has_no_break_frequency() -> None:
+    flat = pd.DataFrame({"frequency_hz": [1.0, 2.0], "gain": [1.0, 0.8]})
+    assert np.isnan(break_frequency(flat))

@@ -1,0 +1,88 @@
+"""A verb imports what its answer takes and no more: importing is most of a short run."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import LUMPED, simulate
+from plant.log.files import write_record
+from plant.sensors.sensors import BENCH
+
+DEAR = {
+    "control",
+    "distributed",
+    "filterpy",
+    "jinja2",
+    "matplotlib",
+    "pandas",
+    "pint",
+    "rich",
+    "scipy.interpolate",
+    "scipy.ndimage",
+    "scipy.optimize",
+    "scipy.signal",
+    "scipy.stats",
+    "statsmodels",
+}
+"""Modules that no verb needs for its JSON; what Typer and Numba import by themselves (pydantic, scipy.linalg) is not
+ours to leave out."""
+
+TELLING = """
+import sys
+from experiments.cli import app
+try:
+    app()
+except SystemExit as ended:
+    print(*sys.modules, file=sys.stderr)
+    sys.exit(ended.code)
+"""
+
+
+def python(text: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-c", text, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=dict(os.environ))  # noqa: S603
+
+
+def loaded_by(arguments: Sequence[str]) -> set[str]:
+    done = python(TELLING, *arguments)
+    assert done.returncode == 0, done.stderr
+    return set(done.stderr.split())
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    healthy, rng = EhaParameters(), np.random.default_rng(3)
+    drive = make_drive("prbs", 4.0, 1e-3, healthy, rng)
+    record = simulate(LUMPED, drive, 1e-3, healthy, sensors=BENCH, rng=rng)
+    folder = tmp_path_factory.mktemp("logs")
+    paths = {suffix: folder / f"run.{suffix}" for suffix in ("csv", "parquet", "mat")}
+    for path in paths.values():
+        write_record(record, path)
+    return paths
+
+
+@pytest.mark.parametrize(
+    ("verb", "suffix"),
+    [("estimate", "csv"), ("estimate", "parquet"), ("estimate", "mat"), ("diagnose", "csv"), ("identify", "csv")],
+)
+def test_a_verb_on_a_log_imports_nothing_dear(logs: dict[str, Path], verb: str, suffix: str) -> None:
+    assert not DEAR & loaded_by([verb, str(logs[suffix]), "--json"])
+
+
+def test_help_imports_no_arithmetic() -> None:
+    assert not (DEAR - {"rich"} | {"numpy", "numba", "pyarrow"}) & loaded_by(["estimate", "--help"])
+
+
+@pytest.mark.parametrize(("arguments", "code"), [(["conditions", "--json"], 0), (["estimate"], 2)])
+def test_an_end_at_once_keeps_exit_code_and_what_was_to_run_at_exit(arguments: list[str], code: int) -> None:
+    text = "import atexit, experiments.cli\natexit.register(print, 'called')\nexperiments.cli.main()"
+    done = python(text, *arguments)
+    assert done.returncode == code
+    assert done.stdout.endswith("called\n")

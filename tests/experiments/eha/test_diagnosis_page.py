@@ -1,0 +1,44 @@
+"""The page on one log."""
+
+import re
+
+import numpy as np
+import pytest
+
+from experiments.eha.diagnosis_page import diagnosis_page
+from experiments.eha.entries import diagnosis_entries
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.diagnose import diagnose_log
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.sensors.sensors import RIG
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    p = parameters_for(CONDITIONS["minor_leakage"])
+    rng = np.random.default_rng(2)
+    drive = make_drive("steps", 3.0, 1e-3, EhaParameters(), rng)
+    log = simulate(CIRCUIT, drive, 1e-3, p, sensors=RIG, rng=rng).replace(differential_pressure_pa=None)
+    found = diagnose_log(log, Rig())
+    assert (found.condition, found.unknown) == ("minor_leakage", False)
+    result = {"file": "run.csv", "rig": "paper", **diagnosis_entries(found)}
+    return diagnosis_page({**result, "not_told": ["one thing is not told", "another neither"]}, found)
+
+
+@pytest.mark.slow
+def test_the_page_says_what_how_bad_since_when_and_what_next(page: str) -> None:
+    assert "<h1>Minor leakage, probability" in page
+    for heading in ("Which condition", "How bad", "Since when", "Measured and fitted", "What to measure next"):
+        assert heading in page
+    assert "Since before the log began." in page
+    assert page.count("data:image/svg+xml;base64,") == 3
+
+
+@pytest.mark.slow
+def test_every_paragraph_begins_with_a_capital_and_ends_with_a_full_stop(page: str) -> None:
+    paragraphs = [re.sub("<[^>]*>", "", one).strip() for one in re.findall("<p>(.*?)</p>", page, re.DOTALL)]
+    assert "One thing is not told." in paragraphs
+    assert [one for one in paragraphs if not (one[0].isupper() and one.endswith("."))] == []

@@ -1,0 +1,156 @@
+"""Findings as entries: the keys that a log is promised, whatever came of it, and notes as codes with data."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.eha.estimate import estimate_log
+from estimation.notes import EstimateCode, SensorCode
+from experiments.command.json_output import plain
+from experiments.eha.entries import (
+    COSTS,
+    NO_CLASS,
+    NO_DIAGNOSIS,
+    NO_ESTIMATE,
+    costs,
+    diagnosis_entries,
+    estimate_entries,
+)
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.diagnose import diagnose_log
+from faults.notes import AdviceCode, AgainstCode, ClassCode
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.eha.simulate import LUMPED, simulate
+from plant.log.record import Record
+from plant.notes import Code
+from plant.sensors.faults import SensorFault, with_fault
+from plant.sensors.sensors import BENCH
+
+PRESSURE = "differential_pressure_pa"
+ALWAYS = {"outcome", "message", "warnings"}
+TOLD_BY_THE_VERB = {"condition"}
+"""What estimate was told, and is no part of what it found."""
+
+
+def log(condition: str = "minor_leakage", duration: float = 3.0) -> Record:
+    p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(8)
+    return simulate(LUMPED, make_drive("steps", duration, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+
+
+def at_rest() -> Record:
+    rng, n = np.random.default_rng(1), 500
+    return Record(1e-3, {"motor_speed_rad_s": np.zeros(n), "velocity_m_s": rng.normal(0.0, 1e-3, n)})
+
+
+def codes(entries: dict[str, object]) -> list[str]:
+    return [note["code"] for note in entries["notes"]]
+
+
+def test_the_codes_that_entries_know_by_name_are_codes() -> None:
+    known: set[Code] = {*EstimateCode, *ClassCode}
+    assert set(COSTS) | set(NO_CLASS) <= {str(code.value) for code in known}
+
+
+def test_an_estimate_has_the_entries_that_it_promises() -> None:
+    entries = estimate_entries(estimate_log(log(), Rig()))
+    assert set(entries) | TOLD_BY_THE_VERB == set(NO_ESTIMATE) | ALWAYS
+    assert set(entries["bulk_modulus_pa"]) == {"value", "std", "ci95"}
+    assert set(entries["states"]) == {"leakage_coefficient", "flow_bias"}
+    assert entries["leakage_coefficient_m3_s_pa"] == entries["states"]["leakage_coefficient"]
+    assert entries["gate"] == {"passed": True, "reasons": []}
+    assert (entries["warnings"], entries["notes"]) == ([], [])
+
+
+def test_notes_are_codes_with_data_that_json_takes() -> None:
+    values = log()[PRESSURE].copy()
+    values[1500:] = values[1500]
+    found = diagnose_log(log().replace(**{PRESSURE: values}), Rig())
+    entries = diagnosis_entries(found)
+    written = json.loads(json.dumps(plain(entries), allow_nan=False))
+    froze = next(note for note in written["notes"] if note["code"] == SensorCode.SENSOR_FROZE)
+    assert froze["data"]["channel"] == PRESSURE
+    assert froze["data"]["begin_s"] == pytest.approx(1.5)
+    assert froze["text"] == str(SensorCode.SENSOR_FROZE.note(**froze["data"]))
+    assert froze["text"] in written["reasons"]
+    assert froze["text"] in written["gate"]["reasons"]
+    assert len(written["notes"]) == len(found.all_notes)
+    assert AdviceCode.CHECK_SENSOR in codes(entries)
+
+
+def test_a_diagnosis_has_the_entries_that_it_promises() -> None:
+    entries = diagnosis_entries(diagnose_log(log(), Rig()))
+    assert set(entries) == set(NO_DIAGNOSIS) | ALWAYS
+    assert (entries["condition"], entries["unknown"]) == ("minor_leakage", False)
+
+
+def test_a_log_at_rest_is_in_no_class_and_its_message_alone_says_why() -> None:
+    entries = diagnosis_entries(diagnose_log(at_rest(), Rig()))
+    assert (entries["outcome"], entries["condition"], entries["runner_up"]) == ("not_observable", None, None)
+    assert (entries["unknown"], entries["reasons"], entries["advice"]) == (None, [], [])
+    assert entries["message"] == str(ClassCode.MODELS_ALIKE.note())
+    assert entries["warnings"] == []
+    assert ClassCode.MODELS_ALIKE in codes(entries)
+    assert "probabilities" not in entries
+
+
+NO_CIRCUIT = Rig("no circuit", replace(EhaParameters(), relief_pressure=1e9))
+
+
+def test_a_rig_around_which_no_circuit_fits_gets_a_condition_without_probabilities() -> None:
+    found = diagnose_log(log(), NO_CIRCUIT)
+    entries = diagnosis_entries(found)
+    assert set(entries) <= set(NO_DIAGNOSIS) | ALWAYS
+    assert (entries["outcome"], entries["condition"], entries["unknown"]) == ("ok", "minor_leakage", False)
+    assert "probabilities" not in entries
+    assert "severity" not in entries
+    (why,) = [note for note in entries["notes"] if note["code"] == ClassCode.NO_CIRCUIT]
+    assert "accumulator_oil must fill both chambers" in why["data"]["reason"]
+    assert entries["warnings"] == [why["text"]]
+    assert (entries["reasons"], entries["advice"]) == ([], [])
+    assert entries["bulk_modulus_pa"]["value"] == pytest.approx(2.07e8, rel=0.01)
+
+
+def test_without_a_circuit_an_accused_sensor_makes_the_condition_unknown_too() -> None:
+    frozen = with_fault(log(), SensorFault(channel="velocity_m_s", kind="freeze", start=1.5))
+    entries = diagnosis_entries(diagnose_log(frozen, NO_CIRCUIT))
+    assert entries["unknown"]
+    assert entries["message"].startswith("UNKNOWN")
+    assert codes(entries).count(SensorCode.SENSOR_FROZE) == 1
+    assert entries["advice"] == [str(AdviceCode.CHECK_SENSOR.note(channels="velocity_m_s"))]
+
+
+def test_a_log_too_short_for_a_circuit_says_so_and_keeps_its_scores() -> None:
+    entries = diagnosis_entries(diagnose_log(log("major_leakage").slice(600, 650), Rig()))
+    assert list(entries["scores"]) == list(CONDITIONS)
+    assert "probabilities" not in entries
+    assert {ClassCode.NO_PROBABILITIES, ClassCode.MODELS_ALIKE} & set(codes(entries))
+
+
+def test_what_was_left_out_of_any_channel_is_a_warning_of_a_diagnosis() -> None:
+    velocity = log()["velocity_m_s"].copy()
+    velocity[::150] += 1.0
+    entries = diagnosis_entries(diagnose_log(log().replace(velocity_m_s=velocity), Rig()))
+    left_out = SensorCode.OUTLIERS_LEFT_OUT.note(channel="velocity_m_s", count=20, total=3000)
+    assert entries["warnings"] == [str(left_out)]
+    assert (entries["condition"], entries["unknown"]) == ("minor_leakage", False)
+
+
+def test_what_an_absent_channel_costs_is_a_note_and_said_once_of_all_logs() -> None:
+    entries = diagnosis_entries(diagnose_log(log().replace(position_m=None, **{PRESSURE: None}), Rig()))
+    assert ClassCode.PRESSURE_ABSENT_CLASS in codes(entries)
+    assert str(ClassCode.PRESSURE_ABSENT_CLASS.note()) not in entries["warnings"]
+    sound = diagnosis_entries(diagnose_log(log(), Rig()))
+    (said,) = costs([entries, sound, entries])
+    assert said == f"2 of 3 logs: {ClassCode.PRESSURE_ABSENT_CLASS.note()}"
+
+
+def test_nominal_models_that_miss_a_log_are_named_beside_what_the_circuit_says() -> None:
+    odd = log().replace(velocity_m_s=0.2 * log()["velocity_m_s"], position_m=None, **{PRESSURE: 5.0 * log()[PRESSURE]})
+    found = diagnose_log(odd, Rig())
+    assert found.unknown
+    (none_fits,) = (note for note in found.against if note.code == AgainstCode.NONE_FITS)
+    assert none_fits.data["percent"] > 50.0

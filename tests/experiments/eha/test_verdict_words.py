@@ -1,0 +1,91 @@
+"""A diagnosis in words."""
+
+import pytest
+
+from estimation.finding import Change, Finding, Gate, Outcome, Quantity
+from experiments.eha.entries import diagnosis_entries
+from experiments.eha.verdict_words import amount, believed, headline, models_said, next_step, since
+from faults.conditions import CONDITIONS
+from faults.diagnosis.diagnose import EhaEvidence
+from faults.diagnosis.rmse import Scores
+from faults.notes import AdviceCode, AgainstCode, ClassCode
+from plant.notes import Note
+
+
+def found_as(
+    condition: str, change: Change | None = None, against: tuple[Note, ...] = (), *, judged: bool = True
+) -> Finding:
+    """A diagnosis whose nominal models are a tenth of the condition's place off."""
+    errors = {name: 0.1 if name == condition else 0.2 + 0.01 * place for place, name in enumerate(CONDITIONS)}
+    shares = {**dict.fromkeys(CONDITIONS, 0.0), "major_friction": 0.03, condition: 0.97}
+    return Finding(
+        actuator="eha",
+        outcome=Outcome.OK,
+        quantities={"bulk_modulus": Quantity.normal(2.07e8, 1e6, "Pa")},
+        gate=Gate(True, ()),
+        channels=("velocity_m_s",),
+        condition=condition,
+        probabilities=shares if judged else {},
+        unknown=bool(against),
+        against=against,
+        severities={"leakage_flow": Quantity(1.0, "L/min", (0.9, 1.1)), "entrained_air": Quantity(None, "%")},
+        not_told=(ClassCode.BULK_MODULUS_NOT_VISIBLE.note(),),
+        since=change,
+        advice=(AdviceCode.CHECK_RIG.note() if against else AdviceCode.NOTHING.note(),),
+        evidence=EhaEvidence(estimate=None, scores=Scores(errors, {"velocity_m_s": errors}), diagnosis=None),
+    )
+
+
+def test_a_change_within_the_log_is_dated_with_its_interval() -> None:
+    found = diagnosis_entries(found_as("minor_leakage", Change(3.21, (3.1, 3.3), "normal")))
+    assert (found["since_s"], found["since_ci95_s"], found["condition_before"]) == (3.21, [3.1, 3.3], "normal")
+    assert "since 3.21 s (3.10 to 3.30), normal until then" in headline(found)
+
+
+def test_a_fault_without_a_change_was_there_before_the_log_began() -> None:
+    found = diagnosis_entries(found_as("minor_leakage"))
+    assert (found["since_s"], found["since_ci95_s"], found["condition_before"]) == (None, None, None)
+    assert "since before the log began" in headline(found)
+
+
+def test_a_healthy_actuator_is_healthy_since_no_time_unless_it_was_ill() -> None:
+    assert since(diagnosis_entries(found_as("normal"))) == ""
+    mended = diagnosis_entries(found_as("normal", Change(2.0, (1.9, 2.2), "minor_friction")))
+    assert since(mended).endswith("minor friction until then")
+    assert "since" not in headline(diagnosis_entries(found_as("normal")))
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_a_headline_begins_with_the_condition(condition: str) -> None:
+    entries = diagnosis_entries(found_as(condition))
+    assert headline(entries).startswith(condition.replace("_", " "))
+    assert entries["message"] == headline(entries)
+
+
+AGAINST = (AgainstCode.SPEED_BIAS.note(bias_rad_s=3.0), AgainstCode.OIL_SOFT.note(share=0.4))
+
+
+def test_a_verdict_that_something_speaks_against_says_so_first_and_why() -> None:
+    entries = diagnosis_entries(found_as("minor_leakage", against=AGAINST))
+    assert headline(entries).startswith("UNKNOWN, in none of the nine conditions; the nearest: minor leakage")
+    assert believed(entries) == "no: " + "; ".join(map(str, AGAINST))
+    assert next_step(entries) == str(AdviceCode.CHECK_RIG.note())
+    sound = diagnosis_entries(found_as("minor_leakage"))
+    assert believed(sound).startswith("yes: ")
+    assert believed(sound).endswith(str(ClassCode.BULK_MODULUS_NOT_VISIBLE.note()))
+
+
+@pytest.mark.parametrize(("against", "begins"), [((), "minor_leakage, by a wide margin"), (AGAINST, "UNKNOWN")])
+def test_nominal_models_alone_name_the_nearest_with_its_margin(against: tuple[Note, ...], begins: str) -> None:
+    entries = diagnosis_entries(found_as("minor_leakage", against=against, judged=False))
+    assert entries["message"] == models_said(entries)
+    assert entries["message"].startswith(begins)
+    assert "the error of normal is 2.0 times as large" in entries["message"]
+    assert (entries["condition"], entries["runner_up"]) == ("minor_leakage", "normal")
+
+
+def test_a_severity_that_is_not_told_is_not_determined() -> None:
+    entries = diagnosis_entries(found_as("normal"))
+    assert entries["severity"]["entrained_air"] == {"value": None, "unit": "%", "ci95": [None, None]}
+    assert amount(entries["severity"]["entrained_air"]) == "not determined"
+    assert amount(entries["severity"]["leakage_flow"]) == "1.00 L/min (0.90 to 1.10)"

@@ -1,0 +1,106 @@
+"""`hydrostate library` shows the models, and what it builds says why they are output error."""
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+from estimation.identification import LinearModel
+from estimation.identification.design.input_design import Limits
+from experiments.cli import app
+from experiments.library.figures import LIBRARY_FIGURES
+from experiments.library.library import read_library
+from experiments.library.sentences import structure_sentences
+from experiments.library.structures import clock_table, order_and_bandwidth, structure_table
+from experiments.library.study import LIBRARY
+from experiments.library.tables import library_table, response_table, root_table
+from experiments.page.figure_files import figure_files
+from experiments.page.render import render_page
+from experiments.running.study import Seeded, run_study
+from faults.conditions import CONDITIONS
+from plant.eha.circuit_parameters import CircuitParameters
+
+SHOWN = ("normal", "minor_friction")
+
+
+@pytest.fixture(scope="module")
+def tables() -> Mapping[str, pd.DataFrame]:
+    """Return what the command finds, by short tests of two conditions."""
+    rig, library = CircuitParameters(), read_library()
+    models = {name: library[name] for name in SHOWN}
+    return {
+        "library": library_table(library),
+        "roots": root_table(library),
+        "responses": response_table(library),
+        "structures": structure_table(rig, models, 7, duration=24.0),
+        "orders": order_and_bandwidth(rig, models, 7, duration=12.0),
+        "clocks": clock_table(models["normal"], Limits(125.66), 7, duration=5.0).reset_index(),
+    }
+
+
+def test_the_library_that_ships_is_shown_and_its_json_holds_the_models() -> None:
+    ran = CliRunner().invoke(app, ["library", "--json"])
+    assert ran.exit_code == 0, ran.output
+    entries = json.loads(ran.stdout)
+    assert [entry["condition"] for entry in entries] == list(CONDITIONS)
+    assert LinearModel.from_dict(entries[0]).to_dict() == read_library()["normal"].to_dict()
+    shown = CliRunner().invoke(app, ["library"]).output
+    assert all(name in shown for name in CONDITIONS)
+
+
+def test_a_file_that_is_no_library_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "other.json").write_text("{}")
+    ran = CliRunner().invoke(app, ["library", str(tmp_path / "other.json")])
+    assert ran.exit_code == 2
+    assert "must say format 'hydrostate transfer-function library'" in ran.output
+    both = CliRunner().invoke(app, ["library", str(tmp_path / "other.json"), "--out", str(tmp_path / "new")])
+    assert both.exit_code == 2
+    assert "shown or built" in both.output
+
+
+def test_output_error_runs_free_best_and_predicts_one_step_worst(tables: Mapping[str, pd.DataFrame]) -> None:
+    for _, rows in tables["structures"].groupby("condition"):
+        found = rows.set_index("structure")
+        assert found.loc["output-error", "behind_percent"] < 0.5
+        assert found["fit_percent"].idxmin() == "ARX"
+        assert found["one_step_percent"].idxmin() == "output-error"
+
+
+def test_the_rivals_criteria_look_above_25_hz(tables: Mapping[str, pd.DataFrame]) -> None:
+    weight = tables["structures"].pivot_table(index="condition", columns="structure", values="weight_above_percent")
+    ours = weight.pop("output-error")
+    assert ours.between(3.0, 10.0).all()  # what a 50 ms clock puts there
+    assert (weight.min(axis=1) > 2.0 * ours).all()
+
+
+def test_the_sentences_say_what_the_table_holds(tables: Mapping[str, pd.DataFrame]) -> None:
+    who, _, why = structure_sentences(tables["structures"])
+    arx = tables["structures"].set_index(["structure", "condition"]).loc["ARX"]
+    assert f"{arx['behind_percent'].min():.2g} to {arx['behind_percent'].max():.2g} points behind" in who
+    assert f"{arx['weight_above_percent'].mean():.0f} % of that of ARX" in why
+
+
+def test_the_page_needs_nothing_beside_it_and_shows_every_figure(tables: Mapping[str, pd.DataFrame]) -> None:
+    figures = figure_files(LIBRARY_FIGURES, tables)
+    facts = {**tables, **LIBRARY.facts(tables, Seeded(7)), "settings": Seeded(7)}
+    page = render_page(LIBRARY.template, facts, LIBRARY.columns, figures)
+    assert page.count("data:image/svg+xml;base64,") == len(LIBRARY_FIGURES)
+    assert not re.search(r"""(src|href)=["'](?!data:|#)""", page)
+    for target in re.findall(r'href="#([^"]+)"', page):
+        assert f'id="{target}"' in page
+    assert all(image[:4] == b"\x89PNG" for path, image in figures.items() if path.endswith(".png"))
+
+
+@pytest.mark.slow
+def test_what_is_built_is_a_library_with_its_report(tmp_path: Path) -> None:
+    report = run_study(LIBRARY, Seeded(2024), tmp_path / "library", Console(stderr=True, quiet=True))
+    models = read_library(report.with_name("library.json"))
+    assert list(models) == list(CONDITIONS)
+    structures = pd.read_csv(report.parent / "tables" / "structures.csv").set_index("structure")
+    assert (structures.loc["output-error", "behind_percent"] < 0.5).all()
+    assert structures.loc["ARX", "behind_percent"].max() > 10.0

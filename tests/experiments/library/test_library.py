@@ -1,0 +1,113 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation.identification.design.input_design import Limits
+from estimation.identification.fit.order import order_table
+from experiments.library.library import FORMAT, build_library, circuit_passes, library_text, read_library
+from experiments.library.structures import MADE_FOR, clock_table
+from experiments.library.tables import library_table, root_table
+from experiments.nine_conditions.printed_transfer_functions import printed_model
+from experiments.running.random_streams import stream
+from faults.conditions import CONDITIONS
+from plant.eha.circuit_parameters import CircuitParameters
+from plant.errors import HydrostateError
+
+
+def test_the_library_that_ships_has_nine_stable_models_with_both_covariances() -> None:
+    models = read_library()
+    assert list(models) == list(CONDITIONS)
+    for model in models.values():
+        assert model.is_stable
+        assert np.isfinite(model.covariance_white).all()
+        assert np.isfinite(model.covariance_robust).all()
+        assert 0.0 < model.dc_gain_std < 0.1 * model.dc_gain
+        assert model.data_hash
+
+
+def test_gains_fall_with_leakage_and_with_friction() -> None:
+    gains = library_table(read_library()).set_index("condition")["dc_gain"]
+    assert gains["normal"] > gains["minor_leakage"] > gains["major_leakage"]
+    assert gains["minor_friction"] > gains["minor_leakage_minor_friction"] > gains["major_leakage_minor_friction"]
+    assert (gains < 1.1 * 5.57e-7 / 1.52e-3).all()  # no piston outruns its pump
+
+
+def test_nothing_jumps_as_the_printed_models_do() -> None:
+    """Errata E15: eight of the nine printed models do not roll off, and ours do."""
+    table = library_table(read_library())
+    assert (table["jump_ratio"].abs() < 0.15).all()
+    assert (table["published_jump_ratio"] > 0.7).sum() == 8
+
+
+def test_the_printed_digits_leave_the_normal_gain_open() -> None:
+    """Errata E14."""
+    low, high = printed_model("normal")["dc_gain"]["interval"]
+    assert low == pytest.approx(3.2e-5, rel=0.02)
+    assert high == pytest.approx(7.78e-4, rel=0.01)
+    assert printed_model("normal")["pole_half_width"][0][0] > 0.0
+
+
+def test_a_written_library_is_read_back_in_every_bit(tmp_path: Path) -> None:
+    models = read_library()
+    entries = {name: {"model": model.to_dict()} for name, model in models.items()}
+    (tmp_path / "library.json").write_text(library_text({"format": FORMAT, "version": 1, "conditions": entries}))
+    again = read_library(tmp_path / "library.json")
+    assert all(again[name].to_dict() == model.to_dict() for name, model in models.items())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        json.dumps({"format": "other"}),
+        json.dumps({"format": FORMAT, "version": 9}),
+        json.dumps({"format": FORMAT}),
+    ],
+)
+def test_another_file_is_no_library(text: str, tmp_path: Path) -> None:
+    (tmp_path / "file.json").write_text(text)
+    with pytest.raises(HydrostateError, match="library"):
+        read_library(tmp_path / "file.json")
+
+
+def test_passes_have_no_mean_and_alternate_without_changing_sign() -> None:
+    speeds, velocities = circuit_passes(CircuitParameters(), "normal", np.random.default_rng(1), duration=8.0)
+    assert len(speeds) == len(velocities) == 2
+    assert all(abs(one.mean()) < 1e-9 for one in velocities)
+    # a faster motor means a faster piston, whichever way the pass went
+    assert all(np.corrcoef(u, v)[0, 1] > 0.5 for u, v in zip(speeds, velocities, strict=True))
+
+
+def test_a_literal_five_hertz_clock_is_the_worst_at_25_hz() -> None:
+    table = clock_table(read_library()["major_leakage"], Limits(125.66), 1)
+    assert table["at_25_hz"].idxmax() == "200 ms"
+    assert table.loc[MADE_FOR, "at_25_hz"] < 1.1 * table["at_25_hz"].min()
+
+
+def test_roots_of_both_stand_side_by_side_with_what_they_may_be_off_by() -> None:
+    roots = root_table(read_library())
+    printed = roots[
+        (roots["condition"] == "minor_friction") & (roots["source"] == "Table 6") & (roots["kind"] == "pole")
+    ]
+    np.testing.assert_allclose(printed["real"], 0.8735)
+    assert (roots["real_spread"] > 0.0).all()
+    assert set(roots["condition"]) == set(CONDITIONS)
+
+
+def test_a_higher_order_never_fits_several_short_experiments_worse() -> None:
+    condition = "major_leakage_major_friction"
+    u, y = circuit_passes(CircuitParameters(), condition, stream(2024, "order", condition), duration=20.0)
+    table = order_table(u, y, 1e-3)
+    assert (np.diff(table["rmse"]) <= 1e-6 * table["rmse"].iloc[0]).all()
+
+
+@pytest.mark.slow
+def test_the_library_is_what_the_study_builds() -> None:
+    stored = read_library()
+    built = build_library(2024)["conditions"]
+    for name, model in stored.items():
+        gain = built[name]["dc_gain"]
+        assert gain["value"] == pytest.approx(model.dc_gain, rel=1e-3)

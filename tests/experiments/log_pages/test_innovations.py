@@ -1,0 +1,46 @@
+"""The page of a filtered log: titled, labelled, and written whole."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation.eha.bulk_modulus import BulkModulusEstimate, estimate_bulk_modulus
+from experiments.log_pages.innovations import draw_innovations, write_innovations
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import LUMPED, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+
+def log() -> Record:
+    p, rng = EhaParameters(), np.random.default_rng(1)
+    return simulate(LUMPED, make_drive("steps", 4.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+
+
+def filtered() -> BulkModulusEstimate:
+    return estimate_bulk_modulus(log(), EhaParameters(), form="pressure", method="ekf")
+
+
+def test_it_says_what_was_believed_and_whether_to_believe_it() -> None:
+    found = filtered()
+    figure = draw_innovations(found, "run.csv")
+    title = figure.get_suptitle()
+    assert "run.csv" in title
+    assert "pressure form" in title
+    assert ("the gate passes" in title) == found.gate.passed
+    assert [axis.get_ylabel() != "" for axis in figure.axes] == [True] * 3
+    assert figure.axes[-1].get_xlabel() == "time [s]"
+
+
+def test_it_is_written_as_a_png_and_nothing_is_left_beside_it(tmp_path: Path) -> None:
+    write_innovations(filtered(), "run.csv", tmp_path / "run.png")
+    assert [path.name for path in tmp_path.iterdir()] == ["run.png"]
+    assert (tmp_path / "run.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_log_that_was_fitted_has_no_track_to_draw() -> None:
+    fitted = estimate_bulk_modulus(log(), EhaParameters())
+    with pytest.raises(ValueError, match="fitted, not filtered"):
+        draw_innovations(fitted, "run.csv")

@@ -1,0 +1,89 @@
+"""The motor paper's linear models: who is stable, where they peak, and what a loop around them does."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.motor_paper.hysteresis import hysteresis_loops, hysteresis_table, impulse_table
+from experiments.motor_paper.loop import loop_runs, loop_table, relay_table, spectrum_table
+from experiments.motor_paper.vibration import (
+    figures_7_to_9,
+    fractional_table,
+    margin_table,
+    pole_table,
+    response_table,
+    tuning_table,
+)
+from plant.motor_paper.hysteresis_model import HysteresisParameters
+from plant.motor_paper.vibration_model import VibrationParameters
+
+MODEL, DIAPHRAGM = VibrationParameters(), HysteresisParameters()
+
+
+def test_only_the_printed_signs_are_unstable() -> None:
+    stable = pole_table(MODEL).groupby("model")["stable"].all()
+    assert stable[~stable].index.tolist() == ["equations 1 and 2, as printed"]
+
+
+def test_nyquist_counts_what_the_closed_poles_say() -> None:
+    table = margin_table(MODEL)
+    assert (table["turns"] + table["open_unstable_poles"]).tolist() == table["closed_unstable_poles"].tolist()
+
+
+def test_equation_4_peaks_near_480_hz() -> None:
+    rows = response_table(MODEL)
+    rows = rows[rows["model"] == "equation 4, signs mended"].set_index("frequency_hz")["gain"]
+    assert rows.idxmax() == pytest.approx(475.0, rel=0.01)
+    assert rows.max() == pytest.approx(5.03, rel=0.01)
+
+
+def test_damping_halves_the_peak_and_stiffness_moves_it() -> None:
+    table = tuning_table(MODEL).set_index(["changed", "factor"])
+    assert table.loc[("damping", 2.0), "peak_gain"] < 0.55 * table.loc[("damping", 1.0), "peak_gain"]
+    assert table.loc[("load_stiffness", 2.0), "frequency_hz"] > table.loc[("load_stiffness", 1.0), "frequency_hz"]
+
+
+def test_sampled_figures_7_to_9_lie_on_the_exact_ones() -> None:
+    last = figures_7_to_9().groupby("order").last()
+    assert last["sampled_integral"].tolist() == pytest.approx(last["integral"].tolist(), rel=3e-3)
+    assert last["sampled_derivative"].tolist() == pytest.approx(last["derivative"].tolist(), rel=1e-3)
+
+
+def test_oustaloups_states_draw_the_exact_response() -> None:
+    table = fractional_table(MODEL)
+    assert (table["imitated_gain"] / table["gain"] - 1.0).abs().max() < 6e-3
+
+
+def test_the_mended_loop_is_the_same_at_every_frequency_and_the_printed_one_is_not() -> None:
+    table = hysteresis_table(hysteresis_loops(DIAPHRAGM)).groupby("law")["width_percent"]
+    assert table.max()["mended"] == pytest.approx(table.min()["mended"], rel=1e-9)
+    assert table.max()["mended"] == pytest.approx(10.55, abs=0.01)
+    assert table.max()["printed"] > 400.0 * table.min()["printed"]
+
+
+def test_the_impulse_response_dies_out() -> None:
+    moved = impulse_table(DIAPHRAGM)["displacement_m_per_v_s"].abs()
+    assert moved.iloc[-100:].max() < 0.2 * moved.max()
+
+
+@pytest.fixture(scope="module")
+def runs() -> pd.DataFrame:
+    return loop_runs(MODEL, 2024)
+
+
+def test_only_an_integral_leaves_no_error_and_the_derivative_settles_sooner(runs: pd.DataFrame) -> None:
+    table = loop_table(runs).set_index("controller")
+    assert table.loc["P", "error_percent"] > 50.0
+    assert table.loc[["PI", "PID"], "error_percent"].abs().max() < 0.5
+    assert table.loc["PID", "settling_time_s"] < 0.3 * table.loc["PI", "settling_time_s"]
+
+
+def test_the_derivative_pays_in_noise(runs: pd.DataFrame) -> None:
+    table = spectrum_table(runs)
+    loudest = table[table["frequency_hz"] > 1e3].groupby("controller")["amplitude_n"].max()
+    assert loudest["PID"] > 3.0 * loudest["PI"]
+
+
+def test_a_relay_finds_the_models_half_turn() -> None:
+    table = relay_table(MODEL).set_index("quantity")
+    assert np.abs(table["relay"] / table["model"] - 1.0).max() < 0.03

@@ -1,0 +1,157 @@
+"""The figures show what the tables hold, and say what they show."""
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+
+from experiments.nine_conditions.bulk_modulus import PRESSURE_SINE
+from experiments.nine_conditions.bulk_modulus import PRESSURE_STEPS as OURS
+from experiments.nine_conditions.classification import draw_confusions
+from experiments.nine_conditions.convergence import draw_convergence
+from experiments.nine_conditions.estimates import draw_estimates, draw_forms
+from experiments.nine_conditions.figures import FIGURES
+from experiments.nine_conditions.identification import draw_order
+from experiments.page.style import spread_out, styled
+from experiments.running.study import Found
+from faults.conditions import CONDITIONS
+from tests.experiments.conftest import SMALL
+
+UNIT = re.compile(r"\[[^\[\]]+\]")
+LETTERS = re.compile(r"(?<!\\)\b[a-z]{3,}")
+
+
+def _labels_of_numbers(figure: Figure) -> Iterator[str]:
+    """Yield the label of every axis whose ticks are numbers, or of the figure where its panels share one."""
+    for axis in figure.axes:
+        for ticks, shared in ((axis.xaxis, figure.get_supxlabel()), (axis.yaxis, figure.get_supylabel())):
+            written = [label.get_text() for label in ticks.get_ticklabels() if label.get_visible() and label.get_text()]
+            sides = ("labelleft", "labelright") if ticks is axis.yaxis else ("labelbottom", "labeltop")
+            inner = not any(ticks.get_tick_params().get(side) for side in sides)
+            if axis.get_visible() and written and not inner and not any(LETTERS.search(text) for text in written):
+                yield ticks.get_label_text() or shared
+
+
+def _texts(figure: Figure) -> list[str]:
+    return [text.get_text() for axis in figure.axes for text in axis.texts]
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_figure_has_a_title_and_units_on_its_numbers(name: str, drawn: dict[str, Figure]) -> None:
+    figure = drawn[name]
+    assert figure.get_suptitle()
+    labels = list(_labels_of_numbers(figure))
+    assert name == "confusions" or labels
+    assert all(UNIT.search(label) for label in labels), labels
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_labels_stay_inside_the_figure(name: str, drawn: dict[str, Figure]) -> None:
+    figure = drawn[name]
+    box = figure.get_tightbbox()
+    width, height = figure.get_size_inches()
+    assert box.x0 >= -0.02
+    assert box.y0 >= -0.02
+    assert box.x1 <= width + 0.02
+    assert box.y1 <= height + 0.02
+
+
+def test_convergence_shows_every_first_guess_in_every_condition(drawn: dict[str, Figure]) -> None:
+    figure = drawn["convergence_pressure_form"]
+    titles = [axis.get_title(loc="left") for axis in figure.axes]
+    assert len(titles) == len(CONDITIONS)
+    assert "minor leakage + major friction" in titles
+    starts = set(SMALL.starts)
+    for axis in figure.axes:
+        firsts = {1e8 * float(np.asarray(line.get_ydata())[0]) for line in axis.lines if len(line.get_xdata()) > 2}
+        assert firsts == starts
+
+
+def test_convergence_is_of_the_experiment_that_its_title_names(study: Found) -> None:
+    with styled():
+        figure = draw_convergence(OURS, study.series["convergence"], 2.07e8)
+    line = max(figure.axes[0].lines, key=lambda curve: len(curve.get_xdata()))
+    curves = study.series["convergence"]
+    rows = curves[
+        (curves["plant"] == OURS.plant)
+        & (curves["form"] == OURS.form)
+        & (curves["drive"] == OURS.drive)
+        & (curves["pressure_logged"] == OURS.pressure_logged)
+        & (curves["condition"] == "normal")
+    ]
+    lasts = {round(value / 1e8, 9) for value in rows.groupby("start_pa")["bulk_modulus_pa"].last()}
+    assert round(float(np.asarray(line.get_ydata())[-1]), 9) in lasts
+
+
+def _only(estimates: pd.DataFrame, **changes: object) -> pd.DataFrame:
+    chosen = np.logical_and.reduce([estimates[name] == value for name, value in PRESSURE_SINE._asdict().items()])
+    return estimates[chosen].assign(**changes)
+
+
+def test_what_is_not_observable_is_said_in_words(study: Found) -> None:
+    rows = _only(study.tables["bulk_modulus"], outcome="not_observable", value_pa=np.nan, error_percent=np.nan)
+    with styled():
+        assert _texts(draw_estimates(rows, 2.07e8)).count("not observable") == len(CONDITIONS)
+
+
+def test_an_estimate_off_the_axis_says_how_far(study: Found) -> None:
+    rows = _only(study.tables["bulk_modulus"], outcome="ok", value_pa=0.2e8, error_percent=-90.0)
+    with styled():
+        assert _texts(draw_estimates(rows, 2.07e8)).count("off the axis: -90 %") == len(CONDITIONS)
+
+
+def test_a_filter_that_diverged_leaves_the_figures_standing(study: Found) -> None:
+    rows = study.tables["bulk_modulus"].assign(
+        outcome="diverged", value_pa=np.nan, error_percent=np.nan, filter_settled_at_pa=np.nan
+    )
+    with styled():
+        draw_forms(rows, 2.07e8).draw_without_rendering()
+        figure = draw_estimates(rows, 2.07e8)
+        figure.draw_without_rendering()
+    cells = rows.groupby(["plant", "form", "drive", "pressure_logged", "condition"]).ngroups
+    assert _texts(figure).count("diverged") == cells
+
+
+def test_confusions_write_the_counts() -> None:
+    matrix = pd.DataFrame(np.diag(np.arange(1, 10)), index=list(CONDITIONS), columns=list(CONDITIONS))
+    matrix.iloc[2, 5] = 17
+    summary = pd.DataFrame({"bank": ["a"], "variant": ["nominal"], "accuracy": [0.5]})
+    with styled():
+        figure = draw_confusions({("a", "nominal"): matrix}, summary)
+    assert sorted(_texts(figure), key=int) == [*map(str, range(1, 10)), "17"]
+    assert "50.0 % right" in figure.axes[0].get_title(loc="left")
+
+
+def test_scores_frame_the_smallest_of_each_row(study: Found, drawn: dict[str, Figure]) -> None:
+    axis = drawn["scores"].axes[0]
+    framed = [(round(patch.get_y() + 0.5), round(patch.get_x() + 0.5)) for patch in axis.patches]
+    assert framed == list(enumerate(study.tables["score_example"].to_numpy().argmin(axis=1)))
+
+
+def test_order_is_named_in_the_title(study: Found) -> None:
+    order = study.series["order"].assign(suggested_order=7)
+    with styled():
+        assert "order 7" in draw_order(order).get_suptitle()
+
+
+def test_figures_leave_the_tables_as_they_were(study: Found) -> None:
+    before = study.tables["bulk_modulus"].copy(deep=True)
+    with styled():
+        draw_estimates(study.tables["bulk_modulus"], 2.07e8)
+    pd.testing.assert_frame_equal(study.tables["bulk_modulus"], before)
+
+
+def test_the_truth_is_the_simulated_parameter(study: Found) -> None:
+    parameters = study.tables["parameters"]
+    other = parameters.assign(value=parameters["value"].where(parameters["parameter"] != "bulk_modulus", 1.5e8))
+    with styled():
+        figure = FIGURES["forms_on_sticking_plant"]({**study.frames, "parameters": other})
+    assert "truth 1.50" in _texts(figure)
+
+
+def test_marks_of_one_row_are_spread_around_it() -> None:
+    assert spread_out(1, 0.5) == [0.0]
+    assert sum(spread_out(7, 0.5)) == pytest.approx(0.0)

@@ -1,0 +1,187 @@
+"""A result folder is there whole or not at all, and nobody's files are lost."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from estimation.identification.model.linear_model import LinearModel
+from experiments.nine_conditions.figures import FIGURES
+from experiments.nine_conditions.study import NINE_CONDITIONS
+from experiments.nine_conditions.transfer_functions import identification_study
+from experiments.page.figure_files import figure_files
+from experiments.page.folder import check_target
+from experiments.running import study as runner
+from experiments.running.study import Found, write_result
+from plant.eha.model import EhaParameters
+from plant.errors import HydrostateError
+from tests.experiments.conftest import SMALL
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave figures and report out, which these tests do not need."""
+    monkeypatch.setattr(runner, "figure_files", lambda *_: {})
+    monkeypatch.setattr(runner, "render_page", lambda *_: "report")
+
+
+def write_study(study: Found, folder: Path) -> Path:
+    """Write the small study; return its report."""
+    write_result(NINE_CONDITIONS, SMALL, study, folder)
+    return folder / "report.html"
+
+
+def _listing(folder: Path) -> list[str]:
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+
+
+def test_the_folder_holds_all_that_was_found(written: Path, study: Found) -> None:
+    present = _listing(written)
+    for name in FIGURES:
+        assert {f"figures/{name}.png", f"figures/{name}.svg"} <= set(present)
+    assert len([name for name in present if name.startswith("tables/")]) == len(study.tables)
+    assert len([name for name in present if name.startswith("series/")]) == len(study.series)
+    assert {"report.html", "manifest.json", "transfer_functions.json"} <= set(present)
+    assert json.loads((written / "manifest.json").read_text(encoding="utf-8"))["files"] == present
+
+
+def test_tables_are_read_back_as_they_were(written: Path, study: Found) -> None:
+    found = pd.read_csv(written / "tables/bulk_modulus.csv", keep_default_na=True)
+    wanted = study.tables["bulk_modulus"]
+    np.testing.assert_array_equal(found["value_pa"], wanted["value_pa"].astype(float))
+    confusion = pd.read_csv(written / "tables/confusion_transfer_functions_nominal.csv", index_col="condition")
+    np.testing.assert_array_equal(confusion, study.tables["confusion transfer functions nominal"])
+
+
+def test_transfer_functions_keep_every_digit(written: Path) -> None:
+    stored = json.loads((written / "transfer_functions.json").read_text(encoding="utf-8"))
+    library, _ = identification_study(EhaParameters(), SMALL)
+    for name, model in library.items():
+        found = LinearModel.from_dict(stored[name])
+        np.testing.assert_array_equal(found.numerator, model.numerator)
+        np.testing.assert_array_equal(found.covariance, model.covariance)
+
+
+def test_figures_are_the_same_at_every_run(written: Path, study: Found) -> None:
+    name = "forms_on_sticking_plant"
+    again = figure_files({name: FIGURES[name]}, study.frames)
+    assert again[f"figures/{name}.svg"] == (written / f"figures/{name}.svg").read_bytes()
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_an_earlier_study_is_replaced_whole(study: Found, tmp_path: Path) -> None:
+    target = tmp_path / "out"
+    write_study(study, target)
+    (target / "tables/bulk_modulus.csv").write_text("stale", encoding="utf-8")
+    write_study(study, target)
+    assert "stale" not in (target / "tables/bulk_modulus.csv").read_text(encoding="utf-8")
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize("failure", [HydrostateError("no report"), KeyboardInterrupt(), OSError(28, "No space left")])
+def test_a_failure_midway_leaves_the_earlier_result(
+    study: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failure: BaseException
+) -> None:
+    target = tmp_path / "out"
+    write_study(study, target)
+    before = {name: (target / name).read_bytes() for name in _listing(target)}
+
+    write_bytes = Path.write_bytes
+
+    def fail_at_the_report(path: Path, content: bytes) -> int:
+        if path.name == "report.html":
+            raise failure
+        return write_bytes(path, content)
+
+    monkeypatch.setattr(Path, "write_bytes", fail_at_the_report)
+    with pytest.raises((HydrostateError, KeyboardInterrupt)):
+        write_study(study, target)
+    assert {name: (target / name).read_bytes() for name in _listing(target)} == before
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_swap_that_fails_brings_the_earlier_result_back(
+    study: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "out"
+    write_study(study, target)
+    rename = Path.rename
+
+    def second_fails(path: Path, new: Path) -> Path:
+        if path.name.endswith(".tmp"):
+            raise PermissionError(13, "Permission denied")
+        return rename(path, new)
+
+    monkeypatch.setattr(Path, "rename", second_fails)
+    with pytest.raises(HydrostateError, match="can be written, got: Permission denied"):
+        write_study(study, target)
+    assert (target / "manifest.json").is_file()
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/thesis.tex").write_text("x", encoding="utf-8")
+    with pytest.raises(HydrostateError, match=r"which holds thesis\.tex"):
+        check_target(tmp_path / "out")
+    assert (tmp_path / "out/thesis.tex").is_file()
+
+
+@pytest.mark.parametrize("manifest", ["not json", "[1]", '{"name": "another program", "files": ["manifest.json"]}'])
+def test_a_manifest_of_something_else_is_refused(tmp_path: Path, manifest: str) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/manifest.json").write_text(manifest, encoding="utf-8")
+    with pytest.raises(HydrostateError, match=r"which holds manifest\.json"):
+        check_target(tmp_path / "out")
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_notes_laid_beside_a_study_are_not_deleted(study: Found, tmp_path: Path) -> None:
+    target = tmp_path / "out"
+    write_study(study, target)
+    (target / "tables/annotated.png").write_bytes(b"x")
+    with pytest.raises(HydrostateError, match=r"which holds tables/annotated\.png"):
+        write_study(study, target)
+    (target / "tables/annotated.png").rename(target / "tables/.DS_Store")
+    write_study(study, target)
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_an_empty_folder_and_missing_parents_will_do(study: Found, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    assert write_study(study, tmp_path / "empty") == tmp_path / "empty/report.html"
+    assert write_study(study, tmp_path / "a/b/c").is_file()
+
+
+def test_a_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("x", encoding="utf-8")
+    with pytest.raises(HydrostateError, match="got the file"):
+        check_target(tmp_path / "out")
+    with pytest.raises(HydrostateError, match="can be written, got"):
+        check_target(tmp_path / "out/below")
+
+
+def test_the_current_folder_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(HydrostateError, match="current folder"):
+        check_target(Path())
+    with pytest.raises(HydrostateError, match="current folder"):
+        check_target(tmp_path.parent)
+
+
+def test_a_place_that_cannot_be_written_is_said_before_the_study_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(HydrostateError, match="must be in a place that can be written, got"):
+        check_target(tmp_path / "out")
+
+
+def test_a_path_that_no_file_system_takes_is_said_in_a_sentence(study: Found, tmp_path: Path) -> None:
+    with pytest.raises(HydrostateError, match="result folder"):
+        write_study(study, tmp_path / ("x" * 300))

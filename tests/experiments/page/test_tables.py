@@ -1,0 +1,62 @@
+"""Numbers and tables as a reader sees them."""
+
+import pandas as pd
+import pytest
+
+from experiments.page.numbers import TIMES, exact, fixed, number, pretty_unit
+from experiments.page.tables import Cell, Column, html_table
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "shown"),
+    [
+        (0.0431142, 3, "0.0431"),
+        (428231.9, 4, f"428.2{TIMES}10³"),
+        (9.99999, 3, "10.0"),
+        (99999.96, 4, f"100.0{TIMES}10³"),
+        (4.784e-12, 4, f"4.784{TIMES}10⁻¹²"),
+        (-1.2345e-7, 3, f"\N{MINUS SIGN}123{TIMES}10⁻⁹"),
+        (0.0, 3, "0"),
+    ],
+)
+def test_exponents_come_in_threes_and_digits_as_asked(value: float, digits: int, shown: str) -> None:
+    assert number(value, digits) == shown
+
+
+@pytest.mark.parametrize("value", [None, float("nan"), float("inf")])
+def test_what_is_no_number_is_a_dash(value: float | None) -> None:
+    assert number(value) == fixed(value, 2) == "\N{EN DASH}"
+
+
+def test_zero_has_no_sign_when_rounded() -> None:
+    assert fixed(-0.0004, 2) == "0.00"
+
+
+@pytest.mark.parametrize("value", [1.52e-3, 65890.0, 6.006e-11, 3.4475e6, -7440.0, 0.25])
+def test_exact_numbers_are_given_back(value: float) -> None:
+    mantissa, _, power = exact(value).replace("\N{MINUS SIGN}", "-").partition(f"{TIMES}10")
+    exponent = power.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")) or "0"
+    assert float(f"{mantissa}e{exponent}") == pytest.approx(value, rel=1e-12)
+
+
+def test_units_are_raised() -> None:
+    assert pretty_unit("m^3/(s Pa)") == "m³/(s Pa)"
+
+
+def test_cells_are_escaped() -> None:
+    frame = pd.DataFrame({"a": ["<b>1 & 2</b>"]})
+    html = html_table(frame, (Column("a", "a < b"),), "1 > 0")
+    assert "&lt;b&gt;1 &amp; 2&lt;/b&gt;" in html
+    assert "a &lt; b" in html
+    assert "1 &gt; 0" in html
+
+
+def test_values_are_scaled_to_the_unit_of_the_header() -> None:
+    html = html_table(pd.DataFrame({"v": [0.0431]}), (Column("v", "velocity", "mm/s", 1e3, 3),), "")
+    assert '<th scope="col" class="number">velocity<small>mm/s</small></th>' in html
+    assert '<td class="number">43.1</td>' in html
+
+
+def test_a_cell_carries_its_tone() -> None:
+    html = html_table(pd.DataFrame({"v": [True]}), (Column("v", "v", words=lambda _: Cell("yes", "good")),), "")
+    assert '<td class="good">yes</td>' in html

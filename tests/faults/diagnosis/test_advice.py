@@ -1,0 +1,144 @@
+"""Advice is computed from what a log holds: what it holds already is not asked for."""
+
+import numpy as np
+import pytest
+
+from estimation.notes import EstimateCode, SensorCode
+from faults.conditions import CONDITIONS
+from faults.diagnosis.advice import advice_for, speeds_held
+from faults.notes import AdviceCode, AgainstCode, ClassCode
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from plant.notes import Note
+from plant.sensors.sensors import drop_samples
+
+HEALTHY = EhaParameters()
+PRESSURE = "differential_pressure_pa"
+ALL = ("velocity_m_s", PRESSURE)
+SURE = dict.fromkeys(CONDITIONS, 0.0) | {"normal": 1.0}
+UNSURE = dict.fromkeys(CONDITIONS, 0.0) | {"normal": 0.6, "minor_leakage": 0.4}
+ALIKE = (ClassCode.LEAKAGE_AND_BIAS_ALIKE.note(),)
+
+
+def staircase(levels: list[float], dwell: float = 0.5, sample_time: float = 1e-3, noise: float = 0.0) -> Record:
+    """Levels held one after the other, behind a motor's lag of 10 ms."""
+    wanted = np.repeat(levels, max(1, round(dwell / sample_time)))
+    share, speed = 1.0 - np.exp(-sample_time / 0.01), np.empty(len(wanted))
+    now = 0.0
+    for place, level in enumerate(wanted):
+        now += share * (level - now)
+        speed[place] = now
+    speed += noise * np.random.default_rng(4).standard_normal(len(speed))
+    return Record(sample_time, {"motor_speed_rad_s": speed})
+
+
+def codes(notes: tuple[Note, ...]) -> list[str]:
+    return [note.code for note in notes]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05, 1.0])
+@pytest.mark.parametrize("sample_time", [1e-4, 1e-3, 1e-2])
+@pytest.mark.parametrize(
+    ("levels", "count"),
+    [
+        ([100.0, -100.0, 100.0], 1),
+        ([0.0, 60.0], 1),
+        ([50.0, -100.0], 2),
+        ([100.0, 90.0, 100.0, 90.0], 2),
+        ([0.0, 30.0, 0.0, -60.0, 90.0, -120.0, 60.0, 30.0, -90.0], 4),
+    ],
+)
+def test_speeds_are_counted_as_they_were_held(
+    levels: list[float], count: int, sample_time: float, noise: float
+) -> None:
+    assert speeds_held(staircase(levels, sample_time=sample_time, noise=noise)) == count
+
+
+def test_a_drive_that_never_settles_holds_none_and_rest_is_no_speed() -> None:
+    time = 1e-3 * np.arange(5000)
+    assert speeds_held(Record(1e-3, {"motor_speed_rad_s": 100.0 * np.sin(2.0 * np.pi * 5.0 * time)})) == 0
+    assert speeds_held(Record(1e-3, {"motor_speed_rad_s": np.zeros(5000)})) == 0
+    assert speeds_held(Record(1e-3, {"motor_speed_rad_s": 100.0 * np.ones(3)})) == 0
+    assert speeds_held(Record(1e-3, {"motor_speed_rad_s": np.full(100, np.nan)})) == 0
+
+
+def test_gaps_slow_sensors_and_long_logs_hide_no_speed() -> None:
+    record = staircase([40.0, -80.0, 120.0, 80.0], dwell=1.0, noise=0.05)
+    assert speeds_held(drop_samples(record, 0.05, np.random.default_rng(1))) == 3
+    slow = np.where(np.arange(len(record)) % 10 == 3, record["motor_speed_rad_s"], np.nan)
+    assert speeds_held(record.replace(motor_speed_rad_s=slow)) == 3
+    assert speeds_held(staircase([40.0, 80.0] * 100, dwell=0.15)) == 2
+
+
+def test_speeds_that_a_motor_creeps_through_are_more_than_one() -> None:
+    ramp = np.linspace(0.0, 100.0, 20_000)
+    assert speeds_held(Record(1e-3, {"motor_speed_rad_s": ramp})) == 2
+
+
+def test_the_published_sine_holds_one_speed_at_most_and_steps_hold_several() -> None:
+    rng = np.random.default_rng(2)
+    held = {
+        name: speeds_held(Record(1e-3, {"motor_speed_rad_s": make_drive(name, 10.0, 1e-3, HEALTHY, rng)}))
+        for name in ("sine", "prbs", "steps")
+    }
+    assert held["sine"] <= 1
+    assert held["prbs"] <= 1
+    assert held["steps"] >= 2
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("sample_time", [5e-4, 2e-3])
+def test_a_log_that_holds_two_or_more_speeds_is_never_told_to_hold_two_or_more(seed: int, sample_time: float) -> None:
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(2, 12))
+    levels = rng.permutation(np.linspace(1.0, 0.15, count)) * rng.choice([-1.0, 1.0], count) * 120.0
+    record = staircase(list(levels), float(rng.uniform(0.2, 1.5)), sample_time, float(rng.choice([0.0, 0.05, 1.0])))
+    assert speeds_held(record) >= 2
+    for shares in (SURE, UNSURE):
+        (first, *_) = advice_for(record, shares, (), ALIKE, ALL)
+        assert first.code == AdviceCode.CLOSER_SPEEDS
+        assert first.data["speeds"] >= 2
+
+
+def test_a_log_that_holds_one_speed_is_told_to_hold_more() -> None:
+    (said,) = advice_for(staircase([100.0, -100.0]), SURE, (), ALIKE, ALL)
+    assert said == AdviceCode.MORE_SPEEDS.note(speeds=1)
+
+
+def test_a_log_that_decides_needs_nothing() -> None:
+    assert codes(advice_for(staircase([100.0]), SURE, (), (), ALL)) == [AdviceCode.NOTHING]
+
+
+def test_what_is_absent_or_not_visible_is_asked_for_before_more_of_the_same() -> None:
+    unseen = (ClassCode.FRICTION_NOT_VISIBLE.note(),)
+    said = advice_for(staircase([100.0]), UNSURE, (), unseen, ("velocity_m_s",))
+    assert codes(said) == [AdviceCode.LOG_PRESSURE, AdviceCode.MOVE_PISTON, AdviceCode.LOG_LONGER]
+    assert said[-1].data["duration_s"] == pytest.approx(0.499)
+
+
+def test_a_long_log_that_leaves_conditions_open_is_not_asked_to_be_longer() -> None:
+    assert codes(advice_for(staircase([100.0] * 24), UNSURE, (), (), ALL)) == [AdviceCode.CONDITIONS_OPEN]
+
+
+def test_where_something_speaks_against_a_log_that_is_mended_first() -> None:
+    record = staircase([100.0])
+    froze = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.0, begin_s=0.0, length_s=1.0)
+    clipped = SensorCode.SENSOR_CLIPPED.note(channel=PRESSURE, levels="1e6", percent=3.0)
+    residuals = EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=38.0)
+    assert advice_for(record, UNSURE, (froze, residuals, clipped), ALIKE, ALL) == (
+        AdviceCode.CHECK_SENSOR.note(channels=f"position_m and {PRESSURE}"),
+    )
+    disagree = SensorCode.SENSORS_DISAGREE.note(difference_m_s=0.1)
+    assert advice_for(record, UNSURE, (disagree,), (), ALL) == (
+        AdviceCode.CHECK_SENSOR.note(channels="position_m and velocity_m_s"),
+    )
+    for against in (residuals, AgainstCode.NONE_FITS.note(percent=90.0)):
+        assert codes(advice_for(record, UNSURE, (against,), (), ALL)) == [AdviceCode.FIT_DOUBTED]
+    assert codes(advice_for(record, UNSURE, (AgainstCode.OIL_SOFT.note(share=0.4),), (), ALL)) == [AdviceCode.CHECK_RIG]
+
+
+def test_without_probabilities_nothing_is_said_to_be_decided() -> None:
+    assert advice_for(staircase([100.0]), {}, (), (), ALL) == ()
+    (mend,) = advice_for(staircase([100.0]), {}, (AgainstCode.NONE_FITS.note(percent=90.0),), (), ALL)
+    assert mend.code == AdviceCode.FIT_DOUBTED

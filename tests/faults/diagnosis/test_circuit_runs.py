@@ -1,0 +1,57 @@
+"""Circuits by coordinates, and a log in blocks."""
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.circuit_runs import BLOCK, blocks_of, coordinates_of, parameter_rows
+from faults.diagnosis.class_fit import Actuator
+from plant.eha.circuit_parameters import CircuitParameters, circuit_of
+from plant.eha.model import EhaParameters
+from plant.errors import LogError
+from plant.log.record import Record
+
+ACTUATOR = Actuator.of(EhaParameters())
+SPEED = 100.0 * np.sign(np.sin(np.arange(3000) * 2e-3))
+
+
+@pytest.mark.parametrize("name", CONDITIONS)
+def test_every_condition_comes_back_from_its_coordinates(name: str) -> None:
+    true = circuit_of(parameters_for(CONDITIONS[name]))
+    (row,) = parameter_rows(coordinates_of(true, ACTUATOR.rated)[None], ACTUATOR.circuit, ACTUATOR.rated)
+    found = dict(zip(CircuitParameters.__dataclass_fields__, row.tolist(), strict=True))
+    for field in CircuitParameters.__dataclass_fields__:
+        if field != "motor_lag":  # the logged speed is the motor's own
+            assert found[field] == pytest.approx(getattr(true, field), rel=1e-9), field
+
+
+def test_friction_opposes_motion_at_every_coordinate() -> None:
+    points = np.random.default_rng(1).normal(ACTUATOR.conditions[3], 0.7, (200, 7))
+    rows = parameter_rows(points, ACTUATOR.circuit, ACTUATOR.rated)
+    names = list(CircuitParameters.__dataclass_fields__)
+    a1, a2, a3 = (rows[:, names.index(f"friction_{part}")] for part in ("quadratic", "linear", "coulomb"))
+    assert np.all(np.minimum(a2, 0.0) ** 2 < 4.0 * a1 * a3)
+
+
+@pytest.mark.parametrize("sample_time", [1e-4, 1e-3, 2e-3])
+def test_blocks_are_the_same_whatever_the_sample_rate(sample_time: float) -> None:
+    time = sample_time * np.arange(round(3.0 / sample_time))
+    log = Record(sample_time, {"motor_speed_rad_s": np.cos(time), "position_m": 1e-2 * np.sin(time)})
+    blocks = blocks_of(log)
+    centres = BLOCK * (np.arange(len(blocks.velocity)) + 0.5)
+    assert blocks.block * blocks.sample_time == pytest.approx(BLOCK)
+    assert blocks.velocity == pytest.approx(1e-2 * np.cos(centres), abs=1e-5)
+    assert blocks.travel == pytest.approx(1e-2 * np.ptp(np.sin(centres)), rel=0.02)
+
+
+def test_position_is_preferred_and_its_absence_borne() -> None:
+    velocity = 0.01 * np.sin(np.arange(3000) * 1e-3)
+    log = Record(1e-3, {"motor_speed_rad_s": SPEED, "velocity_m_s": velocity})
+    assert blocks_of(log).velocity == pytest.approx(velocity[:2990].reshape(-1, 10).mean(axis=1))
+    with pytest.raises(LogError, match="velocity_m_s or position_m is wanted, the log has motor_speed_rad_s"):
+        blocks_of(log.replace(velocity_m_s=None))
+
+
+def test_a_log_of_a_few_samples_is_refused() -> None:
+    with pytest.raises(LogError, match=r"8 blocks of 0\.01 s or more, got 0\.049 s"):
+        blocks_of(Record(1e-3, {"motor_speed_rad_s": SPEED[:50], "velocity_m_s": SPEED[:50]}))

@@ -1,0 +1,98 @@
+"""Fitted circuits beside the conditions' regions."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS
+from faults.diagnosis.circuit_runs import COORDINATES, Blocks
+from faults.diagnosis.class_fit import Actuator, PointFit
+from faults.diagnosis.class_regions import PRESSURE_SCALE, believed_information, is_stuck, region_scores, spread_of
+from plant.eha.model import EhaParameters
+
+ACTUATOR = Actuator.of(EhaParameters())
+INFORMATION = 1e4 * np.eye(7)
+
+
+def blocks(*, pressure: bool, travel: float = 0.1) -> Blocks:
+    velocity = np.full(100, travel / 0.99)
+    outputs = 2 if pressure else 1
+    return Blocks(np.zeros(1001), 1e-3, 10, velocity, velocity if pressure else None, np.full(outputs, 1e-3))
+
+
+def fit(place: int, scale: float = 1e-3, outputs: int = 2) -> PointFit:
+    empty = np.zeros((100, outputs))
+    return PointFit(ACTUATOR.conditions[place], 0.0, INFORMATION, np.full(outputs, scale), empty, empty[None])
+
+
+@pytest.mark.parametrize("place", range(len(CONDITIONS)))
+def test_a_nominal_circuit_lies_in_its_own_region_alone(place: int) -> None:
+    scores = region_scores(fit(place), INFORMATION, ACTUATOR)
+    assert scores[place] == 0.0
+    assert np.all(np.delete(scores, place) < -10.0)
+
+
+def test_what_a_log_says_nothing_of_counts_for_no_condition() -> None:
+    only_leakage = np.diag([1e4, *6 * [0.0]])
+    scores = region_scores(fit(0), only_leakage, ACTUATOR)
+    alike = [i for i, condition in enumerate(CONDITIONS.values()) if condition.leakage == "none"]
+    assert scores[alike] == pytest.approx(0.0)
+    assert np.all(np.delete(scores, alike) < -10.0)
+
+
+def test_without_pressure_the_scale_of_pressure_is_not_believed() -> None:
+    believed = believed_information(fit(0, outputs=1), blocks(pressure=False))
+    assert float(PRESSURE_SCALE @ believed @ PRESSURE_SCALE) == pytest.approx(0.0, abs=1e-6)
+    assert believed_information(fit(0), blocks(pressure=True)) == pytest.approx(INFORMATION)
+
+
+def test_a_model_error_widens_what_is_believed() -> None:
+    near, far = (believed_information(fit(0, scale), blocks(pressure=True)) for scale in (1e-3, 1e-2))
+    assert np.all(np.diag(far) < 0.02 * np.diag(near))
+
+
+def test_a_stuck_piston_says_nothing_of_friction() -> None:
+    stuck = blocks(pressure=True, travel=5e-5)
+    assert is_stuck(stuck, ACTUATOR)
+    assert not is_stuck(blocks(pressure=True), ACTUATOR)
+    believed = np.diag(believed_information(fit(0), stuck, stuck=True))
+    assert [name for name, known in zip(COORDINATES, believed, strict=True) if known == 0.0] == [
+        "friction_rest",
+        "friction_quadratic",
+        "friction_rated",
+    ]
+
+
+def residual(left: np.ndarray, *, pressure: bool = True) -> tuple[PointFit, Blocks]:
+    """A fit that leaves what is given of both channels."""
+    log = blocks(pressure=pressure)
+    outputs = log.outputs
+    found = fit(0, outputs=outputs.shape[1])
+    return replace(found, fitted=outputs - 1e-3 * left[:, None]), log
+
+
+def test_what_lasts_widens_intervals_and_white_noise_does_not() -> None:
+    white = np.random.default_rng(1).normal(size=100)
+    lasting = np.repeat(white[:10] / np.std(white[:10]), 10)
+    spreads = [spread_of(*_with(left), ACTUATOR.conditions[0]) for left in (np.zeros(100), white, lasting)]
+    quiet, noisy, coloured = (float(np.sqrt(spread[0, 0])) for spread in spreads)
+    assert noisy < 1.3 * quiet
+    assert coloured > 1.5 * quiet
+
+
+def _with(left: np.ndarray, *, pressure: bool = True) -> tuple[PointFit, np.ndarray, Blocks]:
+    found, log = residual(left, pressure=pressure)
+    return found, INFORMATION, log
+
+
+def test_without_pressure_an_actuator_unlike_its_kind_is_known_less_well() -> None:
+    found, log = residual(np.zeros(100), pressure=False)
+    believed = believed_information(found, log)
+    along = PRESSURE_SCALE / np.linalg.norm(PRESSURE_SCALE)
+    near, far = (
+        float(along @ spread_of(replace(found, coordinates=found.coordinates + off), believed, log, centre) @ along)
+        for centre in [ACTUATOR.conditions[0]]
+        for off in (np.zeros(7), np.array([0.2, -0.2, 0.2, 0.0, 0.0, 0.0, 0.0]))
+    )
+    assert 1.5 * near < far < 1.0

@@ -1,0 +1,105 @@
+"""Verdicts on logs whose truth is known."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from benchmarks.population import OUT_OF_MODEL, TEST, Drawn, draw_logs
+from benchmarks.scores import calibration_error, share_interval
+from estimation.log_checks.clean import clean_log
+from estimation.notes import SensorCode
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.calibration import shipped_calibration
+from faults.diagnosis.circuit_runs import coordinates_of
+from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.diagnose import Diagnosis, diagnose_clean
+from faults.diagnosis.evidence import EVIDENCES
+from faults.diagnosis.severity import severities_at
+from faults.notes import AgainstCode, ClassCode
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import RIG
+
+HEALTHY = EhaParameters()
+ACTUATOR = Actuator.of(HEALTHY)
+PRESSURE = "differential_pressure_pa"
+PRESSURES = pytest.mark.parametrize("pressure", [True, False], ids=["with pressure", "without"])
+
+
+def diagnosed(record: Record, *, pressure: bool = True) -> Diagnosis:
+    seen = record if pressure else record.replace(**{PRESSURE: None})
+    return diagnose_clean(clean_log(seen, HEALTHY), ACTUATOR)
+
+
+@pytest.fixture(scope="module")
+def population() -> list[Drawn]:
+    return list(draw_logs([TEST]))
+
+
+@pytest.mark.slow
+@PRESSURES
+def test_every_log_of_a_seed_gets_its_class_and_none_is_flagged(population: list[Drawn], *, pressure: bool) -> None:
+    found = [diagnosed(log.record, pressure=pressure) for log in population]
+    assert [one.condition for one in found] == [log.condition for log in population]
+    assert [one.against for one in found] == [()] * len(found)
+    assert all(sum(one.probabilities.values()) == pytest.approx(1.0) for one in found)
+
+
+@pytest.mark.slow
+@PRESSURES
+def test_severities_come_with_intervals_that_mostly_cover(population: list[Drawn], *, pressure: bool) -> None:
+    covered: list[bool] = []
+    for log in population:
+        true = severities_at(coordinates_of(log.parameters, ACTUATOR.rated), ACTUATOR)
+        covered += [one.covers(true[name]) for name, one in diagnosed(log.record, pressure=pressure).severity.items()]
+    assert np.mean(covered) > 0.85
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", OUT_OF_MODEL)
+def test_logs_out_of_the_model_are_called_unknown_with_a_reason(kind: str, population: list[Drawn]) -> None:
+    found = [diagnosed(OUT_OF_MODEL[kind](log)) for log in population[:18:6]]
+    assert sum(one.unknown for one in found) >= len(found) - 1
+    assert all(bool(one.against) == one.unknown for one in found)
+    assert {type(note.code) for one in found for note in one.against} <= {AgainstCode, SensorCode}
+
+
+def stuck(condition: str) -> Diagnosis:
+    p = ACTUATOR.circuit
+    drive = make_drive("sine", 3.0, 1e-3, p, np.random.default_rng(0))
+    faulty = parameters_for(CONDITIONS[condition])
+    return diagnosed(simulate(CIRCUIT, drive, 1e-3, faulty, sensors=RIG, rng=np.random.default_rng(1)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("condition", ["normal", "minor_leakage_minor_friction", "major_friction"])
+def test_a_stuck_piston_shows_leakage_and_leaves_friction_open(condition: str) -> None:
+    found = stuck(condition)
+    level = CONDITIONS[condition].leakage
+    alike = [share for name, share in found.probabilities.items() if CONDITIONS[name].leakage == level]
+    assert sum(alike) > 0.9
+    assert max(alike) < 0.5
+    assert ClassCode.FRICTION_NOT_VISIBLE in [note.code for note in found.not_told]
+
+
+def test_the_shipped_numbers_say_where_they_come_from() -> None:
+    shipped = shipped_calibration()
+    assert set(shipped.weights(True)) == set(shipped.weights(False)) == set(EVIDENCES)
+    assert shipped.provenance["script"] == "python -m benchmarks fit_diagnosis"
+    widths: Mapping[str, float] = shipped.widths(True)
+    assert all(width > 0.0 for width in widths.values())
+
+
+def test_a_sure_classifier_that_is_always_right_has_no_calibration_error() -> None:
+    assert calibration_error(np.ones(100), np.ones(100, dtype=bool)) == 0.0
+    coin = np.arange(1000) % 2 == 0
+    assert calibration_error(np.full(1000, 0.5), coin) == pytest.approx(0.0, abs=0.01)
+
+
+def test_an_exact_interval_holds_the_share() -> None:
+    low, high = share_interval(90, 100)
+    assert low < 0.9 < high
+    assert (low, high) == pytest.approx((0.8238, 0.9510), abs=1e-4)

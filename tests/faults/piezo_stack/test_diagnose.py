@@ -1,0 +1,65 @@
+"""Classes and findings from logs of the piezo-stack actuator."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS
+from faults.piezo_stack.diagnose import calibrated_stack, diagnose_stack
+from faults.piezo_stack.faults import stack_in_condition, stack_with_fault
+from plant.log.record import Record
+from plant.piezo_stack.parameters import PiezoStackParameters
+from plant.piezo_stack.run import BENCH_SENSORS, simulate_stack, sine_drive
+
+HEALTHY = PiezoStackParameters(load_mass=10.0)
+OTHER = replace(
+    HEALTHY,
+    delivery_length=1.05 * HEALTHY.delivery_length,
+    return_length=1.05 * HEALTHY.return_length,
+    intake_length=1.05 * HEALTHY.intake_length,
+    outlet_reed_stiffness=0.95 * HEALTHY.outlet_reed_stiffness,
+    inlet_reed_stiffness=0.95 * HEALTHY.inlet_reed_stiffness,
+    discharge_coefficient=1.03 * HEALTHY.discharge_coefficient,
+)
+SAMPLE_TIME = 5e-5
+DRIVE = sine_drive(275.0, 140.0, 0.05, SAMPLE_TIME)
+
+
+def log_of(p: PiezoStackParameters, seed: int = 1) -> Record:
+    return simulate_stack(p, DRIVE, SAMPLE_TIME, sensors=BENCH_SENSORS, rng=np.random.default_rng(seed))
+
+
+def test_a_condition_is_named() -> None:
+    name = "major_leakage_minor_friction"
+    found = diagnose_stack(log_of(stack_in_condition(HEALTHY, name)), HEALTHY)
+    assert (found.condition, found.faults, found.gate.reasons) == (name, (), ())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("air_doubled", "2 times the healthy share"),
+        ("chamber_leakage_minor", "the pump chamber leaks: 5e-12"),
+        ("depolarised_10_percent", "10 % of its stroke is lost"),
+        ("inlet_reed_soft", "inlet reed soft: 0.5"),
+        ("inlet_reed_gap", "inlet reed does not shut: a gap of 30 um"),
+        ("inlet_reed_jammed", "inlet reed stiff or jammed"),
+    ],
+)
+def test_every_other_fault_is_named_with_its_size(fault: str, said: str) -> None:
+    found = diagnose_stack(log_of(stack_with_fault(HEALTHY, fault)), HEALTHY)
+    assert found.condition == "normal"
+    (note,) = found.faults
+    assert said in str(note)
+
+
+@pytest.mark.slow
+def test_another_actuator_is_warned_of_and_diagnosed_once_calibrated() -> None:
+    assert diagnose_stack(log_of(OTHER), HEALTHY).gate.reasons
+    calibrated = calibrated_stack(log_of(OTHER), HEALTHY)
+    assert calibrated.delivery_length == pytest.approx(OTHER.delivery_length, rel=0.01)
+    for name in list(CONDITIONS)[::4]:
+        found = diagnose_stack(log_of(stack_in_condition(OTHER, name), 2), calibrated)
+        assert (found.condition, found.gate.reasons) == (name, ())

@@ -1,0 +1,40 @@
+"""The watch's loops are Python: run as it stands it says what the compiled kernel says, to the last bit."""
+
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from faults.watch import kernel, watch
+from faults.watch.events import Alarm, Change, Event, Ready
+from faults.watch.watch import Watch
+from plant.eha.model import EhaParameters
+
+P, T = EhaParameters(), 2e-3
+
+
+def reversals(seconds: float, leak_from: float) -> np.ndarray:
+    """Return an actuator that follows random reversals at once, and loses a third of its speed at some time."""
+    rng = np.random.default_rng(2)
+    count = round(seconds / T)
+    speed = P.rated_speed * np.repeat(rng.choice((-1.0, 1.0), count // 25 + 1), 25)[:count]
+    share = np.where(T * np.arange(count) < leak_from, 0.9, 0.6)
+    position = np.cumsum(share * P.pump_displacement * speed / P.piston_area) * T
+    noise = rng.standard_normal((count, 3))
+    pressure = 1e6 * np.sign(speed)
+    return np.column_stack([speed, position, pressure]) + noise * [0.05, 1e-6, 5e3]
+
+
+def watched(samples: np.ndarray, *, pressure: bool) -> list[Event]:
+    return Watch(P, T, pressure=pressure, learning=60.0).take(samples)
+
+
+@pytest.mark.parametrize("pressure", [True, False])
+def test_plain_python_and_the_compiled_kernel_say_the_same(monkeypatch: pytest.MonkeyPatch, pressure: bool) -> None:
+    samples = reversals(65.0, 62.0)
+    samples[20000:20010] = np.nan
+    compiled = watched(samples, pressure=pressure)
+    assert [type(event) for event in compiled] == [Ready, Alarm, Change]
+    plain: ModuleType = kernel
+    monkeypatch.setattr(watch, "watch_kernel", lambda: plain)
+    assert watched(samples, pressure=pressure) == compiled

@@ -1,0 +1,23 @@
+import numpy as np
+import pytest
+
+from faults.watch.samples import watched_samples
+from plant.errors import LogError
+
+
+def test_velocity_stands_in_for_position_and_two_pressures_for_their_difference() -> None:
+    channels = {
+        "motor_speed_rad_s": np.ones(3),
+        "velocity_m_s": np.array([1.0, np.nan, 2.0]),
+        "pressure_a_pa": np.full(3, 5.0),
+        "pressure_b_pa": np.full(3, 2.0),
+    }
+    samples, pressure = watched_samples(channels, 0.5, travelled=1.0)
+    assert pressure
+    np.testing.assert_array_equal(samples[:, 1], [1.5, np.nan, 2.5])
+    np.testing.assert_array_equal(samples[:, 2], 3.0)
+
+
+def test_a_log_without_motion_is_refused() -> None:
+    with pytest.raises(LogError, match="position_m or velocity_m_s"):
+        watched_samples({"motor_speed_rad_s": np.zeros(3)}, 1e-3)

@@ -1,0 +1,129 @@
+import numpy as np
+import pytest
+
+from faults.watch.events import Alarm, Change, Ready
+from faults.watch.kernel import watch_kernel
+from faults.watch.watch import Watch, watch_record
+from plant.eha.model import EhaParameters
+from plant.errors import HydrostateError
+from plant.log.record import Record
+
+P = EhaParameters()
+T = 2e-3
+SECONDS = 100.0
+
+
+def _run(leak_from: float = np.inf, seconds: float = SECONDS, seed: int = 0) -> np.ndarray:
+    """Return a first-order actuator under random reversals, whose piston loses a quarter of its speed at some time."""
+    rng = np.random.default_rng(seed)
+    count = round(seconds / T)
+    signs = np.repeat(rng.choice((-1.0, 1.0), count // 25 + 1), 25)[:count]
+    speed = P.rated_speed * signs
+    flow = P.pump_displacement * speed / P.piston_area
+    share = np.where(T * np.arange(count) < leak_from, 0.9, 0.65)
+    velocity = np.zeros(count)
+    for k in range(1, count):
+        velocity[k] = velocity[k - 1] + 0.2 * (share[k] * flow[k] - velocity[k - 1])
+    pressure = (P.friction_linear * velocity + P.friction_coulomb * np.tanh(velocity / 1e-3)) / P.piston_area
+    noisy_pressure = pressure + 5e3 * rng.standard_normal(count)
+    position = np.cumsum(velocity) * T + 1e-6 * rng.standard_normal(count)
+    return np.column_stack([speed + 0.05 * rng.standard_normal(count), position, noisy_pressure])
+
+
+@pytest.fixture(scope="module")
+def leaking() -> np.ndarray:
+    return _run(leak_from=90.0)
+
+
+def test_an_abrupt_leak_is_found_within_half_a_second_and_dated(leaking: np.ndarray) -> None:
+    events = Watch(P, T, learning=60.0).take(leaking)
+    ready, alarm, change = events
+    assert isinstance(ready, Ready)
+    assert isinstance(alarm, Alarm)
+    assert isinstance(change, Change)
+    assert ready.time == pytest.approx(60.0)
+    assert 90.0 < alarm.time < 90.5
+    assert alarm.interval[0] <= 90.0 <= alarm.interval[1]
+    assert change.lost is not None
+    assert change.lost[1] - change.lost[0] > 0.15
+
+
+@pytest.mark.parametrize("most", [1, 7, 25000])
+def test_events_do_not_depend_on_how_samples_are_cut(leaking: np.ndarray, most: int) -> None:
+    watch = Watch(P, T, learning=60.0)
+    pieces = [leaking[k : k + most] for k in range(0, len(leaking), most)]
+    assert [event for piece in pieces for event in watch.take(piece)] == Watch(P, T, learning=60.0).take(leaking)
+
+
+def test_healthy_running_raises_no_alarm_in_a_minute_and_a_half() -> None:
+    assert all(isinstance(event, Ready) for event in Watch(P, T, learning=60.0).take(_run(seconds=150.0, seed=3)))
+
+
+def test_without_pressure_motion_alone_finds_the_leak(leaking: np.ndarray) -> None:
+    blind = leaking.copy()
+    blind[:, 2] = 0.0
+    events = Watch(P, T, pressure=False, learning=60.0).take(blind)
+    (alarm,) = (event for event in events if isinstance(event, Alarm))
+    assert alarm.balance == "motion"
+    assert 90.0 < alarm.time < 90.5
+
+
+def test_missing_samples_and_rest_raise_no_alarm() -> None:
+    samples = _run(seconds=150.0, seed=4)
+    samples[35000:35100] = np.nan
+    samples[40000:50000] = [0.0, samples[40000, 1], 0.0]
+    samples[50000:, 1] += samples[40000, 1] - samples[50000, 1]
+    assert not [event for event in Watch(P, T, learning=60.0).take(samples) if isinstance(event, Alarm)]
+
+
+def test_an_interrupted_stream_is_learnt_again(leaking: np.ndarray) -> None:
+    watch = Watch(P, T, learning=60.0)
+    watch.take(leaking[:42000])
+    watch.interrupt()
+    watch.clock_reads(500.0)
+    assert watch.take(leaking[45000:]) == []
+    assert watch.last == pytest.approx(500.0 + T * (len(leaking) - 45000))
+
+
+def test_a_log_is_watched_like_its_samples(leaking: np.ndarray) -> None:
+    names = ("motor_speed_rad_s", "position_m", "differential_pressure_pa")
+    record = Record(T, dict(zip(names, leaking.T, strict=True)))
+    assert watch_record(record, P, learning=60.0) == Watch(P, T, learning=60.0).take(leaking)
+
+
+def test_the_threshold_of_exponential_peaks_is_passed_at_the_rate_asked_for() -> None:
+    rng, kernel, width = np.random.default_rng(1), watch_kernel(), 0.02
+    passed = []
+    for _ in range(1500):
+        levels = np.minimum((rng.exponential(0.7, 3000) / width).astype(int), 4095)
+        peaks = np.bincount(levels, minlength=4096).astype(np.float64)
+        level = kernel.threshold(peaks, 0.0, width, 0.3)
+        passed.append(3000.0 * np.exp(-level / 0.7))
+    assert np.mean(passed) == pytest.approx(0.3, rel=0.1)
+
+
+def test_the_threshold_is_higher_the_less_has_been_learnt() -> None:
+    kernel, once_in = watch_kernel(), 1e4
+    levels = {}
+    for count in (400, 40000):
+        heights = -0.7 * np.log((np.arange(count) + 0.5) / count)
+        peaks = np.bincount((heights / 0.02).astype(int), minlength=4096).astype(np.float64)
+        levels[count] = kernel.threshold(peaks, 0.0, 0.02, count / once_in)
+    assert levels[40000] == pytest.approx(0.7 * np.log(once_in), abs=0.02)
+    assert levels[400] > levels[40000] + 0.2
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"sample_time": 0.1}, "at least every"),
+        ({"sample_time": 0.0}, "at least every"),
+        ({"false_alarms": 0.0}, "false alarms must"),
+        ({"false_alarms": float("nan")}, "false alarms must"),
+        ({"learning": 10.0}, "learning must"),
+    ],
+)
+def test_what_cannot_be_watched_is_refused(changes: dict[str, float], said: str) -> None:
+    given = {"sample_time": T, **changes}
+    with pytest.raises(HydrostateError, match=said):
+        Watch(P, **given)

@@ -1,0 +1,40 @@
+"""What is pasted into a kernel file is the function as written, less what a kernel has no use for."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from plant.compiled.kernel_file import load_kernel
+from plant.compiled.paste import INLINED, bare_text, kernel_text, pasted
+
+LIMIT = 3.0
+
+
+def clipped(value: float, least: float = 0.0) -> float:
+    """Return a value within its limits."""
+    return max(least, min(value, LIMIT))  # the pasted text has neither comment nor docstring
+
+
+def total(values: NDArray[np.float64]) -> float:
+    result: float = 0.0
+    for value in values:
+        result += clipped(math.sqrt(value))
+    return result
+
+
+def test_annotations_docstrings_and_comments_stay_behind() -> None:
+    assert bare_text(clipped) == "def clipped(value, least=0.0):\n    return max(least, min(value, LIMIT))"
+
+
+def test_a_pasted_function_computes_what_the_function_does() -> None:
+    text = kernel_text("a sum", pasted(clipped, options=INLINED, constants={"LIMIT": LIMIT}), pasted(total))
+    values = np.array([0.5, 4.0, 16.0])
+    assert load_kernel("pasted_sum", text).total(values) == total(values)
+
+
+def test_only_what_def_defines_can_be_pasted() -> None:
+    with pytest.raises(TypeError, match="written with def"):
+        pasted(Path)

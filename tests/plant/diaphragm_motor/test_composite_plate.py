@@ -1,0 +1,72 @@
+"""The diaphragm as a composite plate: exact limits, independent finite-element figures, the plant's own numbers."""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+
+from plant.diaphragm_motor.composite_plate import (
+    PlateParameters,
+    clamped_plate_roots,
+    mode_shape,
+    plate_coefficients,
+    plate_modes,
+)
+from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
+from plant.errors import RigError
+
+PLATE = PlateParameters()
+
+
+def test_the_motors_coefficients_are_those_of_table_1s_plate() -> None:
+    found, motor = plate_coefficients(PLATE), DiaphragmMotorParameters()
+    wanted = (motor.diaphragm_compliance, motor.volume_a_volt, motor.deflection_a_pascal, motor.deflection_a_volt)
+    np.testing.assert_allclose(found, wanted, rtol=1e-3)
+
+
+def test_bare_brass_is_the_textbooks_plate() -> None:
+    bare = replace(PLATE, ceramic_thickness=0.0, clamp_radius=20.5e-3)
+    bend = bare.brass_modulus * bare.brass_thickness**3 / (12.0 * (1.0 - bare.poisson_ratio**2))
+    found = plate_coefficients(bare)
+    assert found.compliance == pytest.approx(pi * bare.clamp_radius**6 / (192.0 * bend), rel=1e-9)
+    assert found.deflection_a_pascal == pytest.approx(bare.clamp_radius**4 / (64.0 * bend), rel=1e-9)
+    assert found.volume_a_volt == found.deflection_a_volt == 0.0
+
+
+def test_a_plate_of_one_stuff_throughout_does_not_see_its_joint() -> None:
+    """Ceramic to next to the rim, as stiff as the brass: a uniform plate of both thicknesses."""
+    same = replace(PLATE, ceramic_compliance=1.0 / PLATE.brass_modulus, ceramic_radius=PLATE.clamp_radius * (1 - 1e-9))
+    bend = same.brass_modulus * same.thickness**3 / (12.0 * (1.0 - same.poisson_ratio**2))
+    assert plate_coefficients(same).compliance == pytest.approx(pi * same.clamp_radius**6 / (192.0 * bend), rel=1e-6)
+
+
+def test_the_whole_blank_bends_as_the_errata_say_equation_14_should() -> None:
+    blank = replace(PLATE, clamp_radius=20.5e-3, charge_constant=171e-12)
+    assert plate_coefficients(blank).deflection_a_volt == pytest.approx(0.150e-6, rel=5e-3)
+
+
+def test_the_roots_are_those_of_a_clamped_plate() -> None:
+    modes = clamped_plate_roots(6)
+    np.testing.assert_allclose([root for *_, root in modes], [10.216, 21.26, 34.88, 39.77, 51.03, 60.83], rtol=2e-4)
+    assert [mode[:2] for mode in modes] == [(0, 0), (1, 0), (2, 0), (0, 1), (3, 0), (1, 1)]
+
+
+def test_the_first_dry_mode_is_far_above_the_drive() -> None:
+    """A finite-element model of the same plate, made apart from this one, has it at 3983 Hz."""
+    assert plate_modes(PLATE)[0].frequency == pytest.approx(3983.0, rel=0.01)
+
+
+def test_a_modes_shape_is_held_and_level_at_the_rim() -> None:
+    for mode in plate_modes(PLATE):
+        rim = mode_shape(mode, np.array([1.0 - 1e-4, 1.0]), np.zeros(2))
+        assert rim == pytest.approx([0.0, 0.0], abs=1e-6)
+        inside = mode_shape(mode, np.linspace(0.0, 1.0, 401), np.zeros(401))
+        assert np.max(np.abs(inside)) == pytest.approx(1.0)
+        assert np.count_nonzero(np.diff(np.sign(inside[1:-1]))) == mode.circles
+
+
+@pytest.mark.parametrize(("name", "value"), [("brass_thickness", 0.0), ("ceramic_radius", 0.02)])
+def test_an_impossible_plate_is_refused(name: str, value: float) -> None:
+    with pytest.raises(RigError, match=f"{name} must"):
+        PlateParameters(**{name: value})

@@ -1,0 +1,119 @@
+import pickle
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig, read_rig, rig_template, write_rig_template
+from plant.errors import RigError
+from plant.units import notes
+
+
+def rig_of(tmp_path: Path, text: str) -> Rig:
+    path = tmp_path / "rig.toml"
+    path.write_text(text)
+    return read_rig(path)
+
+
+def test_the_template_gives_the_papers_parameters_exactly(tmp_path: Path) -> None:
+    rig = rig_of(tmp_path, rig_template())
+    assert rig.parameters == EhaParameters()
+    assert rig.name == "paper"
+    assert dict(rig.uncertainties) == {}
+    assert dict(rig.columns) == {}
+
+
+def test_every_parameter_of_the_template_has_its_unit_meaning_and_source() -> None:
+    lines = rig_template().splitlines()
+    for name, note in notes(EhaParameters).items():
+        row = next(index for index, line in enumerate(lines) if line.startswith(f"{name} = "))
+        assert all(part in lines[row - 1] for part in (f"[{note.unit}]", note.meaning, note.source))
+
+
+def test_the_commented_examples_of_the_template_are_valid(tmp_path: Path) -> None:
+    start = rig_template().index("[uncertainty]")
+    examples = [line for line in rig_template()[start:].splitlines() if "channel = " not in line]
+    live = "\n".join(line.removeprefix("# ") if " = " in line else line for line in examples)
+    rig = rig_of(tmp_path, live)
+    assert rig.uncertainties["bulk_modulus"] == 0.3
+    assert rig.columns["position_m"] == "POS_MM:mm"
+    assert len(rig.columns) == 8
+
+
+def test_a_rig_of_ones_own_keeps_what_it_says_and_the_papers_rest(tmp_path: Path) -> None:
+    rig = rig_of(
+        tmp_path,
+        'name = "bench 2"\n[parameters]\npiston_area = 3.04e-3\nflow_bias = 0\n'
+        '[uncertainty]\nbulk_modulus = 0.3\n[columns]\nposition_m = "POS_MM:mm"\n',
+    )
+    assert rig.name == "bench 2"
+    assert rig.parameters == EhaParameters(piston_area=3.04e-3, flow_bias=0.0)
+    assert dict(rig.uncertainties) == {"bulk_modulus": 0.3}
+    assert dict(rig.columns) == {"position_m": "POS_MM:mm"}
+
+
+@pytest.mark.parametrize("field", [field.name for field in fields(EhaParameters)])
+def test_every_parameter_refuses_text(tmp_path: Path, field: str) -> None:
+    with pytest.raises(RigError, match=rf"parameters\.{field} must be a valid number, got 'big'"):
+        rig_of(tmp_path, f'[parameters]\n{field} = "big"\n')
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "[parameters]\npiston_aera = 1.0",
+            r"parameters\.piston_aera is unknown, did you mean 'piston_area'",
+        ),
+        ("[parametres]\npiston_area = 1.0", r"parametres is unknown, did you mean 'parameters'\?"),
+        (
+            "[uncertainty]\nbulk_modulos = 0.3",
+            r"did you mean 'bulk_modulus'",
+        ),
+        ("[uncertainty]\nbulk_modulus = -0.3", r"uncertainty\.bulk_modulus must be 0 or more"),
+        ("[uncertainty]\nbulk_modulus = nan", r"uncertainty\.bulk_modulus must be 0 or more"),
+        ("[parameters]\npiston_area = -1.0", r"piston_area must be positive, got -1\.0"),
+        ("[parameters]\npiston_area = inf", r"piston_area must be a finite number"),
+        ("[parameters]\npiston_area = true", r"parameters\.piston_area must be a valid number, got True"),
+        ("parameters = 3", r"parameters must be a valid dictionary, got 3"),
+        ("name = 3", r"name must be a valid string, got 3"),
+        ('[columns]\nposition = "P"', r"channel 'position' is unknown, did you mean 'position_m'"),
+        ('[columns]\nposition_m = "P:bar"', r"unit 'bar' does not convert to 'm'"),
+        ("[columns]\nposition_m = 3", r"columns\.position_m must be a valid string, got 3"),
+        ("[parameters", r"a TOML file is wanted"),
+        ("a = 1\na = 2", r"a TOML file is wanted"),
+    ],
+)
+def test_what_a_rig_cannot_hold_is_refused_with_file_and_field(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(RigError, match=message) as caught:
+        rig_of(tmp_path, text)
+    assert str(caught.value).startswith(str(tmp_path / "rig.toml"))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_rig_that_is_not_there_or_no_text_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RigError, match="cannot be read: No such file"):
+        read_rig(tmp_path / "rig.toml")
+    with pytest.raises(RigError, match="cannot be read: Is a directory"):
+        read_rig(tmp_path)
+    (tmp_path / "rig.toml").write_bytes(b"\xff\xfe\x00\x01")
+    with pytest.raises(RigError, match="TOML"):
+        read_rig(tmp_path / "rig.toml")
+
+
+def test_the_template_is_written_once_and_never_over_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    write_rig_template(path)
+    assert read_rig(path).parameters == EhaParameters()
+    path.write_text("mine")
+    with pytest.raises(RigError, match="not overwritten"):
+        write_rig_template(path)
+    assert path.read_text() == "mine"
+    with pytest.raises(RigError, match="cannot be written: No such file"):
+        write_rig_template(tmp_path / "nowhere" / "rig.toml")
+
+
+def test_a_rig_survives_pickling() -> None:
+    rig = Rig("bench 2", EhaParameters(stroke=0.1), {"bulk_modulus": 0.3}, {"position_m": "P:mm"})
+    assert pickle.loads(pickle.dumps(rig)) == rig  # noqa: S301 (our own bytes)

@@ -1,0 +1,211 @@
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from plant.errors import LogError
+from plant.log.checks import Checked, Clock, trusted
+from plant.log.notes import LogCode
+
+Values = NDArray[np.float64]
+N = 1000
+TIME = 1e-3 * np.arange(N)
+SPEED = 100.0 * np.sin(2.0 * np.pi * 2.0 * TIME)
+VELOCITY = 0.03 * np.sin(2.0 * np.pi * 2.0 * TIME)
+
+
+def check(time: Values = TIME, **changes: Values) -> Checked:
+    log = {"time_s": time, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY, **changes}
+    return trusted(log, source="a.csv")
+
+
+def with_gaps(values: Values, *rows: int) -> Values:
+    out = values.copy()
+    out[list(rows)] = np.nan
+    return out
+
+
+def test_a_clean_log_passes_without_a_note_and_unchanged() -> None:
+    checked = check()
+    assert checked.notes == ()
+    assert checked.sample_time == pytest.approx(1e-3, rel=1e-12)
+    np.testing.assert_array_equal(checked.channels["velocity_m_s"], VELOCITY)
+
+
+@pytest.mark.parametrize("digits", [6, 9])
+def test_times_rounded_when_printed_pass_silently(digits: int) -> None:
+    time = np.array([float(f"{t:.{digits}g}") for t in 0.5 + TIME / 2])
+    assert check(time).notes == ()
+
+
+def test_times_since_the_epoch_pass_silently() -> None:
+    checked = check(1.7e9 + TIME)
+    assert checked.notes == ()
+    assert checked.sample_time == pytest.approx(1e-3, rel=1e-6)
+
+
+def test_the_sample_time_is_the_mean_of_rounded_steps() -> None:
+    time = np.round(np.arange(N) / 3000.0, 6)
+    assert check(time).sample_time == pytest.approx(1.0 / 3000.0, rel=1e-6)
+
+
+def test_jitter_within_one_percent_is_resampled_with_a_note() -> None:
+    rng = np.random.default_rng(1)
+    time = TIME + 1e-3 * np.concatenate(([0.0], rng.uniform(-0.0045, 0.0045, N - 2), [0.0]))
+    phase = 2.0 * np.pi * 2.0
+    checked = check(time, velocity_m_s=0.03 * np.sin(phase * time))
+    assert [note.code for note in checked.notes] == [LogCode.TIME_JITTERS]
+    assert checked.notes[0].data["percent"] < 0.9
+    even = checked.start_time + checked.sample_time * np.arange(N)
+    np.testing.assert_allclose(checked.channels["velocity_m_s"], 0.03 * np.sin(phase * even), atol=2e-8)
+
+
+def test_jitter_of_exactly_one_percent_is_accepted() -> None:
+    time = TIME.copy()
+    time[700] += 0.01 * 1e-3
+    (note,) = check(time).notes
+    assert note.code == LogCode.TIME_JITTERS
+    assert note.data["percent"] == pytest.approx(1.0, rel=1e-6)
+    assert str(note) == "time_s jitters by 1 % of 0.001 s; resampled"
+
+
+@pytest.mark.parametrize("shift", [0.011, 0.3])
+def test_jitter_beyond_one_percent_is_refused_with_its_rows(shift: float) -> None:
+    time = TIME.copy()
+    time[700] += shift * 1e-3
+    with pytest.raises(LogError, match=r"uniform within 1 %.*from row 70[01] to 70[12]"):
+        check(time)
+
+
+def test_a_missing_sample_stays_missing_through_resampling() -> None:
+    time = TIME.copy()
+    time[1::2] += 5e-6
+    checked = check(time, velocity_m_s=with_gaps(VELOCITY, 10, 11, 500))
+    assert np.flatnonzero(np.isnan(checked.channels["velocity_m_s"])).tolist() == [10, 11, 500]
+
+
+@pytest.mark.parametrize("time", [np.zeros(N), TIME[::-1], np.repeat(TIME[::2], 2)])
+def test_time_that_does_not_increase_is_refused(time: Values) -> None:
+    with pytest.raises(LogError, match="must increase"):
+        check(time)
+
+
+def test_a_duplicated_row_is_named() -> None:
+    time = TIME.copy()
+    time[41] = time[40]
+    with pytest.raises(LogError, match=r"time_s must increase, got 0\.04 in row 42 after 0\.04"):
+        check(time)
+
+
+def test_whole_samples_left_out_become_missing_samples_in_place() -> None:
+    keep = np.ones(N, dtype=bool)
+    keep[[100, 101, 600]] = False
+    checked = trusted(
+        {"time_s": TIME[keep], "motor_speed_rad_s": SPEED[keep], "velocity_m_s": VELOCITY[keep]},
+        source="a.csv",
+    )
+    velocity = checked.channels["velocity_m_s"]
+    assert np.flatnonzero(np.isnan(velocity)).tolist() == [100, 101, 600]
+    np.testing.assert_array_equal(velocity[keep], VELOCITY[keep])
+    assert [(note.code, note.data["channel"], note.data["count"], note.data["total"]) for note in checked.notes] == [
+        (LogCode.SAMPLES_MASKED, "motor_speed_rad_s", 3, 1000),
+        (LogCode.SAMPLES_MASKED, "velocity_m_s", 3, 1000),
+    ]
+    assert str(checked.notes[0]) == "motor_speed_rad_s is missing in 3 of 1000 samples (0.3 %); they are masked"
+
+
+def test_more_than_five_percent_left_out_is_refused() -> None:
+    keep = np.ones(N, dtype=bool)
+    keep[100:151] = False
+    log = {"time_s": TIME[keep], "motor_speed_rad_s": SPEED[keep], "velocity_m_s": VELOCITY[keep]}
+    with pytest.raises(LogError, match="leaves out 51 of 1000 samples"):
+        trusted(log, source="a.csv")
+
+
+def every_tenth(values: Values, first: int) -> Values:
+    slow = np.full(len(values), np.nan)
+    slow[first::10] = values[first::10]
+    return slow
+
+
+def test_a_channel_that_is_logged_every_tenth_row_is_kept_with_a_note() -> None:
+    checked = check(motor_speed_rad_s=every_tenth(SPEED, 0), differential_pressure_pa=every_tenth(1e6 * VELOCITY, 3))
+    assert [(note.code, dict(note.data)) for note in checked.notes] == [
+        (LogCode.CHANNEL_SLOWER, {"channel": "motor_speed_rad_s", "rows": 10}),
+        (LogCode.CHANNEL_SLOWER, {"channel": "differential_pressure_pa", "rows": 10}),
+    ]
+    assert np.count_nonzero(np.isfinite(checked.channels["differential_pressure_pa"])) == N // 10
+
+
+def test_a_channel_of_which_nine_tenths_are_lost_at_random_is_left_out() -> None:
+    lost = np.where(np.random.default_rng(1).random(N) < 0.9, np.nan, 1e5)
+    checked = check(differential_pressure_pa=lost)
+    assert "differential_pressure_pa" not in checked.channels
+    assert checked.notes[0].code == LogCode.CHANNEL_LEFT_OUT
+    assert checked.notes[0].data["channel"] == "differential_pressure_pa"
+    assert checked.notes[0].data["count"] == np.count_nonzero(np.isnan(lost))
+
+
+def test_channels_with_times_of_their_own_are_put_on_the_clock_of_the_fastest() -> None:
+    when = TIME[5::10] + 3.7e-4
+    rows = np.argsort(np.concatenate([TIME, when]), kind="stable")
+    none, nothing = np.full(len(when), np.nan), np.full(N, np.nan)
+    ramp = 1e5 + 1e6 * when
+    log = {
+        "time_s": np.concatenate([TIME, when]),
+        "motor_speed_rad_s": np.concatenate([SPEED, none]),
+        "velocity_m_s": np.concatenate([VELOCITY, none]),
+        "differential_pressure_pa": np.concatenate([nothing, ramp]),
+    }
+    checked = trusted({name: values[rows] for name, values in log.items()}, source="a.csv")
+    pressure = checked.channels["differential_pressure_pa"]
+    np.testing.assert_array_equal(checked.channels["velocity_m_s"], VELOCITY)
+    assert np.flatnonzero(np.isfinite(pressure)).tolist() == list(range(5, N, 10))
+    np.testing.assert_allclose(pressure[15:-10:10], 1e5 + 1e6 * TIME[15:-10:10], rtol=1e-12)
+    assert checked.notes[0].code == LogCode.TIMES_OF_THEIR_OWN
+    assert checked.notes[0].data["channel"] == "motor_speed_rad_s"
+    assert checked.notes[0].data["sample_time_s"] == pytest.approx(1e-3, rel=1e-9)
+
+
+def test_uneven_times_of_whole_rows_are_refused_though_a_sample_is_missing() -> None:
+    time = TIME.copy()
+    time[500:] += 4e-4
+    with pytest.raises(LogError, match="must be uniform within 1 %"):
+        check(time, motor_speed_rad_s=with_gaps(SPEED, 3), velocity_m_s=with_gaps(VELOCITY, 7))
+
+
+@pytest.mark.parametrize("count", [0, 1, 9])
+def test_fewer_than_ten_samples_are_refused(count: int) -> None:
+    part = {"time_s": TIME, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY}
+    with pytest.raises(LogError, match=f"at least 10 samples are wanted, got {count}"):
+        trusted({name: values[:count] for name, values in part.items()}, source="a.csv")
+
+
+@pytest.mark.parametrize("lost", ["time_s", "motor_speed_rad_s"])
+def test_a_missing_required_column_is_named(lost: str) -> None:
+    log = {"time_s": TIME, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY}
+    del log[lost]
+    with pytest.raises(LogError, match=rf"a\.csv: column {lost} is missing, the log has"):
+        trusted(log, source="a.csv")
+
+
+def test_position_or_velocity_is_wanted() -> None:
+    with pytest.raises(LogError, match="position_m or velocity_m_s is missing"):
+        trusted({"time_s": TIME, "motor_speed_rad_s": SPEED}, source="a.csv")
+
+
+def test_differential_pressure_is_derived_from_both_port_pressures() -> None:
+    a, b = 2e6 + 1e4 * SPEED, 1e6 - 1e4 * SPEED
+    checked = check(pressure_a_pa=a, pressure_b_pa=b)
+    np.testing.assert_array_equal(checked.channels["differential_pressure_pa"], a - b)
+    measured = 2.1e4 * SPEED
+    kept = check(pressure_a_pa=a, pressure_b_pa=b, differential_pressure_pa=measured)
+    np.testing.assert_array_equal(kept.channels["differential_pressure_pa"], measured)
+    assert "differential_pressure_pa" not in check(pressure_a_pa=a).channels
+
+
+def test_the_clock_of_the_writer_is_used_only_where_the_times_agree_with_it() -> None:
+    log = {"time_s": 0.1 + TIME, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY}
+    same = trusted(log, source="a.csv", clock=Clock(1e-3, 0.1))
+    assert (same.sample_time, same.start_time) == (1e-3, 0.1)
+    other = trusted(log, source="a.csv", clock=Clock(2e-3, 0.1))
+    assert other.sample_time == pytest.approx(1e-3, rel=1e-9)

@@ -1,0 +1,124 @@
+import pytest
+
+from plant.errors import LogError, RigError
+from plant.log.columns import parse_columns, resolve_columns
+
+
+def channels(*names: str, **mapping: str) -> dict[str, str]:
+    return {column.channel: column.name for column in resolve_columns(names, mapping, "a.csv")}
+
+
+@pytest.mark.parametrize(
+    ("name", "channel", "factor"),
+    [
+        ("motor_speed_rpm", "motor_speed_rad_s", 0.10471975511965977),
+        ("motor_speed_rev_min", "motor_speed_rad_s", 0.10471975511965977),
+        ("motor_speed_rev_per_s", "motor_speed_rad_s", 6.283185307179586),
+        ("motor_speed_deg_s", "motor_speed_rad_s", 0.017453292519943295),
+        ("position_mm", "position_m", 1e-3),
+        ("position_um", "position_m", 1e-6),
+        ("velocity_mm_s", "velocity_m_s", 1e-3),
+        ("differential_pressure_bar", "differential_pressure_pa", 1e5),
+        ("differential_pressure_psi", "differential_pressure_pa", 6894.757293168361),
+        ("differential_pressure_MPa", "differential_pressure_pa", 1e6),
+        ("differential_pressure_kpa", "differential_pressure_pa", 1e3),
+        ("pressure_a_bar", "pressure_a_pa", 1e5),
+        ("pressure_b_kgf_cm2", "pressure_b_pa", 98066.5),
+        ("motor_voltage_mv", "motor_voltage_v", 1e-3),
+        ("time_ms", "time_s", 1e-3),
+        ("time_us", "time_s", 1e-6),
+    ],
+)
+def test_a_unit_suffix_converts_to_the_channel(name: str, channel: str, factor: float) -> None:
+    (column,) = resolve_columns([name], None, "a.csv")
+    assert (column.channel, column.offset) == (channel, 0.0)
+    assert column.factor == pytest.approx(factor, rel=1e-14)
+
+
+def test_spaces_and_a_byte_order_mark_around_a_name_are_tolerated() -> None:
+    assert channels("\ufefftime_s", " position_m ", "\tvelocity_mm_s") == {
+        "time_s": "time_s",
+        "position_m": "position_m",
+        "velocity_m_s": "velocity_mm_s",
+    }
+
+
+def test_unknown_columns_are_ignored_and_simulated_truth_is_kept() -> None:
+    assert list(channels("time_s", "note", "temperature_degc", "true_bulk_modulus_pa")) == [
+        "time_s",
+        "true_bulk_modulus_pa",
+    ]
+
+
+def test_an_unknown_unit_names_file_column_wanted_and_got() -> None:
+    with pytest.raises(LogError, match=r"a\.csv: column 'position_xyz' cannot become position_m: unit 'xyz'"):
+        channels("time_s", "position_xyz")
+
+
+def test_a_unit_of_something_else_is_refused() -> None:
+    with pytest.raises(LogError, match=r"'position_bar'.*does not convert to 'm'"):
+        channels("position_bar")
+
+
+def test_a_setpoint_beside_its_channel_is_no_second_channel() -> None:
+    assert channels("position_setpoint_mm", "position_m")["position_m"] == "position_m"
+
+
+def test_two_columns_for_one_channel_are_refused_and_a_mapping_settles_it() -> None:
+    with pytest.raises(LogError, match="'position_m' and 'position_mm' both give position_m"):
+        channels("position_m", "position_mm")
+    with pytest.raises(LogError, match="both give position_m"):
+        channels("position_m", "position_m")
+    assert channels("position_m", "position_mm", position_m="position_mm:mm") == {"position_m": "position_mm"}
+
+
+def test_foreign_names_take_their_unit_from_the_mapping_or_are_si() -> None:
+    columns = resolve_columns(["POS_MM", "V"], {"position_m": "POS_MM:mm", "velocity_m_s": "V"}, "a.csv")
+    assert [(c.channel, c.position) for c in columns] == [("position_m", 0), ("velocity_m_s", 1)]
+    assert [c.factor for c in columns] == [pytest.approx(1e-3), 1.0]
+
+
+def test_a_foreign_name_may_hold_a_colon() -> None:
+    assert channels("axis:position", position_m="axis:position") == {"position_m": "axis:position"}
+    assert channels("axis:position", position_m="axis:position:mm") == {"position_m": "axis:position"}
+
+
+@pytest.mark.parametrize(
+    ("mapping", "message"),
+    [
+        ({"position_m": "POS:mm"}, "column 'POS' is wanted for position_m, the log has 'X', 'X', 'Y'"),
+        ({"position_m": "X:mm"}, "wanted once for position_m, the log has it 2 times"),
+        ({"position_m": "Y:bar"}, "column 'Y' cannot become position_m: unit 'bar'"),
+        ({"positon_m": "Y"}, "channel 'positon_m' is unknown, did you mean 'position_m'"),
+    ],
+)
+def test_a_mapping_that_does_not_fit_the_log_is_refused(mapping: dict[str, str], message: str) -> None:
+    with pytest.raises(LogError, match=message):
+        resolve_columns(["X", "X", "Y"], mapping, "a.csv")
+
+
+def test_command_line_columns_are_parsed() -> None:
+    assert parse_columns(["position_m=POS_MM:mm", " velocity_m_s = V ", "time_s=T=1:ms"]) == {
+        "position_m": "POS_MM:mm",
+        "velocity_m_s": "V",
+        "time_s": "T=1:ms",
+    }
+
+
+@pytest.mark.parametrize(
+    ("texts", "message"),
+    [
+        (["POS_MM:mm"], "CHANNEL=NAME:UNIT"),
+        (["position_m="], "CHANNEL=NAME:UNIT"),
+        (["=POS"], "CHANNEL=NAME:UNIT"),
+        (["position_m=:mm"], "wants a column"),
+        (["position_m=A", "position_m=B"], "wanted once"),
+        (["position=A"], "did you mean 'position_m'"),
+        (["position_m=A:bar"], "does not convert to 'm'"),
+        (["position_m=A:"], "unit ''"),
+        (["motor_speed_rad_s=N:Hz"], "leaves the angle out"),
+    ],
+)
+def test_a_command_line_column_of_another_shape_is_refused(texts: list[str], message: str) -> None:
+    with pytest.raises(RigError, match=message):
+        parse_columns(texts)

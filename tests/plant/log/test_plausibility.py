@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+
+from plant.log.notes import LogCode
+from plant.log.plausibility import implausible
+
+T = 1e-3
+TIME = T * np.arange(4000)
+RNG = np.random.default_rng(5)
+SPEED = 120.0 * np.sin(2.0 * np.pi * TIME) + 0.05 * RNG.standard_normal(len(TIME))
+TRUE_VELOCITY = 0.04 * np.sin(2.0 * np.pi * TIME)
+LOG = {
+    "motor_speed_rad_s": SPEED,
+    "position_m": np.round(np.cumsum(TRUE_VELOCITY) * T, 6),
+    "velocity_m_s": TRUE_VELOCITY + 1e-3 * RNG.standard_normal(len(TIME)),
+    "differential_pressure_pa": 3e5 * np.sin(2.0 * np.pi * TIME),
+    "pressure_a_pa": 1e6 + 2e5 * np.sin(2.0 * np.pi * TIME),
+    "pressure_b_pa": 1e6 - 2e5 * np.sin(2.0 * np.pi * TIME),
+    "motor_voltage_v": 4.0 * np.sin(2.0 * np.pi * TIME),
+}
+OUT_OF_RANGE = {LogCode.CHANNEL_LARGE, LogCode.CHANNEL_SMALL}
+AT_ODDS = {LogCode.POSITION_AND_VELOCITY_UNITS, LogCode.TRAVEL_UNITS}
+
+
+def test_a_plausible_log_gives_no_note() -> None:
+    assert implausible(T, LOG) == []
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+@pytest.mark.parametrize("name", list(LOG))
+def test_a_channel_wrong_by_a_thousand_is_noticed(name: str, factor: float) -> None:
+    notes = implausible(T, {**LOG, name: factor * LOG[name]})
+    assert notes
+    assert {note.code for note in notes} <= OUT_OF_RANGE | AT_ODDS
+    assert all(note.data["channel"] == name for note in notes if note.code in OUT_OF_RANGE)
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+@pytest.mark.parametrize("name", ["position_m", "velocity_m_s"])
+def test_a_slip_is_noticed_without_the_other_of_position_and_velocity(name: str, factor: float) -> None:
+    slipped = {"motor_speed_rad_s": SPEED, name: factor * LOG[name]}
+    (note,) = implausible(T, slipped)
+    assert note.code in OUT_OF_RANGE | {LogCode.TRAVEL_UNITS}
+    assert note.data["channel"] == name
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+def test_a_sample_time_wrong_by_a_thousand_is_noticed(factor: float) -> None:
+    (note,) = implausible(factor * T, LOG)
+    assert note.code == (LogCode.SAMPLE_TIME_LONG if factor > 1.0 else LogCode.SAMPLE_TIME_SHORT)
+    assert note.data["sample_time_s"] == factor * T
+
+
+@pytest.mark.parametrize("factor", [50.0, 0.02])
+def test_a_sample_time_within_bounds_that_contradicts_the_motion_is_noticed(factor: float) -> None:
+    (note,) = implausible(factor * T, LOG)
+    assert note.code == LogCode.POSITION_AND_VELOCITY_UNITS
+    assert note.data["ratio"] == pytest.approx(1.0 / factor, rel=0.02)
+
+
+def test_a_note_says_what_was_seen_and_which_slip_explains_it() -> None:
+    (note,) = implausible(T, {**LOG, "position_m": 1e3 * LOG["position_m"]})
+    assert note.code == LogCode.CHANNEL_LARGE
+    assert (note.data["channel"], note.data["limit"]) == ("position_m", 5.0)
+    assert note.data["size"] == pytest.approx(12.73, abs=0.01)
+    assert str(note) == "position_m spans 12.7 m, at most 5 is usual; looks like mm read as m"
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_sensor_noise_on_a_stuck_piston_is_no_slip_of_units(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    position = np.round(2e-7 * rng.standard_normal(len(TIME)) + 3e-7, 6)
+    noisy = 1e-3 * rng.standard_normal(len(TIME)) + 2e-4
+    for velocity in (noisy, np.gradient(position, T)):
+        stuck = {**LOG, "position_m": position, "velocity_m_s": velocity}
+        assert implausible(T, stuck) == []
+
+
+def test_a_finely_resolved_stuck_piston_is_no_slip_of_units() -> None:
+    position = 1e-8 * np.random.default_rng(2).standard_normal(len(TIME))
+    assert implausible(T, {"motor_speed_rad_s": SPEED, "position_m": position}) == []
+
+
+def test_a_log_in_which_nothing_moves_says_so() -> None:
+    still = np.zeros(len(TIME))
+    (note,) = implausible(T, {**LOG, "position_m": still, "velocity_m_s": still})
+    assert note.code == LogCode.NOTHING_MOVES
+    assert note.data["channels"] == "position_m and velocity_m_s"
+    (note,) = implausible(T, {**LOG, "motor_speed_rad_s": still})
+    assert note.code == LogCode.SPEED_CONSTANT
+
+
+def test_missing_samples_do_not_hide_a_slip() -> None:
+    position = 1e3 * LOG["position_m"] / 4.0
+    position[100:150] = np.nan
+    (note,) = implausible(T, {**LOG, "position_m": position})
+    assert note.code == LogCode.POSITION_AND_VELOCITY_UNITS
+    assert note.data["ratio"] == pytest.approx(250.0, rel=0.02)

@@ -1,0 +1,152 @@
+"""The loops that kernels are pasted from give in plain Python what the kernels give."""
+
+import ctypes
+import inspect
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import FunctionType, ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from plant.compiled import vector
+from plant.compiled.functions import Scalar, absolute
+from plant.solvers.adaptive_kernel import compile_adaptive
+from plant.solvers.adaptive_loop import growth, run_controlled, smooth, within
+from plant.solvers.fixed_step_kernel import compile_fixed_step
+from plant.solvers.fixed_step_loops import run_alone, run_side_by_side
+from plant.solvers.steps import rk4_step
+from plant.solvers.trajectory import compile_trajectory
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Damper:
+    mass: float = 2.0
+    stiffness: float = 50.0
+    quadratic: float = 3.0
+
+
+def rates(state: tuple[Scalar, Scalar], force: Scalar, p: Any) -> tuple[Scalar, Scalar]:
+    x, v = state
+    return v, (force - p.stiffness * x - p.quadratic * absolute(v) * v) / p.mass
+
+
+DRIVE = np.concatenate([np.zeros(5), np.full(20, 30.0), np.linspace(30.0, -20.0, 15)])
+ROWS = np.array([[2.0 + 0.1 * lane, 50.0, 3.0] for lane in range(8)])
+STARTS = np.linspace(0.0, 0.1, 16).reshape(2, 8)
+T = 0.02
+
+
+def file_of(run: Callable[..., Any]) -> ModuleType:
+    return sys.modules[run.__module__]
+
+
+def in_python(lines: FunctionType) -> Callable[..., Any]:
+    """Lines of a kernel, on floats."""
+    by_hand = {"fma": lambda a, b, c: a * b + c, "ratios": lambda a, b: [x / y for x, y in zip(a, b, strict=True)]}
+    return FunctionType(lines.__code__, {**vars(vector), **by_hand})
+
+
+def on_memory(file: ModuleType, lines: FunctionType) -> Callable[[int, float], None]:
+    """Lines of a kernel as an operation on numbers in memory, one at a time."""
+    names, computed = inspect.signature(lines).parameters, in_python(lines)
+
+    def operation(address: int, j: float) -> None:
+        def at(name: str) -> ctypes.c_double:
+            return ctypes.c_double.from_address(address + 8 * file.SLOTS[name])
+
+        for name, value in computed(*(j if name == "j" else at(name).value for name in names)).items():
+            if name in file.SLOTS:
+                at(name).value = value
+
+    return operation
+
+
+def kernel_in_python(file: ModuleType, *names: str, **others: Any) -> Any:
+    sizes = {name: getattr(file, name) for name in ("LANES", "WIDTH", "COLUMNS", "NUMBERS") if hasattr(file, name)}
+    operations = {f"{name}_at": on_memory(file, getattr(file, name)) for name in names}
+    return SimpleNamespace(**sizes, **operations, VECTOR=1, **others)
+
+
+@pytest.mark.parametrize("rows", [1, 40], ids=["constant", "changing"])
+def test_one_run(rows: int) -> None:
+    run = compile_trajectory("damper", rk4_step(rates), 2, Damper)
+    file, width = file_of(run), 2
+    step = in_python(file.step)
+
+    def advance(numbers: tuple[float, ...], address: int) -> tuple[float, ...]:
+        given = dict(zip(("x0", "x1", "u_start", "u_end"), numbers, strict=True))
+        memory = (ctypes.c_double * file.NUMBERS).from_address(address)
+        names = inspect.signature(file.step).parameters
+        return tuple(step(*(given[n] if n in given else memory[file.SLOTS[n]] for n in names)).values())
+
+    def store(state: tuple[float, ...], address: int) -> None:
+        (ctypes.c_double * width).from_address(address)[:] = state
+
+    plain = kernel_in_python(
+        file,
+        "settle",
+        load=lambda address: tuple((ctypes.c_double * width).from_address(address)),
+        store=store,
+        advance=advance,
+    )
+    parameters = np.repeat(ROWS[:1], rows, 0)
+    parameters[rows // 2 :, 1] = 60.0
+    given = STARTS[:, 1], DRIVE, parameters, T, 3
+    np.testing.assert_array_equal(run_alone(plain, *given), run(*given))
+
+
+def test_runs_side_by_side() -> None:
+    run = compile_fixed_step("damper", rk4_step(rates), 2, Damper, 8)
+    plain = kernel_in_python(file_of(run), "settle", "step")
+    drives = np.ascontiguousarray(np.outer(DRIVE, np.linspace(0.5, 1.5, 8)))
+    found, wanted = np.empty((len(DRIVE), 2, 5)), np.empty((len(DRIVE), 2, 5))
+    run_side_by_side(plain, STARTS, drives, ROWS, T, 3, found)
+    run(STARTS, drives, ROWS, T, 3, wanted)
+    np.testing.assert_allclose(found, wanted, rtol=1e-11, atol=1e-14)
+
+
+@pytest.mark.parametrize(("lanes", "kept", "rows"), [(1, 1, 1), (8, 8, 1), (8, 3, 40)])
+def test_steps_of_controlled_error(lanes: int, kept: int, rows: int) -> None:
+    run = compile_adaptive("damper", rates, 2, Damper, lanes)
+
+    def move(source: int, target: int) -> None:
+        ctypes.memmove(target, source, 8 * lanes)
+
+    plain = kernel_in_python(file_of(run), "settle", "stages", "between", move=move)
+    parameters = np.repeat(ROWS[None, :lanes], rows, 0)
+    parameters[rows // 2 :, :, 1] = 60.0
+    starts = np.ascontiguousarray(STARTS[:, :lanes])
+    given = starts, DRIVE, parameters, T, np.array([1e3, 1e2]), 1e-3, 20.0, 1e-3
+    found, wanted = np.empty((len(DRIVE), 2, kept)), np.empty((len(DRIVE), 2, kept))
+    run_controlled(plain, *given, found)
+    run(*given, wanted)
+    np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-12)
+
+
+def test_a_drive_is_smooth_as_far_as_one_parabola_follows_it() -> None:
+    line = np.concatenate([np.arange(10.0), np.full(5, 9.0)])
+    rows = np.zeros((1, 1, 1))
+    assert smooth(line, rows, 0, 1e-3) == (9, 0.0, 1.0, 0.0)
+    end, lift, ramp, curvature = smooth(0.5 * np.arange(6.0) ** 2, rows, 0, 0.1)
+    assert (end, lift, ramp, curvature) == (5, pytest.approx(1.0 / 12.0), 2.5, 1.0)
+    changing = np.repeat(np.array([0.0, 1.0]), [4, 11])[:, None, None]
+    assert smooth(line, changing, 0, 1e-3)[0] == 4
+
+
+def test_a_step_ends_with_its_piece_or_leaves_enough_of_it() -> None:
+    assert within(3.0, 3.0, 20.0, 0.1) == 3.0
+    assert within(2.0, 3.0, 20.0, 0.1) == 1.5
+    assert within(1.0, 3.0, 20.0, 0.1) == 1.0
+    assert within(50.0, 99.0, 20.0, 0.1) == 20.0
+    assert within(3.0, 0.0, 20.0, 0.1) == 0.1
+
+
+def test_the_smaller_the_error_the_longer_the_next_step() -> None:
+    factors = [growth(error) for error in (0.0, 1e-3, 0.02, 0.1, 0.3, 0.8)]
+    assert factors == [4.0, 2.0, 1.6, 1.25, 1.0, 0.9]

@@ -1,0 +1,135 @@
+"""The module that a Python user imports: it says what a log holds, and answers a slip with the remedy."""
+
+# ruff: noqa: ARG005 - every mistake is given the same two things
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import control
+import pandas as pd
+import pytest
+from matplotlib.axes import Axes
+
+import hydrostate as hs
+
+ROOT = Path(__file__).resolve().parents[1]
+HEAVY = ("numba", "numpy", "scipy", "pandas", "matplotlib", "typer")
+
+
+@pytest.fixture(scope="module")
+def log() -> hs.Log:
+    return hs.simulate("minor_leakage", duration=4.0, sample_time=1e-3, seed=7)
+
+
+@pytest.fixture(scope="module")
+def verdict(log: hs.Log) -> hs.Answer:
+    return log.diagnose()
+
+
+@pytest.fixture
+def file(log: hs.Log, tmp_path: Path) -> Path:
+    path = tmp_path / "run.csv"
+    log.to_frame().rename(columns={"position_m": "POS"}).to_csv(path)
+    return path
+
+
+def test_a_log_that_is_read_is_the_log_that_was_written(log: hs.Log, file: Path) -> None:
+    again = hs.read(file, columns={"position_m": "POS"})
+    assert set(again.channels) == set(log.channels)
+    assert again["position_m"][-1] == pytest.approx(log["position_m"][-1], abs=1e-12)
+    assert len(again.between(1.0, 2.0)) == 1001
+
+
+def test_estimate_and_diagnosis_are_one_answer(log: hs.Log, verdict: hs.Answer) -> None:
+    found = log.estimate()
+    assert found.believed
+    assert found.bulk_modulus == verdict.bulk_modulus
+    assert found.bulk_modulus.covers(log.rig.parameters.bulk_modulus)
+    assert verdict.condition == "minor_leakage"
+    assert verdict.probabilities["minor_leakage"] > 0.9
+
+
+def test_an_answer_turns_into_what_a_program_needs(verdict: hs.Answer) -> None:
+    table = verdict.to_frame()
+    assert isinstance(table, pd.DataFrame)
+    assert table.loc["bulk_modulus", "unit"] == "Pa"
+    assert verdict.to_dict()["bulk_modulus_pa"]["value"] == verdict.bulk_modulus.value
+    assert len(str(verdict).splitlines()) < 24
+    assert "minor leakage" in str(verdict)
+    assert "<table" in verdict._repr_html_()
+    assert all(isinstance(axis, Axes) and axis.get_xlabel() for axis in verdict.plot())
+
+
+def test_a_model_turns_into_python_controls(log: hs.Log) -> None:
+    model = log.identify()
+    assert isinstance(model.to_control(), control.TransferFunction)
+    assert model.to_frame().loc["dc_gain", "value"] == model.dc_gain
+    assert "fit" in str(model)
+    assert [axis.get_ylabel() for axis in model.plot()] == ["gain [dB]", "phase [degrees]"]
+
+
+MISTAKES: dict[str, tuple[Callable[[hs.Log, Path], object], str]] = {
+    "no such file": (lambda log, file: hs.read("none.csv"), "none.csv: there is no such file"),
+    "no path": (lambda log, file: hs.read(3), "the path of a log is wanted, got 3"),  # type: ignore[arg-type]
+    "no such column": (
+        lambda log, file: hs.read(file, columns={"position_m": "X"}),
+        "name one of them as position_m=NAME",
+    ),
+    "columns as text": (lambda log, file: hs.read(file, columns="POS"), "columns must be a mapping"),  # type: ignore[arg-type]
+    "rig as a mapping": (lambda log, file: hs.read(file, rig={}), "rig must be a Rig of eha"),  # type: ignore[arg-type]
+    "rig of another kind": (
+        lambda log, file: hs.read(file, rig=log.rig, plant="piezo-stack"),
+        "must be a Rig of piezo",
+    ),
+    "no such rig file": (lambda log, file: hs.read(file, rig="paper"), "hydrostate rig init FILE"),
+    "text for a number": (lambda log, file: log.estimate(start_std="1e8"), "start_std must be a number, got '1e8'"),
+    "misspelt option": (lambda log, file: log.estimate(methd="ekf"), "did you mean 'method'"),
+    "misspelt condition": (lambda log, file: hs.simulate("minor_leak"), "condition must be one of normal"),
+    "misspelt plant": (lambda log, file: hs.simulate(plant="pump"), "must be one of reduced, lumped"),
+    "misspelt verb": (lambda log, file: log.estimat(), "did you mean 'estimate'"),
+    "misspelt name": (lambda log, file: hs.reed, "did you mean 'read'"),
+    "no such channel": (lambda log, file: log["pressure"], "channel 'pressure' is wanted, the record has"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_natural_mistake_is_answered_with_its_remedy(mistake: str, log: hs.Log, file: Path) -> None:
+    make, said = MISTAKES[mistake]
+    with pytest.raises(hs.HydrostateError) as caught:
+        make(log, file)
+    assert said in str(caught.value)
+
+
+def run(code: str, *folders: Path) -> subprocess.CompletedProcess[str]:
+    path = ", ".join(repr(str(folder)) for folder in (*folders, ROOT))
+    command = [sys.executable, "-c", f"import sys; sys.path[:0] = [{path}]\n{code}"]
+    return subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - our own interpreter
+
+
+def test_importing_it_imports_nothing_heavy() -> None:
+    done = run(f"import hydrostate; print([one for one in {HEAVY} if one in sys.modules])")
+    assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_a_foreign_package_of_the_same_name_is_named(tmp_path: Path) -> None:
+    (tmp_path / "faults").mkdir()
+    (tmp_path / "faults" / "__init__.py").write_text("")
+    done = run("import hydrostate", tmp_path)
+    assert done.returncode == 1
+    assert f"needs its own package 'faults' in {ROOT}, but Python finds {tmp_path / 'faults'}" in done.stderr
+
+
+@pytest.mark.parametrize("package", ["plant", "estimation", "faults", "experiments", "hydrostate"])
+def test_a_face_has_few_names_each_with_an_example(package: str) -> None:
+    face = __import__(package)
+    assert len(face.__all__) <= 25
+    for name in face.__all__:
+        assert getattr(face, name) is not None
+        assert package == "hydrostate" or f"\n{name} " in (face.__doc__ or ""), f"{package}.{name} has no example"
+
+
+def test_importing_a_face_imports_nothing_heavy() -> None:
+    done = run(f"import plant, estimation, faults, experiments; print([one for one in {HEAVY} if one in sys.modules])")
+    assert done.stdout.strip() == "[]", done.stderr

@@ -1,0 +1,107 @@
+"""Codes: no two alike, each raised somewhere with all that its sentence needs, each on the page docs/notes.md."""
+
+import importlib.util
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from plant.notes import Code
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def load(path: Path) -> ModuleType:
+    """Import a script that is in no package."""
+    spec = importlib.util.spec_from_file_location(f"_{path.stem}_page", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+notes = load(ROOT / "docs" / "notes.py")
+
+
+@pytest.fixture(scope="module")
+def enums() -> Mapping[str, type[Code]]:
+    return {enum.__name__: enum for enum in notes.enums()}
+
+
+def test_every_layer_that_raises_notes_is_seen(enums: Mapping[str, type[Code]]) -> None:
+    assert {"LogCode", "SensorCode", "EstimateCode", "IdentificationCode", "AgainstCode", "ClassCode"} <= set(enums)
+    assert len(enums) == len(notes.enums())
+
+
+def test_no_code_occurs_twice(enums: Mapping[str, type[Code]]) -> None:
+    codes = [member.value for enum in enums.values() for member in enum]
+    assert sorted(codes) == sorted(set(codes))
+    assert [member for enum in enums.values() for member in enum if member.value != member.name.lower()] == []
+
+
+def test_no_sentence_occurs_twice_and_all_are_clauses(enums: Mapping[str, type[Code]]) -> None:
+    templates = [member.template for enum in enums.values() for member in enum]
+    assert sorted(templates) == sorted(set(templates))
+    assert [said for said in templates if said.endswith(".") or "\n" in said or said[0].isupper()] == []
+
+
+def test_every_code_is_raised_somewhere(enums: Mapping[str, type[Code]]) -> None:
+    raised = {code for site in notes.sites(enums) for code in site.codes}
+    assert {f"{name}.{member.name}" for name, enum in enums.items() for member in enum} == raised
+
+
+def test_every_note_is_given_what_its_sentence_needs(enums: Mapping[str, type[Code]]) -> None:
+    found = [
+        f"{site.path}:{site.line}: {code} lacks {name}"
+        for site in notes.sites(enums)
+        for code in site.codes
+        for name in notes.fields_of(enums[code.split(".")[0]][code.split(".")[1]].template) - site.fields
+    ]
+    assert found == []
+
+
+def test_the_page_on_notes_is_that_of_the_codes() -> None:
+    written = (ROOT / "docs" / "notes.md").read_text(encoding="utf-8")
+    assert written == notes.page(), "run python docs/notes.py"
+
+
+class Weather(Code):
+    """Codes of an example."""
+
+    RAIN = "rain", "{depth_mm:.1f} mm of rain in {place}"
+    SNOW = "snow", "snow in {place}"
+    DRY = "dry", "no rain"
+
+
+EXAMPLE = """
+def said(wet, where):
+    known = {"place": where, "depth_mm": 3.0}
+    code = Weather.RAIN if wet else Weather.SNOW
+    return code.note(**known), Weather.RAIN.note(place=where), (Weather.SNOW if wet else Weather.DRY).note(**at(where))
+
+def at(where):
+    return {"place": where}
+
+def asked(note):
+    return note.code == Weather.DRY
+"""
+
+
+def test_the_scan_sees_codes_by_name_and_choice_and_fields_by_dictionary() -> None:
+    known = {"Weather": Weather}
+    by_codes = {site.codes: site.fields for site in notes.sites_in("a.py", EXAMPLE, known)}
+    assert by_codes == {
+        ("Weather.RAIN", "Weather.SNOW"): {"place", "depth_mm"},
+        ("Weather.RAIN",): {"place"},
+        ("Weather.SNOW", "Weather.DRY"): {"place"},
+    }
+    assert notes.fields_of(Weather.RAIN.template) - by_codes["Weather.RAIN",] == {"depth_mm"}
+
+
+def test_a_dictionary_that_is_made_elsewhere_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"line 1: what \*\* gives"):
+        list(notes.sites_in("a.py", "Weather.RAIN.note(**elsewhere.known())", {"Weather": Weather}))
