@@ -161,7 +161,9 @@ def greybox_log(
     GreyBoxLog
         The log, its drives without gaps.
     """
-    noise = {**measurement_variances(record, model.outputs), **(variances or {})}
+    noise = dict(variances or {})
+    if unknown := [channel for channel in model.outputs if channel not in noise]:
+        noise |= measurement_variances(record, unknown)
     return GreyBoxLog(
         drives=np.column_stack([bridged(record[channel]) for channel in model.drives]),
         measured=np.column_stack([record[channel] for channel in model.outputs]),
