@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 from importlib.metadata import entry_points
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from plant.errors import HydrostateError
@@ -11,13 +10,11 @@ from plant.errors import HydrostateError
 if TYPE_CHECKING:
     from experiments.actuator_kind import ActuatorKind
 
-ACTUATORS: Mapping[str, str] = MappingProxyType(
-    {
-        "eha": "experiments.eha.kind:EHA",
-        "piezo-stack": "experiments.piezo_stack.kind:PIEZO_STACK",
-        "diaphragm-motor": "experiments.diaphragm_motor.kind:DIAPHRAGM_MOTOR",
-    }
-)
+ACTUATORS: Mapping[str, str] = {
+    "eha": "experiments.eha.kind:EHA",
+    "piezo-stack": "experiments.piezo_stack.kind:PIEZO_STACK",
+    "diaphragm-motor": "experiments.diaphragm_motor.kind:DIAPHRAGM_MOTOR",
+}
 """Where each kind's `experiments.actuator_kind.ActuatorKind` is, by name."""
 
 DEFAULT = "eha"

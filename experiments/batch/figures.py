@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from itertools import cycle
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -135,11 +134,9 @@ def _confusion(tables: Tables) -> Figure:
     return draw_confusion(tables["confusion"], float(diagnosis["right"].sum() / diagnosis["cases"].sum()))
 
 
-BATCH_FIGURES: Drawings = MappingProxyType(
-    {
-        "bulk_modulus": lambda tables: draw_errors(tables["bulk modulus"]),
-        "confusion": _confusion,
-        "classes": lambda tables: draw_classes(tables["classes"]),
-    }
-)
+BATCH_FIGURES: Drawings = {
+    "bulk_modulus": lambda tables: draw_errors(tables["bulk modulus"]),
+    "confusion": _confusion,
+    "classes": lambda tables: draw_classes(tables["classes"]),
+}
 """The figures, by file name: that of the table that they need."""

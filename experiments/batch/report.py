@@ -3,7 +3,6 @@
 import json
 from collections.abc import Mapping, Sequence
 from functools import partial
-from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
@@ -39,56 +38,54 @@ _condition = partial(Column, words=lambda value: in_words(_or_dash(value)))
 _percent = partial(Column, unit="%", words=decimals(2))
 _whole = partial(Column, unit="%", words=decimals(0))
 
-COLUMNS: Mapping[str, Sequence[Column]] = MappingProxyType(
-    {
-        "outcomes": (
-            _text("way", "how"),
-            *(Column(name) for name in ("cases", "ok", "not_observable", "mismatch", "diverged", "failed")),
-        ),
-        "bulk modulus": (
-            _text("way", "how"),
-            _condition("condition"),
-            Column("estimates"),
-            _percent("low_percent", "5 %"),
-            _percent("median_percent", "median error"),
-            _percent("high_percent", "95 %"),
-            _percent("rms_percent", "RMS error"),
-            _whole("near_percent", f"within {NEAR_PERCENT:g} %"),
-            _whole("covered_percent", "interval covers"),
-        ),
-        "diagnosis": (
-            _text("way", "how"),
-            _condition("condition", "true class"),
-            Column("cases"),
-            _whole("right_percent", "right"),
-            Column("median_margin", "times as probable as runner-up, median", digits=3),
-        ),
-        "classes": (
-            _condition("class"),
-            Column("logs"),
-            Column("percent", "of logs", "%", words=decimals(1)),
-        ),
-        "logs": (
-            _text("file", "log"),
-            _text("verb", "asked"),
-            _text("outcome"),
-            _condition("found_condition", "class"),
-            _condition("runner_up", "runner-up"),
-            Column("margin", "best is so many times as probable", digits=3),
-            Column("bulk_modulus_pa"),
-            Column("bulk_modulus_std_pa", "std", digits=2),
-            Column("quantities", "found", words=_quantities),
-            _text("reason", "why, or what speaks against it"),
-        ),
-        "failures": (
-            *(_text("plant"), _text("file", "log"), _text("condition"), _text("seed"), _text("verb", "asked")),
-            _text("reason"),
-        ),
-    }
-)
+COLUMNS: Mapping[str, Sequence[Column]] = {
+    "outcomes": (
+        _text("way", "how"),
+        *(Column(name) for name in ("cases", "ok", "not_observable", "mismatch", "diverged", "failed")),
+    ),
+    "bulk modulus": (
+        _text("way", "how"),
+        _condition("condition"),
+        Column("estimates"),
+        _percent("low_percent", "5 %"),
+        _percent("median_percent", "median error"),
+        _percent("high_percent", "95 %"),
+        _percent("rms_percent", "RMS error"),
+        _whole("near_percent", f"within {NEAR_PERCENT:g} %"),
+        _whole("covered_percent", "interval covers"),
+    ),
+    "diagnosis": (
+        _text("way", "how"),
+        _condition("condition", "true class"),
+        Column("cases"),
+        _whole("right_percent", "right"),
+        Column("median_margin", "times as probable as runner-up, median", digits=3),
+    ),
+    "classes": (
+        _condition("class"),
+        Column("logs"),
+        Column("percent", "of logs", "%", words=decimals(1)),
+    ),
+    "logs": (
+        _text("file", "log"),
+        _text("verb", "asked"),
+        _text("outcome"),
+        _condition("found_condition", "class"),
+        _condition("runner_up", "runner-up"),
+        Column("margin", "best is so many times as probable", digits=3),
+        Column("bulk_modulus_pa"),
+        Column("bulk_modulus_std_pa", "std", digits=2),
+        Column("quantities", "found", words=_quantities),
+        _text("reason", "why, or what speaks against it"),
+    ),
+    "failures": (
+        *(_text("plant"), _text("file", "log"), _text("condition"), _text("seed"), _text("verb", "asked")),
+        _text("reason"),
+    ),
+}
 """How each table is shown."""
 
-VERDICT_TONES: Mapping[str, str] = MappingProxyType({"better": "good", "worse": "bad"})
+VERDICT_TONES: Mapping[str, str] = {"better": "good", "worse": "bad"}
 
 
 def render_batch_report(manifest: Mapping[str, Any], tables: Tables, files: Mapping[str, bytes], done: int) -> str:

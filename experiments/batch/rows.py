@@ -6,7 +6,6 @@ rows at the end; what came of a case is written to its place.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import pyarrow as pa
@@ -56,13 +55,11 @@ SCHEMA = pa.schema(
 ``plant`` is ``log`` for a log, whose ``condition`` is known only if whoever made the log wrote it down; of a kind of
 actuator that is not the gear-pump one it is the kind, and ``quantities`` holds what was found, as JSON."""
 
-NIS: Mapping[str, str] = MappingProxyType(
-    {
-        "position_m": "nis_position",
-        "velocity_m_s": "nis_velocity",
-        "differential_pressure_pa": "nis_pressure",
-    }
-)
+NIS: Mapping[str, str] = {
+    "position_m": "nis_position",
+    "velocity_m_s": "nis_velocity",
+    "differential_pressure_pa": "nis_pressure",
+}
 """Column of each channel's normalised innovation squared [dimensionless]."""
 
 Row: TypeAlias = dict[str, Any]

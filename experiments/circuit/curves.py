@@ -6,13 +6,12 @@ for that; on the rig the same takes several strokes.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
 
 from estimation.fits.steady_state_fit import SteadyFit, SteadyPoints, fit_friction, fit_leakage, steady_points
-from experiments.page.frames import cell
+from experiments.page.frames import Frames, Rows, cell, stacked, tabled
 from experiments.published import SCALARS, load
 from faults.conditions import LEVELS, Level
 from faults.eha.physical import VOLTS_A, VOLTS_B, throttled
@@ -91,7 +90,7 @@ class Sweep:
 
 def _defined(volts: Sequence[float], scalars: Sequence[str]) -> Mapping[float, float]:
     shares = [1.0, *(SCALARS[name].si_value for name in scalars)]
-    return MappingProxyType({v: 100.0 * share for v, share in zip(volts, shares, strict=True)})
+    return {v: 100.0 * share for v, share in zip(volts, shares, strict=True)}
 
 
 LEAKAGE_SWEEP = Sweep(
@@ -195,11 +194,12 @@ def friction_points(
     return steady_points(run for found in runs for run in found)
 
 
+@stacked
 def points_table(
     rig: CircuitParameters,
     rng: np.random.Generator,
     points: Callable[[CircuitParameters, Level, np.random.Generator], SteadyPoints],
-) -> pd.DataFrame:
+) -> Frames:
     """Return the steady points that a refit uses: Figures 8 and 9.
 
     Parameters
@@ -216,25 +216,20 @@ def points_table(
     pandas.DataFrame
         One row a point: level, velocity, differential pressure, flow that is lost and force that friction takes.
     """
-    rows: list[pd.DataFrame] = []
     for level in LEVELS:
         found = points(rig, level, rng)
         lost = rig.pump_displacement * found.speed - rig.piston_area * found.velocity
-        rows.append(
-            pd.DataFrame(
-                {
-                    "level": level,
-                    "velocity_m_s": found.velocity,
-                    "differential_pressure_pa": found.pressure,
-                    "lost_flow_m3_s": lost,
-                    "friction_n": rig.piston_area * found.pressure,
-                }
-            )
-        )
-    return pd.concat(rows, ignore_index=True)
+        yield {
+            "level": level,
+            "velocity_m_s": found.velocity,
+            "differential_pressure_pa": found.pressure,
+            "lost_flow_m3_s": lost,
+            "friction_n": rig.piston_area * found.pressure,
+        }
 
 
-def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> pd.DataFrame:
+@tabled
+def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
     """Return Table 3 refitted from steady points by equations 5.7 and 5.8, beside what went in and what is published.
 
     What went in is the circuit's settled leakage: with make-up open the drain counts whole (errata E17).
@@ -252,7 +247,6 @@ def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> pd.DataFr
         One row a level and coefficient.
     """
     published = load("leakage").set_index("leakage")
-    rows: list[dict[str, object]] = []
     for level in LEVELS:
         p = throttled(rig, VOLTS_A[LEVELS.index(level)], 0.0)
         went_in = {"leakage_coefficient": p.settled_leakage, "flow_bias": p.flow_bias}
@@ -260,11 +254,11 @@ def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> pd.DataFr
             "leakage_coefficient": cell(published, level, "leakage_coefficient_m3_per_s_pa"),
             "flow_bias": cell(published, level, "flow_bias_m3_per_s"),
         }
-        rows += _refit_rows(level, fit_leakage(leakage_points(rig, level, rng), p), went_in, printed)
-    return pd.DataFrame(rows)
+        yield from _refit_rows(level, fit_leakage(leakage_points(rig, level, rng), p), went_in, printed)
 
 
-def friction_refit(rig: CircuitParameters, rng: np.random.Generator) -> pd.DataFrame:
+@tabled
+def friction_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
     """Return Table 4 refitted from steady points by equation 5.11, beside what went in and what is published.
 
     Parameters
@@ -282,13 +276,11 @@ def friction_refit(rig: CircuitParameters, rng: np.random.Generator) -> pd.DataF
     published = load("friction").set_index("friction")
     names = ("friction_quadratic", "friction_linear", "friction_coulomb")
     columns = [column for column in published.columns if column.startswith("a")]
-    rows: list[dict[str, object]] = []
     for level in LEVELS:
         p = throttled(rig, 10.0, VOLTS_B[LEVELS.index(level)])
         went_in = {name: float(getattr(p, name)) for name in names}
         printed = {name: cell(published, level, column) for name, column in zip(names, columns, strict=True)}
-        rows += _refit_rows(level, fit_friction(friction_points(rig, level, rng), p), went_in, printed)
-    return pd.DataFrame(rows)
+        yield from _refit_rows(level, fit_friction(friction_points(rig, level, rng), p), went_in, printed)
 
 
 def _refit_rows(

@@ -1,7 +1,6 @@
 """Estimates of bulk modulus on the circuit plant, in place of the paper's Figure 11."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 import pandas as pd
 from matplotlib.axes import Axes
@@ -21,7 +20,7 @@ from experiments.page.style import (
 )
 from experiments.page.words import in_words
 
-FORM_COLOURS = MappingProxyType({"flow": BLUE, "pressure": ORANGE, "acceleration": VERMILION})
+FORM_COLOURS = {"flow": BLUE, "pressure": ORANGE, "acceleration": VERMILION}
 
 
 def draw_bulk_modulus(tables: Mapping[str, pd.DataFrame]) -> Figure:

@@ -4,7 +4,6 @@ The tables go by the names that `hydrostate circuit` writes them under.
 """
 
 from collections.abc import Callable
-from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -23,7 +22,7 @@ MILLI, MEGA = 1e3, 1e-6
 LITRES_A_MINUTE = 6e4
 """Litres a minute in a cubic metre a second."""
 
-MARKERS = MappingProxyType({"none": "o", "minor": "s", "major": "^"})
+MARKERS = {"none": "o", "minor": "s", "major": "^"}
 
 
 def draw_throttles(tables: Tables) -> Figure:
@@ -180,14 +179,12 @@ def draw_validation_input(tables: Tables) -> Figure:
     return figure
 
 
-CIRCUIT_FIGURES: Drawings = MappingProxyType(
-    {
-        "figures_3_and_4": draw_throttles,
-        "figures_5_and_6": draw_responses,
-        "figure_7": lambda tables: draw_order(tables["figure 7 singular values"]),
-        "figures_8_and_9": draw_refits,
-        "figure_10": draw_validation_input,
-        "figure_11": draw_bulk_modulus,
-    }
-)
+CIRCUIT_FIGURES: Drawings = {
+    "figures_3_and_4": draw_throttles,
+    "figures_5_and_6": draw_responses,
+    "figure_7": lambda tables: draw_order(tables["figure 7 singular values"]),
+    "figures_8_and_9": draw_refits,
+    "figure_10": draw_validation_input,
+    "figure_11": draw_bulk_modulus,
+}
 """The figures, by file name, in the paper's order."""

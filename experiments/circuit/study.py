@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from types import MappingProxyType
 
 import pandas as pd
 
@@ -88,30 +87,28 @@ _REFIT = (
     Column("covered", "covers"),
 )
 
-COLUMNS: Mapping[str, Columns] = MappingProxyType(
-    {
-        "section 4 first tests": (
-            "test",
-            "at",
-            Column("value", "circuit"),
-            Column("expected", "implied by Tables 2 to 4"),
-            "published",
-            "unit",
-        ),
-        "figure 3 velocity against leakage throttle": (
-            Column("throttle_a_v", "throttle A"),
-            Column("velocity_m_s", "settles at"),
-            *_SHARES,
-        ),
-        "figure 4 pressure against friction throttle": (
-            Column("throttle_b_v", "throttle B"),
-            Column("differential_pressure_pa", "settles at"),
-            *_SHARES,
-        ),
-        "figure 8 leakage flow refitted": _REFIT,
-        "figure 9 friction refitted": _REFIT,
-    }
-)
+COLUMNS: Mapping[str, Columns] = {
+    "section 4 first tests": (
+        "test",
+        "at",
+        Column("value", "circuit"),
+        Column("expected", "implied by Tables 2 to 4"),
+        "published",
+        "unit",
+    ),
+    "figure 3 velocity against leakage throttle": (
+        Column("throttle_a_v", "throttle A"),
+        Column("velocity_m_s", "settles at"),
+        *_SHARES,
+    ),
+    "figure 4 pressure against friction throttle": (
+        Column("throttle_b_v", "throttle B"),
+        Column("differential_pressure_pa", "settles at"),
+        *_SHARES,
+    ),
+    "figure 8 leakage flow refitted": _REFIT,
+    "figure 9 friction refitted": _REFIT,
+}
 """How the report shows its tables."""
 
 CIRCUIT = Study("circuit", "circuit/report.html", _find, CIRCUIT_FIGURES, COLUMNS, asdict(RIG))

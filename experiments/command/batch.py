@@ -5,6 +5,7 @@ import signal
 import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from experiments.command.json_output import json_text
-from experiments.command.options import Json
+from experiments.command.options import Json, option
 from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, emit, note
 from plant.errors import HydrostateError
 
@@ -43,35 +44,25 @@ def batch(
         ),
     ],
     out: Annotated[
-        str | None,
-        typer.Option(
-            "--out", "-o", metavar="STORE", help="Folder or URL (s3://...) of the store; results/<study> by default."
-        ),
+        str | None, option("STORE", "Folder or URL (s3://...) of the store; results/<study> by default.", "--out", "-o")
     ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say how many cases there are and what they cost.")
     ] = False,
     resume: Annotated[
-        bool,
-        typer.Option("--resume/--no-resume", help="Keep the cases that the store has, or run all of them again."),
+        bool, typer.Option("--resume/--no-resume", help="Keep the cases that the store has, or run all of them again.")
     ] = True,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run failed cases again.")] = False,
     workers: Annotated[
-        int | None,
-        typer.Option(
-            "--workers", min=1, metavar="N", help="Processes, one thread each; the machine's cores by default."
-        ),
+        int | None, option("N", "Processes, one thread each; the machine's cores by default.", "--workers", min=1)
     ] = None,
     cluster: Annotated[
-        str | None,
-        typer.Option("--cluster", metavar="ADDRESS", help="Use a Dask cluster: its scheduler, as tcp://host:8786."),
+        str | None, option("ADDRESS", "Use a Dask cluster: its scheduler, as tcp://host:8786.", "--cluster")
     ] = None,
     max_failures: Annotated[
-        int | None, typer.Option("--max-failures", min=0, metavar="N", help="Stop once more than N cases have failed.")
+        int | None, option("N", "Stop once more than N cases have failed.", "--max-failures", min=0)
     ] = None,
-    logs: Annotated[
-        str | None, typer.Option("--logs", metavar="GLOB", help="Replaces the glob of the study's logs.")
-    ] = None,
+    logs: Annotated[str | None, option("GLOB", "Replaces the glob of the study's logs.", "--logs")] = None,
     as_json: Json = False,
 ) -> None:
     """Run a study of many cases into a store that survives whatever stops it, and write its report.
@@ -93,11 +84,13 @@ def batch(
     if dry_run:
         _say_plan(plan, store, width, retry_failed, as_json)
         return
+    from experiments.batch.reporting import write_report
+
     begin = time.perf_counter()
     source = f"{SHIPPED}/{study}.toml" if shipped else Path(study).name
     with store.writing():
         tally, before = _run(plan, store, source, width, cluster, max_failures, resume, retry_failed)
-        report = _reported(store)
+        report = write_report(store, store.folder)
     _finish(plan, store, tally, before, report, as_json, time.perf_counter() - begin)
 
 
@@ -111,18 +104,16 @@ def _with_logs(study: "Study", pattern: str | None) -> "Study":
 
 def _say_plan(plan: "Plan", store: "PartStore", workers: int, again: bool, as_json: bool) -> None:
     wanted = plan.keys
-    there = store.manifest() is not None
-    left = set(wanted) - (store.done(again=again)[0] if there else set())
-    share = len(left) / len(wanted)
-    seconds = plan.seconds * share / workers
+    left = set(wanted) - (set() if store.manifest() is None else store.done(again=again)[0])
+    seconds = plan.seconds * (len(left) / len(wanted)) / workers
     series = sum(len(one) for one, _ in plan.blocks)
     if as_json:
         entries = {"outcome": "ok", "study": plan.study.name, "store": store.name, "cases": len(wanted)}
         emit(json_text([{**entries, "series": series, "left": len(left), "seconds": seconds, "workers": workers}]))
         return
     emit(f"{plan.study.name}: {len(wanted)} cases on {series} series; {len(left)} are not in {store.name} yet")
-    words = duration(seconds)
-    emit(f"about {words} with {workers} worker{'s' if workers > 1 else ''} (a rough guess from typical costs)")
+    width = f"{workers} worker{'s' if workers > 1 else ''}"
+    emit(f"about {duration(seconds)} with {width} (a rough guess from typical costs)")
 
 
 def _run(
@@ -152,15 +143,8 @@ def _run(
     if before:
         note(f"{before} of {len(wanted)} cases are in {store.name} already")
     with _shown(len(wanted), before) as advance, _interruptible() as stop:
-        tally = run_batch(
-            plan,
-            store,
-            done,
-            lambda: open_executor(workers, cluster),
-            stop=stop,
-            on_part=advance,
-            max_failures=max_failures,
-        )
+        opener = partial(open_executor, workers, cluster)
+        tally = run_batch(plan, store, done, opener, stop=stop, on_part=advance, max_failures=max_failures)
     return tally, before
 
 
@@ -198,44 +182,31 @@ def _interruptible() -> Generator[Event]:
 def _shown(total: int, before: int) -> "Generator[Callable[[int, Part], None]]":
     """Show cases done, their rate and the time left; failures are named as they come."""
     from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
-    named = [0]
+    quiet = not console.is_terminal
+    columns = (TextColumn("cases"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}"))
+    bar = Progress(*columns, TimeRemainingColumn(), console=console, transient=True, disable=quiet)
+    task = bar.add_task("cases", total=total, completed=before, rate="")
+    pace, named, spoken = Pace(total, before), 0, time.monotonic()
 
-    def say(part: "Part") -> None:
+    def advance(count: int, part: "Part") -> None:
+        nonlocal named, spoken
         for case, reason in part.failures:
-            named[0] += 1
-            if named[0] <= MOST_NAMED:
+            named += 1
+            if named <= MOST_NAMED:
                 note(f"{case}: {reason}")
-            elif named[0] == MOST_NAMED + 1:
+            elif named == MOST_NAMED + 1:
                 note("more cases failed; the report names all")
+        pace.done += count
+        bar.update(task, advance=count, rate=f"{pace.rate:.3g}/s")
+        if quiet and time.monotonic() - spoken > QUIET_SECONDS:
+            spoken = time.monotonic()
+            note(str(pace))
 
-    if console.is_terminal:
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-        columns = (TextColumn("cases"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}"))
-        with Progress(*columns, TimeRemainingColumn(), console=console, transient=True) as bar:
-            task = bar.add_task("cases", total=total, completed=before, rate="")
-            clock = Pace(total, before)
-
-            def advance(count: int, part: "Part") -> None:
-                say(part)
-                clock.add(count)
-                bar.update(task, advance=count, rate=f"{clock.rate:.3g}/s")
-
-            yield advance
-        return
-    clock = Pace(total, before)
-    spoken = [time.monotonic()]
-
-    def advance_quietly(count: int, part: "Part") -> None:
-        say(part)
-        clock.add(count)
-        if time.monotonic() - spoken[0] > QUIET_SECONDS:
-            spoken[0] = time.monotonic()
-            note(str(clock))
-
-    yield advance_quietly
+    with bar:
+        yield advance
 
 
 class Pace:
@@ -249,16 +220,6 @@ class Pace:
 
     def __init__(self, total: int, before: int) -> None:
         self.total, self.done, self._before, self._begin = total, before, before, time.monotonic()
-
-    def add(self, count: int) -> None:
-        """Count cases as done.
-
-        Parameters
-        ----------
-        count : int
-            How many.
-        """
-        self.done += count
 
     @property
     def rate(self) -> float:
@@ -293,20 +254,8 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
-def _reported(store: "PartStore") -> str:
-    from experiments.batch.reporting import write_report
-
-    return write_report(store, store.folder)
-
-
 def _finish(
-    plan: "Plan",
-    store: "PartStore",
-    tally: "Tally",
-    before: int,
-    report: str,
-    as_json: bool,
-    seconds: float,
+    plan: "Plan", store: "PartStore", tally: "Tally", before: int, report: str, as_json: bool, seconds: float
 ) -> None:
     total = len(plan.keys)
     failed = sum(outcome == "failed" for outcome in store.rows(["outcome"])["outcome"].to_pylist())

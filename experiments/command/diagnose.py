@@ -18,6 +18,7 @@ from experiments.command.options import (
     Plant,
     RigFile,
     Seed,
+    option,
 )
 
 commands = typer.Typer()
@@ -28,10 +29,7 @@ def diagnose(
     context: typer.Context,
     logs: Logs,
     condition: Annotated[
-        str | None,
-        typer.Option(
-            "--condition", metavar="NAME", help="The condition that you expect; the result says if it agrees."
-        ),
+        str | None, option("NAME", "The condition that you expect; the result says if it agrees.", "--condition")
     ] = None,
     rig: RigFile = None,
     columns: Columns = None,
@@ -46,8 +44,7 @@ def diagnose(
         bool, typer.Option("--scores/--no-scores", help="Also show every condition's model error in a table.")
     ] = False,
     report: Annotated[
-        Path | None,
-        typer.Option("--report", metavar="FILE", help="Write a page (HTML); of several logs, one each."),
+        Path | None, option("FILE", "Write a page (HTML); of several logs, one each.", "--report")
     ] = None,
     no_pressure: Annotated[
         bool, typer.Option("--no-pressure", help="Use velocity alone, even if differential pressure is logged.")

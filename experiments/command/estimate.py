@@ -1,7 +1,7 @@
 """`hydrostate estimate LOG...`: what each log says of the actuator in numbers, or a sentence why not."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeAlias
 
 import typer
 
@@ -19,7 +19,27 @@ from experiments.command.options import (
     Plant,
     RigFile,
     Seed,
+    option,
 )
+
+Form: TypeAlias = Annotated[
+    str,
+    option(
+        "FORM",
+        "What is believed: flow (needs position and differential pressure; finds leakage too), motion "
+        "(without pressure; finds leakage and friction too), pressure and acceleration (filters that are told "
+        "leakage and friction; the latter is the published one), or auto: flow or motion where the log allows.",
+    ),
+]
+Method: TypeAlias = Annotated[
+    str,
+    option(
+        "METHOD",
+        "least-squares (flow, motion), or a filter: ekf, iekf, ukf, ckf, svsf, sif, imm (is not told leakage "
+        "and friction), particle, smoother, iterated-smoother, filterpy-ekf; auto: least squares where the form "
+        "allows.",
+    ),
+]
 
 commands = typer.Typer()
 
@@ -30,37 +50,21 @@ commands = typer.Typer()
 def estimate(
     context: typer.Context,
     logs: Logs,
-    form: Annotated[
-        str,
-        typer.Option(
-            metavar="FORM",
-            help="What is believed: flow (needs position and differential pressure; finds leakage too), motion "
-            "(without pressure; finds leakage and friction too), pressure and acceleration (filters that are told "
-            "leakage and friction; the latter is the published one), or auto: flow or motion where the log allows.",
-        ),
-    ] = "auto",
-    method: Annotated[
-        str,
-        typer.Option(
-            metavar="METHOD",
-            help="least-squares (flow, motion), or a filter: ekf, iekf, ukf, ckf, svsf, sif, imm (is not told leakage "
-            "and friction), particle, smoother, iterated-smoother, filterpy-ekf; auto: least squares where the form "
-            "allows.",
-        ),
-    ] = "auto",
+    form: Form = "auto",
+    method: Method = "auto",
     states: Annotated[
         str,
-        typer.Option(
-            metavar="NAMES",
-            help="What a filter estimates beside bulk modulus, comma-separated: leakage, friction, air, or parameters "
+        option(
+            "NAMES",
+            "What a filter estimates beside bulk modulus, comma-separated: leakage, friction, air, or parameters "
             "such as flow_bias.",
         ),
     ] = "",
     sensors: Annotated[
         str,
-        typer.Option(
-            metavar="NAMES",
-            help="Use these channels alone, comma-separated: position, velocity, dp; piezo-stack: stack, force, "
+        option(
+            "NAMES",
+            "Use these channels alone, comma-separated: position, velocity, dp; piezo-stack: stack, force, "
             "position, pressure. All by default.",
         ),
     ] = "",
@@ -70,12 +74,9 @@ def estimate(
     smooth: Annotated[
         bool, typer.Option("--smooth", help="Smooth: what the whole log says of every sample (method smoother).")
     ] = False,
-    robust: Annotated[
-        str, typer.Option(metavar="HOW", help="How gross outliers count in a filter: none, huber or student-t.")
-    ] = "none",
+    robust: Annotated[str, option("HOW", "How gross outliers count in a filter: none, huber or student-t.")] = "none",
     figure: Annotated[
-        Path | None,
-        typer.Option(metavar="PNG", help="Draw the filtered estimate with its 95 % band, innovations and NIS."),
+        Path | None, option("PNG", "Draw the filtered estimate with its 95 % band, innovations and NIS.")
     ] = None,
     plant: Plant = None,
     bias_pressure: BiasPressure = None,
@@ -84,14 +85,9 @@ def estimate(
     condition: ConditionName = None,
     rig: RigFile = None,
     columns: Columns = None,
-    start: Annotated[
-        float | None, typer.Option(metavar="PA", help="First guess of bulk modulus [Pa]; the rig's if not given.")
-    ] = None,
+    start: Annotated[float | None, option("PA", "First guess of bulk modulus [Pa]; the rig's if not given.")] = None,
     start_std: Annotated[
-        float,
-        typer.Option(
-            metavar="PA", help="Standard deviation of the first guess [Pa]; convergence needs 1e8.", show_default="3e8"
-        ),
+        float, option("PA", "Standard deviation of the first guess [Pa]; convergence needs 1e8.", show_default="3e8")
     ] = 3e8,
     no_pressure: Annotated[
         bool, typer.Option("--no-pressure", help="Use position and velocity alone, even if pressure is logged.")

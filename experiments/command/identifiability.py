@@ -11,15 +11,19 @@ from experiments.command.options import (
     SEED,
     BiasPressure,
     ConditionName,
+    Drive,
     Frequency,
     Json,
     Load,
+    Noise,
     Out,
     Plant,
+    Ranked,
     RigFile,
     Seed,
     Voltage,
     load_actuator,
+    option,
     understood,
 )
 
@@ -40,24 +44,18 @@ def identifiability(
     plant: Plant = None,
     sensors: Annotated[
         str,
-        typer.Option(
-            metavar="LIST",
-            help="Sensors beside the drive, by commas: position, velocity, dp; piezo-stack: stack, force, position, "
+        option(
+            "LIST",
+            "Sensors beside the drive, by commas: position, velocity, dp; piezo-stack: stack, force, position, "
             "pressure. All by default.",
             show_default=False,
         ),
     ] = "",
-    noise: Annotated[str, typer.Option(metavar="NOISE", help="Noise of the sensors: bench, rig or paper.")] = "bench",
-    drive: Annotated[
-        str, typer.Option(metavar="DRIVE", help="Drive: sine, prbs, steps, chirp or multisine, at the paper's 4 V.")
-    ] = "steps",
-    seconds: Annotated[
-        float, typer.Option(metavar="S", help="Length of the experiment [s].", show_default="10, piezo-stack 0.1")
-    ] = 10.0,
-    rate: Annotated[
-        float, typer.Option(metavar="HZ", help="Samples a second [Hz].", show_default="1000, piezo-stack 20000")
-    ] = 1000.0,
-    ranked: Annotated[bool, typer.Option("--rank", help="Rank all drives, the one that tells most first.")] = False,
+    noise: Noise = "bench",
+    drive: Drive = "steps",
+    seconds: Annotated[float, option("S", "Length of the experiment [s].", show_default="10, piezo-stack 0.1")] = 10.0,
+    rate: Annotated[float, option("HZ", "Samples a second [Hz].", show_default="1000, piezo-stack 20000")] = 1000.0,
+    ranked: Ranked = False,
     condition: ConditionName = None,
     frequency: Frequency = None,
     voltage: Voltage = None,

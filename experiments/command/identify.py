@@ -1,6 +1,6 @@
 """`hydrostate identify LOG...`: the discrete transfer function of each log."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,6 +19,7 @@ from experiments.command.options import (
     figure_path,
     load_columns,
     load_rig,
+    option,
     require_one_of,
     require_positive,
 )
@@ -37,33 +38,26 @@ TABLE_6_TIME = 1e-3
 FORMAT_VERSION = 1
 """Of a written library: later versions add entries and rename none."""
 
-STRUCTURES = ("output-error", "arx", "armax", "box-jenkins", "auto")
+STRUCTURES: "Mapping[str, StructureName | None]" = {
+    "output-error": "output-error",
+    "arx": "ARX",
+    "armax": "ARMAX",
+    "box-jenkins": "Box-Jenkins",
+    "auto": None,
+}
 """What ``--structure`` takes; auto compares the other four on data held back."""
-
-AUTO = "auto"
 
 HIGHEST_ORDER = 4
 """``--order auto`` compares orders up to this by BIC."""
-
-NORMAL_95 = 1.96
-"""Deviations either way that hold 95 %."""
 
 MOST_PROFILED, MOST_TESTED = 100_000, 50_000
 """Longest log whose gain is profiled where a pole is nearly cancelled, and samples that residual tests are given."""
 
 NOTHING: Result = {
     "format_version": FORMAT_VERSION,
-    "structure": None,
-    "numerator": None,
-    "denominator": None,
-    "sample_time_s": None,
-    "fit_percent": None,
-    "covariance": None,
+    **dict.fromkeys(("structure", "numerator", "denominator", "sample_time_s", "fit_percent", "covariance")),
     "dc_gain": {"value": None, "std": None, "ci95": None},
-    "bandwidth_hz": None,
-    "bandwidth_std_hz": None,
-    "poles": None,
-    "zeros": None,
+    **dict.fromkeys(("bandwidth_hz", "bandwidth_std_hz", "poles", "zeros")),
     "delay": {"samples": None, "seconds": None},
     "validation": {"whiteness_p": None, "cross_correlation_p": None},
 }
@@ -76,29 +70,23 @@ commands = typer.Typer()
 def identify(
     logs: Logs,
     structure: Annotated[
-        str, typer.Option(metavar="NAME", help=f"{', '.join(STRUCTURES)}; auto takes the best on data held back.")
-    ] = STRUCTURES[0],
-    order: Annotated[str, typer.Option(metavar="INT|auto", help="Order of the denominator; auto asks BIC.")] = "2",
+        str, option("NAME", f"{', '.join(STRUCTURES)}; auto takes the best on data held back.")
+    ] = "output-error",
+    order: Annotated[str, option("INT|auto", "Order of the denominator; auto asks BIC.")] = "2",
     numerator: Annotated[
-        int | None,
-        typer.Option(min=1, metavar="INT", help="Coefficients of the numerator; one more than the order unless told."),
+        int | None, option("INT", "Coefficients of the numerator; one more than the order unless told.", min=1)
     ] = None,
-    delay: Annotated[str, typer.Option(metavar="INT|auto", help="Dead time [samples of the model].")] = "0",
+    delay: Annotated[str, option("INT|auto", "Dead time [samples of the model].")] = "0",
     sample_time: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="Of the model [s]; 1e-3 (Table 6), or the log's where that is longer."),
+        float | None, option("S", "Of the model [s]; 1e-3 (Table 6), or the log's where that is longer.")
     ] = None,
     filter_hz: Annotated[
-        float | None,
-        typer.Option(
-            metavar="HZ", help="Zero-phase low-pass of input and output before the fit [Hz]; none if not given."
-        ),
+        float | None, option("HZ", "Zero-phase low-pass of input and output before the fit [Hz]; none if not given.")
     ] = None,
-    input_channel: Annotated[str, typer.Option("--input", metavar="CHANNEL", help="Input.")] = "motor_speed_rad_s",
-    output_channel: Annotated[str, typer.Option("--output", metavar="CHANNEL", help="Output.")] = "velocity_m_s",
+    input_channel: Annotated[str, option("CHANNEL", "Input.", "--input")] = "motor_speed_rad_s",
+    output_channel: Annotated[str, option("CHANNEL", "Output.", "--output")] = "velocity_m_s",
     figure: Annotated[
-        Path | None,
-        typer.Option(metavar="PNG", help="Draw measured beside simulated, the residual, its correlations, the gain."),
+        Path | None, option("PNG", "Draw measured beside simulated, the residual, its correlations, the gain.")
     ] = None,
     rig: RigFile = None,
     columns: Columns = None,
@@ -114,11 +102,8 @@ def identify(
     """
     from estimation.identification.from_record import identify_record, record_signals
 
-    require_one_of("--structure", structure, STRUCTURES)
-    wanted_order, wanted_delay = whole_or_auto("--order", order, 1), whole_or_auto("--delay", delay, 0)
-    fixed = 2 if wanted_order is None else wanted_order
-    free = wanted_order is None or wanted_delay is None
-    coefficients = (fixed + (1 if free or not wanted_delay else 0)) if numerator is None else numerator
+    form = _form(structure, order, delay, numerator)
+    form["covariance"] = "auto" if filter_hz is None else "coloured"
     require_positive("--sample-time", sample_time, "s")
     require_positive("--filter-hz", filter_hz, "Hz")
     bench, mapping = load_rig(rig), load_columns(columns)
@@ -127,28 +112,30 @@ def identify(
 
     def work(log: Path) -> Result:
         record = read_log(log, bench.columns, mapping)
-        taken: dict[str, Any] = {
-            "output": output_channel,
-            "input": input_channel,
-            "sample_time": max(TABLE_6_TIME, record.sample_time) if sample_time is None else sample_time,
-            "filter_cutoff_hz": filter_hz,
-        }
-        model = identify_record(
-            record,
-            **taken,
-            n_numerator=coefficients,
-            n_denominator=fixed,
-            delay=wanted_delay or 0,
-            structure=_NAMES[structure],
-            orders=range(1, HIGHEST_ORDER + 1) if wanted_order is None else None,
-            estimate_dead_time=wanted_delay is None,
-            covariance="auto" if filter_hz is None else "coloured",
-        )
+        taken: dict[str, Any] = {"output": output_channel, "input": input_channel, "filter_cutoff_hz": filter_hz}
+        taken["sample_time"] = max(TABLE_6_TIME, record.sample_time) if sample_time is None else sample_time
+        model = identify_record(record, **taken, **form)
         u, y = record_signals(record, **taken)
         return {**chosen, **_entries(model), **_judged(model, u, y, log, figure_path(figure, log, len(logs)))}
 
     batch = run_logs(logs, work, {**NOTHING, **chosen}, "identifying")
     finish(batch, _screen, as_json=as_json, out=out)
+
+
+def _form(structure: str, order: str, delay: str, numerator: int | None) -> dict[str, Any]:
+    """Return the form of the model as `identify_record` takes it."""
+    require_one_of("--structure", structure, list(STRUCTURES))
+    wanted_order, wanted_delay = whole_or_auto("--order", order, 1), whole_or_auto("--delay", delay, 0)
+    fixed = wanted_order or 2
+    direct = wanted_order is None or not wanted_delay
+    return {
+        "n_numerator": fixed + direct if numerator is None else numerator,
+        "n_denominator": fixed,
+        "delay": wanted_delay or 0,
+        "structure": STRUCTURES[structure],
+        "orders": range(1, HIGHEST_ORDER + 1) if wanted_order is None else None,
+        "estimate_dead_time": wanted_delay is None,
+    }
 
 
 def whole_or_auto(option: str, text: str, least: int) -> int | None:
@@ -178,7 +165,7 @@ def whole_or_auto(option: str, text: str, least: int) -> int | None:
     >>> whole_or_auto("--order", "3", 1), whole_or_auto("--order", "auto", 1)
     (3, None)
     """
-    if text == AUTO:
+    if text == "auto":
         return None
     if not text.isdecimal() or int(text) < least:
         raise HydrostateError(f"{option} must be a whole number from {least} on, or auto, got {text!r}")
@@ -186,7 +173,6 @@ def whole_or_auto(option: str, text: str, least: int) -> int | None:
 
 
 def _entries(model: "LinearModel") -> dict[str, Any]:
-    lag = {"samples": model.delay, "seconds": model.delay * model.sample_time}
     bandwidth = model.bandwidth_hz
     extent = "not below the Nyquist frequency" if bandwidth is None else f"{bandwidth:.3g} Hz"
     return {
@@ -197,7 +183,7 @@ def _entries(model: "LinearModel") -> dict[str, Any]:
         "poles": _with_std(model.poles, model.pole_std),
         "zeros": _with_std(model.zeros, model.zero_std),
         "format_version": FORMAT_VERSION,
-        "delay": lag,
+        "delay": {"samples": model.delay, "seconds": model.delay * model.sample_time},
         "message": (
             f"{model.structure} of order {model.denominator.size - 1}, fit {model.fit_percent:.1f} %, "
             f"gain {model.dc_gain:.4g}, bandwidth {extent}"
@@ -207,12 +193,13 @@ def _entries(model: "LinearModel") -> dict[str, Any]:
 
 def _judged(model: "LinearModel", u: "FloatArray", y: "FloatArray", log: Path, figure: Path | None) -> dict[str, Any]:
     """Return what the data say of the model: tests of its residual, and the gain's interval; draw both if wanted."""
+    from estimation.finding import interval_95
     from estimation.identification.fit.profile_interval import dc_gain_interval
     from estimation.identification.fit.validate import validate
 
     gain, std = model.dc_gain, model.dc_gain_std
     fitted = model.structure == "output-error"
-    interval = (gain - NORMAL_95 * std, gain + NORMAL_95 * std)
+    interval = interval_95(gain, std)
     if fitted and model.cancellations and u.size <= MOST_PROFILED:
         interval = dc_gain_interval(model, u, y)
     entries: dict[str, Any] = {"dc_gain": {"value": gain, "std": std, "ci95": interval}}
@@ -235,26 +222,17 @@ def _with_std(roots: Any, spreads: Any) -> list[dict[str, float]]:
     ]
 
 
-_NAMES: "dict[str, StructureName | None]" = {
-    "output-error": "output-error",
-    "arx": "ARX",
-    "armax": "ARMAX",
-    "box-jenkins": "Box-Jenkins",
-    AUTO: None,
-}
-
-
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     shown = table("log", "fit [%]", "gain", "bandwidth [Hz]", "coefficients, q^0 q^-1 ...")
     for name, result in zip(short_names(results), results, strict=True):
         gain = result["dc_gain"]
         bandwidth = "-" if result["bandwidth_hz"] is None else f"{result['bandwidth_hz']:.3g}"
         coefficients = f"b {_spaced(result['numerator'])}\nf {_spaced(result['denominator'])}"
-        spread = f"{gain['value']:.4g} ± {gain['std']:.1g}"
-        shown.add_row(name, f"{result['fit_percent']:.2f}", spread, bandwidth, coefficients)
+        said = (f"{result['fit_percent']:.2f}", f"{gain['value']:.4g} ± {gain['std']:.1g}", bandwidth)
+        shown.add_row(name, *said, coefficients)
     yield shown
-    first = results[0]
-    yield f"From {first['input']} to {first['output']}, ± one standard deviation; sample times are in --json and --out."
+    ends = f"From {results[0]['input']} to {results[0]['output']}"
+    yield f"{ends}, ± one standard deviation; sample times are in --json and --out."
 
 
 def _spaced(values: Sequence[float]) -> str:

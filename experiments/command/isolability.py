@@ -7,7 +7,7 @@ import typer
 
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish
-from experiments.command.options import SEED, Json, Out, RigFile, Seed, load_rig
+from experiments.command.options import SEED, Drive, Json, Noise, Out, Ranked, RigFile, Seed, load_rig, option
 from experiments.command.terminal import table
 from experiments.eha.identifiability import checked_experiment, within_limits
 
@@ -23,15 +23,13 @@ commands = typer.Typer()
 @commands.command(epilog="Example: hydrostate isolability --sensors position,velocity --drive prbs --seconds 10")
 def isolability(
     sensors: Annotated[
-        str, typer.Option(metavar="LIST", help="Sensors beside motor speed, by commas: position, velocity, dp.")
+        str, option("LIST", "Sensors beside motor speed, by commas: position, velocity, dp.")
     ] = "position,velocity,dp",
-    noise: Annotated[str, typer.Option(metavar="NOISE", help="Noise of the sensors: bench, rig or paper.")] = "bench",
-    drive: Annotated[
-        str, typer.Option(metavar="DRIVE", help="Drive: sine, prbs, steps, chirp or multisine, at the paper's 4 V.")
-    ] = "steps",
-    seconds: Annotated[float, typer.Option(metavar="S", help="Length of the experiment [s].")] = 10.0,
-    rate: Annotated[float, typer.Option(metavar="HZ", help="Samples a second [Hz].")] = 1000.0,
-    ranked: Annotated[bool, typer.Option("--rank", help="Rank all drives, the one that tells most first.")] = False,
+    noise: Noise = "bench",
+    drive: Drive = "steps",
+    seconds: Annotated[float, option("S", "Length of the experiment [s].")] = 10.0,
+    rate: Annotated[float, option("HZ", "Samples a second [Hz].")] = 1000.0,
+    ranked: Ranked = False,
     rig: RigFile = None,
     out: Out = None,
     seed: Seed = SEED,

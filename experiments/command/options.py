@@ -14,6 +14,12 @@ if TYPE_CHECKING:
     from experiments.actuator_kind import ActuatorKind
     from plant.eha.rig import Rig
 
+
+def option(metavar: str, said: str, *names: str, **more: Any) -> Any:
+    """Return an option of the command line that takes a value, with what its help says."""
+    return typer.Option(*names, metavar=metavar, help=said, **more)
+
+
 Logs: TypeAlias = Annotated[
     list[Path],
     typer.Argument(
@@ -28,87 +34,84 @@ Json: TypeAlias = Annotated[
 ]
 Out: TypeAlias = Annotated[
     Path | None,
-    typer.Option(
+    option(
+        "DIR",
+        "Also write results.json and results.csv into this folder; a name ending in .json is one file.",
         "--out",
         "-o",
-        metavar="DIR",
-        help="Also write results.json and results.csv into this folder; a name ending in .json is one file.",
     ),
 ]
-Seed: TypeAlias = Annotated[
-    int, typer.Option("--seed", min=0, metavar="INT", help="Seed of all that is random; kept in the results.")
-]
+Seed: TypeAlias = Annotated[int, option("INT", "Seed of all that is random; kept in the results.", "--seed", min=0)]
 RigFile: TypeAlias = Annotated[
     Path | None,
-    typer.Option(
-        "--rig",
-        metavar="FILE",
-        help="Rig file (TOML): parameters in SI, and what the logs call their columns; see `hydrostate rig init`. "
+    option(
+        "FILE",
+        "Rig file (TOML): parameters in SI, and what the logs call their columns; see `hydrostate rig init`. "
         "Without it, the paper's actuator.",
+        "--rig",
     ),
 ]
 Columns: TypeAlias = Annotated[
     list[str] | None,
-    typer.Option(
-        "--columns",
-        metavar="CHANNEL=NAME:UNIT",
-        help="A column under another name, with its unit if it is not SI: position_m=POS_MM:mm. Repeat it, or "
+    option(
+        "CHANNEL=NAME:UNIT",
+        "A column under another name, with its unit if it is not SI: position_m=POS_MM:mm. Repeat it, or "
         "separate several by commas.",
+        "--columns",
     ),
 ]
 ConditionName: TypeAlias = Annotated[
-    str | None, typer.Option("--condition", metavar="NAME", help="A condition by name, see `hydrostate conditions`.")
+    str | None, option("NAME", "A condition by name, see `hydrostate conditions`.", "--condition")
 ]
 
 Plant: TypeAlias = Annotated[
     str | None,
-    typer.Option(
-        "--plant",
-        metavar="PLANT",
-        help="The actuator's kind: eha, the gear-pump actuator; piezo-stack, with drive_voltage_v and what is measured "
+    option(
+        "PLANT",
+        "The actuator's kind: eha, the gear-pump actuator; piezo-stack, with drive_voltage_v and what is measured "
         "of stack_displacement_m, stack_force_n, position_m, chamber_pressure_pa, from rest on; diaphragm-motor, with "
         "drive_voltage_v, a steady sine, electrode_1_v to electrode_7_v and position_m. Options that name a plant "
         "apply to it alone.",
+        "--plant",
         show_default="that of the rig file, else eha",
     ),
 ]
 BiasPressure: TypeAlias = Annotated[
     float | None,
-    typer.Option(
-        "--bias-pressure", metavar="PA", help="piezo-stack: absolute bias pressure of the runs.", show_default="1e6"
-    ),
+    option("PA", "piezo-stack: absolute bias pressure of the runs.", "--bias-pressure", show_default="1e6"),
 ]
 Load: TypeAlias = Annotated[
     float | None,
-    typer.Option(
+    option(
+        "KG|N",
+        "piezo-stack: mass lifted in the runs [kg]; diaphragm-motor: known force against extension [N].",
         "--load",
-        metavar="KG|N",
-        help="piezo-stack: mass lifted in the runs [kg]; diaphragm-motor: known force against extension [N].",
         show_default="0",
     ),
 ]
 Frequency: TypeAlias = Annotated[
     float | None,
-    typer.Option(
-        metavar="HZ",
-        help="piezo-stack: frequency, up to 450 Hz; diaphragm-motor: up to 1000 Hz.",
+    option(
+        "HZ",
+        "piezo-stack: frequency, up to 450 Hz; diaphragm-motor: up to 1000 Hz.",
         show_default="275, diaphragm-motor 480",
     ),
 ]
 Voltage: TypeAlias = Annotated[
     float | None,
-    typer.Option(
-        metavar="V",
-        help="piezo-stack: peak to peak, on half of it as bias; diaphragm-motor: peak to peak, up to 300 V.",
+    option(
+        "V",
+        "piezo-stack: peak to peak, on half of it as bias; diaphragm-motor: peak to peak, up to 300 V.",
         show_default="140, diaphragm-motor 200",
     ),
 ]
 Healthy: TypeAlias = Annotated[
     Path | None,
-    typer.Option(
-        "--healthy", metavar="LOG", help="piezo-stack, diaphragm-motor: a run of the healthy actuator to calibrate on."
-    ),
+    option("LOG", "piezo-stack, diaphragm-motor: a run of the healthy actuator to calibrate on.", "--healthy"),
 ]
+Noise: TypeAlias = Annotated[str, option("NOISE", "Noise of the sensors: bench, rig or paper.")]
+Drive: TypeAlias = Annotated[str, option("DRIVE", "Drive: sine, prbs, steps, chirp or multisine, at the paper's 4 V.")]
+Ranked: TypeAlias = Annotated[bool, typer.Option("--rank", help="Rank all drives, the one that tells most first.")]
 
 PRESSURE = "differential_pressure_pa"
 """The channel that is optional everywhere."""

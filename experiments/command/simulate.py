@@ -19,6 +19,7 @@ from experiments.command.options import (
     Seed,
     Voltage,
     load_actuator,
+    option,
     require_positive,
     understood,
 )
@@ -40,50 +41,32 @@ commands = typer.Typer()
 def simulate(
     context: typer.Context,
     out: Annotated[
-        Path,
-        typer.Option(
-            "--out", "-o", metavar="FILE", help="File to write: .csv, .csv.gz, .parquet or .mat.", show_default=False
-        ),
+        Path, option("FILE", "File to write: .csv, .csv.gz, .parquet or .mat.", "--out", "-o", show_default=False)
     ],
     plant: Annotated[
         str | None,
-        typer.Option(
-            metavar="PLANT",
-            help="lumped (5.8 to 5.10, it sticks), reduced (5.14), circuit (the whole rig), or piezo-stack and "
+        option(
+            "PLANT",
+            "lumped (5.8 to 5.10, it sticks), reduced (5.14), circuit (the whole rig), or piezo-stack and "
             "diaphragm-motor, which have a sine drive and the options marked so.",
             show_default="that of the rig file, else lumped",
         ),
     ] = None,
     condition: ConditionName = None,
     leakage_severity: Annotated[
-        float | None,
-        typer.Option(
-            metavar="NUMBER", help="In place of a condition: 0 none, 1 minor, 2 major, up to 5 [dimensionless]."
-        ),
+        float | None, option("NUMBER", "In place of a condition: 0 none, 1 minor, 2 major, up to 5 [dimensionless].")
     ] = None,
-    friction_severity: Annotated[
-        float | None, typer.Option(metavar="NUMBER", help="Likewise, of friction [dimensionless].")
-    ] = None,
-    drive: Annotated[
-        str, typer.Option(metavar="DRIVE", help="sine, prbs, steps, chirp or multisine, of 4 V or up to it.")
-    ] = "steps",
+    friction_severity: Annotated[float | None, option("NUMBER", "Likewise, of friction [dimensionless].")] = None,
+    drive: Annotated[str, option("DRIVE", "sine, prbs, steps, chirp or multisine, of 4 V or up to it.")] = "steps",
     duration: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S", help="Length of the run [s].", show_default="10, piezo-stack 0.16, diaphragm-motor 0.2"
-        ),
+        float | None, option("S", "Length of the run [s].", show_default="10, piezo-stack 0.16, diaphragm-motor 0.2")
     ] = None,
     sample_time: Annotated[
         float | None,
-        typer.Option(
-            metavar="S", help="Time between samples [s].", show_default="1e-4, piezo-stack 5e-5, diaphragm-motor 2e-5"
-        ),
+        option("S", "Time between samples [s].", show_default="1e-4, piezo-stack 5e-5, diaphragm-motor 2e-5"),
     ] = None,
     sensors: Annotated[
-        str,
-        typer.Option(
-            metavar="SENSORS", help="bench, rig (velocity from the encoder), paper (no differential pressure) or ideal."
-        ),
+        str, option("SENSORS", "bench, rig (velocity from the encoder), paper (no differential pressure) or ideal.")
     ] = "bench",
     rig: RigFile = None,
     seed: Seed = SEED,
@@ -93,10 +76,7 @@ def simulate(
     load: Load = None,
     fault: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME",
-            help="piezo-stack: a condition, or such as air_doubled; diaphragm-motor: such as valve_4_leak=0.1.",
-        ),
+        option("NAME", "piezo-stack: a condition, or such as air_doubled; diaphragm-motor: such as valve_4_leak=0.1."),
     ] = None,
     as_json: Json = False,
 ) -> None:

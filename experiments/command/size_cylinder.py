@@ -8,7 +8,7 @@ import typer
 
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish
-from experiments.command.options import Json, Out
+from experiments.command.options import Json, Out, option
 from experiments.command.terminal import table
 from plant.errors import HydrostateError
 
@@ -31,20 +31,14 @@ SHOP_UNITS = {
     "size-cylinder", epilog="Example: hydrostate size-cylinder --force 10000 --speed 0.1 --stroke 0.5 --pressure 1e7"
 )
 def size_cylinder(
-    force: Annotated[float, typer.Option(metavar="N", help="Force while the rod goes out [N].", show_default=False)],
-    speed: Annotated[float, typer.Option(metavar="M_S", help="Speed going out [m/s].", show_default=False)],
-    stroke: Annotated[float, typer.Option(metavar="M", help="Stroke [m].", show_default=False)],
-    pressure: Annotated[
-        float, typer.Option(metavar="PA", help="Pressure at the valve, above tank [Pa].", show_default=False)
-    ],
-    retract_force: Annotated[float, typer.Option(metavar="N", help="Force going in [N].")] = 0.0,
-    retract_speed: Annotated[
-        float | None, typer.Option(metavar="M_S", help="Speed going in [m/s].", show_default="as going out")
-    ] = None,
-    bore: Annotated[
-        float | None, typer.Option(metavar="M", help="Bore [m], with --rod.", show_default="smallest of ISO 3320")
-    ] = None,
-    rod: Annotated[float | None, typer.Option(metavar="M", help="Rod [m], with --bore.", show_default=False)] = None,
+    force: Annotated[float, option("N", "Force while the rod goes out [N].", show_default=False)],
+    speed: Annotated[float, option("M_S", "Speed going out [m/s].", show_default=False)],
+    stroke: Annotated[float, option("M", "Stroke [m].", show_default=False)],
+    pressure: Annotated[float, option("PA", "Pressure at the valve, above tank [Pa].", show_default=False)],
+    retract_force: Annotated[float, option("N", "Force going in [N].")] = 0.0,
+    retract_speed: Annotated[float | None, option("M_S", "Speed going in [m/s].", show_default="as going out")] = None,
+    bore: Annotated[float | None, option("M", "Bore [m], with --rod.", show_default="smallest of ISO 3320")] = None,
+    rod: Annotated[float | None, option("M", "Rod [m], with --bore.", show_default=False)] = None,
     out: Out = None,
     as_json: Json = False,
 ) -> None:

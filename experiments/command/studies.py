@@ -4,9 +4,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, TypeAlias, TypeVar
 
-import typer
-
 from experiments.command.json_output import json_text
+from experiments.command.options import option
 from experiments.command.terminal import emit
 
 if TYPE_CHECKING:
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
 
 Settings = TypeVar("Settings", bound="DataclassInstance")
 
-Folder: TypeAlias = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the report.")]
+Folder: TypeAlias = Annotated[Path, option("DIR", "Folder of the report.", "--out", "-o")]
 
 
 def finish_study(study: "Study[Settings]", settings: Settings, out: Path, *, as_json: bool) -> None:

@@ -13,7 +13,7 @@ import typer
 
 from experiments.command.json_output import plain
 from experiments.command.logs import read_log, with_rig_columns
-from experiments.command.options import PRESSURE, Columns, RigFile, load_columns, load_rig
+from experiments.command.options import PRESSURE, Columns, RigFile, load_columns, load_rig, option
 from experiments.command.terminal import emit, note
 from plant.errors import HydrostateError, LogError, LogWarning
 from plant.notes import distinct
@@ -49,15 +49,12 @@ def watch(
             show_default=False,
         ),
     ],
-    false_alarms: Annotated[
-        float, typer.Option(metavar="RATE", help="False alarms an hour of healthy, moving operation [1/h].")
-    ] = 1.0,
+    false_alarms: Annotated[float, option("RATE", "False alarms an hour of healthy, moving operation [1/h].")] = 1.0,
     learning: Annotated[
-        float, typer.Option(metavar="S", help="Healthy running to learn before alarms can come [s], 60 at least.")
+        float, option("S", "Healthy running to learn before alarms can come [s], 60 at least.")
     ] = 120.0,
     healthy: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="A healthy log to learn first; an hour of one holds the rate best."),
+        Path | None, option("FILE", "A healthy log to learn first; an hour of one holds the rate best.")
     ] = None,
     rig: RigFile = None,
     columns: Columns = None,

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -114,12 +113,10 @@ def _run(schedule: Schedule, maps: MotorMaps, sensing: str, seed: int) -> Contro
     return controlled_run(schedule, _wanted, END, PEAK, maps, np.random.default_rng(seed), sensing=source)
 
 
-RUNS: Mapping[str, tuple[bool, str]] = MappingProxyType(
-    {
-        "encoder": (False, "encoder"),
-        "self-sensing": (False, "self"),
-        "encoder, leak": (True, "encoder"),
-        "self-sensing, leak": (True, "self"),
-    }
-)
+RUNS: Mapping[str, tuple[bool, str]] = {
+    "encoder": (False, "encoder"),
+    "self-sensing": (False, "self"),
+    "encoder, leak": (True, "encoder"),
+    "self-sensing, leak": (True, "self"),
+}
 """The runs: whether the piston leaks, and where velocity comes from."""

@@ -4,7 +4,6 @@ They read the tables of `hydrostate diaphragm-motor`, and compute nothing.
 """
 
 from collections.abc import Sequence
-from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
@@ -18,7 +17,7 @@ from experiments.page.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY
 
 MILLI, ML_MIN = 1e3, 6e7
 
-ELECTRODES = MappingProxyType({"a1_v": ORANGE, "a2_v": GREY, "a3_v": BLUE, "a4_v": VERMILION})
+ELECTRODES = {"a1_v": ORANGE, "a2_v": GREY, "a3_v": BLUE, "a4_v": VERMILION}
 """Electrodes that are drawn, and their colours; A5, A6 and A7 lie on A3, A2 and A1."""
 
 CYCLE: Sequence[Course] = (
@@ -230,15 +229,13 @@ def draw_control(tables: Tables) -> Figure:
     return figure
 
 
-MOTOR_FIGURES: Drawings = MappingProxyType(
-    {
-        "frequency": draw_frequency,
-        "voltage": draw_voltage,
-        "load": draw_load,
-        "pump_cycle": draw_cycle,
-        "reversal": draw_reversal,
-        "averaged": draw_averaged,
-        "control": draw_control,
-    }
-)
+MOTOR_FIGURES: Drawings = {
+    "frequency": draw_frequency,
+    "voltage": draw_voltage,
+    "load": draw_load,
+    "pump_cycle": draw_cycle,
+    "reversal": draw_reversal,
+    "averaged": draw_averaged,
+    "control": draw_control,
+}
 """The figures, by file name."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from types import MappingProxyType
 
 import pandas as pd
 
@@ -17,19 +16,17 @@ from experiments.running.progress import Track
 from experiments.running.study import Found, Seeded, Study
 from plant.diaphragm_motor.parameters import ROWS, DiaphragmMotorParameters
 
-SWEEPS: Mapping[str, Callable[[DiaphragmMotorParameters], pd.DataFrame]] = MappingProxyType(
-    {
-        "frequency sweep": sweeps.sweep_frequency,
-        "voltage sweep": sweeps.sweep_voltage,
-        "load sweep": sweeps.sweep_load,
-        "load and frequency": sweeps.best_frequencies,
-        "pump cycle": sweeps.pump_cycle,
-        "reversal": sweeps.reversal,
-        "sensitivity": sweeps.sensitivities,
-        "other sets": sweeps.other_sets,
-        "averaged": averaged_course,
-    }
-)
+SWEEPS: Mapping[str, Callable[[DiaphragmMotorParameters], pd.DataFrame]] = {
+    "frequency sweep": sweeps.sweep_frequency,
+    "voltage sweep": sweeps.sweep_voltage,
+    "load sweep": sweeps.sweep_load,
+    "load and frequency": sweeps.best_frequencies,
+    "pump cycle": sweeps.pump_cycle,
+    "reversal": sweeps.reversal,
+    "sensitivity": sweeps.sensitivities,
+    "other sets": sweeps.other_sets,
+    "averaged": averaged_course,
+}
 """The tables that are simulated, by name."""
 
 
@@ -66,39 +63,37 @@ RIG = DiaphragmMotorParameters()
 _CLAIM = ("section", "claim", "published", "ours")
 _BLOCKING = Column("blocking_n", "blocking force", digits=3)
 
-COLUMNS: Mapping[str, Columns] = MappingProxyType(
-    {
-        "reproduced": (*_CLAIM, "holds"),
-        "not reproduced": (*_CLAIM, "why"),
-        "blocking": ("voltage_v", _BLOCKING, Column("velocity_m_s", "velocity without load", digits=3)),
-        "control": (
-            "run",
-            Column("settling_s", "to 2 mm/s", words=_seconds),
-            Column("rise_s", "to 3.5 mm/s", words=_seconds),
-            Column("recovery_s", "after the load", words=_seconds),
-            Column("velocity_m_s", "true velocity", digits=3),
-            Column("measured_m_s", "reported velocity", digits=3),
-        ),
-        "sensitivity": (
-            *("part", "change"),
-            Column("frequency_hz", "best frequency moves", words=_change),
-            Column("flow_percent", "flow changes", words=_change),
-        ),
-        "dry modes": (
-            Column("diameters", "nodal diameters"),
-            Column("circles", "nodal circles"),
-            Column("root", "λ²"),
-            "frequency_hz",
-        ),
-        "other sets": (
-            "set",
-            Column("frequency_hz", "best frequency", digits=3),
-            Column("flow_m3_s", "peak flow", "ml/min", 6e7),
-            Column("blocking_n", "blocking force at 480 Hz", digits=3),
-        ),
-        "rig": (Column("parameter", "name", words=spaced), *("value", "unit", "meaning", "source")),
-    }
-)
+COLUMNS: Mapping[str, Columns] = {
+    "reproduced": (*_CLAIM, "holds"),
+    "not reproduced": (*_CLAIM, "why"),
+    "blocking": ("voltage_v", _BLOCKING, Column("velocity_m_s", "velocity without load", digits=3)),
+    "control": (
+        "run",
+        Column("settling_s", "to 2 mm/s", words=_seconds),
+        Column("rise_s", "to 3.5 mm/s", words=_seconds),
+        Column("recovery_s", "after the load", words=_seconds),
+        Column("velocity_m_s", "true velocity", digits=3),
+        Column("measured_m_s", "reported velocity", digits=3),
+    ),
+    "sensitivity": (
+        *("part", "change"),
+        Column("frequency_hz", "best frequency moves", words=_change),
+        Column("flow_percent", "flow changes", words=_change),
+    ),
+    "dry modes": (
+        Column("diameters", "nodal diameters"),
+        Column("circles", "nodal circles"),
+        Column("root", "λ²"),
+        "frequency_hz",
+    ),
+    "other sets": (
+        "set",
+        Column("frequency_hz", "best frequency", digits=3),
+        Column("flow_m3_s", "peak flow", "ml/min", 6e7),
+        Column("blocking_n", "blocking force at 480 Hz", digits=3),
+    ),
+    "rig": (Column("parameter", "name", words=spaced), *("value", "unit", "meaning", "source")),
+}
 """How the report shows its tables."""
 
 

@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from experiments.page.frames import Rows, tabled
 from plant.diaphragm_motor.composite_plate import PlateParameters, plate_coefficients, plate_modes
 from plant.diaphragm_motor.flow import OperatingPoint, operate, pump_alone
 from plant.diaphragm_motor.model import FLOWS, OPENINGS, PRESSURES
@@ -118,7 +119,8 @@ def blocking_force(p: DiaphragmMotorParameters, frequency: float, swing: float) 
     return 0.5 * (low + high)
 
 
-def sweep_load(p: DiaphragmMotorParameters, swings: Sequence[float] = (100.0, 200.0, 300.0)) -> pd.DataFrame:
+@tabled
+def sweep_load(p: DiaphragmMotorParameters, swings: Sequence[float] = (100.0, 200.0, 300.0)) -> Rows:
     """Return velocity and A4's amplitude over load at the best frequency (equation 18).
 
     Parameters
@@ -133,16 +135,15 @@ def sweep_load(p: DiaphragmMotorParameters, swings: Sequence[float] = (100.0, 20
     pandas.DataFrame
         Columns voltage_v, blocking_n, load_n, flow_m3_s, velocity_m_s, a1_v to a7_v.
     """
-    rows: list[dict[str, float]] = []
     for swing in swings:
         blocked = blocking_force(p, PEAK, swing)
         for load in blocked * np.array(SHARES):
             point = operate(replace(p, load_force=float(load)), PEAK, swing)
-            rows.append({"voltage_v": swing, "blocking_n": blocked, "load_n": float(load), **_point_row(point)})
-    return pd.DataFrame(rows)
+            yield {"voltage_v": swing, "blocking_n": blocked, "load_n": float(load), **_point_row(point)}
 
 
-def best_frequencies(p: DiaphragmMotorParameters, swing: float = 300.0) -> pd.DataFrame:
+@tabled
+def best_frequencies(p: DiaphragmMotorParameters, swing: float = 300.0) -> Rows:
     """Return velocity over frequency under several loads, whose best frequency section 7.2 lets rise (errata M31).
 
     Parameters
@@ -157,13 +158,11 @@ def best_frequencies(p: DiaphragmMotorParameters, swing: float = 300.0) -> pd.Da
     pandas.DataFrame
         Columns load_n, frequency_hz, velocity_m_s.
     """
-    rows: list[dict[str, float]] = []
     for load in LOADS:
         loaded = replace(p, load_force=load)
         for frequency in np.arange(320.0, 561.0, 10.0).tolist():
             speed = operate(loaded, frequency, swing).velocity
-            rows.append({"load_n": load, "frequency_hz": frequency, "velocity_m_s": speed})
-    return pd.DataFrame(rows)
+            yield {"load_n": load, "frequency_hz": frequency, "velocity_m_s": speed}
 
 
 def pump_cycle(p: DiaphragmMotorParameters) -> pd.DataFrame:
@@ -213,7 +212,8 @@ def reversal(p: DiaphragmMotorParameters) -> pd.DataFrame:
     return pd.DataFrame({"time_s": time, "position_m": record["position_m"], "spool": spool}).iloc[::10]
 
 
-def sensitivities(p: DiaphragmMotorParameters) -> pd.DataFrame:
+@tabled
+def sensitivities(p: DiaphragmMotorParameters) -> Rows:
     """Return by how much peak flow and its frequency answer to each part, and to gas (errata M22).
 
     Parameters
@@ -230,18 +230,14 @@ def sensitivities(p: DiaphragmMotorParameters) -> pd.DataFrame:
     changed = [(words, "10 % more", replace(p, **{name: 1.1 * getattr(p, name)})) for name, words in PARTS.items()]
     changed.append(("bulk modulus", "halved", replace(p, bulk_modulus=0.5 * p.bulk_modulus)))
     changed.append(("gas in the chambers", "0.1 to 2 %", replace(p, gas_fraction=(2e-2,) * DIAPHRAGMS)))
-    rows: list[dict[str, object]] = []
     for words, change, other in changed:
         frequency, flow = _peak(other)
-        rows.append(
-            {
-                "part": words,
-                "change": change,
-                "frequency_hz": frequency - best,
-                "flow_percent": 100.0 * (flow / most - 1.0),
-            }
-        )
-    return pd.DataFrame(rows)
+        yield {
+            "part": words,
+            "change": change,
+            "frequency_hz": frequency - best,
+            "flow_percent": 100.0 * (flow / most - 1.0),
+        }
 
 
 def _peak(p: DiaphragmMotorParameters) -> tuple[float, float]:
@@ -254,7 +250,8 @@ def _peak(p: DiaphragmMotorParameters) -> tuple[float, float]:
     return float(frequencies[k] + shift), float(flows[k] + 0.5 * b * shift)
 
 
-def other_sets(p: DiaphragmMotorParameters) -> pd.DataFrame:
+@tabled
+def other_sets(p: DiaphragmMotorParameters) -> Rows:
     """Return three sets of parameters that give the published peak, each of another plate (errata M22).
 
     Parameters
@@ -274,20 +271,16 @@ def other_sets(p: DiaphragmMotorParameters) -> pd.DataFrame:
         "PZT-5A, clamped at 14.4 mm": _calibrated(p, replace(hard, clamp_radius=14.4e-3), 6.6e-4),
         "PZT-5H, clamped at 17.5 mm": _calibrated(p, replace(soft, clamp_radius=17.5e-3), 1.06e-3),
     }
-    rows: list[dict[str, object]] = []
     for name, motor in sets.items():
         frequency, flow = _peak(motor)
-        rows.append(
-            {
-                "set": name,
-                "inertance_kg_m4": motor.inertance,
-                "port_area_m2": motor.port_area,
-                "frequency_hz": frequency,
-                "flow_m3_s": flow,
-                "blocking_n": blocking_force(motor, PEAK, SWING),
-            }
-        )
-    return pd.DataFrame(rows)
+        yield {
+            "set": name,
+            "inertance_kg_m4": motor.inertance,
+            "port_area_m2": motor.port_area,
+            "frequency_hz": frequency,
+            "flow_m3_s": flow,
+            "blocking_n": blocking_force(motor, PEAK, SWING),
+        }
 
 
 def _calibrated(p: DiaphragmMotorParameters, plate: PlateParameters, lag: float) -> DiaphragmMotorParameters:

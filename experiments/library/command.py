@@ -8,7 +8,7 @@ import typer
 
 from experiments.command.json_output import Result
 from experiments.command.logs import Batch, finish
-from experiments.command.options import SEED, Json, Seed
+from experiments.command.options import SEED, Json, Seed, option
 from experiments.command.studies import finish_study
 from experiments.command.terminal import table
 from plant.errors import HydrostateError
@@ -25,9 +25,7 @@ def library(
         Path | None,
         typer.Argument(metavar="FILE", help="A library to show; the one that ships unless given.", show_default=False),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="DIR", help="Build it anew, into this folder.")
-    ] = None,
+    out: Annotated[Path | None, option("DIR", "Build it anew, into this folder.", "--out", "-o")] = None,
     seed: Seed = SEED,
     as_json: Json = False,
 ) -> None:

@@ -1,7 +1,5 @@
 """The nine-condition library: its models beside Table 6, four structures compared, and the clock of the test."""
 
-from types import MappingProxyType
-
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
@@ -25,18 +23,19 @@ from experiments.page.words import in_words
 MILLI = 1e3
 """Millimetres a metre."""
 
-STRUCTURE_MARKS = MappingProxyType(
-    {"output-error": (BLUE, "o"), "ARX": (ORANGE, "s"), "ARMAX": (GREEN, "^"), "Box-Jenkins": (PURPLE, "D")}
-)
+STRUCTURE_MARKS = {
+    "output-error": (BLUE, "o"),
+    "ARX": (ORANGE, "s"),
+    "ARMAX": (GREEN, "^"),
+    "Box-Jenkins": (PURPLE, "D"),
+}
 """Colour and mark of each structure."""
 
-COMPARED = MappingProxyType(
-    {
-        "fit_percent": ("running free", "fit [%]"),
-        "one_step_percent": ("one step ahead", "fit [%]"),
-        "weight_above_percent": ("criterion's weight above 25 Hz", "share [%]"),
-    }
-)
+COMPARED = {
+    "fit_percent": ("running free", "fit [%]"),
+    "one_step_percent": ("one step ahead", "fit [%]"),
+    "weight_above_percent": ("criterion's weight above 25 Hz", "share [%]"),
+}
 """Panels of the comparison: column, title and axis."""
 
 
@@ -156,7 +155,10 @@ def draw_clocks(tables: Tables) -> Figure:
     return figure
 
 
-LIBRARY_FIGURES: Drawings = MappingProxyType(
-    {"library": draw_library, "structures": draw_structures, "orders": draw_orders, "clocks": draw_clocks}
-)
+LIBRARY_FIGURES: Drawings = {
+    "library": draw_library,
+    "structures": draw_structures,
+    "orders": draw_orders,
+    "clocks": draw_clocks,
+}
 """The figures, by file name, in the report's order."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
@@ -13,7 +12,7 @@ from experiments.library.library import build_library, library_models, library_t
 from experiments.library.sentences import clock_sentences, order_sentences, structure_sentences
 from experiments.library.structures import clock_table, order_and_bandwidth, structure_table
 from experiments.library.tables import library_table, response_table, root_table
-from experiments.page.frames import Tables
+from experiments.page.frames import Rows, Tables, tabled
 from experiments.page.numbers import fixed, number
 from experiments.page.tables import Cell, Column, Columns, Row, right
 from experiments.page.words import CONDITION
@@ -51,14 +50,13 @@ def _facts(tables: Tables, _: Seeded) -> Mapping[str, Any]:
     }
 
 
-def _roots(frame: pd.DataFrame) -> pd.DataFrame:
-    rows: list[dict[str, str]] = []
+@tabled
+def _roots(frame: pd.DataFrame) -> Rows:
     for condition, of_one in frame.groupby("condition", sort=False):
         row = {"condition": str(condition)}
         for (kind, source), roots in of_one.groupby(["kind", "source"]):
             row[f"{kind}s, {source}"] = "; ".join(_root(root) for root in roots.to_dict("records"))
-        rows.append(row)
-    return pd.DataFrame(rows)
+        yield row
 
 
 def _root(root: Row) -> str:
@@ -88,43 +86,41 @@ def _at_frequency(name: str) -> Column | None:
     return Column(name, f"at {name.split('_')[1].removesuffix('.0')} Hz", "% of gain", 100.0, 2)
 
 
-COLUMNS: Mapping[str, Columns] = MappingProxyType(
-    {
-        "library": (
-            CONDITION,
-            Column("dc_gain", "steady gain", "mm/s per rad/s, 95 %", of_row=_gain),
-            Column("published_gain_low", "Table 6", "mm/s per rad/s, by rounding", of_row=_printed_gain),
-            Column("bandwidth_hz", "3 dB down", digits=3),
-            Column("published_bandwidth_hz", "Table 6", digits=3),
-            Column("jump_ratio", "b0 / gain", "ratio", digits=2),
-            Column("published_jump_ratio", "Table 6", "ratio", digits=2),
-            Column("fit_percent", digits=3),
-        ),
-        "roots by condition": (CONDITION, "poles, library", "poles, Table 6", "zeros, library", "zeros, Table 6"),
-        "structures": (
-            *(CONDITION, "order", "structure", Column("fit_percent", "free run")),
-            Column("behind_percent", "behind the best", "points ± standard error", of_row=_behind),
-            Column("one_step_percent", "one step ahead"),
-            Column("weight_above_percent", "weight above 25 Hz", digits=2),
-            Column("dc_gain", "steady gain", "mm/s per rad/s", 1e3),
-        ),
-        "orders": (
-            CONDITION,
-            Column("order_by_values", "order by singular values"),
-            Column("order_by_bic", "order by BIC"),
-            Column("order_of_library", "order kept"),
-            *(Column(f"value_{k}_over_floor", f"value {k}", "over floor", digits=2) for k in (1, 2, 3)),
-            *(Column(f"fit_{order}_percent", f"fit, order {order}") for order in (1, 2, 3, 4)),
-            Column("bandwidth_hz", "3 dB down", digits=3),
-            Column("bandwidth_std_hz", "± one deviation", digits=1),
-        ),
-        "clocks": (
-            *(Column("input", "test"), _at_frequency),
-            Column("steady_state", "steady", "% of gain", 100.0, 2),
-            Column("violations", "what it breaks", words=lambda text: text or "nothing"),
-        ),
-    }
-)
+COLUMNS: Mapping[str, Columns] = {
+    "library": (
+        CONDITION,
+        Column("dc_gain", "steady gain", "mm/s per rad/s, 95 %", of_row=_gain),
+        Column("published_gain_low", "Table 6", "mm/s per rad/s, by rounding", of_row=_printed_gain),
+        Column("bandwidth_hz", "3 dB down", digits=3),
+        Column("published_bandwidth_hz", "Table 6", digits=3),
+        Column("jump_ratio", "b0 / gain", "ratio", digits=2),
+        Column("published_jump_ratio", "Table 6", "ratio", digits=2),
+        Column("fit_percent", digits=3),
+    ),
+    "roots by condition": (CONDITION, "poles, library", "poles, Table 6", "zeros, library", "zeros, Table 6"),
+    "structures": (
+        *(CONDITION, "order", "structure", Column("fit_percent", "free run")),
+        Column("behind_percent", "behind the best", "points ± standard error", of_row=_behind),
+        Column("one_step_percent", "one step ahead"),
+        Column("weight_above_percent", "weight above 25 Hz", digits=2),
+        Column("dc_gain", "steady gain", "mm/s per rad/s", 1e3),
+    ),
+    "orders": (
+        CONDITION,
+        Column("order_by_values", "order by singular values"),
+        Column("order_by_bic", "order by BIC"),
+        Column("order_of_library", "order kept"),
+        *(Column(f"value_{k}_over_floor", f"value {k}", "over floor", digits=2) for k in (1, 2, 3)),
+        *(Column(f"fit_{order}_percent", f"fit, order {order}") for order in (1, 2, 3, 4)),
+        Column("bandwidth_hz", "3 dB down", digits=3),
+        Column("bandwidth_std_hz", "± one deviation", digits=1),
+    ),
+    "clocks": (
+        *(Column("input", "test"), _at_frequency),
+        Column("steady_state", "steady", "% of gain", 100.0, 2),
+        Column("violations", "what it breaks", words=lambda text: text or "nothing"),
+    ),
+}
 """How the report shows its tables."""
 
 LIBRARY = Study("library", "library/report.html", _find, LIBRARY_FIGURES, COLUMNS, asdict(RIG), _facts, "report")

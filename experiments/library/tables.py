@@ -8,6 +8,7 @@ import pandas as pd
 from estimation.identification.model.linear_model import LinearModel
 from experiments.circuit.passes import CHANNELS, SAMPLE_TIME
 from experiments.nine_conditions.printed_transfer_functions import printed_model
+from experiments.page.frames import Frames, Rows, stacked, tabled
 
 FREQUENCIES = np.geomspace(0.5, 100.0, 60)
 """Frequencies of the responses [Hz]."""
@@ -30,7 +31,8 @@ def published_model(condition: str) -> LinearModel:
     return LinearModel(np.array(printed["numerator"]), np.array(printed["denominator"]), SAMPLE_TIME, *CHANNELS)
 
 
-def library_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
+@tabled
+def library_table(models: Mapping[str, LinearModel]) -> Rows:
     """Return the library beside Table 6, condition by condition.
 
     Parameters
@@ -44,28 +46,24 @@ def library_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
         Gain with standard deviation, the interval of the printed gain, natural frequencies and bandwidth of both, and
         the share of the gain that acts at once (``jump_ratio``).
     """
-    rows: list[dict[str, object]] = []
     for name, model in models.items():
         printed, published = printed_model(name), published_model(name)
-        rows.append(
-            {
-                "condition": name,
-                "dc_gain": model.dc_gain,
-                "dc_gain_std": model.dc_gain_std,
-                "published_gain_low": printed["dc_gain"]["interval"][0],
-                "published_gain_high": printed["dc_gain"]["interval"][1],
-                "slowest_hz": _frequencies(model).min(),
-                "published_slowest_hz": _frequencies(published).min(),
-                "bandwidth_hz": model.bandwidth_hz,
-                "bandwidth_std_hz": model.bandwidth_std_hz,
-                "published_bandwidth_hz": published.bandwidth_hz,
-                "jump_ratio": model.numerator[0] / model.dc_gain,
-                "published_jump_ratio": published.numerator[0] / published.dc_gain,
-                "fit_percent": model.fit_percent,
-                "cancellations": len(model.cancellations),
-            }
-        )
-    return pd.DataFrame(rows)
+        yield {
+            "condition": name,
+            "dc_gain": model.dc_gain,
+            "dc_gain_std": model.dc_gain_std,
+            "published_gain_low": printed["dc_gain"]["interval"][0],
+            "published_gain_high": printed["dc_gain"]["interval"][1],
+            "slowest_hz": _frequencies(model).min(),
+            "published_slowest_hz": _frequencies(published).min(),
+            "bandwidth_hz": model.bandwidth_hz,
+            "bandwidth_std_hz": model.bandwidth_std_hz,
+            "published_bandwidth_hz": published.bandwidth_hz,
+            "jump_ratio": model.numerator[0] / model.dc_gain,
+            "published_jump_ratio": published.numerator[0] / published.dc_gain,
+            "fit_percent": model.fit_percent,
+            "cancellations": len(model.cancellations),
+        }
 
 
 def root_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
@@ -94,7 +92,8 @@ def root_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=names)
 
 
-def response_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
+@stacked
+def response_table(models: Mapping[str, LinearModel]) -> Frames:
     """Return the gain of the library's models over frequency, with 95 % bands, beside Table 6's.
 
     Parameters
@@ -108,14 +107,12 @@ def response_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
         Columns condition, ``frequency_hz``, ``gain``, ``gain_low``, ``gain_high``, ``published_gain``
         [m/s per rad/s].
     """
-    parts: list[pd.DataFrame] = []
     for name, model in models.items():
         band = model.frequency_response(FREQUENCIES, ci=0.95)
         published = np.abs(published_model(name).frequency_response(FREQUENCIES))
         columns = {"gain": np.abs(band.response), "gain_low": band.gain_low, "gain_high": band.gain_high}
         columns |= {"published_gain": published}
-        parts.append(pd.DataFrame({"condition": name, "frequency_hz": FREQUENCIES, **columns}))
-    return pd.concat(parts, ignore_index=True)
+        yield {"condition": name, "frequency_hz": FREQUENCIES, **columns}
 
 
 def _frequencies(model: LinearModel) -> np.ndarray:

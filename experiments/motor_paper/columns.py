@@ -1,7 +1,6 @@
 """How the report of `hydrostate motor-paper` shows its tables."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 from experiments.motor_paper.regression_figure import READING_WORDS
 from experiments.page.tables import Column, Columns, as_given, decimals, spaced
@@ -123,5 +122,5 @@ _LINEAR: Mapping[str, Columns] = {
     ),
 }
 
-COLUMNS: Mapping[str, Columns] = MappingProxyType({**_PAPER, **_SENSING, **_LINEAR})
+COLUMNS: Mapping[str, Columns] = {**_PAPER, **_SENSING, **_LINEAR}
 """By the names of the tables: of the paper's own and its regression, of sensing, of its linear models."""

@@ -1,11 +1,10 @@
 """The diaphragm-motor paper's hysteresis, equations 20 and 21: loops by both laws, and the linear model about them."""
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 
 from experiments.motor_paper.vibration import response_rows
+from experiments.page.frames import Frames, Rows, stacked, tabled
 from plant.motor_paper.hysteresis_model import (
     HysteresisParameters,
     describing_function,
@@ -20,7 +19,8 @@ LOOP_FREQUENCIES, LOOP_AMPLITUDE = (1.0, 10.0, 100.0, 480.0), 100.0
 """Of the hysteresis loops [Hz, V]."""
 
 
-def hysteresis_loops(p: HysteresisParameters) -> pd.DataFrame:
+@stacked
+def hysteresis_loops(p: HysteresisParameters) -> Frames:
     """Return the loops of Figures 27 and 34, by the law with rates and as printed (errata M21).
 
     Parameters
@@ -33,17 +33,16 @@ def hysteresis_loops(p: HysteresisParameters) -> pd.DataFrame:
     pandas.DataFrame
         Columns law, frequency_hz, voltage_v, hysteresis_v, displacement_m.
     """
-    parts: list[pd.DataFrame] = []
     for law in ("mended", "printed"):
         for frequency in LOOP_FREQUENCIES:
             voltage, hysteresis = hysteresis_loop(p, LOOP_AMPLITUDE, frequency, law=law)
             displacement = p.stroke_a_volt * (voltage - hysteresis)
             columns = {"voltage_v": voltage, "hysteresis_v": hysteresis, "displacement_m": displacement}
-            parts.append(pd.DataFrame({"law": law, "frequency_hz": frequency, **columns}))
-    return pd.concat(parts, ignore_index=True)
+            yield {"law": law, "frequency_hz": frequency, **columns}
 
 
-def hysteresis_table(loops: pd.DataFrame) -> pd.DataFrame:
+@tabled
+def hysteresis_table(loops: pd.DataFrame) -> Rows:
     """Return what each loop amounts to.
 
     Parameters
@@ -57,23 +56,19 @@ def hysteresis_table(loops: pd.DataFrame) -> pd.DataFrame:
         Columns law, frequency_hz, area_v2, width_percent (at no voltage, of the stroke), gain and lag_deg of the
         displacement's first harmonic over that without hysteresis, distortion_percent.
     """
-    rows: list[dict[str, Any]] = []
     for (law, frequency), loop in loops.groupby(["law", "frequency_hz"]):
         voltage, hysteresis = loop["voltage_v"].to_numpy(), loop["hysteresis_v"].to_numpy()
         left = voltage - hysteresis
         passed = 1.0 - describing_function(voltage, hysteresis)
-        rows.append(
-            {
-                "law": law,
-                "frequency_hz": frequency,
-                "area_v2": loop_area(voltage, hysteresis),
-                "width_percent": 100.0 * abs(left[0] - left[len(left) // 2]) / np.ptp(left),
-                "gain": abs(passed),
-                "lag_deg": -np.degrees(np.angle(passed)),
-                "distortion_percent": 100.0 * total_harmonic_distortion(harmonics(left, 9)),
-            }
-        )
-    return pd.DataFrame(rows)
+        yield {
+            "law": law,
+            "frequency_hz": frequency,
+            "area_v2": loop_area(voltage, hysteresis),
+            "width_percent": 100.0 * abs(left[0] - left[len(left) // 2]) / np.ptp(left),
+            "gain": abs(passed),
+            "lag_deg": -np.degrees(np.angle(passed)),
+            "distortion_percent": 100.0 * total_harmonic_distortion(harmonics(left, 9)),
+        }
 
 
 def impulse_table(p: HysteresisParameters) -> pd.DataFrame:

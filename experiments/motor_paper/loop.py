@@ -6,11 +6,11 @@ finds without the model where the loop would swing.
 
 from collections.abc import Mapping
 from math import pi
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from experiments.page.frames import Frames, Rows, stacked, tabled
 from experiments.running.random_streams import stream
 from plant.motor_paper.loop_blocks import (
     LoopRun,
@@ -90,7 +90,8 @@ def designed(p: VibrationParameters) -> Mapping[str, Pid]:
     }
 
 
-def loop_runs(p: VibrationParameters, seed: int) -> pd.DataFrame:
+@stacked
+def loop_runs(p: VibrationParameters, seed: int) -> Frames:
     """Return the step under each controller, with delay and noise.
 
     Parameters
@@ -108,12 +109,10 @@ def loop_runs(p: VibrationParameters, seed: int) -> pd.DataFrame:
     count = round(DURATION / SAMPLE_TIME) + 1
     reference = np.where(np.arange(count) * SAMPLE_TIME >= 2e-3, STEP, 0.0)
     noise = band_limited_noise(stream(seed, "loop"), count, SAMPLE_TIME, NOISE_DENSITY)
-    parts: list[pd.DataFrame] = []
     for name, pid in designed(p).items():
         run = _under(p, pid, reference, noise)
         columns = {"time_s": run.time, "reference_m": reference, "output_m": run.output, "command_n": run.command}
-        parts.append(pd.DataFrame({"controller": name, **columns}))
-    return pd.concat(parts, ignore_index=True)
+        yield {"controller": name, **columns}
 
 
 def _under(p: VibrationParameters, pid: Pid, reference: np.ndarray, noise: np.ndarray) -> LoopRun:
@@ -123,7 +122,8 @@ def _under(p: VibrationParameters, pid: Pid, reference: np.ndarray, noise: np.nd
     return run_loop(massless_matrices(p), controller, PidMemory(), reference, SAMPLE_TIME, delay=DELAY, noise=noise)
 
 
-def loop_table(runs: pd.DataFrame) -> pd.DataFrame:
+@tabled
+def loop_table(runs: pd.DataFrame) -> Rows:
     """Return what each controller makes of the step.
 
     Parameters
@@ -137,23 +137,19 @@ def loop_table(runs: pd.DataFrame) -> pd.DataFrame:
         Columns controller, overshoot_percent (of the value that it settles to), settling_time_s (into 5 % of it for
         good), error_percent (of the step, over the last quarter), ripple_m (standard deviation there).
     """
-    rows: list[dict[str, Any]] = []
     for name, run in runs.groupby("controller", sort=False):
         after = run[run["reference_m"] > 0.0]
         time, output = (after[column].to_numpy() for column in ("time_s", "output_m"))
         end = output[3 * len(output) // 4 :]
         settled = float(end.mean())
         outside = np.flatnonzero(np.abs(output / settled - 1.0) > 0.05)
-        rows.append(
-            {
-                "controller": name,
-                "overshoot_percent": 100.0 * (float(output.max()) / settled - 1.0),
-                "settling_time_s": float(time[outside[-1]] - time[0]),
-                "error_percent": 100.0 * (1.0 - settled / STEP),
-                "ripple_m": float(end.std()),
-            }
-        )
-    return pd.DataFrame(rows)
+        yield {
+            "controller": name,
+            "overshoot_percent": 100.0 * (float(output.max()) / settled - 1.0),
+            "settling_time_s": float(time[outside[-1]] - time[0]),
+            "error_percent": 100.0 * (1.0 - settled / STEP),
+            "ripple_m": float(end.std()),
+        }
 
 
 def relay_table(p: VibrationParameters) -> pd.DataFrame:
@@ -195,7 +191,8 @@ def _half_turn(p: VibrationParameters) -> tuple[float, float]:
     return float(1.0 / abs(response[where])), float(omega[where] / (2.0 * pi))
 
 
-def spectrum_table(runs: pd.DataFrame) -> pd.DataFrame:
+@stacked
+def spectrum_table(runs: pd.DataFrame) -> Frames:
     """Return the amplitude spectra of the commands while the reference rests: what becomes of noise, Figures 19 and 20.
 
     Parameters
@@ -209,7 +206,6 @@ def spectrum_table(runs: pd.DataFrame) -> pd.DataFrame:
         Columns controller, frequency_hz (up to 5 kHz) and amplitude_n, of the second half's command less its mean,
         Hann window.
     """
-    parts: list[pd.DataFrame] = []
     for name, run in runs.groupby("controller", sort=False):
         command = run["command_n"].to_numpy()[len(run) // 2 :]
         window = np.hanning(len(command))
@@ -217,5 +213,4 @@ def spectrum_table(runs: pd.DataFrame) -> pd.DataFrame:
         frequency = np.fft.rfftfreq(len(command), SAMPLE_TIME)
         kept = (frequency > 0.0) & (frequency <= 5e3)
         columns = {"frequency_hz": frequency[kept], "amplitude_n": lines[kept]}
-        parts.append(pd.DataFrame({"controller": name, **columns}))
-    return pd.concat(parts, ignore_index=True)
+        yield {"controller": name, **columns}

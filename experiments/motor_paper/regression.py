@@ -5,28 +5,26 @@ what they cannot see is said beside: flow and velocity are one number, by equati
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
+from experiments.page.frames import Frames, stacked
 from experiments.published import load
 from plant.errors import HydrostateError
 
 FLOW, DEFORMATION, VELOCITY = "output_flow_qg", "deformation_delta_mm", "fluid_velocity_v"
 
-READINGS: Mapping[str, Mapping[tuple[int, str], float]] = MappingProxyType(
-    {
-        "as_printed": MappingProxyType({}),
-        "anova": MappingProxyType({(5, FLOW): 0.0868, (2, VELOCITY): 2.585e-3}),
-        "physical": MappingProxyType({(2, VELOCITY): 2.585e-3}),
-    }
-)
+READINGS: Mapping[str, Mapping[tuple[int, str], float]] = {
+    "as_printed": {},
+    "anova": {(5, FLOW): 0.0868, (2, VELOCITY): 2.585e-3},
+    "physical": {(2, VELOCITY): 2.585e-3},
+}
 """What each reading puts into Table 2, by row (from 0) and column."""
 
-FITTED_AS = MappingProxyType({"const": "intercept", DEFORMATION: "deformation", VELOCITY: "velocity"})
+FITTED_AS = {"const": "intercept", DEFORMATION: "deformation", VELOCITY: "velocity"}
 """Statsmodels' names of the regressors, and those of the published table."""
 
 HIGH_R_SQUARE, SIGNIFICANCE, HIGH_VIF = 0.9, 0.05, 5.0
@@ -141,7 +139,8 @@ def anova_table() -> pd.DataFrame:
     return table.assign(relative_difference=(table["anova"] / table["published"] - 1.0).abs())
 
 
-def residual_table() -> pd.DataFrame:
+@stacked
+def residual_table() -> Frames:
     """Return what the residual, line-fit and probability plots of Figures 10 to 16 show, in every reading.
 
     Returns
@@ -151,7 +150,6 @@ def residual_table() -> pd.DataFrame:
         (residual over its own standard deviation, sqrt(1 - leverage) included), leverage; percentile and sorted_flow,
         as Figure 12's probability output has them; normal_score, the normal quantile of that percentile.
     """
-    parts: list[pd.DataFrame] = []
     for name in READINGS:
         table = reading(name)
         found = fit(table)
@@ -173,8 +171,7 @@ def residual_table() -> pd.DataFrame:
                 "normal_score": norm.ppf(percentile / 100.0),
             }
         )
-        parts.append(part)
-    return pd.concat(parts, ignore_index=True)
+        yield part
 
 
 def inflations(found: Any) -> list[float]:

@@ -3,8 +3,6 @@
 They read the tables of `hydrostate motor-paper`, and compute nothing.
 """
 
-from types import MappingProxyType
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -14,10 +12,10 @@ from experiments.page.figure_files import Drawings
 from experiments.page.frames import Tables
 from experiments.page.style import BLACK, BLUE, GREY, ORANGE, VERMILION, Margins, panels
 
-READING_WORDS = MappingProxyType({"as_printed": "as printed", "anova": "as in Figure 12", "physical": "physical"})
+READING_WORDS = {"as_printed": "as printed", "anova": "as in Figure 12", "physical": "physical"}
 """The readings of Table 2 in words."""
 
-_MARKS = MappingProxyType({"as_printed": (GREY, "x"), "anova": (BLUE, "o"), "physical": (VERMILION, "s")})
+_MARKS = {"as_printed": (GREY, "x"), "anova": (BLUE, "o"), "physical": (VERMILION, "s")}
 
 
 def _marked(axis: Axes, rows: pd.DataFrame, across: str, up: str) -> None:
@@ -118,11 +116,9 @@ def draw_circle(tables: Tables) -> Figure:
     return figure
 
 
-REGRESSION_FIGURES: Drawings = MappingProxyType(
-    {
-        "residuals": draw_residuals,
-        "line_fits": draw_line_fits,
-        "circle": draw_circle,
-    }
-)
+REGRESSION_FIGURES: Drawings = {
+    "residuals": draw_residuals,
+    "line_fits": draw_line_fits,
+    "circle": draw_circle,
+}
 """The figures, by file name."""

@@ -7,13 +7,12 @@ over drive voltages and loads, at 480 Hz. And the spectra of the driven motor, F
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import ceil
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from experiments.motor_paper.regression import fit, inflations, predictive_r_square
+from experiments.page.frames import Frames, Rows, stacked, tabled
 from experiments.running.random_streams import stream
 from plant.diaphragm_motor.flow import SETTLING, operate
 from plant.diaphragm_motor.model import FLOWS, VELOCITY, deflections
@@ -32,25 +31,21 @@ RELATIVE_NOISE = 0.005
 
 DRIVE = "peak_to_peak_v"
 
-MODELS: Mapping[str, Sequence[str]] = MappingProxyType(
-    {
-        "A4": (ELECTRODES[3],),
-        "A3, A4, A5, as the paper wants": ELECTRODES[2:5],
-        "all seven": ELECTRODES,
-        "A4 and drive voltage": (ELECTRODES[3], DRIVE),
-        "A3, A4, A5 and drive voltage": (*ELECTRODES[2:5], DRIVE),
-    }
-)
+MODELS: Mapping[str, Sequence[str]] = {
+    "A4": (ELECTRODES[3],),
+    "A3, A4, A5, as the paper wants": ELECTRODES[2:5],
+    "all seven": ELECTRODES,
+    "A4 and drive voltage": (ELECTRODES[3], DRIVE),
+    "A3, A4, A5 and drive voltage": (*ELECTRODES[2:5], DRIVE),
+}
 """What velocity is regressed on."""
 
-FAULTS = MappingProxyType(
-    {
-        "A4 reads 20 % low": ("sensor_gain", 4, 0.8),
-        "A4 lost 20 % of its polarisation": ("polarisation", 4, 0.8),
-        "valve 4 stuck open": ("valve_leak", 4, 1.0),
-        "gas of 2 % in chamber 4": ("gas_fraction", 4, 0.02),
-    }
-)
+FAULTS = {
+    "A4 reads 20 % low": ("sensor_gain", 4, 0.8),
+    "A4 lost 20 % of its polarisation": ("polarisation", 4, 0.8),
+    "valve 4 stuck open": ("valve_leak", 4, 1.0),
+    "gas of 2 % in chamber 4": ("gas_fraction", 4, 0.02),
+}
 """Faults of one part: parameter, place, value."""
 
 HARMONICS = 9
@@ -106,7 +101,8 @@ def sensing_predictions(points: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def sensing_regressions(points: pd.DataFrame) -> pd.DataFrame:
+@tabled
+def sensing_regressions(points: pd.DataFrame) -> Rows:
     """Return how well velocity is explained by each set of sensing voltages.
 
     Parameters
@@ -120,25 +116,22 @@ def sensing_regressions(points: pd.DataFrame) -> pd.DataFrame:
         Columns regressors, r_square, predictive_r_square, error_m_s (standard error), largest_vif, and smallest and
         largest_coefficient of the electrodes [m/s a volt].
     """
-    rows: list[dict[str, Any]] = []
     for words, names in MODELS.items():
         found = fit(points, names, "velocity_m_s")
         electrodes = found.params[[name for name in names if name != DRIVE]]
-        rows.append(
-            {
-                "regressors": words,
-                "r_square": float(found.rsquared),
-                "predictive_r_square": predictive_r_square(found),
-                "error_m_s": float(np.sqrt(found.mse_resid)),
-                "largest_vif": max(inflations(found)),
-                "smallest_coefficient": float(electrodes.min()),
-                "largest_coefficient": float(electrodes.max()),
-            }
-        )
-    return pd.DataFrame(rows)
+        yield {
+            "regressors": words,
+            "r_square": float(found.rsquared),
+            "predictive_r_square": predictive_r_square(found),
+            "error_m_s": float(np.sqrt(found.mse_resid)),
+            "largest_vif": max(inflations(found)),
+            "smallest_coefficient": float(electrodes.min()),
+            "largest_coefficient": float(electrodes.max()),
+        }
 
 
-def sensing_faults(p: DiaphragmMotorParameters, points: pd.DataFrame) -> pd.DataFrame:
+@tabled
+def sensing_faults(p: DiaphragmMotorParameters, points: pd.DataFrame) -> Rows:
     """Return what each regression, fitted to the healthy motor, says of a faulty one at 200 V and 10 N, without noise.
 
     Parameters
@@ -154,7 +147,6 @@ def sensing_faults(p: DiaphragmMotorParameters, points: pd.DataFrame) -> pd.Data
         Columns fault, velocity_m_s, and the error of each regression [m/s], by its name in `MODELS`.
     """
     fits = {words: fit(points, names, "velocity_m_s") for words, names in MODELS.items()}
-    rows: list[dict[str, Any]] = []
     for words in ("none", *FAULTS):
         faulty = replace(p, load_force=10.0)
         if words in FAULTS:
@@ -167,8 +159,7 @@ def sensing_faults(p: DiaphragmMotorParameters, points: pd.DataFrame) -> pd.Data
             for model, found in fits.items()
         }
         errors = {model: value - point.velocity for model, value in said.items()}
-        rows.append({"fault": words, "velocity_m_s": point.velocity, **errors})
-    return pd.DataFrame(rows)
+        yield {"fault": words, "velocity_m_s": point.velocity, **errors}
 
 
 def motor_spectra(p: DiaphragmMotorParameters) -> pd.DataFrame:
@@ -188,7 +179,8 @@ def motor_spectra(p: DiaphragmMotorParameters) -> pd.DataFrame:
     return pd.concat([_spectra(p, swing) for swing in SWINGS], ignore_index=True)
 
 
-def _spectra(p: DiaphragmMotorParameters, swing: float) -> pd.DataFrame:
+@stacked
+def _spectra(p: DiaphragmMotorParameters, swing: float) -> Frames:
     a_cycle = ceil(1.0 / (FREQUENCY * LONGEST_STEP) - 1e-9)
     step = 1.0 / (FREQUENCY * a_cycle)
     settling, cycles = ceil(2.0 * SETTLING * FREQUENCY) * a_cycle, 20
@@ -202,17 +194,16 @@ def _spectra(p: DiaphragmMotorParameters, swing: float) -> pd.DataFrame:
         "outlet flow [m³/s]": states[:, FLOWS][:, -1],
         "velocity [m/s]": states[:, VELOCITY],
     }
-    parts: list[pd.DataFrame] = []
     for name, values in signals.items():
         lines = np.abs(harmonics(values[settling:], HARMONICS, cycles))
         order = np.arange(HARMONICS + 1)
         columns = {"harmonic": order, "frequency_hz": order * FREQUENCY, "amplitude": lines}
         relative = {"relative_percent": 100.0 * lines / lines[1]}
-        parts.append(pd.DataFrame({"signal": name, DRIVE: swing, **columns, **relative}))
-    return pd.concat(parts, ignore_index=True)
+        yield {"signal": name, DRIVE: swing, **columns, **relative}
 
 
-def distortion_table(spectra: pd.DataFrame) -> pd.DataFrame:
+@tabled
+def distortion_table(spectra: pd.DataFrame) -> Rows:
     """Return the total harmonic distortion of each signal, one column a drive.
 
     Parameters
@@ -225,9 +216,7 @@ def distortion_table(spectra: pd.DataFrame) -> pd.DataFrame:
     pandas.DataFrame
         Columns signal, and thd_100 to thd_300 [percent], by drive.
     """
-    rows: list[dict[str, Any]] = []
     for name, part in spectra.groupby("signal", sort=False):
         lines = {float(str(swing)): some["amplitude"].to_numpy().astype(complex) for swing, some in part.groupby(DRIVE)}
         found = {f"thd_{swing:g}": 100.0 * total_harmonic_distortion(line) for swing, line in lines.items()}
-        rows.append({"signal": name, **found})
-    return pd.DataFrame(rows)
+        yield {"signal": name, **found}

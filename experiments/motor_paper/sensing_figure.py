@@ -3,8 +3,6 @@
 They read the tables of `hydrostate motor-paper`, and compute nothing.
 """
 
-from types import MappingProxyType
-
 from matplotlib.figure import Figure
 
 from experiments.page.drawing import paired_bars, shaded
@@ -96,11 +94,9 @@ def draw_spectra(tables: Tables) -> Figure:
     return figure
 
 
-SENSING_FIGURES: Drawings = MappingProxyType(
-    {
-        "sensing": draw_velocity,
-        "sensing_faults": draw_faults,
-        "spectra": draw_spectra,
-    }
-)
+SENSING_FIGURES: Drawings = {
+    "sensing": draw_velocity,
+    "sensing_faults": draw_faults,
+    "spectra": draw_spectra,
+}
 """The figures, by file name."""

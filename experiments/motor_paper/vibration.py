@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from experiments.page.frames import Frames, Rows, stacked, tabled
 from plant.motor_paper.fractional import grunwald_letnikov
 from plant.motor_paper.hysteresis_model import HysteresisParameters, linearised
 from plant.motor_paper.vibration_model import VibrationParameters, exact_response, first_mode, state_space
@@ -77,7 +78,8 @@ def _poles(models: "dict[str, Any]") -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def margin_table(p: VibrationParameters) -> pd.DataFrame:
+@tabled
+def margin_table(p: VibrationParameters) -> Rows:
     """Return margins of the loops that Figures 22, 23, 31 and 32 speak of: each model times a gain, fed back.
 
     The gain makes the model's own 1 at rest. A loop is stable if its closed poles are; Nyquist's count of clockwise
@@ -96,7 +98,6 @@ def margin_table(p: VibrationParameters) -> pd.DataFrame:
     """
     import control  # slow to import, and few callers need it
 
-    rows: list[dict[str, Any]] = []
     models: dict[str, Any] = {**vibration_models(p), "equation 20, small voltages": linearised(HysteresisParameters())}
     for name, model in models.items():
         loop = model / float(np.real(model.dcgain()))
@@ -106,19 +107,16 @@ def margin_table(p: VibrationParameters) -> pd.DataFrame:
         turns = control.nyquist_response(
             loop, omega=_past_poles(np.asarray(loop.poles())), warn_encirclements=False
         ).count
-        rows.append(
-            {
-                "model": name,
-                "gain_margin": float(gain),
-                "phase_margin_deg": float(phase),
-                "crossover_hz": float(crossover) / (2.0 * pi),
-                "open_unstable_poles": int(np.sum(open_poles > 0.0)),
-                "turns": int(turns),
-                "closed_unstable_poles": int(np.sum(closed > 0.0)),
-                "stable": bool(np.all(closed < 0.0)),
-            }
-        )
-    return pd.DataFrame(rows)
+        yield {
+            "model": name,
+            "gain_margin": float(gain),
+            "phase_margin_deg": float(phase),
+            "crossover_hz": float(crossover) / (2.0 * pi),
+            "open_unstable_poles": int(np.sum(open_poles > 0.0)),
+            "turns": int(turns),
+            "closed_unstable_poles": int(np.sum(closed > 0.0)),
+            "stable": bool(np.all(closed < 0.0)),
+        }
 
 
 def _past_poles(poles: "np.ndarray[Any, np.dtype[np.complex128]]") -> "np.ndarray[Any, np.dtype[np.float64]]":
@@ -167,7 +165,8 @@ def response_rows(name: str, model: Any) -> pd.DataFrame:
     return pd.DataFrame({"model": name, **columns})
 
 
-def tuning_table(p: VibrationParameters) -> pd.DataFrame:
+@tabled
+def tuning_table(p: VibrationParameters) -> Rows:
     """Return what stiffness and damping do to the first mode, as section 5.1.1 tunes them.
 
     Parameters
@@ -181,22 +180,18 @@ def tuning_table(p: VibrationParameters) -> pd.DataFrame:
         Columns changed, factor, frequency_hz, damping_ratio, peak_gain (over that at rest) and decay_time_s (to a
         tenth).
     """
-    rows: list[dict[str, Any]] = []
     for name in ("diaphragm_stiffness", "fluid_stiffness", "load_stiffness", "cylinder_mass", "damping"):
         for factor in (0.5, 1.0, 2.0):
             model = state_space(replace(p, **{name: factor * getattr(p, name)}), massless=True)
             pole = first_mode(model.poles())
-            rows.append(
-                {
-                    "changed": name,
-                    "factor": factor,
-                    "frequency_hz": abs(pole) / (2.0 * pi),
-                    "damping_ratio": -pole.real / abs(pole),
-                    "peak_gain": float(response_rows(name, model)["gain"].max()),
-                    "decay_time_s": -np.log(10.0) / pole.real,
-                }
-            )
-    return pd.DataFrame(rows)
+            yield {
+                "changed": name,
+                "factor": factor,
+                "frequency_hz": abs(pole) / (2.0 * pi),
+                "damping_ratio": -pole.real / abs(pole),
+                "peak_gain": float(response_rows(name, model)["gain"].max()),
+                "decay_time_s": -np.log(10.0) / pole.real,
+            }
 
 
 def figures_7_to_9() -> pd.DataFrame:
@@ -244,7 +239,8 @@ def with_order(p: VibrationParameters, order: float) -> VibrationParameters:
     return replace(p, damping=0.0, fractional_damping=size, fractional_order=order)
 
 
-def fractional_table(p: VibrationParameters) -> pd.DataFrame:
+@stacked
+def fractional_table(p: VibrationParameters) -> Frames:
     """Return responses with fractional damping, exact and by Oustaloup's states.
 
     Parameters
@@ -257,7 +253,6 @@ def fractional_table(p: VibrationParameters) -> pd.DataFrame:
     pandas.DataFrame
         Columns order, frequency_hz, gain and imitated_gain [m/N].
     """
-    parts: list[pd.DataFrame] = []
     for order in ORDERS:
         q = with_order(p, order)
         imitated = np.abs(np.asarray(state_space(q)(2j * pi * FREQUENCIES)).ravel())
@@ -266,5 +261,4 @@ def fractional_table(p: VibrationParameters) -> pd.DataFrame:
             "gain": np.abs(exact_response(q, FREQUENCIES)),
             "imitated_gain": imitated,
         }
-        parts.append(pd.DataFrame({"order": order, **columns}))
-    return pd.concat(parts, ignore_index=True)
+        yield {"order": order, **columns}

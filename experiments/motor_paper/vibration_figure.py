@@ -3,8 +3,6 @@
 They read the tables of `hydrostate motor-paper`, and compute nothing.
 """
 
-from types import MappingProxyType
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -17,15 +15,13 @@ from experiments.page.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMIL
 
 MILLI, MICRO = 1e3, 1e6
 
-_MODELS = MappingProxyType(
-    {
-        "equations 1 and 2, signs mended": (BLUE, "-"),
-        "equations 1 and 2, as printed": (VERMILION, "--"),
-        "equation 4, signs mended": (GREEN, "-"),
-    }
-)
-_CONTROLLERS = MappingProxyType({"P": GREY, "PI": BLUE, "PID": ORANGE})
-_ORDERS = MappingProxyType({0.5: BLUE, 1.0: BLACK, 1.5: VERMILION})
+_MODELS = {
+    "equations 1 and 2, signs mended": (BLUE, "-"),
+    "equations 1 and 2, as printed": (VERMILION, "--"),
+    "equation 4, signs mended": (GREEN, "-"),
+}
+_CONTROLLERS = {"P": GREY, "PI": BLUE, "PID": ORANGE}
+_ORDERS = {0.5: BLUE, 1.0: BLACK, 1.5: VERMILION}
 
 
 def _bode(gain: Axes, phase: Axes, rows: pd.DataFrame) -> None:
@@ -214,14 +210,12 @@ def draw_fractional(tables: Tables) -> Figure:
     return figure
 
 
-VIBRATION_FIGURES: Drawings = MappingProxyType(
-    {
-        "bode": draw_bode,
-        "poles": draw_poles,
-        "loop": draw_loop,
-        "hysteresis_loops": draw_hysteresis,
-        "linearised": draw_linearised,
-        "fractional": draw_fractional,
-    }
-)
+VIBRATION_FIGURES: Drawings = {
+    "bode": draw_bode,
+    "poles": draw_poles,
+    "loop": draw_loop,
+    "hysteresis_loops": draw_hysteresis,
+    "linearised": draw_linearised,
+    "fractional": draw_fractional,
+}
 """The figures, by file name."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from itertools import product
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -83,19 +82,17 @@ POSITION_STEPS = Experiment("lumped", "pressure", "steps", False)
 POSITION_SINE = Experiment("lumped", "pressure", "sine", False)
 """Our filter on the paper's sine, position and velocity alone (errata E13)."""
 
-EXPERIMENTS: Mapping[Experiment, str] = MappingProxyType(
-    {
-        PUBLISHED_WAY: "The published method on the plant that it assumes.",
-        PUBLISHED_WAY_STUCK: "The published method on a plant that sticks (errata E9).",
-        PRESSURE_SINE: "Our method on the plant that sticks, pressure logged.",
-        PRESSURE_STEPS: "Our method on the nine steps, pressure logged.",
-        POSITION_STEPS: "Our method on the nine steps, position and velocity alone.",
-        Experiment("lumped", "flow", "steps", True): (
-            "The flow balance alone: condition unknown, leakage found along with it."
-        ),
-        POSITION_SINE: "Stuck, position and velocity hold nothing (errata E13).",
-    }
-)
+EXPERIMENTS: Mapping[Experiment, str] = {
+    PUBLISHED_WAY: "The published method on the plant that it assumes.",
+    PUBLISHED_WAY_STUCK: "The published method on a plant that sticks (errata E9).",
+    PRESSURE_SINE: "Our method on the plant that sticks, pressure logged.",
+    PRESSURE_STEPS: "Our method on the nine steps, pressure logged.",
+    POSITION_STEPS: "Our method on the nine steps, position and velocity alone.",
+    Experiment("lumped", "flow", "steps", True): (
+        "The flow balance alone: condition unknown, leakage found along with it."
+    ),
+    POSITION_SINE: "Stuck, position and velocity hold nothing (errata E13).",
+}
 """The study's experiments, and what each shows."""
 
 TRACK_POINTS = 200

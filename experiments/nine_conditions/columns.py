@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from functools import partial
 from platform import python_version
-from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
@@ -20,7 +19,7 @@ from experiments.nine_conditions.findings import (
     recoveries,
 )
 from experiments.nine_conditions.settings import StudySettings
-from experiments.page.frames import Tables
+from experiments.page.frames import Rows, Tables, tabled
 from experiments.page.numbers import MINUS, MISSING, exact, fixed, number, pretty_unit
 from experiments.page.tables import Cell, Column, Columns, Row, as_given, decimals, right, spaced
 from experiments.page.words import CONDITION, in_words
@@ -93,9 +92,9 @@ def _estimate(rows: pd.DataFrame, key: Experiment) -> Cell:
     return Cell(f"{spread}, {worst} %", "" if bool(rows["gate_passed"].all()) else "bad")
 
 
-def _models(frame: pd.DataFrame) -> pd.DataFrame:
+@tabled
+def _models(frame: pd.DataFrame) -> Rows:
     """Return two rows a condition: ours, and as Table 6 prints it."""
-    rows: list[dict[str, object]] = []
     for row in frame.to_dict("records"):
         gain, std = 1e3 * row["dc_gain"], 1.96e3 * row["dc_gain_std"]
         low, high = 1e3 * row["published_dc_gain_low"], 1e3 * row["published_dc_gain_high"]
@@ -109,8 +108,7 @@ def _models(frame: pd.DataFrame) -> pd.DataFrame:
             "gain": f"{fixed(low, 3)} to {fixed(high, 3)}",
             **dict.fromkeys(("bandwidth", "fit", "jump"), MISSING),
         }
-        rows += [ours, printed]
-    return pd.DataFrame(rows)
+        yield from [ours, printed]
 
 
 def _pairs(values: Mapping[str, Any]) -> pd.DataFrame:
@@ -142,82 +140,80 @@ def _difference(row: Row) -> Cell:
 
 _exactly = partial(Column, words=as_given)
 
-COLUMNS: Mapping[str, Columns] = MappingProxyType(
-    {
-        "parameters": (
-            Column("meaning", "parameter"),
-            Column("value", words=as_given),
-            Column("unit", words=pretty_unit),
-            "source",
-            Column("parameter", "name in the code", words=lambda name: Markup("<code>{}</code>").format(name)),
-        ),
-        "conditions": (
-            CONDITION,
-            _exactly("throttle_a_v", "throttle A"),
-            _exactly("throttle_b_v", "throttle B"),
-            _exactly("leakage_coefficient_m3_s_pa", "leakage", "m³/(s Pa)"),
-            _exactly("flow_bias_m3_s", "flow bias", "m³/s"),
-            _exactly("friction_quadratic_n_s2_m2", "friction a₁", "N s²/m²"),
-            _exactly("friction_linear_n_s_m", "friction a₂", "N s/m"),
-            _exactly("friction_coulomb_n", "friction a₃"),
-            Column("steady_velocity_m_s", "velocity at 4 V", digits=3),
-            Column("velocity_percent_of_normal", "of normal", "%", digits=3),
-            Column("steady_pressure_pa", "dp at 4 V", "kPa", 1e-3),
-            Column("pressure_percent_of_normal", "of normal", "%", digits=3),
-        ),
-        "recoveries": (
-            Column("key", "experiment", words=experiment_in_words),
-            Column("claim", "what it shows"),
-            Column("recovered", "conditions recovered", of_row=_recovered),
-            Column("mean_pa", "mean estimate", "1e8 Pa", TENTH_GIGA_PASCAL),
-            Column("worst_error_percent", digits=2),
-            Column("wanted_percent", "error allowed", digits=1),
-            Column("unobservable", "conditions not observable", words=lambda names: right(str(len(names)))),
-            Column("missed", "conditions missed", words=lambda names: "; ".join(names) or "none"),
-        ),
-        "estimates by condition": (CONDITION, lambda name: Column(name, name, "1e8 Pa, worst error")),
-        "models": (
-            Column("condition", words=lambda name: Cell(name, "name")),
-            Column("source", "model", words=lambda source: Cell(source, "name")),
-            *(Column(name, words=right) for name in COEFFICIENTS),
-            Column("gain", "steady gain", "mm/s per rad/s, 95 %", words=right),
-            Column("bandwidth", f"{MINUS}3 dB", "Hz", words=right),
-            Column("fit", unit="%", words=right),
-            Column("jump", "b0 / gain", "ratio", words=right),
-        ),
-        "filtering": (
-            Column("variant", "zero-phase filter"),
-            Column("pole_frequency_hz", digits=3),
-            Column("damping", unit="ratio", digits=3),
-            Column("dc_gain", "steady gain", "ratio"),
-            Column("jump_ratio", "b0 / gain", "ratio", words=decimals(3)),
-        ),
-        "validation_rmse": (
-            CONDITION,
-            Column("rmse_transfer_function_m_s", "transfer function, ours", digits=3),
-            Column("rmse_mathematical_m_s", "mathematical model, ours", digits=3),
-            Column("published_rmse_transfer_function_m_s", "transfer function, Table 5", digits=2),
-            Column("published_rmse_mathematical_m_s", "mathematical model, Table 5", digits=2),
-            Column("mathematical_is_better", "mathematical model better, ours"),
-        ),
-        "class accuracies": (
-            Column("bank", "models", words=bank_in_words),
-            Column("variant", "parameters"),
-            Column("runs", unit="count"),
-            Column("percent", "class right", "%"),
-            Column("likeliest_error", "most frequent error", words=lambda error: error or "none"),
-        ),
-        "scalars": (
-            "quantity",
-            Column("published", of_row=_published),
-            Column("ours", of_row=_ours),
-            Column("unit", words=lambda unit: SCALAR_UNITS[unit][0]),
-            Column("ours", "difference", "% of published", of_row=_difference),
-            Column("where", "where in the paper"),
-            Column("note", "what differs and why"),
-        ),
-        "settings of this run": ("name", "value"),
-        "versions that ran it": ("name", "value"),
-    }
-)
+COLUMNS: Mapping[str, Columns] = {
+    "parameters": (
+        Column("meaning", "parameter"),
+        Column("value", words=as_given),
+        Column("unit", words=pretty_unit),
+        "source",
+        Column("parameter", "name in the code", words=lambda name: Markup("<code>{}</code>").format(name)),
+    ),
+    "conditions": (
+        CONDITION,
+        _exactly("throttle_a_v", "throttle A"),
+        _exactly("throttle_b_v", "throttle B"),
+        _exactly("leakage_coefficient_m3_s_pa", "leakage", "m³/(s Pa)"),
+        _exactly("flow_bias_m3_s", "flow bias", "m³/s"),
+        _exactly("friction_quadratic_n_s2_m2", "friction a₁", "N s²/m²"),
+        _exactly("friction_linear_n_s_m", "friction a₂", "N s/m"),
+        _exactly("friction_coulomb_n", "friction a₃"),
+        Column("steady_velocity_m_s", "velocity at 4 V", digits=3),
+        Column("velocity_percent_of_normal", "of normal", "%", digits=3),
+        Column("steady_pressure_pa", "dp at 4 V", "kPa", 1e-3),
+        Column("pressure_percent_of_normal", "of normal", "%", digits=3),
+    ),
+    "recoveries": (
+        Column("key", "experiment", words=experiment_in_words),
+        Column("claim", "what it shows"),
+        Column("recovered", "conditions recovered", of_row=_recovered),
+        Column("mean_pa", "mean estimate", "1e8 Pa", TENTH_GIGA_PASCAL),
+        Column("worst_error_percent", digits=2),
+        Column("wanted_percent", "error allowed", digits=1),
+        Column("unobservable", "conditions not observable", words=lambda names: right(str(len(names)))),
+        Column("missed", "conditions missed", words=lambda names: "; ".join(names) or "none"),
+    ),
+    "estimates by condition": (CONDITION, lambda name: Column(name, name, "1e8 Pa, worst error")),
+    "models": (
+        Column("condition", words=lambda name: Cell(name, "name")),
+        Column("source", "model", words=lambda source: Cell(source, "name")),
+        *(Column(name, words=right) for name in COEFFICIENTS),
+        Column("gain", "steady gain", "mm/s per rad/s, 95 %", words=right),
+        Column("bandwidth", f"{MINUS}3 dB", "Hz", words=right),
+        Column("fit", unit="%", words=right),
+        Column("jump", "b0 / gain", "ratio", words=right),
+    ),
+    "filtering": (
+        Column("variant", "zero-phase filter"),
+        Column("pole_frequency_hz", digits=3),
+        Column("damping", unit="ratio", digits=3),
+        Column("dc_gain", "steady gain", "ratio"),
+        Column("jump_ratio", "b0 / gain", "ratio", words=decimals(3)),
+    ),
+    "validation_rmse": (
+        CONDITION,
+        Column("rmse_transfer_function_m_s", "transfer function, ours", digits=3),
+        Column("rmse_mathematical_m_s", "mathematical model, ours", digits=3),
+        Column("published_rmse_transfer_function_m_s", "transfer function, Table 5", digits=2),
+        Column("published_rmse_mathematical_m_s", "mathematical model, Table 5", digits=2),
+        Column("mathematical_is_better", "mathematical model better, ours"),
+    ),
+    "class accuracies": (
+        Column("bank", "models", words=bank_in_words),
+        Column("variant", "parameters"),
+        Column("runs", unit="count"),
+        Column("percent", "class right", "%"),
+        Column("likeliest_error", "most frequent error", words=lambda error: error or "none"),
+    ),
+    "scalars": (
+        "quantity",
+        Column("published", of_row=_published),
+        Column("ours", of_row=_ours),
+        Column("unit", words=lambda unit: SCALAR_UNITS[unit][0]),
+        Column("ours", "difference", "% of published", of_row=_difference),
+        Column("where", "where in the paper"),
+        Column("note", "what differs and why"),
+    ),
+    "settings of this run": ("name", "value"),
+    "versions that ran it": ("name", "value"),
+}
 """By the names of the tables."""

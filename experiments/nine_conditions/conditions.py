@@ -5,14 +5,15 @@ from collections.abc import Mapping
 import pandas as pd
 
 from estimation.identification.model.linear_model import LinearModel
-from experiments.page.frames import cell
+from experiments.page.frames import Rows, cell, tabled
 from experiments.published import SCALARS, load
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.model import EhaParameters
 from plant.eha.steady_state import steady_state
 
 
-def condition_table(rig: EhaParameters) -> pd.DataFrame:
+@tabled
+def condition_table(rig: EhaParameters) -> Rows:
     """Return each condition's parameters and its steady state at 4 V.
 
     Parameters
@@ -27,29 +28,25 @@ def condition_table(rig: EhaParameters) -> pd.DataFrame:
     """
     published = load("conditions").set_index("condition")
     normal_velocity, normal_pressure = steady_state(rig.rated_speed, rig)
-    rows: list[dict[str, object]] = []
     for name, condition in CONDITIONS.items():
         p = parameters_for(condition, rig)
         velocity, pressure = steady_state(p.rated_speed, p)
-        rows.append(
-            {
-                "condition": name,
-                "leakage": condition.leakage,
-                "friction": condition.friction,
-                "throttle_a_v": cell(published, name, "throttle_a_v"),
-                "throttle_b_v": cell(published, name, "throttle_b_v"),
-                "leakage_coefficient_m3_s_pa": p.leakage_coefficient,
-                "flow_bias_m3_s": p.flow_bias,
-                "friction_quadratic_n_s2_m2": p.friction_quadratic,
-                "friction_linear_n_s_m": p.friction_linear,
-                "friction_coulomb_n": p.friction_coulomb,
-                "steady_velocity_m_s": velocity,
-                "steady_pressure_pa": pressure,
-                "velocity_percent_of_normal": 100.0 * velocity / normal_velocity,
-                "pressure_percent_of_normal": 100.0 * pressure / normal_pressure,
-            }
-        )
-    return pd.DataFrame(rows)
+        yield {
+            "condition": name,
+            "leakage": condition.leakage,
+            "friction": condition.friction,
+            "throttle_a_v": cell(published, name, "throttle_a_v"),
+            "throttle_b_v": cell(published, name, "throttle_b_v"),
+            "leakage_coefficient_m3_s_pa": p.leakage_coefficient,
+            "flow_bias_m3_s": p.flow_bias,
+            "friction_quadratic_n_s2_m2": p.friction_quadratic,
+            "friction_linear_n_s_m": p.friction_linear,
+            "friction_coulomb_n": p.friction_coulomb,
+            "steady_velocity_m_s": velocity,
+            "steady_pressure_pa": pressure,
+            "velocity_percent_of_normal": 100.0 * velocity / normal_velocity,
+            "pressure_percent_of_normal": 100.0 * pressure / normal_pressure,
+        }
 
 
 def scalar_table(conditions: pd.DataFrame, library: Mapping[str, LinearModel], bulk_modulus: float) -> pd.DataFrame:

@@ -1,7 +1,6 @@
 """Figure 11: bulk modulus from many first guesses over time, nine conditions side by side."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -24,13 +23,11 @@ TOP = 6.0
 """Upper end of the axis [1e8 Pa]; Figure 11 ends at 5."""
 
 
-TITLES: Mapping[Experiment, str] = MappingProxyType(
-    {
-        PRESSURE_STEPS: "Pressure form, plant that sticks, nine steps, differential pressure logged",
-        POSITION_STEPS: "Pressure form, plant that sticks, nine steps, position and velocity alone",
-        PUBLISHED_WAY: "Acceleration form (the published one), plant without sticking, 10 Hz sine",
-    }
-)
+TITLES: Mapping[Experiment, str] = {
+    PRESSURE_STEPS: "Pressure form, plant that sticks, nine steps, differential pressure logged",
+    POSITION_STEPS: "Pressure form, plant that sticks, nine steps, position and velocity alone",
+    PUBLISHED_WAY: "Acceleration form (the published one), plant without sticking, 10 Hz sine",
+}
 """The experiments that are drawn."""
 
 

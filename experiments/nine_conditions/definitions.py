@@ -1,7 +1,6 @@
 """Section 3: where each condition settles at 4 V, beside the levels' published definitions (errata E7)."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -10,12 +9,10 @@ from experiments.page.drawing import diamonds, say
 from experiments.page.style import BESIDE_CONDITIONS, BLUE, condition_levels, panels
 from experiments.published import SCALARS
 
-DEFINED: Mapping[str, Mapping[str, str]] = MappingProxyType(
-    {
-        "velocity": {"minor_leakage": "minor_leakage_velocity", "major_leakage": "major_leakage_velocity"},
-        "pressure": {"minor_friction": "minor_friction_pressure", "major_friction": "major_friction_pressure"},
-    }
-)
+DEFINED: Mapping[str, Mapping[str, str]] = {
+    "velocity": {"minor_leakage": "minor_leakage_velocity", "major_leakage": "major_leakage_velocity"},
+    "pressure": {"minor_friction": "minor_friction_pressure", "major_friction": "major_friction_pressure"},
+}
 """By quantity, then condition: the published scalar that defines it."""
 
 

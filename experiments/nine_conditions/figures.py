@@ -1,7 +1,6 @@
 """The study's figures by name. They read stored tables and series, and compute nothing."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -30,21 +29,19 @@ def _confusions(tables: Tables) -> Figure:
     return draw_confusions(matrices, summary)
 
 
-FIGURES: Drawings = MappingProxyType(
-    {
-        "convergence_pressure_form": lambda of: draw_convergence(PRESSURE_STEPS, of["convergence"], truth_of(of)),
-        "convergence_without_pressure": lambda of: draw_convergence(POSITION_STEPS, of["convergence"], truth_of(of)),
-        "convergence_acceleration_form": lambda of: draw_convergence(PUBLISHED_WAY, of["convergence"], truth_of(of)),
-        "forms_on_sticking_plant": lambda of: draw_forms(of["bulk_modulus"], truth_of(of)),
-        "estimates": lambda of: draw_estimates(of["bulk_modulus"], truth_of(of)),
-        "bode": lambda of: draw_bode(of["responses"], of["conditions"]),
-        "order": lambda of: draw_order(of["order"]),
-        "gains": lambda of: draw_gains(of["transfer_functions"]),
-        "validation_run": lambda of: draw_validation_run(of["validation_runs"], SHOWN_RUN),
-        "rmse": lambda of: draw_rmse(of["validation_rmse"]),
-        "confusions": _confusions,
-        "scores": lambda of: draw_scores(of["score_example"]),
-        "definitions": lambda of: draw_definitions(of["conditions"]),
-    }
-)
+FIGURES: Drawings = {
+    "convergence_pressure_form": lambda of: draw_convergence(PRESSURE_STEPS, of["convergence"], truth_of(of)),
+    "convergence_without_pressure": lambda of: draw_convergence(POSITION_STEPS, of["convergence"], truth_of(of)),
+    "convergence_acceleration_form": lambda of: draw_convergence(PUBLISHED_WAY, of["convergence"], truth_of(of)),
+    "forms_on_sticking_plant": lambda of: draw_forms(of["bulk_modulus"], truth_of(of)),
+    "estimates": lambda of: draw_estimates(of["bulk_modulus"], truth_of(of)),
+    "bode": lambda of: draw_bode(of["responses"], of["conditions"]),
+    "order": lambda of: draw_order(of["order"]),
+    "gains": lambda of: draw_gains(of["transfer_functions"]),
+    "validation_run": lambda of: draw_validation_run(of["validation_runs"], SHOWN_RUN),
+    "rmse": lambda of: draw_rmse(of["validation_rmse"]),
+    "confusions": _confusions,
+    "scores": lambda of: draw_scores(of["score_example"]),
+    "definitions": lambda of: draw_definitions(of["conditions"]),
+}
 """From the study's tables to its figures, in the report's order."""

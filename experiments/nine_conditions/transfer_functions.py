@@ -13,7 +13,7 @@ from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.signals.etfe import etfe
 from estimation.identification.signals.preprocess import zero_phase_filter
 from experiments.nine_conditions.settings import StudySettings
-from experiments.page.frames import cell
+from experiments.page.frames import Frames, Rows, cell, stacked, tabled
 from experiments.published import load
 from experiments.running.executors import side_by_side
 from experiments.running.progress import Track, untracked
@@ -61,7 +61,8 @@ def identification_study(
     return dict(zip(CONDITIONS, models, strict=True)), dict(zip(CONDITIONS, records, strict=True))
 
 
-def transfer_function_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
+@tabled
+def transfer_function_table(models: Mapping[str, LinearModel]) -> Rows:
     """Return the library beside Table 6.
 
     Parameters
@@ -76,7 +77,6 @@ def transfer_function_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
         and the gain they leave open by rounding (errata E14).
     """
     published = load("transfer_functions").set_index("condition")
-    rows: list[dict[str, object]] = []
     for name, model in models.items():
         names = ["b0", "b1", "b2", "a1", "a2"]
         values = [*model.numerator, *model.denominator[1:]]
@@ -93,8 +93,7 @@ def transfer_function_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
         }
         row |= {f"published_{key}": cell(published, name, key) for key in names}
         row |= {"published_dc_gain_low": low, "published_dc_gain_high": high}
-        rows.append(row)
-    return pd.DataFrame(rows)
+        yield row
 
 
 def printed_gain_interval(printed: list[str]) -> tuple[float, float]:
@@ -124,7 +123,8 @@ def printed_gain_interval(printed: list[str]) -> tuple[float, float]:
     return float(min(corners)), float(max(corners))
 
 
-def response_curves(models: Mapping[str, LinearModel], records: Mapping[str, Record]) -> pd.DataFrame:
+@stacked
+def response_curves(models: Mapping[str, LinearModel], records: Mapping[str, Record]) -> Frames:
     """Return the models' frequency responses and the empirical ones, in long form.
 
     Parameters
@@ -140,14 +140,12 @@ def response_curves(models: Mapping[str, LinearModel], records: Mapping[str, Rec
         Columns condition, source (``model`` or ``etfe``), frequency_hz, gain, phase_deg, coherence.
     """
     lowest, highest = RESPONSE_FREQUENCIES[[0, -1]]
-    parts: list[pd.DataFrame] = []
     for name, model in models.items():
         response = model.frequency_response(RESPONSE_FREQUENCIES)
         fitted = response_columns(RESPONSE_FREQUENCIES, response, np.ones(len(response)))
         measured = measured_response(records[name], 1000, lowest, highest)
-        parts.append(pd.DataFrame({"condition": name, "source": "model", **fitted}))
-        parts.append(pd.DataFrame({"condition": name, "source": "etfe", **measured}))
-    return pd.concat(parts, ignore_index=True)
+        yield {"condition": name, "source": "model", **fitted}
+        yield {"condition": name, "source": "etfe", **measured}
 
 
 def measured_response(record: Record, lag_window: int, lowest: float, highest: float) -> dict[str, np.ndarray]:

@@ -3,13 +3,12 @@
 import re
 from collections.abc import Mapping
 from importlib.resources import files
-from types import MappingProxyType
 
 from markupsafe import Markup, escape
 
 _LINES = files("experiments.page").joinpath("errata.txt").read_text(encoding="utf-8").splitlines()
 
-ERRATA: Mapping[str, str] = MappingProxyType(dict(line.split(": ", 1) for line in _LINES))
+ERRATA: Mapping[str, str] = dict(line.split(": ", 1) for line in _LINES)
 """One sentence an erratum, by number."""
 
 _NUMBER_OR_TAG = re.compile(r"<[^>]*>|\b[EPM]\d{1,2}\b")

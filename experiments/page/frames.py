@@ -1,8 +1,9 @@
 """Tables by name, single numbers out of them, and the table of a rig's parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, fields
-from typing import Any, SupportsFloat, TypeAlias, cast
+from functools import wraps
+from typing import Any, ParamSpec, SupportsFloat, TypeAlias, cast
 
 import pandas as pd
 
@@ -10,6 +11,34 @@ from plant.units import notes
 
 Tables: TypeAlias = Mapping[str, pd.DataFrame]
 """What a study found, by name."""
+
+Rows: TypeAlias = Iterator[Mapping[str, Any]]
+"""The rows of a table, by column."""
+
+Frames: TypeAlias = Iterator[Mapping[str, Any] | pd.DataFrame]
+"""The parts of a table, each as its columns or as a table."""
+
+P = ParamSpec("P")
+
+
+def tabled(rows: Callable[P, Rows]) -> Callable[P, pd.DataFrame]:
+    """Make a function that yields rows return them as a table."""
+
+    @wraps(rows)
+    def made(*args: P.args, **kwargs: P.kwargs) -> pd.DataFrame:
+        return pd.DataFrame(list(rows(*args, **kwargs)))
+
+    return made
+
+
+def stacked(parts: Callable[P, Frames]) -> Callable[P, pd.DataFrame]:
+    """Make a function that yields parts of a table return them one below the other."""
+
+    @wraps(parts)
+    def made(*args: P.args, **kwargs: P.kwargs) -> pd.DataFrame:
+        return pd.concat(map(pd.DataFrame, parts(*args, **kwargs)), ignore_index=True)
+
+    return made
 
 
 def cell(frame: pd.DataFrame, row: object, column: str) -> float:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import pandas as pd
@@ -33,20 +32,18 @@ Shown: TypeAlias = "str | Cell | Markup"
 Row: TypeAlias = Mapping[Any, Any]
 """One row of a table, by column."""
 
-UNITS: Mapping[str, tuple[str, float]] = MappingProxyType(
-    {
-        "_m_s": ("mm/s", 1e3),
-        "_hz": ("Hz", 1.0),
-        "_kg": ("kg", 1.0),
-        "_pa": ("MPa", 1e-6),
-        "_percent": ("%", 1.0),
-        "_deg": ("°", 1.0),
-        "_n": ("N", 1.0),
-        "_s": ("s", 1.0),
-        "_v": ("V", 1.0),
-        "_w": ("W", 1.0),
-    }
-)
+UNITS: Mapping[str, tuple[str, float]] = {
+    "_m_s": ("mm/s", 1e3),
+    "_hz": ("Hz", 1.0),
+    "_kg": ("kg", 1.0),
+    "_pa": ("MPa", 1e-6),
+    "_percent": ("%", 1.0),
+    "_deg": ("°", 1.0),
+    "_n": ("N", 1.0),
+    "_s": ("s", 1.0),
+    "_v": ("V", 1.0),
+    "_w": ("W", 1.0),
+}
 """Endings of column names: the unit that a reader gets, and the factor from the name's."""
 
 

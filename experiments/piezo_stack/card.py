@@ -1,10 +1,9 @@
 """What a bench's sensors can tell of a piezo-stack actuator, before anything is measured."""
 
-import pandas as pd
-
 from estimation.piezo_stack.estimate import stack_bounds
 from estimation.piezo_stack.finding import SMALLEST_FAULT
 from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS
+from experiments.page.frames import Rows, tabled
 from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.run import SAMPLE_TIME, sine_drive
 
@@ -24,7 +23,8 @@ DURATION = 0.1
 """Length of the experiment [s]."""
 
 
-def identifiability_card(healthy: PiezoStackParameters) -> pd.DataFrame:
+@tabled
+def identifiability_card(healthy: PiezoStackParameters) -> Rows:
     """Return Cramér-Rao bounds of every quantity, all unknown together, by sensors and drive.
 
     Parameters
@@ -38,7 +38,6 @@ def identifiability_card(healthy: PiezoStackParameters) -> pd.DataFrame:
         Columns frequency_hz, sensors, and for each quantity its standard deviation in percent: of a minor fault for
         leaks and friction, of itself for the others.
     """
-    rows: list[dict[str, object]] = []
     for frequency in FREQUENCIES:
         drive = sine_drive(frequency, 140.0, DURATION, SAMPLE_TIME)
         for name, channels in SENSOR_SETS.items():
@@ -46,5 +45,4 @@ def identifiability_card(healthy: PiezoStackParameters) -> pd.DataFrame:
             percent = {
                 unknown: 100.0 * bounds[unknown] / SMALLEST_FAULT.get(unknown, 1.0) for unknown in DEFAULT_UNKNOWNS
             }
-            rows.append({"frequency_hz": frequency, "sensors": name, **percent})
-    return pd.DataFrame(rows)
+            yield {"frequency_hz": frequency, "sensors": name, **percent}

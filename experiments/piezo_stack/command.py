@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.command.options import SEED, Json, Seed, require_positive
+from experiments.command.options import SEED, Json, Seed, option, require_positive
 from experiments.command.studies import Folder, finish_study
 
 commands = typer.Typer()
@@ -15,12 +15,8 @@ commands = typer.Typer()
 def piezo_stack(
     out: Folder = Path("results/piezo-stack"),
     quick: Annotated[bool, typer.Option("--quick", help="A small design map, in seconds.")] = False,
-    voltage_limit: Annotated[
-        float, typer.Option(metavar="V", help="Largest swing of the best operating points [V].")
-    ] = 140.0,
-    power_limit: Annotated[
-        float, typer.Option(metavar="W", help="Largest power of the stack at the best operating points [W].")
-    ] = 30.0,
+    voltage_limit: Annotated[float, option("V", "Largest swing of the best operating points [V].")] = 140.0,
+    power_limit: Annotated[float, option("W", "Largest power of the stack at the best operating points [W].")] = 30.0,
     seed: Seed = SEED,
     as_json: Json = False,
 ) -> None:

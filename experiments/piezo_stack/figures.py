@@ -5,7 +5,6 @@ They read the tables of `hydrostate piezo-stack`, and compute nothing.
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -38,7 +37,7 @@ CYCLE: Sequence[Course] = (
 )
 """Panels of a pump cycle."""
 
-STAGE_COLOURS = MappingProxyType({"compression": ORANGE, "discharge": SKY, "expansion": GREY, "intake": GREEN})
+STAGE_COLOURS = {"compression": ORANGE, "discharge": SKY, "expansion": GREY, "intake": GREEN}
 
 
 def draw_loops(tables: Tables) -> Figure:
@@ -223,14 +222,12 @@ def draw_limits(tables: Tables) -> Figure:
     return figure
 
 
-STACK_FIGURES: Drawings = MappingProxyType(
-    {
-        "figure_10": draw_loops,
-        "figures_11_and_12": draw_no_load,
-        "figures_13_and_14": draw_loaded,
-        "pump_cycle": draw_cycle,
-        "design_maps": draw_maps,
-        "limits": draw_limits,
-    }
-)
+STACK_FIGURES: Drawings = {
+    "figure_10": draw_loops,
+    "figures_11_and_12": draw_no_load,
+    "figures_13_and_14": draw_loaded,
+    "pump_cycle": draw_cycle,
+    "design_maps": draw_maps,
+    "limits": draw_limits,
+}
 """The figures, by file name."""

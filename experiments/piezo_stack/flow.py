@@ -6,7 +6,6 @@ Published are only the numbers that the paper's text quotes (errata P17).
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import groupby, product
-from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -253,25 +252,23 @@ def figure_points() -> dict[str, list[OperatingPoint]]:
     }
 
 
-LIMITS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "reed stiffness": ("outlet_reed_stiffness", "inlet_reed_stiffness"),
-        "reed mass": ("reed_mass",),
-        "reed perimeter": ("reed_perimeter",),
-        "reed lift": ("reed_lift",),
-        "line length (inertance)": ("delivery_length", "return_length", "intake_length"),
-        "line area": ("line_area",),
-        "entrained air": ("air_fraction",),
-        "oil bulk modulus": ("bulk_modulus",),
-        "oil viscosity": ("viscosity",),
-        "chamber volume": ("chamber_height", "dead_volume"),
-        "stack stroke a volt": ("free_stroke_a_volt",),
-        "stack stiffness": ("stack_stiffness",),
-        "hysteresis": ("hysteresis",),
-        "piston area": ("piston_area",),
-        "cylinder friction": ("viscous_friction", "coulomb_friction"),
-    }
-)
+LIMITS: Mapping[str, tuple[str, ...]] = {
+    "reed stiffness": ("outlet_reed_stiffness", "inlet_reed_stiffness"),
+    "reed mass": ("reed_mass",),
+    "reed perimeter": ("reed_perimeter",),
+    "reed lift": ("reed_lift",),
+    "line length (inertance)": ("delivery_length", "return_length", "intake_length"),
+    "line area": ("line_area",),
+    "entrained air": ("air_fraction",),
+    "oil bulk modulus": ("bulk_modulus",),
+    "oil viscosity": ("viscosity",),
+    "chamber volume": ("chamber_height", "dead_volume"),
+    "stack stroke a volt": ("free_stroke_a_volt",),
+    "stack stiffness": ("stack_stiffness",),
+    "hysteresis": ("hysteresis",),
+    "piston area": ("piston_area",),
+    "cylinder friction": ("viscous_friction", "coulomb_friction"),
+}
 """What may limit the flow, and the parameters that it stands for."""
 
 STEP = 0.05

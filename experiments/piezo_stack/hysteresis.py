@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 
 from estimation.piezo_stack.bouc_wen import LOOP, fit_stack_loop, loop_bounds
 from estimation.piezo_stack.bouc_wen_printed import printed_fit
+from experiments.page.frames import Rows, tabled
 from experiments.running.random_streams import stream
 from plant.piezo_stack.free import run_free_stack
 from plant.piezo_stack.parameters import PiezoStackParameters
@@ -31,7 +31,8 @@ SMALL, LARGE = 5.0, 100.0
 """Swings of the small and of the large experiment [V]."""
 
 
-def hysteresis_table(p: PiezoStackParameters, seed: int) -> pd.DataFrame:
+@tabled
+def hysteresis_table(p: PiezoStackParameters, seed: int) -> Rows:
     """Return what the printed procedure and the fit make of one closed loop of 100 V.
 
     Parameters
@@ -52,25 +53,22 @@ def hysteresis_table(p: PiezoStackParameters, seed: int) -> pd.DataFrame:
     small = slow_loop(p, SMALL)
     settled = run_free_stack(p, np.append(0.0, np.full(400, SMALL)), 1e-5)[-1]
     printed = printed_fit((SMALL, float(settled)), small, (voltage, displacement))
-    rows = []
     for name in LOOP:
         truth, (low, high) = float(getattr(p, name)), fit.interval(name)
-        rows.append(
-            {
-                "parameter": name,
-                "truth": truth,
-                "printed": printed.values[name],
-                "fitted": fit.values[name],
-                "low": low,
-                "high": high,
-                "error_percent": 100.0 * (fit.values[name] / truth - 1.0),
-                "covered": low <= truth <= high,
-            }
-        )
-    return pd.DataFrame(rows)
+        yield {
+            "parameter": name,
+            "truth": truth,
+            "printed": printed.values[name],
+            "fitted": fit.values[name],
+            "low": low,
+            "high": high,
+            "error_percent": 100.0 * (fit.values[name] / truth - 1.0),
+            "covered": low <= truth <= high,
+        }
 
 
-def loop_card(p: PiezoStackParameters) -> pd.DataFrame:
+@tabled
+def loop_card(p: PiezoStackParameters) -> Rows:
     """Return what no estimate from a slow loop of 100 V can beat, by how the loop was run and how often sampled.
 
     Parameters
@@ -84,7 +82,6 @@ def loop_card(p: PiezoStackParameters) -> pd.DataFrame:
         Columns loop, samples, and for each parameter its standard deviation in percent; infinite where the loop cannot
         tell it.
     """
-    rows = []
     for samples in (FEW_SAMPLES, SAMPLES):
         for loop, cycles, from_rest in (
             ("one, the first from rest", 1, True),
@@ -93,8 +90,7 @@ def loop_card(p: PiezoStackParameters) -> pd.DataFrame:
         ):
             voltage = 0.5 * LARGE * (1.0 - np.cos(2.0 * np.pi * np.arange(cycles * samples + 1) / samples))
             bounds = loop_bounds(p, voltage, NOISE, from_rest=from_rest)
-            rows.append({"loop": loop, "samples": samples, **{name: 100.0 * bound for name, bound in bounds.items()}})
-    return pd.DataFrame(rows)
+            yield {"loop": loop, "samples": samples, **{name: 100.0 * bound for name, bound in bounds.items()}}
 
 
 def slow_loop(p: PiezoStackParameters, swing: float) -> tuple[np.ndarray, np.ndarray]:

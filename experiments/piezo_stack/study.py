@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -69,50 +68,48 @@ def _told(percent: float) -> Cell | str:
 RIG = PiezoStackParameters()
 """The actuator."""
 
-COLUMNS: Mapping[str, Columns] = MappingProxyType(
-    {
-        "quoted numbers": (
-            *("figure", "claim", "published", Column("ours", digits=3)),
-            Column("unit", words=lambda unit: "" if unit == "1" else unit),
-            Column("holds", "reproduced"),
-        ),
-        "figure 10 loop widths": (
-            "frequency_hz",
-            Column("stroke_m", "stroke", "µm", 1e6),
-            Column("width_percent", unit="% of stroke", digits=3),
-        ),
-        "best operating points": (
-            *("bias_pressure_pa", "load_kg", "frequency_hz", "voltage_v"),
-            Column("flow_m3_s", "flow", "L/min", 1.0 / LITRE_PER_MINUTE, 3),
-            Column("stack_power_w", "stack's power", digits=3),
-            Column("output_power_w", "lifting power", digits=3),
-        ),
-        "hysteresis parameters": (
-            Column("parameter", words=spaced),
-            "truth",
-            Column("printed", "as printed", digits=3),
-            "fitted",
-            Column("low", "95 % interval", of_row=interval("low", "high", 3)),
-            Column("error_percent", digits=2),
-            Column("covered", "covers"),
-        ),
-        "what loops tell": (
-            "loop",
-            Column("samples", "samples a cycle", words=lambda count: f"{count:,}"),
-            lambda name: Column(name, f"{spaced(name)} [%]", words=_told),
-        ),
-        "identifiability": (
-            Column("frequency_hz", "drive"),
-            "sensors",
-            lambda name: Column(name, unit="%", digits=2),
-        ),
-        "rig": (
-            Column("parameter", "name", words=spaced),
-            Column("value", words=number),
-            *("unit", "meaning", "source"),
-        ),
-    }
-)
+COLUMNS: Mapping[str, Columns] = {
+    "quoted numbers": (
+        *("figure", "claim", "published", Column("ours", digits=3)),
+        Column("unit", words=lambda unit: "" if unit == "1" else unit),
+        Column("holds", "reproduced"),
+    ),
+    "figure 10 loop widths": (
+        "frequency_hz",
+        Column("stroke_m", "stroke", "µm", 1e6),
+        Column("width_percent", unit="% of stroke", digits=3),
+    ),
+    "best operating points": (
+        *("bias_pressure_pa", "load_kg", "frequency_hz", "voltage_v"),
+        Column("flow_m3_s", "flow", "L/min", 1.0 / LITRE_PER_MINUTE, 3),
+        Column("stack_power_w", "stack's power", digits=3),
+        Column("output_power_w", "lifting power", digits=3),
+    ),
+    "hysteresis parameters": (
+        Column("parameter", words=spaced),
+        "truth",
+        Column("printed", "as printed", digits=3),
+        "fitted",
+        Column("low", "95 % interval", of_row=interval("low", "high", 3)),
+        Column("error_percent", digits=2),
+        Column("covered", "covers"),
+    ),
+    "what loops tell": (
+        "loop",
+        Column("samples", "samples a cycle", words=lambda count: f"{count:,}"),
+        lambda name: Column(name, f"{spaced(name)} [%]", words=_told),
+    ),
+    "identifiability": (
+        Column("frequency_hz", "drive"),
+        "sensors",
+        lambda name: Column(name, unit="%", digits=2),
+    ),
+    "rig": (
+        Column("parameter", "name", words=spaced),
+        Column("value", words=number),
+        *("unit", "meaning", "source"),
+    ),
+}
 """How the report shows its tables."""
 
 PIEZO_STACK = Study(
