@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache, cached_property, partial
 from glob import glob, has_magic
 from importlib.metadata import version
+from itertools import product
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -91,12 +92,12 @@ class Plan:
     def groups(self) -> tuple[Group, ...]:
         """Every series with its cases, in the study's order."""
         plant = [] if self.study.plant == DEFAULT else [self.study.plant]
-        common = _hash(None, [RESULTS_VERSION, package_version("hydrostate"), _numbers(self.rig), *plant])
+        common = _hash([RESULTS_VERSION, package_version("hydrostate"), _numbers(self.rig), *plant])
         out: list[Group] = []
         for series, works in self.blocks:
             encoded = [_bytes(asdict(work)) for work in works]
             for one in series:
-                begun = _hash(common, _content(one))
+                begun = _hash(_content(one), common)
                 out.append(Group(one, tuple([_key(begun, text) for text in encoded]), works))
         return tuple(out)
 
@@ -131,9 +132,6 @@ class Plan:
                 yield self._task(gathered)
                 gathered = _Gathered(gathered.budget)
             gathered.add(left)
-            if gathered.is_whole():
-                yield self._task(gathered)
-                gathered = _Gathered(gathered.budget)
         if gathered.groups:
             yield self._task(gathered)
 
@@ -169,11 +167,11 @@ class _Gathered:
         self.filters += sum(work.verb == "filter" for work in group.works)
 
     def ends_before(self, group: Group) -> bool:
-        moved_on = _motion(group.series) != _motion(self.groups[-1].series)
-        return self.count + len(group.keys) > MOST_CASES or (moved_on and self.spent >= 0.5 * self.budget)
-
-    def is_whole(self) -> bool:
-        return self.spent >= (self.budget if self.filters % LANES == 0 else 2.0 * self.budget)
+        if self.count + len(group.keys) > MOST_CASES:
+            return True
+        if self.spent >= (self.budget if self.filters % LANES == 0 else 2.0 * self.budget):
+            return True
+        return self.spent >= 0.5 * self.budget and _motion(group.series) != _motion(self.groups[-1].series)
 
 
 def plan_study(study: Study, folder: Path) -> Plan:
@@ -201,11 +199,9 @@ def plan_study(study: Study, folder: Path) -> Plan:
     kind = actuator(study.plant)
     rig = kind.read_rig(folder / study.rig if study.rig else None)
     listed = _simulated if kind.name == DEFAULT else partial(simulated_of, kind)
-    simulated = [(tuple(listed(runs)), _works(runs.methods, runs.starts_pa)) for runs in study.runs]
-    logs = [
-        (tuple(_logs(one, place, folder)), _works(one.methods, one.starts_pa)) for place, one in enumerate(study.logs)
-    ]
-    return Plan(study, rig, (*simulated, *logs))
+    series = [*map(listed, study.runs), *(_logs(one, place, folder) for place, one in enumerate(study.logs))]
+    works = [_works(one.methods, one.starts_pa) for one in (*study.runs, *study.logs)]
+    return Plan(study, rig, tuple(zip(map(tuple, series), works, strict=True)))
 
 
 @cache
@@ -240,26 +236,18 @@ def config_hash(study: Study, rig: Rig[Any]) -> str:
     str
         32 hexadecimal digits.
     """
-    return _hash(None, [study.model_dump(mode="json"), _numbers(rig)]).hexdigest()[:32]
+    return _hash([study.model_dump(mode="json"), _numbers(rig)]).hexdigest()[:32]
 
 
 def _simulated(runs: Runs) -> Iterator[Simulated]:
     """Yield the series, seeds innermost: what seeds share is then computed once."""
     names = runs.conditions if runs.conditions is not None else (() if runs.severities else tuple(CONDITIONS))
-    places = [(name, *(float(LEVELS.index(level)) for level in _levels(name))) for name in names]
+    found = [CONDITIONS[name] for name in names]
+    places = [(one.name, float(LEVELS.index(one.leakage)), float(LEVELS.index(one.friction))) for one in found]
     places += [(None, leakage, friction) for leakage, friction in runs.severities]
-    for plant in runs.plants:
-        for drive in runs.drives:
-            for sensors in runs.sensors:
-                for name, leakage, friction in places:
-                    for seed in runs.seed_list:
-                        yield Simulated(
-                            plant, drive, sensors, name, leakage, friction, seed, runs.duration_s, runs.sample_time_s
-                        )
-
-
-def _levels(name: str) -> tuple[Any, Any]:
-    return CONDITIONS[name].leakage, CONDITIONS[name].friction
+    axes = product(runs.plants, runs.drives, runs.sensors, places, runs.seed_list)
+    for plant, drive, sensors, (name, leakage, friction), seed in axes:
+        yield Simulated(plant, drive, sensors, name, leakage, friction, seed, runs.duration_s, runs.sample_time_s)
 
 
 def _works(methods: tuple[Method, ...], starts: tuple[float, ...]) -> tuple[Work, ...]:
@@ -316,7 +304,7 @@ def _bytes(content: object) -> bytes:
     return json.dumps(content, sort_keys=True, separators=(",", ":")).encode()
 
 
-def _hash(begun: Hash, content: object) -> Hash:
+def _hash(content: object, begun: Hash | None = None) -> Hash:
     digest = hashlib.sha256() if begun is None else begun.copy()
     digest.update(_bytes(content))
     return digest

@@ -2,7 +2,6 @@
 
 import os
 import re
-from abc import ABC, abstractmethod
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -19,8 +18,8 @@ LOCK = "lock"
 """The file that a writer holds."""
 
 
-class Folder(ABC):
-    """A place for files.
+class Folder:
+    """A folder on a disk, made when it is first written to; a subclass keeps its files elsewhere.
 
     Parameters
     ----------
@@ -28,143 +27,62 @@ class Folder(ABC):
         The place, as the user gave it.
     """
 
-    locks = False
+    locks = True
     """Whether the place grants the right to write to one process alone."""
 
     def __init__(self, name: str) -> None:
         self.name = name
 
-    @abstractmethod
     def read(self, file: str) -> bytes:
         """Return a file's content.
 
-        Parameters
-        ----------
-        file : str
-            Its path within the folder.
-
-        Returns
-        -------
-        bytes
-            The content.
-
         Raises
         ------
-        FileNotFoundError
-            If there is no such file.
         OSError
-            If it cannot be read.
+            If there is none (FileNotFoundError), or it cannot be read.
         """
+        return Path(self.name, file).read_bytes()
 
-    @abstractmethod
     def write(self, file: str, content: bytes) -> None:
         """Write a file under a temporary name and rename it.
-
-        Parameters
-        ----------
-        file : str
-            Its path within the folder.
-        content : bytes
-            The content.
 
         Raises
         ------
         OSError
             If it cannot be written.
         """
+        target = Path(self.name, file)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(target) as temporary:
+            temporary.write(content)
 
-    @abstractmethod
     def files(self, below: str = "") -> list[str]:
-        """Return the files directly in a sub-folder.
+        """Return the files directly in a sub-folder, by name and in order; temporary ones too."""
+        place = Path(self.name, below)
+        return sorted(one.name for one in place.iterdir() if one.is_file()) if place.is_dir() else []
 
-        Parameters
-        ----------
-        below : str
-            The sub-folder; the folder itself if empty.
-
-        Returns
-        -------
-        list[str]
-            Names, in order; temporary ones too.
-        """
-
-    @abstractmethod
     def move(self, file: str, to: str) -> None:
-        """Rename a file; one that has gone meanwhile is none.
+        """Rename a file; one that has gone meanwhile is none."""
+        target = Path(self.name, to)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with suppress(FileNotFoundError):
+            Path(self.name, file).replace(target)
 
-        Parameters
-        ----------
-        file, to : str
-            Paths within the folder.
-        """
-
-    @abstractmethod
     def remove(self, file: str) -> None:
-        """Remove a file; one that has gone meanwhile is none.
-
-        Parameters
-        ----------
-        file : str
-            Its path within the folder.
-        """
+        """Remove a file; one that has gone meanwhile is none."""
+        Path(self.name, file).unlink(missing_ok=True)
 
     @contextmanager
     def writer(self) -> Generator[None]:
         """Hold the right to write, where the place can grant it to one process alone.
-
-        Yields
-        ------
-        None
-            While it is held.
 
         Raises
         ------
         HydrostateError
             If another process holds it.
         """
-        yield
-
-
-class _LocalFolder(Folder):
-    """A folder on a disk.
-
-    Parameters
-    ----------
-    path : Path
-        The folder; made when it is first written to.
-    """
-
-    locks = True
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(str(path))
-        self.path = path
-
-    def read(self, file: str) -> bytes:
-        return (self.path / file).read_bytes()
-
-    def write(self, file: str, content: bytes) -> None:
-        target = self.path / file
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(target) as temporary:
-            temporary.write(content)
-
-    def files(self, below: str = "") -> list[str]:
-        place = self.path / below
-        return sorted(one.name for one in place.iterdir() if one.is_file()) if place.is_dir() else []
-
-    def move(self, file: str, to: str) -> None:
-        (self.path / to).parent.mkdir(parents=True, exist_ok=True)
-        with suppress(FileNotFoundError):
-            (self.path / file).replace(self.path / to)
-
-    def remove(self, file: str) -> None:
-        (self.path / file).unlink(missing_ok=True)
-
-    @contextmanager
-    def writer(self) -> Generator[None]:
-        self.path.mkdir(parents=True, exist_ok=True)
-        with (self.path / LOCK).open("a+b") as file:
+        Path(self.name).mkdir(parents=True, exist_ok=True)
+        with Path(self.name, LOCK).open("a+b") as file:
             try:
                 _lock(file.fileno())
             except OSError as error:
@@ -187,18 +105,9 @@ def _lock(number: int) -> None:
 
 
 class _RemoteFolder(Folder):
-    """A place that fsspec reaches. No lock can be had there: two writers write the same parts under the same names.
+    """A place that fsspec reaches. No lock can be had there: two writers write the same parts under the same names."""
 
-    Parameters
-    ----------
-    url : str
-        The place: ``s3://bucket/study``, ``memory://study``.
-
-    Raises
-    ------
-    HydrostateError
-        If fsspec, or what it needs for this protocol, is not installed.
-    """
+    locks = False
 
     def __init__(self, url: str) -> None:
         super().__init__(url)
@@ -244,6 +153,10 @@ class _RemoteFolder(Folder):
         with suppress(FileNotFoundError):
             self._system.rm_file(self._path(file))
 
+    @contextmanager
+    def writer(self) -> Generator[None]:
+        yield
+
 
 def open_folder(place: str | Path) -> Folder:
     """Return the folder of a path or a URL.
@@ -268,6 +181,5 @@ def open_folder(place: str | Path) -> Folder:
     >>> open_folder("results/night").name
     'results/night'
     """
-    if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://", str(place)):
-        return _RemoteFolder(str(place))
-    return _LocalFolder(Path(place))
+    remote = re.match(r"[A-Za-z][A-Za-z0-9+.-]+://", str(place))
+    return _RemoteFolder(str(place)) if remote else Folder(str(Path(place)))

@@ -13,47 +13,17 @@ import pyarrow as pa
 from experiments.batch.series import Group, Log, Series, Simulated, Work
 from plant.errors import HydrostateError
 
-SCHEMA = pa.schema(
-    [
-        ("key", pa.string()),
-        ("plant", pa.string()),
-        ("file", pa.string()),
-        ("drive", pa.string()),
-        ("sensors", pa.string()),
-        ("condition", pa.string()),
-        ("leakage_severity", pa.float64()),
-        ("friction_severity", pa.float64()),
-        ("seed", pa.int64()),
-        ("duration_s", pa.float64()),
-        ("sample_time_s", pa.float64()),
-        ("verb", pa.string()),
-        ("form", pa.string()),
-        ("method", pa.string()),
-        ("pressure", pa.bool_()),
-        ("told", pa.string()),
-        ("start_pa", pa.float64()),
-        ("start_std_pa", pa.float64()),
-        ("outcome", pa.string()),
-        ("reason", pa.string()),
-        ("warnings", pa.string()),
-        ("true_bulk_modulus_pa", pa.float64()),
-        ("bulk_modulus_pa", pa.float64()),
-        ("bulk_modulus_std_pa", pa.float64()),
-        ("error_percent", pa.float64()),
-        ("trusted", pa.bool_()),
-        ("found_condition", pa.string()),
-        ("runner_up", pa.string()),
-        ("margin", pa.float64()),
-        ("nis_position", pa.float64()),
-        ("nis_velocity", pa.float64()),
-        ("nis_pressure", pa.float64()),
-        ("log_likelihood", pa.float64()),
-        ("quantities", pa.string()),
-    ]
-)
-"""Columns of the store. ``outcome`` is ok, not_observable, mismatch, diverged or failed, and ``reason`` says why;
-``plant`` is ``log`` for a log, whose ``condition`` is known only if whoever made the log wrote it down; of a kind of
-actuator that is not the gear-pump one it is the kind, and ``quantities`` holds what was found, as JSON."""
+TEXT, NUMBER = pa.string(), pa.float64()
+
+ARROW: Mapping[Any, pa.DataType] = {
+    str: TEXT,
+    str | None: TEXT,
+    float: NUMBER,
+    float | None: NUMBER,
+    int: pa.int64(),
+    bool: pa.bool_(),
+}
+"""Column types by the annotations of `Simulated` and `Work`."""
 
 NIS: Mapping[str, str] = {
     "position_m": "nis_position",
@@ -62,13 +32,29 @@ NIS: Mapping[str, str] = {
 }
 """Column of each channel's normalised innovation squared [dimensionless]."""
 
-Row: TypeAlias = dict[str, Any]
-"""Entries by column."""
-
-SIMULATED_FIELDS = tuple(one.name for one in fields(Simulated))
-WORK_FIELDS = tuple(one.name for one in fields(Work))
+SIMULATED_FIELDS, WORK_FIELDS = ({one.name: ARROW[one.type] for one in fields(kind)} for kind in (Simulated, Work))
 
 TRUTH = "true_bulk_modulus_pa"
+
+SCHEMA = pa.schema(
+    {
+        **dict.fromkeys(("key", "plant", "file"), TEXT),
+        **SIMULATED_FIELDS,
+        **WORK_FIELDS,
+        **dict.fromkeys(("outcome", "reason", "warnings"), TEXT),
+        **dict.fromkeys((TRUTH, "bulk_modulus_pa", "bulk_modulus_std_pa", "error_percent"), NUMBER),
+        "trusted": pa.bool_(),
+        **dict.fromkeys(("found_condition", "runner_up"), TEXT),
+        **dict.fromkeys(("margin", *NIS.values(), "log_likelihood"), NUMBER),
+        "quantities": TEXT,
+    }
+)
+"""Columns of the store. ``outcome`` is ok, not_observable, mismatch, diverged or failed, and ``reason`` says why;
+``plant`` is ``log`` for a log, whose ``condition`` is known only if whoever made the log wrote it down; of a kind of
+actuator that is not the gear-pump one it is the kind, and ``quantities`` holds what was found, as JSON."""
+
+Row: TypeAlias = dict[str, Any]
+"""Entries by column."""
 
 FOUND = tuple(name for name in SCHEMA.names[SCHEMA.names.index("outcome") :] if name != TRUTH)
 """Columns of what came of a case; those before them, and the truth, say what it is."""

@@ -14,6 +14,13 @@ from faults.scores import confusion_matrix
 METHOD = ["plant", "drive", "sensors", "verb", "form", "method", "pressure"]
 """What tells one way of doing it from another."""
 
+LOG_COLUMNS = [
+    *("file", "verb", "outcome", "found_condition", "runner_up", "margin", "bulk_modulus_pa", "bulk_modulus_std_pa"),
+    *("quantities", "trusted", "reason", "warnings"),
+]
+FAILURE_COLUMNS = ["plant", "file", "drive", "condition", "seed", "verb", "form", "method", "start_pa", "reason", "key"]
+"""Of the tables that list logs, and cases that failed."""
+
 OUTCOME_NAMES = ("ok", "not_observable", "mismatch", "diverged", "failed")
 
 NEAR_PERCENT = 3.0
@@ -69,8 +76,8 @@ def summary_tables(frame: pd.DataFrame) -> Mapping[str, pd.DataFrame]:
         "diagnosis": diagnosis_table(frame),
         "confusion": confusion_table(frame),
         "classes": class_table(frame),
-        "logs": log_table(frame),
-        "failures": failure_table(frame),
+        "logs": frame.loc[frame["file"].notna(), LOG_COLUMNS].reset_index(drop=True),
+        "failures": frame.loc[frame["outcome"] == "failed", FAILURE_COLUMNS].reset_index(drop=True),
     }
     return {name: table for name, table in tables.items() if len(table)}
 
@@ -205,38 +212,3 @@ def class_table(frame: pd.DataFrame) -> pd.DataFrame:
     ]
     shares = [100.0 * int(counts[name]) / len(logs) for name in names]
     return pd.DataFrame({"class": names, "logs": [int(counts[name]) for name in names], "percent": shares})
-
-
-def log_table(frame: pd.DataFrame) -> pd.DataFrame:
-    """List logs with what was found in them.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        From `frame_of`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row a log and verb.
-    """
-    names = ["file", "verb", "outcome", "found_condition", "runner_up", "margin", "bulk_modulus_pa"]
-    names += ["bulk_modulus_std_pa", "quantities", "trusted", "reason", "warnings"]
-    return frame.loc[frame["file"].notna(), names].reset_index(drop=True)
-
-
-def failure_table(frame: pd.DataFrame) -> pd.DataFrame:
-    """List cases that failed.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        From `frame_of`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row a case, with its reason and its key.
-    """
-    names = ["plant", "file", "drive", "condition", "seed", "verb", "form", "method", "start_pa", "reason", "key"]
-    return frame.loc[frame["outcome"] == "failed", names].reset_index(drop=True)

@@ -5,9 +5,7 @@ of one kernel, 32 side by side and never fewer than a kernel of lanes takes.
 """
 
 import threading
-import warnings
-from collections.abc import Callable, Generator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from io import BytesIO
@@ -32,14 +30,14 @@ from experiments.batch.lanes import Lanes, Waiting, write_filtered
 from experiments.batch.of_kind import found_of, simulated_run
 from experiments.batch.rows import NIS, TRUTH, Row, Rows, error_percent
 from experiments.batch.series import Log, Series, Simulated, Work, content_of
-from experiments.command.logs import read_log
+from experiments.command.logs import caught, read_log
 from experiments.running.random_streams import stream
 from faults.conditions import severity
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
 from plant.eha.simulate import PLANTS, simulate
-from plant.errors import LogError, LogWarning
+from plant.errors import LogError
 from plant.log.record import Record
 from plant.sensors.sensors import SENSORS, measure, noise_variances
 
@@ -155,7 +153,7 @@ def _prepared(series: Series, task: Task) -> _Prepared:
     rig, kind = task.rig, actuator(task.plant)
     other = None if kind.name == DEFAULT else kind
     if isinstance(series, Log):
-        with _one_at_a_time, _caught() as said:
+        with _one_at_a_time, caught() as said:
             record = read_log(Path(series.path), rig.columns, dict(series.columns), kind.required)
         if content_of(Path(series.path)) != series.content:
             raise LogError(f"{series.path}: was changed after the study began; run the same command again")
@@ -163,7 +161,7 @@ def _prepared(series: Series, task: Task) -> _Prepared:
         entries: Row = {"duration_s": record.duration, "sample_time_s": record.sample_time}
         entries |= {"condition": known} if isinstance(known, str) else {}
         entries |= {} if other is None else {"plant": kind.name}
-        return _Prepared(record, rig, rig.parameters, None, entries, "; ".join(said()) or None, other)
+        return _Prepared(record, rig, rig.parameters, None, entries, _sentences(said), other)
     if other is not None:
         return _Prepared(simulated_run(other, series, rig), rig, rig.parameters, series.sensors, {}, None, other)
     truth, parameters = _truth(series, rig.parameters)
@@ -200,15 +198,14 @@ def _run(place: int, prepared: _Prepared, work: Work, rows: Rows, lanes: Lanes) 
         else:
             write_filtered(rows, [waiting], [METHODS[work.method](problem)])
         return
-    with _one_at_a_time, _caught() as said:
+    with _one_at_a_time, caught() as said:
         if prepared.other is not None:
             found = found_of(prepared.other, work.verb, prepared.record, prepared.rig)
         elif work.verb == "diagnose":
             found = diagnosed(record, prepared.rig)
         else:
             found = _estimated(record, parameters, work, prepared)
-    sentences = [sentence for sentence in (prepared.warnings, *said()) if sentence]
-    found["warnings"] = "; ".join(dict.fromkeys(sentences)) or None
+    found["warnings"] = _sentences([prepared.warnings, *said] if prepared.warnings else said)
     rows.put([place], {name: [value] for name, value in found.items()})
 
 
@@ -271,6 +268,11 @@ def _first_problem(record: Record, parameters: EhaParameters, work: Work, sensor
     return replace(problem, every=max(1, len(record) // TRACK_ROWS))
 
 
+def _sentences(said: Iterable[object]) -> str | None:
+    """Return what was said of a log in one text, each sentence once."""
+    return "; ".join(dict.fromkeys(map(str, said))) or None
+
+
 @cache
 def _predicted(form: str) -> tuple[str, ...]:
     return predicted_channels(FORMS[form])
@@ -279,12 +281,3 @@ def _predicted(form: str) -> tuple[str, ...]:
 @cache
 def _known_variances(sensors: str) -> Mapping[str, float]:
     return noise_variances(SENSORS[sensors])
-
-
-@contextmanager
-def _caught() -> Generator[Callable[[], list[str]]]:
-    """Catch what is said of a log; the callable returns it, each sentence once."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("ignore")
-        warnings.simplefilter("always", LogWarning)
-        yield lambda: list(dict.fromkeys(str(one.message) for one in caught if issubclass(one.category, LogWarning)))

@@ -1,7 +1,8 @@
 """Several logs, one after the other: one that fails is named and the rest are done."""
 
 import warnings
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
@@ -91,17 +92,28 @@ def run_logs(logs: Sequence[Path], work: Work, blank: Result, what: str) -> Batc
     return Batch(tuple(results), len(logs))
 
 
-def _one(log: Path, work: Work, blank: Result) -> Result:
-    with warnings.catch_warnings(record=True) as caught:
+@contextmanager
+def caught() -> Generator[list[LogWarning]]:
+    """Catch what is said of a log; the list holds it once the block has ended."""
+    said: list[LogWarning] = []
+    with warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("ignore")
         warnings.simplefilter("always", LogWarning)
+        try:
+            yield said
+        finally:
+            said += [one.message for one in raised if isinstance(one.message, LogWarning)]
+
+
+def _one(log: Path, work: Work, blank: Result) -> Result:
+    with caught() as said_of_it:
         try:
             result = dict(work(log))
         except HydrostateError as error:
             result = _failure(blank, error.message if error.source == str(log) else str(error))
         except Exception as error:  # whatever a log brings up must not cost the others their results
             result = _failure(blank, unexpected(error))
-    raised = distinct(one.message.note for one in caught if isinstance(one.message, LogWarning))
+    raised = distinct(one.note for one in said_of_it)
     said = list(dict.fromkeys([*map(str, raised), *result.get("warnings", ())]))
     notes = [*(one.to_dict() for one in raised), *result.get("notes", ())]
     for sentence in said:

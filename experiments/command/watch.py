@@ -2,7 +2,6 @@
 
 import json
 import sys
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -12,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from experiments.command.json_output import plain
-from experiments.command.logs import read_log, with_rig_columns
+from experiments.command.logs import caught, read_log, with_rig_columns
 from experiments.command.options import PRESSURE, Columns, RigFile, load_columns, load_rig, option
 from experiments.command.terminal import emit, note
-from plant.errors import HydrostateError, LogError, LogWarning
+from plant.errors import HydrostateError, LogError
 from plant.notes import distinct
 
 if TYPE_CHECKING:
@@ -115,7 +114,7 @@ class _Asked:
                     f"{self.healthy}: the healthy log must have the rate of what is watched, {1.0 / sample_time:g} Hz, "
                     f"got {1.0 / record.sample_time:g} Hz"
                 )
-            samples, logged = _samples(_channels(record), record.sample_time, str(self.healthy))
+            samples, logged = _samples(record.channels, record.sample_time, str(self.healthy))
             if "motion" not in made.balances and not logged:
                 raise LogError(f"{self.healthy}: the healthy log must have {PRESSURE}, as what is watched has")
             alarms = sum(isinstance(event, Alarm) for event in made.take(samples))
@@ -215,7 +214,7 @@ def _reading(event: "Change") -> str:
 
 def _file(told: _Told, path: Path, asked: _Asked) -> None:
     record = _read(path, asked)
-    samples, pressure = _samples(_channels(record), record.sample_time, str(path))
+    samples, pressure = _samples(record.channels, record.sample_time, str(path))
     watch = asked.watch(record.sample_time, pressure, record.start_time)
     told.start(str(path), watch, asked)
     told.events(watch.take(samples))
@@ -263,20 +262,14 @@ def _samples(
         raise LogError(error.message, source) from error
 
 
-def _channels(record: "Record") -> "dict[str, NDArray[np.float64]]":
-    return {name: record[name] for name in record}
-
-
 def _read(path: Path, asked: _Asked) -> "Record":
     return _noted(str(path), lambda: read_log(path, asked.bench.columns, asked.columns))
 
 
 def _noted(source: str, read: Callable[[], T]) -> T:
     """Return what is read; what the reader should know of it goes to standard error."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("ignore")
-        warnings.simplefilter("always", LogWarning)
+    with caught() as said:
         found = read()
-    for said in distinct(one.message.note for one in caught if isinstance(one.message, LogWarning)):
-        note(f"{source}: warning: {said}")
+    for one in distinct(warning.note for warning in said):
+        note(f"{source}: warning: {one}")
     return found
