@@ -34,8 +34,6 @@ class Run:
         What the bench would have logged; its metadata say what made it.
     about : Mapping[str, Any]
         The same for the reader: condition, drive, sensors.
-    notes : tuple of Note
-        What a reader should know of the run.
     """
 
     record: "Record"
@@ -77,8 +75,6 @@ class LogVerb:
         From a finding to its JSON entries, ``outcome`` and ``message`` among them.
     blank : Mapping[str, Any]
         The entries of a log that could not be used.
-    screen : callable
-        What a terminal shows.
     page : callable, optional
         ``page(result, finding, record) -> HTML``; the page of `experiments.log_pages.finding_page` if not given.
     figure : callable, optional
@@ -109,10 +105,6 @@ class Experiment:
         values with the least standard deviation that any method could reach.
     options : Options
         Options that it understands, with what they are where they are not given.
-    entries : callable
-        From a finding to its JSON entries.
-    screen : callable
-        What a terminal shows.
     """
 
     run: "Callable[[Rig[Any], Options], Sequence[Finding]]"
@@ -129,8 +121,6 @@ class ActuatorKind:
     ----------
     name : str
         What ``--plant`` and rig files call it.
-    description : str
-        What it is, in a line.
     parameters : type
         Frozen dataclass of its parameters: every field has an `SI` note and a default, the healthy actuator's.
     channels : Mapping[str, str]
@@ -178,11 +168,6 @@ class ActuatorKind:
         ----------
         path : Path or None
             The rig file.
-
-        Returns
-        -------
-        Rig
-            The rig.
 
         Raises
         ------

@@ -52,13 +52,7 @@ def actuator(name: str) -> "ActuatorKind":
 
 
 def actuators() -> "Iterator[ActuatorKind]":
-    """Yield every kind, those that come along first.
-
-    Yields
-    ------
-    ActuatorKind
-        Each kind, imported.
-    """
+    """Yield every kind, those that come along first."""
     yield from (_loaded(name, place) for name, place in ACTUATORS.items())
     installed = {one.name: one.value for one in entry_points(group=ENTRY_POINTS)}
     yield from (_loaded(name, place) for name, place in installed.items() if name not in ACTUATORS)
@@ -80,15 +74,8 @@ def offered(kind: "ActuatorKind", verb: str) -> Any:
 
     Parameters
     ----------
-    kind : ActuatorKind
-        The kind.
     verb : str
         ``simulate``, ``estimate``, ``diagnose`` or ``identifiability``.
-
-    Returns
-    -------
-    Simulation, LogVerb or Experiment
-        What it does.
 
     Raises
     ------

@@ -1,9 +1,10 @@
 """The public API says what it is: docstrings, arguments, units, shapes.
 
 The rules, each shown to fire on a made-up offender: every public module, class, function and method has a
-docstring; whoever takes arguments lists them all, and no others, under Parameters; a float says its unit, an
-array its shape; more than one line about a function that returns something has Returns. Members of a Protocol
-with a body of ``...`` need one line only, and commands are checked by their help.
+docstring; an argument that is a float or an array stands under Parameters, with its unit or its shape; another stands
+there only where there is more to say than its name and type do, and nothing does that is no argument. More than one
+line about a function that returns floats or arrays has Returns. Members of a Protocol with a body of ``...`` need one
+line only, and commands are checked by their help.
 """
 
 import ast
@@ -91,6 +92,8 @@ def _mentions(annotation: ast.expr | None, names: frozenset[str]) -> bool:
             return _mentions(ast.parse(quoted, mode="eval").body, names)
         case ast.Name(id=name) | ast.Attribute(attr=name):
             return name in names
+        case ast.Subscript(value=ast.Name(id="Annotated"), slice=ast.Tuple(elts=[kind, *_])):
+            return _mentions(kind, names)
         case ast.Subscript(value=ast.Name(id="Callable") | ast.Attribute(attr="Callable")):
             return False
         case _:
@@ -201,6 +204,8 @@ def _argument_offences(
             yield page.offence(node, name, f"describes {stale!r}, which it does not take")
     for argument, annotation in arguments.items():
         entry = described.get(argument)
+        if entry is None and not _mentions(annotation, page.floats | page.arrays):
+            continue
         if entry is None:
             yield page.offence(node, name, f"does not list {argument!r} under Parameters")
             continue
@@ -225,8 +230,8 @@ def _function_offences(page: Page, node: Function, name: str, owner: ast.ClassDe
         return
     yield from _argument_offences(page, node, name, _arguments(node, method=owner is not None))
     returns = ast.unparse(node.returns) if node.returns else "None"
-    silent = returns in {"None", "NoReturn", "Never"} or decorators & {"property", "cached_property"}
-    if "\n" in docstring and not silent and not sections(docstring).keys() & {"Returns", "Yields"}:
+    numbers = _mentions(node.returns, page.floats | page.arrays) and not decorators & {"property", "cached_property"}
+    if "\n" in docstring and numbers and not sections(docstring).keys() & {"Returns", "Yields"}:
         yield page.offence(node, name, f"does not say under Returns what its {returns} is")
 
 
@@ -260,13 +265,13 @@ OFFENDERS = {
     "function": ("def f(): ...", "f has no docstring"),
     "method": ('class A:\n    """A."""\n    def f(self): ...', "A.f has no docstring"),
     "protocol member": ('class A(Protocol):\n    """A."""\n    def f(self): ...', "A.f has no docstring"),
-    "one line": ('def f(x: int) -> int:\n    """F."""', "f does not list 'x'"),
-    "starred": ('def f(*rest: int):\n    """F."""', "f does not list 'rest'"),
-    "keyword": ('def f(*, x: int):\n    """F.\n\n    Parameters\n    ----------\n    """', "not list 'x'"),
+    "one line": ('def f(x: float) -> int:\n    """F."""', "f does not list 'x'"),
+    "starred": ('def f(*rest: float):\n    """F."""', "f does not list 'rest'"),
+    "keyword": ('def f(*, x: NDArray):\n    """F.\n\n    Parameters\n    ----------\n    """', "not list 'x'"),
     "stale": ('def f():\n    """F.\n\n    Parameters\n    ----------\n    x : int\n    """', "describes 'x'"),
-    "field": ('@dataclass(frozen=True)\nclass A:\n    """A."""\n    x: int', "A does not list 'x'"),
-    "constructor": ('class A:\n    """A."""\n    def __init__(self, x: int): ...', "A does not list 'x'"),
-    "returns": ('def f() -> int:\n    """F.\n\n    More.\n    """', "under Returns what its int is"),
+    "field": ('@dataclass(frozen=True)\nclass A:\n    """A."""\n    x: float', "A does not list 'x'"),
+    "constructor": ('class A:\n    """A."""\n    def __init__(self, x: float): ...', "A does not list 'x'"),
+    "returns": ('def f() -> float:\n    """F.\n\n    More.\n    """', "under Returns what its float is"),
 }
 
 DESCRIBED = '''
@@ -329,7 +334,8 @@ def test_numbers_say_their_unit_or_shape(signature: str, entry: str, description
         'class A(Protocol):\n    """A."""\n    def f(self, x: float):\n        """Do it."""\n        ...',
         '@app.command()\ndef f(x: float):\n    """Do it."""',
         '@dataclass\nclass A:\n    """A."""\n    x: Annotated[float, SI("m", "length", "Table 1")]',
-        'class A:\n    """A."""\n    @property\n    def f(self) -> int:\n        """F.\n\n        More."""',
+        'class A:\n    """A."""\n    @property\n    def f(self) -> float:\n        """F.\n\n        More."""',
+        'def f(x: int) -> str:\n    """F.\n\n    More."""',
     ],
 )
 def test_rules_leave_the_exempt_alone(text: str) -> None:

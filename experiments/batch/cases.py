@@ -40,17 +40,7 @@ SERIES_COST = 4e-7
 
 @dataclass(frozen=True)
 class Task:
-    """What a worker is given: some series with their cases.
-
-    Parameters
-    ----------
-    rig : Rig
-        The healthy actuator.
-    groups : tuple of Group
-        The cases, a series at a time.
-    plant : str
-        Its kind.
-    """
+    """What a worker is given: some series with their cases."""
 
     rig: Rig[Any]
     groups: tuple[Group, ...]
@@ -68,10 +58,6 @@ class Plan:
 
     Parameters
     ----------
-    study : Study
-        The study.
-    rig : Rig
-        Its healthy actuator.
     blocks : tuple
         Series, and what is done with each of them, a block at a time.
     """
@@ -113,13 +99,6 @@ class Plan:
         ----------
         done : collection of str
             Keys of the cases that need not be run.
-        workers : int
-            How many tasks are run at a time.
-
-        Yields
-        ------
-        Task
-            Each case once.
         """
         seen = set(done)
         gathered = _Gathered(min(TASK_SECONDS, self.seconds / (2.0 * workers)))
@@ -177,18 +156,6 @@ class _Gathered:
 def plan_study(study: Study, folder: Path) -> Plan:
     """List the cases of a study; logs are hashed, nothing is run.
 
-    Parameters
-    ----------
-    study : Study
-        The study.
-    folder : Path
-        What its paths are relative to.
-
-    Returns
-    -------
-    Plan
-        The cases.
-
     Raises
     ------
     StudyError
@@ -206,30 +173,12 @@ def plan_study(study: Study, folder: Path) -> Plan:
 
 @cache
 def package_version(name: str) -> str:
-    """Return the version of an installed package; looking it up takes milliseconds.
-
-    Parameters
-    ----------
-    name : str
-        The package.
-
-    Returns
-    -------
-    str
-        Its version.
-    """
+    """Return the version of an installed package; looking it up takes milliseconds."""
     return version(name)
 
 
 def config_hash(study: Study, rig: Rig[Any]) -> str:
     """Return a hash of a study's content and its rig's.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    rig : Rig
-        Its healthy actuator.
 
     Returns
     -------

@@ -38,8 +38,6 @@ def compare_studies(first: pd.DataFrame, second: pd.DataFrame, seed: int = 2024)
     ----------
     first, second : pandas.DataFrame
         Rows of the two studies, from `experiments.batch.summary.frame_of`.
-    seed : int
-        Seed of the bootstrap.
 
     Returns
     -------

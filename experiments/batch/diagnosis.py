@@ -26,13 +26,6 @@ WHY_NONE = {
 def diagnosed(record: Record, rig: Rig) -> dict[str, Any]:
     """Say which of the nine conditions a log was taken in, or that it is in none.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-    rig : Rig
-        The healthy actuator.
-
     Returns
     -------
     dict[str, Any]

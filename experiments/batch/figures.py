@@ -45,11 +45,6 @@ def way_in_words(row: Mapping[Any, Any]) -> str:
     row : Mapping[str, Any]
         Its plant, drive, sensors, verb, form, method and pressure.
 
-    Returns
-    -------
-    str
-        In words.
-
     Examples
     --------
     >>> way_in_words({"plant": "lumped", "drive": "sine", "verb": "filter", "form": "pressure", "method": "ekf",

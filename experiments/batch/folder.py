@@ -19,13 +19,7 @@ LOCK = "lock"
 
 
 class Folder:
-    """A folder on a disk, made when it is first written to; a subclass keeps its files elsewhere.
-
-    Parameters
-    ----------
-    name : str
-        The place, as the user gave it.
-    """
+    """A folder on a disk, made when it is first written to; a subclass keeps its files elsewhere."""
 
     locks = True
     """Whether the place grants the right to write to one process alone."""

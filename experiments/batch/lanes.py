@@ -20,10 +20,6 @@ class Waiting(NamedTuple):
 
     Parameters
     ----------
-    place : int
-        Its row's place.
-    problem : FilterProblem
-        Its task.
     truth : float or None
         The true bulk modulus, where that is known [Pa].
     """
@@ -34,26 +30,14 @@ class Waiting(NamedTuple):
 
 
 class Lanes:
-    """Filters that wait for others like them, until the lanes of a kernel are full.
-
-    Parameters
-    ----------
-    rows : Rows
-        Where results go.
-    """
+    """Filters that wait for others like them, until the lanes of a kernel are full."""
 
     def __init__(self, rows: Rows) -> None:
         self._rows = rows
         self._waiting: dict[tuple[object, ...], list[Waiting]] = {}
 
     def add(self, one: Waiting) -> None:
-        """Let a filter wait; those that fill the lanes of a kernel are run.
-
-        Parameters
-        ----------
-        one : Waiting
-            The filter.
-        """
+        """Let a filter wait; those that fill the lanes of a kernel are run."""
         problem = one.problem
         alike = (id(problem.model), problem.channels, problem.sample_time, problem.measured.shape)
         waiting = self._waiting.setdefault(alike, [])
@@ -81,10 +65,6 @@ def write_filtered(rows: Rows, ran: Sequence[Waiting], traces: Sequence[Trace]) 
 
     Parameters
     ----------
-    rows : Rows
-        Where it goes.
-    ran : sequence of Waiting
-        The filters.
     traces : sequence of Trace
         What each of them returned.
     """

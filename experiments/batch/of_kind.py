@@ -17,13 +17,6 @@ from plant.notes import distinct
 def simulated_of(kind: ActuatorKind, runs: Runs) -> Iterator[Simulated]:
     """Yield the series of runs, every condition with every seed.
 
-    Parameters
-    ----------
-    kind : ActuatorKind
-        The kind of actuator.
-    runs : Runs
-        What the study lists.
-
     Yields
     ------
     Simulated
@@ -47,17 +40,8 @@ def simulated_run(kind: ActuatorKind, series: Simulated, rig: Rig) -> Record:
 
     Parameters
     ----------
-    kind : ActuatorKind
-        The kind of actuator.
     series : Simulated
         One of `simulated_of`.
-    rig : Rig
-        The healthy actuator.
-
-    Returns
-    -------
-    Record
-        The run.
     """
     simulation = offered(kind, "simulate")
     asked = {
@@ -75,14 +59,8 @@ def found_of(kind: ActuatorKind, verb: str, record: Record, rig: Rig) -> Row:
 
     Parameters
     ----------
-    kind : ActuatorKind
-        The kind of actuator.
     verb : str
         ``estimate`` or ``diagnose``.
-    record : Record
-        The log.
-    rig : Rig
-        The healthy actuator.
 
     Returns
     -------

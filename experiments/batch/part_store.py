@@ -33,13 +33,7 @@ MANIFEST, CASES, PARTS, SET_ASIDE = "manifest.json", "cases.parquet", "parts", "
 
 
 class PartStore:
-    """A store of rows.
-
-    Parameters
-    ----------
-    folder : Folder
-        Where it is.
-    """
+    """A store of rows."""
 
     def __init__(self, folder: Folder) -> None:
         self.folder = folder
@@ -52,11 +46,6 @@ class PartStore:
     @contextmanager
     def writing(self) -> Generator[None]:
         """Hold the right to write; leftovers of a writer that was killed are removed first.
-
-        Yields
-        ------
-        None
-            While it is held.
 
         Raises
         ------
@@ -106,13 +95,6 @@ class PartStore:
     def add(self, part: bytes, keys: Sequence[str]) -> None:
         """Add a part.
 
-        Parameters
-        ----------
-        part : bytes
-            A Parquet file of rows.
-        keys : sequence of str
-            The keys of its rows.
-
         Raises
         ------
         HydrostateError
@@ -124,11 +106,6 @@ class PartStore:
 
     def manifest(self) -> Mapping[str, Any] | None:
         """Return what was last written of the study, None where nothing was.
-
-        Returns
-        -------
-        Mapping or None
-            The manifest.
 
         Raises
         ------
@@ -255,11 +232,6 @@ def open_store(place: str | Path) -> PartStore:
     ----------
     place : str or Path
         A local path, or a URL such as ``s3://bucket/study``.
-
-    Returns
-    -------
-    PartStore
-        The store.
 
     Raises
     ------

@@ -99,8 +99,6 @@ def render_batch_report(manifest: Mapping[str, Any], tables: Tables, files: Mapp
         From `experiments.batch.summary.summary_tables`.
     files : Mapping[str, bytes]
         Its figures, by path.
-    done : int
-        Cases in the store.
 
     Returns
     -------

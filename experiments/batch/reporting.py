@@ -20,13 +20,6 @@ def write_report(store: PartStore, folder: Folder) -> str:
     ----------
     store : PartStore
         The store; it may be growing.
-    folder : Folder
-        Where to.
-
-    Returns
-    -------
-    str
-        Where the report is.
 
     Raises
     ------

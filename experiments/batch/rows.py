@@ -61,13 +61,7 @@ FOUND = tuple(name for name in SCHEMA.names[SCHEMA.names.index("outcome") :] if 
 
 
 class Rows:
-    """The rows of a task while its cases are run, each known by its place in the task.
-
-    Parameters
-    ----------
-    groups : sequence of Group
-        The task's cases, a series at a time.
-    """
+    """The rows of a task while its cases are run, each known by its place in the task."""
 
     def __init__(self, groups: Sequence[Group]) -> None:
         self._keys = [key for group in groups for key in group.keys]
@@ -81,8 +75,6 @@ class Rows:
 
         Parameters
         ----------
-        series : int
-            Its place among the task's series.
         entries : Mapping[str, Any]
             Entries by column, of those that say what a case is.
         """
@@ -93,8 +85,6 @@ class Rows:
 
         Parameters
         ----------
-        places : sequence of int
-            Their places.
         columns : Mapping[str, sequence]
             A value for each of them, by column of `FOUND`.
         """
@@ -104,15 +94,7 @@ class Rows:
                 column[place] = value
 
     def fail(self, places: Sequence[int], reason: str | Exception) -> None:
-        """Note that cases could not be run.
-
-        Parameters
-        ----------
-        places : sequence of int
-            Their places.
-        reason : str or Exception
-            Why.
-        """
+        """Note that cases could not be run."""
         told = " ".join(_said(reason).split())
         self.put(places, {"outcome": ["failed"] * len(places), "reason": [told] * len(places)})
 

@@ -30,10 +30,6 @@ class Tally:
 
     Parameters
     ----------
-    done : int
-        Cases run and kept.
-    failed : int
-        Cases among them that failed.
     stopped : str
         Why no more were begun; empty where all were.
     """
@@ -93,8 +89,6 @@ def run_batch(
 
     Parameters
     ----------
-    plan : Plan
-        The study's cases.
     store : PartStore
         Where rows go; its right to write is held by the caller.
     done : collection of str
@@ -107,11 +101,6 @@ def run_batch(
         Called with the count of cases and the part, when it has been kept.
     max_failures : int, optional
         No task is begun once more cases than this have failed.
-
-    Returns
-    -------
-    Tally
-        How far it came.
 
     Raises
     ------
@@ -182,13 +171,6 @@ def _halves(task: Task) -> list[Task]:
 
 def manifest_of(plan: Plan, source: str) -> Mapping[str, Any]:
     """Return what it takes to run a study again.
-
-    Parameters
-    ----------
-    plan : Plan
-        The study's cases.
-    source : str
-        The study file's name.
 
     Returns
     -------

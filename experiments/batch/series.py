@@ -51,16 +51,10 @@ class Log:
 
     Parameters
     ----------
-    file : str
-        Its path as the study names it.
-    path : str
-        Where it is.
     content : str
         Hash of its bytes, see `content_of`.
     size : int
         Its length [byte].
-    columns : tuple of pairs of str
-        Foreign column by channel.
     """
 
     file: str
@@ -86,10 +80,6 @@ class Work:
     ----------
     verb, form, method : str
         As in `experiments.batch.study_file.Method`.
-    pressure : bool
-        Whether differential pressure is used.
-    told : str
-        Whose leakage and friction the method is told.
     start_pa : float or None
         First guess of bulk modulus [Pa]; None for the rig's own, or where there is none to make.
     start_std_pa : float
@@ -110,8 +100,6 @@ class Group(NamedTuple):
 
     Parameters
     ----------
-    series : Simulated or Log
-        The series.
     keys : tuple of str
         The key of each case.
     works : tuple of Work
@@ -125,11 +113,6 @@ class Group(NamedTuple):
 
 def content_of(path: Path) -> str:
     """Return a hash of a log's bytes, and of the notes that stand beside a CSV.
-
-    Parameters
-    ----------
-    path : Path
-        The log.
 
     Returns
     -------

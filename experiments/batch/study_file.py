@@ -104,8 +104,6 @@ class Runs(_Table):
         First guesses of bulk modulus [Pa]; the rig's own where there are none.
     duration_s, sample_time_s : float
         Length of a run and time between its samples [s].
-    methods : tuple of Method
-        What is done with every run.
     """
 
     plants: tuple[str, ...] = ("lumped",)
@@ -155,8 +153,6 @@ class Logs(_Table):
         Foreign column by channel, beside the rig's: ``{ position_m = "POS_MM:mm" }``.
     starts_pa : tuple of float
         First guesses of bulk modulus [Pa]; the rig's own where there are none.
-    methods : tuple of Method
-        What is done with every log.
     """
 
     glob: Annotated[str, Field(min_length=1)]
@@ -170,18 +166,10 @@ class Study(_Table):
 
     Parameters
     ----------
-    name : str
-        What reports call it.
-    question : str
-        What it shall answer.
     plant : str
         The kind of actuator that its runs and logs are of.
     rig : str
         The healthy actuator's rig file, relative to the study file; empty for the paper's.
-    runs : tuple of Runs
-        Simulated cases.
-    logs : tuple of Logs
-        Logs.
     """
 
     name: Annotated[str, Field(min_length=1)]
@@ -212,11 +200,6 @@ def read_study(path: str | Path) -> Study:
     path : str or Path
         A TOML file, or the name of a study that comes with the project.
 
-    Returns
-    -------
-    Study
-        The study.
-
     Raises
     ------
     StudyError
@@ -239,13 +222,6 @@ def parse_study(content: Mapping[str, Any], source: str) -> Study:
     ----------
     content : Mapping[str, Any]
         As TOML or JSON gives it.
-    source : str
-        The file, for messages.
-
-    Returns
-    -------
-    Study
-        The study.
 
     Raises
     ------
@@ -276,11 +252,6 @@ def study_path(path: str | Path) -> Path:
     ----------
     path : str or Path
         A file, or a name such as ``eha-paper``.
-
-    Returns
-    -------
-    Path
-        The file.
     """
     shipped = files(SHIPPED).joinpath(f"{path}.toml")
     if Path(path).exists() or not shipped.is_file():
@@ -290,11 +261,6 @@ def study_path(path: str | Path) -> Path:
 
 def shipped_studies() -> tuple[str, ...]:
     """Return the names of the studies that come with the project.
-
-    Returns
-    -------
-    tuple of str
-        Names, in order.
 
     Examples
     --------

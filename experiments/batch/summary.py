@@ -34,11 +34,6 @@ MOST_LISTED = 200
 def frame_of(rows: pa.Table) -> pd.DataFrame:
     """Return a store's rows as a data frame whose conditions have a name throughout.
 
-    Parameters
-    ----------
-    rows : pyarrow.Table
-        Rows of a store.
-
     Returns
     -------
     pandas.DataFrame

@@ -72,11 +72,6 @@ class Part:
 def run_task(task: Task) -> Part:
     """Run the cases of a task.
 
-    Parameters
-    ----------
-    task : Task
-        The cases.
-
     Returns
     -------
     Part
@@ -105,20 +100,7 @@ def run_task(task: Task) -> Part:
 
 
 def lost_task(task: Task, reason: str) -> Part:
-    """Return a task's cases as failed.
-
-    Parameters
-    ----------
-    task : Task
-        The cases.
-    reason : str
-        Why.
-
-    Returns
-    -------
-    Part
-        The rows.
-    """
+    """Return a task's cases as failed."""
     rows = Rows(task.groups)
     rows.fail(range(len(task.keys)), reason)
     return _as_part(rows)

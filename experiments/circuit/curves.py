@@ -47,8 +47,6 @@ def steady_runs(
         The circuits; their strokes are made long enough.
     speed : float
         Motor speed [rad/s].
-    sensors : Sensors
-        What the bench sees.
     rng : numpy.random.Generator, optional
         Source of sensor noise.
 
@@ -69,10 +67,6 @@ class Sweep:
 
     Parameters
     ----------
-    axis : str
-        Column of the throttle's voltage.
-    quantity : str
-        Channel that settles.
     volts : tuple of float
         The throttle's voltages [V].
     circuit : callable
@@ -115,13 +109,6 @@ FRICTION_SWEEP = Sweep(
 def throttle_curve(rig: CircuitParameters, sweep: Sweep) -> pd.DataFrame:
     """Return what settles over a sweep of one throttle at 4 V of motor: Figures 3 and 4.
 
-    Parameters
-    ----------
-    rig : CircuitParameters
-        The healthy circuit.
-    sweep : Sweep
-        Which throttle, what settles, and at which voltages.
-
     Returns
     -------
     pandas.DataFrame
@@ -150,19 +137,10 @@ def leakage_points(
 
     Parameters
     ----------
-    rig : CircuitParameters
-        The healthy circuit.
     level : {"none", "minor", "major"}
         Leakage level, by throttle A.
-    rng : numpy.random.Generator
-        Source of sensor noise.
     volts : iterable of float
         Throttle B's voltages [V].
-
-    Returns
-    -------
-    SteadyPoints
-        The points.
     """
     a_volts = VOLTS_A[LEVELS.index(level)]
     return steady_points(steady_runs([throttled(rig, a_volts, v) for v in volts], rig.rated_speed, BENCH, rng))
@@ -175,19 +153,10 @@ def friction_points(
 
     Parameters
     ----------
-    rig : CircuitParameters
-        The healthy circuit.
     level : {"none", "minor", "major"}
         Friction level, by throttle B.
-    rng : numpy.random.Generator
-        Source of sensor noise.
     volts : iterable of float
         Motor voltages [V]; those of the paper are random from 0.5 V to 3.5 V.
-
-    Returns
-    -------
-    SteadyPoints
-        The points.
     """
     p = throttled(rig, 10.0, VOLTS_B[LEVELS.index(level)])
     runs = (steady_runs([p], v * rig.motor_speed_per_volt, BENCH, rng) for v in volts)
@@ -204,8 +173,6 @@ def points_table(
 
     Parameters
     ----------
-    rig : CircuitParameters
-        The healthy circuit.
     rng : numpy.random.Generator
         Source of sensor noise, as that of the refit.
     points : callable
@@ -234,13 +201,6 @@ def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
 
     What went in is the circuit's settled leakage: with make-up open the drain counts whole (errata E17).
 
-    Parameters
-    ----------
-    rig : CircuitParameters
-        The healthy circuit.
-    rng : numpy.random.Generator
-        Source of sensor noise.
-
     Returns
     -------
     pandas.DataFrame
@@ -260,13 +220,6 @@ def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
 @tabled
 def friction_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
     """Return Table 4 refitted from steady points by equation 5.11, beside what went in and what is published.
-
-    Parameters
-    ----------
-    rig : CircuitParameters
-        The healthy circuit.
-    rng : numpy.random.Generator
-        Source of sensor noise.
 
     Returns
     -------

@@ -72,12 +72,8 @@ def prbs_around(
 
     Parameters
     ----------
-    p : CircuitParameters
-        The circuit.
     mean_v, amplitude_v : float
         Mean, not negative, and amplitude of the input [V].
-    rng : numpy.random.Generator
-        Source of the signal and of sensor noise.
     duration : float
         Least length of all passes together [s].
 
@@ -106,14 +102,8 @@ def frequency_responses(
 
     Parameters
     ----------
-    rig : CircuitParameters
-        The healthy circuit.
-    seed : int
-        Seed of the signals and of sensor noise.
     inputs : iterable of tuple of float
         Mean and amplitude of each input [V], as `MEAN_INPUTS` and `AMPLITUDE_INPUTS`.
-    condition : str
-        Condition name.
 
     Returns
     -------
@@ -155,8 +145,6 @@ def order_study(rig: CircuitParameters, seed: int, mean_v: float = 2.0) -> pd.Da
 
     Parameters
     ----------
-    rig : CircuitParameters
-        The healthy circuit.
     seed : int
         Seed of the signal, sensor noise, and the floor.
     mean_v : float
@@ -173,20 +161,7 @@ def order_study(rig: CircuitParameters, seed: int, mean_v: float = 2.0) -> pd.Da
 
 
 def validation_input(rig: CircuitParameters, settings: StudySettings) -> pd.DataFrame:
-    """Return the nine steps of section 6, the drive alone: Figure 10.
-
-    Parameters
-    ----------
-    rig : CircuitParameters
-        The circuit, for its motor speed a volt.
-    settings : StudySettings
-        Length, sample time and seed.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns time_s, motor_voltage_v, motor_speed_rad_s.
-    """
+    """Return the nine steps of section 6, the drive alone: Figure 10."""
     T = settings.classification_sample_time
     speed = make_drive("steps", settings.duration, T, rig, stream(settings.seed, "circuit validation"))
     volts = speed / rig.motor_speed_per_volt
@@ -208,12 +183,6 @@ def bulk_modulus_on_circuit(
     ----------
     rig : CircuitParameters
         The healthy circuit; its `bulk_modulus` is the truth.
-    settings : StudySettings
-        First guesses, length, sample time and seed.
-    conditions : sequence of str
-        Condition names.
-    experiments : sequence of Experiment
-        Forms and their drives.
 
     Returns
     -------

@@ -162,11 +162,6 @@ def draw_validation_input(tables: Tables) -> Figure:
     ----------
     tables : Mapping[str, pandas.DataFrame]
         The circuit's tables.
-
-    Returns
-    -------
-    Figure
-        Motor voltage over time.
     """
     steps = tables["figure 10 validation input"]
     title = "The validation input: nine steps of 2.5 V to 4 V that turn round"

@@ -46,10 +46,6 @@ def first_tests(rig: CircuitParameters, seed: int, levels_v: Iterable[float] = L
 
     Parameters
     ----------
-    rig : CircuitParameters
-        The healthy circuit.
-    seed : int
-        Seed of signals and sensor noise.
     levels_v : iterable of float
         Input levels of the steady-state gain [V], positive.
 
@@ -87,11 +83,6 @@ def first_tests(rig: CircuitParameters, seed: int, levels_v: Iterable[float] = L
 def break_frequency(response: pd.DataFrame) -> float:
     """Return where a response's gain has fallen 3 dB below that at its lowest frequency [Hz].
 
-    Parameters
-    ----------
-    response : pandas.DataFrame
-        Columns frequency_hz, rising, and gain.
-
     Returns
     -------
     float
@@ -120,10 +111,6 @@ def dead_zone(p: CircuitParameters, rng: np.random.Generator, highest_v: float =
 
     Parameters
     ----------
-    p : CircuitParameters
-        The circuit.
-    rng : numpy.random.Generator
-        Source of sensor noise.
     highest_v : float
         A voltage that does move it [V].
 
@@ -156,12 +143,8 @@ def dead_time(p: CircuitParameters, from_v: float, to_v: float, rng: np.random.G
 
     Parameters
     ----------
-    p : CircuitParameters
-        The circuit.
     from_v, to_v : float
         Voltage before and after [V]; at 0 V the piston is at rest.
-    rng : numpy.random.Generator
-        Source of sensor noise.
 
     Returns
     -------

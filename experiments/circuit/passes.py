@@ -27,18 +27,6 @@ SAMPLE_TIME = 1e-3
 def in_condition(rig: CircuitParameters, condition: str) -> CircuitParameters:
     """Return the circuit in one of the nine conditions.
 
-    Parameters
-    ----------
-    rig : CircuitParameters
-        The healthy circuit.
-    condition : str
-        Condition name.
-
-    Returns
-    -------
-    CircuitParameters
-        The circuit in it.
-
     Examples
     --------
     >>> in_condition(CircuitParameters(), "major_leakage").flow_bias
@@ -55,8 +43,6 @@ class Passes:
     ----------
     mean_v, amplitude_v : float
         Mean, not negative, and amplitude of the input [V].
-    count : int
-        How many passes.
     pass_time : float
         Length of a pass [s].
     hold_time : float
@@ -75,15 +61,6 @@ class Passes:
 
 def run_passes(p: CircuitParameters, test: Passes, rng: np.random.Generator) -> list[NDArray[np.float64]]:
     """Run a test and return what the bench's sensors see of it, pass by pass, about the mean of each.
-
-    Parameters
-    ----------
-    p : CircuitParameters
-        The circuit.
-    test : Passes
-        The test.
-    rng : numpy.random.Generator
-        Source of the signal and of sensor noise.
 
     Returns
     -------

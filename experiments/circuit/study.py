@@ -36,13 +36,6 @@ from plant.eha.circuit_parameters import CircuitParameters
 def circuit_studies(rig: CircuitParameters, seed: int) -> Mapping[str, Callable[[], pd.DataFrame]]:
     """Return the experiments, by the name of their table.
 
-    Parameters
-    ----------
-    rig : CircuitParameters
-        The healthy circuit.
-    seed : int
-        Seed of every random stream.
-
     Returns
     -------
     Mapping[str, callable]

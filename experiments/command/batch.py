@@ -210,13 +210,7 @@ def _shown(total: int, before: int) -> "Generator[Callable[[int, Part], None]]":
 
 
 class Pace:
-    """How fast cases are done, and how long the rest will take.
-
-    Parameters
-    ----------
-    total, before : int
-        Cases of the study, and those done before.
-    """
+    """How fast cases are done, and how long the rest will take."""
 
     def __init__(self, total: int, before: int) -> None:
         self.total, self.done, self._before, self._begin = total, before, before, time.monotonic()

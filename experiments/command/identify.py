@@ -141,15 +141,6 @@ def _form(structure: str, order: str, delay: str, numerator: int | None) -> dict
 def whole_or_auto(option: str, text: str, least: int) -> int | None:
     """Return a whole number, or None for ``auto``.
 
-    Parameters
-    ----------
-    option : str
-        Its name on the command line.
-    text : str
-        What was given.
-    least : int
-        Smallest number allowed.
-
     Returns
     -------
     int or None

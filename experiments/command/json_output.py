@@ -24,11 +24,6 @@ Result: TypeAlias = Mapping[str, Any]
 def plain(value: object) -> Any:
     """Return a value as JSON knows it; a number that is not finite becomes None.
 
-    Parameters
-    ----------
-    value : object
-        Numbers, text, mappings, sequences and NumPy arrays, nested.
-
     Returns
     -------
     object
@@ -55,30 +50,12 @@ def plain(value: object) -> Any:
 
 
 def json_text(results: Sequence[Result]) -> str:
-    """Return results as one JSON document, in ASCII so that any terminal or pipe carries it.
-
-    Parameters
-    ----------
-    results : sequence of Mapping
-        One object a log.
-
-    Returns
-    -------
-    str
-        The document.
-    """
+    """Return results as one JSON document, in ASCII so that any terminal or pipe carries it."""
     return json.dumps(plain(list(results)), indent=2, allow_nan=False)
 
 
 def flat(result: Result, prefix: str = "") -> dict[str, Any]:
     """Return nested entries as one row of a table, ``bulk_modulus_pa.value`` for a value within another.
-
-    Parameters
-    ----------
-    result : Mapping
-        The entries.
-    prefix : str
-        What stands in front of every name.
 
     Returns
     -------
@@ -101,11 +78,6 @@ def flat(result: Result, prefix: str = "") -> dict[str, Any]:
 
 def csv_text(results: Iterable[Result]) -> str:
     """Return results as a CSV table, one row a log.
-
-    Parameters
-    ----------
-    results : iterable of Mapping
-        One object a log.
 
     Returns
     -------
@@ -152,15 +124,8 @@ def write_results(results: Sequence[Result], out: Path) -> list[Path]:
 
     Parameters
     ----------
-    results : sequence of Mapping
-        One object a log.
     out : Path
         A folder, which gets ``results.json`` and ``results.csv``; or a file that ends in ``.json``.
-
-    Returns
-    -------
-    list[Path]
-        The files written.
 
     Raises
     ------
@@ -177,17 +142,6 @@ def write_results(results: Sequence[Result], out: Path) -> list[Path]:
 
 def write_whole(path: Path, text: str, option: str = "", *, parents: bool = False) -> None:
     """Write a file, whole or not at all.
-
-    Parameters
-    ----------
-    path : Path
-        Where to.
-    text : str
-        What it shall hold.
-    option : str
-        Of the command, that asked for it.
-    parents : bool
-        Whether folders that are missing are made.
 
     Raises
     ------

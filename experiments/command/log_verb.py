@@ -25,12 +25,8 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
 
     Parameters
     ----------
-    context : typer.Context
-        The command line.
     verb : str
         ``estimate`` or ``diagnose``.
-    doing : str
-        What the progress bar says.
     asked : Mapping[str, Any]
         The verb's arguments by name.
 

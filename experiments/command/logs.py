@@ -37,8 +37,6 @@ class Batch:
     ----------
     results : tuple of Mapping
         One object a log, in order.
-    total : int
-        How many logs there were.
     """
 
     results: tuple[Result, ...]
@@ -64,22 +62,6 @@ def run_logs(logs: Sequence[Path], work: Work, blank: Result, what: str) -> Batc
     """Do the work on every log, until interrupted.
 
     Failures and warnings go to standard error as they come, after the log's name.
-
-    Parameters
-    ----------
-    logs : sequence of Path
-        The logs.
-    work : callable
-        Takes a log's path and returns its entries.
-    blank : Mapping
-        Entries of a log that failed.
-    what : str
-        What the progress bar says.
-
-    Returns
-    -------
-    Batch
-        The results so far.
     """
     results: list[Result] = []
     try:
@@ -132,12 +114,6 @@ def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None) -> 
 
     Parameters
     ----------
-    batch : Batch
-        The results.
-    screen : callable
-        What is shown of them to a reader.
-    as_json : bool
-        Whether a program reads instead.
     out : Path or None
         Where results are written too.
 
@@ -170,17 +146,10 @@ def read_log(
 
     Parameters
     ----------
-    path : Path
-        The log.
     rig_columns, columns : Mapping[str, str]
         Foreign column by channel, from the rig file and from the command line.
     required : collection of str, optional
         Channels that must be there; those of the gear-pump actuator if not given.
-
-    Returns
-    -------
-    Record
-        The log.
 
     Raises
     ------

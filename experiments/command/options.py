@@ -128,11 +128,6 @@ def load_rig(path: Path | None) -> "Rig":
     path : Path or None
         The rig file.
 
-    Returns
-    -------
-    Rig
-        The rig.
-
     Raises
     ------
     RigError
@@ -176,12 +171,8 @@ def require_positive(option: str, value: float | None, unit: str) -> None:
 
     Parameters
     ----------
-    option : str
-        Its name on the command line.
     value : float or None
         Its value [in that unit].
-    unit : str
-        For the message.
 
     Raises
     ------
@@ -194,15 +185,6 @@ def require_positive(option: str, value: float | None, unit: str) -> None:
 
 def require_one_of(option: str, value: str, known: Sequence[str]) -> None:
     """Refuse an option that is none of the names known.
-
-    Parameters
-    ----------
-    option : str
-        Its name on the command line.
-    value : str
-        What was given.
-    known : sequence of str
-        The names.
 
     Raises
     ------
@@ -220,10 +202,6 @@ def figure_path(target: Path | None, log: Path, logs: int) -> Path | None:
     ----------
     target : Path or None
         As given to ``--figure``.
-    log : Path
-        The log.
-    logs : int
-        How many there are.
 
     Returns
     -------
@@ -250,11 +228,6 @@ def load_actuator(plant: str | None, path: Path | None) -> "tuple[ActuatorKind, 
     path : Path or None
         The rig file.
 
-    Returns
-    -------
-    tuple of ActuatorKind and Rig
-        Both.
-
     Raises
     ------
     HydrostateError
@@ -277,21 +250,10 @@ def understood(
 
     Parameters
     ----------
-    context : typer.Context
-        The command line.
     asked : Mapping[str, Any]
         Its arguments by name.
-    kind : ActuatorKind
-        The kind of actuator.
-    verb : str
-        The verb.
     common : collection of str
         Options of all kinds, which the verb itself sees to.
-
-    Returns
-    -------
-    dict[str, Any]
-        Values by name.
 
     Raises
     ------

@@ -19,19 +19,7 @@ Folder: TypeAlias = Annotated[Path, option("DIR", "Folder of the report.", "--ou
 
 
 def finish_study(study: "Study[Settings]", settings: Settings, out: Path, *, as_json: bool) -> None:
-    """Run a study with progress on standard error, and say where its result is.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    settings : dataclass
-        Its seed and size.
-    out : Path
-        Folder of the result.
-    as_json : bool
-        Whether what is printed is JSON.
-    """
+    """Run a study with progress on standard error, and say where its result is."""
     from rich.console import Console
 
     from experiments.running.study import run_study

@@ -32,8 +32,6 @@ def emit(text: str, *, err: bool = False) -> None:
     ----------
     text : str
         The line or lines, without the last line's end.
-    err : bool
-        Whether it is a note, for standard error.
     """
     stream = sys.stderr if err else sys.stdout
     try:
@@ -44,13 +42,7 @@ def emit(text: str, *, err: bool = False) -> None:
 
 
 def note(sentence: str) -> None:
-    """Write a sentence to standard error.
-
-    Parameters
-    ----------
-    sentence : str
-        What the user should know.
-    """
+    """Write a sentence to standard error."""
     emit(" ".join(sentence.split()), err=True)
 
 
@@ -91,11 +83,6 @@ def table(*headings: str, title: str | None = None) -> "Table":
         One a column, with its unit; one that ends in ``]`` or ``±`` holds numbers and is set to the right.
     title : str, optional
         Line above.
-
-    Returns
-    -------
-    rich.table.Table
-        The table.
     """
     from rich import box
     from rich.table import Table
@@ -120,11 +107,6 @@ def short_names(results: Sequence[Mapping[str, Any]]) -> list[str]:
     ----------
     results : sequence of Mapping
         One object a log, with its ``file``.
-
-    Returns
-    -------
-    list[str]
-        One name a log.
     """
     files = [str(result["file"]) for result in results]
     names = [file.replace(os.sep, "/").rsplit("/", 1)[-1] for file in files]
@@ -164,13 +146,6 @@ def rendered(*parts: "RenderableType") -> str:
 @contextmanager
 def progress(total: int, what: str) -> Generator[Callable[[], None]]:
     """Show a bar on standard error, if that is a terminal and there is more than one piece of work.
-
-    Parameters
-    ----------
-    total : int
-        Pieces of work.
-    what : str
-        What is being done.
 
     Yields
     ------
@@ -220,18 +195,7 @@ def _kernel_notices() -> Generator[None]:
 
 
 def unexpected(error: Exception) -> str:
-    """Return the sentence for an error that no check foresaw; ``HYDROSTATE_DEBUG=1`` prints where it arose.
-
-    Parameters
-    ----------
-    error : Exception
-        The error, while it is being handled.
-
-    Returns
-    -------
-    str
-        The sentence.
-    """
+    """Return the sentence for an error that no check foresaw; ``HYDROSTATE_DEBUG=1`` prints where it arose."""
     if os.environ.get("HYDROSTATE_DEBUG", "") not in {"", "0"}:
         emit("".join(traceback.format_exception(error)).rstrip(), err=True)
     said = " ".join(str(error).split())[:200]
@@ -246,11 +210,6 @@ def guarded(run: Callable[[], object]) -> int:
     ----------
     run : callable
         Parses arguments and runs a command; returns its exit code, or something else for 0.
-
-    Returns
-    -------
-    int
-        Exit code.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -303,12 +262,6 @@ class HydrostateGroup(TyperGroup):
     """The command line, with its errors as sentences and the exit codes that the help promises."""
 
     def main(self, *args: Any, **kwargs: Any) -> NoReturn:
-        """Run the command line and exit.
-
-        Parameters
-        ----------
-        *args, **kwargs : object
-            As the parser takes them.
-        """
+        """Run the command line and exit."""
         kwargs["standalone_mode"] = False
         sys.exit(guarded(lambda: super(HydrostateGroup, self).main(*args, **kwargs)))

@@ -33,13 +33,6 @@ def _wanted(time: float) -> float:
 def control_runs(p: DiaphragmMotorParameters, seed: int) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Return velocity under control by encoder and by self-sensing, healthy and with a leak (section 4, errata M19).
 
-    Parameters
-    ----------
-    p : DiaphragmMotorParameters
-        The motor.
-    seed : int
-        Seed of the sensor noise.
-
     Returns
     -------
     tuple of pandas.DataFrame
@@ -81,11 +74,6 @@ def control_runs(p: DiaphragmMotorParameters, seed: int) -> tuple[pd.DataFrame, 
 
 def averaged_course(p: DiaphragmMotorParameters) -> pd.DataFrame:
     """Return the averaged motor beside the fast plant while voltage steps under a load (equations 2 and 18).
-
-    Parameters
-    ----------
-    p : DiaphragmMotorParameters
-        The motor.
 
     Returns
     -------

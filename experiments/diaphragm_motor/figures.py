@@ -182,11 +182,6 @@ def draw_averaged(tables: Tables) -> Figure:
     ----------
     tables : Mapping[str, pandas.DataFrame]
         The study's tables.
-
-    Returns
-    -------
-    Figure
-        Velocity over time.
     """
     course = tables["averaged"]
     title = "Averaged over cycles: 150, 250 and 200 V at 480 Hz against 5 N"

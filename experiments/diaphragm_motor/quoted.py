@@ -97,8 +97,6 @@ def not_reproduced(p: DiaphragmMotorParameters, tables: Mapping[str, pd.DataFram
 
     Parameters
     ----------
-    p : DiaphragmMotorParameters
-        The motor.
     tables : Mapping[str, pandas.DataFrame]
         The study's tables.
 

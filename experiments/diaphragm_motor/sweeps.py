@@ -59,8 +59,6 @@ def sweep_frequency(p: DiaphragmMotorParameters, frequencies: Iterable[float] = 
 
     Parameters
     ----------
-    p : DiaphragmMotorParameters
-        The motor.
     frequencies : iterable of float
         Of the drive [Hz].
 
@@ -78,8 +76,6 @@ def sweep_voltage(p: DiaphragmMotorParameters, swings: Iterable[float] = SWINGS)
 
     Parameters
     ----------
-    p : DiaphragmMotorParameters
-        The motor.
     swings : iterable of float
         Peak to peak [V].
 
@@ -97,8 +93,6 @@ def blocking_force(p: DiaphragmMotorParameters, frequency: float, swing: float) 
 
     Parameters
     ----------
-    p : DiaphragmMotorParameters
-        The motor.
     frequency : float
         Of the drive [Hz].
     swing : float
@@ -125,8 +119,6 @@ def sweep_load(p: DiaphragmMotorParameters, swings: Sequence[float] = (100.0, 20
 
     Parameters
     ----------
-    p : DiaphragmMotorParameters
-        The motor.
     swings : sequence of float
         Peak to peak [V].
 
@@ -148,15 +140,8 @@ def best_frequencies(p: DiaphragmMotorParameters, swing: float = 300.0) -> Rows:
 
     Parameters
     ----------
-    p : DiaphragmMotorParameters
-        The motor.
     swing : float
         Peak to peak [V].
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns load_n, frequency_hz, velocity_m_s.
     """
     for load in LOADS:
         loaded = replace(p, load_force=load)
@@ -167,11 +152,6 @@ def best_frequencies(p: DiaphragmMotorParameters, swing: float = 300.0) -> Rows:
 
 def pump_cycle(p: DiaphragmMotorParameters) -> pd.DataFrame:
     """Return two cycles of the settled pump: voltage, pressures, openings and flows (section 2, Figure 3).
-
-    Parameters
-    ----------
-    p : DiaphragmMotorParameters
-        The motor.
 
     Returns
     -------
@@ -194,11 +174,6 @@ def pump_cycle(p: DiaphragmMotorParameters) -> pd.DataFrame:
 def reversal(p: DiaphragmMotorParameters) -> pd.DataFrame:
     """Return a run on which the 4/3 valve extends, holds and retracts (section 5.1).
 
-    Parameters
-    ----------
-    p : DiaphragmMotorParameters
-        The motor.
-
     Returns
     -------
     pandas.DataFrame
@@ -215,11 +190,6 @@ def reversal(p: DiaphragmMotorParameters) -> pd.DataFrame:
 @tabled
 def sensitivities(p: DiaphragmMotorParameters) -> Rows:
     """Return by how much peak flow and its frequency answer to each part, and to gas (errata M22).
-
-    Parameters
-    ----------
-    p : DiaphragmMotorParameters
-        The motor.
 
     Returns
     -------
@@ -253,11 +223,6 @@ def _peak(p: DiaphragmMotorParameters) -> tuple[float, float]:
 @tabled
 def other_sets(p: DiaphragmMotorParameters) -> Rows:
     """Return three sets of parameters that give the published peak, each of another plate (errata M22).
-
-    Parameters
-    ----------
-    p : DiaphragmMotorParameters
-        The motor.
 
     Returns
     -------

@@ -24,20 +24,7 @@ CHANNELS = (("velocity", "mm/s", 1e3), ("differential pressure", "bar", 1e-5))
 
 
 def diagnosis_page(result: Mapping[str, Any], found: "Finding") -> str:
-    """Return the page on a log.
-
-    Parameters
-    ----------
-    result : Mapping
-        Its entries, with a verdict.
-    found : Finding
-        The same finding.
-
-    Returns
-    -------
-    str
-        HTML that loads nothing.
-    """
+    """Return the page on a log."""
     drawn = {
         "probabilities": _draw_probabilities(found),
         "severity": _draw_severities(found),

@@ -30,12 +30,8 @@ class LookedAt(NamedTuple):
 
     Parameters
     ----------
-    drive : str
-        Its drive.
     rank : int
         Its place among those that were looked at, from 1.
-    card : Card
-        What it would tell.
     about : Mapping[str, Any]
         What else it is.
     """
@@ -51,8 +47,6 @@ def cards_of(rig: "Rig[Any]", options: Mapping[str, Any]) -> "list[Finding]":
 
     Parameters
     ----------
-    rig : Rig
-        The actuator.
     options : Mapping[str, Any]
         Of `hydrostate identifiability`.
 
@@ -101,11 +95,6 @@ def checked_experiment(options: Mapping[str, Any]) -> dict[str, str]:
     ----------
     options : Mapping[str, Any]
         ``sensors``, ``noise``, ``drive``, ``seconds`` and ``rate``.
-
-    Returns
-    -------
-    dict[str, str]
-        Channel by name.
 
     Raises
     ------
@@ -169,11 +158,6 @@ def sensed_channels(listed: str) -> dict[str, str]:
     listed : str
         Names in `CHANNELS`, by commas.
 
-    Returns
-    -------
-    dict[str, str]
-        Channel by name.
-
     Raises
     ------
     HydrostateError
@@ -215,11 +199,6 @@ def experiment_entries(found: "Finding") -> dict[str, Any]:
     ----------
     found : Finding
         From `cards_of`.
-
-    Returns
-    -------
-    dict[str, Any]
-        The entries.
     """
     from estimation.trust.card import sentences
 
@@ -247,15 +226,8 @@ def experiments_shown(results: Sequence[Result], options: Mapping[str, Any]) -> 
 
     Parameters
     ----------
-    results : sequence of Result
-        One an experiment.
     options : Mapping[str, Any]
         As given to the verb: ``ranked`` asks for the ranking.
-
-    Returns
-    -------
-    iterable of RenderableType
-        For the terminal.
     """
     return _ranking(results) if options["ranked"] else _screen(results)
 

@@ -28,11 +28,6 @@ def estimates_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
         One a log, with the entries of `experiments.eha.entries.NO_ESTIMATE`.
     options : Mapping[str, Any]
         As given to the verb; none matters here.
-
-    Yields
-    ------
-    RenderableType
-        For the terminal.
     """
     del options
     shown = table("log", "bulk modulus [MPa]", "95 % interval [MPa]", "bound [%]", "verdict")
@@ -67,11 +62,6 @@ def diagnoses_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
         One a log, with the entries of `experiments.eha.entries.NO_DIAGNOSIS`.
     options : Mapping[str, Any]
         As given to the verb: ``scores`` and ``transfer_functions`` ask for a table of errors.
-
-    Yields
-    ------
-    RenderableType
-        For the terminal.
     """
     tables = options["scores"] or options["transfer_functions"]
     detailed = len(results) <= MOST_TABLES

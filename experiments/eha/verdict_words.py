@@ -25,11 +25,6 @@ NEAREST = "UNKNOWN, in none of the nine conditions; the nearest: "
 def verdict_lines(result: Mapping[str, Any]) -> list[str]:
     """Return the five lines that a reader gets of a log.
 
-    Parameters
-    ----------
-    result : Mapping
-        Its entries, with a verdict.
-
     Returns
     -------
     list[str]
@@ -47,11 +42,6 @@ def verdict_lines(result: Mapping[str, Any]) -> list[str]:
 def headline(result: Mapping[str, Any]) -> str:
     """Return the verdict in one sentence.
 
-    Parameters
-    ----------
-    result : Mapping
-        Entries with a verdict.
-
     Returns
     -------
     str
@@ -68,11 +58,6 @@ def headline(result: Mapping[str, Any]) -> str:
 
 def since(result: Mapping[str, Any]) -> str:
     """Return since when the actuator is in its condition.
-
-    Parameters
-    ----------
-    result : Mapping
-        Entries with a verdict.
 
     Returns
     -------
@@ -94,13 +79,6 @@ def since(result: Mapping[str, Any]) -> str:
 def amounts(result: Mapping[str, Any], names: Sequence[str]) -> str:
     """Return severities with their intervals.
 
-    Parameters
-    ----------
-    result : Mapping
-        Entries with a verdict.
-    names : sequence of str
-        Which.
-
     Returns
     -------
     str
@@ -117,11 +95,6 @@ def amount(one: Mapping[str, Any]) -> str:
     one : Mapping
         ``value``, ``unit`` and ``ci95``.
 
-    Returns
-    -------
-    str
-        Pascals as MPa.
-
     Examples
     --------
     >>> amount({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8]})
@@ -136,36 +109,14 @@ def amount(one: Mapping[str, Any]) -> str:
 
 
 def believed(result: Mapping[str, Any]) -> str:
-    """Return whether the verdict may be believed.
-
-    Parameters
-    ----------
-    result : Mapping
-        Entries with a verdict.
-
-    Returns
-    -------
-    str
-        A sentence.
-    """
+    """Return whether the verdict may be believed."""
     if result["unknown"]:
         return "no: " + "; ".join(result["reasons"])
     return "; ".join(["yes: a circuit in one of the nine conditions follows the log", *result["not_told"]])
 
 
 def next_step(result: Mapping[str, Any]) -> str:
-    """Return what to do or to measure next.
-
-    Parameters
-    ----------
-    result : Mapping
-        Entries with a verdict.
-
-    Returns
-    -------
-    str
-        A sentence.
-    """
+    """Return what to do or to measure next."""
     return "; ".join(result["advice"])
 
 

@@ -72,11 +72,6 @@ def draw_library(tables: Tables) -> Figure:
     ----------
     tables : Mapping[str, pandas.DataFrame]
         The library's tables.
-
-    Returns
-    -------
-    Figure
-        One panel a condition.
     """
     responses = tables["responses"]
     margins = Margins(left=0.75, top=0.65, down=0.35, across=0.25)
@@ -135,11 +130,6 @@ def draw_clocks(tables: Tables) -> Figure:
     ----------
     tables : Mapping[str, pandas.DataFrame]
         The library's tables.
-
-    Returns
-    -------
-    Figure
-        One line a test.
     """
     clocks = tables["clocks"].sort_values("at_25_hz")
     columns = [name for name in clocks.columns if name.startswith("at_")]

@@ -63,12 +63,6 @@ def circuit_passes(
 
     Parameters
     ----------
-    rig : CircuitParameters
-        The healthy circuit.
-    condition : str
-        Condition name.
-    rng : numpy.random.Generator
-        Source of the drive and of sensor noise.
     duration : float
         Length of all passes [s].
 
@@ -87,8 +81,6 @@ def build_library(seed: int, *, duration: float = DURATION) -> dict[str, Any]:
 
     Parameters
     ----------
-    seed : int
-        Seed of drives and sensor noise.
     duration : float
         Length of each test [s].
 
@@ -163,11 +155,6 @@ def determined_model(speeds: list[Array], velocities: list[Array]) -> LinearMode
 def described(model: LinearModel) -> dict[str, Any]:
     """Return poles, zeros, gain and bandwidth of a model, each with its standard deviation.
 
-    Parameters
-    ----------
-    model : LinearModel
-        The model.
-
     Returns
     -------
     dict
@@ -191,11 +178,6 @@ def library_text(library: Mapping[str, Any]) -> str:
     ----------
     library : Mapping
         As `build_library` returns it.
-
-    Returns
-    -------
-    str
-        JSON.
     """
     return json.dumps(library, indent=1, allow_nan=False) + "\n"
 

@@ -83,11 +83,6 @@ def clock_sentences(found: pd.DataFrame) -> tuple[str]:
     ----------
     found : pandas.DataFrame
         As `clock_table` returns it, indexed or not.
-
-    Returns
-    -------
-    tuple of str
-        One sentence.
     """
     at, steady = (found.set_index("input")[name] for name in ("at_25_hz", "steady_state"))
     return (

@@ -43,12 +43,8 @@ def structure_table(
 
     Parameters
     ----------
-    rig : CircuitParameters
-        The healthy circuit.
     models : Mapping[str, LinearModel]
         The library, whose orders are taken.
-    seed : int
-        Seed of drives and sensor noise.
     duration : float
         Length of each test [s]; two thirds are fitted.
 
@@ -134,12 +130,8 @@ def order_and_bandwidth(
 
     Parameters
     ----------
-    rig : CircuitParameters
-        The healthy circuit.
     models : Mapping[str, LinearModel]
         The library.
-    seed : int
-        Seed of drives and sensor noise.
     duration : float
         Length of each test [s].
 
@@ -173,12 +165,6 @@ def clock_table(model: LinearModel, limits: Limits, seed: int, *, duration: floa
 
     Parameters
     ----------
-    model : LinearModel
-        Of a condition.
-    limits : Limits
-        What the drive may do.
-    seed : int
-        Seed of the random signals.
     duration : float
         Length of the test [s].
 

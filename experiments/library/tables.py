@@ -17,11 +17,6 @@ FREQUENCIES = np.geomspace(0.5, 100.0, 60)
 def published_model(condition: str) -> LinearModel:
     """Return a model of Table 6 at the inferred sample time (errata E14).
 
-    Parameters
-    ----------
-    condition : str
-        Condition name.
-
     Returns
     -------
     LinearModel

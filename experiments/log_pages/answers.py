@@ -21,13 +21,6 @@ _FIVE = "{:.5g}".format
 def no_such(owner: str, name: str, known: Sequence[str]) -> str:
     """Return the sentence for a name that is not there.
 
-    Parameters
-    ----------
-    owner, name : str
-        Where it was looked for, and the name.
-    known : sequence of str
-        The names that are there.
-
     Returns
     -------
     str
@@ -63,8 +56,6 @@ class Answer(Shown):
 
     Parameters
     ----------
-    finding : Finding
-        The finding.
     entries : Mapping[str, Any]
         The same by the names of the JSON contract.
     screen : callable
@@ -171,13 +162,7 @@ class Answer(Shown):
 
 
 class Model(Shown):
-    """A transfer function that was identified, with everything that `LinearModel` has.
-
-    Parameters
-    ----------
-    model : LinearModel
-        The model.
-    """
+    """A transfer function that was identified, with everything that `LinearModel` has."""
 
     def __init__(self, model: "LinearModel") -> None:
         self.model = model

@@ -30,11 +30,6 @@ ALL_TOLD = "every quantity is told, and the model describes the log"
 def finding_entries(found: "Finding") -> dict[str, Any]:
     """Return what a log says.
 
-    Parameters
-    ----------
-    found : Finding
-        What was found.
-
     Returns
     -------
     dict[str, Any]
@@ -61,11 +56,6 @@ def finding_entries(found: "Finding") -> dict[str, Any]:
 def quantity_entry(one: "Quantity") -> dict[str, Any]:
     """Return a quantity for JSON.
 
-    Parameters
-    ----------
-    one : Quantity
-        The quantity.
-
     Returns
     -------
     dict[str, Any]
@@ -82,11 +72,6 @@ def quantity_entry(one: "Quantity") -> dict[str, Any]:
 def gate_entry(gate: "Gate") -> dict[str, Any]:
     """Return a gate for JSON.
 
-    Parameters
-    ----------
-    gate : Gate
-        The gate.
-
     Returns
     -------
     dict[str, Any]
@@ -97,11 +82,6 @@ def gate_entry(gate: "Gate") -> dict[str, Any]:
 
 def message_of(found: "Finding") -> str:
     """Return a finding in one sentence.
-
-    Parameters
-    ----------
-    found : Finding
-        What was found.
 
     Returns
     -------

@@ -35,15 +35,6 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
     ----------
     result : Mapping
         Its entries: ``file``, ``rig``, ``message`` and others.
-    found : Finding
-        What was found.
-    record : Record
-        The log.
-
-    Returns
-    -------
-    str
-        HTML that loads nothing.
     """
     with styled():
         figure = _draw_channels(record, [*found.channels, *record])

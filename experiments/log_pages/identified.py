@@ -32,15 +32,6 @@ def draw_identified(model: LinearModel, u: FloatArray, y: FloatArray, found: Val
         Fitted to the data; stable.
     u, y : ndarray, shape (n,)
         Input, no gaps, and output, NaN where missing [in their channels' units].
-    found : Validation
-        The model's tests on these data.
-    log : str
-        Its name, for the title.
-
-    Returns
-    -------
-    Figure
-        Six panels.
     """
     title = f"{log}: {model.structure} of order {model.denominator.size - 1}, fit {found.fit_percent:.1f} %"
     figure, axes = panels(title, 3, 2, 8.0, Margins(left=0.9, top=0.65, across=0.8, down=0.65))
@@ -115,12 +106,6 @@ def write_identified(model: LinearModel, u: FloatArray, y: FloatArray, found: Va
         Fitted to the data; stable.
     u, y : ndarray, shape (n,)
         Input and output [in their channels' units].
-    found : Validation
-        The model's tests on these data.
-    log : str
-        Its name, for the title.
-    path : Path
-        Where to.
     """
     with styled(), replacing(path) as file:
         draw_identified(model, u, y, found, log).savefig(file, format="png", dpi=DOTS_PER_INCH)

@@ -33,13 +33,6 @@ NAMES = {
 def draw_innovations(found: BulkModulusEstimate, log: str) -> Figure:
     """Draw the estimate with its 95 % band, the normalised innovations and their mean square over time.
 
-    Parameters
-    ----------
-    found : BulkModulusEstimate
-        A log that was filtered.
-    log : str
-        Its name, for the title.
-
     Returns
     -------
     Figure
@@ -118,16 +111,6 @@ def _mean_square(axis: Axes, time: np.ndarray, normalised: np.ndarray, estimate:
 
 
 def write_innovations(found: BulkModulusEstimate, log: str, path: Path) -> None:
-    """Write the figure as a PNG, whole or not at all.
-
-    Parameters
-    ----------
-    found : BulkModulusEstimate
-        A log that was filtered.
-    log : str
-        Its name, for the title.
-    path : Path
-        Where to.
-    """
+    """Write the figure as a PNG, whole or not at all."""
     with styled(), replacing(path) as file:
         draw_innovations(found, log).savefig(file, format="png", dpi=DOTS_PER_INCH)

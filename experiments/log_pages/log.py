@@ -18,11 +18,6 @@ if TYPE_CHECKING:
 def refuse(message: str) -> NoReturn:
     """Raise our error.
 
-    Parameters
-    ----------
-    message : str
-        What was wanted and what came.
-
     Raises
     ------
     HydrostateError
@@ -40,13 +35,6 @@ def known_options(options: Mapping[str, Any], known: Mapping[str, Any], verb: st
     ----------
     options, known : Mapping[str, Any]
         What was given, and every option with its default.
-    verb : str
-        For the message.
-
-    Returns
-    -------
-    Mapping[str, Any]
-        The same options.
 
     Raises
     ------
@@ -65,17 +53,7 @@ def known_options(options: Mapping[str, Any], known: Mapping[str, Any], verb: st
 
 
 class Log(Shown):
-    """A log of one actuator.
-
-    Parameters
-    ----------
-    record : Record
-        The channels on a uniform clock.
-    rig : Rig
-        The actuator.
-    plant : str
-        Kind of actuator.
-    """
+    """A log of one actuator."""
 
     def __init__(self, record: "Record", rig: "Rig[Any]", plant: str = "eha") -> None:
         self.record, self.rig, self.plant = record, rig, plant
@@ -115,11 +93,6 @@ class Log(Shown):
         ----------
         begin, end : float
             From when to when [s].
-
-        Returns
-        -------
-        Log
-            The part.
         """
         first, last = (round((at - self.record.start_time) / self.sample_time) for at in (begin, end))
         if not 0 <= first < last:
@@ -205,13 +178,7 @@ class Log(Shown):
         return pd.DataFrame(dict(self.record.channels), index=pd.Index(self.record.time, name="time_s"))
 
     def plot(self) -> "list[Axes]":
-        """Draw every channel over time.
-
-        Returns
-        -------
-        list of matplotlib.axes.Axes
-            One a channel.
-        """
+        """Draw every channel over time."""
         import matplotlib.pyplot as plt
 
         _, axes = plt.subplots(

@@ -19,11 +19,6 @@ def quantities_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "
         One a log, with ``quantities``.
     options : Mapping[str, Any]
         As given to the verb; none matters here.
-
-    Yields
-    ------
-    RenderableType
-        For the terminal.
     """
     del options
     for result in results:

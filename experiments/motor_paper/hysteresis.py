@@ -74,11 +74,6 @@ def hysteresis_table(loops: pd.DataFrame) -> Rows:
 def impulse_table(p: HysteresisParameters) -> pd.DataFrame:
     """Return the impulse response of the linearised equation 20, Figure 35.
 
-    Parameters
-    ----------
-    p : HysteresisParameters
-        The diaphragm.
-
     Returns
     -------
     pandas.DataFrame
@@ -92,11 +87,6 @@ def impulse_table(p: HysteresisParameters) -> pd.DataFrame:
 
 def hysteresis_response(p: HysteresisParameters) -> pd.DataFrame:
     """Return the frequency response of the linearised equation 20, Figures 31 and 32.
-
-    Parameters
-    ----------
-    p : HysteresisParameters
-        The diaphragm.
 
     Returns
     -------

@@ -46,11 +46,6 @@ WANTED_DAMPING = 0.5
 def gain_at_rest(p: VibrationParameters) -> float:
     """Return the displacement that a newton gives at rest, equation 4 mended (errata M4).
 
-    Parameters
-    ----------
-    p : VibrationParameters
-        The model.
-
     Returns
     -------
     float
@@ -65,11 +60,6 @@ def designed(p: VibrationParameters) -> Mapping[str, Pid]:
 
     The integral alone would swing at ``2 zeta omega_n`` over the gain at rest; it is kept below by `SAFETY`. The
     derivative raises zeta, and with it the integral.
-
-    Parameters
-    ----------
-    p : VibrationParameters
-        The model.
 
     Returns
     -------
@@ -93,13 +83,6 @@ def designed(p: VibrationParameters) -> Mapping[str, Pid]:
 @stacked
 def loop_runs(p: VibrationParameters, seed: int) -> Frames:
     """Return the step under each controller, with delay and noise.
-
-    Parameters
-    ----------
-    p : VibrationParameters
-        The model.
-    seed : int
-        Of the noise.
 
     Returns
     -------
@@ -154,11 +137,6 @@ def loop_table(runs: pd.DataFrame) -> Rows:
 
 def relay_table(p: VibrationParameters) -> pd.DataFrame:
     """Return what a relay in the loop finds, beside the model's own answer.
-
-    Parameters
-    ----------
-    p : VibrationParameters
-        The model.
 
     Returns
     -------

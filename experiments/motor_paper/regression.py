@@ -34,16 +34,6 @@ HIGH_R_SQUARE, SIGNIFICANCE, HIGH_VIF = 0.9, 0.05, 5.0
 def reading(name: str) -> pd.DataFrame:
     """Return Table 2 in one of its readings (errata M24).
 
-    Parameters
-    ----------
-    name : {"as_printed", "anova", "physical"}
-        Which reading.
-
-    Returns
-    -------
-    pandas.DataFrame
-        The table, six rows.
-
     Raises
     ------
     HydrostateError
@@ -69,15 +59,8 @@ def fit(table: pd.DataFrame, regressors: Sequence[str] = (DEFORMATION, VELOCITY)
     ----------
     table : pandas.DataFrame
         Table 2 in a reading, or another.
-    regressors : sequence of str
-        Columns that explain.
     of : str
         The column that is explained.
-
-    Returns
-    -------
-    statsmodels.regression.linear_model.RegressionResults
-        The fit.
     """
     from statsmodels.regression.linear_model import OLS  # slow to import, and few callers need it
     from statsmodels.tools.tools import add_constant
@@ -87,11 +70,6 @@ def fit(table: pd.DataFrame, regressors: Sequence[str] = (DEFORMATION, VELOCITY)
 
 def anova(found: Any) -> Mapping[str, float]:
     """Return the numbers of Figure 12 from a fit.
-
-    Parameters
-    ----------
-    found : RegressionResults
-        The fit.
 
     Returns
     -------
@@ -177,11 +155,6 @@ def residual_table() -> Frames:
 def inflations(found: Any) -> list[float]:
     """Return the variance inflation factor of each regressor.
 
-    Parameters
-    ----------
-    found : RegressionResults
-        The fit.
-
     Returns
     -------
     list of float
@@ -195,11 +168,6 @@ def inflations(found: Any) -> list[float]:
 
 def predictive_r_square(found: Any) -> float:
     """Return R^2 of predictions of each row from the others (PRESS).
-
-    Parameters
-    ----------
-    found : RegressionResults
-        The fit.
 
     Returns
     -------

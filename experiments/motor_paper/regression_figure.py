@@ -31,11 +31,6 @@ def draw_residuals(tables: Tables) -> Figure:
     ----------
     tables : Mapping[str, pandas.DataFrame]
         The study's tables.
-
-    Returns
-    -------
-    Figure
-        Three panels.
     """
     rows = tables["regression residuals"]
     title = "Residuals of the regression: six rows, three readings"

@@ -55,13 +55,6 @@ HARMONICS = 9
 def operating_points(p: DiaphragmMotorParameters, seed: int) -> pd.DataFrame:
     """Return velocity and electrodes' amplitudes at thirty drives and loads, with noise.
 
-    Parameters
-    ----------
-    p : DiaphragmMotorParameters
-        The motor.
-    seed : int
-        Of the noise.
-
     Returns
     -------
     pandas.DataFrame
@@ -136,8 +129,6 @@ def sensing_faults(p: DiaphragmMotorParameters, points: pd.DataFrame) -> Rows:
 
     Parameters
     ----------
-    p : DiaphragmMotorParameters
-        The motor.
     points : pandas.DataFrame
         As `operating_points` returns them, of the healthy one.
 
@@ -164,11 +155,6 @@ def sensing_faults(p: DiaphragmMotorParameters, points: pd.DataFrame) -> Rows:
 
 def motor_spectra(p: DiaphragmMotorParameters) -> pd.DataFrame:
     """Return mean and harmonics of the motor's signals at 480 Hz, for every drive, without load: Figure 21.
-
-    Parameters
-    ----------
-    p : DiaphragmMotorParameters
-        The motor.
 
     Returns
     -------

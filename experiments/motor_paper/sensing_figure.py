@@ -23,11 +23,6 @@ def draw_velocity(tables: Tables) -> Figure:
     ----------
     tables : Mapping[str, pandas.DataFrame]
         The study's tables.
-
-    Returns
-    -------
-    Figure
-        One panel a regression.
     """
     title = "Velocity from sensing voltages, thirty drives and loads at 480 Hz"
     figure, axes = panels(title, 1, 2, 3.9, Margins(left=0.65, top=0.75, across=0.5), sharey=True)
@@ -75,11 +70,6 @@ def draw_spectra(tables: Tables) -> Figure:
     ----------
     tables : Mapping[str, pandas.DataFrame]
         The study's tables.
-
-    Returns
-    -------
-    Figure
-        One panel a signal.
     """
     rows = tables["motor spectra"]
     rows = rows[(rows["peak_to_peak_v"] == 200.0) & (rows["harmonic"] > 0)]

@@ -26,18 +26,7 @@ ORDERS = (0.5, 1.0, 1.5)
 
 
 def vibration_models(p: VibrationParameters) -> "dict[str, control.StateSpace]":
-    """Return equations 1 to 4 as models of python-control (errata M1 to M4).
-
-    Parameters
-    ----------
-    p : VibrationParameters
-        Masses, springs, dampers.
-
-    Returns
-    -------
-    dict[str, control.StateSpace]
-        By name.
-    """
+    """Return equations 1 to 4 as models of python-control (errata M1 to M4)."""
     return {
         "equations 1 and 2, signs mended": state_space(p),
         "equations 1 and 2, as printed": state_space(p, signs="printed"),
@@ -47,11 +36,6 @@ def vibration_models(p: VibrationParameters) -> "dict[str, control.StateSpace]":
 
 def pole_table(p: VibrationParameters) -> pd.DataFrame:
     """Return the poles of each model, one of each pair.
-
-    Parameters
-    ----------
-    p : VibrationParameters
-        Masses, springs, dampers.
 
     Returns
     -------
@@ -84,11 +68,6 @@ def margin_table(p: VibrationParameters) -> Rows:
 
     The gain makes the model's own 1 at rest. A loop is stable if its closed poles are; Nyquist's count of clockwise
     turns says the same only together with the open loop's unstable poles (errata M30).
-
-    Parameters
-    ----------
-    p : VibrationParameters
-        Masses, springs, dampers.
 
     Returns
     -------
@@ -129,11 +108,6 @@ def _past_poles(poles: "np.ndarray[Any, np.dtype[np.complex128]]") -> "np.ndarra
 def response_table(p: VibrationParameters) -> pd.DataFrame:
     """Return the frequency responses of Figures 22 and 23, each over its own gain at rest.
 
-    Parameters
-    ----------
-    p : VibrationParameters
-        Masses, springs, dampers.
-
     Returns
     -------
     pandas.DataFrame
@@ -147,8 +121,6 @@ def response_rows(name: str, model: Any) -> pd.DataFrame:
 
     Parameters
     ----------
-    name : str
-        What the model is called.
     model : control.StateSpace or control.TransferFunction
         With one input and one output.
 
@@ -225,8 +197,6 @@ def with_order(p: VibrationParameters, order: float) -> VibrationParameters:
 
     Parameters
     ----------
-    p : VibrationParameters
-        A model with viscous damping.
     order : float
         Order of the damping [dimensionless].
 
@@ -242,11 +212,6 @@ def with_order(p: VibrationParameters, order: float) -> VibrationParameters:
 @stacked
 def fractional_table(p: VibrationParameters) -> Frames:
     """Return responses with fractional damping, exact and by Oustaloup's states.
-
-    Parameters
-    ----------
-    p : VibrationParameters
-        A model with viscous damping.
 
     Returns
     -------

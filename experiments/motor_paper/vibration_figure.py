@@ -159,11 +159,6 @@ def draw_linearised(tables: Tables) -> Figure:
     ----------
     tables : Mapping[str, pandas.DataFrame]
         The study's tables.
-
-    Returns
-    -------
-    Figure
-        Four panels.
     """
     margins = Margins(left=0.75, top=0.5, across=0.8, down=0.55)
     figure, (gain, nyquist, phase, impulse) = panels("Equation 20 for small voltages", 2, 2, 5.6, margins)
@@ -183,11 +178,6 @@ def draw_fractional(tables: Tables) -> Figure:
     ----------
     tables : Mapping[str, pandas.DataFrame]
         The study's tables.
-
-    Returns
-    -------
-    Figure
-        Three panels.
     """
     title = "Orders 0.5, 1 and 1.5: lines exact, dots sampled or by Oustaloup's states"
     figure, (left, middle, right) = panels(title, 1, 3, 3.7, Margins(left=0.6, top=0.75, across=0.6))

@@ -23,19 +23,7 @@ from plant.sensors.sensors import BENCH
 
 
 class Experiment(NamedTuple):
-    """One way to estimate bulk modulus, as the tables tell it from others.
-
-    Parameters
-    ----------
-    plant : str
-        Plant that is simulated.
-    form : str
-        Process model that is believed.
-    drive : str
-        Drive signal.
-    pressure_logged : bool
-        Whether differential pressure is in the log.
-    """
+    """One way to estimate bulk modulus, as the tables tell it from others."""
 
     plant: str
     form: str
@@ -43,22 +31,7 @@ class Experiment(NamedTuple):
     pressure_logged: bool
 
     def record(self, p: EhaParameters, settings: StudySettings, rng: np.random.Generator) -> Record:
-        """Return a run of the experiment as the bench would log it.
-
-        Parameters
-        ----------
-        p : EhaParameters
-            The actuator in its condition.
-        settings : StudySettings
-            Length and sample time.
-        rng : numpy.random.Generator
-            Source of drive and sensor noise.
-
-        Returns
-        -------
-        Record
-            The run.
-        """
+        """Return a run of the experiment as the bench would log it."""
         drive = make_drive(self.drive, settings.duration, settings.sample_time, p, rng)
         record = simulate(PLANTS[self.plant], drive, settings.sample_time, p, sensors=BENCH, rng=rng)
         return record if self.pressure_logged else record.replace(differential_pressure_pa=None)
@@ -104,15 +77,6 @@ def bulk_modulus_study(
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Estimate bulk modulus in every experiment, condition, and from every first guess.
 
-    Parameters
-    ----------
-    rig : EhaParameters
-        The healthy actuator.
-    settings : StudySettings
-        Size and seed.
-    track : callable
-        Shows how far it has come.
-
     Returns
     -------
     tuple of pandas.DataFrame
@@ -144,8 +108,6 @@ def estimate_entries(found: BulkModulusEstimate, truth: float) -> dict[str, obje
 
     Parameters
     ----------
-    found : BulkModulusEstimate
-        The estimate.
     truth : float
         Simulated bulk modulus [Pa].
 

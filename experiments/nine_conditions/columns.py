@@ -51,13 +51,6 @@ def report_frames(tables: Tables, settings: StudySettings) -> Tables:
     ----------
     tables : Mapping[str, pandas.DataFrame]
         The study's tables.
-    settings : StudySettings
-        Its size and seed.
-
-    Returns
-    -------
-    Mapping[str, pandas.DataFrame]
-        By name.
     """
     named = {f"{spaced(name)}{SETTING_UNITS.get(name, '')}": value for name, value in asdict(settings).items()}
     return {

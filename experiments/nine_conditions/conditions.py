@@ -14,18 +14,7 @@ from plant.eha.steady_state import steady_state
 
 @tabled
 def condition_table(rig: EhaParameters) -> Rows:
-    """Return each condition's parameters and its steady state at 4 V.
-
-    Parameters
-    ----------
-    rig : EhaParameters
-        The healthy actuator.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row a condition.
-    """
+    """Return each condition's parameters and its steady state at 4 V."""
     published = load("conditions").set_index("condition")
     normal_velocity, normal_pressure = steady_state(rig.rated_speed, rig)
     for name, condition in CONDITIONS.items():

@@ -80,8 +80,6 @@ def draw_intervals(axis: Axes, rows: pd.DataFrame, height: float, size: float, c
     ----------
     axis : Axes
         Where; across, bulk modulus [1e8 Pa].
-    rows : pandas.DataFrame
-        The estimates.
     height : float
         The middle of their marks [count].
     size : float

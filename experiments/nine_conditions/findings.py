@@ -34,12 +34,6 @@ class Recovery:
 
     Parameters
     ----------
-    key : Experiment
-        Which experiment.
-    claim : str
-        What it shows.
-    estimates, conditions : int
-        Counts of rows, and of conditions among them.
     recovered : int
         Conditions whose every estimate is a number within `wanted_percent`, or where nothing is wanted, within 3 %.
     unobservable : tuple of str
@@ -80,8 +74,6 @@ class ClassAccuracy:
     ----------
     bank, variant : str
         The bank, and whether parameters were nominal or spread.
-    runs : int
-        Runs classified.
     percent : float
         Share that was right [percent].
     likeliest_error : str
@@ -131,11 +123,6 @@ def by_experiment(estimates: pd.DataFrame) -> Iterator[tuple[Experiment, pd.Data
 
 def experiment_in_words(key: Experiment) -> str:
     """Return an experiment's name for a reader.
-
-    Parameters
-    ----------
-    key : Experiment
-        Which experiment.
 
     Returns
     -------
@@ -240,11 +227,6 @@ def _likeliest_error(confusion: pd.DataFrame) -> str:
 
 def bank_in_words(bank: str) -> str:
     """Return a classifier's name for a reader.
-
-    Parameters
-    ----------
-    bank : str
-        Name in results.
 
     Returns
     -------

@@ -114,11 +114,6 @@ def draw_gains(models: pd.DataFrame) -> Figure:
     ----------
     models : pandas.DataFrame
         The table ``transfer_functions``.
-
-    Returns
-    -------
-    Figure
-        One row a condition.
     """
     figure, (axis,) = panels("Steady gain from motor speed to velocity", 1, 1, 3.9, BESIDE_CONDITIONS)
     level = condition_levels(axis, models["condition"])

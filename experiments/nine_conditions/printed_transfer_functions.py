@@ -16,11 +16,6 @@ _NAMES = ("b0", "b1", "b2", "a1", "a2")
 def printed_model(condition: str) -> dict[str, Any]:
     """Return a model of Table 6 as printed, with what its rounding leaves open (errata E14).
 
-    Parameters
-    ----------
-    condition : str
-        Condition name.
-
     Returns
     -------
     dict
@@ -61,11 +56,6 @@ def _reach(centre: np.ndarray, corners: list[np.ndarray]) -> np.ndarray:
 
 def pair(value: complex) -> list[float]:
     """Return a complex number as JSON knows it.
-
-    Parameters
-    ----------
-    value : complex
-        Any.
 
     Returns
     -------

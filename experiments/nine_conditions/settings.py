@@ -9,8 +9,6 @@ class StudySettings:
 
     Parameters
     ----------
-    seed : int
-        Seed of every random stream.
     starts : tuple of float
         First guesses of effective bulk modulus [Pa], as in Figure 11.
     duration : float
@@ -19,8 +17,6 @@ class StudySettings:
         Their sample time, section 7 [s].
     identification_duration : float
         Length of the identification runs [s].
-    seeds : int
-        Runs a condition in the classification.
     classification_sample_time : float
         Sample time of the classification runs [s].
     """
@@ -35,16 +31,5 @@ class StudySettings:
 
 
 def quick_settings(seed: int) -> StudySettings:
-    """Return a small study: the same nine conditions and parts, fewer first guesses and seeds, shorter runs.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of every random stream.
-
-    Returns
-    -------
-    StudySettings
-        The small size.
-    """
+    """Return a small study: the same nine conditions and parts, fewer first guesses and seeds, shorter runs."""
     return StudySettings(seed=seed, starts=(0.0, 5e8), duration=4.0, identification_duration=8.0, seeds=2)

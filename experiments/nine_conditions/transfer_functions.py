@@ -36,15 +36,6 @@ def identification_study(
 ) -> tuple[Mapping[str, LinearModel], Mapping[str, Record]]:
     """Simulate the nine identification tests and fit their transfer functions.
 
-    Parameters
-    ----------
-    rig : EhaParameters
-        The healthy actuator.
-    settings : StudySettings
-        Size and seed.
-    track : callable
-        Shows how far it has come.
-
     Returns
     -------
     tuple of Mapping
@@ -153,8 +144,6 @@ def measured_response(record: Record, lag_window: int, lowest: float, highest: f
 
     Parameters
     ----------
-    record : Record
-        Motor speed and velocity.
     lag_window : int
         Longest lag of the correlations that it is taken from [count].
     lowest, highest : float
@@ -194,13 +183,6 @@ def response_columns(frequency: np.ndarray, response: np.ndarray, coherence: np.
 def order_table(record: Record, rng: np.random.Generator) -> pd.DataFrame:
     """Return singular values against their noise floor, for Figure 7.
 
-    Parameters
-    ----------
-    record : Record
-        The identification test of the normal condition.
-    rng : numpy.random.Generator
-        Draws the floor's noise records.
-
     Returns
     -------
     pandas.DataFrame
@@ -228,8 +210,6 @@ def filtering_table(rng: np.random.Generator, duration: float) -> pd.DataFrame:
 
     Parameters
     ----------
-    rng : numpy.random.Generator
-        Draws drive and noise.
     duration : float
         Length of the test [s].
 

@@ -48,12 +48,8 @@ def validation_study(
 
     Parameters
     ----------
-    rig : EhaParameters
-        The healthy actuator.
     library : Mapping[str, LinearModel]
         Transfer functions by condition.
-    settings : StudySettings
-        Size and seed.
 
     Returns
     -------
@@ -100,14 +96,8 @@ def classification_study(
 
     Parameters
     ----------
-    rig : EhaParameters
-        The healthy actuator.
     library : Mapping[str, LinearModel]
         Transfer functions by condition.
-    settings : StudySettings
-        Size and seed.
-    track : callable
-        Shows how far it has come.
 
     Returns
     -------

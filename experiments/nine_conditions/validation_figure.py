@@ -29,8 +29,6 @@ def draw_validation_run(runs: pd.DataFrame, condition: str) -> Figure:
     ----------
     runs : pandas.DataFrame
         The series ``validation_runs``.
-    condition : str
-        Which of the nine conditions.
 
     Returns
     -------

@@ -18,10 +18,6 @@ def say(axis: Axes, words: str, at: tuple[float, float], shift: tuple[float, flo
 
     Parameters
     ----------
-    axis : Axes
-        Where.
-    words : str
-        What.
     at : tuple of float
         The point [axes' units].
     shift : tuple of float
@@ -37,8 +33,6 @@ def diamonds(axis: Axes, x: Any, y: Any, label: str | None = None) -> None:
 
     Parameters
     ----------
-    axis : Axes
-        Where.
     x, y : float or sequence of float
         The points [axes' units]; empty for an entry in the legend alone.
     label : str, optional
@@ -70,13 +64,6 @@ def shaded(groups: Iterable[tuple[Hashable, Any]], last: float = 0.88) -> Iterat
 def named_rows(axis: Axes, names: Sequence[str]) -> "np.ndarray[Any, np.dtype[np.int_]]":
     """Lay names on the vertical axis, the first at the bottom, and return where each stands.
 
-    Parameters
-    ----------
-    axis : Axes
-        The axes to label.
-    names : sequence of str
-        From the bottom.
-
     Returns
     -------
     ndarray of int, shape (n,)
@@ -93,10 +80,6 @@ def paired_bars(axis: Axes, names: Sequence[str], pairs: Sequence[tuple[str, pd.
 
     Parameters
     ----------
-    axis : Axes
-        Where.
-    names : sequence of str
-        From the bottom.
     pairs : sequence of tuple
         Label, lengths [axis' unit] and colour of the upper bars, and of the lower ones.
     """
@@ -117,10 +100,6 @@ def courses(axes: Sequence[Axes], time: pd.Series, frame: pd.DataFrame, panels: 
     ----------
     axes : sequence of Axes
         One a panel, from the top.
-    time : pandas.Series
-        In milliseconds.
-    frame : pandas.DataFrame
-        The signals.
     panels : sequence of Course
         What each panel shows [its label's unit].
     room : float

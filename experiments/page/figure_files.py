@@ -43,18 +43,7 @@ def figure_files(drawings: Drawings, tables: Tables) -> dict[str, bytes]:
 
 
 def svg_of(figure: Figure) -> bytes:
-    """Return a figure as an SVG file that is the same at every run.
-
-    Parameters
-    ----------
-    figure : Figure
-        Drawn in the project's look.
-
-    Returns
-    -------
-    bytes
-        The file.
-    """
+    """Return a figure as an SVG file that is the same at every run."""
     buffer = BytesIO()
     with styled():
         figure.savefig(buffer, format="svg", metadata={"Date": None})

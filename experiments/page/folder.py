@@ -77,8 +77,6 @@ def csv_files(place: str, frames: Tables, float_format: str | None = None) -> di
 
     Parameters
     ----------
-    place : str
-        Folder within the result.
     frames : Mapping[str, pandas.DataFrame]
         By name; rows that have a name are conditions.
     float_format : str, optional
@@ -105,22 +103,12 @@ def json_file(values: Mapping[str, Any]) -> bytes:
     ----------
     values : Mapping[str, Any]
         Plain values, all finite.
-
-    Returns
-    -------
-    bytes
-        The file.
     """
     return (json.dumps(values, indent=2, allow_nan=False) + "\n").encode()
 
 
 def check_target(folder: Path) -> Path:
     """Tell whether a study may be written to a folder, before the study is run.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the result shall go.
 
     Returns
     -------

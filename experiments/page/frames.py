@@ -48,10 +48,6 @@ def cell(frame: pd.DataFrame, row: object, column: str) -> float:
     ----------
     frame : pandas.DataFrame
         A table with unique row labels.
-    row : object
-        Row label.
-    column : str
-        Column name, which carries the unit.
 
     Returns
     -------

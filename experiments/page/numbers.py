@@ -20,8 +20,6 @@ def number(value: float | None, digits: int = 4) -> str:
     ----------
     value : float or None
         The number [any unit].
-    digits : int
-        Significant digits.
 
     Returns
     -------
@@ -53,8 +51,6 @@ def fixed(value: float | None, decimals: int) -> str:
     ----------
     value : float or None
         The number [any unit].
-    decimals : int
-        Digits behind the point.
 
     Returns
     -------
@@ -95,16 +91,6 @@ def exact(value: float) -> str:
 
 def pretty_unit(unit: str) -> str:
     """Return a unit with raised exponents.
-
-    Parameters
-    ----------
-    unit : str
-        As in the parameters' notes.
-
-    Returns
-    -------
-    str
-        As shown.
 
     Examples
     --------

@@ -98,14 +98,8 @@ def panels(
 
     Parameters
     ----------
-    title : str
-        Title of the whole figure.
-    rows, columns : int
-        Counts of axes.
     height_inches : float
         Height [inch].
-    margins : Margins
-        Room around the axes.
     **options : Any
         Passed to `matplotlib.figure.Figure.subplots`: shared axes, ratios.
 
@@ -135,8 +129,6 @@ def condition_rows(axis: Axes, conditions: Sequence[str]) -> Mapping[str, float]
 
     Parameters
     ----------
-    axis : Axes
-        The axes to label.
     conditions : sequence of str
         Names in results, from the top.
 
@@ -158,8 +150,6 @@ def condition_levels(axis: Axes, conditions: Iterable[str]) -> NDArray[np.float6
 
     Parameters
     ----------
-    axis : Axes
-        The axes to label.
     conditions : iterable of str
         Names in results, one a row.
 
@@ -178,8 +168,6 @@ def spread_out(count: int, span: float) -> list[float]:
 
     Parameters
     ----------
-    count : int
-        Marks in the row.
     span : float
         Distance from the first to the last [any unit].
 

@@ -16,8 +16,6 @@ class Cell:
 
     Parameters
     ----------
-    text : str
-        What is written.
     tone : str
         Class of the cell: ``"good"``, ``"bad"``, ``"none"``, or empty.
     """
@@ -53,16 +51,12 @@ class Column:
 
     Parameters
     ----------
-    source : str
-        Name in the data frame.
     header : str, optional
         Heading; the name in words without its unit, unless told.
     unit : str, optional
         Unit as shown, after scaling; that of the name's ending in `UNITS` unless told.
     scale : float, optional
         Factor from the name's unit to the unit shown [dimensionless]; goes with `unit`.
-    digits : int
-        Significant digits.
     words : callable, optional
         From a value to what is written, instead of a number.
     of_row : callable, optional
@@ -95,11 +89,6 @@ beside it, and returns how it is shown, or None."""
 def yes_or_no(good: bool) -> Cell:
     """Return a cell that says yes, or no as what a reader should see.
 
-    Parameters
-    ----------
-    good : bool
-        Which.
-
     Returns
     -------
     Cell
@@ -109,18 +98,7 @@ def yes_or_no(good: bool) -> Cell:
 
 
 def right(text: str) -> Cell:
-    """Return a cell that stands to the right, as numbers do.
-
-    Parameters
-    ----------
-    text : str
-        What is written.
-
-    Returns
-    -------
-    Cell
-        The text among numbers.
-    """
+    """Return a cell that stands to the right, as numbers do."""
     return Cell(text, "number")
 
 
@@ -143,11 +121,6 @@ def as_given(value: float) -> Cell:
 def decimals(count: int) -> Callable[[float | None], Cell]:
     """Return a writer of cells with so many decimals.
 
-    Parameters
-    ----------
-    count : int
-        Digits behind the point.
-
     Returns
     -------
     callable
@@ -157,30 +130,12 @@ def decimals(count: int) -> Callable[[float | None], Cell]:
 
 
 def spaced(name: str) -> str:
-    """Return a name in words.
-
-    Parameters
-    ----------
-    name : str
-        With underscores.
-
-    Returns
-    -------
-    str
-        With spaces.
-    """
+    """Return a name in words."""
     return name.replace("_", " ")
 
 
 def interval(low: str, high: str, digits: int = 4) -> Callable[[Row], str]:
     """Return a writer of cells with both ends of an interval.
-
-    Parameters
-    ----------
-    low, high : str
-        Their columns.
-    digits : int
-        Significant digits.
 
     Returns
     -------
@@ -191,22 +146,7 @@ def interval(low: str, high: str, digits: int = 4) -> Callable[[Row], str]:
 
 
 def html_table(frame: pd.DataFrame, columns: Columns, caption: str) -> Markup:
-    """Return a data frame as an HTML table in a box that scrolls sideways.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        The rows.
-    columns : sequence of Column, str or callable
-        What is shown of them, and how.
-    caption : str
-        What the table holds.
-
-    Returns
-    -------
-    Markup
-        Escaped HTML.
-    """
+    """Return a data frame as an HTML table in a box that scrolls sideways."""
     shown = [column.in_full() for column in _named(frame, columns)]
     body = [[_cell(column, row) for column in shown] for row in frame.to_dict("records")]
     head = Markup("").join(

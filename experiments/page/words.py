@@ -6,11 +6,6 @@ from experiments.page.tables import Cell, Column
 def in_words(condition: str) -> str:
     """Return a condition's name for a reader.
 
-    Parameters
-    ----------
-    condition : str
-        Name in results.
-
     Returns
     -------
     str
@@ -26,16 +21,6 @@ def in_words(condition: str) -> str:
 
 def in_short(condition: str) -> str:
     """Return a condition's name for a crowded axis.
-
-    Parameters
-    ----------
-    condition : str
-        Name in results.
-
-    Returns
-    -------
-    str
-        The words shortened.
 
     Examples
     --------

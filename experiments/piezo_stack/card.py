@@ -27,11 +27,6 @@ DURATION = 0.1
 def identifiability_card(healthy: PiezoStackParameters) -> Rows:
     """Return Cramér-Rao bounds of every quantity, all unknown together, by sensors and drive.
 
-    Parameters
-    ----------
-    healthy : PiezoStackParameters
-        The actuator, with its load.
-
     Returns
     -------
     pandas.DataFrame

@@ -92,13 +92,6 @@ QUICK_GRID = DesignGrid((150.0, 275.0, 400.0), (100.0, 140.0), (LOW_BIAS, HIGH_B
 def sweep(p: PiezoStackParameters, points: Sequence[OperatingPoint]) -> Iterator[dict[str, float]]:
     """Run many operating points, several side by side, and return what each gives: flow, and power in and out.
 
-    Parameters
-    ----------
-    p : PiezoStackParameters
-        The actuator.
-    points : sequence of OperatingPoint
-        The settings.
-
     Yields
     ------
     dict[str, float]
@@ -156,13 +149,6 @@ def _run_time(frequency: float) -> float:
 def pump_cycle(p: PiezoStackParameters, point: OperatingPoint) -> pd.DataFrame:
     """Return the last two pump cycles of a run, each sample with its stage and Reynolds number (Figure 2).
 
-    Parameters
-    ----------
-    p : PiezoStackParameters
-        The actuator.
-    point : OperatingPoint
-        The setting.
-
     Returns
     -------
     pandas.DataFrame
@@ -194,18 +180,7 @@ def pump_cycle(p: PiezoStackParameters, point: OperatingPoint) -> pd.DataFrame:
 
 
 def stack_loops(p: PiezoStackParameters) -> pd.DataFrame:
-    """Return loops of voltage and displacement of the free stack: Figure 10.
-
-    Parameters
-    ----------
-    p : PiezoStackParameters
-        The actuator.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns frequency_hz, voltage_v, displacement_m.
-    """
+    """Return loops of voltage and displacement of the free stack: Figure 10."""
     frames = [
         pd.DataFrame({"frequency_hz": f, "voltage_v": u, "displacement_m": x})
         for f in LOOP_FREQUENCIES
@@ -221,11 +196,6 @@ def loop_widths(loops: pd.DataFrame) -> pd.DataFrame:
     ----------
     loops : pandas.DataFrame
         Of `stack_loops`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns frequency_hz, stroke_m, width_percent.
     """
     rows = [
         {
@@ -280,8 +250,6 @@ def sensitivities(p: PiezoStackParameters, load: float = 10.0) -> pd.DataFrame:
 
     Parameters
     ----------
-    p : PiezoStackParameters
-        The actuator.
     load : float
         Load lifted [kg].
 

@@ -37,8 +37,6 @@ def hysteresis_table(p: PiezoStackParameters, seed: int) -> Rows:
 
     Parameters
     ----------
-    p : PiezoStackParameters
-        The stack that is measured.
     seed : int
         Seed of the sensor noise; the printed procedure is given noiseless signals, or it fails sooner.
 
@@ -70,11 +68,6 @@ def hysteresis_table(p: PiezoStackParameters, seed: int) -> Rows:
 @tabled
 def loop_card(p: PiezoStackParameters) -> Rows:
     """Return what no estimate from a slow loop of 100 V can beat, by how the loop was run and how often sampled.
-
-    Parameters
-    ----------
-    p : PiezoStackParameters
-        The stack.
 
     Returns
     -------

@@ -26,8 +26,6 @@ class StackSettings:
 
     Parameters
     ----------
-    seed : int
-        Seed of the sensor noise.
     quick : bool
         Whether the design map is a small one.
     voltage_limit_v : float

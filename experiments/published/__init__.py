@@ -29,14 +29,10 @@ class PublishedScalar:
     ----------
     value : float
         As printed, in units of `unit`.
-    unit : str
-        The printed unit.
     si_value : float
         The same in SI, in units of `si_unit`.
     si_unit : str
         The SI unit; ``"1"`` for a ratio.
-    meaning : str
-        What the number is.
     where : str
         Section of the paper, with the erratum where one applies.
     """

@@ -30,8 +30,6 @@ def side_by_side(run: Callable[[Case], Found], cases: Iterable[Case], workers: i
     ----------
     run : callable
         From a case to its result; depends on nothing but the case.
-    cases : iterable
-        The cases.
     workers : int, optional
         Threads; the machine's cores by default.
 
@@ -58,13 +56,6 @@ class SerialExecutor(Executor):
 
     def submit(self, fn: Callable[..., Found], /, *args: Any, **kwargs: Any) -> Future[Found]:
         """Run a function and return its finished future.
-
-        Parameters
-        ----------
-        fn : callable
-            The function.
-        *args, **kwargs : object
-            Its arguments.
 
         Returns
         -------
@@ -126,18 +117,7 @@ def open_executor(workers: int = 1, cluster: str | None = None) -> Generator[tup
 
 
 def process_pool(workers: int) -> ProcessPoolExecutor:
-    """Return processes with one thread each, which leave Ctrl-C to the parent and do not outlive it.
-
-    Parameters
-    ----------
-    workers : int
-        How many.
-
-    Returns
-    -------
-    ProcessPoolExecutor
-        The pool.
-    """
+    """Return processes with one thread each, which leave Ctrl-C to the parent and do not outlive it."""
     return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin_worker)
 
 

@@ -21,17 +21,8 @@ def untracked(sequence: Iterable[Piece], total: float | None = None, *, descript
 
     Parameters
     ----------
-    sequence : iterable
-        Pieces of work.
     total : float, optional
         How many [count].
-    description : str
-        What is done.
-
-    Returns
-    -------
-    iterable
-        The pieces.
     """
     del total, description
     return sequence
@@ -39,20 +30,6 @@ def untracked(sequence: Iterable[Piece], total: float | None = None, *, descript
 
 def in_one_piece(track: Track, description: str, make: Callable[[], Piece]) -> Piece:
     """Do one thing that shows no progress of its own.
-
-    Parameters
-    ----------
-    track : callable
-        Shows when it is done.
-    description : str
-        What is done.
-    make : callable
-        Does it.
-
-    Returns
-    -------
-    object
-        What was made.
 
     Examples
     --------

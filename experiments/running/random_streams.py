@@ -8,13 +8,6 @@ import numpy as np
 def stream(seed: int, *key: str | int) -> np.random.Generator:
     """Return the random generator of one case.
 
-    Parameters
-    ----------
-    seed : int
-        The study's seed.
-    *key : str or int
-        What the case is.
-
     Returns
     -------
     numpy.random.Generator

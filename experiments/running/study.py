@@ -29,13 +29,7 @@ Settings = TypeVar("Settings", bound="DataclassInstance", contravariant=True)
 
 @dataclass(frozen=True)
 class Seeded:
-    """Settings of a study that has no others.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of all that is random.
-    """
+    """Settings of a study that has no others."""
 
     seed: int
 
@@ -74,8 +68,6 @@ class Study(Generic[Settings]):
 
     Parameters
     ----------
-    name : str
-        What its manifest calls it.
     template : str
         The words of its page, by their path below ``experiments``.
     find : callable
@@ -88,8 +80,6 @@ class Study(Generic[Settings]):
         Of what is studied, for the manifest.
     facts : callable
         From what was found, and the settings, to what else the page's words and tables need.
-    ends_with : {"manifest", "report"}
-        Whose path the command prints.
     """
 
     name: str
@@ -107,14 +97,8 @@ def run_study(study: Study[Settings], settings: Settings, out: Path, console: Co
 
     Parameters
     ----------
-    study : Study
-        The study.
-    settings : dataclass
-        Its seed and size.
     out : Path
         Folder of the result; replaced whole if it holds an earlier study.
-    console : rich.console.Console
-        Where progress goes.
 
     Returns
     -------
@@ -145,12 +129,6 @@ def write_result(study: Study[Settings], settings: Settings, found: Found, out: 
 
     Parameters
     ----------
-    study : Study
-        The study.
-    settings : dataclass
-        Its seed and size.
-    found : Found
-        What it found.
     out : Path
         Folder of the result; replaced whole if it holds an earlier study.
 
@@ -167,20 +145,7 @@ def write_result(study: Study[Settings], settings: Settings, found: Found, out: 
 
 
 def manifest_of(study: Study[Settings], settings: Settings) -> Mapping[str, Any]:
-    """Return what it takes to run a study again.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    settings : dataclass
-        Its seed and size.
-
-    Returns
-    -------
-    Mapping[str, Any]
-        Name, settings, parameters, versions.
-    """
+    """Return what it takes to run a study again."""
     return {
         "study": study.name,
         "settings": asdict(settings),
