@@ -36,14 +36,6 @@ _PLACES = {
     "main": "cli",
 }
 
-__all__ = [
-    "ACTUATORS",
-    "ActuatorKind",
-    "Answer",
-    "Log",
-    "actuator",
-    "load",
-    "main",
-]
+__all__ = ["ACTUATORS", "ActuatorKind", "Answer", "Log", "actuator", "load", "main"]
 
 __getattr__ = lazily(__name__, _PLACES)

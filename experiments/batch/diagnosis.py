@@ -14,12 +14,7 @@ from plant.log.record import Record
 TOLD_APART = 1.001
 """Least ratio of the best class's probability to the runner-up's at which a class is named [dimensionless]."""
 
-WHY_NONE = {
-    ClassCode.MODELS_ALIKE,
-    ClassCode.MODELS_DIVERGED,
-    ClassCode.NO_CIRCUIT,
-    ClassCode.NO_PROBABILITIES,
-}
+WHY_NONE = {ClassCode.MODELS_ALIKE, ClassCode.MODELS_DIVERGED, ClassCode.NO_CIRCUIT, ClassCode.NO_PROBABILITIES}
 """Why there are no probabilities."""
 
 

@@ -61,11 +61,7 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         _whole("right_percent", "right"),
         Column("median_margin", "times as probable as runner-up, median", digits=3),
     ),
-    "classes": (
-        _condition("class"),
-        Column("logs"),
-        Column("percent", "of logs", "%", words=decimals(1)),
-    ),
+    "classes": (_condition("class"), Column("logs"), Column("percent", "of logs", "%", words=decimals(1))),
     "logs": (
         _text("file", "log"),
         _text("verb", "asked"),

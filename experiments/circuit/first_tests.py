@@ -7,12 +7,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.circuit.curves import steady_runs
-from experiments.circuit.experiments import (
-    AMPLITUDE_INPUTS,
-    MEAN_INPUTS,
-    frequency_responses,
-    low_frequency_gains,
-)
+from experiments.circuit.experiments import AMPLITUDE_INPUTS, MEAN_INPUTS, frequency_responses, low_frequency_gains
 from experiments.circuit.passes import in_condition
 from experiments.published import SCALARS
 from experiments.running.random_streams import stream

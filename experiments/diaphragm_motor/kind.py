@@ -143,10 +143,7 @@ DIAPHRAGM_MOTOR = ActuatorKind(
     required=(DRIVE,),
     conditions=(HEALTHY, *MOTOR_FAULTS),
     rig_name="paper",
-    simulate=Simulation(
-        run=_simulated,
-        options=SINE | BENCH | {"load": None, "fault": None},
-    ),
+    simulate=Simulation(run=_simulated, options=SINE | BENCH | {"load": None, "fault": None}),
     estimate=LogVerb(
         run=lambda record, rig, calibration: motor_finding(record, rig.parameters, calibration=calibration),
         prepare=_prepared,

@@ -25,11 +25,7 @@ CHANNELS = (("velocity", "mm/s", 1e3), ("differential pressure", "bar", 1e-5))
 
 def diagnosis_page(result: Mapping[str, Any], found: "Finding") -> str:
     """Return the page on a log."""
-    drawn = {
-        "probabilities": _draw_probabilities(found),
-        "severity": _draw_severities(found),
-        "fit": _draw_fit(found),
-    }
+    drawn = {"probabilities": _draw_probabilities(found), "severity": _draw_severities(found), "fit": _draw_fit(found)}
     rows = [(SHOWN[name], amount(one)) for name, one in result["severity"].items()]
     facts = {
         "result": result,
@@ -62,8 +58,7 @@ def _draw_probabilities(found: "Finding") -> tuple[Figure, str]:
         axes[0].barh([name.replace("_", " ") for name in names], shares, color=colours)
         for place, share in enumerate(shares):
             axes[0].text(share + 0.7, place, f"{share:.1f}" if share >= 0.05 else "< 0.1", va="center", fontsize=8)
-        axes[0].set_xlim(0.0, 108.0)
-        axes[0].set_xlabel("probability [%], if it is one of the nine")
+        axes[0].set(xlim=(0.0, 108.0), xlabel="probability [%], if it is one of the nine")
     return figure, "Probabilities of the nine conditions."
 
 
@@ -87,8 +82,10 @@ def _draw_severities(found: "Finding") -> tuple[Figure, str]:
             axis.errorbar([value], [0.0], xerr=error, fmt="none", ecolor=BLACK, elinewidth=1.6, capsize=5.0)
             axis.axvline(sound, color=VERMILION, ls="--", lw=1.4)
             reach = max(abs(number) for number in (value, low, high, sound)) or 1.0
-            axis.set_xlim(1.08 * min(0.0, low, sound) - 0.01 * reach, 1.08 * max(value, high, sound) + 0.01 * reach)
-            axis.set_ylim(-0.6, 0.6)
+            axis.set(
+                xlim=(1.08 * min(0.0, low, sound) - 0.01 * reach, 1.08 * max(value, high, sound) + 0.01 * reach),
+                ylim=(-0.6, 0.6),
+            )
             unit = "MPa" if one.unit == "Pa" else one.unit
             axis.set_yticks([0.0], [f"{SHOWN[name].replace(', at most', '')} [{unit}]"])
             axis.tick_params(axis="y", length=0)

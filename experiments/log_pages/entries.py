@@ -61,12 +61,7 @@ def quantity_entry(one: "Quantity") -> dict[str, Any]:
     dict[str, Any]
         ``value``, ``unit``, ``std`` and ``ci95``.
     """
-    return {
-        "value": one.value,
-        "unit": one.unit,
-        "std": one.std,
-        "ci95": None if one.ci95 is None else list(one.ci95),
-    }
+    return {"value": one.value, "unit": one.unit, "std": one.std, "ci95": None if one.ci95 is None else list(one.ci95)}
 
 
 def gate_entry(gate: "Gate") -> dict[str, Any]:

@@ -95,7 +95,6 @@ def _draw_channels(record: "Record", names: Sequence[str]) -> Figure:
     figure, axes = panels("Measured", len(shown), 1, 0.9 + 1.5 * len(shown), margins, sharex=True)
     for axis, name in zip(axes, shown, strict=True):
         axis.plot(record.time[places], record[name][places], color=BLUE, lw=0.8)
-        axis.set_title(name, loc="left")
-        axis.set_ylabel(f"[{UNITS[name]}]")
+        axis.set(title=name, ylabel=f"[{UNITS[name]}]")
     axes[-1].set_xlabel("time [s]")
     return figure

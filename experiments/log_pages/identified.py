@@ -55,8 +55,7 @@ def _over_time(axis: Axes, model: LinearModel, curves: dict[str, tuple[str, Floa
         axis.plot(
             model.sample_time * np.arange(values.size)[::every], values[::every], color=colour, lw=0.9, label=name
         )
-    axis.set_xlabel("time [s]")
-    axis.set_ylabel(f"{model.output_name} [{CHANNELS.get(model.output_name, 'its unit')}]")
+    axis.set(xlabel="time [s]", ylabel=f"{model.output_name} [{CHANNELS.get(model.output_name, 'its unit')}]")
     if len(curves) > 1:
         axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2)
 
@@ -65,8 +64,7 @@ def _correlations(axis: Axes, residual: FloatArray, other: FloatArray, lags: np.
     axis.bar(lags, correlations(residual, other, lags), width=0.7, color=BLUE)
     reach = 1.96 / np.sqrt(np.count_nonzero(np.isfinite(residual)))
     axis.axhspan(-reach, reach, color=GREY, alpha=0.25, lw=0)
-    axis.set_xlabel("lag [samples]; grey, 95 % of white residuals")
-    axis.set_ylabel("correlation [ratio]")
+    axis.set(xlabel="lag [samples]; grey, 95 % of white residuals", ylabel="correlation [ratio]")
 
 
 def _response(gain: Axes, phase: Axes, model: LinearModel, u: FloatArray, y: FloatArray) -> None:
@@ -81,10 +79,12 @@ def _response(gain: Axes, phase: Axes, model: LinearModel, u: FloatArray, y: Flo
     gain.plot(empirical.frequency_hz[sure], np.abs(empirical.response[sure]), color=ORANGE, lw=0.8, label="empirical")
     gain.fill_between(frequency, band.gain_low, band.gain_high, color=BLUE, alpha=0.35, lw=0)
     gain.plot(frequency, np.abs(band.response), color=BLUE, label="model")
-    gain.set_yscale("log")
-    gain.set_ylim(0.1 * np.abs(band.response).min(), 10.0 * np.abs(band.response).max())
-    gain.set_ylabel("gain [output unit per input unit]")
-    gain.set_title("gain with 95 % bands", loc="left")
+    gain.set(
+        yscale="log",
+        ylim=(0.1 * np.abs(band.response).min(), 10.0 * np.abs(band.response).max()),
+        ylabel="gain [output unit per input unit]",
+        title="gain with 95 % bands",
+    )
     gain.legend(loc="lower left")
     turn = np.degrees(np.angle(empirical.response[sure]))
     phase.plot(empirical.frequency_hz[sure], turn, ".", ms=1.5, color=ORANGE)
@@ -93,8 +93,7 @@ def _response(gain: Axes, phase: Axes, model: LinearModel, u: FloatArray, y: Flo
     phase.set_yticks(np.arange(-180.0, 181.0, 90.0))
     phase.set_ylabel("phase [degree]")
     for axis in (gain, phase):
-        axis.set_xscale("log")
-        axis.set_xlabel("frequency [Hz]")
+        axis.set(xscale="log", xlabel="frequency [Hz]")
 
 
 def write_identified(model: LinearModel, u: FloatArray, y: FloatArray, found: Validation, log: str, path: Path) -> None:

@@ -23,11 +23,7 @@ WINDOWS = 100
 
 COLOURS = (BLUE, ORANGE, VERMILION)
 
-NAMES = {
-    "position_m": "position",
-    "velocity_m_s": "velocity",
-    "differential_pressure_pa": "differential pressure",
-}
+NAMES = {"position_m": "position", "velocity_m_s": "velocity", "differential_pressure_pa": "differential pressure"}
 
 
 def draw_innovations(found: BulkModulusEstimate, log: str) -> Figure:
@@ -88,8 +84,7 @@ def _innovations(axis: Axes, time: np.ndarray, normalised: np.ndarray, estimate:
             time[::every], normalised[::every, i], ".", ms=1.5, color=COLOURS[i % 3], label=NAMES.get(channel, channel)
         )
     axis.axhspan(-1.96, 1.96, color=GREY, alpha=0.15, lw=0)
-    axis.set_ylim(-6.0, 6.0)
-    axis.set_ylabel("innovation over its\nexpected deviation")
+    axis.set(ylim=(-6.0, 6.0), ylabel="innovation over its\nexpected deviation")
     axis.legend(loc="upper right", ncols=3, markerscale=5)
 
 
@@ -106,8 +101,7 @@ def _mean_square(axis: Axes, time: np.ndarray, normalised: np.ndarray, estimate:
     low, high = mean_chi_square_bounds(1, window)
     axis.axhspan(low, high, color=GREY, alpha=0.25, lw=0)
     axis.axhline(1.0, color=BLACK, lw=0.6)
-    axis.set_yscale("log")
-    axis.set_ylabel(f"NIS, mean of {window} samples\n(grey: 95 % of windows)")
+    axis.set(yscale="log", ylabel=f"NIS, mean of {window} samples\n(grey: 95 % of windows)")
 
 
 def write_innovations(found: BulkModulusEstimate, log: str, path: Path) -> None:

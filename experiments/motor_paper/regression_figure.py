@@ -111,9 +111,5 @@ def draw_circle(tables: Tables) -> Figure:
     return figure
 
 
-REGRESSION_FIGURES: Drawings = {
-    "residuals": draw_residuals,
-    "line_fits": draw_line_fits,
-    "circle": draw_circle,
-}
+REGRESSION_FIGURES: Drawings = {"residuals": draw_residuals, "line_fits": draw_line_fits, "circle": draw_circle}
 """The figures, by file name."""

@@ -84,10 +84,7 @@ def validation_study(
 
 
 def classification_study(
-    rig: EhaParameters,
-    library: Mapping[str, LinearModel],
-    settings: StudySettings,
-    track: Track = untracked,
+    rig: EhaParameters, library: Mapping[str, LinearModel], settings: StudySettings, track: Track = untracked
 ) -> dict[str, pd.DataFrame]:
     """Classify many runs with each bank, at nominal and at spread parameters.
 

@@ -129,10 +129,7 @@ PIEZO_STACK = ActuatorKind(
     required=(DRIVE,),
     conditions=tuple(CONDITIONS),
     rig_name="paper",
-    simulate=Simulation(
-        run=_simulated,
-        options=SINE | OF_THE_RUN | BENCH | {"condition": None, "fault": None},
-    ),
+    simulate=Simulation(run=_simulated, options=SINE | OF_THE_RUN | BENCH | {"condition": None, "fault": None}),
     estimate=LogVerb(
         run=lambda record, rig, channels: stack_finding(record, rig.parameters, channels=channels),
         prepare=_prepared,
@@ -149,8 +146,7 @@ PIEZO_STACK = ActuatorKind(
         screen=_conditions_shown,
     ),
     identifiability=Experiment(
-        run=_looked_at,
-        options=SINE | OF_THE_RUN | {"sensors": "", "seconds": 0.1, "rate": 1.0 / SAMPLE_TIME},
+        run=_looked_at, options=SINE | OF_THE_RUN | {"sensors": "", "seconds": 0.1, "rate": 1.0 / SAMPLE_TIME}
     ),
 )
 """What `experiments.actuators` registers."""

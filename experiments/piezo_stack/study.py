@@ -97,16 +97,8 @@ COLUMNS: Mapping[str, Columns] = {
         Column("samples", "samples a cycle", words=lambda count: f"{count:,}"),
         lambda name: Column(name, f"{spaced(name)} [%]", words=_told),
     ),
-    "identifiability": (
-        Column("frequency_hz", "drive"),
-        "sensors",
-        lambda name: Column(name, unit="%", digits=2),
-    ),
-    "rig": (
-        Column("parameter", "name", words=spaced),
-        Column("value", words=number),
-        *("unit", "meaning", "source"),
-    ),
+    "identifiability": (Column("frequency_hz", "drive"), "sensors", lambda name: Column(name, unit="%", digits=2)),
+    "rig": (Column("parameter", "name", words=spaced), Column("value", words=number), *("unit", "meaning", "source")),
 }
 """How the report shows its tables."""
 
