@@ -18,7 +18,6 @@ ACTUATORS: Mapping[str, str] = {
 """Where each kind's `experiments.actuator_kind.ActuatorKind` is, by name."""
 
 DEFAULT = "eha"
-"""The kind where none is named."""
 
 ENTRY_POINTS = "hydrostate.actuators"
 """Group of entry points by which an installed package registers kinds of its own: ``name = "module:OBJECT"``."""

@@ -29,7 +29,6 @@ TASK_SECONDS = 2.0
 """About how long a worker is given work for at a time [s]: what a crash can cost, and what a part holds."""
 
 MOST_CASES = 2048
-"""Most cases of a task."""
 
 COSTS: Mapping[str, tuple[float, float]] = {"filter": (0.0, 2.5e-8), "estimate": (0.3, 2e-5), "diagnose": (0.05, 1e-6)}
 """About what a case costs on one core, by verb: by itself, and for each tenth of a millisecond of its series [s]."""

@@ -11,10 +11,8 @@ SERIES = ["plant", "file", "drive", "sensors", "condition", "seed", "duration_s"
 """What a series is. Cases of one series share its noise, so a series is drawn whole."""
 
 DOING = ["form", "method", "pressure", "told", "start_pa", "start_std_pa"]
-"""What is done with it."""
 
 RESAMPLES = 2000
-"""Draws of the bootstrap [count]."""
 
 BLOCK = 200
 """Draws that are held in memory at a time [count]."""

@@ -15,7 +15,6 @@ TOLD_APART = 1.001
 """Least ratio of the best class's probability to the runner-up's at which a class is named [dimensionless]."""
 
 WHY_NONE = {ClassCode.MODELS_ALIKE, ClassCode.MODELS_DIVERGED, ClassCode.NO_CIRCUIT, ClassCode.NO_PROBABILITIES}
-"""Why there are no probabilities."""
 
 
 def diagnosed(record: Record, rig: Rig) -> dict[str, Any]:

@@ -134,4 +134,3 @@ BATCH_FIGURES: Drawings = {
     "confusion": _confusion,
     "classes": lambda tables: draw_classes(tables["classes"]),
 }
-"""The figures, by file name: that of the table that they need."""

@@ -15,7 +15,6 @@ TEMPORARY = ".tmp"
 """How the name of a file ends that is not whole yet."""
 
 LOCK = "lock"
-"""The file that a writer holds."""
 
 
 class Folder:

@@ -79,7 +79,6 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         _text("reason"),
     ),
 }
-"""How each table is shown."""
 
 VERDICT_TONES: Mapping[str, str] = {"better": "good", "worse": "bad"}
 

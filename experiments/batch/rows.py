@@ -54,7 +54,6 @@ SCHEMA = pa.schema(
 actuator that is not the gear-pump one it is the kind, and ``quantities`` holds what was found, as JSON."""
 
 Row: TypeAlias = dict[str, Any]
-"""Entries by column."""
 
 FOUND = tuple(name for name in SCHEMA.names[SCHEMA.names.index("outcome") :] if name != TRUTH)
 """Columns of what came of a case; those before them, and the truth, say what it is."""

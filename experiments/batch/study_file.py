@@ -21,7 +21,6 @@ from plant.errors import HydrostateError
 from plant.sensors.sensors import SENSORS
 
 SHIPPED = "experiments.batch.studies"
-"""The package that holds the studies that come with the project."""
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]

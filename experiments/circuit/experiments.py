@@ -58,7 +58,6 @@ ESTIMATE_COLUMNS = (
     *("form", "drive", "pressure_logged", "condition", "start_pa", "outcome", "value_pa", "ci95_low_pa"),
     *("ci95_high_pa", "truth_pa", "error_percent", "covered", "bound_percent", "gate_passed", "reasons"),
 )
-"""Columns of the table of estimates."""
 
 _LONGEST_PASS = 4.0
 _SETTLING = 0.3

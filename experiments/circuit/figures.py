@@ -20,7 +20,6 @@ from experiments.published import SCALARS
 
 MILLI, MEGA = 1e3, 1e-6
 LITRES_A_MINUTE = 6e4
-"""Litres a minute in a cubic metre a second."""
 
 MARKERS = {"none": "o", "minor": "s", "major": "^"}
 
@@ -190,4 +189,3 @@ CIRCUIT_FIGURES: Drawings = {
     "figure_10": draw_validation_input,
     "figure_11": draw_bulk_modulus,
 }
-"""The figures, by file name, in the paper's order."""

@@ -18,7 +18,6 @@ from plant.eha.simulate import CIRCUIT, simulate
 from plant.sensors.sensors import BENCH
 
 CHANNELS = ("motor_speed_rad_s", "velocity_m_s")
-"""Input and output of a test."""
 
 SAMPLE_TIME = 1e-3
 """Of the tests [s]."""

@@ -64,7 +64,6 @@ def _find(settings: Seeded, track: Track) -> Found:
 
 
 RIG = CircuitParameters()
-"""The healthy circuit."""
 
 _SHARES = (
     Column("percent_of_normal", "circuit", "% of normal", digits=3),
@@ -102,7 +101,5 @@ COLUMNS: Mapping[str, Columns] = {
     "figure 8 leakage flow refitted": _REFIT,
     "figure 9 friction refitted": _REFIT,
 }
-"""How the report shows its tables."""
 
 CIRCUIT = Study("circuit", "circuit/report.html", _find, CIRCUIT_FIGURES, COLUMNS, asdict(RIG))
-"""The paper's experiments on the circuit plant."""

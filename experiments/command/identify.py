@@ -61,7 +61,6 @@ NOTHING: Result = {
     "delay": {"samples": None, "seconds": None},
     "validation": {"whiteness_p": None, "cross_correlation_p": None},
 }
-"""The entries of a log that could not be used."""
 
 commands = typer.Typer()
 

@@ -117,7 +117,6 @@ PRESSURE = "differential_pressure_pa"
 """The channel that is optional everywhere."""
 
 SEED = 2024
-"""Seed where none is given."""
 
 
 def load_rig(path: Path | None) -> "Rig":

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 STANDARD_INPUT = "standard input"
-"""What messages call the stream."""
 
 SAME_RATE = 0.01
 """By how much the rates of a healthy log and of what is watched may differ [fraction]."""

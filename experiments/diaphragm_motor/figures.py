@@ -40,7 +40,6 @@ CYCLE: Sequence[Course] = (
         ),
     ),
 )
-"""Panels of a pump cycle."""
 
 
 def _swept(flow: Axes, sensing: Axes, sweep: pd.DataFrame, across: str, label: str, **marks: Any) -> None:
@@ -233,4 +232,3 @@ MOTOR_FIGURES: Drawings = {
     "averaged": draw_averaged,
     "control": draw_control,
 }
-"""The figures, by file name."""

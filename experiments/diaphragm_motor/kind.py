@@ -161,4 +161,3 @@ DIAPHRAGM_MOTOR = ActuatorKind(
     ),
     identifiability=Experiment(run=_looked_at, options=SINE | {"load": None}),
 )
-"""What `experiments.actuators` registers."""

@@ -15,7 +15,6 @@ ML_MIN = 1e-6 / 60.0
 """One millilitre a minute [m^3/s]."""
 
 COLUMNS = ("section", "claim", "published", "ours", "holds")
-"""Columns of the tables."""
 
 Row = tuple[str, str, str, str, bool]
 

@@ -27,7 +27,6 @@ SWEEPS: Mapping[str, Callable[[DiaphragmMotorParameters], pd.DataFrame]] = {
     "other sets": sweeps.other_sets,
     "averaged": averaged_course,
 }
-"""The tables that are simulated, by name."""
 
 
 def _find(settings: Seeded, track: Track) -> Found:
@@ -58,7 +57,6 @@ def _parameters() -> pd.DataFrame:
 
 
 RIG = DiaphragmMotorParameters()
-"""The motor."""
 
 _CLAIM = ("section", "claim", "published", "ours")
 _BLOCKING = Column("blocking_n", "blocking force", digits=3)
@@ -94,7 +92,6 @@ COLUMNS: Mapping[str, Columns] = {
     ),
     "rig": (Column("parameter", "name", words=spaced), *("value", "unit", "meaning", "source")),
 }
-"""How the report shows its tables."""
 
 
 def _facts(tables: Mapping[str, pd.DataFrame], _: Seeded) -> Mapping[str, pd.DataFrame]:
@@ -105,4 +102,3 @@ def _facts(tables: Mapping[str, pd.DataFrame], _: Seeded) -> Mapping[str, pd.Dat
 DIAPHRAGM_MOTOR = Study(
     "diaphragm-motor", "diaphragm_motor/report.html", _find, MOTOR_FIGURES, COLUMNS, asdict(RIG), _facts
 )
-"""Sections 7.1 to 7.3 of the diaphragm motor's paper, reversal, control, and what fails."""

@@ -29,7 +29,6 @@ NO_ESTIMATE: Mapping[str, Any] = {
     "channels": [],
     "notes": [],
 }
-"""The entries of a log that could not be estimated."""
 
 NO_DIAGNOSIS: Mapping[str, Any] = {
     "condition": None,
@@ -52,7 +51,6 @@ NO_DIAGNOSIS: Mapping[str, Any] = {
     "transfer_function_condition": None,
     "notes": [],
 }
-"""The entries of a log that could not be diagnosed."""
 
 COSTS = frozenset({"pressure_absent", "pressure_unused", "pressure_absent_class"})
 """Codes of what an absent channel costs: of all logs alike, so said once."""

@@ -37,7 +37,6 @@ AS_THE_LOG_ALLOWS = {"form": "auto", "method": "auto", "sensors": "", "no_pressu
 OF_A_FILTER = {"states": "", "robust": "none", "tune": False, "smooth": False, "figure": None}
 FIRST_GUESS = {"start": None, "start_std": 3e8}
 EXPERIMENT = {"sensors": ",".join(SENSORS), "noise": "bench", "drive": "steps", "seconds": 10.0, "rate": 1000.0}
-"""Options, with what they are where they are not given."""
 
 
 class RunCode(Code):
@@ -242,4 +241,3 @@ EHA = ActuatorKind(
         screen=experiments_shown,
     ),
 )
-"""What `experiments.actuators` registers."""

@@ -21,7 +21,6 @@ from experiments.page.style import (
 from experiments.page.words import in_words
 
 MILLI = 1e3
-"""Millimetres a metre."""
 
 STRUCTURE_MARKS = {
     "output-error": (BLUE, "o"),
@@ -29,7 +28,6 @@ STRUCTURE_MARKS = {
     "ARMAX": (GREEN, "^"),
     "Box-Jenkins": (PURPLE, "D"),
 }
-"""Colour and mark of each structure."""
 
 COMPARED = {
     "fit_percent": ("running free", "fit [%]"),
@@ -154,4 +152,3 @@ LIBRARY_FIGURES: Drawings = {
     "orders": draw_orders,
     "clocks": draw_clocks,
 }
-"""The figures, by file name, in the report's order."""

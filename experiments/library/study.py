@@ -21,7 +21,6 @@ from experiments.running.study import Found, Seeded, Study
 from plant.eha.circuit_parameters import CircuitParameters
 
 RIG = CircuitParameters()
-"""The healthy circuit."""
 
 
 def _find(settings: Seeded, track: Track) -> Found:
@@ -121,7 +120,5 @@ COLUMNS: Mapping[str, Columns] = {
         Column("violations", "what it breaks", words=lambda text: text or "nothing"),
     ),
 }
-"""How the report shows its tables."""
 
 LIBRARY = Study("library", "library/report.html", _find, LIBRARY_FIGURES, COLUMNS, asdict(RIG), _facts, "report")
-"""The nine-condition library, and how it was chosen."""

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 
 _FIVE = "{:.5g}".format
-"""Five digits."""
 
 
 def no_such(owner: str, name: str, known: Sequence[str]) -> str:

@@ -22,7 +22,6 @@ BLANK: dict[str, Any] = {
     "gate": NO_GATE,
     "notes": [],
 }
-"""The entries of a log that could not be used."""
 
 ALL_TOLD = "every quantity is told, and the model describes the log"
 

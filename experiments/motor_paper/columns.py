@@ -123,4 +123,3 @@ _LINEAR: Mapping[str, Columns] = {
 }
 
 COLUMNS: Mapping[str, Columns] = {**_PAPER, **_SENSING, **_LINEAR}
-"""By the names of the tables: of the paper's own and its regression, of sensing, of its linear models."""

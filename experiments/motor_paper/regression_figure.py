@@ -13,7 +13,6 @@ from experiments.page.frames import Tables
 from experiments.page.style import BLACK, BLUE, GREY, ORANGE, VERMILION, Margins, panels
 
 READING_WORDS = {"as_printed": "as printed", "anova": "as in Figure 12", "physical": "physical"}
-"""The readings of Table 2 in words."""
 
 _MARKS = {"as_printed": (GREY, "x"), "anova": (BLUE, "o"), "physical": (VERMILION, "s")}
 
@@ -112,4 +111,3 @@ def draw_circle(tables: Tables) -> Figure:
 
 
 REGRESSION_FIGURES: Drawings = {"residuals": draw_residuals, "line_fits": draw_line_fits, "circle": draw_circle}
-"""The figures, by file name."""

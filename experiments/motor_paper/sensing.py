@@ -49,7 +49,6 @@ FAULTS = {
 """Faults of one part: parameter, place, value."""
 
 HARMONICS = 9
-"""How many are shown."""
 
 
 def operating_points(p: DiaphragmMotorParameters, seed: int) -> pd.DataFrame:

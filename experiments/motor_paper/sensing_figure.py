@@ -13,7 +13,6 @@ from experiments.page.style import BLUE, GREY, ORANGE, VERMILION, Margins, panel
 MILLI = 1e3
 
 SHOWN = ("A3, A4, A5, as the paper wants", "A4 and drive voltage")
-"""The regressions that are drawn."""
 
 
 def draw_velocity(tables: Tables) -> Figure:
@@ -86,4 +85,3 @@ def draw_spectra(tables: Tables) -> Figure:
 
 
 SENSING_FIGURES: Drawings = {"sensing": draw_velocity, "sensing_faults": draw_faults, "spectra": draw_spectra}
-"""The figures, by file name."""

@@ -19,7 +19,6 @@ from plant.motor_paper.hysteresis_model import HysteresisParameters
 from plant.motor_paper.vibration_model import VibrationParameters
 
 MOTOR, LINEAR, DIAPHRAGM = DiaphragmMotorParameters(), VibrationParameters(), HysteresisParameters()
-"""The simulated motor, and the paper's linear and hysteresis models."""
 
 TABLES: Mapping[str, Callable[[Tables, int], pd.DataFrame]] = {
     "table 1": lambda _, __: tables.table_1(),
@@ -54,7 +53,6 @@ TABLES: Mapping[str, Callable[[Tables, int], pd.DataFrame]] = {
     "figures 7 to 9": lambda _, __: vibration.figures_7_to_9(),
     "fractional responses": lambda _, __: vibration.fractional_table(LINEAR),
 }
-"""The tables by name, each made from those before it and the seed."""
 
 
 def _find(settings: Seeded, track: Track) -> Found:
@@ -65,7 +63,6 @@ def _find(settings: Seeded, track: Track) -> Found:
 
 
 MOTOR_PAPER_FIGURES: Drawings = {**REGRESSION_FIGURES, **SENSING_FIGURES, **VIBRATION_FIGURES}
-"""All figures of the report, by file name."""
 
 MOTOR_PAPER = Study(
     "motor-paper",
@@ -75,4 +72,3 @@ MOTOR_PAPER = Study(
     COLUMNS,
     {"motor": asdict(MOTOR), "vibration": asdict(LINEAR), "hysteresis": asdict(DIAPHRAGM)},
 )
-"""The diaphragm-motor paper, checked number by number."""

@@ -212,4 +212,3 @@ VIBRATION_FIGURES: Drawings = {
     "linearised": draw_linearised,
     "fractional": draw_fractional,
 }
-"""The figures, by file name."""

@@ -66,7 +66,6 @@ EXPERIMENTS: Mapping[Experiment, str] = {
     ),
     POSITION_SINE: "Stuck, position and velocity hold nothing (errata E13).",
 }
-"""The study's experiments, and what each shows."""
 
 TRACK_POINTS = 200
 """Points of a convergence curve that are kept."""

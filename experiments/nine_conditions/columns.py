@@ -41,7 +41,6 @@ SETTING_UNITS: Mapping[str, str] = {
     "classification_sample_time": " [s]",
     "seeds": " [count]",
 }
-"""Units of the study's settings."""
 
 
 def report_frames(tables: Tables, settings: StudySettings) -> Tables:
@@ -209,4 +208,3 @@ COLUMNS: Mapping[str, Columns] = {
     "settings of this run": ("name", "value"),
     "versions that ran it": ("name", "value"),
 }
-"""By the names of the tables."""

@@ -28,7 +28,6 @@ TITLES: Mapping[Experiment, str] = {
     POSITION_STEPS: "Pressure form, plant that sticks, nine steps, position and velocity alone",
     PUBLISHED_WAY: "Acceleration form (the published one), plant without sticking, 10 Hz sine",
 }
-"""The experiments that are drawn."""
 
 
 def draw_convergence(shown: Experiment, curves: pd.DataFrame, truth_pa: float) -> Figure:

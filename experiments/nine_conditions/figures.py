@@ -17,7 +17,6 @@ from experiments.page.figure_files import Drawings
 from experiments.page.frames import Tables
 
 SHOWN_RUN = "minor_friction"
-"""The condition whose validation run is drawn."""
 
 
 def _confusions(tables: Tables) -> Figure:
@@ -44,4 +43,3 @@ FIGURES: Drawings = {
     "scores": lambda of: draw_scores(of["score_example"]),
     "definitions": lambda of: draw_definitions(of["conditions"]),
 }
-"""From the study's tables to its figures, in the report's order."""

@@ -10,7 +10,6 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 from experiments.page.style import BESIDE_CONDITIONS, BLUE, GREY, ORANGE, VERMILION, Margins, condition_levels, panels
 
 MILLI = 1e3
-"""Millimetres a metre."""
 
 LEAST_COHERENCE = 0.3
 """Empirical phase is drawn where the coherence is at least this; below, it says nothing."""

@@ -40,7 +40,6 @@ from plant.errors import LogWarning
 from plant.sensors.sensors import BENCH
 
 RIG = EhaParameters()
-"""The healthy actuator."""
 
 
 def _find(settings: StudySettings, track: Track) -> Found:
@@ -105,4 +104,3 @@ def _facts(tables: Tables, settings: StudySettings) -> Mapping[str, Any]:
 NINE_CONDITIONS = Study(
     "nine conditions", "nine_conditions/report.html", _find, FIGURES, COLUMNS, asdict(RIG), _facts, "report"
 )
-"""What is wrong inside an actuator, in nine conditions, beside the published results."""

@@ -29,7 +29,6 @@ WITH_PRESSURE, WITHOUT_PRESSURE, TRANSFER_FUNCTIONS = (
     "transfer functions",
 )
 BANKS = (WITH_PRESSURE, WITHOUT_PRESSURE, TRANSFER_FUNCTIONS)
-"""The classifiers that are compared."""
 
 VARIANTS = ("nominal", "spread")
 """Parameters as in the tables, and spread around them."""

@@ -9,7 +9,6 @@ from experiments.page.style import BLACK, BLUE, GREY, VERMILION, Margins, condit
 from experiments.page.words import in_words
 
 MILLI = 1e3
-"""Millimetres a metre."""
 
 BEFORE, AFTER = 0.12, 0.28
 """What the enlargement shows around a reversal [s]."""

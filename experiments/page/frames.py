@@ -10,7 +10,6 @@ import pandas as pd
 from plant.units import notes
 
 Tables: TypeAlias = Mapping[str, pd.DataFrame]
-"""What a study found, by name."""
 
 Rows: TypeAlias = Iterator[Mapping[str, Any]]
 """The rows of a table, by column."""

@@ -57,7 +57,6 @@ STYLE: Mapping[RcKeyType, Any] = {
     "svg.fonttype": "path",
     "svg.hashsalt": "hydrostate",
 }
-"""Matplotlib settings, in force while a figure is drawn and while it is saved."""
 
 
 @contextmanager

@@ -25,10 +25,8 @@ class Cell:
 
 
 Shown: TypeAlias = "str | Cell | Markup"
-"""What may stand in a cell."""
 
 Row: TypeAlias = Mapping[Any, Any]
-"""One row of a table, by column."""
 
 UNITS: Mapping[str, tuple[str, float]] = {
     "_m_s": ("mm/s", 1e3),

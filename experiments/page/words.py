@@ -34,4 +34,3 @@ def in_short(condition: str) -> str:
 
 
 CONDITION = Column("condition", words=lambda name: Cell(in_words(name), "name"))
-"""The column of conditions in a report's table."""

@@ -35,7 +35,6 @@ CYCLE: Sequence[Course] = (
     (("lift [µm]", MICRO), (("outlet_reed_m", BLUE, "outlet reed"), ("inlet_reed_m", VERMILION, "inlet reed"))),
     (("flow [L/min]", 1.0 / LITRE_PER_MINUTE), (("delivery_flow_m3_s", BLUE, "flow in the delivery line"),)),
 )
-"""Panels of a pump cycle."""
 
 STAGE_COLOURS = {"compression": ORANGE, "discharge": SKY, "expansion": GREY, "intake": GREEN}
 
@@ -230,4 +229,3 @@ STACK_FIGURES: Drawings = {
     "design_maps": draw_maps,
     "limits": draw_limits,
 }
-"""The figures, by file name."""

@@ -86,7 +86,6 @@ DESIGN_GRID = DesignGrid()
 """The full map: 19 frequencies, 4 voltages, 2 bias pressures, 7 loads."""
 
 QUICK_GRID = DesignGrid((150.0, 275.0, 400.0), (100.0, 140.0), (LOW_BIAS, HIGH_BIAS), (0.0, 20.0))
-"""A small map that shows the same."""
 
 
 def sweep(p: PiezoStackParameters, points: Sequence[OperatingPoint]) -> Iterator[dict[str, float]]:

@@ -149,4 +149,3 @@ PIEZO_STACK = ActuatorKind(
         run=_looked_at, options=SINE | OF_THE_RUN | {"sensors": "", "seconds": 0.1, "rate": 1.0 / SAMPLE_TIME}
     ),
 )
-"""What `experiments.actuators` registers."""

@@ -64,7 +64,6 @@ def _told(percent: float) -> Cell | str:
 
 
 RIG = PiezoStackParameters()
-"""The actuator."""
 
 COLUMNS: Mapping[str, Columns] = {
     "quoted numbers": (
@@ -100,7 +99,6 @@ COLUMNS: Mapping[str, Columns] = {
     "identifiability": (Column("frequency_hz", "drive"), "sensors", lambda name: Column(name, unit="%", digits=2)),
     "rig": (Column("parameter", "name", words=spaced), Column("value", words=number), *("unit", "meaning", "source")),
 }
-"""How the report shows its tables."""
 
 PIEZO_STACK = Study(
     "piezo-stack",
@@ -111,4 +109,3 @@ PIEZO_STACK = Study(
     asdict(RIG),
     facts=lambda *_: {"rig": parameter_table(RIG)},
 )
-"""The flow of the piezo-stack actuator, its hysteresis, and what its sensors tell."""

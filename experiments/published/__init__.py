@@ -15,7 +15,6 @@ import pandas as pd
 from plant.errors import require_known
 
 TableName: TypeAlias = Literal["conditions", "parameters", "leakage", "friction", "rmse", "transfer_functions"]
-"""The six tables, in the paper's order."""
 
 MotorTableName: TypeAlias = Literal["table1_geometry", "table2", "fig12_anova", "table4_flow", "table5_actuators"]
 """The diaphragm-motor paper's tables, and the regression that its Figure 12 holds."""
@@ -54,7 +53,6 @@ def _scalars() -> Mapping[str, PublishedScalar]:
 
 
 SCALARS: Mapping[str, PublishedScalar] = MappingProxyType(_scalars())
-"""The text's scalars by name."""
 
 _FILES: Mapping[TableName | MotorTableName, str] = MappingProxyType(
     {
