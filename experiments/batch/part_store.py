@@ -24,6 +24,7 @@ import pyarrow.parquet as pq
 from experiments.batch.folder import LOCK, TEMPORARY, Folder, open_folder
 from experiments.batch.rows import SCHEMA
 from experiments.page.folder import DESKTOP_FILES
+from experiments.running.refusal import refused
 from plant.errors import HydrostateError
 
 FORMAT = 1
@@ -52,7 +53,7 @@ class PartStore:
         HydrostateError
             If the folder holds what no batch wrote, cannot be written, or another process is writing.
         """
-        with self._sentences():
+        with refused(f"store {self.name} cannot be written"):
             self._check()
             with self.folder.writer():
                 self._tidy()
@@ -60,7 +61,7 @@ class PartStore:
 
     def clear(self) -> None:
         """Remove every part."""
-        with self._sentences():
+        with refused(f"store {self.name} cannot be written"):
             for name in self._parts():
                 self.folder.remove(f"{PARTS}/{name}")
 
@@ -87,7 +88,7 @@ class PartStore:
         HydrostateError
             If it cannot be written.
         """
-        with self._sentences():
+        with refused(f"store {self.name} cannot be written"):
             self.folder.write(CASES, _parquet(pa.table({"key": pa.array(keys, pa.string())})))
             text = json.dumps({"format": FORMAT, **manifest}, indent=2, allow_nan=False) + "\n"
             self.folder.write(MANIFEST, text.encode())
@@ -101,7 +102,7 @@ class PartStore:
             If it cannot be written.
         """
         digest = hashlib.sha256("".join(keys).encode()).hexdigest()[:24]
-        with self._sentences():
+        with refused(f"store {self.name} cannot be written"):
             self.folder.write(f"{PARTS}/{digest}.parquet", part)
 
     def manifest(self) -> Mapping[str, Any] | None:
@@ -146,7 +147,7 @@ class PartStore:
             except FileNotFoundError:
                 continue
             except (pa.ArrowException, OSError, KeyError):
-                with self._sentences():
+                with refused(f"store {self.name} cannot be written"):
                     self.folder.move(f"{PARTS}/{name}", f"{SET_ASIDE}/{name}")
                 broken.append(name)
                 continue
@@ -215,14 +216,6 @@ class PartStore:
             raise HydrostateError(
                 f"store {self.name} must be new, empty, or a batch study's, and it holds {strangers[0]}: choose another"
             )
-
-    @contextmanager
-    def _sentences(self) -> Generator[None]:
-        """Turn a system's error into a sentence."""
-        try:
-            yield
-        except OSError as error:
-            raise HydrostateError(f"store {self.name} cannot be written: {error.strerror or error}") from error
 
 
 def open_store(place: str | Path) -> PartStore:

@@ -8,6 +8,7 @@ from experiments.batch.summary import frame_of, summary_tables
 from experiments.page.figure_files import figure_files
 from experiments.page.folder import csv_files
 from experiments.page.frames import Tables
+from experiments.running.refusal import refused
 from plant.errors import HydrostateError
 
 REPORT = "report.html"
@@ -35,11 +36,9 @@ def write_report(store: PartStore, folder: Folder) -> str:
     figures = figure_files(drawings, tables)
     page = render_batch_report(manifest, tables, figures, len(rows)).encode()
     numbered = {name: table.reset_index() if table.index.name else table for name, table in tables.items()}
-    try:
+    with refused(f"report {folder.name} cannot be written"):
         for name, content in {**figures, **csv_files("tables", numbered), REPORT: page}.items():
             folder.write(name, content)
-    except OSError as error:
-        raise HydrostateError(f"report {folder.name} cannot be written: {error.strerror or error}") from error
     return f"{folder.name.rstrip('/')}/{REPORT}"
 
 

@@ -9,7 +9,7 @@ from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish
 from experiments.command.options import SEED, Drive, Json, Noise, Out, Ranked, RigFile, Seed, load_rig, option
 from experiments.command.terminal import table
-from experiments.eha.identifiability import checked_experiment, within_limits
+from experiments.eha.identifiability import checked_experiment, driven, title_of, within_limits
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -48,91 +48,70 @@ def isolability(
     about = {"rig": bench.name, "sensors": list(channels), "noise": noise}
     about |= {"seconds": seconds, "rate_hz": rate, "seed": seed}
     found = within_limits(options, lambda name: _distances(name, bench, channels, about))
-    results = _results(found, channels, about)
+    results = tuple(_results(found, channels, about))
     finish(Batch(results, len(results)), _ranking if ranked else _screen, as_json=as_json, out=out)
 
 
 def _distances(drive: str, bench: "Rig", channels: Mapping[str, str], about: Mapping[str, Any]) -> "Distances":
-    import numpy as np
-
     from faults.eha.isolability import condition_distances
-    from plant.eha.drives import make_drive
-    from plant.sensors.sensors import SENSORS
 
-    T = 1.0 / about["rate_hz"]
-    speed = make_drive(drive, about["seconds"], T, bench.parameters, np.random.default_rng(about["seed"]))
-    return condition_distances(bench.parameters, speed, T, tuple(channels.values()), SENSORS[about["noise"]])
+    speed, T, sensors = driven(drive, bench.parameters, about)
+    return condition_distances(bench.parameters, speed, T, tuple(channels.values()), sensors)
 
 
 def _results(
     found: "Mapping[str, Distances]", channels: Mapping[str, str], about: Mapping[str, Any]
-) -> tuple[Result, ...]:
+) -> Iterable[Result]:
     from faults.eha.isolability import structural_isolability, wrong_verdicts
 
     structure = structural_isolability(tuple(channels.values()))
-    results: list[Result] = []
-    for place, name in enumerate(sorted(found, key=lambda one: -found[one].least)):
-        distances = found[name]
-        nearest = {
-            condition: {
-                "rival": distances.conditions[int(row.argmin())],
-                "nats_per_second": float(row.min()) / distances.seconds,
-                "wrong_verdicts_percent": 100.0 * wrong_verdicts(float(row.min())),
-            }
-            for condition, row in zip(distances.conditions, distances.mutual, strict=True)
+    for rank, name in enumerate(sorted(found, key=lambda one: -found[one].least), 1):
+        one = found[name]
+        yield {
+            "drive": name,
+            "rank": rank,
+            "outcome": "ok",
+            "not_told_from": {fault: None if rivals is None else list(rivals) for fault, rivals in structure.items()},
+            "conditions": list(one.conditions),
+            "nats_per_second": one.nats / one.seconds,
+            "nearest": {
+                condition: {
+                    "rival": one.conditions[int(row.argmin())],
+                    "nats_per_second": float(row.min()) / one.seconds,
+                    "wrong_verdicts_percent": 100.0 * wrong_verdicts(float(row.min())),
+                }
+                for condition, row in zip(one.conditions, one.mutual, strict=True)
+            },
+            "hardest_pair": list(one.hardest),
+            "hardest_nats_per_second": one.least / one.seconds,
+            **about,
+            "message": _verdict(one),
         }
-        results.append(
-            {
-                "drive": name,
-                "rank": place + 1,
-                "outcome": "ok",
-                "not_told_from": {
-                    fault: None if rivals is None else list(rivals) for fault, rivals in structure.items()
-                },
-                "conditions": list(distances.conditions),
-                "nats_per_second": distances.nats / distances.seconds,
-                "nearest": nearest,
-                "hardest_pair": list(distances.hardest),
-                "hardest_nats_per_second": distances.least / distances.seconds,
-                **about,
-                "message": _verdict(distances),
-            }
-        )
-    return tuple(results)
 
 
 def _verdict(distances: "Distances") -> str:
     from faults.eha.isolability import ERROR, wrong_verdicts
 
-    pairs = [
-        (one, other)
-        for i, one in enumerate(distances.conditions)
-        for j, other in enumerate(distances.conditions[:i])
-        if wrong_verdicts(float(distances.mutual[i, j])) > ERROR
-    ]
+    count = len(distances.conditions)
+    apart = [distances.mutual[i, j] for i in range(count) for j in range(i)]
+    alike = sum(wrong_verdicts(float(one)) > ERROR for one in apart)
     first, second = distances.hardest
-    if not pairs:
+    if not alike:
         return f"all conditions can be told apart; the hardest pair is {first} and {second}"
-    total = len(distances.conditions) * (len(distances.conditions) - 1) // 2
     return (
-        f"{len(pairs)} of {total} pairs cannot be told apart with fewer than {100.0 * ERROR:g} % wrong, "
+        f"{alike} of {len(apart)} pairs cannot be told apart with fewer than {100.0 * ERROR:g} % wrong, "
         f"{first} and {second} least of all"
     )
 
 
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     for result in results:
-        structure = table("fault", "cannot be told from, whatever its course", title=_title(result, "structure"))
+        structure = table("fault", "cannot be told from, whatever its course", title=title_of(result, "structure"))
         for fault, rivals in result["not_told_from"].items():
             structure.add_row(fault, "not detectable" if rivals is None else ", ".join(rivals) or "told from all")
         yield structure
-        shown = table(
-            "condition",
-            "nearest rival",
-            "distance [nats/s]",
-            "least wrong verdicts [%]",
-            title=_title(result, result["drive"]),
-        )
+        headings = ("condition", "nearest rival", "distance [nats/s]", "least wrong verdicts [%]")
+        shown = table(*headings, title=title_of(result, result["drive"]))
         for condition, near in result["nearest"].items():
             wrong = near["wrong_verdicts_percent"]
             said = "under 0.01" if wrong < 0.01 else f"{wrong:.2g}"
@@ -142,15 +121,8 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
 
 
 def _ranking(results: Sequence[Result]) -> "Iterable[RenderableType]":
-    shown = table("drive", "hardest pair", "distance [nats/s]", title=_title(results[0], "drives"))
+    shown = table("drive", "hardest pair", "distance [nats/s]", title=title_of(results[0], "drives"))
     for result in results:
         shown.add_row(result["drive"], " and ".join(result["hardest_pair"]), f"{result['hardest_nats_per_second']:.3g}")
     yield shown
     yield f"{results[0]['drive']} tells most: {results[0]['message']}"
-
-
-def _title(result: Result, what: str) -> str:
-    return (
-        f"{what}, {result['seconds']:g} s at {result['rate_hz']:g} Hz, {', '.join(result['sensors'])}, "
-        f"rig {result['rig']}"
-    )

@@ -14,6 +14,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from experiments.running.refusal import refused
 from plant.atomic import replacing
 from plant.errors import HydrostateError
 
@@ -109,10 +110,8 @@ def prepare_output(out: Path | None) -> None:
     if out is None:
         return
     folder = _folder(out)
-    try:
+    with refused(f"--out {out}: the folder cannot be made"):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise HydrostateError(f"--out {out}: the folder cannot be made: {error.strerror or error}") from error
     if not os.access(folder, os.W_OK | os.X_OK):
         raise HydrostateError(f"--out {out}: there is no permission to write there")
     if out != folder and out.is_dir():
@@ -132,11 +131,11 @@ def write_results(results: Sequence[Result], out: Path) -> list[Path]:
     HydrostateError
         If they cannot be written.
     """
-    texts = {out: json_text(results)}
+    texts = {out: json_text(results) + "\n"}
     if out == _folder(out):
-        texts = {out / "results.json": json_text(results), out / "results.csv": csv_text(results)}
+        texts = {out / "results.json": texts[out], out / "results.csv": csv_text(results)}
     for path, text in texts.items():
-        write_whole(path, text if path.suffix == ".csv" else text + "\n")
+        write_whole(path, text)
     return list(texts)
 
 
@@ -148,13 +147,11 @@ def write_whole(path: Path, text: str, option: str = "", *, parents: bool = Fals
     HydrostateError
         If it cannot be written.
     """
-    try:
+    with refused(f"{option} {path}: cannot be written".lstrip()):
         if parents:
             path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as file:
             file.write(text.encode())
-    except OSError as error:
-        raise HydrostateError(f"{option} {path}: cannot be written: {error.strerror or error}".lstrip()) from error
 
 
 def _folder(out: Path) -> Path:

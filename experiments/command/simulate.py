@@ -24,6 +24,7 @@ from experiments.command.options import (
     understood,
 )
 from experiments.command.terminal import emit, note
+from experiments.running.refusal import refused
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -107,10 +108,8 @@ def _prepare(out: Path) -> None:
 
     if out.suffix.lower() not in SUFFIXES:
         raise HydrostateError(f"--out must end in {', '.join(SUFFIXES)}, got {str(out)!r}")
-    try:
+    with refused(f"--out {out}: the folder cannot be made"):
         out.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise HydrostateError(f"--out {out}: the folder cannot be made: {error.strerror or error}") from error
     if out.is_dir():
         raise HydrostateError(f"--out {out}: a file is wanted, got a directory")
 

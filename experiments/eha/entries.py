@@ -16,16 +16,13 @@ NO_QUANTITY: Mapping[str, Any] = {"value": None, "std": None, "ci95": None}
 
 NO_ESTIMATE: Mapping[str, Any] = {
     "bulk_modulus_pa": NO_QUANTITY,
-    "leakage_coefficient_m3_s_pa": None,
-    "flow_bias_m3_s": None,
+    **dict.fromkeys(("leakage_coefficient_m3_s_pa", "flow_bias_m3_s")),
     "states": {},
     "noise": None,
     "nis": {},
-    "method": None,
-    "form": None,
+    **dict.fromkeys(("method", "form")),
     "gate": NO_GATE,
-    "bound_percent": None,
-    "condition": None,
+    **dict.fromkeys(("bound_percent", "condition")),
     "channels": [],
     "notes": [],
 }
@@ -33,22 +30,15 @@ NO_ESTIMATE: Mapping[str, Any] = {
 NO_DIAGNOSIS: Mapping[str, Any] = {
     "condition": None,
     "scores": {},
-    "probabilities": None,
-    "unknown": None,
+    **dict.fromkeys(("probabilities", "unknown")),
     "reasons": [],
     "severity": None,
     "not_told": [],
     "advice": [],
-    "since_s": None,
-    "since_ci95_s": None,
-    "condition_before": None,
-    "gate": None,
+    **dict.fromkeys(("since_s", "since_ci95_s", "condition_before", "gate")),
     "bulk_modulus_pa": NO_QUANTITY,
     "channels": [],
-    "runner_up": None,
-    "margin": None,
-    "transfer_function_scores": None,
-    "transfer_function_condition": None,
+    **dict.fromkeys(("runner_up", "margin", "transfer_function_scores", "transfer_function_condition")),
     "notes": [],
 }
 
@@ -111,7 +101,7 @@ def diagnosis_entries(found: "Finding") -> dict[str, Any]:
     from faults.diagnosis.models_verdict import margin, ranked
 
     evidence: EhaEvidence = found.evidence
-    judged, ratio = bool(found.probabilities), margin(evidence.scores)
+    judged, ratio, others = bool(found.probabilities), margin(evidence.scores), evidence.transfer_functions
     order = sorted(found.probabilities, key=lambda name: -found.probabilities[name]) if judged else None
     order = order or [name for name, _ in ranked(evidence.scores)]
     entries: dict[str, Any] = {
@@ -126,7 +116,8 @@ def diagnosis_entries(found: "Finding") -> dict[str, Any]:
         "unknown": None if found.condition is None else found.unknown,
         "reasons": [str(note) for note in found.against],
         "advice": [str(note) for note in found.advice],
-        **_transfer_functions(evidence),
+        "transfer_function_scores": None if others is None else dict(others.by_condition),
+        "transfer_function_condition": None if others is None else others.condition,
         **_notes(found),
     }
     if found.condition is None:
@@ -143,14 +134,6 @@ def diagnosis_entries(found: "Finding") -> dict[str, Any]:
         "condition_before": None if since is None else since.before,
     }
     return {**entries, "message": headline(entries)}
-
-
-def _transfer_functions(evidence: "EhaEvidence") -> dict[str, Any]:
-    others = evidence.transfer_functions
-    return {
-        "transfer_function_scores": None if others is None else dict(others.by_condition),
-        "transfer_function_condition": None if others is None else others.condition,
-    }
 
 
 def _quantity(one: "Quantity") -> dict[str, Any]:

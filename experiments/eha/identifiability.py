@@ -9,12 +9,15 @@ from experiments.command.terminal import note, table
 from plant.errors import DriveError, HydrostateError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
     from rich.console import RenderableType
 
     from estimation.finding import Finding
     from estimation.trust.card import Card
     from plant.eha.model import EhaParameters
     from plant.eha.rig import Rig
+    from plant.sensors.sensors import Sensors
 
 T = TypeVar("T")
 
@@ -174,22 +177,25 @@ def sensed_channels(listed: str) -> dict[str, str]:
 def _card(
     drive: str, parameters: "EhaParameters", rig: "Rig[Any]", channels: Mapping[str, str], about: Mapping[str, Any]
 ) -> "Card":
+    from estimation.trust.identifiability import identifiability_card
+
+    speed, sample_time, sensors = driven(drive, parameters, about)
+    measured, known = tuple(channels.values()), rig.uncertainties
+    return identifiability_card(parameters, speed, sample_time, measured, sensors=sensors, uncertainties=known)
+
+
+def driven(
+    drive: str, parameters: "EhaParameters", about: Mapping[str, Any]
+) -> "tuple[NDArray[np.float64], float, Sensors]":
+    """Return motor speed [rad/s], shape (n,), the time between its samples [s], and the sensors of an experiment."""
     import numpy as np
 
-    from estimation.trust.identifiability import identifiability_card
     from plant.eha.drives import make_drive
     from plant.sensors.sensors import SENSORS
 
-    sample_time = 1.0 / about["rate_hz"]
-    speed = make_drive(drive, about["seconds"], sample_time, parameters, np.random.default_rng(about["seed"]))
-    return identifiability_card(
-        parameters,
-        speed,
-        sample_time,
-        tuple(channels.values()),
-        sensors=SENSORS[about["noise"]],
-        uncertainties=rig.uncertainties,
-    )
+    T = 1.0 / about["rate_hz"]
+    speed = make_drive(drive, about["seconds"], T, parameters, np.random.default_rng(about["seed"]))
+    return speed, T, SENSORS[about["noise"]]
 
 
 def experiment_entries(found: "Finding") -> dict[str, Any]:
@@ -239,7 +245,7 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
 
     units = notes(EhaParameters)
     for result in results:
-        shown = table("parameter", "least standard deviation [%]", title=_title(result, str(result["drive"])))
+        shown = table("parameter", "least standard deviation [%]", title=title_of(result, str(result["drive"])))
         for name, std in result["relative_std_percent"].items():
             shown.add_row(units[name].meaning, percent(0.01 * std).removesuffix(" %"))
         shown.add_row("friction force at the speed reached", percent(0.01 * result["friction_force_percent"])[:-2])
@@ -252,7 +258,7 @@ def _ranking(results: Sequence[Result]) -> "Iterable[RenderableType]":
 
     names = list(results[0]["relative_std_percent"])
     headings = [f"{name.replace('_', ' ')} [%]" for name in names]
-    shown = table("drive", "overall [%]", *headings, "stuck [%]", title=_title(results[0], "drives"))
+    shown = table("drive", "overall [%]", *headings, "stuck [%]", title=title_of(results[0], "drives"))
     for result in results:
         values = [result["overall_percent"], *result["relative_std_percent"].values(), result["stuck_percent"]]
         shown.add_row(result["drive"], *(percent(0.01 * value).removesuffix(" %") for value in values))
@@ -261,8 +267,8 @@ def _ranking(results: Sequence[Result]) -> "Iterable[RenderableType]":
     yield f"{results[0]['drive']}: {results[0]['message']}" if results[0]["message"] else str(results[0]["drive"])
 
 
-def _title(result: Result, what: str) -> str:
-    return (
-        f"{what}, {result['seconds']:g} s at {result['rate_hz']:g} Hz, {', '.join(result['sensors'])}, "
-        f"condition {result['condition']}, rig {result['rig']}"
-    )
+def title_of(result: Result, what: str) -> str:
+    """Return what stands above a table of an experiment."""
+    condition = f"condition {result['condition']}, " if "condition" in result else ""
+    sensors = ", ".join(result["sensors"])
+    return f"{what}, {result['seconds']:g} s at {result['rate_hz']:g} Hz, {sensors}, {condition}rig {result['rig']}"

@@ -4,13 +4,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from experiments.actuator_kind import ActuatorKind, Experiment, LogVerb, Options, Run, Simulation
 from experiments.command.json_output import Result
 from experiments.command.options import PRESSURE, require_one_of, require_positive
 from experiments.command.terminal import note
 from experiments.eha.entries import NO_DIAGNOSIS, NO_ESTIMATE, diagnosis_entries, estimate_entries
+from experiments.eha.identifiability import CHANNELS as SENSORS
 from experiments.eha.identifiability import cards_of, experiment_entries, experiments_shown
 from experiments.eha.screens import diagnoses_shown, estimates_shown
 from faults.conditions import CONDITIONS, LEVELS, find_condition, parameters_for, severity
@@ -20,14 +21,16 @@ from plant.log.columns import CHANNELS
 from plant.notes import Code
 
 if TYPE_CHECKING:
+    from typing import TypeAlias
+
     from estimation.eha.bulk_modulus import EstimateOptions
     from estimation.finding import Finding
     from estimation.identification.model.linear_model import LinearModel
     from plant.eha.rig import Rig
     from plant.log.record import Record
 
-SENSORS = {"position": "position_m", "velocity": "velocity_m_s", "dp": PRESSURE}
-"""Channels by the names of ``--sensors``."""
+    Linear: TypeAlias = Callable[[], Mapping[str, LinearModel]] | None
+
 
 ITS_CHANNELS = ("motor_speed_rad_s", *SENSORS.values(), "pressure_a_pa", "pressure_b_pa", "motor_voltage_v")
 
@@ -82,18 +85,14 @@ def _faulty(rig: EhaParameters, options: Options) -> tuple[EhaParameters, dict[s
     return severity(leaking, rubbing, rig), made_of
 
 
-class _Estimation(NamedTuple):
-    """How a log is estimated, and the channels that are not to be used."""
-
-    how: "EstimateOptions"
-    unused: frozenset[str]
-
-
-def _prepared_estimation(rig: "Rig[Any]", options: Options) -> "tuple[Rig[Any], _Estimation]":
+def _prepared_estimation(
+    rig: "Rig[Any]", options: Options
+) -> "tuple[Rig[Any], tuple[EstimateOptions, frozenset[str]]]":
+    """Return the rig in its condition, how its log is estimated, and the channels that are not to be used."""
     how, unused = _how(options), _unused(options["sensors"], options["no_pressure"])
     if options["condition"] is not None:
         rig = replace(rig, parameters=parameters_for(find_condition(options["condition"]), rig.parameters))
-    return rig, _Estimation(how, unused)
+    return rig, (how, unused)
 
 
 def _how(options: Options) -> "EstimateOptions":
@@ -133,11 +132,11 @@ def _listed(names: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in names.split(",") if name.strip())
 
 
-def _estimated(record: "Record", rig: "Rig[Any]", asked: _Estimation) -> "Finding":
+def _estimated(record: "Record", rig: "Rig[Any]", asked: "tuple[EstimateOptions, frozenset[str]]") -> "Finding":
     from estimation.eha.estimate import estimate_log
 
-    unused = {channel: None for channel in asked.unused if channel in record}
-    return estimate_log(record.replace(**unused), rig, asked.how)
+    how, unused = asked
+    return estimate_log(record.replace(**{channel: None for channel in unused if channel in record}), rig, how)
 
 
 def _innovations(found: "Finding", log: str, path: Path) -> None:
@@ -156,16 +155,10 @@ def _taken_as_known(results: Sequence[Result]) -> Iterable[str]:
         yield f"no --condition: leakage and friction were taken to be those of the rig {rig!r}, healthy"
 
 
-class _Diagnosis(NamedTuple):
-    """Whether pressure is used, and what gives the nine transfer functions, where they are wanted."""
-
-    no_pressure: bool
-    linear: "Callable[[], Mapping[str, LinearModel]] | None"
-
-
-def _prepared_diagnosis(rig: "Rig[Any]", options: Options) -> "tuple[Rig[Any], _Diagnosis]":
+def _prepared_diagnosis(rig: "Rig[Any]", options: Options) -> "tuple[Rig[Any], tuple[bool, Linear]]":
+    """Return the rig, whether pressure is unused, and what gives nine transfer functions, where they are wanted."""
     linear = cache(lambda: _identified(rig.parameters, options["seed"]))
-    return rig, _Diagnosis(options["no_pressure"], linear if options["transfer_functions"] else None)
+    return rig, (options["no_pressure"], linear if options["transfer_functions"] else None)
 
 
 def _identified(parameters: EhaParameters, seed: int) -> "Mapping[str, LinearModel]":
@@ -177,21 +170,21 @@ def _identified(parameters: EhaParameters, seed: int) -> "Mapping[str, LinearMod
     from plant.errors import LogWarning
 
     note("identifying nine transfer functions from simulated tests of the rig")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", LogWarning)
+    with warnings.catch_warnings(action="ignore", category=LogWarning):
         return identify_bank(parameters, np.random.default_rng(seed))
 
 
-def _diagnosed(record: "Record", rig: "Rig[Any]", asked: _Diagnosis) -> "Finding":
+def _diagnosed(record: "Record", rig: "Rig[Any]", asked: "tuple[bool, Linear]") -> "Finding":
     from faults.diagnosis.diagnose import diagnose_log
     from faults.diagnosis.rmse import score_transfer_functions
 
-    if asked.no_pressure:
+    no_pressure, linear = asked
+    if no_pressure:
         record = record.replace(**{PRESSURE: None})
     found = diagnose_log(record, rig)
-    if asked.linear is None:
+    if linear is None:
         return found
-    scores = score_transfer_functions(record, asked.linear())
+    scores = score_transfer_functions(record, linear())
     return replace(found, evidence=replace(found.evidence, transfer_functions=scores))
 
 

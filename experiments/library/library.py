@@ -132,8 +132,7 @@ def determined_model(speeds: list[Array], velocities: list[Array]) -> LinearMode
     """
     found: list[tuple[float, LinearModel]] = []
     for order in range(1, HIGHEST_ORDER + 1):
-        with warnings.catch_warnings():  # of models that are not kept
-            warnings.simplefilter("ignore", LogWarning)
+        with warnings.catch_warnings(action="ignore", category=LogWarning):  # of models that are not kept
             model = fit_output_error(
                 speeds,
                 velocities,

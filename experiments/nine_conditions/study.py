@@ -43,9 +43,8 @@ RIG = EhaParameters()
 
 
 def _find(settings: StudySettings, track: Track) -> Found:
-    with warnings.catch_warnings():
-        # what a fit says of itself stands beside it in the tables; set here, since threads share the filters
-        warnings.simplefilter("ignore", LogWarning)
+    # what a fit says of itself stands beside it in the tables; set here, since threads share the filters
+    with warnings.catch_warnings(action="ignore", category=LogWarning):
         return _parts(settings, track)
 
 

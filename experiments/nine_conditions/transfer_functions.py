@@ -228,8 +228,7 @@ def filtering_table(rng: np.random.Generator, duration: float) -> pd.DataFrame:
     y = y + 0.05 * np.std(y) * rng.standard_normal(len(y))
     rows = [_pole_row("truth", plant), _pole_row("neither filtered", _fit(u, y))]
     rows.append(_pole_row("both filtered", _fit(*zero_phase_filter(u, y, T))))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", LogWarning)
+    with warnings.catch_warnings(action="ignore", category=LogWarning):
         only_output = zero_phase_filter(u, y, T, filter_input=False)
     rows.append(_pole_row("output only, as in section 4", _fit(*only_output)))
     return pd.DataFrame(rows)

@@ -3,8 +3,8 @@
 import json
 import os
 import shutil
-from collections.abc import Generator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from secrets import token_hex
 from types import MappingProxyType
@@ -13,10 +13,13 @@ from typing import Any
 import pandas as pd
 
 from experiments.page.frames import Tables
+from experiments.running.refusal import refused
 from plant.errors import HydrostateError
 
 SERIES_FORMAT = "%.9g"
 """Digits of the curves; tables keep all."""
+
+UNWRITABLE = "result folder {} must be in a place that can be written, got"
 
 DESKTOP_FILES = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 """Files that file managers leave behind, which are nobody's work."""
@@ -60,15 +63,16 @@ def write_tables(
     contents = {**csv_files("tables", tables), **csv_files("series", series, SERIES_FORMAT), **files}
     contents["manifest.json"] = json_file({**manifest, "files": sorted([*contents, "manifest.json"])})
     temporary = target.with_name(f".{target.name}.{token_hex(4)}.tmp")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with _removed_on_failure(temporary):
+    with refused(UNWRITABLE.format(folder)):
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
             for name, content in contents.items():
                 (temporary / name).parent.mkdir(parents=True, exist_ok=True)
                 (temporary / name).write_bytes(content)
             _swap(temporary, target)
-    except OSError as error:
-        raise _unwritable(folder, error) from error
+        except BaseException:
+            shutil.rmtree(temporary, ignore_errors=True)
+            raise
     return folder / "manifest.json"
 
 
@@ -121,10 +125,8 @@ def check_target(folder: Path) -> Path:
         If it is a file, is or holds the current folder, or holds anything that no study wrote, or if nothing can be
         written there.
     """
-    try:
+    with refused(UNWRITABLE.format(folder)):
         return _checked(folder)
-    except OSError as error:
-        raise _unwritable(folder, error) from error
 
 
 def _checked(folder: Path) -> Path:
@@ -147,30 +149,13 @@ def _checked(folder: Path) -> Path:
     return target
 
 
-def _unwritable(folder: Path, error: OSError) -> HydrostateError:
-    return HydrostateError(
-        f"result folder {folder} must be in a place that can be written, got: {error.strerror or error}"
-    )
-
-
 def _strangers(folder: Path) -> set[str]:
     """Return the files in a folder that no study wrote."""
     present = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir()}
-    try:
+    with suppress(FileNotFoundError, ValueError, TypeError, KeyError):
         manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-        written = set(manifest["files"]) if "study" in manifest else set[str]()
-    except (FileNotFoundError, ValueError, TypeError, KeyError):
-        written = set[str]()
-    return {name for name in present - written if Path(name).name not in DESKTOP_FILES}
-
-
-@contextmanager
-def _removed_on_failure(folder: Path) -> Generator[None]:
-    try:
-        yield
-    except BaseException:
-        shutil.rmtree(folder, ignore_errors=True)
-        raise
+        present -= set(manifest["files"] if "study" in manifest else ())
+    return {name for name in present if Path(name).name not in DESKTOP_FILES}
 
 
 def _swap(temporary: Path, target: Path) -> None:
