@@ -39,30 +39,20 @@ def compare(
         write_whole(out, render_comparison(found, names), "--out", parents=True)
         note(f"written: {out}")
     if as_json:
-        emit(
-            json_text(
-                [{"outcome": "ok", "first": first, "second": second, "seed": seed, "rows": found.to_dict("records")}]
-            )
-        )
+        about = {"outcome": "ok", "first": first, "second": second, "seed": seed}
+        emit(json_text([{**about, "rows": found.to_dict("records")}]))
         return
-    shown = table(
-        "asked", "measure", f"{names[0]} [%]", f"{names[1]} [%]", "difference [%]", "95 % interval [%]", "verdict"
-    )
+    numbers = (*(f"{name} [%]" for name in names), "difference [%]", "95 % interval [%]")
+    shown = table("asked", "measure", *numbers, "verdict")
     for row in found[found["condition"] == "all"].to_dict("records"):
         known = row["low"] is not None and row["low"] == row["low"]
         interval = f"{row['low']:+.3g} to {row['high']:+.3g}" if known else "-"
         numbers = (f"{row['first']:.3g}", f"{row['second']:.3g}", f"{row['difference']:+.3g}", interval)
         shown.add_row(row["verb"], row["measure"], *numbers, row["verdict"])
-    changed = dict.fromkeys(text for text in found["changed"] if text)
-    single = found[found["condition"] != "all"]
-    by_verdict = {verdict: int((single["verdict"] == verdict).sum()) for verdict in ("better", "worse")}
-    emit(
-        rendered(
-            *(f"changed: {text}" for text in changed),
-            shown,
-            f"by condition: {by_verdict['better']} better, {by_verdict['worse']} worse, of {len(single)}",
-        )
-    )
+    changed = [f"changed: {text}" for text in dict.fromkeys(found["changed"]) if text]
+    single = found.loc[found["condition"] != "all", "verdict"]
+    better, worse = (int((single == verdict).sum()) for verdict in ("better", "worse"))
+    emit(rendered(*changed, shown, f"by condition: {better} better, {worse} worse, of {len(single)}"))
 
 
 @commands.command(epilog="Example: hydrostate report results/eha-paper --out report")

@@ -89,11 +89,8 @@ def table(*headings: str, title: str | None = None) -> "Table":
     from rich.text import Text
 
     unicode = "utf" in (getattr(sys.stdout, "encoding", None) or "").lower()
-    made = Table(
-        box=box.SIMPLE_HEAD if unicode else box.ASCII,
-        title=None if title is None else Text(title),
-        title_justify="left",
-    )
+    head = None if title is None else Text(title)
+    made = Table(box=box.SIMPLE_HEAD if unicode else box.ASCII, title=head, title_justify="left")
     for heading in headings:
         numeric = heading.endswith("]")
         made.add_column(Text(heading), justify="right" if numeric else "left", overflow="fold", no_wrap=numeric)
@@ -129,14 +126,9 @@ def rendered(*parts: "RenderableType") -> str:
     from rich.console import Console
 
     terminal = sys.stdout.isatty()
-    console = Console(
-        file=io.StringIO(),
-        force_terminal=terminal,
-        width=None if terminal else PIPE_WIDTH,
-        markup=False,
-        highlight=False,
-        emoji=False,
-    )
+    width = None if terminal else PIPE_WIDTH
+    as_is: Any = dict.fromkeys(("markup", "highlight", "emoji"), False)
+    console = Console(file=io.StringIO(), force_terminal=terminal, width=width, **as_is)
     with console.capture() as captured:
         for part in parts:
             console.print(part, soft_wrap=isinstance(part, str))
@@ -252,10 +244,8 @@ def _usage_sentence(error: Exception) -> str | None:
     message = getattr(error, "format_message", None)
     if message is None:
         return None
-    context = getattr(error, "ctx", None)
-    command = getattr(context, "command_path", "hydrostate")
-    said = str(message())
-    return f"{command}: {said}" if said else ""
+    command = getattr(getattr(error, "ctx", None), "command_path", "hydrostate")
+    return f"{command}: {said}" if (said := str(message())) else ""
 
 
 class HydrostateGroup(TyperGroup):

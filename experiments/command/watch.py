@@ -98,14 +98,8 @@ class _Asked:
         from faults.watch.events import Alarm
         from faults.watch.watch import Watch
 
-        made = Watch(
-            self.bench.parameters,
-            sample_time,
-            pressure=pressure and not self.no_pressure,
-            false_alarms=self.false_alarms,
-            learning=self.learning,
-            start=start,
-        )
+        way: Any = {"false_alarms": self.false_alarms, "learning": self.learning, "start": start}
+        made = Watch(self.bench.parameters, sample_time, pressure=pressure and not self.no_pressure, **way)
         if self.healthy is not None:
             record = _read(self.healthy, self)
             if abs(record.sample_time / sample_time - 1.0) > SAME_RATE:
@@ -134,16 +128,10 @@ class _Told:
 
     def start(self, source: str, watch: "Watch", asked: _Asked) -> None:
         self.watch, self.began = watch, watch.last
-        self._line(
-            "start",
-            self.began,
-            file=source,
-            rig=asked.bench.name,
-            rate_hz=round(1.0 / watch.sample_time, 6),
-            balances=list(watch.balances),
-            false_alarms_per_hour=asked.false_alarms,
-            message="learning what is normal" if len(watch.balances) == 2 else f"learning, without {PRESSURE}",
-        )
+        about = {"file": source, "rig": asked.bench.name, "rate_hz": round(1.0 / watch.sample_time, 6)}
+        about |= {"balances": list(watch.balances), "false_alarms_per_hour": asked.false_alarms}
+        said = "learning what is normal" if len(watch.balances) == 2 else f"learning, without {PRESSURE}"
+        self._line("start", self.began, **about, message=said)
         if self._armed:
             self._ready(self.began, watch.thresholds)
 

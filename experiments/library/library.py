@@ -131,18 +131,11 @@ def determined_model(speeds: list[Array], velocities: list[Array]) -> LinearMode
         Of order 1 at least, which is always kept.
     """
     found: list[tuple[float, LinearModel]] = []
+    names = dict(zip(("input_name", "output_name"), CHANNELS, strict=True))
     for order in range(1, HIGHEST_ORDER + 1):
         with warnings.catch_warnings(action="ignore", category=LogWarning):  # of models that are not kept
-            model = fit_output_error(
-                speeds,
-                velocities,
-                SAMPLE_TIME,
-                n_numerator=order + 1,
-                n_denominator=order,
-                covariance="coloured",
-                input_name=CHANNELS[0],
-                output_name=CHANNELS[1],
-            )
+            form: Any = {"n_numerator": order + 1, "n_denominator": order, **names}
+            model = fit_output_error(speeds, velocities, SAMPLE_TIME, covariance="coloured", **form)
         slowest = -SAMPLE_TIME / float(np.log(np.abs(model.poles[0])))
         known = model.dc_gain_std < VAGUE * abs(model.dc_gain) and slowest < PASS_TIME - SETTLING
         if order == 1 or (known and not model.cancellations):

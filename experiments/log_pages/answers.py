@@ -138,24 +138,17 @@ class Answer(Shown):
 
         shares, table = self.finding.probabilities, self.to_frame().dropna()
         rows = [*(["probability"] if shares else []), *table.index]
-        _, axes = plt.subplots(
-            max(len(rows), 1), 1, squeeze=False, figsize=(8.0, 0.8 * len(rows) + 2.0), layout="constrained"
-        )
+        size = (8.0, 0.8 * len(rows) + 2.0)
+        _, axes = plt.subplots(max(len(rows), 1), 1, squeeze=False, figsize=size, layout="constrained")
         for axis, name in zip(axes[:, 0], rows, strict=False):
             if name == "probability":
                 axis.barh([one.replace("_", " ") for one in shares], [100.0 * share for share in shares.values()])
                 axis.set_xlabel("probability [%]")
                 continue
             one = table.loc[name]
-            axis.errorbar(
-                [one["value"]],
-                [0],
-                xerr=[[one["value"] - one["ci95_low"]], [one["ci95_high"] - one["value"]]],
-                fmt="o",
-                capsize=4,
-            )
-            axis.set_yticks([])
-            axis.set_xlabel(f"{name.replace('_', ' ')} [{one['unit']}]")
+            reach = [[one["value"] - one["ci95_low"]], [one["ci95_high"] - one["value"]]]
+            axis.errorbar([one["value"]], [0], xerr=reach, fmt="o", capsize=4)
+            axis.set(yticks=[], xlabel=f"{name.replace('_', ' ')} [{one['unit']}]")
         axes[0, 0].set_title(f"{self._entries['message']}"[:100])
         return list(axes[:, 0])
 

@@ -10,11 +10,9 @@ from estimation.identification.fit.residual_tests import DEFAULT_LAGS, correlati
 from estimation.identification.fit.validate import Validation
 from estimation.identification.model.linear_model import FloatArray, LinearModel
 from estimation.identification.signals.automatic_window import automatic_response
-from experiments.page.style import BLUE, GREY, ORANGE, VERMILION, Margins, panels, styled
-from plant.atomic import replacing
+from experiments.page.figure_files import write_png
+from experiments.page.style import BLUE, GREY, ORANGE, VERMILION, Margins, panels
 from plant.log.record import CHANNELS
-
-DOTS_PER_INCH = 130
 
 SHOWN_SAMPLES = 8000
 """About so many samples are drawn of each curve."""
@@ -52,9 +50,8 @@ def draw_identified(model: LinearModel, u: FloatArray, y: FloatArray, found: Val
 def _over_time(axis: Axes, model: LinearModel, curves: dict[str, tuple[str, FloatArray]]) -> None:
     for name, (colour, values) in curves.items():
         every = max(1, values.size // SHOWN_SAMPLES)
-        axis.plot(
-            model.sample_time * np.arange(values.size)[::every], values[::every], color=colour, lw=0.9, label=name
-        )
+        time = model.sample_time * np.arange(values.size)[::every]
+        axis.plot(time, values[::every], color=colour, lw=0.9, label=name)
     axis.set(xlabel="time [s]", ylabel=f"{model.output_name} [{CHANNELS.get(model.output_name, 'its unit')}]")
     if len(curves) > 1:
         axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2)
@@ -79,19 +76,13 @@ def _response(gain: Axes, phase: Axes, model: LinearModel, u: FloatArray, y: Flo
     gain.plot(empirical.frequency_hz[sure], np.abs(empirical.response[sure]), color=ORANGE, lw=0.8, label="empirical")
     gain.fill_between(frequency, band.gain_low, band.gain_high, color=BLUE, alpha=0.35, lw=0)
     gain.plot(frequency, np.abs(band.response), color=BLUE, label="model")
-    gain.set(
-        yscale="log",
-        ylim=(0.1 * np.abs(band.response).min(), 10.0 * np.abs(band.response).max()),
-        ylabel="gain [output unit per input unit]",
-        title="gain with 95 % bands",
-    )
+    gain.set(yscale="log", ylim=(0.1 * np.abs(band.response).min(), 10.0 * np.abs(band.response).max()))
+    gain.set(ylabel="gain [output unit per input unit]", title="gain with 95 % bands")
     gain.legend(loc="lower left")
     turn = np.degrees(np.angle(empirical.response[sure]))
     phase.plot(empirical.frequency_hz[sure], turn, ".", ms=1.5, color=ORANGE)
     phase.plot(frequency, np.degrees(np.angle(band.response)), color=BLUE)
-    phase.set_ylim(-190.0, 190.0)
-    phase.set_yticks(np.arange(-180.0, 181.0, 90.0))
-    phase.set_ylabel("phase [degree]")
+    phase.set(ylim=(-190.0, 190.0), yticks=np.arange(-180.0, 181.0, 90.0), ylabel="phase [degree]")
     for axis in (gain, phase):
         axis.set(xscale="log", xlabel="frequency [Hz]")
 
@@ -106,5 +97,4 @@ def write_identified(model: LinearModel, u: FloatArray, y: FloatArray, found: Va
     u, y : ndarray, shape (n,)
         Input and output [in their channels' units].
     """
-    with styled(), replacing(path) as file:
-        draw_identified(model, u, y, found, log).savefig(file, format="png", dpi=DOTS_PER_INCH)
+    write_png(lambda: draw_identified(model, u, y, found, log), path)

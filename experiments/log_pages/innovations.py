@@ -1,6 +1,7 @@
 """A filtered log on one page: the estimate with its band, the innovations, and what was expected of them."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,10 +11,8 @@ from estimation.eha.bulk_modulus import BulkModulusEstimate
 from estimation.filters.run import Estimate
 from estimation.models.eha_forms import BULK_MODULUS
 from estimation.trust.consistency import mean_chi_square_bounds
-from experiments.page.style import BLACK, BLUE, GREY, ORANGE, VERMILION, Margins, panels, styled
-from plant.atomic import replacing
-
-DOTS_PER_INCH = 130
+from experiments.page.figure_files import write_png
+from experiments.page.style import BLACK, BLUE, GREY, ORANGE, VERMILION, Margins, panels
 
 SHOWN_INNOVATIONS = 4000
 """About so many innovations are drawn of each channel."""
@@ -59,30 +58,22 @@ def draw_innovations(found: BulkModulusEstimate, log: str) -> Figure:
 def _track(axis: Axes, found: BulkModulusEstimate, estimate: Estimate) -> None:
     mean, std = estimate.track(BULK_MODULUS)
     std = std * found.gate.inflation
-    axis.fill_between(
-        estimate.time,
-        (mean - 1.96 * std) / 1e6,
-        (mean + 1.96 * std) / 1e6,
-        color=BLUE,
-        alpha=0.25,
-        lw=0,
-        label="95 % band",
-    )
+    low, high = (mean - 1.96 * std) / 1e6, (mean + 1.96 * std) / 1e6
+    axis.fill_between(estimate.time, low, high, color=BLUE, alpha=0.25, lw=0, label="95 % band")
     axis.plot(estimate.time, mean / 1e6, color=BLUE, label="estimate")
     late = mean[len(mean) // 10 :]
     if np.all(np.isfinite(late)):
         spread = max(float(np.ptp(late)), 4.0 * float(std[-1]), 0.02 * abs(float(late[-1])))
         axis.set_ylim((late[-1] - 1.5 * spread) / 1e6, (late[-1] + 1.5 * spread) / 1e6)
-    axis.set_ylabel("bulk modulus [MPa]")
+    axis.set(ylabel="bulk modulus [MPa]")
     axis.legend(loc="upper right", ncols=2)
 
 
 def _innovations(axis: Axes, time: np.ndarray, normalised: np.ndarray, estimate: Estimate) -> None:
     every = max(1, len(time) // SHOWN_INNOVATIONS)
     for i, channel in enumerate(estimate.channels):
-        axis.plot(
-            time[::every], normalised[::every, i], ".", ms=1.5, color=COLOURS[i % 3], label=NAMES.get(channel, channel)
-        )
+        look: Any = {"ms": 1.5, "color": COLOURS[i % 3], "label": NAMES.get(channel, channel)}
+        axis.plot(time[::every], normalised[::every, i], ".", **look)
     axis.axhspan(-1.96, 1.96, color=GREY, alpha=0.15, lw=0)
     axis.set(ylim=(-6.0, 6.0), ylabel="innovation over its\nexpected deviation")
     axis.legend(loc="upper right", ncols=3, markerscale=5)
@@ -106,5 +97,4 @@ def _mean_square(axis: Axes, time: np.ndarray, normalised: np.ndarray, estimate:
 
 def write_innovations(found: BulkModulusEstimate, log: str, path: Path) -> None:
     """Write the figure as a PNG, whole or not at all."""
-    with styled(), replacing(path) as file:
-        draw_innovations(found, log).savefig(file, format="png", dpi=DOTS_PER_INCH)
+    write_png(lambda: draw_innovations(found, log), path)

@@ -148,11 +148,8 @@ class Log(Shown):
         from estimation.identification.from_record import identify_record
 
         known = {name: one.default for name, one in inspect.signature(identify_record).parameters.items()}
-        return Model(
-            identify_record(
-                self.record, **known_options(options, {k: v for k, v in known.items() if k != "record"}, "identify")
-            )
-        )
+        del known["record"]
+        return Model(identify_record(self.record, **known_options(options, known, "identify")))
 
     def _asked(self, verb: str, options: Mapping[str, Any]) -> "Answer":
         from experiments.actuators import actuator, offered
@@ -181,9 +178,8 @@ class Log(Shown):
         """Draw every channel over time."""
         import matplotlib.pyplot as plt
 
-        _, axes = plt.subplots(
-            len(self.channels), 1, sharex=True, squeeze=False, figsize=(8.0, 1.8 * len(self.channels))
-        )
+        count = len(self.channels)
+        _, axes = plt.subplots(count, 1, sharex=True, squeeze=False, figsize=(8.0, 1.8 * count))
         for axis, name in zip(axes[:, 0], self.channels, strict=True):
             axis.plot(self.record.time, self.record[name], lw=0.8)
             axis.set_ylabel(name.replace("_", " "), fontsize=8)

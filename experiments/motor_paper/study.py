@@ -64,11 +64,6 @@ def _find(settings: Seeded, track: Track) -> Found:
 
 MOTOR_PAPER_FIGURES: Drawings = {**REGRESSION_FIGURES, **SENSING_FIGURES, **VIBRATION_FIGURES}
 
-MOTOR_PAPER = Study(
-    "motor-paper",
-    "motor_paper/report.html",
-    _find,
-    MOTOR_PAPER_FIGURES,
-    COLUMNS,
-    {"motor": asdict(MOTOR), "vibration": asdict(LINEAR), "hysteresis": asdict(DIAPHRAGM)},
-)
+PARAMETERS = {"motor": asdict(MOTOR), "vibration": asdict(LINEAR), "hysteresis": asdict(DIAPHRAGM)}
+
+MOTOR_PAPER = Study("motor-paper", "motor_paper/report.html", _find, MOTOR_PAPER_FIGURES, COLUMNS, PARAMETERS)

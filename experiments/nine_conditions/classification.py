@@ -42,9 +42,8 @@ def draw_confusions(confusions: Mapping[tuple[str, str], pd.DataFrame], accuracy
     variants = list(dict.fromkeys(accuracy["variant"]))
     margins = Margins(left=1.6, top=0.7, bottom=1.45, down=0.5)
     title = "Class found against true class: counts of runs"
-    figure, axes = panels(
-        title, len(variants), len(banks), 3.2 * len(variants) + 1.3, margins, sharex=True, sharey=True
-    )
+    rows, columns = len(variants), len(banks)
+    figure, axes = panels(title, rows, columns, 3.2 * rows + 1.3, margins, sharex=True, sharey=True)
     right = accuracy.set_index(["bank", "variant"])["accuracy"]
     order = [(bank, variant) for variant in variants for bank in banks]
     for place, (axis, (bank, variant)) in enumerate(zip(axes, order, strict=True)):
@@ -53,10 +52,8 @@ def draw_confusions(confusions: Mapping[tuple[str, str], pd.DataFrame], accuracy
         score = 100.0 * float(right.loc[(bank, variant)])
         axis.set(title=f"{bank_in_words(bank)}\n{variant} parameters: {score:.1f} % right")
         _class_ticks(axis, list(matrix.columns))
-        axis.set(
-            ylabel="true class" if place % len(banks) == 0 else "",
-            xlabel="class found" if place >= len(order) - len(banks) else "",
-        )
+        axis.set(ylabel="" if place % columns else "true class")
+        axis.set(xlabel="class found" if place >= len(order) - columns else "")
     return figure
 
 
@@ -75,9 +72,8 @@ def draw_confusion(matrix: pd.DataFrame, share: float) -> Figure:
     Figure
         The matrix with its counts.
     """
-    figure, (axis,) = panels(
-        f"Class found against true class: {100.0 * share:.1f} % right", 1, 1, 5.6, Margins(left=2.2, bottom=1.45)
-    )
+    title = f"Class found against true class: {100.0 * share:.1f} % right"
+    figure, (axis,) = panels(title, 1, 1, 5.6, Margins(left=2.2, bottom=1.45))
     _counts(axis, matrix.to_numpy())
     _class_ticks(axis, list(matrix.columns))
     axis.set(ylabel="true class", xlabel="class found")
@@ -117,13 +113,8 @@ def draw_scores(scores: pd.DataFrame) -> Figure:
     Figure
         A heatmap with the scores written in, the smallest of each row framed.
     """
-    figure, (axis,) = panels(
-        "Score of every model on one run in every condition: the smallest names the class",
-        1,
-        1,
-        5.4,
-        Margins(left=2.2, right=-0.3, top=0.4, bottom=1.05),
-    )
+    title = "Score of every model on one run in every condition: the smallest names the class"
+    figure, (axis,) = panels(title, 1, 1, 5.4, Margins(left=2.2, right=-0.3, top=0.4, bottom=1.05))
     values = scores.to_numpy(dtype=float)
     image = axis.imshow(values, cmap=ERRORS, norm=LogNorm(values.min(), values.max()), aspect="auto")
     shade = np.asarray(image.norm(values))
@@ -131,16 +122,10 @@ def draw_scores(scores: pd.DataFrame) -> Figure:
     for row, column in enumerate(best):
         axis.add_patch(Rectangle((column - 0.5, row - 0.5), 1, 1, fill=False, linewidth=1.6, clip_on=False))
     for (row, column), value in np.ndenumerate(values):
-        smallest = column == best[row]
-        axis.text(
-            column,
-            row,
-            f"{value:.2f}" if value >= 0.1 else f"{value:.3f}",
-            ha="center",
-            va="center",
-            color="white" if shade[row, column] < DARK else "black",
-            fontweight="bold" if smallest else "normal",
-        )
+        ink = "white" if shade[row, column] < DARK else "black"
+        weight = "bold" if column == best[row] else "normal"
+        words = f"{value:.{2 if value >= 0.1 else 3}f}"
+        axis.text(column, row, words, ha="center", va="center", color=ink, fontweight=weight)
     _class_ticks(axis, list(scores.columns))
     axis.set_xticks(range(len(scores.columns)), [in_short(name) for name in scores.columns], rotation=30)
     axis.set_yticks(range(len(scores)), [in_words(str(name)) for name in scores.index])

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
 from experiments.nine_conditions.bulk_modulus import POSITION_STEPS, PRESSURE_STEPS, PUBLISHED_WAY, Experiment
+from experiments.page.drawing import say
 from experiments.page.style import BLACK, BLUE, SKY, VERMILION, Margins, panels
 from experiments.page.words import in_words
 
@@ -59,14 +60,9 @@ def draw_convergence(shown: Experiment, curves: pd.DataFrame, truth_pa: float) -
     _time_axis(axes[0], first_tick, last)
     figure.supxlabel(f"time [s], logarithmic after the first {1e3 * first_tick:g} ms", fontsize=9, y=0.01)
     figure.supylabel("effective bulk modulus [1e8 Pa]", fontsize=9, x=0.005)
-    axes[0].annotate(
-        f"truth {truth_pa / GIGA_TENTH:.2f}",
-        (last, truth_pa / GIGA_TENTH),
-        (0, 4),
-        textcoords="offset points",
-        ha="right",
-    )
-    axes[0].annotate("first guesses", (0.0, TOP), (6, -6), textcoords="offset points", va="top", fontsize=8)
+    truth = truth_pa / GIGA_TENTH
+    say(axes[0], f"truth {truth:.2f}", (last, truth), (0, 4), ha="right")
+    say(axes[0], "first guesses", (0.0, TOP), (6, -6), va="top", fontsize=8)
     return figure
 
 
@@ -81,9 +77,8 @@ def _panel(axis: Axes, rows: pd.DataFrame, colours: Mapping[float, object], trut
 
 def _time_axis(axis: Axes, first_tick: float, last: float) -> None:
     axis.set_xscale("symlog", linthresh=first_tick, linscale=0.6)
-    axis.set(xlim=(0.0, 1.05 * last))
     decades = [tick for tick in (1e-4, 1e-3, 0.01, 0.1, 1.0, 10.0, 100.0) if first_tick <= tick <= 1.05 * last]
-    axis.set(xticks=[0.0, *decades])
+    axis.set(xlim=(0.0, 1.05 * last), xticks=[0.0, *decades])
     axis.xaxis.set_minor_locator(NullLocator())
     axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set(ylim=(0.0, TOP))

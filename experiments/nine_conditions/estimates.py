@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from experiments.nine_conditions.convergence import GIGA_TENTH
 from experiments.nine_conditions.findings import by_experiment, experiment_in_words
+from experiments.page.drawing import say
 from experiments.page.style import (
     BESIDE_CONDITIONS,
     BLACK,
@@ -119,31 +120,19 @@ def draw_forms(estimates: pd.DataFrame, truth_pa: float) -> Figure:
         (sine[sine["form"] == "acceleration"], VERMILION, "published acceleration form"),
         (sine[(sine["form"] == "pressure") & sine["pressure_logged"]], BLUE, "pressure form, dp logged"),
     )
-    figure, (axis,) = panels(
-        "Where two filters settle on a plant that sticks, driven by the 10 Hz sine", 1, 1, 3.9, BESIDE_CONDITIONS
-    )
+    title = "Where two filters settle on a plant that sticks, driven by the 10 Hz sine"
+    figure, (axis,) = panels(title, 1, 1, 3.9, BESIDE_CONDITIONS)
     heights = condition_rows(axis, list(dict.fromkeys(sine["condition"])))
     truth = truth_pa / GIGA_TENTH
-    for (rows, colour, words), side in zip(shown, ("left", "right"), strict=True):
+    places = ((0.0, 8, "left"), (truth, -8, "right"))
+    for (rows, colour, words), (x, shift, side) in zip(shown, places, strict=True):
         for condition, found in rows.groupby("condition", sort=False):
             level = [heights[str(condition)] + offset for offset in spread_out(len(found), 0.4)]
             axis.plot(found["filter_settled_at_pa"] / GIGA_TENTH, level, "o", markersize=4, color=colour, alpha=0.8)
-        right = side == "right"
-        axis.annotate(
-            words,
-            (truth if right else 0.0, len(heights) - 0.45),
-            (-8 if right else 8, 0),
-            textcoords="offset points",
-            color=colour,
-            ha="right" if right else "left",
-            fontweight="bold",
-            annotation_clip=False,
-        )
+        look = {"color": colour, "ha": side, "fontweight": "bold", "annotation_clip": False}
+        say(axis, words, (x, len(heights) - 0.45), (shift, 0), **look)
     axis.axvline(truth, color=BLACK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=0)
-    axis.annotate(f"truth {truth:.2f}", (truth, -0.5), (5, 0), textcoords="offset points", va="bottom")
-    axis.set(
-        ylim=(-0.6, len(heights) - 0.1),
-        xlim=(-0.04, 1.2 * truth),
-        xlabel="where the filter settles: mean over the last 20 % [1e8 Pa]",
-    )
+    say(axis, f"truth {truth:.2f}", (truth, -0.5), (5, 0), va="bottom")
+    axis.set(ylim=(-0.6, len(heights) - 0.1), xlim=(-0.04, 1.2 * truth))
+    axis.set(xlabel="where the filter settles: mean over the last 20 % [1e8 Pa]")
     return figure

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
+from experiments.page.drawing import say
 from experiments.page.style import BESIDE_CONDITIONS, BLUE, GREY, ORANGE, VERMILION, Margins, condition_levels, panels
 
 MILLI = 1e3
@@ -89,15 +90,7 @@ def draw_order(order: pd.DataFrame) -> Figure:
         axis.plot(order.loc[~above, "index"], order.loc[~above, name], "o", color=GREY, markerfacecolor="white")
         axis.axhline(floor, color=VERMILION, linewidth=1.2)
         last = float(order["index"].max())
-        axis.annotate(
-            "noise floor",
-            (last + 0.6, floor),
-            (0, -4),
-            textcoords="offset points",
-            color=VERMILION,
-            ha="right",
-            va="top",
-        )
+        say(axis, "noise floor", (last + 0.6, floor), (0, -4), color=VERMILION, ha="right", va="top")
         axis.set(yscale="log", ylim=(0.5 * min(floor, float(order[name].min())), None), xlim=(0.4, last + 0.6))
         axis.xaxis.set_major_locator(MaxNLocator(integer=True))
         axis.set(title=words, xlabel="index [count]")
@@ -116,23 +109,11 @@ def draw_gains(models: pd.DataFrame) -> Figure:
     """
     figure, (axis,) = panels("Steady gain from motor speed to velocity", 1, 1, 3.9, BESIDE_CONDITIONS)
     level = condition_levels(axis, models["condition"])
-    axis.hlines(
-        level - 0.16,
-        MILLI * models["published_dc_gain_low"],
-        MILLI * models["published_dc_gain_high"],
-        color=ORANGE,
-        linewidth=5.0,
-        label="Table 6: what its four digits leave open",
-    )
+    low, high = (MILLI * models[f"published_dc_gain_{end}"] for end in ("low", "high"))
+    axis.hlines(level - 0.16, low, high, color=ORANGE, linewidth=5.0, label="Table 6: what its four digits leave open")
+    gain, reach = MILLI * models["dc_gain"], 1.96 * MILLI * models["dc_gain_std"]
     axis.errorbar(
-        MILLI * models["dc_gain"],
-        level + 0.16,
-        xerr=1.96 * MILLI * models["dc_gain_std"],
-        fmt="o",
-        color=BLUE,
-        markersize=4,
-        capsize=2,
-        label="ours, with 95 % interval",
+        gain, level + 0.16, None, reach, "o", markersize=4, capsize=2, color=BLUE, label="ours, with 95 % interval"
     )
     axis.set(xlim=(0.0, None), xlabel="steady gain [mm/s per rad/s]")
     axis.legend(loc="lower right")

@@ -5,6 +5,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from experiments.page.drawing import say
 from experiments.page.style import BLACK, BLUE, GREY, VERMILION, Margins, condition_levels, panels
 from experiments.page.words import in_words
 
@@ -35,16 +36,9 @@ def draw_validation_run(runs: pd.DataFrame, condition: str) -> Figure:
         Drive above, velocities below, the second reversal enlarged beside them.
     """
     run = runs[runs["condition"] == condition]
-    figure, axes = panels(
-        f"The nine steps, {in_words(condition)}",
-        2,
-        2,
-        5.2,
-        Margins(left=0.75, across=0.7, down=0.5),
-        width_ratios=[2.1, 1.0],
-        height_ratios=[1.0, 1.9],
-        sharex="col",
-    )
+    shares = {"width_ratios": [2.1, 1.0], "height_ratios": [1.0, 1.9], "sharex": "col"}
+    margins = Margins(left=0.75, across=0.7, down=0.5)
+    figure, axes = panels(f"The nine steps, {in_words(condition)}", 2, 2, 5.2, margins, **shares)
     drive, drive_near, velocity, velocity_near = axes
     reversal = _reversal(run)
     near = run[run["time_s"].between(reversal - BEFORE, reversal + AFTER)]
@@ -76,14 +70,7 @@ def _mark_sticking(axis: Axes, near: pd.DataFrame) -> None:
     still = near[near["mathematical_m_s"] == 0.0]
     if len(still) > 1:
         middle = 0.5 * (float(still["time_s"].min()) + float(still["time_s"].max()))
-        axis.annotate(
-            "sticks",
-            (middle, 0.0),
-            (28, 24),
-            textcoords="offset points",
-            color=BLUE,
-            arrowprops={"arrowstyle": "->", "color": BLUE},
-        )
+        say(axis, "sticks", (middle, 0.0), (28, 24), color=BLUE, arrowprops={"arrowstyle": "->", "color": BLUE})
 
 
 def draw_rmse(rmse: pd.DataFrame) -> Figure:
@@ -99,15 +86,8 @@ def draw_rmse(rmse: pd.DataFrame) -> Figure:
     Figure
         Ours on the left, the published ones on the right, one row a condition.
     """
-    figure, axes = panels(
-        "Error in velocity on the nine steps, beside Table 5",
-        1,
-        2,
-        3.9,
-        Margins(left=2.0, top=0.6),
-        sharex=True,
-        sharey=True,
-    )
+    title = "Error in velocity on the nine steps, beside Table 5"
+    figure, axes = panels(title, 1, 2, 3.9, Margins(left=2.0, top=0.6), sharex=True, sharey=True)
     for axis, prefix, title in ((axes[0], "", "ours, simulated"), (axes[1], "published_", "published, measured")):
         level = condition_levels(axis, rmse["condition"])
         mathematical = MILLI * rmse[f"{prefix}rmse_mathematical_m_s"]

@@ -2,18 +2,20 @@
 
 from collections.abc import Callable, Mapping
 from io import BytesIO
+from pathlib import Path
 from typing import TypeAlias
 
 from matplotlib.figure import Figure
 
 from experiments.page.frames import Tables
 from experiments.page.style import styled
+from plant.atomic import replacing
 
 Drawings: TypeAlias = Mapping[str, Callable[[Tables], Figure]]
 """From a study's tables to its figures, by file name."""
 
-PNG_DOTS_PER_INCH = 150
-"""Resolution of the PNG figures; 1500 pixels wide."""
+PNG_DOTS_PER_INCH, LOG_DOTS_PER_INCH = 150, 130
+"""Resolution of the PNG figures of studies, 1500 pixels wide, and of logs."""
 
 
 def figure_files(drawings: Drawings, tables: Tables) -> dict[str, bytes]:
@@ -48,3 +50,9 @@ def svg_of(figure: Figure) -> bytes:
     with styled():
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     return buffer.getvalue()
+
+
+def write_png(draw: Callable[[], Figure], path: Path) -> None:
+    """Write the figure of one log as a PNG, whole or not at all."""
+    with styled(), replacing(path) as file:
+        draw().savefig(file, format="png", dpi=LOG_DOTS_PER_INCH)

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 import pandas as pd
 
-from experiments.page.frames import parameter_table
+from experiments.page.frames import Tables, parameter_table
 from experiments.page.numbers import number
 from experiments.page.tables import Cell, Column, Columns, interval, spaced
 from experiments.piezo_stack import flow
@@ -100,12 +100,9 @@ COLUMNS: Mapping[str, Columns] = {
     "rig": (Column("parameter", "name", words=spaced), Column("value", words=number), *("unit", "meaning", "source")),
 }
 
-PIEZO_STACK = Study(
-    "piezo-stack",
-    "piezo_stack/report.html",
-    _find,
-    STACK_FIGURES,
-    COLUMNS,
-    asdict(RIG),
-    facts=lambda *_: {"rig": parameter_table(RIG)},
-)
+
+def _facts(*_: object) -> Tables:
+    return {"rig": parameter_table(RIG)}
+
+
+PIEZO_STACK = Study("piezo-stack", "piezo_stack/report.html", _find, STACK_FIGURES, COLUMNS, asdict(RIG), _facts)
