@@ -132,14 +132,13 @@ def _drained(batch: _Batch, executor: Executor, width: int) -> bool:
             task = flying.pop(future)
             try:
                 part = future.result()
-            except BrokenExecutor:
-                whole = False
-                batch.suspect(task, alone=alone)
             except CancelledError as error:
                 raise HydrostateError("the cluster went away; run the same command again to go on") from error
             except Exception as error:
-                if type(error).__name__ != "KilledWorker":  # Dask's word for it, which need not be installed
+                broken = isinstance(error, BrokenExecutor)
+                if not broken and type(error).__name__ != "KilledWorker":  # Dask's word, which need not be installed
                     raise
+                whole = whole and not broken
                 batch.suspect(task, alone=alone)
             else:
                 batch.keep(task, part)

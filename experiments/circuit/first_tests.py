@@ -9,6 +9,7 @@ import pandas as pd
 from experiments.circuit.curves import steady_runs
 from experiments.circuit.experiments import AMPLITUDE_INPUTS, MEAN_INPUTS, frequency_responses, low_frequency_gains
 from experiments.circuit.passes import in_condition
+from experiments.page.frames import Rows, tabled
 from experiments.published import SCALARS
 from experiments.running.random_streams import stream
 from plant.eha.circuit_parameters import CircuitParameters
@@ -32,7 +33,8 @@ _VOLT_RESOLUTION = 0.005
 _STEP_SAMPLE_TIME = 1e-4
 
 
-def first_tests(rig: CircuitParameters, seed: int, levels_v: Iterable[float] = LEVELS_V) -> pd.DataFrame:
+@tabled
+def first_tests(rig: CircuitParameters, seed: int, levels_v: Iterable[float] = LEVELS_V) -> Rows:
     """Return section 4's first tests: dead time, steady gain, break frequency, linearity, dead zone.
 
     Dead time is until the encoder leaves its line by five counts, at a step of 4 V from rest, where the pressure that
@@ -51,28 +53,28 @@ def first_tests(rig: CircuitParameters, seed: int, levels_v: Iterable[float] = L
         dead zone), published what the paper prints; either is NaN where there is none.
     """
     rng = stream(seed, "circuit first tests")
-    rows = [_row("dead time", f"{low:g} V to 4 V", dead_time(rig, low, 4.0, rng), "s") for low in (0.0, 2.0)]
+    for low in (0.0, 2.0):
+        yield _row("dead time", f"{low:g} V to 4 V", dead_time(rig, low, 4.0, rng), "s")
     for volts in levels_v:
         speed = volts * rig.motor_speed_per_volt
         (run,) = steady_runs([replace(rig, stroke=ROOMY_STROKE)], speed, BENCH, rng)
         settled = run["velocity_m_s"][-1000:]
         implied = steady_state(speed, rig)[0] / speed
-        rows.append(_row("steady-state gain", f"{volts:g} V", float(np.mean(settled)) / speed, "m/rad", implied))
+        yield _row("steady-state gain", f"{volts:g} V", float(np.mean(settled)) / speed, "m/rad", implied)
     means = frequency_responses(rig, seed, MEAN_INPUTS)
     for mean in BREAK_MEANS_V:
         found = break_frequency(means[means["mean_v"] == mean])
-        rows.append(_row("break frequency", f"mean {mean:g} V", found, "Hz", published=SCALARS["bandwidth"].si_value))
+        yield _row("break frequency", f"mean {mean:g} V", found, "Hz", published=SCALARS["bandwidth"].si_value)
     gains = low_frequency_gains(means, "mean_v")
-    rows.append(_row("gain spread", "means from 2 V", _spread(gains[gains.index >= 2.0]), "1"))
+    yield _row("gain spread", "means from 2 V", _spread(gains[gains.index >= 2.0]), "1")
     gains = low_frequency_gains(frequency_responses(rig, seed, AMPLITUDE_INPUTS), "amplitude_v")
-    rows.append(_row("gain spread", "amplitudes from 2 V", _spread(gains[gains.index >= 2.0]), "1"))
-    rows.append(_row("gain spread", "amplitudes from 0.5 V", _spread(gains), "1"))
+    yield _row("gain spread", "amplitudes from 2 V", _spread(gains[gains.index >= 2.0]), "1")
+    yield _row("gain spread", "amplitudes from 0.5 V", _spread(gains), "1")
     for name in ("normal", "minor_leakage", "major_leakage"):
         p = in_condition(rig, name)
         held = p.flow_bias + p.leakage_coefficient * p.friction_coulomb / p.piston_area
         implied = held / (p.pump_displacement * p.motor_speed_per_volt)
-        rows.append(_row("dead zone", name, dead_zone(p, rng), "V", implied))
-    return pd.DataFrame(rows)
+        yield _row("dead zone", name, dead_zone(p, rng), "V", implied)
 
 
 def break_frequency(response: pd.DataFrame) -> float:

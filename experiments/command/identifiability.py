@@ -1,11 +1,10 @@
 """`hydrostate identifiability`: what an experiment would tell, before it is made."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from experiments.command.json_output import Result, prepare_output
+from experiments.command.json_output import prepare_output
 from experiments.command.logs import Batch, finish
 from experiments.command.options import (
     SEED,
@@ -83,7 +82,5 @@ def identifiability(
     about = {"plant": kind.name, "rig": bench.name, "seed": seed}
     results = tuple({**about, **experiment.entries(one)} for one in experiment.run(bench, options))
 
-    def screen(results: Sequence[Result]) -> Any:
-        return experiment.screen(results, options)
-
-    finish(Batch(results, len(results)), screen, as_json=as_json, out=out)
+    batch = Batch(results, len(results))
+    finish(batch, lambda shown: experiment.screen(shown, options), as_json=as_json, out=out)

@@ -1,6 +1,6 @@
 """The body of `estimate` and `diagnose`, the same for every kind of actuator."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -72,10 +72,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     for remark in chosen.remarks(batch.results):
         note(remark)
 
-    def screen(results: Sequence[Result]) -> Any:
-        return chosen.screen(results, options)
-
-    finish(batch, screen, as_json=asked["as_json"], out=asked["out"])
+    finish(batch, lambda results: chosen.screen(results, options), as_json=asked["as_json"], out=asked["out"])
 
 
 def _agreement(result: Result, found: "Finding") -> list[str]:

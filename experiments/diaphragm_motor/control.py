@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 
-from estimation.diaphragm_motor.control import ControlledRun, controlled_run
-from estimation.diaphragm_motor.maps import AVERAGE_STEP, MotorMaps, average_run, motor_maps
+from estimation.diaphragm_motor.control import controlled_run
+from estimation.diaphragm_motor.maps import AVERAGE_STEP, average_run, motor_maps
 from experiments.diaphragm_motor.sweeps import PEAK
 from plant.diaphragm_motor.model import POSITION
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
@@ -45,19 +46,10 @@ def control_runs(p: DiaphragmMotorParameters, seed: int) -> tuple[pd.DataFrame, 
     for name, (motor, sensing) in RUNS.items():
         base = leaking if motor else p
         schedule: Schedule = [(0.0, replace(base, load_force=LIGHT)), (BURDEN, replace(base, load_force=HEAVY))]
-        run = _run(schedule, maps, sensing, seed)
-        courses.append(
-            pd.DataFrame(
-                {
-                    "run": name,
-                    "time_s": run.time,
-                    "wanted_m_s": run.wanted,
-                    "measured_m_s": run.measured,
-                    "velocity_m_s": run.velocity,
-                    "voltage_v": run.swing,
-                }
-            )
-        )
+        run = controlled_run(schedule, _wanted, END, PEAK, maps, np.random.default_rng(seed), sensing=sensing)
+        columns = {"time_s": run.time, "wanted_m_s": run.wanted, "measured_m_s": run.measured}
+        columns |= {"velocity_m_s": run.velocity, "voltage_v": run.swing}
+        courses.append(pd.DataFrame({"run": name, **columns}))
         late = run.time > END - 0.2
         figures.append(
             {
@@ -90,18 +82,11 @@ def averaged_course(p: DiaphragmMotorParameters) -> pd.DataFrame:
     shown = np.arange(round(2e-3 / SAMPLE_TIME), len(time) - 104, round(1e-3 / SAMPLE_TIME))
     half = 0.5 / PEAK
     moved = np.interp(time[shown] + half, time, position) - np.interp(time[shown] - half, time, position)
-    averaged = np.interp(time[shown], time[::sparse], velocity)
-    return pd.DataFrame(
-        {"time_s": time[shown], "voltage_v": swing[shown], "fast_m_s": moved * PEAK, "averaged_m_s": averaged}
-    )
+    speeds = {"fast_m_s": moved * PEAK, "averaged_m_s": np.interp(time[shown], time[::sparse], velocity)}
+    return pd.DataFrame({"time_s": time[shown], "voltage_v": swing[shown], **speeds})
 
 
-def _run(schedule: Schedule, maps: MotorMaps, sensing: str, seed: int) -> ControlledRun:
-    source = "self" if sensing == "self" else "encoder"
-    return controlled_run(schedule, _wanted, END, PEAK, maps, np.random.default_rng(seed), sensing=source)
-
-
-RUNS: Mapping[str, tuple[bool, str]] = {
+RUNS: Mapping[str, tuple[bool, Literal["encoder", "self"]]] = {
     "encoder": (False, "encoder"),
     "self-sensing": (False, "self"),
     "encoder, leak": (True, "encoder"),

@@ -135,6 +135,8 @@ def _faults_shown(results: Sequence[Result], options: Options) -> "Iterable[Rend
     yield from (f"{result['file']}: {result['message']}" for result in results)
 
 
+OF_A_LOG: Any = {"prepare": _prepared, "options": {"load": None, "healthy": None}, "blank": {**BLANK, **OWN}}
+
 DIAPHRAGM_MOTOR = ActuatorKind(
     name=NAME,
     description="seven piezo diaphragms in series that pump into a cylinder",
@@ -146,18 +148,14 @@ DIAPHRAGM_MOTOR = ActuatorKind(
     simulate=Simulation(run=_simulated, options=SINE | BENCH | {"load": None, "fault": None}),
     estimate=LogVerb(
         run=lambda record, rig, calibration: motor_finding(record, rig.parameters, calibration=calibration),
-        prepare=_prepared,
-        options={"load": None, "healthy": None},
         entries=_estimate_entries,
-        blank={**BLANK, **OWN},
+        **OF_A_LOG,
     ),
     diagnose=LogVerb(
         run=lambda record, rig, calibration: motor_fault_finding(record, rig.parameters, calibration=calibration),
-        prepare=_prepared,
-        options={"load": None, "healthy": None},
         entries=_fault_entries,
-        blank={**BLANK, **OWN},
         screen=_faults_shown,
+        **OF_A_LOG,
     ),
     identifiability=Experiment(run=_looked_at, options=SINE | {"load": None}),
 )

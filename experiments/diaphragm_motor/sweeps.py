@@ -202,12 +202,8 @@ def sensitivities(p: DiaphragmMotorParameters) -> Rows:
     changed.append(("gas in the chambers", "0.1 to 2 %", replace(p, gas_fraction=(2e-2,) * DIAPHRAGMS)))
     for words, change, other in changed:
         frequency, flow = _peak(other)
-        yield {
-            "part": words,
-            "change": change,
-            "frequency_hz": frequency - best,
-            "flow_percent": 100.0 * (flow / most - 1.0),
-        }
+        moved = {"frequency_hz": frequency - best, "flow_percent": 100.0 * (flow / most - 1.0)}
+        yield {"part": words, "change": change, **moved}
 
 
 def _peak(p: DiaphragmMotorParameters) -> tuple[float, float]:

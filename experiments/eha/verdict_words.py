@@ -51,9 +51,7 @@ def headline(result: Mapping[str, Any]) -> str:
     (best, first), (second, other) = ranked[:2]
     parts = [f"{_said(best)}, probability {_percent(first)}", since(result), f"next {_said(second)}, {_percent(other)}"]
     named = "; ".join(part for part in parts if part)
-    if result["unknown"]:
-        return f"{NEAREST}{named}"
-    return named
+    return f"{NEAREST}{named}" if result["unknown"] else named
 
 
 def since(result: Mapping[str, Any]) -> str:

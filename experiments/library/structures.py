@@ -14,6 +14,7 @@ from estimation.identification.fit.validate import fit_percent, validate
 from estimation.identification.model.linear_model import LinearModel
 from experiments.circuit.passes import SAMPLE_TIME
 from experiments.library.library import DURATION, Array, circuit_passes
+from experiments.page.frames import Rows, tabled
 from experiments.running.random_streams import stream
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.sensors.sensors import BENCH
@@ -34,9 +35,10 @@ MADE_FOR, ONE_TEST = "binary, made for 25 Hz", "multisine, 0.5 to 50 Hz"
 """Names of the tests that are no plain clock."""
 
 
+@tabled
 def structure_table(
     rig: CircuitParameters, models: Mapping[str, LinearModel], seed: int, duration: float = DURATION
-) -> pd.DataFrame:
+) -> Rows:
     """Return how ARX, ARMAX, output error and Box-Jenkins do in each condition on passes held back.
 
     Each has the order of the library's model, so that none is judged by poles that the data do not determine.
@@ -55,16 +57,15 @@ def structure_table(
         less this one's) with the standard error of that difference over the passes, ``one_step_percent``,
         ``weight_above_percent`` (share of the criterion's weight above `PAPER_BANDWIDTH`), ``dc_gain``, and ``best``.
     """
-
-    def compare(name: str) -> pd.DataFrame:
+    for name, model in models.items():
         fitted, kept = split_record(*circuit_passes(rig, name, stream(seed, "structures", name), duration))
-        order = models[name].denominator.size - 1
+        order = model.denominator.size - 1
         form = {"n_numerator": order + 1, "n_denominator": order}
         found = {one: fit_structure(one, *fitted, SAMPLE_TIME, form) for one in STRUCTURES}
         runs = {one: _held_back(model, kept) for one, model in found.items()}
         best = max(runs, key=lambda one: runs[one][0].mean())
-        rows = [
-            {
+        for one, (free, ahead) in runs.items():
+            yield {
                 "condition": name,
                 "order": order,
                 "structure": one,
@@ -76,11 +77,6 @@ def structure_table(
                 "dc_gain": found[one].dc_gain,
                 "best": one == best,
             }
-            for one, (free, ahead) in runs.items()
-        ]
-        return pd.DataFrame(rows)
-
-    return pd.concat([compare(name) for name in models], ignore_index=True)
 
 
 def _held_back(model: LinearModel, kept: tuple[list[Array], list[Array]]) -> tuple[Array, Array]:
@@ -123,9 +119,10 @@ def weight_above(model: LinearModel, inputs: Sequence[Array], frequency_hz: floa
     return float(weight[f > frequency_hz].sum() / weight.sum())
 
 
+@tabled
 def order_and_bandwidth(
     rig: CircuitParameters, models: Mapping[str, LinearModel], seed: int, duration: float = 20.0
-) -> pd.DataFrame:
+) -> Rows:
     """Return the order that each condition shows, and its break frequency, beside the paper's second order and 25 Hz.
 
     Parameters
@@ -141,23 +138,20 @@ def order_and_bandwidth(
         By condition: order above the noise floor, order by BIC, the first three projected singular values over the
         floor, the fit of orders 1 to 4, and the library's order and bandwidth.
     """
-
-    def look(name: str) -> dict[str, object]:
+    for name, model in models.items():
         u, y = circuit_passes(rig, name, stream(seed, "order", name), duration)
         test, table = order_test(np.concatenate(u), np.concatenate(y)), criteria(u, y, SAMPLE_TIME)
         ratio = test.projected_singular_values[:3] / test.projected_noise_floor
-        return {
+        yield {
             "condition": name,
             "order_by_values": test.suggested_order,
             "order_by_bic": int(table.index[int(np.argmin(table["bic"]))]),
             **{f"value_{k}_over_floor": value for k, value in enumerate(ratio, 1)},
             **{f"fit_{order}_percent": fit for order, fit in table["fit_percent"].items()},
-            "order_of_library": models[name].denominator.size - 1,
-            "bandwidth_hz": models[name].bandwidth_hz,
-            "bandwidth_std_hz": models[name].bandwidth_std_hz,
+            "order_of_library": model.denominator.size - 1,
+            "bandwidth_hz": model.bandwidth_hz,
+            "bandwidth_std_hz": model.bandwidth_std_hz,
         }
-
-    return pd.DataFrame([look(name) for name in models])
 
 
 def clock_table(model: LinearModel, limits: Limits, seed: int, *, duration: float = 20.0) -> pd.DataFrame:
@@ -181,7 +175,6 @@ def clock_table(model: LinearModel, limits: Limits, seed: int, *, duration: floa
     }
     for hold in HOLDS:
         samples = round(hold / T)
-        candidates[f"{1e3 * hold:g} ms"] = (
-            limits.speed * np.repeat(rng.choice([-1.0, 1.0], n // samples + 1), samples)[:n]
-        )
+        signs = np.repeat(rng.choice([-1.0, 1.0], n // samples + 1), samples)[:n]
+        candidates[f"{1e3 * hold:g} ms"] = limits.speed * signs
     return rank_inputs(model, candidates, BENCH.velocity_noise, np.array(AT_FREQUENCIES), limits)

@@ -6,6 +6,7 @@ over drive voltages and loads, at 480 Hz. And the spectra of the driven motor, F
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from math import ceil
 
 import numpy as np
@@ -51,7 +52,8 @@ FAULTS = {
 HARMONICS = 9
 
 
-def operating_points(p: DiaphragmMotorParameters, seed: int) -> pd.DataFrame:
+@tabled
+def operating_points(p: DiaphragmMotorParameters, seed: int) -> Rows:
     """Return velocity and electrodes' amplitudes at thirty drives and loads, with noise.
 
     Returns
@@ -60,9 +62,8 @@ def operating_points(p: DiaphragmMotorParameters, seed: int) -> pd.DataFrame:
         Columns peak_to_peak_v, load_n, velocity_m_s and one an electrode [V].
     """
     rng = stream(seed, "motor sensing")
-    return pd.DataFrame(
-        [_at(replace(p, load_force=share * swing), swing, rng) for swing in SWINGS for share in LOAD_SHARES]
-    )
+    for swing, share in product(SWINGS, LOAD_SHARES):
+        yield _at(replace(p, load_force=share * swing), swing, rng)
 
 
 def _at(p: DiaphragmMotorParameters, swing: float, rng: np.random.Generator) -> dict[str, float]:
@@ -72,7 +73,8 @@ def _at(p: DiaphragmMotorParameters, swing: float, rng: np.random.Generator) -> 
     return {DRIVE: swing, "load_n": p.load_force, "velocity_m_s": point.velocity, **amplitudes}
 
 
-def sensing_predictions(points: pd.DataFrame) -> pd.DataFrame:
+@stacked
+def sensing_predictions(points: pd.DataFrame) -> Frames:
     """Return the velocity that each regression gives for the points that it was fitted to.
 
     Parameters
@@ -85,12 +87,9 @@ def sensing_predictions(points: pd.DataFrame) -> pd.DataFrame:
     pandas.DataFrame
         Columns regressors, peak_to_peak_v, velocity_m_s and fitted_m_s.
     """
-    kept = points[[DRIVE, "velocity_m_s"]]
-    parts = [
-        kept.assign(regressors=words, fitted_m_s=fit(points, names, "velocity_m_s").fittedvalues)
-        for words, names in MODELS.items()
-    ]
-    return pd.concat(parts, ignore_index=True)
+    for words, names in MODELS.items():
+        fitted = fit(points, names, "velocity_m_s").fittedvalues
+        yield points[[DRIVE, "velocity_m_s"]].assign(regressors=words, fitted_m_s=fitted)
 
 
 @tabled

@@ -34,7 +34,8 @@ def vibration_models(p: VibrationParameters) -> "dict[str, control.StateSpace]":
     }
 
 
-def pole_table(p: VibrationParameters) -> pd.DataFrame:
+@tabled
+def pole_table(p: VibrationParameters) -> Rows:
     """Return the poles of each model, one of each pair.
 
     Returns
@@ -42,24 +43,21 @@ def pole_table(p: VibrationParameters) -> pd.DataFrame:
     pandas.DataFrame
         Columns model, real_rad_s, imaginary_rad_s, frequency_hz, damping_ratio and stable.
     """
-    return _poles({**vibration_models(p), "equation 20, small voltages": linearised(HysteresisParameters())})
+    for name, model in _all_models(p).items():
+        for pole in sorted(model.poles(), key=abs):
+            if pole.imag >= 0.0:
+                yield {
+                    "model": name,
+                    "real_rad_s": float(pole.real),
+                    "imaginary_rad_s": float(pole.imag),
+                    "frequency_hz": float(abs(pole) / (2.0 * pi)),
+                    "damping_ratio": float(-pole.real / abs(pole)),
+                    "stable": bool(pole.real < 0.0),
+                }
 
 
-def _poles(models: "dict[str, Any]") -> pd.DataFrame:
-    rows = [
-        {
-            "model": name,
-            "real_rad_s": float(pole.real),
-            "imaginary_rad_s": float(pole.imag),
-            "frequency_hz": float(abs(pole) / (2.0 * pi)),
-            "damping_ratio": float(-pole.real / abs(pole)),
-            "stable": bool(pole.real < 0.0),
-        }
-        for name, model in models.items()
-        for pole in sorted(model.poles(), key=abs)
-        if pole.imag >= 0.0
-    ]
-    return pd.DataFrame(rows)
+def _all_models(p: VibrationParameters) -> dict[str, Any]:
+    return {**vibration_models(p), "equation 20, small voltages": linearised(HysteresisParameters())}
 
 
 @tabled
@@ -77,15 +75,13 @@ def margin_table(p: VibrationParameters) -> Rows:
     """
     import control  # slow to import, and few callers need it
 
-    models: dict[str, Any] = {**vibration_models(p), "equation 20, small voltages": linearised(HysteresisParameters())}
-    for name, model in models.items():
+    for name, model in _all_models(p).items():
         loop = model / float(np.real(model.dcgain()))
         gain, phase, _, crossover = control.margin(loop)
         closed_loop: Any = control.feedback(loop, 1)
         open_poles, closed = np.real(loop.poles()), np.real(closed_loop.poles())
-        turns = control.nyquist_response(
-            loop, omega=_past_poles(np.asarray(loop.poles())), warn_encirclements=False
-        ).count
+        omega = _past_poles(np.asarray(loop.poles()))
+        turns = control.nyquist_response(loop, omega=omega, warn_encirclements=False).count
         yield {
             "model": name,
             "gain_margin": float(gain),
@@ -166,7 +162,8 @@ def tuning_table(p: VibrationParameters) -> Rows:
             }
 
 
-def figures_7_to_9() -> pd.DataFrame:
+@stacked
+def figures_7_to_9() -> Frames:
     """Return fractional integral and derivative of t^2, exactly and sampled, Figures 7 to 9 and equation 6 (errata M6).
 
     Returns
@@ -176,20 +173,15 @@ def figures_7_to_9() -> pd.DataFrame:
     """
     time = np.linspace(0.0, 1.0, 1001)
     square = np.square(time)
-    parts = [
-        pd.DataFrame(
-            {
-                "order": a,
-                "time_s": time,
-                "integral": 2.0 * time ** (2.0 + a) / gamma(3.0 + a),
-                "derivative": 2.0 * time ** (2.0 - a) / gamma(3.0 - a),
-                "sampled_integral": grunwald_letnikov(square, -a, 1e-3),
-                "sampled_derivative": grunwald_letnikov(square, a, 1e-3),
-            }
-        )
-        for a in ORDERS
-    ]
-    return pd.concat(parts, ignore_index=True)
+    for a in ORDERS:
+        yield {
+            "order": a,
+            "time_s": time,
+            "integral": 2.0 * time ** (2.0 + a) / gamma(3.0 + a),
+            "derivative": 2.0 * time ** (2.0 - a) / gamma(3.0 - a),
+            "sampled_integral": grunwald_letnikov(square, -a, 1e-3),
+            "sampled_derivative": grunwald_letnikov(square, a, 1e-3),
+        }
 
 
 def with_order(p: VibrationParameters, order: float) -> VibrationParameters:

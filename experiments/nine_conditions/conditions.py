@@ -38,7 +38,8 @@ def condition_table(rig: EhaParameters) -> Rows:
         }
 
 
-def scalar_table(conditions: pd.DataFrame, library: Mapping[str, LinearModel], bulk_modulus: float) -> pd.DataFrame:
+@tabled
+def scalar_table(conditions: pd.DataFrame, library: Mapping[str, LinearModel], bulk_modulus: float) -> Rows:
     """Return the scalars of the paper's text beside ours.
 
     Parameters
@@ -65,8 +66,8 @@ def scalar_table(conditions: pd.DataFrame, library: Mapping[str, LinearModel], b
         "bulk_modulus": bulk_modulus,
         "earlier_bulk_modulus": bulk_modulus,
     }
-    rows = [
-        {
+    for name, scalar in SCALARS.items():
+        yield {
             "quantity": scalar.meaning,
             "unit": scalar.si_unit,
             "published": scalar.si_value,
@@ -74,9 +75,6 @@ def scalar_table(conditions: pd.DataFrame, library: Mapping[str, LinearModel], b
             "where": scalar.where,
             "note": SCALAR_NOTES[name],
         }
-        for name, scalar in SCALARS.items()
-    ]
-    return pd.DataFrame(rows)
 
 
 SCALAR_NOTES: Mapping[str, str] = {

@@ -203,15 +203,10 @@ def class_accuracies(tables: Tables) -> tuple[ClassAccuracy, ...]:
     tuple of ClassAccuracy
         One a row of the table ``classification``.
     """
+    rows = tables["classification"][["bank", "variant", "runs", "accuracy"]].itertuples(index=False, name=None)
     return tuple(
-        ClassAccuracy(
-            bank=str(row["bank"]),
-            variant=str(row["variant"]),
-            runs=int(row["runs"]),
-            percent=100.0 * float(row["accuracy"]),
-            likeliest_error=_likeliest_error(tables[f"confusion {row['bank']} {row['variant']}"]),
-        )
-        for _, row in tables["classification"].iterrows()
+        ClassAccuracy(bank, variant, runs, 100.0 * share, _likeliest_error(tables[f"confusion {bank} {variant}"]))
+        for bank, variant, runs, share in rows
     )
 
 

@@ -10,6 +10,7 @@ from itertools import groupby, product
 import numpy as np
 import pandas as pd
 
+from experiments.page.frames import Frames, Rows, stacked, tabled
 from experiments.running.executors import side_by_side
 from plant.errors import HydrostateError
 from plant.piezo_stack.flow import FLOW_TIME, STAGES, line_reynolds_numbers, mean_flow, stages
@@ -113,8 +114,7 @@ def rows_of(cases: Sequence[tuple[PiezoStackParameters, OperatingPoint]]) -> Ite
     dict[str, float]
         As `sweep`.
     """
-    alike = groupby(cases, key=lambda case: _run_time(case[1].frequency_hz))
-    groups = [list(group) for _, group in alike]
+    groups = [list(group) for _, group in groupby(cases, key=lambda case: _run_time(case[1].frequency_hz))]
     parts = [group[first : first + LANES] for group in groups for first in range(0, len(group), LANES)]
     for rows in side_by_side(_rows_together, parts):
         yield from rows
@@ -178,17 +178,16 @@ def pump_cycle(p: PiezoStackParameters, point: OperatingPoint) -> pd.DataFrame:
     return last.assign(time_s=last["time_s"] - last["time_s"].iloc[0])
 
 
-def stack_loops(p: PiezoStackParameters) -> pd.DataFrame:
+@stacked
+def stack_loops(p: PiezoStackParameters) -> Frames:
     """Return loops of voltage and displacement of the free stack: Figure 10."""
-    frames = [
-        pd.DataFrame({"frequency_hz": f, "voltage_v": u, "displacement_m": x})
-        for f in LOOP_FREQUENCIES
-        for u, x in [stack_loop(p, f, LOOP_VOLTAGE)]
-    ]
-    return pd.concat(frames, ignore_index=True)
+    for frequency in LOOP_FREQUENCIES:
+        voltage, displacement = stack_loop(p, frequency, LOOP_VOLTAGE)
+        yield {"frequency_hz": frequency, "voltage_v": voltage, "displacement_m": displacement}
 
 
-def loop_widths(loops: pd.DataFrame) -> pd.DataFrame:
+@tabled
+def loop_widths(loops: pd.DataFrame) -> Rows:
     """Return stroke and width of each loop of `stack_loops`.
 
     Parameters
@@ -196,15 +195,12 @@ def loop_widths(loops: pd.DataFrame) -> pd.DataFrame:
     loops : pandas.DataFrame
         Of `stack_loops`.
     """
-    rows = [
-        {
+    for frequency, loop in loops.groupby("frequency_hz"):
+        yield {
             "frequency_hz": frequency,
             "stroke_m": float(np.ptp(loop["displacement_m"])),
             "width_percent": 100.0 * loop_width(loop["voltage_v"].to_numpy(), loop["displacement_m"].to_numpy()),
         }
-        for frequency, loop in loops.groupby("frequency_hz")
-    ]
-    return pd.DataFrame(rows)
 
 
 def figure_points() -> dict[str, list[OperatingPoint]]:
@@ -285,8 +281,7 @@ def best_points(design: pd.DataFrame, voltage_limit: float, power_limit: float) 
     pandas.DataFrame
         The rows of most flow, one a load and bias pressure; none where no setting within the limits lifts the load.
     """
-    allowed = design[
-        (design["voltage_v"] <= voltage_limit) & (design["stack_power_w"] <= power_limit) & (design["flow_m3_s"] > 0.0)
-    ]
+    within = (design["voltage_v"] <= voltage_limit) & (design["stack_power_w"] <= power_limit)
+    allowed = design[within & (design["flow_m3_s"] > 0.0)]
     best = allowed.groupby(["bias_pressure_pa", "load_kg"])["flow_m3_s"].idxmax()
     return allowed.loc[best].reset_index(drop=True)

@@ -121,6 +121,8 @@ def _conditions_shown(results: Sequence[Result], options: Options) -> "Iterable[
     yield from (f"{result['file']}: {result['message']}" for result in results)
 
 
+OF_A_LOG: Any = {"prepare": _prepared, "entries": _entries, "blank": {**BLANK, "misfit": {}}}
+
 PIEZO_STACK = ActuatorKind(
     name=NAME,
     description="a piezo stack that pumps through reed valves into a cylinder",
@@ -132,18 +134,14 @@ PIEZO_STACK = ActuatorKind(
     simulate=Simulation(run=_simulated, options=SINE | OF_THE_RUN | BENCH | {"condition": None, "fault": None}),
     estimate=LogVerb(
         run=lambda record, rig, channels: stack_finding(record, rig.parameters, channels=channels),
-        prepare=_prepared,
         options=OF_THE_RUN | {"healthy": None, "sensors": ""},
-        entries=_entries,
-        blank={**BLANK, "misfit": {}},
+        **OF_A_LOG,
     ),
     diagnose=LogVerb(
         run=lambda record, rig, channels: diagnose_stack(record, rig.parameters, channels=channels),
-        prepare=_prepared,
         options=OF_THE_RUN | {"healthy": None},
-        entries=_entries,
-        blank={**BLANK, "misfit": {}},
         screen=_conditions_shown,
+        **OF_A_LOG,
     ),
     identifiability=Experiment(
         run=_looked_at, options=SINE | OF_THE_RUN | {"sensors": "", "seconds": 0.1, "rate": 1.0 / SAMPLE_TIME}
