@@ -52,12 +52,8 @@ def way_in_words(row: Mapping[Any, Any]) -> str:
     'lumped, sine: pressure form, ekf'
     """
     place = ", ".join(str(row[name]) for name in ("plant", "drive") if row[name])
-    if row["verb"] == "diagnose":
-        how = "diagnose"
-    else:
-        how = ("" if row["form"] == "auto" else f"{row['form']} form, ") + str(row["method"]).replace(
-            "auto", "estimate"
-        )
+    form = "" if row["form"] == "auto" else f"{row['form']} form, "
+    how = "diagnose" if row["verb"] == "diagnose" else form + str(row["method"]).replace("auto", "estimate")
     return f"{place}: {how}" + ("" if row["pressure"] else ", pressure not used")
 
 
@@ -80,9 +76,8 @@ def draw_errors(table: pd.DataFrame) -> Figure:
     names = list(dict.fromkeys(ways))
     height = 1.3 + max(ROW_INCHES, 0.13 * len(names)) * count + 0.2 * len(names)
     margins = Margins(left=2.3, top=0.45, bottom=0.7 + 0.2 * len(names))
-    figure, (axis,) = panels(
-        "Error of bulk modulus by condition: median, and 5 to 95 % of cases", 1, 1, height, margins
-    )
+    title = "Error of bulk modulus by condition: median, and 5 to 95 % of cases"
+    figure, (axis,) = panels(title, 1, 1, height, margins)
     levels = condition_levels(axis, shown["condition"])
     offsets = spread_out(len(names), 0.6)
     edge = min(FARTHEST_PERCENT, 1.1 * max(0.1, float(shown[["low_percent", "high_percent"]].abs().max().max())))

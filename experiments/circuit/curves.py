@@ -4,7 +4,7 @@ Every point is a run from rest at constant speed until it settles. The cylinder 
 for that; on the rig the same takes several strokes.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -128,9 +128,7 @@ def throttle_curve(rig: CircuitParameters, sweep: Sweep) -> pd.DataFrame:
     )
 
 
-def leakage_points(
-    rig: CircuitParameters, level: Level, rng: np.random.Generator, volts: Iterable[float] = FIGURE_8_VOLTS
-) -> SteadyPoints:
+def leakage_points(rig: CircuitParameters, level: Level, rng: np.random.Generator) -> SteadyPoints:
     """Return steady points at one leakage level, 4 V of motor and several loads by throttle B: Figure 8.
 
     Loads stay below the relief setting: what the relief valve passes is no leakage.
@@ -139,27 +137,21 @@ def leakage_points(
     ----------
     level : {"none", "minor", "major"}
         Leakage level, by throttle A.
-    volts : iterable of float
-        Throttle B's voltages [V].
     """
     a_volts = VOLTS_A[LEVELS.index(level)]
-    return steady_points(steady_runs([throttled(rig, a_volts, v) for v in volts], rig.rated_speed, BENCH, rng))
+    return steady_points(steady_runs([throttled(rig, a_volts, v) for v in FIGURE_8_VOLTS], rig.rated_speed, BENCH, rng))
 
 
-def friction_points(
-    rig: CircuitParameters, level: Level, rng: np.random.Generator, volts: Iterable[float] = FIGURE_9_VOLTS
-) -> SteadyPoints:
+def friction_points(rig: CircuitParameters, level: Level, rng: np.random.Generator) -> SteadyPoints:
     """Return steady points at one friction level and several motor voltages, throttle A shut: Figure 9.
 
     Parameters
     ----------
     level : {"none", "minor", "major"}
         Friction level, by throttle B.
-    volts : iterable of float
-        Motor voltages [V]; those of the paper are random from 0.5 V to 3.5 V.
     """
     p = throttled(rig, 10.0, VOLTS_B[LEVELS.index(level)])
-    runs = (steady_runs([p], v * rig.motor_speed_per_volt, BENCH, rng) for v in volts)
+    runs = (steady_runs([p], v * rig.motor_speed_per_volt, BENCH, rng) for v in FIGURE_9_VOLTS)
     return steady_points(run for found in runs for run in found)
 
 

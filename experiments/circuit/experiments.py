@@ -139,16 +139,11 @@ def low_frequency_gains(responses: pd.DataFrame, by: str) -> pd.Series:
     return responses.groupby(by)["gain"].first()
 
 
-def order_study(rig: CircuitParameters, seed: int, mean_v: float = 2.0) -> pd.DataFrame:
+def order_study(rig: CircuitParameters, seed: int) -> pd.DataFrame:
     """Return the singular values of the circuit's normal condition with their noise floor: Figure 7.
 
-    Parameters
-    ----------
-    seed : int
-        Seed of the signal, sensor noise, and the floor.
-    mean_v : float
-        Input mean [V]. Moving, the piston does not stick; from 4 V on, quadratic friction damps so much that one
-        value alone stands above the floor.
+    The mean is 2 V: moving, the piston does not stick; from 4 V on, quadratic friction damps so much that one value
+    alone stands above the floor.
 
     Returns
     -------
@@ -156,7 +151,7 @@ def order_study(rig: CircuitParameters, seed: int, mean_v: float = 2.0) -> pd.Da
         As `experiments.nine_conditions.transfer_functions.order_table`.
     """
     rng = stream(seed, "circuit order")
-    return order_table(prbs_around(rig, mean_v, AMPLITUDE_V, rng), rng)
+    return order_table(prbs_around(rig, 2.0, AMPLITUDE_V, rng), rng)
 
 
 def validation_input(rig: CircuitParameters, settings: StudySettings) -> pd.DataFrame:
@@ -168,10 +163,7 @@ def validation_input(rig: CircuitParameters, settings: StudySettings) -> pd.Data
 
 
 def bulk_modulus_on_circuit(
-    rig: CircuitParameters,
-    settings: StudySettings,
-    conditions: Sequence[str] = tuple(CONDITIONS),
-    experiments: Sequence[Experiment] = CIRCUIT_FORMS,
+    rig: CircuitParameters, settings: StudySettings, conditions: Sequence[str] = tuple(CONDITIONS)
 ) -> pd.DataFrame:
     """Estimate bulk modulus on the circuit by three forms, in nine conditions, from every first guess: Figure 11.
 
@@ -195,15 +187,14 @@ def bulk_modulus_on_circuit(
         p = in_condition(rig, name)
         record = experiment.record(p, settings, stream(settings.seed, "circuit bulk modulus", experiment.drive, name))
         known = _believed(rig if experiment.form == "flow" else p)
-        rows: list[dict[str, object]] = []
-        for start in settings.starts:
-            found = estimate_bulk_modulus(record, known, form=experiment.form, start=start)
-            rows.append(
-                {**experiment._asdict(), "condition": name, "start_pa": start, **estimate_entries(found, truth)}
-            )
-        return rows
+        head = {**experiment._asdict(), "condition": name}
+        finds = (
+            (start, estimate_bulk_modulus(record, known, form=experiment.form, start=start))
+            for start in settings.starts
+        )
+        return [{**head, "start_pa": start, **estimate_entries(found, truth)} for start, found in finds]
 
-    rows = [row for rows in side_by_side(estimate, product(experiments, conditions)) for row in rows]
+    rows = [row for rows in side_by_side(estimate, product(CIRCUIT_FORMS, conditions)) for row in rows]
     frame = pd.DataFrame(rows).assign(truth_pa=truth)
     covered = (frame["ci95_low_pa"].astype(float) <= truth) & (truth <= frame["ci95_high_pa"].astype(float))
     return frame.assign(covered=covered)[list(ESTIMATE_COLUMNS)]

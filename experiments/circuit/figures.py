@@ -46,12 +46,8 @@ def draw_throttles(tables: Tables) -> Figure:
     right.axhline(relief, color=GREY, linewidth=1.0, linestyle=(0, (4, 3)), zorder=0)
     say(right, "relief valve, 500 psi", (0.0, relief), (4, -4), va="top", color=GREY)
     left.set(title="Figure 3", xlabel="throttle A: leakage, fully open at 0 V [V]", ylabel="velocity [% of normal]")
-    right.set(
-        title="Figure 4",
-        xlabel="throttle B: load, shut towards 10 V [V]",
-        ylabel="differential pressure [% of normal]",
-        ylim=(0.0, 1.1 * relief),
-    )
+    right.set(title="Figure 4", xlabel="throttle B: load, shut towards 10 V [V]")
+    right.set(ylabel="differential pressure [% of normal]", ylim=(0.0, 1.1 * relief))
     left.set(ylim=(0.0, 110.0))
     left.legend(loc="lower right")
     return figure
@@ -172,12 +168,8 @@ def draw_validation_input(tables: Tables) -> Figure:
     axis.step(steps["time_s"], steps["motor_voltage_v"], where="post", color=BLUE)
     for level in (-4.0, -2.5, 2.5, 4.0):
         axis.axhline(level, color=GREY, linewidth=0.8, linestyle=(0, (4, 3)), zorder=0)
-    axis.set(
-        yticks=[-4.0, -2.5, 0.0, 2.5, 4.0],
-        xlim=(0.0, float(steps["time_s"].max())),
-        xlabel="time [s]",
-        ylabel="motor voltage [V]",
-    )
+    axis.set(yticks=[-4.0, -2.5, 0.0, 2.5, 4.0], xlim=(0.0, float(steps["time_s"].max())))
+    axis.set(xlabel="time [s]", ylabel="motor voltage [V]")
     return figure
 
 

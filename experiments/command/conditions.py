@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from rich.console import RenderableType
+
+RigPath: TypeAlias = Annotated[Path, typer.Argument(metavar="PATH", help="File to write; an existing one is kept.")]
 
 commands = typer.Typer()
 rig_commands = typer.Typer(no_args_is_help=True, help="Files that describe an actuator which is not the paper's.")
@@ -62,9 +64,7 @@ def _screen(results: "Sequence[Result]") -> "Iterable[RenderableType]":
 
 @rig_commands.command("init", epilog="Example: hydrostate rig init bench2.toml")
 def rig_init(
-    path: Annotated[Path, typer.Argument(metavar="PATH", help="File to write; an existing one is kept.")] = Path(
-        "rig.toml"
-    ),
+    path: RigPath = Path("rig.toml"),
     plant: Plant = None,
 ) -> None:
     """Write a commented rig file (TOML, SI) that describes the paper's actuator, to be changed into yours."""

@@ -185,10 +185,9 @@ def draw_averaged(tables: Tables) -> Figure:
     course = tables["averaged"]
     title = "Averaged over cycles: 150, 250 and 200 V at 480 Hz against 5 N"
     figure, (axis,) = panels(title, 1, 1, 3.2, Margins(left=0.7))
-    axis.plot(
-        course["time_s"], MILLI * course["fast_m_s"], color=SKY, linewidth=2.2, label="fast plant, mean of a cycle"
-    )
-    axis.plot(course["time_s"], MILLI * course["averaged_m_s"], color=VERMILION, label="averaged motor on its maps")
+    time, fast = course["time_s"], MILLI * course["fast_m_s"]
+    axis.plot(time, fast, color=SKY, linewidth=2.2, label="fast plant, mean of a cycle")
+    axis.plot(time, MILLI * course["averaged_m_s"], color=VERMILION, label="averaged motor on its maps")
     axis.set(xlabel="time [s]", ylabel="velocity [mm/s]")
     axis.legend(loc="lower right")
     return figure

@@ -3,7 +3,6 @@
 Flow is that of the pump running freely to tank, velocity that of the piston behind its valve (errata M22 and M26).
 """
 
-from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -54,13 +53,8 @@ def _point_row(point: OperatingPoint) -> dict[str, float]:
     return {"flow_m3_s": point.outlet_flow, "velocity_m_s": point.velocity, **sensed}
 
 
-def sweep_frequency(p: DiaphragmMotorParameters, frequencies: Iterable[float] = FREQUENCIES) -> pd.DataFrame:
+def sweep_frequency(p: DiaphragmMotorParameters) -> pd.DataFrame:
     """Return flow of the pump alone and amplitudes of its electrodes over frequency, as section 7.1 tells.
-
-    Parameters
-    ----------
-    frequencies : iterable of float
-        Of the drive [Hz].
 
     Returns
     -------
@@ -68,16 +62,11 @@ def sweep_frequency(p: DiaphragmMotorParameters, frequencies: Iterable[float] = 
         Columns frequency_hz, flow_m3_s, velocity_m_s, a1_v to a7_v.
     """
     pump = pump_alone(p)
-    return pd.DataFrame([{"frequency_hz": f, **_point_row(operate(pump, f, SWING))} for f in frequencies])
+    return pd.DataFrame([{"frequency_hz": f, **_point_row(operate(pump, f, SWING))} for f in FREQUENCIES])
 
 
-def sweep_voltage(p: DiaphragmMotorParameters, swings: Iterable[float] = SWINGS) -> pd.DataFrame:
+def sweep_voltage(p: DiaphragmMotorParameters) -> pd.DataFrame:
     """Return flow and sensing over voltage at the best frequency, as section 7.1 tells.
-
-    Parameters
-    ----------
-    swings : iterable of float
-        Peak to peak [V].
 
     Returns
     -------
@@ -85,7 +74,7 @@ def sweep_voltage(p: DiaphragmMotorParameters, swings: Iterable[float] = SWINGS)
         Columns voltage_v, flow_m3_s, velocity_m_s, a1_v to a7_v.
     """
     pump = pump_alone(p)
-    return pd.DataFrame([{"voltage_v": swing, **_point_row(operate(pump, PEAK, swing))} for swing in swings])
+    return pd.DataFrame([{"voltage_v": swing, **_point_row(operate(pump, PEAK, swing))} for swing in SWINGS])
 
 
 def blocking_force(p: DiaphragmMotorParameters, frequency: float, swing: float) -> float:
@@ -114,20 +103,15 @@ def blocking_force(p: DiaphragmMotorParameters, frequency: float, swing: float) 
 
 
 @tabled
-def sweep_load(p: DiaphragmMotorParameters, swings: Sequence[float] = (100.0, 200.0, 300.0)) -> Rows:
+def sweep_load(p: DiaphragmMotorParameters) -> Rows:
     """Return velocity and A4's amplitude over load at the best frequency (equation 18).
-
-    Parameters
-    ----------
-    swings : sequence of float
-        Peak to peak [V].
 
     Returns
     -------
     pandas.DataFrame
         Columns voltage_v, blocking_n, load_n, flow_m3_s, velocity_m_s, a1_v to a7_v.
     """
-    for swing in swings:
+    for swing in (100.0, 200.0, 300.0):
         blocked = blocking_force(p, PEAK, swing)
         for load in blocked * np.array(SHARES):
             point = operate(replace(p, load_force=float(load)), PEAK, swing)
@@ -135,18 +119,12 @@ def sweep_load(p: DiaphragmMotorParameters, swings: Sequence[float] = (100.0, 20
 
 
 @tabled
-def best_frequencies(p: DiaphragmMotorParameters, swing: float = 300.0) -> Rows:
-    """Return velocity over frequency under several loads, whose best frequency section 7.2 lets rise (errata M31).
-
-    Parameters
-    ----------
-    swing : float
-        Peak to peak [V].
-    """
+def best_frequencies(p: DiaphragmMotorParameters) -> Rows:
+    """Return velocity over frequency under several loads, whose best frequency section 7.2 lets rise (errata M31)."""
     for load in LOADS:
         loaded = replace(p, load_force=load)
         for frequency in np.arange(320.0, 561.0, 10.0).tolist():
-            speed = operate(loaded, frequency, swing).velocity
+            speed = operate(loaded, frequency, 300.0).velocity
             yield {"load_n": load, "frequency_hz": frequency, "velocity_m_s": speed}
 
 

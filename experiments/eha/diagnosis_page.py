@@ -82,10 +82,8 @@ def _draw_severities(found: "Finding") -> tuple[Figure, str]:
             axis.errorbar([value], [0.0], xerr=error, fmt="none", ecolor=BLACK, elinewidth=1.6, capsize=5.0)
             axis.axvline(sound, color=VERMILION, ls="--", lw=1.4)
             reach = max(abs(number) for number in (value, low, high, sound)) or 1.0
-            axis.set(
-                xlim=(1.08 * min(0.0, low, sound) - 0.01 * reach, 1.08 * max(value, high, sound) + 0.01 * reach),
-                ylim=(-0.6, 0.6),
-            )
+            least, most = min(0.0, low, sound), max(value, high, sound)
+            axis.set(xlim=(1.08 * least - 0.01 * reach, 1.08 * most + 0.01 * reach), ylim=(-0.6, 0.6))
             unit = "MPa" if one.unit == "Pa" else one.unit
             axis.set_yticks([0.0], [f"{SHOWN[name].replace(', at most', '')} [{unit}]"])
             axis.tick_params(axis="y", length=0)

@@ -94,16 +94,13 @@ def _scores_table(result: Result) -> "RenderableType":
     others = result["transfer_function_scores"]
     headings = ["condition", f"model error [{unit}]", *([] if others is None else ["transfer function [m/s]"]), ""]
     shown = table(*headings, title=result["file"])
+    winners = {
+        "<- best": "condition",
+        "runner-up": "runner_up",
+        "best transfer function": "transfer_function_condition",
+    }
     for name, score in result["scores"].items():
-        marks = [words for words, best in _winners(result).items() if best == name]
+        marks = [words for words, entry in winners.items() if result[entry] == name]
         cells = [name, f"{score:.4g}", *([] if others is None else [f"{others[name]:.4g}"]), ", ".join(marks)]
         shown.add_row(*cells, style="bold" if name == result["condition"] else None)
     return shown
-
-
-def _winners(result: Result) -> dict[str, str | None]:
-    return {
-        "<- best": result["condition"],
-        "runner-up": result["runner_up"],
-        "best transfer function": result["transfer_function_condition"],
-    }

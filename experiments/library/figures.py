@@ -112,11 +112,8 @@ def draw_orders(tables: Tables) -> Figure:
         if order > 1:
             fits.plot(gained, level, mark, color=colour, markersize=5, label=f"order {order}")
     values.axvline(1.0, color=GREY, linewidth=1.0, linestyle=(0, (4, 3)), zorder=0)
-    values.set(
-        title="projected singular values: dashed, the floor of noise",
-        xscale="log",
-        xlabel="value over its noise floor [ratio]",
-    )
+    values.set(title="projected singular values: dashed, the floor of noise", xscale="log")
+    values.set(xlabel="value over its noise floor [ratio]")
     fits.axvline(0.0, color=GREY, linewidth=1.0, linestyle=(0, (4, 3)), zorder=0)
     fits.set(title="output error of higher order than first", xlabel="fit gained over first order [percentage points]")
     for axis in (values, fits):

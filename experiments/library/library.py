@@ -76,13 +76,8 @@ def circuit_passes(
     return list(speeds), list(velocities)
 
 
-def build_library(seed: int, *, duration: float = DURATION) -> dict[str, Any]:
+def build_library(seed: int) -> dict[str, Any]:
     """Return the library as JSON values.
-
-    Parameters
-    ----------
-    duration : float
-        Length of each test [s].
 
     Returns
     -------
@@ -92,7 +87,7 @@ def build_library(seed: int, *, duration: float = DURATION) -> dict[str, Any]:
     rig = CircuitParameters()
 
     def identify(name: str) -> dict[str, Any]:
-        speeds, velocities = circuit_passes(rig, name, stream(seed, "library", name), duration)
+        speeds, velocities = circuit_passes(rig, name, stream(seed, "library", name))
         model = determined_model(speeds, velocities)
         return {"model": model.to_dict(), **described(model), "table_6": printed_model(name)}
 
@@ -108,7 +103,7 @@ def build_library(seed: int, *, duration: float = DURATION) -> dict[str, Any]:
             "mean_v": MEAN_V,
             "amplitude_v": AMPLITUDE_V,
             "hold_time_s": HOLD_TIME,
-            "duration_s": duration,
+            "duration_s": DURATION,
         },
         "conditions": entries,
     }

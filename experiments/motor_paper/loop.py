@@ -71,12 +71,11 @@ def designed(p: VibrationParameters) -> Mapping[str, Pid]:
     at_rest = gain_at_rest(p)
     share = p.fluid_stiffness / (p.diaphragm_stiffness + p.fluid_stiffness)
     derivative = 2.0 * (WANTED_DAMPING - zeta) * omega * p.cylinder_mass / share
+    gain, integral = PROPORTIONAL / at_rest, 2.0 * WANTED_DAMPING * omega / at_rest / SAFETY
     return {
-        "P": Pid(PROPORTIONAL / at_rest),
-        "PI": Pid(PROPORTIONAL / at_rest, 2.0 * zeta * omega / at_rest / SAFETY),
-        "PID": Pid(
-            PROPORTIONAL / at_rest, 2.0 * WANTED_DAMPING * omega / at_rest / SAFETY, derivative, 3.0 * SAMPLE_TIME
-        ),
+        "P": Pid(gain),
+        "PI": Pid(gain, 2.0 * zeta * omega / at_rest / SAFETY),
+        "PID": Pid(gain, integral, derivative, 3.0 * SAMPLE_TIME),
     }
 
 
@@ -190,5 +189,4 @@ def spectrum_table(runs: pd.DataFrame) -> Frames:
         lines = 2.0 * np.abs(np.fft.rfft((command - command.mean()) * window)) / window.sum()
         frequency = np.fft.rfftfreq(len(command), SAMPLE_TIME)
         kept = (frequency > 0.0) & (frequency <= 5e3)
-        columns = {"frequency_hz": frequency[kept], "amplitude_n": lines[kept]}
-        yield {"controller": name, **columns}
+        yield {"controller": name, "frequency_hz": frequency[kept], "amplitude_n": lines[kept]}

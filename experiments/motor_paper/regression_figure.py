@@ -75,9 +75,8 @@ def draw_line_fits(tables: Tables) -> Figure:
     ordered = rows.sort_values("standardised_residual")["standardised_residual"].to_numpy()
     right.plot(rows["normal_score"], ordered, "o", color=BLUE)
     right.plot([-1.5, 1.5], [-1.5, 1.5], color=GREY, linewidth=0.9)
-    right.set(
-        xlabel="normal quantile", ylabel="standardised residual", title="what normality is asked of: the residuals"
-    )
+    right.set(xlabel="normal quantile", ylabel="standardised residual")
+    right.set(title="what normality is asked of: the residuals")
     flows.plot(rows["percentile"], rows["sorted_flow"], "o", color=BLUE)
     flows.set(xlabel="percentile [%]", ylabel="flow, sorted [mL/s]", title="Figure 14")
     return figure

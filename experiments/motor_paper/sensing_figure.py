@@ -77,9 +77,8 @@ def draw_spectra(tables: Tables) -> Figure:
     figure, axes = panels(title, 1, len(groups), 3.4, Margins(left=0.65, top=0.75, across=0.2), sharey=True)
     for axis, (name, part) in zip(axes, groups, strict=True):
         axis.bar(part["harmonic"], part["relative_percent"], 0.7, color=BLUE)
-        axis.set(
-            title=str(name).split(" [")[0], xlabel="harmonic", xticks=[1, 3, 5, 7, 9], yscale="log", ylim=(1e-3, 200.0)
-        )
+        axis.set(title=str(name).split(" [")[0], xlabel="harmonic", xticks=[1, 3, 5, 7, 9])
+        axis.set(yscale="log", ylim=(1e-3, 200.0))
     axes[0].set(ylabel="% of the first")
     return figure
 

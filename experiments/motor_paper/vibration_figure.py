@@ -86,12 +86,8 @@ def draw_poles(tables: Tables) -> Figure:
             short = str(name).removeprefix("equations ").removeprefix("equation ")
             left.plot([first["real_rad_s"]] * 2, both, "x", color=_MODELS[str(name)][0], markersize=8, label=short)
     left.axvline(0.0, color=BLACK, linewidth=0.8)
-    left.set(
-        xlabel="real part [1/s]; right of zero is unstable",
-        ylabel="imaginary part [1000 rad/s]",
-        xlim=(-450.0, 450.0),
-        ylim=(-6.5, 6.5),
-    )
+    left.set(xlabel="real part [1/s]; right of zero is unstable", ylabel="imaginary part [1000 rad/s]")
+    left.set(xlim=(-450.0, 450.0), ylim=(-6.5, 6.5))
     left.legend(loc="center left", fontsize=8.0)
     _nyquist(right, tables["vibration responses"].query("frequency_hz < 2000"))
     say(right, "-1", (-1.0, 0.0), (4, 4))

@@ -19,6 +19,7 @@ from experiments.nine_conditions.findings import (
     recoveries,
 )
 from experiments.nine_conditions.settings import StudySettings
+from experiments.nine_conditions.transfer_functions import COEFFICIENTS
 from experiments.page.frames import Rows, Tables, tabled
 from experiments.page.numbers import MINUS, MISSING, exact, fixed, number, pretty_unit
 from experiments.page.tables import Cell, Column, Columns, Row, as_given, decimals, right, spaced
@@ -28,7 +29,6 @@ from experiments.running.study import versions
 TENTH_GIGA_PASCAL = 1e-8
 """From Pa to 1e8 Pa."""
 
-COEFFICIENTS = ("b0", "b1", "b2", "a1", "a2")
 
 SCALAR_UNITS: Mapping[str, tuple[str, float]] = {"1": ("%", 100.0), "Hz": ("Hz", 1.0), "Pa": ("Pa", 1.0)}
 """How a scalar is shown, by its SI unit."""

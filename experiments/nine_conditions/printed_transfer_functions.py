@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from experiments.nine_conditions.transfer_functions import printed_gain_interval
+from experiments.nine_conditions.transfer_functions import COEFFICIENTS, printed_gain_interval
 from experiments.page.frames import cell
 from experiments.published import load
 
 _DIGITS = 4
-_NAMES = ("b0", "b1", "b2", "a1", "a2")
 
 
 def printed_model(condition: str) -> dict[str, Any]:
@@ -23,7 +22,7 @@ def printed_model(condition: str) -> dict[str, Any]:
         the interval of the gain.
     """
     table = load("transfer_functions").set_index("condition")
-    printed = [repr(cell(table, condition, name)) for name in _NAMES]
+    printed = [repr(cell(table, condition, name)) for name in COEFFICIENTS]
     values = np.array([float(text) for text in printed])
     half = 0.5 * 10.0 ** (np.floor(np.log10(np.abs(values))) - (_DIGITS - 1))
     centre = _roots(values)

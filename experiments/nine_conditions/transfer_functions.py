@@ -24,6 +24,8 @@ from plant.eha.model import EhaParameters
 from plant.errors import LogWarning
 from plant.log.record import Record
 
+COEFFICIENTS = ("b0", "b1", "b2", "a1", "a2")
+
 ROUNDING = 0.5
 """Half a unit of the last printed digit: what Table 6 leaves open."""
 
@@ -69,22 +71,22 @@ def transfer_function_table(models: Mapping[str, LinearModel]) -> Rows:
     """
     published = load("transfer_functions").set_index("condition")
     for name, model in models.items():
-        names = ["b0", "b1", "b2", "a1", "a2"]
         values = [*model.numerator, *model.denominator[1:]]
-        row: dict[str, object] = {"condition": name}
-        row |= dict(zip(names, values, strict=True))
-        row |= {f"{key}_std": std for key, std in zip(names, model.coefficient_std, strict=True)}
-        low, high = printed_gain_interval([repr(cell(published, name, key)) for key in names])
-        row |= {
+        printed = {key: cell(published, name, key) for key in COEFFICIENTS}
+        low, high = printed_gain_interval([repr(value) for value in printed.values()])
+        yield {
+            "condition": name,
+            **dict(zip(COEFFICIENTS, values, strict=True)),
+            **{f"{key}_std": std for key, std in zip(COEFFICIENTS, model.coefficient_std, strict=True)},
             "dc_gain": model.dc_gain,
             "dc_gain_std": model.dc_gain_std,
             "bandwidth_hz": model.bandwidth_hz,
             "fit_percent": model.fit_percent,
             "jump_ratio": values[0] / model.dc_gain,
+            **{f"published_{key}": value for key, value in printed.items()},
+            "published_dc_gain_low": low,
+            "published_dc_gain_high": high,
         }
-        row |= {f"published_{key}": cell(published, name, key) for key in names}
-        row |= {"published_dc_gain_low": low, "published_dc_gain_high": high}
-        yield row
 
 
 def printed_gain_interval(printed: list[str]) -> tuple[float, float]:
@@ -202,7 +204,8 @@ def order_table(record: Record, rng: np.random.Generator) -> pd.DataFrame:
     )
 
 
-def filtering_table(rng: np.random.Generator, duration: float) -> pd.DataFrame:
+@tabled
+def filtering_table(rng: np.random.Generator, duration: float) -> Rows:
     """Return what zero-phase filtering of the output alone does to a fit, on a plant whose poles are known.
 
     Section 4 filters the output only. The plant here is a strictly proper 30 Hz resonance with damping 0.6, driven as
@@ -226,12 +229,12 @@ def filtering_table(rng: np.random.Generator, duration: float) -> pd.DataFrame:
     u = np.repeat(rng.choice([-1.0, 1.0], size=round(duration / 0.05)), 50)
     y = plant.simulate(u)
     y = y + 0.05 * np.std(y) * rng.standard_normal(len(y))
-    rows = [_pole_row("truth", plant), _pole_row("neither filtered", _fit(u, y))]
-    rows.append(_pole_row("both filtered", _fit(*zero_phase_filter(u, y, T))))
+    yield _pole_row("truth", plant)
+    yield _pole_row("neither filtered", _fit(u, y))
+    yield _pole_row("both filtered", _fit(*zero_phase_filter(u, y, T)))
     with warnings.catch_warnings(action="ignore", category=LogWarning):
         only_output = zero_phase_filter(u, y, T, filter_input=False)
-    rows.append(_pole_row("output only, as in section 4", _fit(*only_output)))
-    return pd.DataFrame(rows)
+    yield _pole_row("output only, as in section 4", _fit(*only_output))
 
 
 def _fit(u: np.ndarray, y: np.ndarray) -> LinearModel:

@@ -61,7 +61,8 @@ def cell(frame: pd.DataFrame, row: object, column: str) -> float:
     return float(cast("SupportsFloat", frame.at[row, column]))
 
 
-def parameter_table(parameters: Any) -> pd.DataFrame:
+@tabled
+def parameter_table(parameters: Any) -> Rows:
     """Return parameters with the notes that the code carries.
 
     Parameters
@@ -75,9 +76,5 @@ def parameter_table(parameters: Any) -> pd.DataFrame:
         One row a parameter: parameter, value, unit, meaning, source.
     """
     noted = notes(type(parameters))
-    return pd.DataFrame(
-        [
-            {"parameter": field.name, "value": getattr(parameters, field.name), **asdict(noted[field.name])}
-            for field in fields(parameters)
-        ]
-    )
+    for field in fields(parameters):
+        yield {"parameter": field.name, "value": getattr(parameters, field.name), **asdict(noted[field.name])}

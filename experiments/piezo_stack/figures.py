@@ -114,9 +114,8 @@ def draw_loaded(tables: Tables) -> Figure:
     Figure
         Fixed weights on the left, rising load on the right.
     """
-    figure, (left, right) = panels(
-        "Output flow under load, 140 V and 1.0 MPa", 1, 2, 3.8, Margins(left=0.65, top=0.65, across=0.6), sharey=True
-    )
+    title = "Output flow under load, 140 V and 1.0 MPa"
+    figure, (left, right) = panels(title, 1, 2, 3.8, Margins(left=0.65, top=0.65, across=0.6), sharey=True)
     weights = {0.0: "no load", 10.0: "10 kg", 20.0: "20 kg"}
     _curves(left, tables["figure 13 flow with fixed weight"], "load_kg", weights)
     _quoted(left, 1.0)

@@ -23,15 +23,13 @@ Case = TypeVar("Case")
 Found = TypeVar("Found")
 
 
-def side_by_side(run: Callable[[Case], Found], cases: Iterable[Case], workers: int | None = None) -> Iterator[Found]:
+def side_by_side(run: Callable[[Case], Found], cases: Iterable[Case]) -> Iterator[Found]:
     """Run every case and yield the results in the cases' order.
 
     Parameters
     ----------
     run : callable
         From a case to its result; depends on nothing but the case.
-    workers : int, optional
-        Threads; the machine's cores by default.
 
     Yields
     ------
@@ -43,7 +41,7 @@ def side_by_side(run: Callable[[Case], Found], cases: Iterable[Case], workers: i
     >>> list(side_by_side(abs, [-2, 3]))
     [2, 3]
     """
-    executor = ThreadPoolExecutor(max_workers=workers or os.cpu_count() or 1)
+    executor = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
     try:
         with threadpool_limits(limits=1, user_api="blas"):
             yield from executor.map(run, cases)
