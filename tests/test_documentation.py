@@ -1,10 +1,8 @@
 """The public API says what it is: docstrings, arguments, units, shapes.
 
-The rules, each shown to fire on a made-up offender: every public module, class, function and method has a
-docstring; an argument that is a float or an array stands under Parameters, with its unit or its shape; another stands
-there only where there is more to say than its name and type do, and nothing does that is no argument. More than one
-line about a function that returns floats or arrays has Returns. Members of a Protocol with a body of ``...`` need one
-line only, and commands are checked by their help.
+The rules, each shown to fire on a made-up offender: whatever is public has a docstring; floats and arrays, and no
+strangers, stand under Parameters with unit or shape; more than one line about a function that returns floats or arrays
+has Returns. Protocol members with a body of ``...`` need one line only, and commands are checked by their help.
 """
 
 import ast
@@ -197,17 +195,15 @@ def _argument_offences(
 ) -> Iterator[str]:
     found = sections(ast.get_docstring(node) or "")
     described = entries(found.get("Parameters", []))
+    for stale in () if isinstance(node, ast.ClassDef) else described.keys() - arguments.keys():
+        yield page.offence(node, name, f"describes {stale!r}, which it does not take")
     if isinstance(node, ast.ClassDef):
         described |= entries(found.get("Attributes", []))
-    else:
-        for stale in described.keys() - arguments.keys():
-            yield page.offence(node, name, f"describes {stale!r}, which it does not take")
     for argument, annotation in arguments.items():
         entry = described.get(argument)
-        if entry is None and not _mentions(annotation, page.floats | page.arrays):
-            continue
         if entry is None:
-            yield page.offence(node, name, f"does not list {argument!r} under Parameters")
+            if _mentions(annotation, page.floats | page.arrays):
+                yield page.offence(node, name, f"does not list {argument!r} under Parameters")
             continue
         says_unit = UNIT_SUFFIX.search(argument) or has_unit(f"{entry.type_line} {entry.description}")
         if _mentions(annotation, page.floats) and not says_unit and not entry.type_line.startswith("bool"):
@@ -229,10 +225,9 @@ def _function_offences(page: Page, node: Function, name: str, owner: ast.ClassDe
     if node.name in page.pasted or command or (owner is not None and "Protocol" in _bases(owner) and _is_stub(node)):
         return
     yield from _argument_offences(page, node, name, _arguments(node, method=owner is not None))
-    returns = ast.unparse(node.returns) if node.returns else "None"
     numbers = _mentions(node.returns, page.floats | page.arrays) and not decorators & {"property", "cached_property"}
     if "\n" in docstring and numbers and not sections(docstring).keys() & {"Returns", "Yields"}:
-        yield page.offence(node, name, f"does not say under Returns what its {returns} is")
+        yield page.offence(node, name, f"does not say under Returns what its {ast.unparse(node.returns)} is")
 
 
 def documentation_offences(page: Page) -> Iterator[str]:
