@@ -9,11 +9,9 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.models.model import OPENING, ProcessModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,14 +9,10 @@ in a line, line after line. Several lanes are stepped at a time, where they stan
 
 import math
 from collections.abc import Callable
-from typing import Protocol, TypeAlias
+from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from estimation.arrays import Array, IntArray
 from plant.compiled.intrinsics import ROWS, transpose
-
-Array: TypeAlias = NDArray[np.float64]
 
 AHEAD = 512
 """Bytes of each log that are fetched ahead of their use: the memory answers within a few samples of all lanes."""
@@ -142,8 +138,8 @@ def flush(kernel: LanesKernel, work: Array, logs: Array) -> None:
 def run(
     kernel: LanesKernel,
     work: Array,
-    drives: NDArray[np.int64],
-    measured: NDArray[np.int64],
+    drives: IntArray,
+    measured: IntArray,
     rows: Array,
     samples: int,
     substeps: int,
@@ -165,7 +161,7 @@ def run(
         steps(kernel, work, drive, sample, at, new, ROWS, substeps, every, *results)
 
 
-def lay_side_by_side(kernel: LanesKernel, places: NDArray[np.int64], begin: int, width: int, rows: int) -> None:
+def lay_side_by_side(kernel: LanesKernel, places: IntArray, begin: int, width: int, rows: int) -> None:
     """Copy `ROWS` samples of each log, of so many numbers, into lines of all lanes."""
     line = kernel.LINE
     for lane in range(0, line, 8 * ROWS):

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.kalman import Outputs, belief_names
 from estimation.engine.rule import Rule
 from estimation.models.model import ProcessModel
@@ -15,8 +16,6 @@ from plant.compiled.hoist import hoisted
 from plant.compiled.simplify import fused, simplified
 from plant.compiled.source import CALLED, symbols_in
 from plant.errors import HydrostateError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

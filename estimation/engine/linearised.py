@@ -7,8 +7,8 @@ from types import ModuleType
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.kalman import bounded, scaled_step
 from estimation.engine.parts import function_source
 from estimation.models.model import ProcessModel
@@ -16,8 +16,6 @@ from plant.compiled.expression import ZERO, Expression
 from plant.compiled.kernel_file import load_kernel
 from plant.compiled.paste import kernel_text, pasted
 from plant.compiled.source import INTRINSICS
-
-Array = NDArray[np.float64]
 
 Fill: TypeAlias = Callable[[Array, Array, Array, Array, float, float, float, Array, Array], None]
 """``fill(mean, start, end, parameters, h, j, share, moved, slopes)``: compute the new mean and its Jacobian."""

@@ -8,9 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
+from estimation.arrays import Array
 from estimation.engine.kalman import belief_names
 from estimation.engine.layout import halves_of, layout
 from estimation.engine.rule import Rule
@@ -18,8 +16,6 @@ from estimation.models.model import ProcessModel
 from plant.compiled.expression import Expression
 from plant.compiled.paste import BORROWING
 from plant.compiled.source import lines_source, symbols_in
-
-Array = NDArray[np.float64]
 
 Prepare: TypeAlias = Callable[[Array, Array], None]
 """``prepare(rows, constants)``: compute what does not change from sample to sample."""

@@ -5,14 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem, Trace, empty_trace
 from estimation.engine.kernels import compile_kernel
 from estimation.engine.layout import Layout, layout, upper_triangle
 from estimation.engine.rule import Rule, chosen_settings, weighing
-
-Array = NDArray[np.float64]
 
 
 def constant_row(problem: FilterProblem, settings: dict[str, float]) -> Array:

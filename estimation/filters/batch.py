@@ -11,8 +11,8 @@ from functools import partial
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array, IntArray
 from estimation.engine.contract import FilterProblem, Trace
 from estimation.engine.kernels import LANES, compile_kernel
 from estimation.engine.layout import layout
@@ -21,8 +21,6 @@ from estimation.engine.runner import constant_rows, read_off, run_rule
 from estimation.filters.ekf import EKF
 from plant.compiled.intrinsics import ROWS
 from plant.errors import HydrostateError
-
-Array = NDArray[np.float64]
 
 FEWEST_IN_LANES = 8
 """A block of fewer filters is run one after the other: empty lanes cost as much as full ones."""
@@ -123,7 +121,7 @@ def _run_block(rule: Rule, block: Sequence[FilterProblem]) -> list[Trace]:
     ]
 
 
-def _places(arrays: Sequence[Array]) -> NDArray[np.int64]:
+def _places(arrays: Sequence[Array]) -> IntArray:
     """Return the addresses at which arrays begin."""
     return np.array([one.ctypes.data for one in arrays])
 

@@ -12,15 +12,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem, Trace, empty_trace
 from estimation.engine.linearised import compile_step
 from estimation.models.model import ProcessModel
 from plant.errors import HydrostateError
 from plant.solvers.steps import parameter_names
-
-Array = NDArray[np.float64]
 
 
 def filterpy_ekf(problem: FilterProblem) -> Trace:

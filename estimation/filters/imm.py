@@ -16,8 +16,8 @@ from itertools import product
 from math import log
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem, Trace, empty_trace
 from estimation.engine.layout import upper_triangle
 from estimation.engine.rule import Rule, chosen_settings, positive, weighing
@@ -25,8 +25,6 @@ from estimation.engine.runner import constant_row
 from estimation.filters.ekf import EKF
 from estimation.filters.imm_loops import compile_imm
 from plant.errors import HydrostateError
-
-Array = NDArray[np.float64]
 
 LEAKAGE: Mapping[str, tuple[float, ...]] = {
     "leakage_coefficient": (1.0, 5.3, 12.6),

@@ -7,8 +7,8 @@ from functools import cache
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array, IntArray
 from estimation.engine.parts import rule_functions
 from estimation.engine.rule import Rule
 from estimation.models.model import ProcessModel
@@ -19,7 +19,6 @@ from plant.compiled.source import INTRINSICS
 Kind = tuple[Rule, ProcessModel]
 """What modes share: a filter on a model; they differ in parameters."""
 
-Array = NDArray[np.float64]
 
 PrepareMode: TypeAlias = Callable[[int, Array, Array], None]
 PredictMode: TypeAlias = Callable[[int, Array, Array, Array, Array, float], None]
@@ -137,7 +136,7 @@ def unpack(belief: Array, mean: Array, covariance: Array, *, WIDTH: int) -> None
 def run(
     states: Array,
     rows: Array,
-    kinds: NDArray[np.int64],
+    kinds: IntArray,
     transitions: Array,
     log_probability: Array,
     drives: Array,

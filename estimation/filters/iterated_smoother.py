@@ -17,15 +17,13 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem, Trace, empty_trace
 from estimation.engine.rule import chosen_settings
 from estimation.engine.runner import constant_row
 from estimation.filters.trajectory_loops import compile_trajectory
 from plant.errors import HydrostateError
-
-Array = NDArray[np.float64]
 
 ITERATIONS = 50
 """Corrections at most."""

@@ -17,8 +17,8 @@ from functools import cache
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem, Trace, empty_trace
 from estimation.engine.kalman import belief_symbols, bounded, moved, observed, process_noise
 from estimation.engine.layout import layout
@@ -32,8 +32,6 @@ from plant.compiled.kernel_file import load_kernel
 from plant.compiled.paste import MERGED, kernel_text, pasted
 from plant.compiled.source import INTRINSICS
 from plant.errors import HydrostateError
-
-Array = NDArray[np.float64]
 
 Move: TypeAlias = Callable[[Array, Array, Array, Array, float], None]
 """``move(state, rows, before, after, j)``: take sub-step j of the model between samples of the drives."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem, Method, Trace
 from estimation.filters.ckf import ckf
 from estimation.filters.ekf import ekf
@@ -27,8 +27,6 @@ from plant.compiled.expression import symbol
 from plant.errors import LogError, require_known
 from plant.log.record import Record
 from plant.solvers.steps import Parameters, parameter_row, parameter_symbols
-
-Array = NDArray[np.float64]
 
 METHODS: Mapping[str, Method] = MappingProxyType(
     {

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.rule import Rule
 from estimation.filters.ekf import EKF
 from estimation.filters.imm import interacting, log_transitions
@@ -16,8 +16,6 @@ from estimation.models.model import ProcessModel
 from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.solvers.steps import Parameters
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

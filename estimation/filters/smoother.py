@@ -22,16 +22,14 @@ from dataclasses import dataclass
 from math import isqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem, Trace
 from estimation.engine.kalman import belief_names
 from estimation.engine.rule import chosen_settings
 from estimation.engine.runner import constant_row
 from estimation.filters.ekf import ekf
 from estimation.filters.smoother_loops import compile_smoother
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ from types import ModuleType
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.kalman import (
     Covariance,
     Outputs,
@@ -29,8 +29,6 @@ from plant.compiled.expression import ONE, ZERO, Expression, select, symbol
 from plant.compiled.kernel_file import load_kernel
 from plant.compiled.paste import kernel_text, pasted
 from plant.compiled.source import INTRINSICS
-
-Array = NDArray[np.float64]
 
 BackPredict: TypeAlias = Callable[[Array, Array, Array, Array, Array, float], None]
 """``back_predict(state, adjoint, rows, before, after, j)``: take the adjoint back over a sub-step from a state."""

@@ -12,8 +12,8 @@ from types import ModuleType
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.kalman import belief_symbols, moved, observed, scaled_step
 from estimation.engine.layout import layout
 from estimation.engine.parts import data_places, function_source
@@ -24,8 +24,6 @@ from plant.compiled.expression import ONE, ZERO, jacobian, symbol
 from plant.compiled.kernel_file import load_kernel
 from plant.compiled.paste import BORROWING, kernel_text, pasted
 from plant.compiled.source import INTRINSICS
-
-Array = NDArray[np.float64]
 
 Advance: TypeAlias = Callable[[Array, Array, Array, Array, float], None]
 """``advance(state, rows, before, after, j)``: take sub-step j between samples of the drives."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from estimation.arrays import Array
 from estimation.identification.design.dead_time import estimate_delay
 from estimation.identification.fit.arx import fit_arx
 from estimation.identification.fit.fitted import CovarianceKind
@@ -16,7 +17,7 @@ from estimation.identification.fit.order import order_table
 from estimation.identification.fit.output_error import fit_output_error
 from estimation.identification.fit.prediction_error import fit_armax, fit_box_jenkins
 from estimation.identification.fit.validate import fit_percent, validate
-from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.experiments import Signals, listed
 from plant.errors import HydrostateError, LogWarning
 
@@ -172,9 +173,7 @@ def compare_structures(
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("structure")
 
 
-def split_record(
-    u: Signals, y: Signals
-) -> tuple[tuple[list[FloatArray], list[FloatArray]], tuple[list[FloatArray], list[FloatArray]]]:
+def split_record(u: Signals, y: Signals) -> tuple[tuple[list[Array], list[Array]], tuple[list[Array], list[Array]]]:
     """Return what is fitted and what is held back: the last third of a record, or of the experiments.
 
     Parameters

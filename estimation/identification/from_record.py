@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from estimation.arrays import Array
 from estimation.identification.choose import STRUCTURES, StructureName, choose_model
 from estimation.identification.design.sticking import rest_shares, rests
 from estimation.identification.fit.fitted import CovarianceKind
 from estimation.identification.fit.residual_tests import DEFAULT_LAGS, feedback_test
-from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.notes import IdentificationCode
 from estimation.identification.signals.preprocess import resample, zero_phase_filter
 from estimation.log_checks.bridging import bridged
@@ -115,7 +116,7 @@ def record_signals(
     input: str = "motor_speed_rad_s",  # noqa: A002 - the word that the command and its JSON use
     sample_time: float = 1e-3,
     filter_cutoff_hz: float | None = None,
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Array, Array]:
     """Return input and output of a record as `identify_record` fits them.
 
     Parameters
@@ -151,7 +152,7 @@ def record_signals(
     return (u, y) if filter_cutoff_hz is None else zero_phase_filter(u, y, sample_time, cutoff_hz=filter_cutoff_hz)
 
 
-def _warn_of_rest(model: LinearModel, fit_percents: Mapping[Any, float], u: FloatArray, y: FloatArray) -> None:
+def _warn_of_rest(model: LinearModel, fit_percents: Mapping[Any, float], u: Array, y: Array) -> None:
     part = slice(0, RESTING_SAMPLES)
     measured, linear = rest_shares(u[part], y[part], model.sample_time)
     if rests(measured, linear):
@@ -167,7 +168,7 @@ def _warn_of_rest(model: LinearModel, fit_percents: Mapping[Any, float], u: Floa
         warnings.warn(LogWarning(said), stacklevel=3)
 
 
-def _warn_of_feedback(model: LinearModel, u: FloatArray, y: FloatArray) -> None:
+def _warn_of_feedback(model: LinearModel, u: Array, y: Array) -> None:
     part = slice(0, FEEDBACK_SAMPLES)
     if not model.is_stable or u[part].size < 8 * DEFAULT_LAGS:
         return
@@ -178,7 +179,7 @@ def _warn_of_feedback(model: LinearModel, u: FloatArray, y: FloatArray) -> None:
         warnings.warn(LogWarning(said), stacklevel=3)
 
 
-def _output(record: Record, name: str) -> FloatArray:
+def _output(record: Record, name: str) -> Array:
     if name in record or name != "velocity_m_s" or "position_m" not in record:
         return record[name]
     if len(record) < 3:
@@ -187,7 +188,7 @@ def _output(record: Record, name: str) -> FloatArray:
     return np.gradient(record["position_m"], record.sample_time)
 
 
-def _without_gaps(values: FloatArray, name: str) -> FloatArray:
+def _without_gaps(values: Array, name: str) -> Array:
     n_missing = int(np.count_nonzero(np.isnan(values)))
     if n_missing == 0:
         return values

@@ -9,13 +9,11 @@ from collections.abc import Mapping
 from types import SimpleNamespace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.models.model import ProcessModel, StateVariable
 from plant.compiled.functions import Scalar
 from plant.eha.model import PARAMETER_NAMES, EhaParameters, EhaValues, lumped_step, reduced_derivative
-
-Array = NDArray[np.float64]
 
 BULK_MODULUS = "bulk_modulus_pa"
 """Name of the state that every form estimates."""

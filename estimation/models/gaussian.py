@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from plant.errors import HydrostateError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,12 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from plant.compiled.functions import Scalar
 from plant.solvers.steps import Parameters
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

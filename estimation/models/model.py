@@ -10,15 +10,13 @@ from math import inf, log
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.models.gaussian import Gaussian
 from plant.compiled.functions import Scalar
 from plant.errors import HydrostateError, LogError
 from plant.runs import steps_a_sample
 from plant.solvers.steps import Parameters
-
-Array = NDArray[np.float64]
 
 OPENING = "opening_"
 """What a drive is called, before a state's name, that holds the variance that a sample adds to the state beside the

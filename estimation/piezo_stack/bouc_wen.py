@@ -6,20 +6,17 @@ The paper's own procedure is in `estimation.piezo_stack.bouc_wen_printed`; it ca
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from types import MappingProxyType
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from estimation.arrays import Array
 from estimation.finding import interval_95
 from estimation.tuning.step_sensitivity import sensitivity_step
 from plant.errors import LogError
 from plant.piezo_stack.hysteresis import slow_stack_step
 from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.solvers.trajectory import compile_trajectory
-
-Array: TypeAlias = NDArray[np.float64]
 
 SHAPE = ("hysteresis", "hysteresis_phi_1", "hysteresis_phi_2", "hysteresis_phi_3", "hysteresis_gamma")
 """The parameters of the loop's shape, equation 1."""

@@ -9,9 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from estimation.arrays import Array
 
 REGIONS = np.array([[1.0, 1.0, 1.0, 1.0], [-1.0, 1.0, -1.0, 1.0], [-1.0, -1.0, 1.0, 1.0], [1.0, -1.0, -1.0, 1.0]])
 """Signs of phi_1, phi_2, phi_3 and gamma where (rate, h) are (+, +), (+, -), (-, +), (-, -): equation 33."""

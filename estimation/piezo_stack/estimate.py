@@ -8,19 +8,18 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import sqrt
 from types import MappingProxyType, SimpleNamespace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.finding import interval_95
 from estimation.piezo_stack.runs import COARSE_SLOPE_STEP, COARSE_STEP, STACK_CHANNELS, StackRuns, prepared
 from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS
 from plant.log.record import Record
 from plant.piezo_stack.parameters import LONGEST_STEP, PiezoStackParameters
 from plant.piezo_stack.run import BENCH_SENSORS, StackSensors, checked_voltage
-
-Array: TypeAlias = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,10 @@ filters have it, would fill a kernel with some hundred thousand operations.
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
 from types import MappingProxyType, SimpleNamespace
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.piezo_stack.runs import STACK_CHANNELS, StackRuns, prepared
 from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, changed
 from plant.errors import HydrostateError
@@ -21,8 +20,6 @@ from plant.piezo_stack.model import STATES, at_bias
 from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.run import BENCH_SENSORS, StackSensors, stack_channels
 from plant.piezo_stack.trajectory import NAME, run_rows, stack_row
-
-Array: TypeAlias = NDArray[np.float64]
 
 STATE_SIZES = np.array(
     [1e-5, 0.02, 2e3, 1e-6, 1e-9, 1e-4, 0.1, 1e-4, 0.1, 1e-9, 1e-5, 1e-9, 1e-3, 0.1, 1e-9, 1e-5, 1e-9, 1e-5, 1e-9]

@@ -3,19 +3,16 @@
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from types import SimpleNamespace
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.piezo_stack.unknowns import UNKNOWNS, changed
 from plant.errors import HydrostateError, LogError, require_known
 from plant.log.record import Record
 from plant.piezo_stack.parameters import LONGEST_STEP, PiezoStackParameters
 from plant.piezo_stack.run import BENCH_SENSORS, StackSensors, checked_voltage, stack_channels
 from plant.piezo_stack.trajectory import run_stacks
-
-Array: TypeAlias = NDArray[np.float64]
 
 DRIVE = "drive_voltage_v"
 """The channel of the drive."""

@@ -8,8 +8,8 @@ from types import ModuleType
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.kalman import belief_symbols, bounded, observed, scaled_step, total
 from estimation.engine.parts import data_places, function_source
 from estimation.filters.run import TRACK_ROWS
@@ -25,8 +25,6 @@ from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.solvers.steps import Parameters, parameter_row
-
-Array = NDArray[np.float64]
 
 FINEST_STEP = 1e-4
 """Step of the model along the trajectory, or less where the log is sampled faster [s]."""

@@ -5,9 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from estimation.arrays import Array
 
 PRESSURE = "differential_pressure_pa"
 """The channel without which a stuck piston says nothing."""

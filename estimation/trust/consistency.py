@@ -6,16 +6,14 @@ estimate move from stretch to stretch no more than its own shrinking interval al
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.filters.run import Estimate
 from estimation.finding import Gate
 from estimation.notes import EstimateCode
 from estimation.trust.whiteness import SETTLING, Whiteness, whiteness
 from plant.log.record import Record
 from plant.notes import Note
-
-Array = NDArray[np.float64]
 
 LARGEST_NIS = 2.0
 """Mean NIS of a channel above which the filter is called overconfident; 1 is expected [dimensionless]."""

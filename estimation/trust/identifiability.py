@@ -13,8 +13,8 @@ from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.models.eha_forms import PRESSURE_FORM
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import StateVariable
@@ -26,8 +26,6 @@ from plant.errors import HydrostateError, require_each_known
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, Sensors, noise_variances
 from plant.units import notes
-
-Array = NDArray[np.float64]
 
 UNKNOWN = (
     "bulk_modulus",

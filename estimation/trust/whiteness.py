@@ -10,13 +10,11 @@ cautious, and is no objection. All of it is a few Fourier transforms of the kept
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array, BoolArray
 from estimation.filters.run import Estimate
 from estimation.log_checks.bridging import bridged
 from plant.log.record import Record
-
-Array = NDArray[np.float64]
 
 SEGMENTS = 8
 """Stretches whose spectra are averaged: few, so that a line of the drive stands out; enough for a sharp threshold."""
@@ -144,7 +142,7 @@ def whiteness(estimate: Estimate, record: Record) -> tuple[Whiteness, ...]:
     return tuple(found)
 
 
-def _normalised(estimate: Estimate, first: int) -> tuple[Array, NDArray[np.bool_]]:
+def _normalised(estimate: Estimate, first: int) -> tuple[Array, BoolArray]:
     """Return innovations over their deviations after settling, 0 where a sample is missing; and which are present."""
     residuals, variances = estimate.residuals[first:], estimate.residual_variances[first:]
     present = ~np.isnan(residuals)

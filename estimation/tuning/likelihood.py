@@ -12,8 +12,8 @@ from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem
 from estimation.engine.layout import layout
 from estimation.filters.ekf import EKF
@@ -27,8 +27,6 @@ from estimation.tuning.scoring import Coordinate, Maximum, maximise
 from plant.eha.model import EhaParameters, lumped_step
 from plant.errors import HydrostateError, require_each_known
 from plant.log.record import Record
-
-Array = NDArray[np.float64]
 
 LUMPED_FORM = replace(PRESSURE_FORM, name="lumped", states=PRESSURE_FORM.states[:3], step=lumped_step)
 """The pressure form with bulk modulus as a parameter: what is constant need not be a state of a fit."""

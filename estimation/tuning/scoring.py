@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem
 from estimation.engine.runner import constant_row
 from estimation.tuning.sensitivity import Sensitivity, innovation_sensitivity
-
-Array = NDArray[np.float64]
 
 AT_REST = 1e-3
 """The optimiser stops where a further step would gain less than this in log-likelihood [dimensionless]."""

@@ -13,8 +13,8 @@ from types import ModuleType
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem
 from estimation.engine.kalman import Outputs, belief_names
 from estimation.engine.layout import layout
@@ -28,8 +28,6 @@ from plant.compiled.hoist import hoisted
 from plant.compiled.kernel_file import load_kernel
 from plant.compiled.paste import kernel_text, pasted
 from plant.compiled.source import INTRINSICS
-
-Array = NDArray[np.float64]
 
 
 def rewritten(outputs: Outputs, replacement: Mapping[str, Expression]) -> Outputs:

@@ -29,8 +29,9 @@ from plant.errors import HydrostateError
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from estimation.arrays import Array
     from estimation.identification.choose import StructureName
-    from estimation.identification.model.linear_model import FloatArray, LinearModel
+    from estimation.identification.model.linear_model import LinearModel
 
 TABLE_6_TIME = 1e-3
 """Sample time of Table 6 as we read it [s] (errata E14)."""
@@ -181,7 +182,7 @@ def _entries(model: "LinearModel") -> dict[str, Any]:
     }
 
 
-def _judged(model: "LinearModel", u: "FloatArray", y: "FloatArray", log: Path, figure: Path | None) -> dict[str, Any]:
+def _judged(model: "LinearModel", u: "Array", y: "Array", log: Path, figure: Path | None) -> dict[str, Any]:
     """Return what the data say of the model: tests of its residual, and the gain's interval; draw both if wanted."""
     from estimation.finding import interval_95
     from estimation.identification.fit.profile_interval import dc_gain_interval

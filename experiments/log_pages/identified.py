@@ -6,9 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from estimation.arrays import Array
 from estimation.identification.fit.residual_tests import DEFAULT_LAGS, correlations
 from estimation.identification.fit.validate import Validation
-from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.signals.automatic_window import automatic_response
 from experiments.page.figure_files import write_png
 from experiments.page.style import BLUE, GREY, ORANGE, VERMILION, Margins, panels
@@ -21,7 +22,7 @@ LEAST_COHERENCE = 0.1
 """Below, the empirical response says nothing and is left out."""
 
 
-def draw_identified(model: LinearModel, u: FloatArray, y: FloatArray, found: Validation, log: str) -> Figure:
+def draw_identified(model: LinearModel, u: Array, y: Array, found: Validation, log: str) -> Figure:
     """Draw measured and simulated output, the residual with its correlations, and the gain with its band.
 
     Parameters
@@ -47,7 +48,7 @@ def draw_identified(model: LinearModel, u: FloatArray, y: FloatArray, found: Val
     return figure
 
 
-def _over_time(axis: Axes, model: LinearModel, curves: dict[str, tuple[str, FloatArray]]) -> None:
+def _over_time(axis: Axes, model: LinearModel, curves: dict[str, tuple[str, Array]]) -> None:
     for name, (colour, values) in curves.items():
         every = max(1, values.size // SHOWN_SAMPLES)
         time = model.sample_time * np.arange(values.size)[::every]
@@ -57,14 +58,14 @@ def _over_time(axis: Axes, model: LinearModel, curves: dict[str, tuple[str, Floa
         axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2)
 
 
-def _correlations(axis: Axes, residual: FloatArray, other: FloatArray, lags: np.ndarray) -> None:
+def _correlations(axis: Axes, residual: Array, other: Array, lags: np.ndarray) -> None:
     axis.bar(lags, correlations(residual, other, lags), width=0.7, color=BLUE)
     reach = 1.96 / np.sqrt(np.count_nonzero(np.isfinite(residual)))
     axis.axhspan(-reach, reach, color=GREY, alpha=0.25, lw=0)
     axis.set(xlabel="lag [samples]; grey, 95 % of white residuals", ylabel="correlation [ratio]")
 
 
-def _response(gain: Axes, phase: Axes, model: LinearModel, u: FloatArray, y: FloatArray) -> None:
+def _response(gain: Axes, phase: Axes, model: LinearModel, u: Array, y: Array) -> None:
     frequency = np.geomspace(1.0 / (u.size * model.sample_time), 0.5 / model.sample_time, 200)
     band = model.frequency_response(frequency, ci=0.95)
     known = np.isfinite(y)
@@ -87,7 +88,7 @@ def _response(gain: Axes, phase: Axes, model: LinearModel, u: FloatArray, y: Flo
         axis.set(xscale="log", xlabel="frequency [Hz]")
 
 
-def write_identified(model: LinearModel, u: FloatArray, y: FloatArray, found: Validation, log: str, path: Path) -> None:
+def write_identified(model: LinearModel, u: Array, y: Array, found: Validation, log: str, path: Path) -> None:
     """Write the figure as a PNG, whole or not at all.
 
     Parameters

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import max_len_seq
 
-from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.arrays import Array
+from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.criterion import Structure, sensitivities
 from plant.errors import HydrostateError
 
@@ -53,7 +54,7 @@ class Limits:
             )
 
 
-def prbs_for(bandwidth_hz: float, sample_time: float, limits: Limits, *, slowest: float, duration: float) -> FloatArray:
+def prbs_for(bandwidth_hz: float, sample_time: float, limits: Limits, *, slowest: float, duration: float) -> Array:
     """Return a maximum-length binary signal whose clock and length suit a bandwidth.
 
     The clock is 0.4 / bandwidth, so that its power is 3 dB down there; the register is the shortest whose sequence
@@ -101,7 +102,7 @@ def prbs_for(bandwidth_hz: float, sample_time: float, limits: Limits, *, slowest
     return limits.speed * np.repeat(2.0 * sequence - 1.0, hold)[:n]
 
 
-def multisine_for(frequencies_hz: FloatArray, sample_time: float, limits: Limits, *, duration: float) -> FloatArray:
+def multisine_for(frequencies_hz: Array, sample_time: float, limits: Limits, *, duration: float) -> Array:
     """Return sines of equal power and low crest, scaled to the highest speed.
 
     Schroeder's phases, then those of the signal clipped, again and again (Van der Ouderaa and others 1988).
@@ -147,7 +148,7 @@ def multisine_for(frequencies_hz: FloatArray, sample_time: float, limits: Limits
     return limits.speed * best / np.abs(best).max()
 
 
-def violations(model: LinearModel, u: FloatArray, limits: Limits) -> list[str]:
+def violations(model: LinearModel, u: Array, limits: Limits) -> list[str]:
     """Return what a test would break, by simulating it on a model; nothing, if it may be run.
 
     Parameters
@@ -180,7 +181,7 @@ def violations(model: LinearModel, u: FloatArray, limits: Limits) -> list[str]:
     return found
 
 
-def predicted_covariance(model: LinearModel, u: FloatArray, noise_std: float) -> FloatArray:
+def predicted_covariance(model: LinearModel, u: Array, noise_std: float) -> Array:
     """Return the covariance that an efficient fit to a test would have, the Cramér-Rao bound at the model.
 
     Parameters
@@ -211,9 +212,9 @@ def predicted_covariance(model: LinearModel, u: FloatArray, noise_std: float) ->
 
 def rank_inputs(
     model: LinearModel,
-    candidates: Mapping[str, FloatArray],
+    candidates: Mapping[str, Array],
     noise_std: float,
-    frequencies_hz: FloatArray,
+    frequencies_hz: Array,
     limits: Limits,
 ) -> "pd.DataFrame":
     """Return how accurate each test would make the response, best first.

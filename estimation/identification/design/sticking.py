@@ -7,8 +7,8 @@ waits a little longer, and fits better, so information criteria take all that ar
 
 import numpy as np
 
+from estimation.arrays import Array
 from estimation.identification.fit.output_error import fit_output_error
-from estimation.identification.model.linear_model import FloatArray
 
 AT_REST, DRIVEN = 0.05, 0.5
 """Shares of the 95th percentiles of output and input, below which the output rests, and above which it is driven."""
@@ -22,7 +22,7 @@ often. That flags 17 of 18 logs of a bench with friction (the excess is 1.6 to 1
 108 records of the linear models of Table 6 at 1 and 10 % noise (0.3 % at most)."""
 
 
-def rest_shares(u: FloatArray, y: FloatArray, sample_time: float) -> tuple[float, float]:
+def rest_shares(u: Array, y: Array, sample_time: float) -> tuple[float, float]:
     """Return in which share of the driven samples the output rests, and in which a second-order model would.
 
     Parameters

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from estimation.arrays import Array
 from estimation.identification.fit.fitted import CovarianceKind, fitted_model, scaled
 from estimation.identification.model.lags import lagged
-from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
 from estimation.identification.search.criterion import Structure, profile
 from estimation.identification.search.descent import stable
@@ -93,7 +94,7 @@ def fit_arx(
     )
 
 
-def _state_of(form: Structure, b: FloatArray, f: FloatArray, data: Experiments) -> FloatArray:
+def _state_of(form: Structure, b: Array, f: Array, data: Experiments) -> Array:
     """Return the initial state with which a stable model simulates the first experiment best."""
     if not stable(f):
         return np.zeros(form.n_states)

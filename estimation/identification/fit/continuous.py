@@ -3,11 +3,12 @@
 import numpy as np
 from scipy.optimize import least_squares
 
+from estimation.arrays import Array
 from estimation.identification.fit.covariances import covariances
 from estimation.identification.fit.fitted import scaled
 from estimation.identification.fit.output_error import descend_from, jacobian_and_residual, minimise
 from estimation.identification.model.held_input import held_input_model
-from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.criterion import Structure
 from estimation.identification.search.descent import stable
 from estimation.identification.search.experiments import (
@@ -88,19 +89,19 @@ class _Problem:
         self.data, self.sample_time = data, sample_time
         self.n_zeros, self.n_poles, self.dead_time = n_zeros, n_poles, dead_time
 
-    def discrete(self, values: FloatArray) -> tuple[FloatArray, FloatArray, int]:
+    def discrete(self, values: Array) -> tuple[Array, Array, int]:
         """Return numerator, denominator, delay at one sample a unit of time."""
         n_b = self.n_zeros + 1
         late = self.dead_time / self.sample_time if self.dead_time is not None else values[-1]
         a = np.concatenate([[1.0], values[n_b : n_b + self.n_poles]])
         return held_input_model(values[:n_b], a, max(float(late), 0.0), 1.0)
 
-    def form(self, values: FloatArray) -> Structure:
+    def form(self, values: Array) -> Structure:
         """Return the discrete structure that holds every dead time between this sample and the next."""
         b, _, delay = self.discrete(values)
         return Structure(b.size - delay, self.n_poles, delay)
 
-    def parts(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def parts(self, values: Array) -> tuple[Array, Array]:
         """Return Jacobian by continuous values and initial states, and the residual, initial states at their best."""
         b, f, delay = self.discrete(values)
         form = Structure(b.size - delay, self.n_poles, delay)
@@ -124,16 +125,16 @@ class _Problem:
             moved[b.size - delay :, k] = (other_f[1:] - f[1:]) / step
         return np.concatenate([jacobian[:, :n_main] @ moved, initial], axis=1), residual
 
-    def descend(self, start: FloatArray) -> tuple[float, FloatArray]:
+    def descend(self, start: Array) -> tuple[float, Array]:
         """Return cost and values of the minimum that one start leads to."""
         refused = np.full(self.data.u.size, 1e3)
 
-        def residual(values: FloatArray) -> FloatArray:
+        def residual(values: Array) -> Array:
             if (self.dead_time is None and values[-1] < 0.0) or not stable(self.discrete(values)[1][1:]):
                 return refused
             return self.parts(values)[1]
 
-        def jacobian(values: FloatArray) -> FloatArray:
+        def jacobian(values: Array) -> Array:
             columns, _ = self.parts(values)
             free, initial = columns[:, : values.size], columns[:, values.size :]
             return -(free - initial @ np.linalg.lstsq(initial, free, rcond=None)[0])
@@ -143,11 +144,11 @@ class _Problem:
         )
         return float(found.cost), np.asarray(found.x, dtype=np.float64)
 
-    def starts(self, longest: float) -> list[FloatArray]:
+    def starts(self, longest: float) -> list[Array]:
         """Return starts from discrete fits at several dead times: poles by their logarithms, numerator by response."""
         known = self.dead_time
         lates = [known] if known is not None else np.linspace(0.0, longest, 7)
-        kept: list[tuple[float, FloatArray]] = []
+        kept: list[tuple[float, Array]] = []
         for late in lates:
             whole = int(np.floor(late / self.sample_time + 1e-9))
             form = Structure(self.n_poles + 1, self.n_poles, whole + (0 if self.n_zeros == self.n_poles else 1))
@@ -157,7 +158,7 @@ class _Problem:
             kept.append((cost, values))
         return [values for _, values in sorted(kept, key=lambda one: one[0])[:3]]
 
-    def _from_discrete(self, form: Structure, theta: FloatArray, late: float) -> FloatArray:
+    def _from_discrete(self, form: Structure, theta: Array, late: float) -> Array:
         b, f = theta[: form.n_numerator], np.concatenate([[1.0], theta[form.n_numerator :][: self.n_poles]])
         roots = np.roots(f).astype(np.complex128)
         # a pole on the negative axis has no real counterpart: it becomes a fast real one
@@ -175,7 +176,7 @@ class _Problem:
         return values if self.dead_time is not None else np.concatenate([values, [late]])
 
     def result(
-        self, values: FloatArray, given: Experiments, scales: tuple[float, float], names: tuple[str, str]
+        self, values: Array, given: Experiments, scales: tuple[float, float], names: tuple[str, str]
     ) -> LinearModel:
         """Return the model in seconds and in the data's units."""
         T, n_b = self.sample_time, self.n_zeros + 1

@@ -1,14 +1,13 @@
 """Covariance of fitted coefficients: for a white residual, and robust where it is coloured."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from estimation.identification.model.linear_model import FloatArray
+from estimation.arrays import Array, BoolArray
 from estimation.identification.search.experiments import Experiments
 
 
-def covariances(jacobian: FloatArray, residual: FloatArray, data: Experiments) -> tuple[FloatArray, FloatArray, bool]:
+def covariances(jacobian: Array, residual: Array, data: Experiments) -> tuple[Array, Array, bool]:
     """Return ``s^2 (J'J)^-1`` and the sandwich ``(J'J)^-1 J'RJ (J'J)^-1``.
 
     Parameters
@@ -53,13 +52,13 @@ def covariances(jacobian: FloatArray, residual: FloatArray, data: Experiments) -
     return _spread(white / unscale, felt), _spread(robust / unscale, felt), determined
 
 
-def _spread(matrix: FloatArray, felt: NDArray[np.bool_]) -> FloatArray:
+def _spread(matrix: Array, felt: BoolArray) -> Array:
     whole = np.full((felt.size, felt.size), np.nan)
     whole[np.ix_(felt, felt)] = matrix
     return whole
 
 
-def _coloured_meat(columns: FloatArray, residual: FloatArray, n_used: int) -> FloatArray:
+def _coloured_meat(columns: Array, residual: Array, n_used: int) -> Array:
     """Return ``J'RJ``, R's autocovariance tapered by Parzen's window, which keeps it positive."""
     size = 1 << int(np.ceil(np.log2(2 * residual.size)))
     n_lags = max(1, min(n_used // 10, int(4.0 * n_used**0.5)))

@@ -6,9 +6,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+from estimation.arrays import Array
 from estimation.identification.fit.covariances import covariances
 from estimation.identification.fit.residual_tests import ljung_box
-from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
 from estimation.identification.search.experiments import Experiments, data_hash
@@ -46,9 +47,9 @@ def scaled(data: Experiments) -> tuple[Experiments, float, float]:
 
 
 def fitted_model(
-    values: tuple[FloatArray, FloatArray, FloatArray],
-    jacobian: FloatArray,
-    residual: FloatArray,
+    values: tuple[Array, Array, Array],
+    jacobian: Array,
+    residual: Array,
     data: Experiments,
     scales: tuple[float, float],
     *,
@@ -57,7 +58,7 @@ def fitted_model(
     covariance: CovarianceKind,
     names: tuple[str, str],
     structure: str,
-    noise: tuple[FloatArray, FloatArray] | None = None,
+    noise: tuple[Array, Array] | None = None,
 ) -> LinearModel:
     """Return the result of a fit to scaled data.
 
@@ -147,13 +148,11 @@ def _require_effect(rss: float, power: float, n_used: int, n_parameters: int, na
         )
 
 
-def _noise(noise: tuple[FloatArray, FloatArray] | None) -> dict[str, Any]:
+def _noise(noise: tuple[Array, Array] | None) -> dict[str, Any]:
     return {} if noise is None else {"noise_numerator": noise[0], "noise_denominator": noise[1]}
 
 
-def _simulated_fit(
-    values: tuple[FloatArray, FloatArray, FloatArray], delay: int, residual: FloatArray | None, data: Experiments
-) -> float:
+def _simulated_fit(values: tuple[Array, Array, Array], delay: int, residual: Array | None, data: Experiments) -> float:
     """Return the fit of the simulation from the fitted initial state; with a noise model, of the first experiment."""
     deviation = data.y[data.used] - data.y[data.used].mean()
     if residual is None:

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from estimation.arrays import Array
 from estimation.identification.fit.fitted import CovarianceKind, fitted_model, scaled
 from estimation.identification.fit.output_error import jacobian_and_residual
 from estimation.identification.model.lags import lagged
-from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
 from estimation.identification.search.criterion import Structure, profile, stabilised
 from estimation.identification.search.experiments import Experiments, Signals, experiments_for
@@ -98,8 +99,8 @@ def fit_instrumental(
 
 
 def _refined(
-    form: Structure, f: FloatArray, data: Experiments, n_c: int, n_d: int
-) -> tuple[FloatArray, tuple[FloatArray, FloatArray], FloatArray, FloatArray]:
+    form: Structure, f: Array, data: Experiments, n_c: int, n_d: int
+) -> tuple[Array, tuple[Array, Array], Array, Array]:
     """Return values with initial states, noise model, Jacobian and whitened residual of one start."""
     n_b, n_f = form.n_numerator, form.n_denominator
     c, d = np.ones(1), np.ones(1)
@@ -120,7 +121,7 @@ def _refined(
     return theta, (c, d), jacobian, residual
 
 
-def _pass(form: Structure, values: FloatArray, data: Experiments, c: FloatArray, d: FloatArray) -> FloatArray:
+def _pass(form: Structure, values: Array, data: Experiments, c: Array, d: Array) -> Array:
     """Return numerator and denominator of one weighted instrumental step, over all experiments."""
     n_b, n_f = form.n_numerator, form.n_denominator
     f = np.concatenate([[1.0], values[n_b:]])
@@ -140,7 +141,7 @@ def _pass(form: Structure, values: FloatArray, data: Experiments, c: FloatArray,
     return np.asarray(np.linalg.lstsq(gram, right, rcond=None)[0], dtype=np.float64)
 
 
-def _with_initial(form: Structure, f: FloatArray, data: Experiments) -> FloatArray:
+def _with_initial(form: Structure, f: Array, data: Experiments) -> Array:
     """Return the best numerator and initial states for a denominator; the numerator is the longest experiment's."""
     fits = [profile(form, f, data.u[part], data.y[part], data.used[part])[1] for part in data.slices]
     n_main = form.n_numerator + form.n_denominator

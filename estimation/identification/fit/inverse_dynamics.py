@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import butter, decimate, sosfiltfilt
 
-from estimation.identification.model.linear_model import FloatArray
+from estimation.arrays import Array
 from plant.errors import HydrostateError
 
 FILTER_ORDER = 4
@@ -39,11 +39,11 @@ class RigidBody:
     viscous: float
     coulomb: float
     offset: float
-    std: FloatArray
+    std: Array
     relative_force_error: float
 
     @property
-    def values(self) -> FloatArray:
+    def values(self) -> Array:
         """Mass, viscous, Coulomb and offset, shape (4,)."""
         return np.array([self.mass, self.viscous, self.coulomb, self.offset])
 
@@ -123,7 +123,7 @@ def force_error(
 
 def _regression(
     position: ArrayLike, force: ArrayLike, sample_time: float, cutoff_hz: float, every: int
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Array, Array]:
     x, drive = np.asarray(position, dtype=np.float64), np.asarray(force, dtype=np.float64)
     if x.ndim != 1 or x.shape != drive.shape or x.size < 20 * every:
         raise HydrostateError(

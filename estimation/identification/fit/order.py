@@ -9,11 +9,11 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike
 from scipy.linalg import lstsq, svdvals
 
+from estimation.arrays import Array
 from estimation.identification.fit.fitted import NoEffectError
 from estimation.identification.fit.output_error import fit_output_error
 from estimation.identification.fit.validate import validate
 from estimation.identification.model.lags import lagged
-from estimation.identification.model.linear_model import FloatArray
 from estimation.identification.search.experiments import Signals, listed
 from plant.errors import HydrostateError, LogWarning
 
@@ -43,14 +43,14 @@ class OrderTest:
         Projected singular values above their floor.
     """
 
-    hankel_singular_values: FloatArray
+    hankel_singular_values: Array
     hankel_noise_floor: float
-    projected_singular_values: FloatArray
+    projected_singular_values: Array
     projected_noise_floor: float
     suggested_order: int
 
 
-def markov_parameters(u: ArrayLike, y: ArrayLike, n_lags: int) -> FloatArray:
+def markov_parameters(u: ArrayLike, y: ArrayLike, n_lags: int) -> Array:
     """Return the impulse response by least squares, ``y_t = sum_k g_k u_(t-k)``.
 
     Parameters
@@ -213,7 +213,7 @@ def _held_out(u: Signals, y: Signals, sample_time: float, n_numerator: int, orde
     return validate(model, inputs[cut:], outputs[cut:]).fit_percent
 
 
-def _require_record(u: FloatArray, y: FloatArray, n_wanted: int) -> None:
+def _require_record(u: Array, y: Array, n_wanted: int) -> None:
     if u.ndim != 1 or u.shape != y.shape or u.size < n_wanted:
         raise HydrostateError(
             f"an order test needs input and output of one length, {n_wanted} samples or more, "
@@ -225,7 +225,7 @@ def _require_record(u: FloatArray, y: FloatArray, n_wanted: int) -> None:
         raise HydrostateError(f"the input must vary, got the constant {u[0]:g}")
 
 
-def _impulse_responses(u: FloatArray, outputs: FloatArray, n_lags: int) -> FloatArray:
+def _impulse_responses(u: Array, outputs: Array, n_lags: int) -> Array:
     """Return the least-squares impulse response behind each row of outputs, shape (m, n_lags)."""
     _require_record(u, outputs[0], 3 * n_lags)
     begin = n_lags - 1
@@ -238,7 +238,7 @@ def _impulse_responses(u: FloatArray, outputs: FloatArray, n_lags: int) -> Float
     return lstsq(gram, correlation.T)[0].T
 
 
-def _lag_gram(u: FloatArray, n_lags: int) -> FloatArray:
+def _lag_gram(u: Array, n_lags: int) -> Array:
     """Return ``sum_t u_(t-i) u_(t-j)`` over full lags by displacement along diagonals, (n_lags, n_lags)."""
     begin, n = n_lags - 1, u.size
     gram = np.empty((n_lags, n_lags))
@@ -250,7 +250,7 @@ def _lag_gram(u: FloatArray, n_lags: int) -> FloatArray:
     return gram
 
 
-def _surrogates(residual: FloatArray, n_samples: int, rng: np.random.Generator) -> FloatArray:
+def _surrogates(residual: Array, n_samples: int, rng: np.random.Generator) -> Array:
     """Return noise with the residual's spectrum and fresh phases, shape (SURROGATES, n_samples)."""
     magnitude = np.abs(np.fft.rfft(np.resize(residual, n_samples)))
     phases = np.exp(2j * np.pi * rng.random((SURROGATES, magnitude.size)))
@@ -258,7 +258,7 @@ def _surrogates(residual: FloatArray, n_samples: int, rng: np.random.Generator) 
     return np.fft.irfft(magnitude * phases, n_samples)
 
 
-def _projected_values(u: FloatArray, outputs: FloatArray, past: FloatArray, n_rows: int) -> list[FloatArray]:
+def _projected_values(u: Array, outputs: Array, past: Array, n_rows: int) -> list[Array]:
     """Return the projected singular values behind each row of outputs, on one set of instruments.
 
     Future outputs less what future inputs explain, on past inputs and outputs (Verhaegen and Dewilde, 1992);
@@ -266,7 +266,7 @@ def _projected_values(u: FloatArray, outputs: FloatArray, past: FloatArray, n_ro
     """
     width = u.size - 2 * n_rows + 1
 
-    def block(x: FloatArray, first: int) -> FloatArray:
+    def block(x: Array, first: int) -> Array:
         return lagged(x, 0, n_rows)[first + n_rows - 1 : first + n_rows - 1 + width]
 
     known = np.concatenate([block(u, n_rows), block(u, 0), block(past, 0)], axis=1)

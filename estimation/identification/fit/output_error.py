@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.arrays import Array
 from estimation.identification.fit.fitted import CovarianceKind, fitted_model, scaled
-from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.criterion import Structure, predict, sensitivities
 from estimation.identification.search.descent import descend
 from estimation.identification.search.experiments import Experiments, Signals, experiments_for
@@ -122,7 +123,7 @@ def fit_output_error(
     )
 
 
-def minimise(structure: Structure, data: Experiments) -> FloatArray:
+def minimise(structure: Structure, data: Experiments) -> Array:
     """Return the values of the lowest minimum found from all starts.
 
     Parameters
@@ -143,7 +144,7 @@ def minimise(structure: Structure, data: Experiments) -> FloatArray:
         descend_from(structure, start, part, SCREENING_STEPS, SCREENING_TOLERANCE)
         for start in [*starting_values(structure, part, count), *_one_order_less(structure, part)]
     ]
-    finalists: list[tuple[float, FloatArray]] = []
+    finalists: list[tuple[float, Array]] = []
     for cost, theta in sorted(screened, key=lambda found: found[0]):
         is_new = all(cost - other > SAME_MINIMUM * cost for other, _ in finalists)
         if is_new and len(finalists) < FINALISTS:
@@ -153,7 +154,7 @@ def minimise(structure: Structure, data: Experiments) -> FloatArray:
     return min(finished, key=lambda found: found[0])[1]
 
 
-def _one_order_less(structure: Structure, data: Experiments) -> list[FloatArray]:
+def _one_order_less(structure: Structure, data: Experiments) -> list[Array]:
     """Return starts that hold the minimum of one order less, beside a pole that a zero cancels.
 
     Of several experiments only: in the spectra of short ones a slow pole is not told from drift, and the starts found
@@ -167,7 +168,7 @@ def _one_order_less(structure: Structure, data: Experiments) -> list[FloatArray]
     b, f = theta[:n_b], np.concatenate([[1.0], theta[n_b : n_b + n_f]])
     # a state answers with its polynomial over F, so it too is multiplied
     states = theta[n_b + n_f :].reshape(data.count, fewer.n_initial)
-    starts: list[FloatArray] = []
+    starts: list[Array] = []
     for pole in CANCELLED:
         extra = np.array([1.0, -pole])
         longer = [np.convolve(state, extra) for state in states if state.size]
@@ -176,8 +177,8 @@ def _one_order_less(structure: Structure, data: Experiments) -> list[FloatArray]
 
 
 def descend_from(
-    structure: Structure, start: FloatArray, data: Experiments, steps: int, tolerance: float = TOLERANCE
-) -> tuple[float, FloatArray]:
+    structure: Structure, start: Array, data: Experiments, steps: int, tolerance: float = TOLERANCE
+) -> tuple[float, Array]:
     """Return cost and values of the minimum that one start leads to.
 
     Parameters
@@ -209,7 +210,7 @@ def descend_from(
     return found[0], found[1]
 
 
-def jacobian_and_residual(structure: Structure, theta: FloatArray, data: Experiments) -> tuple[FloatArray, FloatArray]:
+def jacobian_and_residual(structure: Structure, theta: Array, data: Experiments) -> tuple[Array, Array]:
     """Return sensitivities and residual, zero where the output is missing.
 
     Parameters

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimation.arrays import Array
 from estimation.identification.fit.fitted import CovarianceKind, fitted_model, scaled
 from estimation.identification.fit.output_error import jacobian_and_residual, minimise
-from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.criterion import Structure
 from estimation.identification.search.descent import stable
 from estimation.identification.search.experiments import Experiments, Signals, experiments_for
@@ -52,7 +53,7 @@ class NoiseStructure:
         s = self.system
         return np.array([s.n_numerator, s.n_denominator, self.n_c, self.n_d, s.delay, s.n_initial])
 
-    def acceptable(self, theta: FloatArray) -> bool:
+    def acceptable(self, theta: Array) -> bool:
         """Return whether the predictor is stable: C always, and F and D unless tied, when they cancel out of it.
 
         Parameters
@@ -193,7 +194,7 @@ def _fit(
     )
 
 
-def _starts(form: NoiseStructure, data: Experiments) -> list[FloatArray]:
+def _starts(form: NoiseStructure, data: Experiments) -> list[Array]:
     """Return starts: the output-error model with the noise that it leaves, with none, and from ARX."""
     system = form.system
     n_b, n_f = system.n_numerator, system.n_denominator
@@ -205,7 +206,7 @@ def _starts(form: NoiseStructure, data: Experiments) -> list[FloatArray]:
     u, y = max(pairs, key=lambda pair: pair[0].size)
     arx_b, arx_f = least_squares_arx(n_b, n_f, system.delay, u, y)
     arx = np.concatenate([arx_b[system.delay :], arx_f[1:]])
-    starts: list[FloatArray] = []
+    starts: list[Array] = []
     for values, rest in ((main, initial), (arx, np.zeros_like(initial))):
         noises = [(np.zeros(form.n_c), np.zeros(form.n_d))]
         if values is main and form.n_c + form.n_d:
@@ -220,18 +221,16 @@ def _starts(form: NoiseStructure, data: Experiments) -> list[FloatArray]:
     return starts
 
 
-def _descend(
-    form: NoiseStructure, start: FloatArray, data: Experiments
-) -> tuple[float, FloatArray, FloatArray, FloatArray]:
+def _descend(form: NoiseStructure, start: Array, data: Experiments) -> tuple[float, Array, Array, Array]:
     """Return cost, values, prediction errors and Jacobian of the minimum that one start leads to."""
     n, p = data.u.size, start.size
 
-    def predicted(theta: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    def predicted(theta: Array) -> tuple[float, Array, Array]:
         error, jacobian = np.zeros(n), np.zeros((n, p))
         cost = prediction_errors(theta, form.sizes, form.tied, data.u, data.y, data.used, data.bounds, error, jacobian)
         return cost, error, jacobian
 
-    def normal(theta: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    def normal(theta: Array) -> tuple[float, Array, Array]:
         cost, error, jacobian = predicted(theta)
         return cost, jacobian.T @ jacobian, -(jacobian.T @ error)
 

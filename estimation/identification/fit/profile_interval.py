@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import gammaincinv
 
+from estimation.arrays import Array
 from estimation.identification.fit.output_error import descend_from
-from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.criterion import Structure
 from estimation.identification.search.descent import normal_equations, stable
 from estimation.identification.search.experiments import Experiments, Signals, experiments_from
@@ -103,7 +104,7 @@ def dc_gain_interval(
     for side in (-1.0, 1.0):
         path = [best]
 
-        def excess(value: float, path: list[FloatArray] = path) -> float:
+        def excess(value: float, path: list[Array] = path) -> float:
             cost, theta = min(
                 (_forced(problem, start, value) for start in [path[-1], *others]), key=lambda found: found[0]
             )
@@ -139,7 +140,7 @@ def _stretch(model: LinearModel) -> float:
     return (model.dc_gain_std / plain) ** 2 if plain > 0.0 and np.isfinite(model.dc_gain_std / plain) else 1.0
 
 
-def _forced(problem: _Problem, start: FloatArray, gain: float) -> tuple[float, FloatArray]:
+def _forced(problem: _Problem, start: Array, gain: float) -> tuple[float, Array]:
     """Return cost and values of the best fit with a given gain; the last numerator coefficient follows from the rest.
 
     The gain's condition ``sum b = gain (1 + sum f)`` is linear, so sensitivities of the free values are those of all
@@ -157,14 +158,14 @@ def _forced(problem: _Problem, start: FloatArray, gain: float) -> tuple[float, F
     base = start.copy()
     base[n_b - 1] = gain * (1.0 + base[n_b : n_b + n_f].sum()) - base[: n_b - 1].sum()
 
-    def at(moved: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    def at(moved: Array) -> tuple[float, Array, Array]:
         gram, gradient = np.zeros((p, p)), np.zeros(p)
         theta = base + basis @ moved
         cost = normal_equations(theta, sizes, data.u, data.y, weight, data.bounds, gram, gradient)
         whole = gram + np.tril(gram, -1).T
         return cost, np.ascontiguousarray(basis.T @ whole @ basis), basis.T @ gradient
 
-    def acceptable(moved: FloatArray) -> bool:
+    def acceptable(moved: Array) -> bool:
         return stable((base + basis @ moved)[n_b : n_b + n_f])
 
     cost, moved = levenberg(at, np.zeros(p - 1), acceptable, tolerance=1e-9, most_steps=MOST_STEPS, slower=0.1)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtrc
 
+from estimation.arrays import Array
 from estimation.identification.model.lags import lagged
-from estimation.identification.model.linear_model import FloatArray
 from plant.errors import HydrostateError
 
 DEFAULT_LAGS = 25
@@ -183,7 +183,7 @@ def feedback_test(residual: ArrayLike, u: ArrayLike, *, n_lags: int = DEFAULT_LA
     return cross_correlation_test(white[::-1], inputs[::-1], n_lags=n_lags, jacobian=before[::-1])
 
 
-def correlations(residual: ArrayLike, other: ArrayLike, lags: ArrayLike) -> FloatArray:
+def correlations(residual: ArrayLike, other: ArrayLike, lags: ArrayLike) -> Array:
     """Return the correlation of a residual with another signal, or itself, some samples earlier.
 
     Parameters
@@ -215,12 +215,12 @@ def correlations(residual: ArrayLike, other: ArrayLike, lags: ArrayLike) -> Floa
     return np.array(products) / size
 
 
-def _unit(columns: FloatArray) -> FloatArray:
+def _unit(columns: Array) -> Array:
     scale = np.linalg.norm(columns, axis=0)
     return columns / np.where(scale > 0.0, scale, 1.0)
 
 
-def _without(absorbed: FloatArray, columns: FloatArray) -> FloatArray:
+def _without(absorbed: Array, columns: Array) -> Array:
     basis = np.linalg.qr(_unit(absorbed))[0]
     return columns - basis @ (basis.T @ columns)
 

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from estimation.arrays import Array
 from estimation.identification.fit.fitted import scaled
 from estimation.identification.fit.order import order_test
 from estimation.identification.model.lags import lagged
-from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
 from estimation.identification.search.criterion import Structure, polynomial, profile, stabilised
 from estimation.identification.search.experiments import data_hash, experiments_from
@@ -33,7 +34,7 @@ class SubspaceFit:
     """
 
     model: LinearModel
-    singular_values: FloatArray
+    singular_values: Array
     noise_floor: float
 
 
@@ -118,11 +119,11 @@ def fit_subspace(
     return SubspaceFit(model, values * y_scale, test.projected_noise_floor * y_scale)
 
 
-def _projected(u: FloatArray, y: FloatArray, rows: int) -> tuple[FloatArray, FloatArray]:
+def _projected(u: Array, y: Array, rows: int) -> tuple[Array, Array]:
     """Return the extended observability matrix's left singular vectors, and the values."""
     width = u.size - 2 * rows + 1
 
-    def block(x: FloatArray, first: int) -> FloatArray:
+    def block(x: Array, first: int) -> Array:
         return lagged(x, 0, rows)[first + rows - 1 : first + rows - 1 + width, ::-1]
 
     known = np.concatenate([block(u, rows), block(u, 0), block(y, 0), block(y, rows)], axis=1)

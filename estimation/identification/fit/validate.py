@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from estimation.arrays import Array
 from estimation.identification.fit.residual_tests import DEFAULT_LAGS, ResidualTest, cross_correlation_test, ljung_box
-from estimation.identification.model.linear_model import FloatArray, LinearModel
+from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.criterion import Structure, profile, sensitivities
 from plant.errors import HydrostateError
 
@@ -81,7 +82,7 @@ def rmse(y: ArrayLike, simulated: ArrayLike) -> float:
     return float(np.sqrt(np.mean((measured - model) ** 2)))
 
 
-def estimate_initial_state(model: LinearModel, u: ArrayLike, y: ArrayLike) -> FloatArray:
+def estimate_initial_state(model: LinearModel, u: ArrayLike, y: ArrayLike) -> Array:
     """Return the initial state with which a model simulates a log best.
 
     Parameters
@@ -133,7 +134,7 @@ def validate(
     inputs, outputs = np.asarray(u, dtype=np.float64), np.asarray(y, dtype=np.float64)
     state = model.initial_state if fitted else estimate_initial_state(model, inputs, outputs)
     simulated = model.simulate(inputs, initial=state)
-    jacobian: FloatArray | None = None
+    jacobian: Array | None = None
     if fitted:
         n_b = model.numerator.size - model.delay
         structure = Structure(n_b, model.denominator.size - 1, model.delay)
@@ -147,7 +148,7 @@ def validate(
     )
 
 
-def _together(y: ArrayLike, simulated: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def _together(y: ArrayLike, simulated: ArrayLike) -> tuple[Array, Array]:
     measured, model = np.asarray(y, dtype=np.float64), np.asarray(simulated, dtype=np.float64)
     if measured.shape != model.shape:
         raise HydrostateError(f"measured and simulated output must match, got {measured.shape} and {model.shape}")

@@ -3,12 +3,10 @@
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from estimation.arrays import Array, ComplexArray
 from estimation.fits.root import root_between
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 NEAR = 1e-5
 """Relative step of the gain's slope at the corner."""
@@ -33,7 +31,7 @@ class Response(Protocol):
         ...
 
     @property
-    def covariance(self) -> FloatArray:
+    def covariance(self) -> Array:
         """Covariance of the coefficients."""
         ...
 

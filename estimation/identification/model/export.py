@@ -5,14 +5,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
     import control
 
-FloatArray = NDArray[np.float64]
 
 COVARIANCES = ("covariance", "covariance_white", "covariance_robust")
 """Matrices, in which a number not known is NaN."""
@@ -21,21 +20,21 @@ COVARIANCES = ("covariance", "covariance_white", "covariance_robust")
 class Exportable:
     """How a linear model leaves the program, and comes back; the fields are those of `LinearModel`."""
 
-    numerator: FloatArray
-    denominator: FloatArray
+    numerator: Array
+    denominator: Array
     sample_time: float
     input_name: str
     output_name: str
     delay: int
-    initial_state: FloatArray
+    initial_state: Array
     fit_percent: float
     rmse: float
     residual_std: float
     n_samples: int
     data_hash: str
     structure: str
-    noise_numerator: FloatArray
-    noise_denominator: FloatArray
+    noise_numerator: Array
+    noise_denominator: Array
     continuous: bool
     dead_time: float
     dead_time_std: float
@@ -139,7 +138,7 @@ class Exportable:
                 given[name] = float("nan")
         return cls(**given)
 
-    def _padded(self) -> tuple[FloatArray, FloatArray]:
+    def _padded(self) -> tuple[Array, Array]:
         length = max(self.numerator.size, self.denominator.size)
         return (
             np.pad(self.numerator, (0, length - self.numerator.size)),
@@ -163,7 +162,7 @@ _ENTRIES = {
 """Entry of the JSON contract by field."""
 
 
-def _matrix(values: FloatArray) -> list[list[float | None]]:
+def _matrix(values: Array) -> list[list[float | None]]:
     return [[_or_none(value) for value in row] for row in values.tolist()]
 
 

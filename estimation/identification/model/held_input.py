@@ -1,15 +1,14 @@
 """The exact discrete model of a continuous one whose input is held between samples."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
-FloatArray = NDArray[np.float64]
+from estimation.arrays import Array
 
 
 def held_input_model(
-    numerator: FloatArray, denominator: FloatArray, dead_time: float, sample_time: float
-) -> tuple[FloatArray, FloatArray, int]:
+    numerator: Array, denominator: Array, dead_time: float, sample_time: float
+) -> tuple[Array, Array, int]:
     """Return the exact discrete model of a continuous one whose input is held between samples.
 
     Parameters
@@ -67,7 +66,7 @@ def held_input_model(
     return np.concatenate([np.zeros(whole), b]), f, whole + leading
 
 
-def _held(A: FloatArray, B: FloatArray, duration: float) -> tuple[FloatArray, FloatArray]:
+def _held(A: Array, B: Array, duration: float) -> tuple[Array, Array]:
     n = A.shape[0]
     block = np.zeros((n + 1, n + 1))
     block[:n, :n], block[:n, n:] = A * duration, B * duration

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from estimation.identification.model.linear_model import FloatArray
+from estimation.arrays import Array
 
 
-def lagged(x: FloatArray, first: int, count: int) -> FloatArray:
+def lagged(x: Array, first: int, count: int) -> Array:
     """Return ``x[t - first - k]`` for k < count as columns, zero before the record.
 
     Parameters

@@ -4,8 +4,9 @@ from dataclasses import dataclass, field
 from typing import overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from estimation.arrays import Array, ComplexArray
 from estimation.identification.model.bandwidth import bandwidth, bandwidth_std
 from estimation.identification.model.export import Exportable
 from estimation.identification.model.held_input import held_input_model
@@ -21,21 +22,18 @@ from estimation.identification.model.uncertainty import (
 )
 from plant.errors import HydrostateError
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
-
-def _frozen(values: ArrayLike) -> FloatArray:
+def _frozen(values: ArrayLike) -> Array:
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False
     return array
 
 
-def _nothing() -> FloatArray:
+def _nothing() -> Array:
     return np.empty(0)
 
 
-def _one() -> FloatArray:
+def _one() -> Array:
     return np.ones(1)
 
 
@@ -97,24 +95,24 @@ class LinearModel(Exportable):
     [0.0, 0.2, 0.36]
     """
 
-    numerator: FloatArray
-    denominator: FloatArray
+    numerator: Array
+    denominator: Array
     sample_time: float
     input_name: str
     output_name: str
     delay: int = 0
-    covariance: FloatArray = field(default_factory=_nothing)
-    initial_state: FloatArray = field(default_factory=_nothing)
+    covariance: Array = field(default_factory=_nothing)
+    initial_state: Array = field(default_factory=_nothing)
     fit_percent: float = float("nan")
     rmse: float = float("nan")
     residual_std: float = float("nan")
     n_samples: int = 0
     data_hash: str = ""
-    covariance_white: FloatArray = field(default_factory=_nothing)
-    covariance_robust: FloatArray = field(default_factory=_nothing)
+    covariance_white: Array = field(default_factory=_nothing)
+    covariance_robust: Array = field(default_factory=_nothing)
     structure: str = ""
-    noise_numerator: FloatArray = field(default_factory=_one)
-    noise_denominator: FloatArray = field(default_factory=_one)
+    noise_numerator: Array = field(default_factory=_one)
+    noise_denominator: Array = field(default_factory=_one)
     continuous: bool = False
     dead_time: float = 0.0
     dead_time_std: float = float("nan")
@@ -148,7 +146,7 @@ class LinearModel(Exportable):
             object.__setattr__(self, name, value)
 
     @property
-    def free_numerator(self) -> FloatArray:
+    def free_numerator(self) -> Array:
         """Numerator behind its dead time, shape (n_numerator,)."""
         return self.numerator[self.delay :]
 
@@ -201,7 +199,7 @@ class LinearModel(Exportable):
         return float(self.frequency_response([0.0], ci=0.95).gain_std[0])
 
     @property
-    def coefficient_std(self) -> FloatArray:
+    def coefficient_std(self) -> Array:
         """Standard deviations of ``[b[delay:], f[1:]]``, shape (p,)."""
         return np.sqrt(np.diag(self.covariance))
 
@@ -270,7 +268,7 @@ class LinearModel(Exportable):
         frequencies = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
         return response_band(frequencies, response, gradient, self.covariance, ci)
 
-    def simulate(self, u: ArrayLike, initial: ArrayLike | None = None) -> FloatArray:
+    def simulate(self, u: ArrayLike, initial: ArrayLike | None = None) -> Array:
         """Return the model's output for an input.
 
         Parameters
@@ -292,7 +290,7 @@ class LinearModel(Exportable):
         state = np.zeros_like(self.initial_state) if initial is None else np.asarray(initial, dtype=np.float64)
         return filtered(self.numerator, self.denominator, values, state)
 
-    def predict(self, u: ArrayLike, y: ArrayLike) -> FloatArray:
+    def predict(self, u: ArrayLike, y: ArrayLike) -> Array:
         """Return the one-step-ahead prediction of the output by the noise model, from rest.
 
         Parameters
@@ -332,7 +330,7 @@ class LinearModel(Exportable):
         b, f, delay = held_input_model(self.numerator, self.denominator, self.dead_time, T)
         return LinearModel(b, f, T, self.input_name, self.output_name, delay=delay)
 
-    def step(self, duration: float) -> tuple[FloatArray, FloatArray]:
+    def step(self, duration: float) -> tuple[Array, Array]:
         """Return the response to a unit step.
 
         Parameters

@@ -5,14 +5,12 @@ scipy.signal drags in scipy.stats, and takes longer to import than a model to fi
 
 import numba
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from estimation.arrays import Array
 
 
-def filtered(
-    numerator: ArrayLike, denominator: ArrayLike, series: ArrayLike, state: ArrayLike | None = None
-) -> FloatArray:
+def filtered(numerator: ArrayLike, denominator: ArrayLike, series: ArrayLike, state: ArrayLike | None = None) -> Array:
     """Return what a transfer function makes of a series.
 
     Parameters
@@ -47,7 +45,7 @@ def filtered(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _run(b: FloatArray, f: FloatArray, u: FloatArray, z: FloatArray) -> None:
+def _run(b: Array, f: Array, u: Array, z: Array) -> None:
     """Write the output over the input (transposed direct form II); the state follows."""
     last = z.size - 1
     for k in range(u.size):

@@ -3,10 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from estimation.arrays import Array, ComplexArray
 
 CANCELS = 4.0
 """A pole and a zero that are closer than this many standard deviations of their distance are near cancellation."""
@@ -32,7 +30,7 @@ class Cancellation:
     deviations: float
 
 
-def sorted_roots(coefficients: FloatArray) -> ComplexArray:
+def sorted_roots(coefficients: Array) -> ComplexArray:
     """Return the roots of a polynomial in descending powers, largest modulus first.
 
     Parameters
@@ -49,7 +47,7 @@ def sorted_roots(coefficients: FloatArray) -> ComplexArray:
     return roots[np.argsort(-np.abs(roots), kind="stable")]
 
 
-def root_gradients(coefficients: FloatArray, roots: ComplexArray) -> ComplexArray:
+def root_gradients(coefficients: Array, roots: ComplexArray) -> ComplexArray:
     """Return the derivative of each root by each coefficient, ``-r^(n-k) / P'(r)``.
 
     Parameters
@@ -71,7 +69,7 @@ def root_gradients(coefficients: FloatArray, roots: ComplexArray) -> ComplexArra
         return np.asarray(-powers / slope[:, None], dtype=np.complex128)
 
 
-def complex_std(gradients: ComplexArray, covariance: FloatArray) -> ComplexArray:
+def complex_std(gradients: ComplexArray, covariance: Array) -> ComplexArray:
     """Return standard deviations of real and imaginary part, as one complex number each.
 
     Parameters
@@ -92,7 +90,7 @@ def complex_std(gradients: ComplexArray, covariance: FloatArray) -> ComplexArray
 
 
 def cancellations(
-    numerator: FloatArray, denominator: FloatArray, covariance: FloatArray, at_rest: complex
+    numerator: Array, denominator: Array, covariance: Array, at_rest: complex
 ) -> tuple[Cancellation, ...]:
     """Return the poles that a zero nearly cancels, as far as the data can tell.
 
@@ -135,7 +133,7 @@ def cancellations(
     return tuple(sorted(found, key=lambda pair: pair.deviations))
 
 
-def _deviations(distance: FloatArray, spread: FloatArray) -> float:
+def _deviations(distance: Array, spread: Array) -> float:
     """Return a distance in standard deviations along itself; infinite derivatives say nothing apart."""
     length = float(np.hypot(distance[0], distance[1]))
     if length == 0.0 or not np.isfinite(spread).all():
@@ -163,16 +161,16 @@ class ResponseBand:
         Band of the gain, pointwise [output unit per input unit].
     """
 
-    frequency_hz: FloatArray
+    frequency_hz: Array
     response: ComplexArray
-    gain_std: FloatArray
-    phase_std: FloatArray
-    gain_low: FloatArray
-    gain_high: FloatArray
+    gain_std: Array
+    phase_std: Array
+    gain_low: Array
+    gain_high: Array
 
 
 def response_band(
-    frequency_hz: FloatArray, response: ComplexArray, gradient: ComplexArray, covariance: FloatArray, level: float
+    frequency_hz: Array, response: ComplexArray, gradient: ComplexArray, covariance: Array, level: float
 ) -> ResponseBand:
     """Return pointwise bands of gain and phase, first order in the covariance.
 

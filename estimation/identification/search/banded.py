@@ -5,18 +5,15 @@ It neglects the initial state and what changes within a band, so it ranks and im
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array, ComplexArray
 from estimation.identification.search.jit import compiled
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 @compiled
 def explained_power(
-    denominators: FloatArray, n_b: int, delay: int, omega: FloatArray, power: FloatArray, cross: ComplexArray
-) -> tuple[FloatArray, FloatArray]:
+    denominators: Array, n_b: int, delay: int, omega: Array, power: Array, cross: ComplexArray
+) -> tuple[Array, Array]:
     """Return the output power that the best numerator explains for each denominator, and that numerator.
 
     Parameters
@@ -90,7 +87,7 @@ def explained_power(
 
 
 @compiled
-def _stable(f: FloatArray) -> bool:
+def _stable(f: Array) -> bool:
     row = f.copy()
     for size in range(row.size, 0, -1):
         reflection = row[size - 1]
@@ -107,15 +104,15 @@ def _stable(f: FloatArray) -> bool:
 
 @compiled
 def _banded_normal_equations(
-    theta: FloatArray,
+    theta: Array,
     n_b: int,
     n_f: int,
     delay: int,
     shifts: ComplexArray,
-    root_power: FloatArray,
+    root_power: Array,
     wanted: ComplexArray,
-    gram: FloatArray,
-    gradient: FloatArray,
+    gram: Array,
+    gradient: Array,
 ) -> float:
     """Return ``sum |root_power B/F - wanted|^2``; fill ``J'J`` and minus ``J'r``, J'r the descent direction."""
     p = n_b + n_f
@@ -148,14 +145,14 @@ def _banded_normal_equations(
 
 @compiled
 def refine_banded(
-    starts: FloatArray,
+    starts: Array,
     n_b: int,
     delay: int,
-    omega: FloatArray,
-    power: FloatArray,
+    omega: Array,
+    power: Array,
     cross: ComplexArray,
     most_steps: int,
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Array, Array]:
     """Improve starts by Levenberg-Marquardt on the banded criterion.
 
     Parameters

@@ -3,13 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lstsq
 
-from estimation.identification.model.linear_model import ComplexArray, FloatArray
+from estimation.arrays import Array, BoolArray, ComplexArray
 from estimation.identification.model.recursion import filtered
-
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -48,7 +45,7 @@ class Structure:
         """All free values."""
         return self.n_numerator + self.n_denominator + self.n_initial
 
-    def split(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def split(self, theta: Array) -> tuple[Array, Array, Array]:
         """Return numerator with its leading zeros, monic denominator, and initial state.
 
         Parameters
@@ -68,7 +65,7 @@ class Structure:
         return b, f, state
 
 
-def polynomial(poles: ComplexArray) -> FloatArray:
+def polynomial(poles: ComplexArray) -> Array:
     """Return the monic polynomial with these roots.
 
     Parameters
@@ -84,7 +81,7 @@ def polynomial(poles: ComplexArray) -> FloatArray:
     return np.real(np.poly(poles)).astype(np.float64)
 
 
-def is_stable(denominator: FloatArray) -> bool:
+def is_stable(denominator: Array) -> bool:
     """Return whether every root of a monic denominator lies inside the unit circle.
 
     Parameters
@@ -100,7 +97,7 @@ def is_stable(denominator: FloatArray) -> bool:
     return bool(np.isfinite(denominator).all() and (np.abs(np.roots(denominator)) < 1.0).all())
 
 
-def stabilised(denominator: FloatArray, n_samples: int) -> FloatArray:
+def stabilised(denominator: Array, n_samples: int) -> Array:
     """Return the denominator with its unstable roots reflected into the unit circle.
 
     Parameters
@@ -126,7 +123,7 @@ def stabilised(denominator: FloatArray, n_samples: int) -> FloatArray:
     return polynomial(roots * shrink)
 
 
-def predict(structure: Structure, theta: FloatArray, u: FloatArray) -> FloatArray:
+def predict(structure: Structure, theta: Array, u: Array) -> Array:
     """Return the model's output.
 
     Parameters
@@ -147,7 +144,7 @@ def predict(structure: Structure, theta: FloatArray, u: FloatArray) -> FloatArra
     return filtered(b, f, u, state)
 
 
-def sensitivities(structure: Structure, theta: FloatArray, u: FloatArray) -> FloatArray:
+def sensitivities(structure: Structure, theta: Array, u: Array) -> Array:
     """Return the exact derivative of the model's output with respect to every free value.
 
     With ``yhat = B/F u + S/F d`` (``S`` the initial state, ``d`` a unit pulse), ``dyhat/db_k = q^-k u/F``,
@@ -178,9 +175,7 @@ def sensitivities(structure: Structure, theta: FloatArray, u: FloatArray) -> Flo
     return jacobian
 
 
-def _fill_linear_columns(
-    structure: Structure, f: FloatArray, u: FloatArray, numerator: FloatArray, initial: FloatArray
-) -> None:
+def _fill_linear_columns(structure: Structure, f: Array, u: Array, numerator: Array, initial: Array) -> None:
     """Write the output's derivative by numerator (n, n_b) and initial state (n, n_initial) into zeros."""
     decayed = filtered([1.0], f, u)
     for k in range(structure.n_numerator):
@@ -194,9 +189,7 @@ def _fill_linear_columns(
             initial[k:, k] = response[: u.size - k]
 
 
-def profile(
-    structure: Structure, denominator: FloatArray, u: FloatArray, y: FloatArray, used: BoolArray
-) -> tuple[float, FloatArray]:
+def profile(structure: Structure, denominator: Array, u: Array, y: Array, used: BoolArray) -> tuple[float, Array]:
     """Return the least cost that a denominator allows, and the values that reach it.
 
     Numerator and initial state enter linearly, so for a given denominator they follow by least squares.

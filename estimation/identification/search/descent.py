@@ -5,12 +5,9 @@ iteration over n samples costs three recursions and p (p + 1) / 2 inner products
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array, IntArray
 from estimation.identification.search.jit import compiled
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 CHUNK = 2048
 """Samples whose Jacobian rows are held at once; small enough for the processor's cache."""
@@ -20,7 +17,7 @@ FORGOTTEN = 1e-18
 
 
 @compiled
-def stable(f: FloatArray) -> bool:
+def stable(f: Array) -> bool:
     """Return whether ``1 + f_1 q^-1 + ...`` has all roots inside the unit circle (Schur-Cohn recursion).
 
     Parameters
@@ -48,7 +45,7 @@ def stable(f: FloatArray) -> bool:
 
 
 @compiled
-def solve_damped(gram: FloatArray, gradient: FloatArray, damping: float, step: FloatArray, factor: FloatArray) -> bool:
+def solve_damped(gram: Array, gradient: Array, damping: float, step: Array, factor: Array) -> bool:
     """Solve ``(H + damping diag H) step = -gradient`` by Cholesky, columns scaled; False if not definite.
 
     Parameters
@@ -104,14 +101,14 @@ def solve_damped(gram: FloatArray, gradient: FloatArray, damping: float, step: F
 
 @compiled
 def normal_equations(
-    theta: FloatArray,
+    theta: Array,
     sizes: IntArray,
-    u: FloatArray,
-    y: FloatArray,
-    weight: FloatArray,
+    u: Array,
+    y: Array,
+    weight: Array,
     bounds: IntArray,
-    gram: FloatArray,
-    gradient: FloatArray,
+    gram: Array,
+    gradient: Array,
 ) -> float:
     """Return the sum of squared residuals; fill ``J'J`` and half its gradient.
 
@@ -222,15 +219,15 @@ def normal_equations(
 
 @compiled
 def descend(
-    start: FloatArray,
+    start: Array,
     sizes: IntArray,
-    u: FloatArray,
-    y: FloatArray,
-    weight: FloatArray,
+    u: Array,
+    y: Array,
+    weight: Array,
     bounds: IntArray,
     most_steps: int,
     tolerance: float,
-) -> tuple[float, FloatArray, FloatArray, bool]:
+) -> tuple[float, Array, Array, bool]:
     """Minimise the output-error criterion from one start.
 
     A step that leaves the unit circle is rejected like one that raises the cost, and the next is shorter; so stability

@@ -6,14 +6,11 @@ from dataclasses import dataclass
 from typing import TypeAlias, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from estimation.identification.model.linear_model import FloatArray
+from estimation.arrays import Array, BoolArray, IntArray
 from estimation.identification.search.criterion import Structure
 from plant.errors import HydrostateError
-
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
 
 Signals: TypeAlias = ArrayLike | Sequence[ArrayLike]
 """One signal, or a list of signals, one an experiment."""
@@ -38,8 +35,8 @@ class Experiments:
         Where each experiment begins, and the end.
     """
 
-    u: FloatArray
-    y: FloatArray
+    u: Array
+    y: Array
     used: BoolArray
     bounds: IntArray
 
@@ -58,13 +55,13 @@ class Experiments:
         """Where each experiment stands."""
         return [slice(int(a), int(b)) for a, b in zip(self.bounds[:-1], self.bounds[1:], strict=True)]
 
-    def measured(self) -> FloatArray:
+    def measured(self) -> Array:
         """Return the output with NaN where it is missing, shape (n,)."""
         return np.where(self.used, self.y, np.nan)
 
-    def bridged(self) -> list[tuple[FloatArray, FloatArray]]:
+    def bridged(self) -> list[tuple[Array, Array]]:
         """Return input and output of each experiment, gaps of the output filled by straight lines."""
-        pairs: list[tuple[FloatArray, FloatArray]] = []
+        pairs: list[tuple[Array, Array]] = []
         for part in self.slices:
             u, y, used = self.u[part], self.y[part], self.used[part]
             samples = np.arange(u.size)
@@ -185,7 +182,7 @@ def data_hash(data: Experiments, sample_time: float) -> str:
     return digest.hexdigest()
 
 
-def listed(signals: Signals) -> list[FloatArray]:
+def listed(signals: Signals) -> list[Array]:
     """Return signals as a list with one array an experiment.
 
     Parameters
@@ -203,7 +200,7 @@ def listed(signals: Signals) -> list[FloatArray]:
     return [np.asarray(cast("ArrayLike", signals), dtype=np.float64)]
 
 
-def _require_signals(u: FloatArray, y: FloatArray, input_name: str, output_name: str) -> None:
+def _require_signals(u: Array, y: Array, input_name: str, output_name: str) -> None:
     if u.ndim != 1 or u.shape != y.shape:
         raise HydrostateError(
             f"input {input_name!r} and output {output_name!r} must be one-dimensional and of one length, "
@@ -218,7 +215,7 @@ def _require_signals(u: FloatArray, y: FloatArray, input_name: str, output_name:
         raise HydrostateError(f"output {output_name!r} must be finite or missing (NaN), got infinite values")
 
 
-def _require_excitation(inputs: list[FloatArray], wanted: int, input_name: str) -> None:
+def _require_excitation(inputs: list[Array], wanted: int, input_name: str) -> None:
     if all(u.size == 0 or u.min() == u.max() for u in inputs):
         level = f"{inputs[0][0]:g}" if inputs[0].size else "nothing"
         raise HydrostateError(
@@ -233,7 +230,7 @@ def _require_excitation(inputs: list[FloatArray], wanted: int, input_name: str) 
         )
 
 
-def _excited(u: FloatArray, wanted: int) -> int:
+def _excited(u: Array, wanted: int) -> int:
     if u.size < 2 * wanted:
         return 0
     windows = np.lib.stride_tricks.sliding_window_view(u, wanted)

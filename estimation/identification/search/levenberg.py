@@ -6,22 +6,20 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array
 from estimation.identification.search.descent import solve_damped
-
-FloatArray = NDArray[np.float64]
 
 
 def levenberg(
-    at: Callable[[FloatArray], tuple[float, FloatArray, FloatArray]],
-    start: FloatArray,
-    acceptable: Callable[[FloatArray], bool],
+    at: Callable[[Array], tuple[float, Array, Array]],
+    start: Array,
+    acceptable: Callable[[Array], bool],
     *,
     tolerance: float,
     most_steps: int,
     slower: float = 3.0,
-) -> tuple[float, FloatArray]:
+) -> tuple[float, Array]:
     """Minimise a sum of squares from one start; a step that is not acceptable is rejected like one that raises it.
 
     Parameters
@@ -48,7 +46,7 @@ def levenberg(
     --------
     >>> slopes = np.array([[1.0, 0.0], [0.0, 2.0], [1.0, 1.0]])
     >>> wanted = np.array([1.0, 2.0, 2.0])
-    >>> def line(x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    >>> def line(x: Array) -> tuple[float, Array, Array]:
     ...     left = slopes @ x - wanted
     ...     return float(left @ left), slopes.T @ slopes, slopes.T @ left
     >>> levenberg(line, np.zeros(2), lambda x: True, tolerance=1e-12, most_steps=20)[1].round(6).tolist()

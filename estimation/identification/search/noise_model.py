@@ -3,15 +3,15 @@
 import numpy as np
 from scipy.linalg import lstsq
 
+from estimation.arrays import Array
 from estimation.identification.model.lags import lagged
-from estimation.identification.model.linear_model import FloatArray
 from estimation.identification.search.criterion import stabilised
 
 LONG = 30
 """Coefficients of the long autoregression whose residual stands for the innovations."""
 
 
-def noise_start(v: FloatArray, n_c: int, n_d: int) -> tuple[FloatArray, FloatArray]:
+def noise_start(v: Array, n_c: int, n_d: int) -> tuple[Array, Array]:
     """Return C and D of ``v = C/D e`` by two regressions, stable and invertible.
 
     Parameters

@@ -4,26 +4,22 @@ A missing output is replaced by its prediction, so the recursion goes on and the
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array, BoolArray, IntArray
 from estimation.identification.search.jit import compiled
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
 
 
 @compiled
 def prediction_errors(
-    theta: FloatArray,
+    theta: Array,
     sizes: IntArray,
     tied: bool,
-    u: FloatArray,
-    y: FloatArray,
+    u: Array,
+    y: Array,
     used: BoolArray,
     bounds: IntArray,
-    error: FloatArray,
-    jacobian: FloatArray,
+    error: Array,
+    jacobian: Array,
 ) -> float:
     """Return the sum of squared prediction errors; fill errors and the derivative of the prediction.
 

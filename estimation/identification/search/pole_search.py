@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.identification.model.linear_model import ComplexArray, FloatArray
+from estimation.arrays import Array, ComplexArray
 from estimation.identification.search.banded import explained_power, refine_banded
 from estimation.identification.search.criterion import Structure, polynomial
 
@@ -52,12 +52,12 @@ class BandedSpectra:
         Output times conjugate input [output unit times input unit].
     """
 
-    omega: FloatArray
-    power: FloatArray
+    omega: Array
+    power: Array
     cross: ComplexArray
 
 
-def banded_spectra(pairs: list[tuple[FloatArray, FloatArray]]) -> BandedSpectra:
+def banded_spectra(pairs: list[tuple[Array, Array]]) -> BandedSpectra:
     """Return the spectra of one or more experiments in common logarithmic bands.
 
     Parameters
@@ -88,7 +88,7 @@ def banded_spectra(pairs: list[tuple[FloatArray, FloatArray]]) -> BandedSpectra:
     return BandedSpectra(omega[kept] / count[kept], power[kept], totals[3][kept] + 1j * totals[4][kept])
 
 
-def search_poles(structure: Structure, spectra: BandedSpectra, n_samples: int) -> tuple[FloatArray, FloatArray]:
+def search_poles(structure: Structure, spectra: BandedSpectra, n_samples: int) -> tuple[Array, Array]:
     """Return starts from a search over pole positions, distinct from each other, best first.
 
     Orders are built up: a real pole is added to the best refined models of one order less, a pair to those of two
@@ -112,7 +112,7 @@ def search_poles(structure: Structure, spectra: BandedSpectra, n_samples: int) -
         Numerator, and denominator behind its 1.
     """
     singles, pairs = _real_poles(n_samples), _pole_pairs(n_samples)
-    best: list[FloatArray] = [np.empty((1, 0))]
+    best: list[Array] = [np.empty((1, 0))]
     costs, thetas = np.empty(0), np.empty((0, structure.n_numerator))
     for order in range(1, structure.n_denominator + 1):
         last = order == structure.n_denominator
@@ -127,7 +127,7 @@ def search_poles(structure: Structure, spectra: BandedSpectra, n_samples: int) -
     return costs, thetas
 
 
-def refine(structure: Structure, denominators: FloatArray, spectra: BandedSpectra) -> tuple[FloatArray, FloatArray]:
+def refine(structure: Structure, denominators: Array, spectra: BandedSpectra) -> tuple[Array, Array]:
     """Return banded minima reached from given denominators, each once, best first.
 
     Parameters
@@ -163,11 +163,11 @@ def refine(structure: Structure, denominators: FloatArray, spectra: BandedSpectr
     return costs[kept], thetas[kept]
 
 
-def _rises(costs: FloatArray, before: int, index: int) -> bool:
+def _rises(costs: Array, before: int, index: int) -> bool:
     return bool(costs[index] - costs[before] > SAME_COST * costs[index])
 
 
-def _explained(structure: Structure, denominators: FloatArray, spectra: BandedSpectra) -> tuple[FloatArray, FloatArray]:
+def _explained(structure: Structure, denominators: Array, spectra: BandedSpectra) -> tuple[Array, Array]:
     return explained_power(
         np.ascontiguousarray(denominators),
         structure.n_numerator,
@@ -179,8 +179,8 @@ def _explained(structure: Structure, denominators: FloatArray, spectra: BandedSp
 
 
 def _single_candidates(
-    structure: Structure, fewer: FloatArray, singles: FloatArray, spectra: BandedSpectra
-) -> tuple[FloatArray, FloatArray]:
+    structure: Structure, fewer: Array, singles: Array, spectra: BandedSpectra
+) -> tuple[Array, Array]:
     """Return every extension by a real pole, and those where the explained power peaks along the pole."""
     candidates = _multiplied(fewer, singles)
     explained, _ = _explained(structure, candidates, spectra)
@@ -189,14 +189,14 @@ def _single_candidates(
     return candidates, candidates[peak.ravel()]
 
 
-def _real_poles(n_samples: int) -> FloatArray:
+def _real_poles(n_samples: int) -> Array:
     """Return first-order denominators behind the 1, in the order of the pole, shape (m, 1)."""
     time_constants = np.geomspace(0.4, n_samples / 3.0, 44)
     poles = np.concatenate([[-0.98, -0.9, -0.7, -0.45, -0.2, 0.02], np.exp(-1.0 / time_constants)])
     return -poles[:, None]
 
 
-def _pole_pairs(n_samples: int) -> FloatArray:
+def _pole_pairs(n_samples: int) -> Array:
     """Return second-order denominators behind the 1, shape (m, 2)."""
     frequencies = np.geomspace(8.0 * np.pi / n_samples, 0.97 * np.pi, 32)
     zeta = np.array(DAMPING_RATIOS)[:, None]
@@ -208,7 +208,7 @@ def _pole_pairs(n_samples: int) -> FloatArray:
     return np.concatenate([complex_pairs, real_pairs])
 
 
-def _multiplied(kept: FloatArray, additions: FloatArray) -> FloatArray:
+def _multiplied(kept: Array, additions: Array) -> Array:
     """Return every product of two lists of monic polynomials, each given behind its leading 1."""
     left = np.concatenate([np.ones((len(kept), 1)), kept], axis=1)
     right = np.concatenate([np.ones((len(additions), 1)), additions], axis=1)
@@ -219,8 +219,8 @@ def _multiplied(kept: FloatArray, additions: FloatArray) -> FloatArray:
     return product.reshape(-1, product.shape[2])[:, 1:]
 
 
-def _distinct(ranked: FloatArray, count: int) -> FloatArray:
-    chosen: list[FloatArray] = []
+def _distinct(ranked: Array, count: int) -> Array:
+    chosen: list[Array] = []
     poles: list[ComplexArray] = []
     for row in ranked[: 12 * count]:
         ordered = np.sort_complex(np.roots(np.concatenate([[1.0], row])).astype(np.complex128))
@@ -234,7 +234,7 @@ def _distinct(ranked: FloatArray, count: int) -> FloatArray:
     return np.array(chosen).reshape(-1, ranked.shape[1])
 
 
-def reflected(denominators: list[FloatArray]) -> FloatArray:
+def reflected(denominators: list[Array]) -> Array:
     """Return monic denominators as rows behind their 1, unstable roots reflected into the unit circle.
 
     Parameters
@@ -247,7 +247,7 @@ def reflected(denominators: list[FloatArray]) -> FloatArray:
     ndarray, shape (m, n_f)
         Stable.
     """
-    rows: list[FloatArray] = []
+    rows: list[Array] = []
     for denominator in denominators:
         roots = np.roots(denominator).astype(np.complex128)
         radius = np.abs(roots)

@@ -9,8 +9,8 @@ banded spectra, and a search over pole positions (`estimation.identification.sea
 import numpy as np
 from scipy.linalg import hankel, lstsq
 
+from estimation.arrays import Array
 from estimation.identification.model.lags import lagged
-from estimation.identification.model.linear_model import FloatArray
 from estimation.identification.model.recursion import filtered
 from estimation.identification.search.criterion import Structure, polynomial, stabilised
 from estimation.identification.search.experiments import Experiments
@@ -26,7 +26,7 @@ TWINS = 1e-6
 """Denominators closer than this are one start."""
 
 
-def starting_values(structure: Structure, data: Experiments, count: int) -> list[FloatArray]:
+def starting_values(structure: Structure, data: Experiments, count: int) -> list[Array]:
     """Return candidate numerators and denominators, stable, the most promising first.
 
     Parameters
@@ -56,17 +56,15 @@ def starting_values(structure: Structure, data: Experiments, count: int) -> list
     return _without_twins(thetas[np.argsort(costs, kind="stable")])[:count]
 
 
-def _without_twins(ranked: FloatArray) -> list[FloatArray]:
-    kept: list[FloatArray] = []
+def _without_twins(ranked: Array) -> list[Array]:
+    kept: list[Array] = []
     for row in ranked:
         if all(np.abs(row - other).max() > TWINS * (1.0 + np.abs(row).max()) for other in kept):
             kept.append(row)
     return kept
 
 
-def least_squares_arx(
-    n_numerator: int, n_denominator: int, delay: int, u: FloatArray, y: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def least_squares_arx(n_numerator: int, n_denominator: int, delay: int, u: Array, y: Array) -> tuple[Array, Array]:
     """Return numerator and denominator of the least-squares ARX model ``F y = B u + e``.
 
     Parameters
@@ -91,7 +89,7 @@ def least_squares_arx(
     return np.concatenate([np.zeros(delay), b]), np.concatenate([[1.0], f])
 
 
-def reduced_high_order_arx(n_denominator: int, u: FloatArray, y: FloatArray) -> FloatArray:
+def reduced_high_order_arx(n_denominator: int, u: Array, y: Array) -> Array:
     """Return the denominator of a high-order ARX model reduced by the eigensystem realisation (Kung, 1978).
 
     A long ARX model is nearly unbiased under any noise; the shift structure of the leading singular vectors

@@ -8,7 +8,7 @@ band is widened by what the accepted window differs from the longer ones: what o
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimation.identification.model.linear_model import ComplexArray, FloatArray
+from estimation.arrays import Array, ComplexArray
 from estimation.identification.signals.etfe import (
     FrequencyResponse,
     checked_signals,
@@ -82,8 +82,8 @@ def automatic_response(u: ArrayLike, y: ArrayLike, sample_time: float) -> Freque
 
 
 def _estimates(
-    known: tuple[FloatArray, FloatArray, FloatArray], windows: list[int], size: int, n: int
-) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    known: tuple[Array, Array, Array], windows: list[int], size: int, n: int
+) -> tuple[ComplexArray, Array, Array]:
     """Return response, gain deviation and coherence by window and frequency; NaN where the input has no power."""
     n_frequencies = size // 2 + 1
     responses = np.full((len(windows), n_frequencies), np.nan, dtype=np.complex128)
@@ -102,7 +102,7 @@ def _estimates(
     return responses, deviations, coherences
 
 
-def _accepted(responses: ComplexArray, deviations: FloatArray) -> np.ndarray:
+def _accepted(responses: ComplexArray, deviations: Array) -> np.ndarray:
     """Return for each frequency the row of the shortest window that agrees with all longer ones."""
     n_rows, n_frequencies = responses.shape
     chosen = np.zeros(n_frequencies, dtype=np.intp)

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from scipy.signal import csd, welch
 from scipy.special import ndtri
 
-from estimation.identification.model.linear_model import ComplexArray, FloatArray
+from estimation.arrays import Array, ComplexArray
 from plant.errors import HydrostateError
 
 
@@ -31,13 +31,13 @@ class FrequencyResponse:
         window was chosen locally.
     """
 
-    frequency_hz: FloatArray
+    frequency_hz: Array
     response: ComplexArray
-    coherence: FloatArray
-    gain_std: FloatArray
-    resolution_hz: float | FloatArray
+    coherence: Array
+    gain_std: Array
+    resolution_hz: float | Array
 
-    def gain_band(self, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
+    def gain_band(self, level: float = 0.95) -> tuple[Array, Array]:
         """Return the band that covers the gain at each frequency with a given probability.
 
         Parameters
@@ -98,7 +98,7 @@ def etfe(u: ArrayLike, y: ArrayLike, sample_time: float, *, lag_window: int | No
     return _response(frequency[usable], *spectra, averages, 1.0 / (lags * sample_time))
 
 
-def correlations(u: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def correlations(u: Array, y: Array) -> tuple[Array, Array, Array]:
     """Return circular correlations of the zero-padded signals.
 
     Parameters
@@ -118,8 +118,8 @@ def correlations(u: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, 
 
 
 def smoothed_spectra(
-    correlations: tuple[FloatArray, FloatArray, FloatArray], lags: int, size: int
-) -> tuple[FloatArray, FloatArray, ComplexArray]:
+    correlations: tuple[Array, Array, Array], lags: int, size: int
+) -> tuple[Array, Array, ComplexArray]:
     """Return the spectra uu, yy, yu through a Hann lag window.
 
     Parameters
@@ -194,9 +194,9 @@ def etfe_welch(
 
 
 def _response(
-    frequency: FloatArray,
-    power_u: FloatArray,
-    power_y: FloatArray,
+    frequency: Array,
+    power_u: Array,
+    power_y: Array,
     cross: ComplexArray,
     averages: float,
     resolution: float,
@@ -206,7 +206,7 @@ def _response(
     return FrequencyResponse(frequency, response, squared, gain_std(response, squared, averages), resolution)
 
 
-def gain_std(response: ComplexArray, squared: FloatArray, averages: float) -> FloatArray:
+def gain_std(response: ComplexArray, squared: Array, averages: float) -> Array:
     """Return the asymptotic standard deviation of the gain (Bendat and Piersol, Random Data, 9.1).
 
     Parameters
@@ -227,7 +227,7 @@ def gain_std(response: ComplexArray, squared: FloatArray, averages: float) -> Fl
     return np.abs(response) * np.sqrt(unexplained / (2.0 * averages))
 
 
-def checked_signals(u: ArrayLike, y: ArrayLike, sample_time: float) -> tuple[FloatArray, FloatArray]:
+def checked_signals(u: ArrayLike, y: ArrayLike, sample_time: float) -> tuple[Array, Array]:
     """Return checked signals without their means.
 
     Parameters

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimation.identification.model.linear_model import FloatArray
+from estimation.arrays import Array
 from estimation.identification.notes import IdentificationCode
 from estimation.log_checks.bridging import bridged
 from plant.errors import HydrostateError, LogWarning
@@ -20,7 +20,7 @@ ANTI_ALIAS_SHARE = 0.8
 """Its corner as a share of the new Nyquist frequency."""
 
 
-def detrend(x: ArrayLike) -> FloatArray:
+def detrend(x: ArrayLike) -> Array:
     """Return the signal less its mean over the samples that are there.
 
     Parameters
@@ -50,7 +50,7 @@ def zero_phase_filter(
     cutoff_hz: float = 30.0,
     order: int = 12,
     filter_input: bool = True,
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Array, Array]:
     """Low-pass input and output forth and back with one Butterworth filter (section 4 of the EHA paper).
 
     A linear relation between ``u`` and ``y`` survives the same filter on both. The paper filters the output
@@ -93,7 +93,7 @@ def zero_phase_filter(
     return filtered, _low_pass(np.asarray(y, dtype=np.float64), sample_time, cutoff_hz, order)
 
 
-def resample(x: ArrayLike, sample_time: float, new_sample_time: float) -> FloatArray:
+def resample(x: ArrayLike, sample_time: float, new_sample_time: float) -> Array:
     """Return the signal on another sample time, beginning at the same instant.
 
     To a longer sample time, integer multiple or not, the signal is first low-passed without phase at 0.8 of
@@ -147,7 +147,7 @@ def resample(x: ArrayLike, sample_time: float, new_sample_time: float) -> FloatA
     return np.where(missing[nearest], np.nan, CubicSpline(np.arange(values.size), smooth)(position))
 
 
-def _low_pass(x: FloatArray, sample_time: float, cutoff_hz: float, order: int) -> FloatArray:
+def _low_pass(x: Array, sample_time: float, cutoff_hz: float, order: int) -> Array:
     from scipy.signal import butter, sosfiltfilt
 
     nyquist = 0.5 / sample_time
