@@ -7,7 +7,7 @@ nothing underflows, and nothing is floored. A mode that stops being finite has n
 others at the next sample.
 
 `imm` runs a bank of extended Kalman filters that differ in the leakage and the friction that they are told, so that a
-log's own need not be known; `estimation.filters.run_imm` runs any bank on a record.
+log's own need not be known; `interacting` runs any bank.
 """
 
 from collections.abc import Mapping, Sequence

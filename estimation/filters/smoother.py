@@ -18,7 +18,6 @@ kilobytes beside the track.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from math import isqrt
 
 import numpy as np
@@ -30,24 +29,6 @@ from estimation.engine.rule import chosen_settings
 from estimation.engine.runner import constant_row
 from estimation.filters.ekf import ekf
 from estimation.filters.smoother_loops import compile_smoother
-
-
-@dataclass(frozen=True, eq=False)
-class SmoothedStretch:
-    """Beliefs at every sample of a stretch of a log, in the filter's units.
-
-    Parameters
-    ----------
-    filtered_mean, mean : ndarray, shape (samples, n)
-        Means, of the filter and smoothed [dimensionless].
-    filtered_covariance, covariance : ndarray, shape (samples, n, n)
-        Their covariances [dimensionless].
-    """
-
-    filtered_mean: Array
-    mean: Array
-    filtered_covariance: Array
-    covariance: Array
 
 
 def smoother(problem: FilterProblem) -> Trace:
@@ -76,41 +57,6 @@ def smoother(problem: FilterProblem) -> Trace:
         at = (first + kept) // problem.every
         trace.track[at], trace.track_variance[at] = smoothed[kept, :n], smoothed[kept][:, diagonal]
     return trace
-
-
-def smoothed_stretch(problem: FilterProblem, first: int = 0, stop: int | None = None) -> SmoothedStretch:
-    """Return the beliefs at every sample of a stretch, given the whole log.
-
-    Parameters
-    ----------
-    problem : FilterProblem
-        The task.
-    first, stop : int
-        The stretch, from the first sample up to, without it, the last; by default the whole log.
-
-    Returns
-    -------
-    SmoothedStretch
-        Filtered and smoothed beliefs; its memory grows with the stretch.
-    """
-    end, n = len(problem.measured) if stop is None else stop, problem.model.width
-    width = n + n * (n + 1) // 2
-    beliefs = np.empty((2, end - first, width))
-    for start, posteriors, smoothed in _chunks(problem):
-        low, high = max(start, first), min(start + len(smoothed), end)
-        if low < high:
-            beliefs[0, low - first : high - first] = posteriors[low - start : high - start]
-            beliefs[1, low - first : high - first] = smoothed[low - start : high - start]
-        if start <= first:
-            break
-    return SmoothedStretch(beliefs[0, :, :n], beliefs[1, :, :n], _unpacked(beliefs[0], n), _unpacked(beliefs[1], n))
-
-
-def _unpacked(beliefs: Array, n: int) -> Array:
-    covariance = np.empty((len(beliefs), n, n))
-    for (i, j), values in zip(zip(*np.triu_indices(n), strict=True), beliefs[:, n:].T, strict=True):
-        covariance[:, i, j] = covariance[:, j, i] = values
-    return covariance
 
 
 def _chunks(problem: FilterProblem) -> Iterator[tuple[int, Array, Array]]:

@@ -1,12 +1,13 @@
 """How many samples pass before the output answers."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimation.identification.fit.fitted import scaled
+from estimation.identification.fit.fitted import Task
 from estimation.identification.fit.output_error import descend_from
 from estimation.identification.search.criterion import Structure
-from estimation.identification.search.experiments import Experiments, experiments_for
 from estimation.identification.search.pole_search import banded_spectra, search_poles
 from plant.errors import HydrostateError
 
@@ -48,8 +49,8 @@ def estimate_delay(u: ArrayLike, y: ArrayLike, *, n_numerator: int = 2, n_denomi
     if most < 0:
         raise HydrostateError(f"most must be at least 0, got {most}")
     form = Structure(n_numerator, n_denominator, most)
-    data, _, _ = scaled(experiments_for(u, y, form, input_name="input", output_name="output"))
-    data = Experiments(data.u, data.y, data.used & (np.arange(data.u.size) >= form.n_states), data.bounds)
+    data = Task(form, 1.0, "white", ("input", "output")).experiments(u, y)
+    data = replace(data, used=data.used & (np.arange(data.u.size) >= form.n_states))
     spectra = banded_spectra(data.bridged())
     coarse = [
         search_poles(Structure(n_numerator, n_denominator, delay), spectra, data.u.size) for delay in range(most + 1)

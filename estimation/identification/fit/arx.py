@@ -1,15 +1,17 @@
 """ARX models: linear least squares."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.fit.fitted import CovarianceKind, fitted_model, scaled
+from estimation.identification.fit.fitted import CovarianceKind, Task
 from estimation.identification.model.lags import lagged
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
 from estimation.identification.search.criterion import Structure, profile
 from estimation.identification.search.descent import stable
-from estimation.identification.search.experiments import Experiments, Signals, experiments_for
+from estimation.identification.search.experiments import Experiments, Signals
 
 
 def fit_arx(
@@ -61,7 +63,8 @@ def fit_arx(
     [1.0, -0.7]
     """
     form = Structure(n_numerator, n_denominator, delay)
-    data, *scales = scaled(experiments_for(u, y, form, input_name=input_name, output_name=output_name))
+    task = Task(form, sample_time, covariance, (input_name, output_name))
+    data = task.experiments(u, y)
     rows, target, kept = [], [], np.zeros(data.u.size, dtype=bool)
     begin = max(n_denominator, delay + n_numerator - 1)
     for part in data.slices:
@@ -78,20 +81,9 @@ def fit_arx(
     values = np.linalg.lstsq(regressors, wanted, rcond=None)[0]
     residual = wanted - regressors @ values
     b, f = values[:n_numerator], values[n_numerator:]
-    counted = Experiments(data.u, data.y, kept, data.bounds)
-    return fitted_model(
-        (b, f, _state_of(form, b, f, data)),
-        regressors,
-        residual,
-        counted,
-        (scales[0], scales[1]),
-        sample_time=sample_time,
-        delay=delay,
-        covariance=covariance,
-        names=(input_name, output_name),
-        structure="ARX",
-        noise=(np.ones(1), np.concatenate([[1.0], f])),
-    )
+    theta = np.concatenate([values, _state_of(form, b, f, data)])
+    noise = (np.ones(1), np.concatenate([[1.0], f]))
+    return task.model(theta, regressors, residual, replace(data, used=kept), "ARX", noise)
 
 
 def _state_of(form: Structure, b: Array, f: Array, data: Experiments) -> Array:

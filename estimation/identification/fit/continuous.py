@@ -5,7 +5,7 @@ from scipy.optimize import least_squares
 
 from estimation.arrays import Array
 from estimation.identification.fit.covariances import covariances
-from estimation.identification.fit.fitted import scaled
+from estimation.identification.fit.fitted import quality
 from estimation.identification.fit.output_error import descend_from, jacobian_and_residual, minimise
 from estimation.identification.model.held_input import held_input_model
 from estimation.identification.model.linear_model import LinearModel
@@ -69,15 +69,13 @@ def fit_continuous(
     if not 0 <= n_zeros <= n_poles or n_poles < 1:
         raise HydrostateError(f"0 <= n_zeros <= n_poles and n_poles >= 1 are wanted, got {n_zeros} and {n_poles}")
     n_wanted = SAMPLES_PER_PARAMETER * (n_zeros + 2 * n_poles + 2)
-    given = experiments_from(
-        u, y, input_name=input_name, output_name=output_name, n_excited=2 * n_poles, n_wanted=n_wanted
-    )
-    data, u_scale, y_scale = scaled(given)
-    problem = _Problem(data, sample_time, n_zeros, n_poles, dead_time)
+    names = (input_name, output_name)
+    given = experiments_from(u, y, names, n_excited=2 * n_poles, n_wanted=n_wanted)
+    problem = _Problem(given.scaled(), sample_time, n_zeros, n_poles, dead_time)
     longest = 10.0 * sample_time if longest_dead_time is None else longest_dead_time
     found = [problem.descend(start) for start in problem.starts(longest)]
     values = min(found, key=lambda one: one[0])[1]
-    return problem.result(values, given, (u_scale, y_scale), (input_name, output_name))
+    return problem.result(values, data_hash(given, sample_time), names)
 
 
 class _Problem:
@@ -96,11 +94,6 @@ class _Problem:
         a = np.concatenate([[1.0], values[n_b : n_b + self.n_poles]])
         return held_input_model(values[:n_b], a, max(float(late), 0.0), 1.0)
 
-    def form(self, values: Array) -> Structure:
-        """Return the discrete structure that holds every dead time between this sample and the next."""
-        b, _, delay = self.discrete(values)
-        return Structure(b.size - delay, self.n_poles, delay)
-
     def parts(self, values: Array) -> tuple[Array, Array]:
         """Return Jacobian by continuous values and initial states, and the residual, initial states at their best."""
         b, f, delay = self.discrete(values)
@@ -117,11 +110,9 @@ class _Problem:
                 step = 1e-5
             up = values.copy()
             up[k] += step
-            other_b, other_f, other_delay = self.discrete(up)
-            length = max(b.size, other_b.size)
-            change = np.pad(other_b, (0, length - other_b.size)) - np.pad(b, (0, length - b.size))
-            del other_delay
-            moved[: b.size - delay, k] = change[delay : b.size] / step
+            other_b, other_f, _ = self.discrete(up)
+            known = np.pad(other_b, (0, max(b.size - other_b.size, 0)))[: b.size]
+            moved[: b.size - delay, k] = (known - b)[delay:] / step
             moved[b.size - delay :, k] = (other_f[1:] - f[1:]) / step
         return np.concatenate([jacobian[:, :n_main] @ moved, initial], axis=1), residual
 
@@ -175,9 +166,7 @@ class _Problem:
         values = np.asarray(np.concatenate([numerator, a[1:]]), dtype=np.float64)
         return values if self.dead_time is not None else np.concatenate([values, [late]])
 
-    def result(
-        self, values: Array, given: Experiments, scales: tuple[float, float], names: tuple[str, str]
-    ) -> LinearModel:
+    def result(self, values: Array, fingerprint: str, names: tuple[str, str]) -> LinearModel:
         """Return the model in seconds and in the data's units."""
         T, n_b = self.sample_time, self.n_zeros + 1
         jacobian, residual = self.parts(values)
@@ -185,28 +174,22 @@ class _Problem:
         # values are in samples: a coefficient of s^k is multiplied by T^k, relative to the leading 1 of s^n
         powers_b = np.arange(self.n_zeros, -1, -1)
         powers_a = np.arange(self.n_poles - 1, -1, -1)
-        unscale = np.concatenate(
-            [T ** (powers_b - self.n_poles) * (scales[1] / scales[0]), T ** (powers_a - self.n_poles)]
-        )
+        gain = self.data.y_scale / self.data.u_scale
+        unscale = np.concatenate([T ** (powers_b - self.n_poles) * gain, T ** (powers_a - self.n_poles)])
         n_main = unscale.size
-        spread = np.outer(unscale, unscale)
+        white_main, robust = (one[:n_main, :n_main] * np.outer(unscale, unscale) for one in (white, robust))
         late = self.dead_time if self.dead_time is not None else float(values[-1]) * T
-        rss, n_used = float(residual @ residual), self.data.n_used
-        deviation = self.data.y[self.data.used] - self.data.y[self.data.used].mean()
         return LinearModel(
             numerator=values[:n_b] * unscale[:n_b],
             denominator=np.concatenate([[1.0], values[n_b:n_main] * unscale[n_b:]]),
             sample_time=T,
             input_name=names[0],
             output_name=names[1],
-            covariance=white[:n_main, :n_main] * spread,
-            covariance_white=white[:n_main, :n_main] * spread,
-            covariance_robust=robust[:n_main, :n_main] * spread,
-            fit_percent=100.0 * (1.0 - float(np.sqrt(rss / (deviation @ deviation)))),
-            rmse=float(np.sqrt(rss / n_used)) * scales[1],
-            residual_std=float(np.sqrt(rss / (n_used - jacobian.shape[1]))) * scales[1],
-            n_samples=n_used,
-            data_hash=data_hash(given, T),
+            covariance=white_main,
+            covariance_white=white_main,
+            covariance_robust=robust,
+            data_hash=fingerprint,
+            **quality(residual, self.data, jacobian.shape[1]),
             structure="continuous-output-error",
             continuous=True,
             dead_time=late,

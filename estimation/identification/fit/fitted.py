@@ -1,7 +1,7 @@
 """From fitted values to the one result type: scaling undone, both covariances, quality of fit."""
 
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -12,7 +12,14 @@ from estimation.identification.fit.residual_tests import ljung_box
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
-from estimation.identification.search.experiments import Experiments, data_hash
+from estimation.identification.search.criterion import Structure
+from estimation.identification.search.experiments import (
+    SAMPLES_PER_PARAMETER,
+    Experiments,
+    Signals,
+    data_hash,
+    experiments_from,
+)
 from estimation.notes import EstimateCode
 from plant.errors import CovarianceWarning, HydrostateError, LogWarning
 
@@ -26,117 +33,164 @@ class NoEffectError(HydrostateError):
     """A model of the wanted size explains no more of the output than chance would."""
 
 
-def scaled(data: Experiments) -> tuple[Experiments, float, float]:
-    """Return the data with input and output of order one, and their root mean squares.
+@dataclass(frozen=True)
+class Task:
+    """What a fit is asked for.
 
     Parameters
     ----------
-    data : Experiments
-        In any unit.
-
-    Returns
-    -------
-    data : Experiments
-        Divided.
-    u_scale, y_scale : float
-        What by [input unit], [output unit].
-    """
-    u_scale = float(np.sqrt(np.mean(data.u**2)))
-    y_scale = float(np.sqrt(np.sum(data.y**2) / data.n_used))
-    return replace(data, u=data.u / u_scale, y=data.y / y_scale), u_scale, y_scale
-
-
-def fitted_model(
-    values: tuple[Array, Array, Array],
-    jacobian: Array,
-    residual: Array,
-    data: Experiments,
-    scales: tuple[float, float],
-    *,
-    sample_time: float,
-    delay: int,
-    covariance: CovarianceKind,
-    names: tuple[str, str],
-    structure: str,
-    noise: tuple[Array, Array] | None = None,
-) -> LinearModel:
-    """Return the result of a fit to scaled data.
-
-    Parameters
-    ----------
-    values : tuple of ndarray, shapes (n_b,), (n_f,) and (n_states,)
-        Free numerator, denominator behind its 1, initial state of the first experiment.
-    jacobian : ndarray, shape (n, p)
-        Derivative of the prediction, numerator and denominator first.
-    residual : ndarray, shape (n,)
-        Prediction error; 0 where the output is missing.
-    data : Experiments
-        The scaled data.
-    scales : tuple of float
-        Root mean squares that the data were divided by [input unit, output unit].
+    form : Structure
+        Orders of ``B/F``.
     sample_time : float
         Seconds between samples [s].
-    delay : int
-        Dead time [samples].
     covariance : {"white", "coloured", "auto"}
         Which one the standard deviations use.
     names : tuple of str
         Input and output channel.
-    structure : str
-        What was fitted.
-    noise : tuple of ndarray, shapes (n_c + 1,) and (n_d + 1,), optional
-        C and D, monic.
+    n_c, n_d : int
+        Coefficients of the noise model behind their 1.
+    """
+
+    form: Structure
+    sample_time: float
+    covariance: CovarianceKind
+    names: tuple[str, str]
+    n_c: int = 0
+    n_d: int = 0
+
+    def experiments(self, u: Signals, y: Signals) -> Experiments:
+        """Return checked experiments of order one, long and lively enough for the orders.
+
+        Parameters
+        ----------
+        u, y : array_like of shape (n,), or a sequence of them
+            Input, no gaps; output, NaN where missing.
+
+        Returns
+        -------
+        Experiments
+            Divided by their root mean squares.
+
+        Raises
+        ------
+        HydrostateError
+            If an order is not usable, or as `experiments_from`.
+        """
+        form = self.form
+        n_b, n_f = form.n_numerator, form.n_denominator
+        if min(n_b, n_f) < 1 or min(form.delay, self.n_c, self.n_d) < 0:
+            raise HydrostateError(
+                "n_numerator and n_denominator must be at least 1, delay, n_c and n_d at least 0, "
+                f"got {n_b}, {n_f}, {form.delay}, {self.n_c} and {self.n_d}"
+            )
+        n_wanted = SAMPLES_PER_PARAMETER * (form.n_parameters + self.n_c + self.n_d)
+        return experiments_from(u, y, self.names, n_excited=form.n_main, n_wanted=n_wanted).scaled()
+
+    def model(
+        self,
+        theta: Array,
+        jacobian: Array,
+        residual: Array,
+        data: Experiments,
+        structure: str,
+        noise: tuple[Array, Array] | None = None,
+    ) -> LinearModel:
+        """Return the result of a fit to scaled data, in the data's units.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (n_numerator + n_denominator + n_initial,) or longer
+            Free numerator, denominator behind its 1, initial states.
+        jacobian : ndarray, shape (n, p)
+            Derivative of the prediction, numerator and denominator first.
+        residual : ndarray, shape (n,)
+            Prediction error; 0 where the output is missing.
+        data : Experiments
+            The scaled data.
+        structure : str
+            What was fitted.
+        noise : tuple of ndarray, shapes (n_c + 1,) and (n_d + 1,), optional
+            C and D, monic.
+
+        Returns
+        -------
+        LinearModel
+            With both covariances.
+
+        Raises
+        ------
+        NoEffectError
+            If the model is no better than none by BIC.
+
+        Warns
+        -----
+        LogWarning
+            If the model is unstable, the coefficients are not separately determined, or a pole nearly cancels a zero.
+        """
+        form, gain = self.form, data.y_scale / data.u_scale
+        b, f, state = form.split(theta[: form.n_parameters])
+        n_main = form.n_main
+        unscale = np.concatenate([np.full(form.n_numerator, gain), np.ones(form.n_denominator)])
+        *spreads, determined = covariances(jacobian, residual, data)
+        white, robust = (spread[:n_main, :n_main] * np.outer(unscale, unscale) for spread in spreads)
+        coloured = self.covariance == "coloured"
+        if self.covariance == "auto":
+            coloured = ljung_box(np.where(data.used, residual, np.nan)).p_value < COLOURED
+        found = quality(residual, data, jacobian.shape[1])
+        if noise is None:
+            _require_effect(float(residual @ residual), float(data.y @ data.y), data.n_used, n_main, self.names)
+        else:
+            simulated = _simulated_fit(b, f, state, data)
+            found |= {"noise_numerator": noise[0], "noise_denominator": noise[1], "fit_percent": simulated}
+        whole = replace(data, u=data.u * data.u_scale, y=data.y * data.y_scale)
+        model = LinearModel(
+            numerator=b * gain,
+            denominator=f,
+            sample_time=self.sample_time,
+            input_name=self.names[0],
+            output_name=self.names[1],
+            delay=form.delay,
+            covariance=robust if coloured else white,
+            initial_state=state * data.y_scale,
+            data_hash=data_hash(whole, self.sample_time),
+            covariance_white=white,
+            covariance_robust=robust,
+            structure=structure,
+            **found,
+        )
+        _warn(model, determined)
+        return model
+
+
+def quality(residual: Array, data: Experiments, n_parameters: int) -> dict[str, Any]:
+    """Return fit, root mean square, deviation and count of a residual, by the fields of `LinearModel`.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+        0 where the output is missing.
+    data : Experiments
+        Scaled or not.
+    n_parameters : int
+        Free values.
 
     Returns
     -------
-    LinearModel
-        In the data's units.
-
-    Raises
-    ------
-    NoEffectError
-        If the model is no better than none by BIC.
-
-    Warns
-    -----
-    LogWarning
-        If the model is unstable, the coefficients are not separately determined, or a pole nearly cancels a zero.
+    dict
+        In the data's own units.
     """
-    b, f, state = values
-    u_scale, y_scale = scales
-    n_main = b.size + f.size
-    unscale = np.concatenate([np.full(b.size, y_scale / u_scale), np.ones(f.size)])
-    *spreads, determined = covariances(jacobian, residual, data)
-    white, robust = (spread[:n_main, :n_main] * np.outer(unscale, unscale) for spread in spreads)
-    if covariance == "auto":
-        coloured = ljung_box(np.where(data.used, residual, np.nan)).p_value < COLOURED
-    else:
-        coloured = covariance == "coloured"
-    rss, n_used = float(residual @ residual) * y_scale**2, data.n_used
-    if noise is None:
-        _require_effect(rss, float(data.y @ data.y) * y_scale**2, n_used, n_main, names)
-    whole = replace(data, u=data.u * u_scale, y=data.y * y_scale)
-    model = LinearModel(
-        numerator=np.concatenate([np.zeros(delay), b * (y_scale / u_scale)]),
-        denominator=np.concatenate([[1.0], f]),
-        sample_time=sample_time,
-        input_name=names[0],
-        output_name=names[1],
-        delay=delay,
-        covariance=robust if coloured else white,
-        initial_state=state * y_scale,
-        fit_percent=_simulated_fit(values, delay, residual if noise is None else None, data),
-        rmse=float(np.sqrt(rss / n_used)),
-        residual_std=float(np.sqrt(rss / (n_used - jacobian.shape[1]))),
-        n_samples=n_used,
-        data_hash=data_hash(whole, sample_time),
-        covariance_white=white,
-        covariance_robust=robust,
-        structure=structure,
-        **_noise(noise),
-    )
-    _warn(model, determined)
-    return model
+    rss = float(residual @ residual) * data.y_scale**2
+    return {
+        "fit_percent": _fit_percent(residual, data.y[data.used]),
+        "rmse": float(np.sqrt(rss / data.n_used)),
+        "residual_std": float(np.sqrt(rss / (data.n_used - n_parameters))),
+        "n_samples": data.n_used,
+    }
+
+
+def _fit_percent(residual: Array, measured: Array) -> float:
+    deviation = measured - measured.mean()
+    return 100.0 * (1.0 - float(np.sqrt((residual @ residual) / (deviation @ deviation))))
 
 
 def _require_effect(rss: float, power: float, n_used: int, n_parameters: int, names: tuple[str, str]) -> None:
@@ -148,26 +202,13 @@ def _require_effect(rss: float, power: float, n_used: int, n_parameters: int, na
         )
 
 
-def _noise(noise: tuple[Array, Array] | None) -> dict[str, Any]:
-    return {} if noise is None else {"noise_numerator": noise[0], "noise_denominator": noise[1]}
-
-
-def _simulated_fit(values: tuple[Array, Array, Array], delay: int, residual: Array | None, data: Experiments) -> float:
-    """Return the fit of the simulation from the fitted initial state; with a noise model, of the first experiment."""
-    deviation = data.y[data.used] - data.y[data.used].mean()
-    if residual is None:
-        b, f, state = values
-        part = data.slices[0]
-        with np.errstate(over="ignore", invalid="ignore"):
-            numerator, denominator = np.concatenate([np.zeros(delay), b]), np.concatenate([[1.0], f])
-            output = filtered(numerator, denominator, data.u[part], state)
-            residual = np.where(data.used[part], data.y[part] - output, 0.0)
-            measured = data.y[part][data.used[part]]
-            deviation = measured - measured.mean()
-            total = float(residual @ residual)
-        if not np.isfinite(total):
-            return float("nan")
-    return 100.0 * (1.0 - float(np.sqrt((residual @ residual) / (deviation @ deviation))))
+def _simulated_fit(b: Array, f: Array, state: Array, data: Experiments) -> float:
+    """Return the fit of the first experiment's simulation from the fitted initial state; NaN where it overflows."""
+    part = data.slices[0]
+    with np.errstate(over="ignore", invalid="ignore"):
+        residual = np.where(data.used[part], data.y[part] - filtered(b, f, data.u[part], state), 0.0)
+        total = float(residual @ residual)
+    return _fit_percent(residual, data.y[part][data.used[part]]) if np.isfinite(total) else float("nan")
 
 
 def _warn(model: LinearModel, determined: bool) -> None:

@@ -3,13 +3,13 @@
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.fit.fitted import CovarianceKind, fitted_model, scaled
+from estimation.identification.fit.fitted import CovarianceKind, Task
 from estimation.identification.fit.output_error import jacobian_and_residual
 from estimation.identification.model.lags import lagged
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
 from estimation.identification.search.criterion import Structure, profile, stabilised
-from estimation.identification.search.experiments import Experiments, Signals, experiments_for
+from estimation.identification.search.experiments import Experiments, Signals
 from estimation.identification.search.noise_model import noise_start
 from estimation.identification.search.starts import least_squares_arx, reduced_high_order_arx
 from plant.errors import HydrostateError
@@ -68,51 +68,38 @@ def fit_instrumental(
         As `fit_output_error`, or if an output is missing.
     """
     form = Structure(n_numerator, n_denominator, delay)
-    given = experiments_for(u, y, form, input_name=input_name, output_name=output_name, n_c=n_c, n_d=n_d)
-    if not given.used.all():
+    task = Task(form, sample_time, covariance, (input_name, output_name), n_c, n_d)
+    data = task.experiments(u, y)
+    if not data.used.all():
         raise HydrostateError(
-            f"instrumental variables need every sample of {output_name!r}, got {int((~given.used).sum())} missing: "
+            f"instrumental variables need every sample of {output_name!r}, got {int((~data.used).sum())} missing: "
             "use fit_output_error"
         )
-    data, *scales = scaled(given)
-    longest_u, longest_y = max(data.bridged(), key=lambda pair: pair[0].size)
+    longest_u, longest_y = data.u[data.longest], data.y[data.longest]
     starts = [
         least_squares_arx(n_numerator, n_denominator, delay, longest_u, longest_y)[1],
         reduced_high_order_arx(n_denominator, longest_u, longest_y),
     ]
     found = [_refined(form, stabilised(f, longest_u.size), data, n_c, n_d) for f in starts]
     theta, noise, jacobian, residual = min(found, key=lambda one: float(one[3] @ one[3]))
-    n_main = n_numerator + n_denominator
-    return fitted_model(
-        (theta[:n_numerator], theta[n_numerator:n_main], theta[n_main : n_main + form.n_states]),
-        jacobian,
-        residual,
-        data,
-        (scales[0], scales[1]),
-        sample_time=sample_time,
-        delay=delay,
-        covariance=covariance,
-        names=(input_name, output_name),
-        structure="RIV" if n_c + n_d else "SRIV",
-        noise=noise if n_c + n_d else None,
-    )
+    named = "RIV" if n_c + n_d else "SRIV"
+    return task.model(theta, jacobian, residual, data, named, noise if n_c + n_d else None)
 
 
 def _refined(
     form: Structure, f: Array, data: Experiments, n_c: int, n_d: int
 ) -> tuple[Array, tuple[Array, Array], Array, Array]:
     """Return values with initial states, noise model, Jacobian and whitened residual of one start."""
-    n_b, n_f = form.n_numerator, form.n_denominator
+    n_b = form.n_numerator
     c, d = np.ones(1), np.ones(1)
-    longest = max(data.slices, key=lambda part: part.stop - part.start)
     theta = _with_initial(form, f, data)
     for _ in range(MOST_PASSES):
-        before = theta[: n_b + n_f]
+        before = theta[: form.n_main]
         if n_c + n_d:
-            c, d = noise_start(jacobian_and_residual(form, theta, data)[1][longest], n_c, n_d)
+            c, d = noise_start(jacobian_and_residual(form, theta, data)[1][data.longest], n_c, n_d)
         values = _pass(form, before, data, c, d)
         theta = _with_initial(form, stabilised(np.concatenate([[1.0], values[n_b:]]), data.u.size), data)
-        if np.abs(theta[: n_b + n_f] - before).max() <= SETTLED * np.abs(before).max():
+        if np.abs(theta[: form.n_main] - before).max() <= SETTLED * np.abs(before).max():
             break
     jacobian, residual = jacobian_and_residual(form, theta, data)
     for part in data.slices:
@@ -127,7 +114,7 @@ def _pass(form: Structure, values: Array, data: Experiments, c: Array, d: Array)
     f = np.concatenate([[1.0], values[n_b:]])
     b = np.concatenate([np.zeros(form.delay), values[:n_b]])
     weight = np.convolve(c, f)
-    gram, right = np.zeros((n_b + n_f, n_b + n_f)), np.zeros(n_b + n_f)
+    gram, right = np.zeros((form.n_main, form.n_main)), np.zeros(form.n_main)
     begin = form.n_states
     for part in data.slices:
         inputs = filtered(d, weight, data.u[part])
@@ -144,6 +131,5 @@ def _pass(form: Structure, values: Array, data: Experiments, c: Array, d: Array)
 def _with_initial(form: Structure, f: Array, data: Experiments) -> Array:
     """Return the best numerator and initial states for a denominator; the numerator is the longest experiment's."""
     fits = [profile(form, f, data.u[part], data.y[part], data.used[part])[1] for part in data.slices]
-    n_main = form.n_numerator + form.n_denominator
     sizes = [part.stop - part.start for part in data.slices]
-    return np.concatenate([fits[int(np.argmax(sizes))][:n_main], *(fit[n_main:] for fit in fits)])
+    return np.concatenate([fits[int(np.argmax(sizes))][: form.n_main], *(fit[form.n_main :] for fit in fits)])

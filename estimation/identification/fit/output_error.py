@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.fit.fitted import CovarianceKind, fitted_model, scaled
+from estimation.identification.fit.fitted import CovarianceKind, Task
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.criterion import Structure, predict, sensitivities
 from estimation.identification.search.descent import descend
-from estimation.identification.search.experiments import Experiments, Signals, experiments_for
+from estimation.identification.search.experiments import Experiments, Signals
 from estimation.identification.search.starts import starting_values
 
 SCREENING_SAMPLES = 50_000
@@ -104,23 +104,10 @@ def fit_output_error(
     [1.0, -0.7]
     """
     structure = Structure(n_numerator, n_denominator, delay, estimate_initial_state)
-    data = experiments_for(u, y, structure, input_name=input_name, output_name=output_name)
-    data, *scales = scaled(data)
+    task = Task(structure, sample_time, covariance, (input_name, output_name))
+    data = task.experiments(u, y)
     theta = minimise(structure, data)
-    jacobian, residual = jacobian_and_residual(structure, theta, data)
-    b, f, state = structure.split(theta[: structure.n_parameters])
-    return fitted_model(
-        (b[delay:], f[1:], state),
-        jacobian,
-        residual,
-        data,
-        (scales[0], scales[1]),
-        sample_time=sample_time,
-        delay=delay,
-        covariance=covariance,
-        names=(input_name, output_name),
-        structure="output-error",
-    )
+    return task.model(theta, *jacobian_and_residual(structure, theta, data), data, "output-error")
 
 
 def minimise(structure: Structure, data: Experiments) -> Array:
@@ -149,7 +136,7 @@ def minimise(structure: Structure, data: Experiments) -> Array:
         is_new = all(cost - other > SAME_MINIMUM * cost for other, _ in finalists)
         if is_new and len(finalists) < FINALISTS:
             finalists.append((cost, theta))
-    carried = structure.n_numerator + structure.n_denominator if part is not data else None
+    carried = structure.n_main if part is not data else None
     finished = [descend_from(structure, theta[:carried], data, FINAL_STEPS, TOLERANCE) for _, theta in finalists]
     return min(finished, key=lambda found: found[0])[1]
 
@@ -201,13 +188,10 @@ def descend_from(
     theta : ndarray
         All values.
     """
-    n_main = structure.n_numerator + structure.n_denominator
-    whole = np.zeros(n_main + structure.n_initial * data.count)
+    whole = np.zeros(structure.n_main + structure.n_initial * data.count)
     whole[: start.size] = start
-    sizes = np.array([structure.n_numerator, structure.n_denominator, structure.delay, structure.n_initial])
     weight = data.used.astype(np.float64)
-    found = descend(whole, sizes, data.u, data.y, weight, data.bounds, steps, tolerance)
-    return found[0], found[1]
+    return descend(whole, structure.sizes, data.u, data.y, weight, data.bounds, steps, tolerance)[:2]
 
 
 def jacobian_and_residual(structure: Structure, theta: Array, data: Experiments) -> tuple[Array, Array]:
@@ -229,7 +213,7 @@ def jacobian_and_residual(structure: Structure, theta: Array, data: Experiments)
     residual : ndarray, shape (n,)
         Measured less simulated.
     """
-    n_main, n_s = structure.n_numerator + structure.n_denominator, structure.n_initial
+    n_main, n_s = structure.n_main, structure.n_initial
     jacobian = np.zeros((data.u.size, theta.size), order="F")
     residual = np.zeros(data.u.size)
     for index, part in enumerate(data.slices):

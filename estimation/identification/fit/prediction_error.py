@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.fit.fitted import CovarianceKind, fitted_model, scaled
+from estimation.identification.fit.fitted import CovarianceKind, Task
 from estimation.identification.fit.output_error import jacobian_and_residual, minimise
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.criterion import Structure
 from estimation.identification.search.descent import stable
-from estimation.identification.search.experiments import Experiments, Signals, experiments_for
+from estimation.identification.search.experiments import Experiments, Signals
 from estimation.identification.search.levenberg import levenberg
 from estimation.identification.search.noise_model import noise_start
 from estimation.identification.search.one_step import prediction_errors
@@ -45,13 +45,30 @@ class NoiseStructure:
     @property
     def n_main(self) -> int:
         """Values beside the initial states."""
-        return self.system.n_numerator + self.system.n_denominator + self.n_c + self.n_d
+        return self.system.n_main + self.n_c + self.n_d
 
     @property
     def sizes(self) -> np.ndarray:
         """As `prediction_errors` takes them."""
         s = self.system
         return np.array([s.n_numerator, s.n_denominator, self.n_c, self.n_d, s.delay, s.n_initial])
+
+    def split(self, theta: Array) -> tuple[Array, Array, Array, Array]:
+        """Return numerator with denominator, denominator, C and D, behind their 1.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (n_main,) or longer
+            All values.
+
+        Returns
+        -------
+        tuple of ndarray
+            Shapes (n_b + n_f,), (n_f,), (n_c,) and (n_d,).
+        """
+        at_c = self.system.n_main
+        at_d = at_c + self.n_c
+        return theta[:at_c], theta[self.system.n_numerator : at_c], theta[at_c:at_d], theta[at_d : self.n_main]
 
     def acceptable(self, theta: Array) -> bool:
         """Return whether the predictor is stable: C always, and F and D unless tied, when they cancel out of it.
@@ -66,9 +83,7 @@ class NoiseStructure:
         bool
             False, too, where a value is not finite.
         """
-        n_b, n_f = self.system.n_numerator, self.system.n_denominator
-        f, c = theta[n_b : n_b + n_f], theta[n_b + n_f : n_b + n_f + self.n_c]
-        d = theta[n_b + n_f + self.n_c : self.n_main]
+        _, f, c, d = self.split(theta)
         return bool(np.isfinite(theta).all() and stable(c) and (self.tied or (stable(f) and stable(d))))
 
 
@@ -112,8 +127,9 @@ def fit_armax(
     HydrostateError
         As `fit_output_error`.
     """
-    form = NoiseStructure(Structure(n_numerator, n_denominator, delay), n_c, 0, tied=True)
-    return _fit(form, u, y, sample_time, covariance, (input_name, output_name), "ARMAX")
+    system = Structure(n_numerator, n_denominator, delay)
+    task = Task(system, sample_time, covariance, (input_name, output_name), n_c)
+    return _fit(NoiseStructure(system, n_c, 0, tied=True), u, y, task, "ARMAX")
 
 
 def fit_box_jenkins(
@@ -157,53 +173,29 @@ def fit_box_jenkins(
     HydrostateError
         As `fit_output_error`.
     """
-    form = NoiseStructure(Structure(n_numerator, n_denominator, delay), n_c, n_d, tied=False)
-    return _fit(form, u, y, sample_time, covariance, (input_name, output_name), "Box-Jenkins")
+    system = Structure(n_numerator, n_denominator, delay)
+    task = Task(system, sample_time, covariance, (input_name, output_name), n_c, n_d)
+    return _fit(NoiseStructure(system, n_c, n_d, tied=False), u, y, task, "Box-Jenkins")
 
 
-def _fit(
-    form: NoiseStructure,
-    u: Signals,
-    y: Signals,
-    sample_time: float,
-    covariance: CovarianceKind,
-    names: tuple[str, str],
-    structure: str,
-) -> LinearModel:
-    given = experiments_for(u, y, form.system, input_name=names[0], output_name=names[1], n_c=form.n_c, n_d=form.n_d)
-    data, *scales = scaled(given)
+def _fit(form: NoiseStructure, u: Signals, y: Signals, task: Task, structure: str) -> LinearModel:
+    data = task.experiments(u, y)
     found = [_descend(form, start, data) for start in _starts(form, data)]
     _, theta, error, jacobian = min(found, key=lambda one: one[0])
-    n_b, n_f = form.system.n_numerator, form.system.n_denominator
-    f = theta[n_b : n_b + n_f]
-    c = np.concatenate([[1.0], theta[n_b + n_f : n_b + n_f + form.n_c]])
-    d = np.concatenate([[1.0], f if form.tied else theta[n_b + n_f + form.n_c : form.n_main]])
+    main, f, c, d = form.split(theta)
     state = theta[form.n_main : form.n_main + form.system.n_states]
-    return fitted_model(
-        (theta[:n_b], f, state),
-        jacobian,
-        error,
-        data,
-        (scales[0], scales[1]),
-        sample_time=sample_time,
-        delay=form.system.delay,
-        covariance=covariance,
-        names=names,
-        structure=structure,
-        noise=(c, d),
-    )
+    noise = (np.concatenate([[1.0], c]), np.concatenate([[1.0], f if form.tied else d]))
+    return task.model(np.concatenate([main, state]), jacobian, error, data, structure, noise)
 
 
 def _starts(form: NoiseStructure, data: Experiments) -> list[Array]:
     """Return starts: the output-error model with the noise that it leaves, with none, and from ARX."""
-    system = form.system
+    system, longest = form.system, data.longest
     n_b, n_f = system.n_numerator, system.n_denominator
     output_error = minimise(system, data)
     _, residual = jacobian_and_residual(system, output_error, data)
-    longest = max(data.slices, key=lambda part: part.stop - part.start)
-    main, initial = output_error[: n_b + n_f], output_error[n_b + n_f :]
-    pairs = data.bridged()
-    u, y = max(pairs, key=lambda pair: pair[0].size)
+    main, initial = output_error[: system.n_main], output_error[system.n_main :]
+    u, y = data.bridged()[data.slices.index(longest)]
     arx_b, arx_f = least_squares_arx(n_b, n_f, system.delay, u, y)
     arx = np.concatenate([arx_b[system.delay :], arx_f[1:]])
     starts: list[Array] = []

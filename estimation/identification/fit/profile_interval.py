@@ -6,7 +6,7 @@ instead which gains a fit can be forced to at a cost that chance explains (Venzo
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import gammaincinv
@@ -33,17 +33,6 @@ BISECTIONS = 8
 
 WIDENINGS = 40
 """Widenings of the first guess before an interval is called unbounded."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    structure: Structure
-    data: Experiments
-
-    @property
-    def sizes(self) -> np.ndarray:
-        form = self.structure
-        return np.array([form.n_numerator, form.n_denominator, form.delay, form.n_initial])
 
 
 def dc_gain_interval(
@@ -83,15 +72,12 @@ def dc_gain_interval(
         )
     n_b = model.numerator.size - model.delay
     form = Structure(n_b, model.denominator.size - 1, model.delay, estimate_initial_state)
-    data = experiments_from(
-        u, y, input_name=model.input_name, output_name=model.output_name, n_excited=1, n_wanted=form.n_parameters
-    )
-    size_u, size_y = float(np.sqrt(np.mean(data.u**2))), float(np.sqrt(np.sum(data.y**2) / data.n_used))
-    problem = _Problem(form, replace(data, u=data.u / size_u, y=data.y / size_y))
-    unit = size_y / size_u
+    names = (model.input_name, model.output_name)
+    data = experiments_from(u, y, names, n_excited=1, n_wanted=form.n_parameters).scaled()
+    unit = data.y_scale / data.u_scale
     fitted = np.concatenate([model.numerator[model.delay :] / unit, model.denominator[1:]])
-    starts = [fitted, *starting_values(form, problem.data, OTHER_STARTS if model.cancellations else 1)]
-    least, best = min((descend_from(form, start, problem.data, 100) for start in starts), key=lambda found: found[0])
+    starts = [fitted, *starting_values(form, data, OTHER_STARTS if model.cancellations else 1)]
+    least, best = min((descend_from(form, start, data, 100) for start in starts), key=lambda found: found[0])
     variance = least / (data.n_used - best.size)
     # where a cancelled pole lies is chosen after the fact, among many places: one more degree of freedom each
     freedom = 1 + len(model.cancellations)
@@ -99,14 +85,14 @@ def dc_gain_interval(
     allowed = least + quantile * variance * _stretch(model)
     gain = float(best[:n_b].sum() / (1.0 + best[n_b : n_b + form.n_denominator].sum()))
     first = max(model.dc_gain_std / unit, 1e-6 * abs(gain)) * np.sqrt(2.0 * gammaincinv(0.5, level))
-    others = [descend_from(form, start, problem.data, 12)[1] for start in starts[1:]]
+    others = [descend_from(form, start, data, 12)[1] for start in starts[1:]]
     ends: list[float] = []
     for side in (-1.0, 1.0):
         path = [best]
 
         def excess(value: float, path: list[Array] = path) -> float:
             cost, theta = min(
-                (_forced(problem, start, value) for start in [path[-1], *others]), key=lambda found: found[0]
+                (_forced(form, data, start, value) for start in [path[-1], *others]), key=lambda found: found[0]
             )
             path.append(theta)
             return cost - allowed
@@ -140,14 +126,13 @@ def _stretch(model: LinearModel) -> float:
     return (model.dc_gain_std / plain) ** 2 if plain > 0.0 and np.isfinite(model.dc_gain_std / plain) else 1.0
 
 
-def _forced(problem: _Problem, start: Array, gain: float) -> tuple[float, Array]:
+def _forced(form: Structure, data: Experiments, start: Array, gain: float) -> tuple[float, Array]:
     """Return cost and values of the best fit with a given gain; the last numerator coefficient follows from the rest.
 
     The gain's condition ``sum b = gain (1 + sum f)`` is linear, so sensitivities of the free values are those of all
     values times one constant matrix.
     """
-    sizes, data = problem.sizes, problem.data
-    n_b, n_f = int(sizes[0]), int(sizes[1])
+    n_b, n_f = form.n_numerator, form.n_denominator
     p = start.size
     free = np.delete(np.arange(p), n_b - 1)
     basis = np.eye(p)[:, free]
@@ -161,7 +146,7 @@ def _forced(problem: _Problem, start: Array, gain: float) -> tuple[float, Array]
     def at(moved: Array) -> tuple[float, Array, Array]:
         gram, gradient = np.zeros((p, p)), np.zeros(p)
         theta = base + basis @ moved
-        cost = normal_equations(theta, sizes, data.u, data.y, weight, data.bounds, gram, gradient)
+        cost = normal_equations(theta, form.sizes, data.u, data.y, weight, data.bounds, gram, gradient)
         whole = gram + np.tril(gram, -1).T
         return cost, np.ascontiguousarray(basis.T @ whole @ basis), basis.T @ gradient
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.arrays import Array
-from estimation.identification.fit.fitted import scaled
+from estimation.identification.fit.fitted import quality
 from estimation.identification.fit.order import order_test
 from estimation.identification.model.lags import lagged
 from estimation.identification.model.linear_model import LinearModel
@@ -80,13 +80,13 @@ def fit_subspace(
         As `fit_output_error`, if an output is missing, or if nothing rises above the noise floor.
     """
     rows = max(block_rows, 2 * (order or 0) + 1)
-    given = experiments_from(u, y, input_name=input_name, output_name=output_name, n_excited=rows, n_wanted=12 * rows)
+    given = experiments_from(u, y, (input_name, output_name), n_excited=rows, n_wanted=12 * rows)
     if not given.used.all():
         raise HydrostateError(
             f"a subspace fit needs every sample of {output_name!r}, got {int((~given.used).sum())} missing: "
             "use fit_output_error"
         )
-    data, _, y_scale = scaled(given)
+    data = given.scaled()
     left, values = _projected(data.u, data.y, rows)
     test = order_test(data.u, data.y, n_rows=rows)
     n = test.suggested_order if order is None else order
@@ -109,14 +109,11 @@ def fit_subspace(
         output_name=output_name,
         delay=form.delay,
         initial_state=state,
-        fit_percent=100.0 * (1.0 - float(np.linalg.norm(residual) / np.linalg.norm(given.y - given.y.mean()))),
-        rmse=float(np.sqrt(np.mean(residual**2))),
-        residual_std=float(np.sqrt(residual @ residual / (residual.size - form.n_parameters))),
-        n_samples=given.n_used,
         data_hash=data_hash(given, sample_time),
         structure="subspace",
+        **quality(residual, given, form.n_parameters),
     )
-    return SubspaceFit(model, values * y_scale, test.projected_noise_floor * y_scale)
+    return SubspaceFit(model, values * data.y_scale, test.projected_noise_floor * data.y_scale)
 
 
 def _projected(u: Array, y: Array, rows: int) -> tuple[Array, Array]:

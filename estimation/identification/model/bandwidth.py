@@ -1,62 +1,24 @@
 """Where a response has fallen by 3 dB, and how surely."""
 
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from estimation.arrays import Array, ComplexArray
 from estimation.fits.root import root_between
+
+if TYPE_CHECKING:
+    from estimation.identification.model.linear_model import LinearModel
 
 NEAR = 1e-5
 """Relative step of the gain's slope at the corner."""
 
 
-class Response(Protocol):
-    """What a bandwidth is asked of."""
-
-    @property
-    def poles(self) -> ComplexArray:
-        """Poles in z or s."""
-        ...
-
-    @property
-    def continuous(self) -> bool:
-        """Whether they are in s."""
-        ...
-
-    @property
-    def sample_time(self) -> float:
-        """Seconds between samples [s]."""
-        ...
-
-    @property
-    def covariance(self) -> Array:
-        """Covariance of the coefficients."""
-        ...
-
-    def response_gradient(self, frequency_hz: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-        """Return the response, and its derivative by the coefficients.
-
-        Parameters
-        ----------
-        frequency_hz : array_like, shape (k,)
-            Frequencies [Hz].
-
-        Returns
-        -------
-        tuple of ndarray
-            Shapes (k,) and (k, p).
-        """
-        ...
-
-
-def bandwidth(model: Response) -> float | None:
+def bandwidth(model: "LinearModel") -> float | None:
     """Return the lowest frequency at which the gain is 3 dB below that at zero frequency.
 
     Parameters
     ----------
-    model : Response
+    model : LinearModel
         Any transfer function.
 
     Returns
@@ -80,12 +42,12 @@ def bandwidth(model: Response) -> float | None:
     return root_between(excess, float(grid[below[0] - 1]), float(grid[below[0]]), 2e-12)
 
 
-def bandwidth_std(model: Response) -> float | None:
+def bandwidth_std(model: "LinearModel") -> float | None:
     """Return the standard deviation of the bandwidth, first order in the covariance.
 
     Parameters
     ----------
-    model : Response
+    model : LinearModel
         Any transfer function.
 
     Returns

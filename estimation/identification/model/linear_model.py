@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from estimation.arrays import Array, ComplexArray
 from estimation.identification.model.bandwidth import bandwidth, bandwidth_std
-from estimation.identification.model.export import Exportable
+from estimation.identification.model.export import from_dict, to_control, to_dict, to_mat, to_ss
 from estimation.identification.model.held_input import held_input_model
 from estimation.identification.model.recursion import filtered
 from estimation.identification.model.uncertainty import (
@@ -38,7 +38,7 @@ def _one() -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class LinearModel(Exportable):
+class LinearModel:
     """The transfer function ``y = B/F u + C/D e`` with its uncertainty.
 
     In discrete time the polynomials are in powers of the delay operator; in continuous time (`continuous`) in
@@ -116,6 +116,9 @@ class LinearModel(Exportable):
     continuous: bool = False
     dead_time: float = 0.0
     dead_time_std: float = float("nan")
+
+    to_control, to_ss, to_dict, to_mat = to_control, to_ss, to_dict, to_mat
+    from_dict = classmethod(from_dict)
 
     def __post_init__(self) -> None:
         b, f = _frozen(self.numerator), _frozen(self.denominator)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lstsq
 
-from estimation.arrays import Array, BoolArray, ComplexArray
+from estimation.arrays import Array, BoolArray, ComplexArray, IntArray
 from estimation.identification.model.recursion import filtered
 
 
@@ -36,6 +36,16 @@ class Structure:
         return max(self.n_denominator, self.n_numerator + self.delay - 1)
 
     @property
+    def n_main(self) -> int:
+        """Coefficients of numerator and denominator."""
+        return self.n_numerator + self.n_denominator
+
+    @property
+    def sizes(self) -> IntArray:
+        """As the compiled descent takes them."""
+        return np.array([self.n_numerator, self.n_denominator, self.delay, self.n_initial])
+
+    @property
     def n_initial(self) -> int:
         """Free initial-state values."""
         return self.n_states if self.estimate_initial_state else 0
@@ -43,7 +53,7 @@ class Structure:
     @property
     def n_parameters(self) -> int:
         """All free values."""
-        return self.n_numerator + self.n_denominator + self.n_initial
+        return self.n_main + self.n_initial
 
     def split(self, theta: Array) -> tuple[Array, Array, Array]:
         """Return numerator with its leading zeros, monic denominator, and initial state.

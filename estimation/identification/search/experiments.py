@@ -2,14 +2,13 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.arrays import Array, BoolArray, IntArray
-from estimation.identification.search.criterion import Structure
 from plant.errors import HydrostateError
 
 Signals: TypeAlias = ArrayLike | Sequence[ArrayLike]
@@ -39,6 +38,8 @@ class Experiments:
     y: Array
     used: BoolArray
     bounds: IntArray
+    u_scale: float = 1.0
+    y_scale: float = 1.0
 
     @property
     def count(self) -> int:
@@ -55,6 +56,17 @@ class Experiments:
         """Where each experiment stands."""
         return [slice(int(a), int(b)) for a, b in zip(self.bounds[:-1], self.bounds[1:], strict=True)]
 
+    @property
+    def longest(self) -> slice:
+        """Where the longest experiment stands."""
+        return max(self.slices, key=lambda part: part.stop - part.start)
+
+    def scaled(self) -> "Experiments":
+        """Return the data divided by their root mean squares, so that input and output are of order one."""
+        u_scale = float(np.sqrt(np.mean(self.u**2)))
+        y_scale = float(np.sqrt(np.sum(self.y**2) / self.n_used))
+        return replace(self, u=self.u / u_scale, y=self.y / y_scale, u_scale=u_scale, y_scale=y_scale)
+
     def measured(self) -> Array:
         """Return the output with NaN where it is missing, shape (n,)."""
         return np.where(self.used, self.y, np.nan)
@@ -69,17 +81,15 @@ class Experiments:
         return pairs
 
 
-def experiments_from(
-    u: Signals, y: Signals, *, input_name: str, output_name: str, n_excited: int, n_wanted: int
-) -> Experiments:
+def experiments_from(u: Signals, y: Signals, names: tuple[str, str], *, n_excited: int, n_wanted: int) -> Experiments:
     """Return checked experiments.
 
     Parameters
     ----------
     u, y : array_like of shape (n,), or a sequence of them
         Input, no gaps; output, NaN where missing.
-    input_name, output_name : str
-        For messages.
+    names : tuple of str
+        Input and output channel, for messages.
     n_excited : int
         Coefficients that the input must excite.
     n_wanted : int
@@ -95,6 +105,7 @@ def experiments_from(
     HydrostateError
         If the signals do not match, hold unusable values, are too short or constant, or the input excites too little.
     """
+    input_name, output_name = names
     inputs, outputs = listed(u), listed(y)
     if len(inputs) != len(outputs):
         raise HydrostateError(f"as many inputs as outputs are wanted, got {len(inputs)} and {len(outputs)}")
@@ -114,48 +125,6 @@ def experiments_from(
     _require_excitation(inputs, n_excited, input_name)
     bounds = np.concatenate([[0], np.cumsum([one_u.size for one_u in inputs])]).astype(np.int64)
     return Experiments(np.concatenate(inputs), np.where(used, together, 0.0), used, bounds)
-
-
-def experiments_for(
-    u: Signals, y: Signals, form: Structure, *, input_name: str, output_name: str, n_c: int = 0, n_d: int = 0
-) -> Experiments:
-    """Return checked experiments, long and lively enough for a fit of given orders.
-
-    Parameters
-    ----------
-    u, y : array_like of shape (n,), or a sequence of them
-        Input, no gaps; output, NaN where missing.
-    form : Structure
-        Orders of ``B/F``.
-    input_name, output_name : str
-        For messages.
-    n_c, n_d : int
-        Coefficients of the noise model behind their 1.
-
-    Returns
-    -------
-    Experiments
-        One after the other.
-
-    Raises
-    ------
-    HydrostateError
-        If an order is too small, or as `experiments_from`.
-    """
-    n_b, n_f = form.n_numerator, form.n_denominator
-    if min(n_b, n_f) < 1 or min(form.delay, n_c, n_d) < 0:
-        raise HydrostateError(
-            "n_numerator and n_denominator must be at least 1, delay, n_c and n_d at least 0, "
-            f"got {n_b}, {n_f}, {form.delay}, {n_c} and {n_d}"
-        )
-    return experiments_from(
-        u,
-        y,
-        input_name=input_name,
-        output_name=output_name,
-        n_excited=n_b + n_f,
-        n_wanted=SAMPLES_PER_PARAMETER * (form.n_parameters + n_c + n_d),
-    )
 
 
 def data_hash(data: Experiments, sample_time: float) -> str:

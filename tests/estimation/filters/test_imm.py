@@ -11,7 +11,6 @@ from estimation.filters.ckf import CKF
 from estimation.filters.ekf import ekf
 from estimation.filters.imm import bank_parameters, imm, log_transitions
 from estimation.filters.run import METHODS, filter_problem, run_filter
-from estimation.filters.run_imm import Mode, run_imm
 from estimation.filters.svsf import SVSF
 from estimation.models.augment import augmented, augmented_prior
 from estimation.models.eha_forms import FORMS
@@ -26,6 +25,7 @@ from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 from plant.solvers.steps import parameter_row
+from tests.estimation.filters.banks import Mode, run_imm
 
 Array = NDArray[np.float64]
 RIG = EhaParameters()

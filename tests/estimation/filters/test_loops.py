@@ -11,11 +11,11 @@ import pytest
 from estimation.engine.contract import FilterProblem, Trace
 from estimation.filters import imm, imm_loops, iterated_smoother, particle, smoother, smoother_loops, trajectory_loops
 from estimation.filters.run import filter_problem
-from estimation.filters.run_imm import Mode, MultipleModelEstimate, run_imm
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
+from tests.estimation.filters.banks import Mode, MultipleModelEstimate, run_imm
 
 AsPython = Callable[..., Callable[..., Any]]
 PRIOR = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1e-4, 1e-3, 1.0]))

@@ -1,7 +1,7 @@
 """The smoother is the textbook's, costs little memory, and is never less sure than the filter."""
 
 import tracemalloc
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from estimation.engine.contract import FilterProblem
 from estimation.engine.linearised import compile_step
 from estimation.filters.ekf import ekf
 from estimation.filters.run import filter_problem
-from estimation.filters.smoother import SmoothedStretch, smoothed_stretch, smoother
+from estimation.filters.smoother import _chunks, smoother
 from estimation.models.eha_forms import FORMS
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
@@ -25,6 +25,38 @@ from plant.sensors.sensors import BENCH
 
 Array = NDArray[np.float64]
 RIG = EhaParameters()
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothedStretch:
+    """Beliefs at every sample of a stretch of a log, in the filter's units."""
+
+    filtered_mean: Array
+    mean: Array
+    filtered_covariance: Array
+    covariance: Array
+
+
+def smoothed_stretch(problem: FilterProblem, first: int = 0, stop: int | None = None) -> SmoothedStretch:
+    """Return the beliefs at every sample of a stretch, given the whole log."""
+    end, n = len(problem.measured) if stop is None else stop, problem.model.width
+    width = n + n * (n + 1) // 2
+    beliefs = np.empty((2, end - first, width))
+    for start, posteriors, smoothed in _chunks(problem):
+        low, high = max(start, first), min(start + len(smoothed), end)
+        if low < high:
+            beliefs[0, low - first : high - first] = posteriors[low - start : high - start]
+            beliefs[1, low - first : high - first] = smoothed[low - start : high - start]
+        if start <= first:
+            break
+    return SmoothedStretch(beliefs[0, :, :n], beliefs[1, :, :n], _unpacked(beliefs[0], n), _unpacked(beliefs[1], n))
+
+
+def _unpacked(beliefs: Array, n: int) -> Array:
+    covariance = np.empty((len(beliefs), n, n))
+    for (i, j), values in zip(zip(*np.triu_indices(n), strict=True), beliefs[:, n:].T, strict=True):
+        covariance[:, i, j] = covariance[:, j, i] = values
+    return covariance
 
 
 def linear_task(linear: ProcessModel, samples: int = 150, missing: float = 0.2) -> FilterProblem:

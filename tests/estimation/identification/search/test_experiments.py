@@ -5,7 +5,7 @@ from estimation.identification import LinearModel, fit_output_error
 from estimation.identification.search.experiments import experiments_from
 from plant.errors import HydrostateError
 
-NAMES = {"input_name": "u", "output_name": "y", "n_excited": 2, "n_wanted": 10}
+WANTED = {"names": ("u", "y"), "n_excited": 2, "n_wanted": 10}
 
 
 def test_several_experiments_share_coefficients_and_begin_each_in_its_own_state(plant_30hz: LinearModel) -> None:
@@ -26,7 +26,7 @@ def test_several_experiments_share_coefficients_and_begin_each_in_its_own_state(
 def test_gaps_are_bridged_for_starts_only() -> None:
     y = np.sin(np.arange(40.0))
     y[5:8] = np.nan
-    data = experiments_from(np.arange(40.0) % 7, y, **NAMES)
+    data = experiments_from(np.arange(40.0) % 7, y, **WANTED)
     assert data.n_used == 37
     assert np.isnan(data.measured()[5:8]).all()
     assert np.isfinite(data.bridged()[0][1]).all()
@@ -35,13 +35,13 @@ def test_gaps_are_bridged_for_starts_only() -> None:
 def test_one_output_for_each_input_is_wanted() -> None:
     u = np.arange(40.0) % 7
     with pytest.raises(HydrostateError, match="as many inputs as outputs are wanted, got 2 and 1"):
-        experiments_from([u, u], [u], **NAMES)
+        experiments_from([u, u], [u], **WANTED)
 
 
 def test_an_experiment_without_any_output_is_refused() -> None:
     u = np.arange(40.0) % 7
     with pytest.raises(HydrostateError, match="every experiment needs samples"):
-        experiments_from([u, u], [u, np.full(40, np.nan)], **NAMES)
+        experiments_from([u, u], [u, np.full(40, np.nan)], **WANTED)
 
 
 @pytest.mark.parametrize("seed", range(4))

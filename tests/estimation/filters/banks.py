@@ -1,4 +1,4 @@
-"""`run_imm(modes, prior, record, dwell_time=...)`: a record filtered by several models that take turns."""
+"""A record filtered by several models that take turns, to test the bank with modes of one's own."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,23 +20,7 @@ from plant.solvers.steps import Parameters
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """One way that the plant may behave.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-    model : ProcessModel
-        How the state moves in it.
-    parameters : dataclass
-        The actuator in it.
-    rule : Rule
-        The filter that runs it.
-    settings : Mapping[str, float]
-        The rule's settings with their values, in the rule's order [each in its own unit].
-    noise : Mapping[str, float] or None
-        Process-noise densities that replace the model's [SI squared a second], by state name.
-    """
+    """One way that the plant may behave."""
 
     name: str
     model: ProcessModel
@@ -48,17 +32,7 @@ class Mode:
 
 @dataclass(frozen=True, eq=False)
 class MultipleModelEstimate:
-    """A log filtered by several models.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Of the modes.
-    estimate : Estimate
-        The mixture: its mean and variance along the track, its innovations and likelihood.
-    log_probability : ndarray, shape (rows, modes)
-        Natural logarithm of each mode's probability along the track [dimensionless].
-    """
+    """A log filtered by several models."""
 
     names: tuple[str, ...]
     estimate: Estimate
@@ -81,38 +55,7 @@ def run_imm(
     variances: Mapping[str, float] | None = None,
     keep_innovations: bool = False,
 ) -> MultipleModelEstimate:
-    """Filter a record by several models that take turns.
-
-    Parameters
-    ----------
-    modes : sequence of Mode
-        The ways that the plant may behave.
-    prior : Gaussian
-        Belief before the first sample, in SI, the same in every mode.
-    record : Record
-        The log.
-    dwell_time : float or sequence of float
-        Mean time that a mode lasts, one for all or one each [s].
-    probabilities : sequence of float, optional
-        Of the modes before the first sample [probability]; equal by default.
-    channels : tuple of str, optional
-        Channels to use, as in `estimation.filters.run.run_filter`.
-    variances : Mapping[str, float], optional
-        Measurement variances [SI squared]; by default read off the log.
-    keep_innovations : bool
-        Whether every innovation of the mixture is kept.
-
-    Returns
-    -------
-    MultipleModelEstimate
-        The mixture, and how probable each mode was.
-
-    Raises
-    ------
-    HydrostateError
-        If there is no mode, the modes differ in their states or in the step that they need, or a dwell time or a
-        probability is none.
-    """
+    """Filter a record by several models that take turns."""
     _require_alike(modes)
     used = available_channels(modes[0].model, record) if channels is None else channels
     spread = measurement_variances(record, used) if variances is None else variances
