@@ -7,6 +7,7 @@ It neglects the initial state and what changes within a band, so it ranks and im
 import numpy as np
 
 from estimation.arrays import Array, ComplexArray
+from estimation.identification.search.descent import solve_damped, stable
 from estimation.identification.search.jit import compiled
 
 
@@ -84,22 +85,6 @@ def explained_power(
             values[i] = total / factor[i, i]
         numerators[row] = values
     return explained, numerators
-
-
-@compiled
-def _stable(f: Array) -> bool:
-    row = f.copy()
-    for size in range(row.size, 0, -1):
-        reflection = row[size - 1]
-        if not abs(reflection) < 1.0:
-            return False
-        scale = 1.0 / (1.0 - reflection * reflection)
-        for i in range(size // 2):
-            j = size - 2 - i
-            first, last = row[i], row[j]
-            row[i] = (first - reflection * last) * scale
-            row[j] = (last - reflection * first) * scale
-    return True
 
 
 @compiled
@@ -187,39 +172,27 @@ def refine_banded(
         for i in range(n_powers):
             shifts[k, i] = np.exp(-1j * omega[k] * i)
     costs, refined = np.zeros(m), starts.copy()
-    gram, gradient = np.zeros((p, p)), np.zeros(p)
+    gram, gradient, step, factor = np.zeros((p, p)), np.zeros(p), np.zeros(p), np.zeros((p, p))
     new_gram, new_gradient = np.zeros((p, p)), np.zeros(p)
-    scaled, right = np.zeros((p, p)), np.zeros(p)
     for row in range(m):
         theta = starts[row].copy()
         cost = _banded_normal_equations(theta, n_b, n_f, delay, shifts, root_power, wanted, gram, gradient)
         damping = 1e-3
         for _ in range(most_steps):
-            for i in range(p):
-                scale_i = np.sqrt(max(gram[i, i], 1e-300))
-                right[i] = -gradient[i] / scale_i
-                for j in range(i + 1):
-                    scale_j = np.sqrt(max(gram[j, j], 1e-300))
-                    scaled[i, j] = gram[i, j] / (scale_i * scale_j)
-                    scaled[j, i] = scaled[i, j]
-                scaled[i, i] = 1.0 + damping + 1e-12
-            step = np.linalg.solve(scaled, right)
-            promised = 0.0
-            for i in range(p):
-                promised += step[i] * (right[i] + damping * step[i])
-            trial = theta.copy()
-            for i in range(p):
-                trial[i] += step[i] / np.sqrt(max(gram[i, i], 1e-300))
-            if promised <= 1e-7 * cost:
-                break
-            new_cost = np.inf
-            if _stable(trial[n_b:]):
-                new_cost = _banded_normal_equations(
-                    trial, n_b, n_f, delay, shifts, root_power, wanted, new_gram, new_gradient
-                )
+            new_cost, promised = np.inf, 0.0
+            if solve_damped(gram, gradient, damping, step, factor):
+                for i in range(p):
+                    promised += step[i] * (damping * gram[i, i] * step[i] - gradient[i])
+                if promised <= 1e-7 * cost:
+                    break
+                trial = theta + step
+                if stable(trial[n_b:]):
+                    new_cost = _banded_normal_equations(
+                        trial, n_b, n_f, delay, shifts, root_power, wanted, new_gram, new_gradient
+                    )
             if new_cost < cost:
                 damping = max(0.1 * damping, 1e-12) if cost - new_cost > 0.5 * promised else 2.0 * damping
-                cost, theta = new_cost, trial
+                cost, theta = new_cost, theta + step
                 gram[:] = new_gram
                 gradient[:] = new_gradient
             else:

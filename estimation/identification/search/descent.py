@@ -8,12 +8,10 @@ import numpy as np
 
 from estimation.arrays import Array, IntArray
 from estimation.identification.search.jit import compiled
+from estimation.identification.search.response import impulse_response, respond
 
 CHUNK = 2048
 """Samples whose Jacobian rows are held at once; small enough for the processor's cache."""
-
-FORGOTTEN = 1e-18
-"""An initial state is left out of the sums once its response has decayed to this share."""
 
 
 @compiled
@@ -140,81 +138,55 @@ def normal_equations(
     longest = 0
     for e in range(bounds.size - 1):
         longest = max(longest, bounds[e + 1] - bounds[e])
-    filtered_u = np.zeros(longest + pad)
-    filtered_w = np.zeros(longest + pad)
-    pulse = np.zeros(longest + pad)
-    error = np.zeros(longest)
+    signals, simulated = np.zeros((3, longest + pad)), np.zeros(longest)
     columns = np.empty((n_main + n_s + 1, CHUNK))
     gram[:] = 0.0
     gradient[:] = 0.0
     cost = 0.0
+    b, f = theta[:n_b], theta[n_b:n_main]
     for e in range(bounds.size - 1):
         begin, n = bounds[e], bounds[e + 1] - bounds[e]
         first_s = n_main + e * n_s
-        n_pulse = 0
-        if n_s > 0:
-            alive, t = 1.0, 0
-            largest = 1.0
-            while t < n and alive > FORGOTTEN * largest:
-                value = 1.0 if t == 0 else 0.0
-                for j in range(n_f):
-                    value -= theta[n_b + j] * pulse[pad + t - 1 - j]
-                pulse[pad + t] = value
-                # a resonance passes through zero: the last whole order of samples must have died out
-                alive = 0.0
-                for j in range(n_f + 1):
-                    alive = max(alive, abs(pulse[pad + t - j]))
-                largest = max(largest, alive)
-                t += 1
-            n_pulse = min(n, t + n_s)
-            for i in range(t, n_pulse):
-                pulse[pad + i] = 0.0
-        for t in range(n):
-            value = u[begin + t]
-            for j in range(n_f):
-                value -= theta[n_b + j] * filtered_u[pad + t - 1 - j]
-            filtered_u[pad + t] = value
-            simulated = 0.0
-            for k in range(n_b):
-                simulated += theta[k] * filtered_u[pad + t - delay - k]
-            if t < n_pulse:
-                for k in range(n_s):
-                    simulated += theta[first_s + k] * pulse[pad + t - k]
-            error[t] = weight[begin + t] * (y[begin + t] - simulated)
-            value = simulated
-            for j in range(n_f):
-                value -= theta[n_b + j] * filtered_w[pad + t - 1 - j]
-            filtered_w[pad + t] = value
+        n_pulse = impulse_response(f, n, n_s, pad, signals[0])
+        state = theta[first_s : first_s + n_s]
+        respond(b, f, delay, state, u[begin : begin + n], pad, signals, n_pulse, simulated)
         for lower in range(0, n, CHUNK):
             m = min(CHUNK, n - lower)
             p = n_main + n_s if lower < n_pulse else n_main
+            part = weight[begin + lower : begin + lower + m]
+            first = pad + lower
             for k in range(n_b):
                 for t in range(m):
-                    columns[k, t] = weight[begin + lower + t] * filtered_u[pad + lower + t - delay - k]
+                    columns[k, t] = part[t] * signals[1, first + t - delay - k]
             for j in range(n_f):
                 for t in range(m):
-                    columns[n_b + j, t] = -weight[begin + lower + t] * filtered_w[pad + lower + t - 1 - j]
+                    columns[n_b + j, t] = -part[t] * signals[2, first + t - 1 - j]
             for k in range(p - n_main):
                 for t in range(m):
-                    inside = lower + t < n_pulse
-                    columns[n_main + k, t] = weight[begin + lower + t] * pulse[pad + lower + t - k] if inside else 0.0
+                    columns[n_main + k, t] = part[t] * signals[0, first + t - k] if lower + t < n_pulse else 0.0
             for t in range(m):
-                columns[p, t] = error[lower + t]
-            for i in range(p + 1):
-                row = i if i < n_main else first_s + i - n_main
-                for j in range(i + 1):
-                    total = 0.0
-                    for t in range(m):
-                        total += columns[i, t] * columns[j, t]
-                    column = j if j < n_main else first_s + j - n_main
-                    if i == p:
-                        if j == p:
-                            cost += total
-                        else:
-                            gradient[column] -= total
-                    else:
-                        gram[row, column] += total
+                columns[p, t] = part[t] * (y[begin + lower + t] - simulated[lower + t])
+            cost += _add_products(columns, p, m, n_main, first_s, gram, gradient)
     return cost
+
+
+@compiled
+def _add_products(columns: Array, p: int, m: int, n_main: int, first_s: int, gram: Array, gradient: Array) -> float:
+    """Add products of p columns of m samples to ``J'J`` and ``-J'r``, and return that of the last, r, with itself."""
+    for i in range(p + 1):
+        row = i if i < n_main else first_s + i - n_main
+        for j in range(i + 1):
+            total = 0.0
+            for t in range(m):
+                total += columns[i, t] * columns[j, t]
+            column = j if j < n_main else first_s + j - n_main
+            if j == p:
+                return total
+            if i == p:
+                gradient[column] -= total
+            else:
+                gram[row, column] += total
+    return 0.0
 
 
 @compiled

@@ -7,6 +7,7 @@ import numpy as np
 
 from estimation.arrays import Array, BoolArray, IntArray
 from estimation.identification.search.jit import compiled
+from estimation.identification.search.response import impulse_response, respond
 
 
 @compiled
@@ -47,74 +48,67 @@ def prediction_errors(
     float
         Sum of squares.
     """
-    n_b, n_f, n_c, n_d, delay, n_s = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5]
-    p = theta.size
-    at_c, at_d = n_b + n_f, n_b + n_f + n_c
-    first = at_d + n_d
-    n_ar = n_f if tied else n_d
-    at_ar = n_b if tied else at_d
-    deep = max(n_ar, n_c) + 1
+    n_b, n_f, delay, n_s = sizes[0], sizes[1], sizes[4], sizes[5]
+    first = n_b + n_f + sizes[2] + sizes[3]
+    pad = max(n_f, n_b + delay, n_s) + 1
+    b, f = theta[:n_b], theta[n_b : n_b + n_f]
     cost: float = 0.0
     for e in range(bounds.size - 1):
-        begin, n = bounds[e], bounds[e + 1] - bounds[e]
-        own = first + e * n_s
-        pad = max(n_f, n_b + delay, n_s) + 1
-        fu, fw, pulse = np.zeros(n + pad), np.zeros(n + pad), np.zeros(n + pad)
-        noise, moved_noise = np.zeros(deep), np.zeros((deep, p))
-        past, moved_past = np.zeros(deep), np.zeros((deep, p))
-        slope = np.zeros(p)
+        part = slice(bounds[e], bounds[e + 1])
+        n, own = bounds[e + 1] - bounds[e], first + e * n_s
+        signals, noise = np.zeros((3, n + pad)), np.zeros(n)
+        n_pulse = impulse_response(f, n, n_s, pad, signals[0])
+        respond(b, f, delay, theta[own : own + n_s], u[part], pad, signals, n_pulse, noise)
+        # minus the derivative of what the model leaves of the output
         for t in range(n):
-            value, kick, simulated = u[begin + t], 1.0 if t == 0 else 0.0, 0.0
-            for j in range(n_f):
-                value -= theta[n_b + j] * fu[pad + t - 1 - j]
-                kick -= theta[n_b + j] * pulse[pad + t - 1 - j]
-            fu[pad + t], pulse[pad + t] = value, kick
+            noise[t] = y[bounds[e] + t] - noise[t]
+            for i in range(theta.size):
+                jacobian[bounds[e] + t, i] = 0.0
             for k in range(n_b):
-                simulated += theta[k] * fu[pad + t - delay - k]
-            for k in range(n_s):
-                simulated += theta[own + k] * pulse[pad + t - k]
-            value = simulated
+                jacobian[bounds[e] + t, k] = signals[1, pad + t - delay - k]
             for j in range(n_f):
-                value -= theta[n_b + j] * fw[pad + t - 1 - j]
-            fw[pad + t] = value
-            # what the past says of the noise now, and how that moves with the parameters
-            expected = 0.0
-            slope[:] = 0.0
-            for j in range(n_ar):
-                row = (t - 1 - j) % deep
-                if t - 1 - j >= 0:
-                    expected -= theta[at_ar + j] * noise[row]
-                    slope[at_ar + j] -= noise[row]
-                    for i in range(p):
-                        slope[i] -= theta[at_ar + j] * moved_noise[row, i]
-            for j in range(n_c):
-                row = (t - 1 - j) % deep
-                if t - 1 - j >= 0:
-                    expected += theta[at_c + j] * past[row]
-                    slope[at_c + j] += past[row]
-                    for i in range(p):
-                        slope[i] += theta[at_c + j] * moved_past[row, i]
-            row = t % deep
-            if used[begin + t]:
-                noise[row] = y[begin + t] - simulated
-                past[row] = noise[row] - expected
-                for i in range(p):
-                    moved_noise[row, i] = 0.0
-                for k in range(n_b):
-                    moved_noise[row, k] = -fu[pad + t - delay - k]
-                for j in range(n_f):
-                    moved_noise[row, n_b + j] = fw[pad + t - 1 - j]
+                jacobian[bounds[e] + t, n_b + j] = -signals[2, pad + t - 1 - j]
+            if t < n_pulse:
                 for k in range(n_s):
-                    moved_noise[row, own + k] = -pulse[pad + t - k]
-                for i in range(p):
-                    moved_past[row, i] = moved_noise[row, i] - slope[i]
-            else:
-                noise[row], past[row] = expected, 0.0
-                for i in range(p):
-                    moved_noise[row, i] = slope[i]
-                    moved_past[row, i] = 0.0
-            error[begin + t] = past[row]
+                    jacobian[bounds[e] + t, own + k] = signals[0, pad + t - k]
+        cost += _whiten(theta, sizes, tied, noise, used[part], error[part], jacobian[part])
+    return cost
+
+
+@compiled
+def _whiten(
+    theta: Array, sizes: IntArray, tied: bool, noise: Array, used: BoolArray, error: Array, jacobian: Array
+) -> float:
+    """Turn ``v = C/D e`` and minus its derivative into e and minus its own; return the sum of its squares.
+
+    A sample that is missing is replaced, in v, by what the past says of it.
+    """
+    n_c = sizes[2]
+    at_c = sizes[0] + sizes[1]
+    n_ar, at_ar = (sizes[1], sizes[0]) if tied else (sizes[3], at_c + n_c)
+    p = theta.size
+    deep = max(n_ar, n_c) + 1
+    moved_noise, slope = np.zeros((deep, p)), np.zeros(p)
+    cost = 0.0
+    for t in range(noise.size):
+        # what the past says of the noise now, and how that moves with the parameters
+        expected = 0.0
+        slope[:] = 0.0
+        for j in range(min(n_ar, t)):
+            expected -= theta[at_ar + j] * noise[t - 1 - j]
+            slope[at_ar + j] -= noise[t - 1 - j]
             for i in range(p):
-                jacobian[begin + t, i] = -moved_past[row, i]
-            cost += float(error[begin + t]) ** 2
+                slope[i] -= theta[at_ar + j] * moved_noise[(t - 1 - j) % deep, i]
+        for j in range(min(n_c, t)):
+            expected += theta[at_c + j] * error[t - 1 - j]
+            slope[at_c + j] += error[t - 1 - j]
+            for i in range(p):
+                slope[i] -= theta[at_c + j] * jacobian[t - 1 - j, i]
+        for i in range(p):
+            moved_noise[t % deep, i] = -jacobian[t, i] if used[t] else slope[i]
+            jacobian[t, i] = slope[i] - moved_noise[t % deep, i]
+        if not used[t]:
+            noise[t] = expected
+        error[t] = noise[t] - expected
+        cost += error[t] * error[t]
     return cost
