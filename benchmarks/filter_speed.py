@@ -25,8 +25,8 @@ from benchmarks.peers.acceleration_form import coefficients
 from estimation.engine.contract import FilterProblem
 from estimation.engine.kernels import LANES, compile_kernel
 from estimation.engine.layout import halves_of, layout
-from estimation.engine.runner import constant_row
-from estimation.filters.batch import aligned, filter_batch
+from estimation.engine.runner import aligned, constant_row
+from estimation.filters.batch import filter_batch
 from estimation.filters.ekf import EKF, ekf
 from estimation.filters.filterpy_bridge import filterpy_ekf
 from estimation.filters.run import filter_problem
@@ -103,7 +103,7 @@ def kernel_work(batch: list[FilterProblem]) -> Callable[[], None]:
         for work, (drives, measured) in zip(works, data, strict=True):
             work[: len(begin)] = begin[:, None]
             where = (drives.ctypes.data, measured.ctypes.data, 0, 0, count, first.substeps, first.every)
-            kernel.steps(work.ravel(), *where, track, track, logs, nothing, nothing)
+            kernel.steps(work.ravel(), *where, (track, track, logs, nothing, nothing))
 
     return run
 

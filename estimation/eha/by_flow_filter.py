@@ -213,4 +213,4 @@ def mixture(traces: list[Trace]) -> Trace:
     track = np.sum([weight * trace.track for weight, trace in heard], axis=0)
     variance = np.sum([weight * (t.track_variance + (t.track - track) ** 2) for weight, t in heard], axis=0)
     best = traces[int(np.argmax(scores))]
-    return replace(best, mean=mean, covariance=np.sum(spread, axis=0), track=track, track_variance=variance)
+    return best._replace(mean=mean, covariance=np.sum(spread, axis=0), track=track, track_variance=variance)

@@ -6,7 +6,7 @@ a line in `estimation.filters.run.METHODS`; nothing else changes.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -80,8 +80,7 @@ class FilterProblem:
         return added
 
 
-@dataclass(frozen=True, eq=False)
-class Trace:
+class Trace(NamedTuple):
     """What a method returns, in the model's scaled units.
 
     Parameters
@@ -105,7 +104,7 @@ class Trace:
     track: Array
     track_variance: Array
     nis: Array
-    count: Array
+    count: Array  # pyright: ignore[reportIncompatibleMethodOverride] - a trace is no list
     log_likelihood: float
     residuals: Array
     residual_variances: Array

@@ -9,7 +9,7 @@ in a line, line after line. Several lanes are stepped at a time, where they stan
 
 import math
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 from estimation.arrays import Array, IntArray
 from plant.compiled.intrinsics import ROWS, transpose
@@ -22,6 +22,10 @@ FLUSH = 8
 
 LARGE = 1e60
 """A product beyond this goes into the logarithm, and starts again at 1."""
+
+
+Results: TypeAlias = tuple[Array, Array, Array, Array, Array]
+"""Track and its variance, logarithms of flushed products, residuals and their variances, to be filled."""
 
 
 class LanesKernel(Protocol):
@@ -71,13 +75,10 @@ def steps(
     end: int,
     substeps: int,
     every: int,
-    track: Array,
-    track_variance: Array,
-    logs: Array,
-    residuals: Array,
-    variances: Array,
+    results: Results,
 ) -> None:
     """Filter samples ``first`` to ``end`` of logs that lie side by side, sample 0 of which is sample ``begin``."""
+    track, track_variance, logs, residuals, variances = results
     means, spreads, slots, line = track.ctypes.data, track_variance.ctypes.data, work.ctypes.data, kernel.LINE
     row = (begin + first + every - 1) // every
     for i in range(first, end):
@@ -144,11 +145,7 @@ def run(
     samples: int,
     substeps: int,
     every: int,
-    track: Array,
-    track_variance: Array,
-    logs: Array,
-    residuals: Array,
-    variances: Array,
+    results: Results,
 ) -> None:
     """Filter separate logs, `ROWS` samples of each at a time; the last time some of them have been there before."""
     drive, sample = rows.ctypes.data, rows.ctypes.data + kernel.LINE * ROWS * kernel.DRIVES
@@ -157,8 +154,7 @@ def run(
         new = begin - at
         lay_side_by_side(kernel, drives, at, kernel.DRIVES, drive)
         lay_side_by_side(kernel, measured, at, kernel.CHANNELS, sample)
-        results = track, track_variance, logs, residuals, variances
-        steps(kernel, work, drive, sample, at, new, ROWS, substeps, every, *results)
+        steps(kernel, work, drive, sample, at, new, ROWS, substeps, every, results)
 
 
 def lay_side_by_side(kernel: LanesKernel, places: IntArray, begin: int, width: int, rows: int) -> None:

@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields
+from types import ModuleType
 
 import numpy as np
 
@@ -74,88 +75,97 @@ def run_rule(rule: Rule, problem: FilterProblem) -> Trace:
     HydrostateError
         If a setting is not known or not what it must be, or the rule has no robust update and one is asked for.
     """
-    settings, rule = chosen_settings(problem, rule.name, rule.settings), weighing(rule, problem.robust)
     trace = empty_trace(problem)
-    places = layout(rule, problem.model, problem.channels)
-    kernel = compile_kernel(rule, problem.model, problem.channels)
-    carried, logs = len(places.carried), np.zeros((len(problem.channels), 1))
-    work = np.empty(len(kernel.SLOTS))
-    work[:carried] = places.start(problem.mean, problem.covariance)
-    work[carried : carried + len(places.rows)] = constant_row(problem, settings)
+    places, kernel, work = prepared(rule, [problem])
     drives, measured = (np.ascontiguousarray(one, np.float64) for one in (problem.drives, problem.measured))
-    kernel.steps(
-        work,
-        drives.ctypes.data,
-        measured.ctypes.data,
-        0,
-        0,
-        len(measured),
-        problem.substeps,
-        problem.every,
-        trace.track,
-        trace.track_variance,
-        logs,
-        trace.residuals,
-        trace.residual_variances,
-    )
-    final = read_off(places, problem.model.width, work[:carried, None], logs, problem.variances[:, None])
-    return replace(
-        trace,
-        mean=final.mean[0],
-        covariance=final.covariance[0],
-        nis=final.nis[0],
-        count=final.count[0],
-        log_likelihood=float(final.log_likelihood[0]),
-    )
+    where, logs = (drives.ctypes.data, measured.ctypes.data), np.zeros((len(problem.channels), 1))
+    results = trace.track, trace.track_variance, logs, trace.residuals, trace.residual_variances
+    kernel.steps(work.ravel(), *where, 0, 0, len(measured), problem.substeps, problem.every, results)
+    return read_off(places, [problem], work, logs, [trace])[0]
 
 
-@dataclass(frozen=True, eq=False)
-class Final:
-    """Final belief and scores of filters side by side.
+def prepared(rule: Rule, lanes: Sequence[FilterProblem]) -> tuple[Layout, ModuleType, Array]:
+    """Return layout and kernel of a rule, and what the kernel works in before the first sample.
 
     Parameters
     ----------
-    mean, covariance : ndarray, shapes (filters, n) and (filters, n, n)
-        Beliefs after the last sample, in the filter's units [dimensionless].
-    nis, count : ndarray, shape (filters, channels)
-        Sums of squared normalised innovations, and of samples present [dimensionless].
-    log_likelihood : ndarray, shape (filters,)
-        Log-likelihoods [dimensionless].
+    rule : Rule
+        The filter.
+    lanes : sequence of FilterProblem
+        Tasks that differ in numbers only, side by side.
+
+    Returns
+    -------
+    places : Layout
+        The kernel's layout.
+    kernel : module
+        Compiled.
+    work : ndarray, shape (slots, lanes)
+        Its buffer [dimensionless].
     """
+    first = lanes[0]
+    settings, rule = chosen_settings(first, rule.name, rule.settings), weighing(rule, first.robust)
+    places = layout(rule, first.model, first.channels)
+    kernel = compile_kernel(rule, first.model, first.channels, len(lanes))
+    carried, work = len(places.carried), aligned(len(kernel.SLOTS), len(lanes))
+    work[:carried] = places.start(np.array([one.mean for one in lanes]), np.array([one.covariance for one in lanes]))
+    work[carried : carried + len(places.rows)] = constant_rows(lanes, settings)
+    return places, kernel, work
 
-    mean: Array
-    covariance: Array
-    nis: Array
-    count: Array
-    log_likelihood: Array
+
+def aligned(*shape: int) -> Array:
+    """Return an array that begins where a cache line does: a vector across two of them takes twice as long.
+
+    Parameters
+    ----------
+    *shape : int
+        Its shape.
+
+    Returns
+    -------
+    ndarray
+        Not initialised.
+    """
+    size = math.prod(shape)
+    buffer = np.empty(size + 8)
+    begin = -buffer.ctypes.data % 64 // 8
+    return buffer[begin : begin + size].reshape(shape)
 
 
-def read_off(places: Layout, width: int, carried: Array, logs: Array, variances: Array) -> Final:
-    """Read final beliefs and scores off what a kernel carried.
+def read_off(
+    places: Layout, lanes: Sequence[FilterProblem], work: Array, logs: Array, traces: Sequence[Trace]
+) -> list[Trace]:
+    """Read final beliefs and scores off what a kernel worked in.
 
     Parameters
     ----------
     places : Layout
         The kernel's layout.
-    width : int
-        Count of states.
-    carried : ndarray, shape (carried, filters)
-        What it carried after the last sample [dimensionless].
-    logs : ndarray, shape (channels, filters)
+    lanes : sequence of FilterProblem
+        The tasks side by side.
+    work : ndarray, shape (slots, lanes)
+        The kernel's buffer after the last sample [dimensionless].
+    logs : ndarray, shape (channels, lanes)
         Logarithms of the products flushed on the way [dimensionless].
-    variances : ndarray, shape (channels, filters)
-        Measurement variances [SI squared].
+    traces : sequence of Trace
+        Tracks and innovations of as many tasks as are wanted.
 
     Returns
     -------
-    Final
-        Beliefs and scores.
+    list of Trace
+        The same with final beliefs and scores.
     """
+    width, carried = lanes[0].model.width, work[: len(places.carried)]
     rows, columns = upper_triangle(width)
     covariance = np.empty((carried.shape[1], width, width))
     covariance[:, rows, columns] = covariance[:, columns, rows] = carried[width : width + len(rows)].T
     nis, count, product = (places.sums(carried, name) for name in ("nis", "count", "product"))
+    variances = np.array([one.variances for one in lanes]).T
     with np.errstate(invalid="ignore", divide="ignore"):  # the score of a filter that diverged is not a number
         spread = logs + np.log(product) + count * np.log(2.0 * math.pi * variances)
-    log_likelihood = -0.5 * np.sum(nis + spread, axis=0)
-    return Final(carried[:width].T.copy(), covariance, nis.T.copy(), count.T.copy(), log_likelihood)
+    score = -0.5 * np.sum(nis + spread, axis=0)
+    final = zip(carried[:width].T.copy(), covariance, nis.T.copy(), count.T.copy(), map(float, score), strict=True)
+    return [
+        trace._replace(mean=mean, covariance=P, nis=own, count=present, log_likelihood=likelihood)
+        for trace, (mean, P, own, present, likelihood) in zip(traces, final, strict=False)
+    ]

@@ -4,20 +4,19 @@ Every filter has its own prior, parameters, noise and measurements; what they sh
 sampling. A filter gives the same bits here and alone (`estimation.engine.runner.run_rule`).
 """
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 
 import numpy as np
 
 from estimation.arrays import Array, IntArray
-from estimation.engine.contract import FilterProblem, Trace
-from estimation.engine.kernels import LANES, compile_kernel
-from estimation.engine.layout import layout
-from estimation.engine.rule import Rule, chosen_settings, weighing
-from estimation.engine.runner import constant_rows, read_off, run_rule
+from estimation.engine.contract import FilterProblem, Trace, empty_trace
+from estimation.engine.kernels import LANES
+from estimation.engine.rule import Rule
+from estimation.engine.runner import aligned, prepared, read_off, run_rule
 from estimation.filters.ekf import EKF
 from plant.compiled.intrinsics import ROWS
 from plant.errors import HydrostateError
@@ -76,73 +75,26 @@ def _run_block(rule: Rule, block: Sequence[FilterProblem]) -> list[Trace]:
         _require_alike(first, problem)
     if len(block) < FEWEST_IN_LANES or len(first.measured) < ROWS:
         return [run_rule(rule, problem) for problem in block]
-    settings, rule = chosen_settings(first, rule.name, rule.settings), weighing(rule, first.robust)
     lanes = [block[min(lane, len(block) - 1)] for lane in range(LANES)]
-    places, kernel = layout(rule, first.model, first.channels), compile_kernel(rule, first.model, first.channels, LANES)
-    carried = len(places.carried)
-    work = aligned(len(kernel.SLOTS), LANES)
-    work[:carried] = places.start(np.array([one.mean for one in lanes]), np.array([one.covariance for one in lanes]))
-    work[carried : carried + len(places.rows)] = constant_rows(lanes, settings)
+    places, kernel, work = prepared(rule, lanes)
     track = np.empty(((len(first.measured) - 1) // first.every + 1, first.model.width, LANES))
     track_variance, logs = np.empty_like(track), np.zeros((len(first.channels), LANES))
     drives = [np.ascontiguousarray(problem.drives, np.float64) for problem in lanes]
     measured = [np.ascontiguousarray(problem.measured, np.float64) for problem in lanes]
     nothing = np.empty((0, len(first.channels)))
-    kernel.run(
-        work.ravel(),
-        _places(drives),
-        _places(measured),
-        aligned(len(first.model.drives) + len(first.channels), ROWS, LANES),
-        len(first.measured),
-        first.substeps,
-        first.every,
-        track,
-        track_variance,
-        logs,
-        nothing,
-        nothing,
-    )
-    variances = np.array([one.variances for one in lanes]).T
-    final = read_off(places, first.model.width, work[:carried], logs, variances)
+    room = aligned(len(first.model.drives) + len(first.channels), ROWS, LANES)
+    results = track, track_variance, logs, nothing, nothing
+    where = _places(drives), _places(measured)
+    kernel.run(work.ravel(), *where, room, len(first.measured), first.substeps, first.every, results)
     tracks, spreads = (np.ascontiguousarray(np.moveaxis(one, -1, 0)) for one in (track, track_variance))
-    return [
-        Trace(
-            mean=final.mean[lane],
-            covariance=final.covariance[lane],
-            track=tracks[lane],
-            track_variance=spreads[lane],
-            nis=final.nis[lane],
-            count=final.count[lane],
-            log_likelihood=float(final.log_likelihood[lane]),
-            residuals=nothing,
-            residual_variances=nothing,
-        )
-        for lane in range(len(block))
-    ]
+    blank = empty_trace(replace(first, keep_innovations=False))
+    traces = [blank._replace(track=own, track_variance=spread) for own, spread in zip(tracks, spreads, strict=True)]
+    return read_off(places, lanes, work, logs, traces)[: len(block)]
 
 
 def _places(arrays: Sequence[Array]) -> IntArray:
     """Return the addresses at which arrays begin."""
     return np.array([one.ctypes.data for one in arrays])
-
-
-def aligned(*shape: int) -> Array:
-    """Return an array that begins where a cache line does: a vector across two of them takes twice as long.
-
-    Parameters
-    ----------
-    *shape : int
-        Its shape.
-
-    Returns
-    -------
-    ndarray
-        The array, not filled.
-    """
-    size = math.prod(shape)
-    buffer = np.empty(size + 8)
-    begin = -buffer.ctypes.data % 64 // 8
-    return buffer[begin : begin + size].reshape(shape)
 
 
 ALIKE = ("channels", "sample_time", "substeps", "every", "robust", "settings")

@@ -7,7 +7,6 @@ filterpy drags in scipy.stats and takes longer to import than a log to filter, s
 
 import math
 import warnings
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -55,8 +54,8 @@ def filterpy_ekf(problem: FilterProblem) -> Trace:
             log_likelihood = sum(_sample(kalman, problem, trace, H, bounds, k) for k in range(len(problem.measured)))
         except (np.linalg.LinAlgError, ValueError):  # what numpy and scipy raise of a covariance that is none any more
             lost = np.full_like(problem.mean, np.nan)
-            return replace(trace, mean=lost, covariance=np.outer(lost, lost), log_likelihood=math.nan)
-    return replace(trace, mean=kalman.x, covariance=kalman.P, log_likelihood=log_likelihood)
+            return trace._replace(mean=lost, covariance=np.outer(lost, lost), log_likelihood=math.nan)
+    return trace._replace(mean=kalman.x, covariance=kalman.P, log_likelihood=log_likelihood)
 
 
 def _filter(problem: FilterProblem) -> Any:

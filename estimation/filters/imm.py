@@ -136,17 +136,10 @@ def interacting(
         first.measured,
         first.substeps,
         first.every,
-        trace.track,
-        trace.track_variance,
         history,
-        trace.mean,
-        trace.covariance,
-        trace.nis,
-        trace.count,
-        trace.residuals,
-        trace.residual_variances,
+        trace,
     )
-    return replace(trace, log_likelihood=log_likelihood), history
+    return trace._replace(log_likelihood=log_likelihood), history
 
 
 def log_transitions(dwell_times: Sequence[float], sample_time: float) -> Array:

@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from estimation.arrays import Array, IntArray
+from estimation.engine.contract import Trace
 from estimation.engine.parts import rule_functions
 from estimation.engine.rule import Rule
 from estimation.models.model import ProcessModel
@@ -20,6 +21,8 @@ Kind = tuple[Rule, ProcessModel]
 """What modes share: a filter on a model; they differ in parameters."""
 
 
+Room: TypeAlias = tuple[Array, Array, Array, Array]
+"""What `mix` works in: states, terms and weights of the modes, and a belief."""
 PrepareMode: TypeAlias = Callable[[int, Array, Array], None]
 PredictMode: TypeAlias = Callable[[int, Array, Array, Array, Array, float], None]
 UpdateMode: TypeAlias = Callable[[int, Array, Array, Array, Array], None]
@@ -69,22 +72,10 @@ def blend(states: Array, weights: Array, shift: Array, result: Array, *, WIDTH: 
 
 
 def mix(
-    states: Array,
-    mixed: Array,
-    transitions: Array,
-    log_probability: Array,
-    predicted: Array,
-    terms: Array,
-    weights: Array,
-    shift: Array,
-    *,
-    WIDTH: int,
-    BELIEF: int,
+    states: Array, transitions: Array, log_probability: Array, predicted: Array, room: Room, *, WIDTH: int, BELIEF: int
 ) -> None:
-    """Start each mode from what it would be if it had just come from the others: their mixture, as likely as each is.
-
-    The mixing of Blom and Bar-Shalom (1988): mode j is where mode i has come from with probability ``p_ji mu_j / c_i``.
-    """
+    """Start each mode from what it would be had it just come from the others: their mixture, as likely as each is."""
+    mixed, terms, weights, shift = room
     modes = states.shape[0]
     for i in range(modes):
         for j in range(modes):
@@ -133,6 +124,21 @@ def unpack(belief: Array, mean: Array, covariance: Array, *, WIDTH: int) -> None
             place += 1
 
 
+def judge(k: int, sample: Array, seen: Array, predicted: Array, terms: Array, shares: Array, trace: Trace) -> None:
+    """Score the innovations of the mixture, a mode without probability left out, and keep them where wanted."""
+    believed = 0.0
+    for i in range(shares.shape[0]):
+        shares[i] = math.exp(predicted[i]) if terms[i] > -np.inf else 0.0
+        believed += shares[i]
+    for c in range(sample.shape[0]):
+        e, s = innovate(c, sample[c], seen, shares, believed)
+        if e == e:
+            trace.nis[c] += e * e / s
+            trace.count[c] += 1.0
+        if trace.residuals.shape[0] > 0:
+            trace.residuals[k, c], trace.residual_variances[k, c] = e, s
+
+
 def run(
     states: Array,
     rows: Array,
@@ -143,15 +149,8 @@ def run(
     measured: Array,
     substeps: int,
     every: int,
-    track: Array,
-    track_variance: Array,
     history: Array,
-    mean: Array,
-    covariance: Array,
-    nis: Array,
-    count: Array,
-    residuals: Array,
-    residual_variances: Array,
+    trace: Trace,
     *,
     WIDTH: int,
     BELIEF: int,
@@ -162,27 +161,16 @@ def run(
 ) -> float:
     """Mix, step every mode, weigh and combine, at every sample; return the log-likelihood."""
     (n, channels), modes = measured.shape, states.shape[0]
-    keep = residuals.shape[0] == n
-    constants, seen, mixed = np.empty((modes, CONSTANTS)), np.empty((modes, 2, channels)), np.empty_like(states)
+    constants, seen = np.empty((modes, CONSTANTS)), np.empty((modes, 2, channels))
     terms, weights, shares, shift = np.empty(modes), np.empty(modes), np.empty(modes), np.empty(BELIEF)
+    room = np.empty_like(states), terms, weights, shift
     predicted, overall = log_probability.copy(), np.empty(BELIEF)
     log_likelihood = 0.0
     for i in range(modes):
         prepare(kinds[i], rows[i], constants[i])
     for k in range(n):
         if k > 0:
-            mix(
-                states,
-                mixed,
-                transitions,
-                log_probability,
-                predicted,
-                terms,
-                weights,
-                shift,
-                WIDTH=WIDTH,
-                BELIEF=BELIEF,
-            )
+            mix(states, transitions, log_probability, predicted, room, WIDTH=WIDTH, BELIEF=BELIEF)
             for i in range(modes):
                 for j in range(substeps):
                     predict(kinds[i], states[i], constants[i], drives[k - 1], drives[k], float(j))
@@ -191,28 +179,20 @@ def run(
             terms[i] = predicted[i] + log_density(measured[k], seen[i], states[i], BELIEF=BELIEF)
         total = log_sum(terms, weights)
         log_likelihood += total
-        believed = 0.0
         for i in range(modes):
             log_probability[i] = terms[i] - total
-            shares[i] = math.exp(predicted[i]) if terms[i] > -np.inf else 0.0
-            believed += shares[i]
-        for c in range(channels):
-            e, s = innovate(c, measured[k, c], seen, shares, believed)
-            if e == e:
-                nis[c] += e * e / s
-                count[c] += 1.0
-            if keep:
-                residuals[k, c], residual_variances[k, c] = e, s
+        judge(k, measured[k], seen, predicted, terms, shares, trace)
         if k % every == 0 or k == n - 1:
             if total == -np.inf:
                 overall[:] = np.nan
             else:
                 blend(states, weights, shift, overall, WIDTH=WIDTH, BELIEF=BELIEF)
-            unpack(overall, mean, covariance, WIDTH=WIDTH)
+            unpack(overall, trace.mean, trace.covariance, WIDTH=WIDTH)
         if k % every == 0:
             history[k // every] = log_probability
             for a in range(WIDTH):
-                track[k // every, a], track_variance[k // every, a] = mean[a], covariance[a, a]
+                trace.track[k // every, a] = trace.mean[a]
+                trace.track_variance[k // every, a] = trace.covariance[a, a]
     return log_likelihood
 
 
@@ -265,7 +245,7 @@ def compile_imm(kinds: tuple[Kind, ...], channels: tuple[str, ...]) -> ImmKernel
         _dispatch("prepare", "rows, constants", len(kinds)),
         _dispatch("predict", "state, constants, before, after, j", len(kinds)),
         _dispatch("update", "state, constants, sample, seen", len(kinds)),
-        pasted(log_sum, blend, mix, log_density, innovate, unpack, run, constants=sizes),
+        pasted(log_sum, blend, mix, log_density, innovate, judge, unpack, run, constants=sizes),
     )
     names = "_".join(f"{rule.name}_{model.name}" for rule, model in kinds)
     kernel = load_kernel(f"imm_{names}", kernel_text(f"interacting models, {names}", *parts))

@@ -12,9 +12,8 @@ with Gaussian noise it attains the Cramér-Rao bound as long as the trajectory i
 linear about it. Outliers are weighed by their residuals from the trajectory, again and again (Holland and Welsch 1977).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem, Trace, empty_trace
 from estimation.engine.rule import chosen_settings
 from estimation.engine.runner import constant_row
-from estimation.filters.trajectory_loops import compile_trajectory
+from estimation.filters.trajectory_loops import Lines, Log, compile_trajectory
 from plant.errors import HydrostateError
 
 ITERATIONS = 50
@@ -45,23 +44,6 @@ LONGEST = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class _Linearised:
-    """The log linearised along a trajectory, sample by sample [dimensionless; of residual and variance, SI]."""
-
-    F: Array
-    gain: Array
-    slope: Array
-    residual: Array
-    variance: Array
-    kept: Array
-
-    @property
-    def parts(self) -> tuple[Array, ...]:
-        """What the way back reads."""
-        return self.F, self.gain, self.slope, self.residual, self.variance
-
-
-@dataclass(frozen=True, eq=False)
 class _Trajectory:
     """A run of the model: its adjoint, the states under it, and the sum of squares."""
 
@@ -79,11 +61,15 @@ class _Search:
         self.kernel: ModuleType = compile_trajectory(problem.model, problem.channels, problem.robust)
         self.opened = problem.opened + problem.noise * problem.sample_time
         self.bounds = np.array([state.scaled_bounds for state in problem.model.states])
-        self.spread = np.tile(problem.variances, (samples, 1))
         drives, measured = (np.ascontiguousarray(one, np.float64) for one in (problem.drives, problem.measured))
-        self.rows = constant_row(problem, {})
-        self.log: tuple[Any, ...] = (self.rows, drives, measured, self.spread, problem.substeps)
-        self.lines = _Linearised(
+        self.log: Log = (
+            constant_row(problem, {}),
+            drives,
+            measured,
+            np.tile(problem.variances, (samples, 1)),
+            problem.substeps,
+        )
+        self.lines = Lines(
             np.empty((samples, n, n)),
             np.empty((samples, channels, n)),
             np.empty((samples, channels, n)),
@@ -96,7 +82,7 @@ class _Search:
         """Return the model's run under an adjoint."""
         states, known = np.empty_like(adjoint), self.problem.covariance @ adjoint[0]
         start = self.problem.mean + known
-        cost = self.kernel.roll(start, adjoint, self.opened, self.bounds, *self.log, states)
+        cost = self.kernel.roll(start, adjoint, self.opened, self.bounds, self.log, states)
         return _Trajectory(adjoint, states, float(cost + adjoint[0] @ known))
 
     def begin(self) -> _Trajectory:
@@ -113,15 +99,15 @@ class _Search:
     def linearise(self, at: _Trajectory) -> Array:
         """Linearise along a trajectory, and return the filter's covariance at the end of the log."""
         P = self.problem.covariance.copy()
-        way = (at.states, at.adjoint, self.opened, *self.log)
-        self.kernel.forward(self.problem.mean, P, *way, *self.lines.parts, self.problem.every, self.lines.kept)
+        way = (at.states, at.adjoint, self.opened, self.log)
+        self.kernel.forward(self.problem.mean, P, *way, self.lines, self.problem.every)
         return P
 
     def corrected(self, at: _Trajectory) -> _Trajectory | None:
         """Return a trajectory with a smaller sum of squares, or None where there is none on the way to the best."""
         self.linearise(at)
         wanted = np.empty_like(at.adjoint)
-        self.kernel.backward(*self.lines.parts, wanted)
+        self.kernel.backward(self.lines, wanted)
         share = 1.0
         while share > SHORTEST:
             candidate = self.run(at.adjoint + share * (wanted - at.adjoint))
@@ -143,8 +129,7 @@ class _Search:
 
     def reweigh(self, at: _Trajectory) -> _Trajectory:
         """Weigh every sample by its residual, and return the same trajectory with its new sum of squares."""
-        _, _, measured, spread, _ = self.log
-        self.kernel.reweigh(at.states, self.rows, measured, self.problem.variances, spread)
+        self.kernel.reweigh(at.states, self.log, self.problem.variances)
         return self.run(at.adjoint)
 
 
@@ -193,14 +178,14 @@ def _lost(problem: FilterProblem) -> Trace:
     for part in (trace.mean, trace.covariance, trace.track, trace.track_variance, trace.residuals):
         part.fill(np.nan)
     trace.residual_variances.fill(np.nan)
-    return replace(trace, log_likelihood=float("nan"))
+    return trace._replace(log_likelihood=float("nan"))
 
 
 def _reported(search: _Search, at: _Trajectory) -> Trace:
     """Return the trajectory with the covariances and innovations of the filter linearised along it."""
     problem, lines = search.problem, search.lines
     final = search.linearise(at)
-    search.kernel.spread_back(*lines.parts, problem.every, lines.kept)
+    search.kernel.spread_back(lines, problem.every)
     present = np.isfinite(lines.residual)
     squared = np.where(present, lines.residual**2 / lines.variance, 0.0)
     logs = np.where(present, np.log(2.0 * np.pi * lines.variance), 0.0)

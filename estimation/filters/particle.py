@@ -53,14 +53,7 @@ def run(
     variances: Array,
     substeps: int,
     every: int,
-    track: Array,
-    track_variance: Array,
-    mean: Array,
-    covariance: Array,
-    nis: Array,
-    count: Array,
-    residuals: Array,
-    residual_variances: Array,
+    trace: Trace,
     *,
     WIDTH: int,
     move: Move,
@@ -69,7 +62,7 @@ def run(
 ) -> float:
     """Run the filter; return its log-likelihood."""
     n, channels = measured.shape
-    size, keep = particles.shape[0], residuals.shape[0] == n
+    size = particles.shape[0]
     others, weights, seen = np.empty_like(particles), np.empty(size), np.empty((size, channels))
     deviations = np.empty(WIDTH)
     log_likelihood = 0.0
@@ -91,15 +84,16 @@ def run(
             if measured[k, c] == measured[k, c]:
                 middle, s = predicted(weights, seen[:, c], variances[c])
                 e = measured[k, c] - middle
-                nis[c] += e * e / s
-                count[c] += 1.0
+                trace.nis[c] += e * e / s
+                trace.count[c] += 1.0
                 log_likelihood += weigh(weights, seen[:, c], measured[k, c], variances[c])
-            if keep:
-                residuals[k, c], residual_variances[k, c] = e, s
-        gather(particles, weights, mean, covariance, WIDTH=WIDTH)
+            if trace.residuals.shape[0] > 0:
+                trace.residuals[k, c], trace.residual_variances[k, c] = e, s
+        gather(particles, weights, trace.mean, trace.covariance, WIDTH=WIDTH)
         if k % every == 0:
             for a in range(WIDTH):
-                track[k // every, a], track_variance[k // every, a] = mean[a], covariance[a, a]
+                trace.track[k // every, a] = trace.mean[a]
+                trace.track_variance[k // every, a] = trace.covariance[a, a]
         if np.any(measured[k] == measured[k]):
             resample(rng, particles, weights, others)
     return log_likelihood
@@ -263,13 +257,6 @@ def particle_filter(problem: FilterProblem, particles: int, rng: np.random.Gener
         problem.variances,
         problem.substeps,
         problem.every,
-        trace.track,
-        trace.track_variance,
-        trace.mean,
-        trace.covariance,
-        trace.nis,
-        trace.count,
-        trace.residuals,
-        trace.residual_variances,
+        trace,
     )
-    return replace(trace, log_likelihood=log_likelihood)
+    return trace._replace(log_likelihood=log_likelihood)

@@ -71,12 +71,13 @@ def _chunks(problem: FilterProblem) -> Iterator[tuple[int, Array, Array]]:
     nothing, blank = np.empty((0, 0, n)), np.empty((0, len(state)))
     for i, first in enumerate(firsts):
         checkpoints[i] = state
-        kernel.forward(state, *log, first, min(first + length, samples), nothing, blank, blank)
+        kernel.forward(state, log, first, min(first + length, samples), (nothing, blank, blank))
     starts = np.empty((length, problem.substeps, n))
     priors, posteriors, smoothed = (np.empty((length, len(state))) for _ in range(3))
+    beliefs = (starts, priors, posteriors)
     adjoint = np.zeros(len(state))
     for i, first in reversed(list(enumerate(firsts))):
         stop = min(first + length, samples)
-        kernel.forward(checkpoints[i], *log, first, stop, starts, priors, posteriors)
-        kernel.backward(adjoint, *log, first, stop, starts, priors, posteriors, smoothed)
+        kernel.forward(checkpoints[i], log, first, stop, beliefs)
+        kernel.backward(adjoint, log, first, stop, beliefs, smoothed)
         yield first, posteriors[: stop - first], smoothed[: stop - first]

@@ -43,17 +43,18 @@ OnBelief: TypeAlias = Callable[[Array, Array, Array], None]
 """``smooth(state, adjoint, smoothed)`` smooths a belief; ``lift(state, shift, adjoint)`` adds what a shift means."""
 
 
+Log: TypeAlias = tuple[Array, Array, Array, int]
+"""What a kernel reads and never changes, drives, measurements, and sub-steps a sample."""
+Beliefs: TypeAlias = tuple[Array, Array, Array]
+"""States before sub-steps, and beliefs before and after each sample's update."""
+
+
 def forward(
     state: Array,
-    rows: Array,
-    drives: Array,
-    measured: Array,
-    substeps: int,
+    log: Log,
     first: int,
     stop: int,
-    starts: Array,
-    priors: Array,
-    posteriors: Array,
+    beliefs: Beliefs,
     *,
     CONSTANTS: int,
     prepare: Prepare,
@@ -61,6 +62,8 @@ def forward(
     update: RuleUpdate,
 ) -> None:
     """Filter a chunk; keep the states before sub-steps and the beliefs about each sample, unless there is no room."""
+    rows, drives, measured, substeps = log
+    starts, priors, posteriors = beliefs
     keep = starts.shape[0] > 0
     constants = np.empty(CONSTANTS)
     seen = np.empty((2, measured.shape[1]))
@@ -80,15 +83,10 @@ def forward(
 
 def backward(
     adjoint: Array,
-    rows: Array,
-    drives: Array,
-    measured: Array,
-    substeps: int,
+    log: Log,
     first: int,
     stop: int,
-    starts: Array,
-    priors: Array,
-    posteriors: Array,
+    beliefs: Beliefs,
     smoothed: Array,
     *,
     smooth: OnBelief,
@@ -98,6 +96,8 @@ def backward(
     back_predict: BackPredict,
 ) -> None:
     """Smooth a chunk from its end, and carry the adjoint back to its beginning."""
+    rows, drives, measured, substeps = log
+    starts, priors, posteriors = beliefs
     shift = np.zeros(starts.shape[2])
     for k in range(stop - 1, first - 1, -1):
         smooth(posteriors[k - first], adjoint, smoothed[k - first])

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from functools import cache
 from types import ModuleType
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -35,16 +35,39 @@ See: TypeAlias = Callable[[Array, Array, Array, Array], None]
 """``see(state, rows, seen, slope)``: what the model predicts of each channel, and its derivative by the state."""
 
 
+class Lines(NamedTuple):
+    """The log linearised along a trajectory, sample by sample [dimensionless; of residual and variance, SI].
+
+    Parameters
+    ----------
+    F : ndarray, shape (samples, n, n)
+        Jacobian of the step before each sample.
+    gain, slope : ndarray, shape (samples, channels, n)
+        The filter's gain, and the derivative of each channel.
+    residual, variance : ndarray, shape (samples, channels)
+        Innovations and their variances, NaN where nothing is measured.
+    kept : ndarray, shape (rows, n, n)
+        Covariance at every so many samples.
+    """
+
+    F: Array
+    gain: Array
+    slope: Array
+    residual: Array
+    variance: Array
+    kept: Array
+
+
+Log: TypeAlias = tuple[Array, Array, Array, Array, int]
+"""What the kernel reads and never changes, drives, measurements, their variances, and sub-steps a sample."""
+
+
 def roll(
     start: Array,
     adjoint: Array,
     opened: Array,
     bounds: Array,
-    rows: Array,
-    drives: Array,
-    measured: Array,
-    spread: Array,
-    substeps: int,
+    log: Log,
     trajectory: Array,
     *,
     WIDTH: int,
@@ -56,6 +79,7 @@ def roll(
 
     It is infinite where the run diverges, or begins out of bounds.
     """
+    rows, drives, measured, spread, substeps = log
     state, seen, slope = start.copy(), np.empty(CHANNELS), np.empty((CHANNELS, WIDTH))
     cost = 0.0
     for i in range(WIDTH):
@@ -86,18 +110,9 @@ def forward(
     trajectory: Array,
     adjoint: Array,
     opened: Array,
-    rows: Array,
-    drives: Array,
-    measured: Array,
-    spread: Array,
-    substeps: int,
-    F: Array,
-    gain: Array,
-    slope: Array,
-    residual: Array,
-    variance: Array,
+    log: Log,
+    lines: Lines,
     every: int,
-    kept: Array,
     *,
     WIDTH: int,
     CHANNELS: int,
@@ -105,6 +120,8 @@ def forward(
     see: See,
 ) -> None:
     """Filter deviations from the trajectory; leave the filter's last covariance in P, and some on the way in kept."""
+    rows, drives, measured, spread, substeps = log
+    F, _, slope, residual, variance, kept = lines
     m, state, before = prior - trajectory[0], np.empty(WIDTH), np.empty(WIDTH)
     J, product = np.eye(WIDTH), np.empty((WIDTH, WIDTH))
     seen, PH = np.empty(CHANNELS), np.empty(WIDTH)
@@ -136,23 +153,12 @@ def forward(
                 residual[k, c] = variance[k, c] = np.nan
                 continue
             residual[k, c], variance[k, c] = measured[k, c] - seen[c], spread[k, c]
-            update(k, c, m, P, PH, slope, gain, residual, variance, WIDTH=WIDTH)
+            update(k, c, m, P, PH, lines, WIDTH=WIDTH)
 
 
-def update(
-    k: int,
-    c: int,
-    m: Array,
-    P: Array,
-    PH: Array,
-    slope: Array,
-    gain: Array,
-    residual: Array,
-    variance: Array,
-    *,
-    WIDTH: int,
-) -> None:
+def update(k: int, c: int, m: Array, P: Array, PH: Array, lines: Lines, *, WIDTH: int) -> None:
     """Update a deviation and its covariance by channel c of sample k, and finish its residual and variance."""
+    _, gain, slope, residual, variance, _ = lines
     e, s = residual[k, c], variance[k, c]
     for i in range(WIDTH):
         PH[i] = 0.0
@@ -180,10 +186,9 @@ def multiply(a: Array, b: Array, product: Array, *, WIDTH: int) -> None:
             product[i, j] = total
 
 
-def backward(
-    F: Array, gain: Array, slope: Array, residual: Array, variance: Array, wanted: Array, *, WIDTH: int, CHANNELS: int
-) -> None:
+def backward(lines: Lines, wanted: Array, *, WIDTH: int, CHANNELS: int) -> None:
     """Carry the adjoint back over the log: what pushes the trajectory to where it fits best."""
+    F, gain, slope, residual, variance, _ = lines
     u, earlier = np.zeros(WIDTH), np.empty(WIDTH)
     for k in range(residual.shape[0] - 1, -1, -1):
         for c in range(CHANNELS - 1, -1, -1):
@@ -202,19 +207,9 @@ def backward(
             u[:] = earlier
 
 
-def spread_back(
-    F: Array,
-    gain: Array,
-    slope: Array,
-    residual: Array,
-    variance: Array,
-    every: int,
-    kept: Array,
-    *,
-    WIDTH: int,
-    CHANNELS: int,
-) -> None:
+def spread_back(lines: Lines, every: int, *, WIDTH: int, CHANNELS: int) -> None:
     """Turn the covariances kept on the way, which knew the log up to there, into those that know all of it."""
+    F, gain, slope, residual, variance, kept = lines
     U, half, PU = np.zeros((WIDTH, WIDTH)), np.empty((WIDTH, WIDTH)), np.empty((WIDTH, WIDTH))
     UK = np.empty(WIDTH)
     for k in range(residual.shape[0] - 1, -1, -1):
@@ -242,10 +237,8 @@ def spread_back(
 
 def reweigh(
     trajectory: Array,
-    rows: Array,
-    measured: Array,
+    log: Log,
     variances: Array,
-    spread: Array,
     *,
     WIDTH: int,
     CHANNELS: int,
@@ -253,6 +246,7 @@ def reweigh(
     doubt: Callable[[Array], None],
 ) -> None:
     """Set the variances of all samples by how far they lie from the trajectory; ``doubt`` makes a factor of a ratio."""
+    rows, _, measured, spread, _ = log
     seen, slope, ratio = np.empty(CHANNELS), np.empty((CHANNELS, WIDTH)), np.empty(1)
     for k in range(measured.shape[0]):
         see(trajectory[k], rows, seen, slope)

@@ -7,10 +7,9 @@ signs and choices are held constant. One kernel does so for any number of direct
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -99,8 +98,7 @@ def directional(outputs: Outputs, moving: Mapping[str, Expression]) -> Outputs:
     return rewritten(slopes, {"along": ZERO})
 
 
-@dataclass(frozen=True, eq=False)
-class Sensitivity:
+class Sensitivity(NamedTuple):
     """Innovations, and their derivatives along directions.
 
     Parameters
@@ -192,10 +190,7 @@ def innovation_sensitivity(
         problem.drives,
         problem.measured,
         problem.substeps,
-        result.residuals,
-        result.variances,
-        result.residual_slopes,
-        result.variance_slopes,
+        result,
     )
     return result
 
@@ -220,10 +215,7 @@ def run(
     drives: Array,
     measured: Array,
     substeps: int,
-    residuals: Array,
-    variances: Array,
-    moved: Array,
-    spread: Array,
+    found: Sensitivity,
     *,
     fix_predict: Fix,
     vary_predict: Vary,
@@ -233,6 +225,7 @@ def run(
     update: Act,
 ) -> None:
     """Filter; carry the belief's derivatives along before each half of a step moves the belief itself."""
+    residuals, variances, moved, spread = found
     for k in range(measured.shape[0]):
         a, b, y = drives[max(k - 1, 0)], drives[k], measured[k]
         if k > 0:

@@ -112,7 +112,7 @@ def test_the_information_is_the_covariance_of_the_scores() -> None:
         directions[names.index(name), k] = row[names.index(name)]
     found = innovation_sensitivity(problem, directions)
     drawn = np.random.default_rng(0).standard_normal(found.residuals.shape) * np.sqrt(found.variances)
-    scores = replace(found, residuals=np.where(np.isnan(found.residuals), np.nan, drawn)).scores
+    scores = found._replace(residuals=np.where(np.isnan(found.residuals), np.nan, drawn)).scores
     np.testing.assert_allclose(np.diag(scores.T @ scores), np.diag(found.information), rtol=0.25)
 
 
