@@ -15,13 +15,20 @@ from estimation.engine.contract import FilterProblem, Trace
 from estimation.engine.layout import layout
 from estimation.filters.ekf import EKF, ekf
 from estimation.filters.run import filter_problem
+from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
-from estimation.tuning.likelihood import noise_coordinates
+from estimation.trust.whiteness import quantum
 from estimation.tuning.scoring import Coordinate, Maximum, maximise
 from estimation.tuning.sensitivity import Sensitivity, innovation_sensitivity
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
+
+NOISE_SPREAD = 3.0
+"""Standard deviation of what is presumed of the logarithm of a noise level: a factor of twenty either way."""
+
+LEAST_SHARE = 0.25
+"""Of the noise of measured motor speed, so much at least is taken to be the sensor's, and unseen by the plant."""
 
 PUBLISHED_STEP = 1e-4
 """Step for which equation 7.6 gives covariances [s]."""
@@ -171,6 +178,68 @@ def tune(
         converged=found.converged,
         prior=Gaussian(physical, problem.covariance * np.outer(slope, slope)),
     )
+
+
+def noise_coordinates(
+    problem: FilterProblem, record: Record, parameters: EhaParameters, speed_variance: float | None = None
+) -> list[Coordinate]:
+    """Return the logarithms of process and sensor noise as coordinates, presumed within a factor of the given.
+
+    Parameters
+    ----------
+    problem : FilterProblem
+        The task; a process noise of 0 stays so.
+    record : Record
+        The log; a sensor's variance stays above that of its quantum, and the noise of differential pressure above a
+        quarter of what the noise of measured motor speed makes it.
+    parameters : EhaParameters
+        The actuator.
+    speed_variance : float, optional
+        Measurement variance of motor speed [rad^2/s^2]; read off the log if not given.
+
+    Returns
+    -------
+    list of Coordinate
+        One a state with noise, then one a channel.
+    """
+    names = layout(EKF, problem.model, problem.channels).rows
+    unseen = speed_noise(record, parameters, speed_variance)
+    noise: list[tuple[str, float, float]] = []
+    for i, (state, value) in enumerate(zip(problem.model.states, problem.noise, strict=True)):
+        if value > 0.0:
+            least = LEAST_SHARE * unseen / state.scale**2 if state.name == "differential_pressure_pa" else 0.0
+            noise.append((f"q{i}", float(value), min(least, 0.99 * float(value))))
+    sensors: list[tuple[str, float, float]] = []
+    for c, channel in enumerate(problem.channels):
+        resolved = quantum(record[channel])
+        floor = min(resolved**2 / 12.0, 0.99 * float(problem.variances[c]))
+        sensors.append((f"r{c}", float(problem.variances[c]), floor))
+    return [
+        Coordinate(name, names.index(name), value, floor=floor, spread=NOISE_SPREAD)
+        for name, value, floor in (*noise, *sensors)
+    ]
+
+
+def speed_noise(record: Record, p: EhaParameters, variance: float | None = None) -> float:
+    """Return the noise density of differential pressure that comes of the noise of measured speed.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    p : EhaParameters
+        The actuator.
+    variance : float, optional
+        Of measured speed [rad^2/s^2]; read off the log if not given.
+
+    Returns
+    -------
+    float
+        Noise density [Pa^2/s].
+    """
+    if variance is None:
+        variance = measurement_variances(record, ["motor_speed_rad_s"])["motor_speed_rad_s"]
+    return variance * record.sample_time * (p.pump_displacement * p.bulk_modulus / p.chamber_volume) ** 2
 
 
 def _tuned(problem: FilterProblem, found: Maximum) -> FilterProblem:

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from estimation.trust.card import Card, percent, rank_drives, sentences
 from estimation.trust.identifiability import SENSED, identifiability_card
-from estimation.tuning.likelihood import fit_likelihood
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
 from plant.errors import HydrostateError
 from plant.sensors.sensors import BENCH, PAPER
+from tests.estimation.tuning.likelihood_fit import fit_likelihood
 
 Array = NDArray[np.float64]
 RIG = EhaParameters()

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from estimation.finding import NORMAL_95
-from estimation.tuning.likelihood import FITTED, LikelihoodFit, fit_likelihood
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -15,6 +14,7 @@ from plant.eha.simulate import LUMPED, simulate
 from plant.errors import HydrostateError, LogError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
+from tests.estimation.tuning.likelihood_fit import FITTED, LikelihoodFit, fit_likelihood
 
 WRONG = dict(zip(FITTED, (1.6, 0.5, 1.4, 0.7, 1.0, 1.3), strict=True))
 """Factors by which the first guesses are off."""

@@ -20,7 +20,6 @@ from estimation.models.eha_forms import ACCELERATION_FORM, PRESSURE_FORM
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
 from estimation.tuning import sensitivity
-from estimation.tuning.likelihood import LUMPED_FORM
 from estimation.tuning.scoring import problem_with
 from estimation.tuning.sensitivity import innovation_sensitivity
 from plant.eha.drives import make_drive
@@ -28,6 +27,7 @@ from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, drop_samples
+from tests.estimation.tuning.likelihood_fit import LUMPED_FORM
 
 Array = NDArray[np.float64]
 RIG = EhaParameters()
