@@ -16,11 +16,11 @@ import pandas as pd
 
 from benchmarks.bouc_wen_oscillator import OscillatorParameters, fit_oscillator, linear_start, simulate_oscillator
 from benchmarks.peers.stiff_solvers import reference_trajectory
+from benchmarks.piezo_stack_filter import filter_stack
 from benchmarks.targets import misses, say, timed
 from estimation.finding import NORMAL_95
 from estimation.piezo_stack.bouc_wen import LOOP, fit_stack_loop
 from estimation.piezo_stack.estimate import estimate_stack, stack_bounds
-from estimation.piezo_stack.filter import filter_stack
 from experiments.piezo_stack.flow import DESIGN_GRID, figure_points, loop_widths, stack_loops, sweep
 from experiments.piezo_stack.hysteresis import NOISE, slow_loop
 from experiments.piezo_stack.quoted import quoted_numbers

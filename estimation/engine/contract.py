@@ -20,8 +20,6 @@ class FilterProblem:
 
     Parameters
     ----------
-    model : ProcessModel
-        The process model.
     channels : tuple of str
         Measured channels, in the order of their columns.
     mean : ndarray, shape (n,)
@@ -41,12 +39,8 @@ class FilterProblem:
         Measurement variances in SI.
     sample_time : float
         Seconds between samples [s].
-    substeps : int
-        Model steps a sample.
     every : int
         The track keeps every so many samples.
-    keep_innovations : bool
-        Whether every residual is kept.
     robust : str
         How innovations that are too large to be noise count, see `estimation.engine.robust.inflation`.
     settings : Mapping[str, float]
@@ -115,18 +109,7 @@ Method: TypeAlias = Callable[[FilterProblem], Trace]
 
 
 def empty_trace(problem: FilterProblem) -> Trace:
-    """Return a trace with its arrays allocated, the belief set to the prior.
-
-    Parameters
-    ----------
-    problem : FilterProblem
-        The task.
-
-    Returns
-    -------
-    Trace
-        Arrays for the method to fill.
-    """
+    """Return a trace with its arrays allocated, the belief set to the prior."""
     samples, channels = problem.measured.shape
     rows = (samples - 1) // problem.every + 1
     kept = samples if problem.keep_innovations else 0

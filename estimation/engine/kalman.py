@@ -29,8 +29,6 @@ def entry(P: Covariance, i: int, j: int) -> Expression:
     ----------
     P : dict
         Its upper triangle.
-    i, j : int
-        Row and column.
 
     Returns
     -------
@@ -59,11 +57,6 @@ def total(terms: Sequence[Expression]) -> Expression:
 def belief_symbols(model: ProcessModel) -> tuple[list[Expression], Covariance]:
     """Return the symbols of a belief.
 
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
-
     Returns
     -------
     tuple of (list of Expression, dict)
@@ -74,18 +67,7 @@ def belief_symbols(model: ProcessModel) -> tuple[list[Expression], Covariance]:
 
 
 def belief_names(width: int) -> tuple[str, ...]:
-    """Return the names of a belief's symbols: the mean's, then the upper triangle's, row by row.
-
-    Parameters
-    ----------
-    width : int
-        Count of states.
-
-    Returns
-    -------
-    tuple of str
-        Names.
-    """
+    """Return the names of a belief's symbols: the mean's, then the upper triangle's, row by row."""
     return (*(f"z{i}" for i in range(width)), *(f"P{i}_{j}" for i in range(width) for j in range(i, width)))
 
 
@@ -94,8 +76,6 @@ def to_physical(model: ProcessModel, mean: Sequence[Expression]) -> tuple[Expres
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     mean : sequence of Expression
         The state in the filter's units.
 
@@ -111,11 +91,6 @@ def to_physical(model: ProcessModel, mean: Sequence[Expression]) -> tuple[Expres
 
 def drive_symbols(model: ProcessModel) -> list[tuple[Expression, Expression]]:
     """Return each drive's value at the start and the end of a sub-step, linear between the samples ``a`` and ``b``.
-
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
 
     Returns
     -------
@@ -135,8 +110,6 @@ def moved(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]:
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     mean : sequence of Expression
         The state.
 
@@ -161,12 +134,8 @@ def observed(model: ProcessModel, mean: Sequence[Expression], channels: Sequence
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     mean : sequence of Expression
         The state in the filter's units.
-    channels : sequence of str
-        Measured channels.
 
     Returns
     -------
@@ -182,8 +151,6 @@ def bounded(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     mean : sequence of Expression
         The state in the filter's units.
 
@@ -250,8 +217,6 @@ def believed(model: ProcessModel, mean: Sequence[Expression], covariance: Covari
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     mean : sequence of Expression
         The state in the filter's units.
     covariance : dict
@@ -269,11 +234,6 @@ def believed(model: ProcessModel, mean: Sequence[Expression], covariance: Covari
 def scaled_step(model: ProcessModel) -> tuple[list[Expression], list[list[Expression]]]:
     """Trace the model's step in the filter's units.
 
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
-
     Returns
     -------
     tuple of (list of Expression, list of list of Expression)
@@ -286,13 +246,6 @@ def scaled_step(model: ProcessModel) -> tuple[list[Expression], list[list[Expres
 
 def process_noise(model: ProcessModel, i: int) -> Expression:
     """Return the variance that one step adds to a state.
-
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
-    i : int
-        Index of the state.
 
     Returns
     -------

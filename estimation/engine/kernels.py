@@ -34,12 +34,6 @@ def kernel_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...], la
 
     Parameters
     ----------
-    rule : Rule
-        The filter.
-    model : ProcessModel
-        The model.
-    channels : tuple of str
-        Measured channels.
     lanes : int
         One, or `LANES`.
 
@@ -80,12 +74,6 @@ def compile_kernel(rule: Rule, model: ProcessModel, channels: tuple[str, ...], l
 
     Parameters
     ----------
-    rule : Rule
-        The filter.
-    model : ProcessModel
-        The model.
-    channels : tuple of str
-        Measured channels.
     lanes : int
         One, or `LANES`.
 

@@ -30,8 +30,6 @@ class Layout:
     rows : tuple of str
         Inputs that stay the same: parameters, process noise ``q``, measurement variances ``r``, settings,
         ``h``, ``share``.
-    channels : int
-        Count of measured channels.
     """
 
     carried: tuple[str, ...]
@@ -84,11 +82,6 @@ class Layout:
 def upper_triangle(n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the indices of a symmetric matrix's upper triangle, row by row.
 
-    Parameters
-    ----------
-    n : int
-        Size of the matrix.
-
     Returns
     -------
     tuple of ndarray, each shape (n (n + 1) / 2,)
@@ -101,20 +94,6 @@ def upper_triangle(n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 @cache
 def layout(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> Layout:
     """Return how the kernel of a rule on a model is laid out.
-
-    Parameters
-    ----------
-    rule : Rule
-        The filter.
-    model : ProcessModel
-        The model.
-    channels : tuple of str
-        Measured channels.
-
-    Returns
-    -------
-    Layout
-        Names by place.
 
     Raises
     ------
@@ -159,8 +138,6 @@ def score_expressions(outputs: Mapping[str, Expression], channels: Sequence[str]
     ----------
     outputs : Mapping[str, Expression]
         What an update returned.
-    channels : sequence of str
-        Measured channels.
 
     Returns
     -------
@@ -185,19 +162,8 @@ def halves_of(rule: Rule, model: ProcessModel, channels: tuple[str, ...], *, sco
 
     Parameters
     ----------
-    rule : Rule
-        The filter.
-    model : ProcessModel
-        The model.
-    channels : tuple of str
-        Measured channels.
     scored : bool
         Whether the score's expressions are among the update's.
-
-    Returns
-    -------
-    Halves
-        Its expressions.
     """
     update = rule.update(model, channels)
     if scored:

@@ -32,11 +32,6 @@ def step(mean: Array, start: Array, end: Array, parameters: Array, h: float, *, 
 def compile_step(model: ProcessModel) -> ModuleType:
     """Generate one step of a model with its analytic Jacobian, for filters that work on arrays.
 
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
-
     Returns
     -------
     ModuleType

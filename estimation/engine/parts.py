@@ -38,21 +38,12 @@ def function_source(
 
     Parameters
     ----------
-    name : str
-        Of the function.
-    arguments : str
-        Its arguments, as in Python.
     reads : Mapping[str, str]
         Where each symbol is read from; only those needed are.
     outputs : Mapping[str, Expression]
         What is computed, by name.
     writes : Mapping[str, str], optional
         Where each output goes; all are written after all are computed. By default they are returned, as a tuple.
-
-    Returns
-    -------
-    str
-        Its source.
 
     Examples
     --------
@@ -85,13 +76,6 @@ def function_source(
 def data_places(model: ProcessModel, channels: tuple[str, ...]) -> dict[str, str]:
     """Return where a step's drives and a sample's measurements are read from.
 
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
-    channels : tuple of str
-        Measured channels.
-
     Returns
     -------
     dict[str, str]
@@ -123,17 +107,6 @@ class RuleFunctions:
 
 def rule_functions(rule: Rule, model: ProcessModel, channels: tuple[str, ...], suffix: str = "") -> RuleFunctions:
     """Write a rule's halves as functions.
-
-    Parameters
-    ----------
-    rule : Rule
-        The filter.
-    model : ProcessModel
-        The model.
-    channels : tuple of str
-        Measured channels.
-    suffix : str
-        End of the functions' names.
 
     Returns
     -------

@@ -16,8 +16,6 @@ class Setting:
 
     Parameters
     ----------
-    name : str
-        Its name.
     default : float
         What holds unless it is set [its own unit].
     wanted : str
@@ -37,15 +35,8 @@ def positive(name: str, default: float) -> Setting:
 
     Parameters
     ----------
-    name : str
-        Its name.
     default : float
         What holds unless it is set [its own unit].
-
-    Returns
-    -------
-    Setting
-        The setting.
     """
     return Setting(name, default, "positive", lambda value, _: value > 0.0)
 
@@ -86,15 +77,8 @@ def weighing(rule: Rule, robust: str) -> Rule:
 
     Parameters
     ----------
-    rule : Rule
-        The filter.
     robust : str
         See `estimation.engine.robust.inflation`.
-
-    Returns
-    -------
-    Rule
-        The filter.
 
     Raises
     ------
@@ -118,10 +102,6 @@ def chosen_settings(problem: FilterProblem, method: str, known: Sequence[Setting
     ----------
     problem : FilterProblem
         The task, with what its user set.
-    method : str
-        The method's name, for the message.
-    known : sequence of Setting
-        All that can be set.
 
     Returns
     -------

@@ -19,8 +19,6 @@ def constant_row(problem: FilterProblem, settings: dict[str, float]) -> Array:
 
     Parameters
     ----------
-    problem : FilterProblem
-        The task.
     settings : dict[str, float]
         The rule's settings with their values, in the rule's order [each in its own unit].
 
@@ -60,15 +58,8 @@ def run_rule(rule: Rule, problem: FilterProblem) -> Trace:
 
     Parameters
     ----------
-    rule : Rule
-        The filter.
     problem : FilterProblem
         The task; it may set the rule's settings, and say how outliers count.
-
-    Returns
-    -------
-    Trace
-        Its result.
 
     Raises
     ------
@@ -89,8 +80,6 @@ def prepared(rule: Rule, lanes: Sequence[FilterProblem]) -> tuple[Layout, Module
 
     Parameters
     ----------
-    rule : Rule
-        The filter.
     lanes : sequence of FilterProblem
         Tasks that differ in numbers only, side by side.
 
@@ -139,10 +128,6 @@ def read_off(
 
     Parameters
     ----------
-    places : Layout
-        The kernel's layout.
-    lanes : sequence of FilterProblem
-        The tasks side by side.
     work : ndarray, shape (slots, lanes)
         The kernel's buffer after the last sample [dimensionless].
     logs : ndarray, shape (channels, lanes)

@@ -37,8 +37,6 @@ def filter_batch(
     ----------
     problems : iterable of FilterProblem
         The tasks, in any number; a block of 32 is drawn when it is its turn, so they need not fit in memory together.
-    rule : Rule
-        The filter.
     workers : int
         Threads, each running one block at a time.
 

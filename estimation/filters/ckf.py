@@ -16,11 +16,6 @@ from plant.compiled.expression import ZERO, constant
 def cubature_spread(n: int) -> Spread:
     """Return the spread of the cubature points (Arasaratnam and Haykin 2009).
 
-    Parameters
-    ----------
-    n : int
-        Count of states.
-
     Returns
     -------
     Spread

@@ -32,11 +32,6 @@ from plant.compiled.expression import ONE, ZERO, Expression, jacobian, select, s
 def ekf_predict(model: ProcessModel) -> Outputs:
     """Return the extended Kalman filter's predict step: mean through the model, ``P = F P F' + Q h``.
 
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
-
     Returns
     -------
     dict[str, Expression]
@@ -61,8 +56,6 @@ def ekf_update(model: ProcessModel, channels: Sequence[str], robust: str = "none
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     channels : sequence of str
         Measured channels, in the order of processing.
     robust : str
@@ -105,11 +98,6 @@ class Update:
 def noise_symbols(channels: Sequence[str]) -> list[Expression]:
     """Return the symbols of measurement variances.
 
-    Parameters
-    ----------
-    channels : sequence of str
-        Measured channels.
-
     Returns
     -------
     list of Expression
@@ -125,8 +113,6 @@ def linearised_update(
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     channels : sequence of str
         Measured channels, in the order of processing.
     point : sequence of Expression

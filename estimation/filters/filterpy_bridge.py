@@ -23,11 +23,6 @@ from plant.solvers.steps import parameter_names
 def filterpy_ekf(problem: FilterProblem) -> Trace:
     """Run filterpy's extended Kalman filter on the task, one Python step at a time.
 
-    Parameters
-    ----------
-    problem : FilterProblem
-        The task.
-
     Returns
     -------
     Trace

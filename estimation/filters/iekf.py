@@ -32,8 +32,6 @@ def iekf_update(model: ProcessModel, channels: Sequence[str], robust: str = "non
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     channels : sequence of str
         Measured channels, in the order of processing.
     robust : str

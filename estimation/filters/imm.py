@@ -71,11 +71,6 @@ def imm(problem: FilterProblem) -> Trace:
 def bank_parameters(problem: FilterProblem) -> list[Array]:
     """Return the rows of parameters of the default bank.
 
-    Parameters
-    ----------
-    problem : FilterProblem
-        The task.
-
     Returns
     -------
     list of ndarray, each shape (parameters,)
@@ -126,19 +121,9 @@ def interacting(
         constants[i, : len(row)] = row
     trace = empty_trace(first)
     history = np.empty((len(trace.track), len(bank)))
-    log_likelihood = kernel.run(
-        states,
-        constants,
-        np.array([kinds.index(kind) for kind in each]),
-        transitions,
-        log_probability,
-        first.drives,
-        first.measured,
-        first.substeps,
-        first.every,
-        history,
-        trace,
-    )
+    order, log = np.array([kinds.index(kind) for kind in each]), (first.drives, first.measured)
+    chain = (transitions, log_probability)
+    log_likelihood = kernel.run(states, constants, order, *chain, *log, first.substeps, first.every, history, trace)
     return trace._replace(log_likelihood=log_likelihood), history
 
 

@@ -227,13 +227,6 @@ def compile_imm(kinds: tuple[Kind, ...], channels: tuple[str, ...]) -> ImmKernel
     ----------
     kinds : tuple of (Rule, ProcessModel)
         The different filters and models in it, of equal states.
-    channels : tuple of str
-        Measured channels.
-
-    Returns
-    -------
-    ImmKernel
-        The loop.
     """
     rules = [rule_functions(rule, model, channels, f"_{i}") for i, (rule, model) in enumerate(kinds)]
     width = kinds[0][1].width

@@ -69,14 +69,9 @@ class _Search:
             np.tile(problem.variances, (samples, 1)),
             problem.substeps,
         )
-        self.lines = Lines(
-            np.empty((samples, n, n)),
-            np.empty((samples, channels, n)),
-            np.empty((samples, channels, n)),
-            np.empty((samples, channels)),
-            np.empty((samples, channels)),
-            np.empty(((samples - 1) // problem.every + 1, n, n)),
-        )
+        rows, each = (samples - 1) // problem.every + 1, (samples, channels)
+        shapes = (samples, n, n), (*each, n), (*each, n), each, each, (rows, n, n)
+        self.lines = Lines(*(np.empty(shape) for shape in shapes))
 
     def run(self, adjoint: Array) -> _Trajectory:
         """Return the model's run under an adjoint."""
@@ -135,11 +130,6 @@ class _Search:
 
 def iterated_smoother(problem: FilterProblem) -> Trace:
     """Find the likeliest trajectory of a log, and the covariance along it.
-
-    Parameters
-    ----------
-    problem : FilterProblem
-        The task.
 
     Returns
     -------

@@ -164,13 +164,6 @@ takes to be constant, in first standard deviations [1/s^(1/2)], without which al
 def compile_particles(model: ProcessModel, channels: tuple[str, ...]) -> Callable[..., float]:
     """Generate and load the particle filter's kernel.
 
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
-    channels : tuple of str
-        Measured channels.
-
     Returns
     -------
     callable
@@ -221,15 +214,6 @@ def particle(problem: FilterProblem) -> Trace:
 def particle_filter(problem: FilterProblem, particles: int, rng: np.random.Generator) -> Trace:
     """Run a bootstrap particle filter.
 
-    Parameters
-    ----------
-    problem : FilterProblem
-        The task.
-    particles : int
-        How many are carried.
-    rng : Generator
-        Where they are drawn from.
-
     Returns
     -------
     Trace
@@ -247,16 +231,8 @@ def particle_filter(problem: FilterProblem, particles: int, rng: np.random.Gener
     trace = empty_trace(problem)
     limits = np.array([state.scaled_bounds for state in problem.model.states]).T.copy()
     cloud = rng.multivariate_normal(problem.mean, problem.covariance, size=particles, method="eigh")
-    log_likelihood = compile_particles(problem.model, problem.channels)(
-        rng,
-        np.clip(cloud, *limits),
-        constant_row(problem, {}),
-        limits,
-        problem.drives,
-        problem.measured,
-        problem.variances,
-        problem.substeps,
-        problem.every,
-        trace,
-    )
+    log = (problem.drives, problem.measured, problem.variances, problem.substeps, problem.every)
+    run_kernel = compile_particles(problem.model, problem.channels)
+    cloud = np.clip(cloud, *limits)
+    log_likelihood = run_kernel(rng, cloud, constant_row(problem, {}), limits, *log, trace)
     return trace._replace(log_likelihood=log_likelihood)

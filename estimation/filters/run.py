@@ -58,10 +58,6 @@ class Estimate:
 
     Parameters
     ----------
-    model : ProcessModel
-        The model that was believed.
-    channels : tuple of str
-        The channels that were measured.
     time : ndarray, shape (rows,)
         Times of the track [s].
     mean, variance : ndarray, shape (rows, n)
@@ -91,11 +87,6 @@ class Estimate:
     def track(self, state: str) -> tuple[Array, Array]:
         """Return a state's history.
 
-        Parameters
-        ----------
-        state : str
-            State name.
-
         Returns
         -------
         tuple of ndarray, each shape (rows,)
@@ -109,8 +100,6 @@ class Estimate:
 
         Parameters
         ----------
-        state : str
-            State name.
         fraction : float
             Share of the run that counts as its end [fraction].
 
@@ -144,8 +133,6 @@ def run_filter(
     ----------
     method : callable
         A filter of `METHODS`.
-    model : ProcessModel
-        The process model.
     prior : Gaussian
         Belief before the first sample, in SI.
     record : Record
@@ -158,17 +145,10 @@ def run_filter(
         Measurement variances [SI squared]; by default read off the log (`measurement_variances`).
     noise : Mapping[str, float], optional
         Process-noise densities [SI squared a second] that replace the model's, by state name.
-    keep_innovations : bool
-        Whether every innovation is kept.
     robust : str
         How gross outliers count: one of `ROBUST`.
     settings : Mapping[str, float], optional
         What the method lets its user set [each in its own unit].
-
-    Returns
-    -------
-    Estimate
-        The filtered log.
 
     Raises
     ------
@@ -195,12 +175,8 @@ def filter_problem(
 
     Parameters
     ----------
-    model : ProcessModel
-        The process model.
     prior : Gaussian
         Belief before the first sample, in SI.
-    record : Record
-        The log.
     parameters : dataclass
         The plant's known parameters, with the fields of the model's.
     channels : tuple of str, optional
@@ -209,11 +185,6 @@ def filter_problem(
         Measurement variances [SI squared].
     noise : Mapping[str, float], optional
         Process-noise densities [SI squared a second]; of a logarithmic state, those of the logarithm [1/s].
-
-    Returns
-    -------
-    FilterProblem
-        The task, in the filter's units.
 
     Raises
     ------
@@ -248,11 +219,6 @@ def filter_problem(
 def predicted_channels(model: ProcessModel) -> tuple[str, ...]:
     """Return the channels that a model predicts.
 
-    Parameters
-    ----------
-    model : ProcessModel
-        The process model.
-
     Returns
     -------
     tuple of str
@@ -264,13 +230,6 @@ def predicted_channels(model: ProcessModel) -> tuple[str, ...]:
 
 def available_channels(model: ProcessModel, record: Record) -> tuple[str, ...]:
     """Return the channels that the model predicts and the record has.
-
-    Parameters
-    ----------
-    model : ProcessModel
-        The process model.
-    record : Record
-        The log.
 
     Returns
     -------
@@ -285,17 +244,10 @@ def in_si(problem: FilterProblem, trace: Trace, start_time: float) -> Estimate:
 
     Parameters
     ----------
-    problem : FilterProblem
-        The task.
     trace : Trace
         The method's result, in the filter's units.
     start_time : float
         Time of the first sample [s].
-
-    Returns
-    -------
-    Estimate
-        The filtered log.
     """
     rows = np.arange(len(trace.track), dtype=np.float64)
     means = {

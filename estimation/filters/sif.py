@@ -21,11 +21,6 @@ believed whole. Ten follow the noise, ten thousand take seconds to converge."""
 def sif_share(innovation: Innovation) -> Expression:
     """Return the share of the innovation by which the filter corrects (Gadsden and Al-Shabi 2020).
 
-    Parameters
-    ----------
-    innovation : Innovation
-        Of one channel.
-
     Returns
     -------
     Expression

@@ -92,8 +92,6 @@ def root(P: Covariance, n: int) -> Matrix:
     ----------
     P : dict
         Upper triangle.
-    n : int
-        Count of states.
 
     Returns
     -------
@@ -147,13 +145,6 @@ def is_affine(item: Expression, mean: Sequence[Expression]) -> bool:
 def all_affine(model: ProcessModel, channels: Sequence[str]) -> bool:
     """Return whether a model sees every channel as a sum of multiples of its states.
 
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
-    channels : sequence of str
-        Measured channels.
-
     Returns
     -------
     bool
@@ -176,13 +167,6 @@ def image(function: Callable[[Vector], Vector], at: Vector, mean: Vector, L: Mat
         The belief's mean, in terms of any symbols.
     L : list of list of Expression
         Root of its covariance.
-    spread : Spread
-        Of the points.
-
-    Returns
-    -------
-    Image
-        Mean, slopes and bends.
     """
     n, c = len(mean), spread.reach
     traced = function(at)
@@ -210,15 +194,6 @@ def image(function: Callable[[Vector], Vector], at: Vector, mean: Vector, L: Mat
 def covariance_of(found: Image, i: int, j: int, spread: Spread) -> Expression:
     """Return the covariance of two components of an image.
 
-    Parameters
-    ----------
-    found : Image
-        The image.
-    i, j : int
-        The components.
-    spread : Spread
-        Of the points.
-
     Returns
     -------
     Expression
@@ -234,13 +209,6 @@ def sigma_predict(model: ProcessModel, spread_of: SpreadOf) -> Outputs:
 
     The model is asked about states within their physical bounds only: a point beyond them is projected onto them
     (Kandepu, Foss and Imsland 2008, section 3), while a state that the step hands through keeps its own points.
-
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
-    spread_of : callable
-        Spread of the points.
 
     Returns
     -------
@@ -271,12 +239,8 @@ def sigma_update(model: ProcessModel, channels: Sequence[str], spread_of: Spread
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     channels : sequence of str
         Measured channels, in the order of processing.
-    spread_of : callable
-        Spread of the points.
     robust : str
         How innovations that are too large count, see `estimation.engine.robust.inflation`.
 

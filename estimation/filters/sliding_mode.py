@@ -27,8 +27,6 @@ class Innovation:
 
     Parameters
     ----------
-    channel : int
-        Its number.
     value : Expression
         Measured less predicted [SI].
     noise : Expression
@@ -57,12 +55,8 @@ def sliding_update(model: ProcessModel, channels: Sequence[str], share: Share) -
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     channels : sequence of str
         Measured channels, in the order of processing.
-    share : callable
-        The filter's share.
 
     Returns
     -------

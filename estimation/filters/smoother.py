@@ -34,11 +34,6 @@ from estimation.filters.smoother_loops import compile_smoother
 def smoother(problem: FilterProblem) -> Trace:
     """Run the extended Kalman filter forwards and the smoother backwards.
 
-    Parameters
-    ----------
-    problem : FilterProblem
-        The task.
-
     Returns
     -------
     Trace

@@ -127,11 +127,6 @@ def _filtered(model: ProcessModel, channels: Sequence[str], robust: str) -> Upda
 def back_predict_expressions(model: ProcessModel) -> Outputs:
     """Return the adjoint before a step of the model from the one after it (Bierman 1973).
 
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
-
     Returns
     -------
     dict[str, Expression]
@@ -152,8 +147,6 @@ def back_update_expressions(model: ProcessModel, channels: Sequence[str], robust
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     channels : sequence of str
         Measured channels, in the order of processing.
     robust : str
@@ -180,8 +173,6 @@ def hold_expressions(model: ProcessModel, channels: Sequence[str], robust: str) 
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     channels : sequence of str
         Measured channels, in the order of processing.
     robust : str
@@ -199,11 +190,6 @@ def hold_expressions(model: ProcessModel, channels: Sequence[str], robust: str) 
 
 def lift_expressions(model: ProcessModel) -> Outputs:
     """Return the adjoint of a mean that was moved by ``w``: ``u + P^-1 w``.
-
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
 
     Returns
     -------
@@ -227,11 +213,6 @@ def lift_expressions(model: ProcessModel) -> Outputs:
 def smooth_expressions(model: ProcessModel) -> Outputs:
     """Return the smoothed belief from the filter's and the adjoint (Bierman 1973).
 
-    Parameters
-    ----------
-    model : ProcessModel
-        The model.
-
     Returns
     -------
     dict[str, Expression]
@@ -254,10 +235,6 @@ def compile_smoother(model: ProcessModel, channels: tuple[str, ...], robust: str
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
-    channels : tuple of str
-        Measured channels.
     robust : str
         How innovations that are too large count.
 

@@ -34,11 +34,6 @@ makes it follow the noise, one far above leaves Kalman's gain alone.
 def svsf_share(innovation: Innovation) -> Expression:
     """Return the share of the innovation by which the filter corrects (Gadsden and Habibi 2013).
 
-    Parameters
-    ----------
-    innovation : Innovation
-        Of one channel.
-
     Returns
     -------
     Expression
@@ -57,8 +52,6 @@ def svsf_update(model: ProcessModel, channels: Sequence[str]) -> Outputs:
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     channels : sequence of str
         Measured channels, in the order of processing.
 

@@ -262,10 +262,6 @@ def compile_trajectory(model: ProcessModel, channels: tuple[str, ...], robust: s
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
-    channels : tuple of str
-        Measured channels.
     robust : str
         How residuals that are too large count, see `estimation.engine.robust.inflation`.
 

@@ -26,18 +26,7 @@ millionth of its mean, and that difference would be rounding.
 
 
 def scaled_spread(n: int) -> Spread:
-    """Return the spread of the scaled transform: reach ``alpha sqrt(n + kappa)`` (Julier 2002).
-
-    Parameters
-    ----------
-    n : int
-        Count of states.
-
-    Returns
-    -------
-    Spread
-        In the symbols of the settings.
-    """
+    """Return the spread of the scaled transform: reach ``alpha sqrt(n + kappa)`` (Julier 2002)."""
     alpha, beta, kappa = (symbol(name) for name in ("alpha", "beta", "kappa"))
     return Spread(alpha * sqrt(n + kappa), beta + alpha * alpha * kappa / n)
 

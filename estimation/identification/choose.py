@@ -45,8 +45,6 @@ class Choice:
 
     Parameters
     ----------
-    model : LinearModel
-        Fitted to the whole record.
     orders : pandas.DataFrame or None
         As `order_table`; None where the order was given.
     structures : pandas.DataFrame or None
@@ -86,19 +84,10 @@ def choose_model(
         Orders compared; one is taken as given.
     delay : int or None
         Dead time [samples]; None estimates it.
-    structures : sequence of str
-        Structures compared.
     n_numerator : int, optional
         Numerator coefficients; one more than the order, or as many behind a delay, unless told.
     covariance : {"white", "coloured", "auto"}
         As `fit_output_error`.
-    input_name, output_name : str
-        Channel names.
-
-    Returns
-    -------
-    Choice
-        Model and tables.
 
     Raises
     ------
@@ -142,8 +131,6 @@ def compare_structures(
         Seconds between samples [s].
     form : dict
         Sizes and names, as the fits take them.
-    structures : sequence of str
-        What to compare.
 
     Returns
     -------
@@ -210,11 +197,6 @@ def fit_structure(name: str, u: Signals, y: Signals, sample_time: float, form: d
         Seconds between samples [s].
     form : dict
         Sizes and names, as the fits take them; a noise model has as many coefficients as F, `NOISE_ORDER` at most.
-
-    Returns
-    -------
-    LinearModel
-        The model.
     """
     noise = min(form["n_denominator"], NOISE_ORDER)
     return _FITS[name](u, y, sample_time, **form, **dict.fromkeys(_NOISE.get(name, ()), noise))

@@ -121,10 +121,6 @@ def record_signals(
 
     Parameters
     ----------
-    record : Record
-        The log.
-    output, input : str
-        Channel names.
     sample_time : float
         Of the model [s].
     filter_cutoff_hz : float, optional

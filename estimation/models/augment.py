@@ -141,11 +141,6 @@ def augmented_prior(
     spread : float or Mapping[str, float]
         Standard deviation of each further state relative to its first guess: of its logarithm, for a positive one
         [fraction].
-
-    Returns
-    -------
-    Gaussian
-        Prior of all states, in SI.
     """
     further = model.states[len(prior.mean) :]
     means: list[float] = []

@@ -27,15 +27,8 @@ def with_bulk_modulus(p: EhaValues, bulk_modulus: Scalar) -> SimpleNamespace:
 
     Parameters
     ----------
-    p : EhaParameters or namespace of Expression
-        The actuator.
     bulk_modulus : float or Expression
         Effective bulk modulus [Pa], convention of equation 5.8 (errata E2).
-
-    Returns
-    -------
-    namespace
-        The same names, one value changed.
     """
     values = {name: getattr(p, name) for name in PARAMETER_NAMES}
     return SimpleNamespace(**{**values, "bulk_modulus": bulk_modulus})
@@ -102,8 +95,6 @@ def volume_left_open(
 
     Parameters
     ----------
-    p : EhaParameters
-        The actuator.
     unknown : Mapping[str, ndarray], each of shape (n,)
         Variance of what the pump turned [rad^2], and of where the piston was [m^2], sample by sample.
     sample_time : float

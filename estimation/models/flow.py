@@ -178,18 +178,7 @@ MASS_FLOW_FORM = replace(FLOW_FORM, name="flow_mass", rates=_by_mass)
 
 
 def relieving(form: GreyBoxModel) -> GreyBoxModel:
-    """Return the form for a log in which the relief valve opens: its setting and slope are then unknown too.
-
-    Parameters
-    ----------
-    form : GreyBoxModel
-        A flow form.
-
-    Returns
-    -------
-    GreyBoxModel
-        The form with two more unknowns.
-    """
+    """Return the form for a log in which the relief valve opens: its setting and slope are then unknown too."""
     return replace(
         form, name=f"{form.name}_relieving", unknowns=(*form.unknowns, "relief_pressure", "relief_conductance")
     )

@@ -24,14 +24,8 @@ class GreyBoxModel:
 
     Parameters
     ----------
-    name : str
-        Name, for the kernel's file.
     drives : tuple of str
         Channels that drive the model; linear between samples.
-    outputs : tuple of str
-        Channels that are fitted.
-    unknowns : tuple of str
-        Parameters that are fitted.
     initial : callable
         ``initial(parameters)``: the state before the first sample, in SI.
     rates : callable

@@ -36,8 +36,6 @@ class StateVariable:
     ----------
     name : str
         Name with unit suffix, as in log columns.
-    unit : str
-        SI unit.
     scale : float
         Size of one unit inside the filter, in SI: the filter's numbers are then of order one (errata E10)
         [in the state's unit].
@@ -73,8 +71,6 @@ class ProcessModel:
 
     Parameters
     ----------
-    name : str
-        Name in reports and JSON.
     states : tuple of StateVariable
         The states, in the order of the step's tuple.
     step : callable
@@ -127,11 +123,6 @@ class ProcessModel:
         ----------
         belief : Gaussian
             In SI; a logarithmic state's deviation is taken relative to its mean.
-
-        Returns
-        -------
-        Gaussian
-            The same, scaled.
 
         Raises
         ------
@@ -210,16 +201,6 @@ class ProcessModel:
 
     def index(self, name: str) -> int:
         """Return the position of a state.
-
-        Parameters
-        ----------
-        name : str
-            State name.
-
-        Returns
-        -------
-        int
-            Its index.
 
         Raises
         ------

@@ -45,8 +45,6 @@ class HysteresisFit:
         Standard deviations by parameter name [SI].
     error : float
         Root mean square of the residuals [m].
-    evaluations : int
-        Simulations that it took.
     condition : float
         Condition number of the scaled Jacobian [dimensionless]; large where parameters cannot be told apart.
     """
@@ -59,11 +57,6 @@ class HysteresisFit:
 
     def interval(self, name: str) -> tuple[float, float]:
         """Return a parameter's 95 % interval.
-
-        Parameters
-        ----------
-        name : str
-            The parameter.
 
         Returns
         -------
@@ -120,8 +113,6 @@ def loop_bounds(
 
     Parameters
     ----------
-    parameters : PiezoStackParameters
-        The stack.
     voltage : ndarray, shape (n,)
         Whole cycles, from trough to trough [V].
     noise : float
@@ -207,13 +198,6 @@ def fitted(
         Displacement [m].
     start, scale : ndarray, shape (parameters,)
         First guess, and the size of each parameter [SI].
-    names : sequence of str
-        The parameters.
-
-    Returns
-    -------
-    HysteresisFit
-        What was found.
     """
     size = float(np.std(measured))
     last: dict[bytes, tuple[Array, Array]] = {}

@@ -43,11 +43,6 @@ def printed_fit(step: tuple[float, float], sine: tuple[Array, Array], loop: tupl
         Voltage [V] and displacement [m] of a small slow sine.
     loop : tuple of ndarray, shape (m,)
         Voltage [V] and displacement [m] of a large slow loop.
-
-    Returns
-    -------
-    PrintedFit
-        Its parameters.
     """
     a = step[1] / step[0]
     du, dx = (np.gradient(values) for values in sine)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from estimation.arrays import Array
 from estimation.finding import interval_95
 from estimation.piezo_stack.runs import COARSE_SLOPE_STEP, COARSE_STEP, STACK_CHANNELS, StackRuns, prepared
-from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS
+from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, told
 from plant.log.record import Record
 from plant.piezo_stack.parameters import LONGEST_STEP, PiezoStackParameters
 from plant.piezo_stack.run import BENCH_SENSORS, StackSensors, checked_voltage
@@ -36,8 +36,6 @@ class StackEstimate:
         Between the scaled estimates.
     misfit : Mapping[str, float]
         Root mean square of each channel's residual over its noise; 1 for the right model [dimensionless].
-    evaluations : int
-        Runs that it took.
     parameters : PiezoStackParameters or namespace
         The actuator with the estimates in it.
     """
@@ -51,11 +49,6 @@ class StackEstimate:
 
     def interval(self, name: str) -> tuple[float, float]:
         """Return a quantity's 95 % interval.
-
-        Parameters
-        ----------
-        name : str
-            The quantity.
 
         Returns
         -------
@@ -86,15 +79,8 @@ def estimate_stack(
         What is estimated, of `UNKNOWNS`.
     channels : collection of str
         What is used of what is logged.
-    sensors : StackSensors
-        Noise of the channels.
     starts : sequence of Mapping[str, float]
         First guesses, scaled as in `UNKNOWNS` [dimensionless].
-
-    Returns
-    -------
-    StackEstimate
-        Estimates with intervals.
 
     Raises
     ------
@@ -147,18 +133,12 @@ def stack_bounds(
 
     Parameters
     ----------
-    parameters : PiezoStackParameters
-        The actuator.
     voltage : ndarray, shape (n,)
         Drive at the samples [V].
     sample_time : float
         Seconds between samples [s].
     unknowns : collection of str
         What is unknown, of `UNKNOWNS`.
-    channels : collection of str
-        What is logged.
-    sensors : StackSensors
-        Noise of the channels.
 
     Returns
     -------
@@ -243,17 +223,11 @@ def _spread(residuals: Array, theta: Array) -> float:
 def _concluded(runs: StackRuns, theta: Array, residuals: Array, scaled: Array) -> StackEstimate:
     p = runs.actuator(theta)
     deviations = np.sqrt(np.diag(scaled))
-    values: dict[str, float] = {}
-    spread: dict[str, float] = {}
-    for i, name in enumerate(runs.names):
-        unknown = UNKNOWNS[name]
-        found = getattr(p, unknown.names[0])
-        values[name] = found / getattr(runs.healthy, unknown.names[0]) if len(unknown.names) > 1 else found
-        spread[name] = float(deviations[i]) * (unknown.scale or values[name])
+    found = {name: told(p, runs.healthy, name, float(one)) for name, one in zip(runs.names, deviations, strict=True)}
     parts = np.split(residuals, len(runs.noise))
     return StackEstimate(
-        MappingProxyType(values),
-        MappingProxyType(spread),
+        MappingProxyType({name: value for name, (value, _) in found.items()}),
+        MappingProxyType({name: deviation for name, (_, deviation) in found.items()}),
         scaled / np.outer(deviations, deviations),
         {name: sqrt(float(np.mean(part**2))) for name, part in zip(runs.noise, parts, strict=True)},
         runs.count,

@@ -23,19 +23,6 @@ MOST_DEVIATION = 0.30
 SMALLEST_FAULT: Mapping[str, float] = {"chamber_leakage": 5e-12, "crossport_leakage": 5e-12, "coulomb_friction": 100.0}
 """Sizes that leaks and friction are judged by, which are nothing or little when healthy [SI]."""
 
-UNITS: Mapping[str, str] = {
-    "air_fraction": "1",
-    "chamber_leakage": "m^3/(s Pa)",
-    "crossport_leakage": "m^3/(s Pa)",
-    "coulomb_friction": "N",
-    "polarisation": "1",
-    "outlet_reed_stiffness": "N/m",
-    "inlet_reed_stiffness": "N/m",
-    "outlet_reed_gap": "m",
-    "inlet_reed_gap": "m",
-}
-"""Unit of each quantity."""
-
 
 class StackCode(Code):
     """Notes on an estimate of the piezo-stack actuator."""
@@ -51,8 +38,6 @@ def stack_finding(
 
     Parameters
     ----------
-    record : Record
-        The log.
     healthy : PiezoStackParameters
         The actuator as it should be, at the run's bias pressure and load.
     channels : tuple of str
@@ -103,8 +88,6 @@ def stack_prospect(
         Drive at the samples [V].
     sample_time : float
         Seconds between samples [s].
-    channels : tuple of str
-        What would be logged.
 
     Returns
     -------
@@ -115,17 +98,12 @@ def stack_prospect(
     for name, bound in stack_bounds(actuator, voltage, sample_time, channels=channels).items():
         unknown = UNKNOWNS[name]
         value = 1.0 if len(unknown.names) > 1 else float(getattr(actuator, name))
-        quantities[name] = Quantity(value, UNITS[name], None, bound if unknown.scale else bound * value)
+        quantities[name] = Quantity(value, UNKNOWNS[name].unit, None, bound if unknown.scale else bound * value)
     return Finding(NAME, Outcome.OK, quantities, Gate(True, ()), channels)
 
 
 def missed(found: StackEstimate) -> Mapping[str, float]:
     """Return the channels that the fitted actuator does not describe.
-
-    Parameters
-    ----------
-    found : StackEstimate
-        The estimate.
 
     Returns
     -------
@@ -136,24 +114,11 @@ def missed(found: StackEstimate) -> Mapping[str, float]:
 
 
 def stack_quantities(found: StackEstimate, healthy: PiezoStackParameters) -> dict[str, Quantity]:
-    """Return every quantity with its interval; without a number where the sensors hold too little.
-
-    Parameters
-    ----------
-    found : StackEstimate
-        The estimate.
-    healthy : PiezoStackParameters
-        The actuator as it should be.
-
-    Returns
-    -------
-    dict[str, Quantity]
-        By name.
-    """
+    """Return every quantity with its interval; without a number where the sensors hold too little."""
     quantities: dict[str, Quantity] = {}
     for name, value in found.values.items():
         size = 1.0 if name == "polarisation" else SMALLEST_FAULT.get(name) or getattr(healthy, name) or 1e-4
         told = found.deviations[name] < MOST_DEVIATION * size
         numbers = (value, found.interval(name)) if told else (None, None)
-        quantities[name] = Quantity(numbers[0], UNITS[name], numbers[1], found.deviations[name])
+        quantities[name] = Quantity(numbers[0], UNKNOWNS[name].unit, numbers[1], found.deviations[name])
     return quantities

@@ -42,14 +42,8 @@ class StackRuns:
         Drive at the samples [V].
     sample_time : float
         Seconds between samples [s].
-    healthy : PiezoStackParameters
-        The actuator that the unknowns change.
-    names : tuple of str
-        The unknowns.
     noise : Mapping[str, float]
         Standard deviation of each channel's noise [SI].
-    count : int
-        Runs so far.
     """
 
     voltage: Array
@@ -66,11 +60,6 @@ class StackRuns:
         ----------
         theta : ndarray, shape (unknowns,)
             Scaled as in `UNKNOWNS` [dimensionless].
-
-        Returns
-        -------
-        namespace
-            Its parameters.
         """
         return changed(self.healthy, dict(zip(self.names, theta.tolist(), strict=True)))
 
@@ -162,14 +151,10 @@ def prepared(
     ----------
     record : Record
         ``drive_voltage_v`` and one or more of `STACK_CHANNELS`.
-    healthy : PiezoStackParameters
-        The actuator as it should be.
     names : tuple of str
         What is estimated, of `UNKNOWNS`.
     channels : collection of str
         What is used of what is logged.
-    sensors : StackSensors
-        Noise of the channels.
 
     Returns
     -------

@@ -14,28 +14,27 @@ class Unknown:
 
     Parameters
     ----------
-    names : tuple of str
-        Parameters that change with it.
     scale : float
         Unit of its change in SI; 0 where it acts as a factor, whose logarithm is fitted.
     """
 
     names: tuple[str, ...]
     scale: float = 0.0
+    unit: str = "1"
 
 
 UNKNOWNS: Mapping[str, Unknown] = MappingProxyType(
     {
         "air_fraction": Unknown(("air_fraction",)),
-        "chamber_leakage": Unknown(("chamber_leakage",), 1e-11),
-        "crossport_leakage": Unknown(("crossport_leakage",), 1e-11),
-        "coulomb_friction": Unknown(("coulomb_friction",), 100.0),
+        "chamber_leakage": Unknown(("chamber_leakage",), 1e-11, unit="m^3/(s Pa)"),
+        "crossport_leakage": Unknown(("crossport_leakage",), 1e-11, unit="m^3/(s Pa)"),
+        "coulomb_friction": Unknown(("coulomb_friction",), 100.0, unit="N"),
         "polarisation": Unknown(("free_stroke_a_volt", "hysteresis")),
-        "outlet_reed_stiffness": Unknown(("outlet_reed_stiffness",)),
-        "inlet_reed_stiffness": Unknown(("inlet_reed_stiffness",)),
-        "outlet_reed_gap": Unknown(("outlet_reed_gap",), 1e-4),
-        "inlet_reed_gap": Unknown(("inlet_reed_gap",), 1e-4),
-        "viscous_friction": Unknown(("viscous_friction",)),
+        "outlet_reed_stiffness": Unknown(("outlet_reed_stiffness",), unit="N/m"),
+        "inlet_reed_stiffness": Unknown(("inlet_reed_stiffness",), unit="N/m"),
+        "outlet_reed_gap": Unknown(("outlet_reed_gap",), 1e-4, unit="m"),
+        "inlet_reed_gap": Unknown(("inlet_reed_gap",), 1e-4, unit="m"),
+        "viscous_friction": Unknown(("viscous_friction",), unit="N s/m"),
         "delivery_length": Unknown(("delivery_length", "return_length", "intake_length")),
         "discharge_coefficient": Unknown(("discharge_coefficient",)),
     }
@@ -95,3 +94,25 @@ def changed(healthy: PiezoStackParameters, changes: Mapping[str, float]) -> Simp
             else:
                 values[parameter] *= exp(min(max(change, -5.0), 5.0))
     return SimpleNamespace(**values)
+
+
+def told(actuator: SimpleNamespace, healthy: PiezoStackParameters, name: str, deviation: float) -> tuple[float, float]:
+    """Return a quantity as it is told, a factor where it scales several parameters, with its standard deviation.
+
+    Parameters
+    ----------
+    name : str
+        Of `UNKNOWNS`.
+    deviation : float
+        Of the scaled unknown [dimensionless].
+
+    Returns
+    -------
+    tuple of float
+        Value and deviation [SI, or of a factor dimensionless].
+    """
+    unknown = UNKNOWNS[name]
+    value = getattr(actuator, unknown.names[0])
+    if len(unknown.names) > 1:
+        value /= getattr(healthy, unknown.names[0])
+    return value, deviation * (unknown.scale or value)

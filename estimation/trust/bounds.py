@@ -36,8 +36,6 @@ class Bound:
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     time : ndarray, shape (rows,)
         Times of the track [s].
     mean : ndarray, shape (rows, n)
@@ -56,11 +54,6 @@ class Bound:
 
     def track(self, state: str) -> Array:
         """Return the bound of one state along the run.
-
-        Parameters
-        ----------
-        state : str
-            State name.
 
         Returns
         -------
@@ -88,8 +81,6 @@ def posterior_bound(
 
     Parameters
     ----------
-    model : ProcessModel
-        The model.
     prior : Gaussian
         Truth at the first sample, and how well it is known then [SI]; a variance of 0 is exact knowledge.
     record : Record
@@ -101,11 +92,6 @@ def posterior_bound(
     noise : Mapping[str, float], optional
         Process-noise densities that replace the model's, by state name [SI squared a second]; of a logarithmic state,
         those of the logarithm [1/s].
-
-    Returns
-    -------
-    Bound
-        Standard deviations along the run.
 
     Raises
     ------
@@ -123,19 +109,12 @@ def posterior_bound(
     every = max(1, len(record) // TRACK_ROWS)
     rows = (len(record) - 1) // every + 1
     mean, std = np.empty((rows, model.width)), np.empty((rows, model.width))
-    covariance = _compile(model, tuple(variances)).run(
-        scaled.mean.copy(),
-        scaled.covariance.copy(),
-        model.noise_densities(noise) * record.sample_time / substeps,
-        np.array(list(variances.values()), dtype=np.float64),
-        np.column_stack([bridged(record[drive]) for drive in model.drives]),
-        parameter_row(parameters, model.parameters),
-        record.sample_time / substeps,
-        substeps,
-        every,
-        mean,
-        std,
-    )
+    h = record.sample_time / substeps
+    told = model.noise_densities(noise) * record.sample_time / substeps, np.array([*variances.values()], np.float64)
+    drives = np.column_stack([bridged(record[drive]) for drive in model.drives])
+    row, start = parameter_row(parameters, model.parameters), (scaled.mean.copy(), scaled.covariance.copy())
+    run_kernel = _compile(model, tuple(variances)).run
+    covariance = run_kernel(*start, *told, drives, row, h, substeps, every, mean, std)
     physical, slope = model.to_si(mean)
     finite = bool(np.all(np.isfinite(physical)) and np.all(np.isfinite(covariance)))
     spread = np.outer(slope[-1], slope[-1])
@@ -278,12 +257,8 @@ def bulk_modulus_bound(
         A model with the state ``bulk_modulus_pa``.
     prior : Gaussian
         Belief before the log, in SI; its bulk modulus is replaced by the parameters'.
-    record : Record
-        The drive, on its clock.
     parameters : EhaParameters
         The actuator, at the bulk modulus for which the bound is wanted.
-    channels : tuple of str
-        Channels measured.
     variances : Mapping[str, float]
         Their variances [SI squared].
     noise : Mapping[str, float], optional
@@ -306,8 +281,6 @@ def at_bulk_modulus(parameters: EhaParameters, bulk_modulus: float) -> EhaParame
 
     Parameters
     ----------
-    parameters : EhaParameters
-        The actuator.
     bulk_modulus : float
         Effective bulk modulus [Pa], convention of equation 5.8 (errata E2).
 

@@ -28,10 +28,6 @@ class Card:
 
     Parameters
     ----------
-    channels : tuple of str
-        Channels measured.
-    unknowns : tuple of str
-        Parameters asked for.
     relative_std : Mapping[str, float]
         Least relative standard deviation of each [fraction]; 1 is nothing learnt.
     known_exactly : Mapping[str, float]
@@ -76,11 +72,6 @@ def rank_drives(cards: Mapping[str, Card], parameter: str | None = None) -> list
         The card of each drive, by its name.
     parameter : str, optional
         The parameter that counts; by default all unknowns alike, by the geometric mean of their bounds.
-
-    Returns
-    -------
-    list[str]
-        Names.
     """
     return sorted(
         cards, key=lambda name: cards[name].overall if parameter is None else cards[name].relative_std[parameter]
@@ -99,11 +90,6 @@ def percent(value: float) -> str:
     value : float
         The fraction [dimensionless].
 
-    Returns
-    -------
-    str
-        The percentage with its sign.
-
     Examples
     --------
     >>> percent(0.00042), percent(0.11), percent(0.997), percent(1.02)
@@ -115,18 +101,7 @@ def percent(value: float) -> str:
 
 
 def sentences(card: Card) -> tuple[str, ...]:
-    """Say what a card means.
-
-    Parameters
-    ----------
-    card : Card
-        The card.
-
-    Returns
-    -------
-    tuple of str
-        Sentences without a full stop.
-    """
+    """Say what a card means."""
     said: list[str] = []
     lost = [name for name, std in card.relative_std.items() if std > OBSERVABLE]
     if lost:

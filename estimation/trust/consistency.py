@@ -62,8 +62,6 @@ def mean_chi_square_bounds(degrees: int, count: int, confidence: float = 0.95) -
     ----------
     degrees : int
         Degrees of freedom of one statistic: states for NEES, channels for NIS.
-    count : int
-        How many statistics are averaged.
     confidence : float
         Probability of the interval [probability].
 
@@ -96,11 +94,6 @@ def consistency_gate(estimate: Estimate, state: str, record: Record | None = Non
         The state in question, constant in time.
     record : Record, optional
         The log that was filtered; without it innovations are judged by their size alone.
-
-    Returns
-    -------
-    Gate
-        Passed, or the reasons against it.
     """
     channels = () if record is None else whiteness(estimate, record)
     moves = wander(estimate, state)
@@ -122,8 +115,6 @@ def wander(estimate: Estimate, state: str) -> float:
 
     Parameters
     ----------
-    estimate : Estimate
-        The filtered log.
     state : str
         A state that is constant in time.
 
@@ -143,13 +134,6 @@ def wander(estimate: Estimate, state: str) -> float:
 
 def describes(estimate: Estimate, state: str) -> bool:
     """Return whether the model describes the log at all, however roughly.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        The filtered log.
-    state : str
-        The state in question.
 
     Returns
     -------

@@ -46,8 +46,6 @@ class Whiteness:
 
     Parameters
     ----------
-    channel : str
-        The channel.
     count : int
         Samples present after settling.
     excess : float
@@ -93,8 +91,6 @@ def whiteness(estimate: Estimate, record: Record) -> tuple[Whiteness, ...]:
 
     Parameters
     ----------
-    estimate : Estimate
-        The filtered log, its innovations kept.
     record : Record
         The log, for its drive and for what its sensors resolve.
 

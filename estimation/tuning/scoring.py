@@ -25,8 +25,6 @@ class Coordinate:
     ----------
     name : str
         Name in the kernel's row of constants: a parameter, ``q0`` or ``r0`` and so on.
-    place : int
-        Its place in that row.
     guess : float
         Its value where the coordinate is 0 [unit of the row's entry].
     scale : float, optional
@@ -80,10 +78,6 @@ class Maximum:
         Log-likelihood and what was presumed, relative to the guesses given [dimensionless].
     information : ndarray, shape (coordinates, coordinates)
         Fisher information of the log and of what was presumed [dimensionless].
-    sensitivity : Sensitivity
-        Innovations there, and how they move.
-    converged : bool
-        Whether the search came to rest.
     """
 
     coordinates: tuple[Coordinate, ...]
@@ -98,20 +92,6 @@ def maximise(problem: FilterProblem, coordinates: Sequence[Coordinate], iteratio
 
     The Fisher information stands for the Hessian (scoring), within a trust region (Conn, Gould and Toint 2000,
     algorithm 7.3.4, as scipy has it).
-
-    Parameters
-    ----------
-    problem : FilterProblem
-        The task.
-    coordinates : sequence of Coordinate
-        What moves.
-    iterations : int
-        Most steps.
-
-    Returns
-    -------
-    Maximum
-        Where the search ended.
     """
     from scipy.optimize import OptimizeResult, minimize
 
@@ -123,10 +103,10 @@ def maximise(problem: FilterProblem, coordinates: Sequence[Coordinate], iteratio
             raise StopIteration
 
     found = minimize(
-        search.loss,
+        lambda u: search.point(u).loss,
         begin,
-        jac=search.slope,
-        hess=search.curvature,
+        jac=lambda u: search.point(u).slope,
+        hess=lambda u: search.point(u).curvature,
         method="trust-exact",
         callback=rested,
         options={"maxiter": iterations, "gtol": 0.0, "initial_trust_radius": 1.0, "max_trust_radius": FARTHEST},
@@ -152,15 +132,6 @@ class _Search:
         self._problem, self._coordinates = problem, coordinates
         self._row = constant_row(problem, {})
         self._points: dict[bytes, _Point] = {}
-
-    def loss(self, u: Array) -> float:
-        return self.point(u).loss
-
-    def slope(self, u: Array) -> Array:
-        return self.point(u).slope
-
-    def curvature(self, u: Array) -> Array:
-        return self.point(u).curvature
 
     def gain(self, u: Array) -> float:
         """Return what a full scoring step from here would gain."""
@@ -197,8 +168,6 @@ def problem_with(problem: FilterProblem, row: Array) -> FilterProblem:
 
     Parameters
     ----------
-    problem : FilterProblem
-        The task.
     row : ndarray, shape (rows,)
         Constants in the order of `estimation.engine.runner.constant_row` [each in its own unit].
 

@@ -156,8 +156,6 @@ def innovation_sensitivity(
 
     Parameters
     ----------
-    problem : FilterProblem
-        The task.
     directions : ndarray, shape (rows, directions)
         Derivative of the kernel's constant row (`estimation.engine.runner.constant_row`: parameters, process noise,
         sensor variances, ...) along each direction [their units over the direction's].
@@ -165,33 +163,17 @@ def innovation_sensitivity(
         Derivative of the prior's mean and upper triangle [dimensionless over the direction's unit]; 0 by default.
     rule : Rule
         The filter; one without settings and memory.
-
-    Returns
-    -------
-    Sensitivity
-        Innovations and derivatives.
     """
     model, channels = problem.model, problem.channels
     start = layout(rule, model, channels).start(problem.mean, problem.covariance)[: len(belief_names(model.width))]
     samples, width = problem.measured.shape
     count = directions.shape[1]
     slopes = np.zeros((len(start), count)) if belief is None else np.array(belief, dtype=np.float64)
-    result = Sensitivity(
-        np.empty((samples, width)),
-        np.empty((samples, width)),
-        np.empty((samples, width, count)),
-        np.empty((samples, width, count)),
-    )
-    _compile(rule, model, channels).run(
-        start,
-        slopes,
-        constant_row(problem, {}),
-        np.ascontiguousarray(directions, dtype=np.float64),
-        problem.drives,
-        problem.measured,
-        problem.substeps,
-        result,
-    )
+    shapes = [(samples, width)] * 2 + [(samples, width, count)] * 2
+    result = Sensitivity(*(np.empty(shape) for shape in shapes))
+    rows, log = constant_row(problem, {}), (problem.drives, problem.measured, problem.substeps)
+    along = np.ascontiguousarray(directions, dtype=np.float64)
+    _compile(rule, model, channels).run(start, slopes, rows, along, *log, result)
     return result
 
 

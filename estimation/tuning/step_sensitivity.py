@@ -17,10 +17,6 @@ def sensitivity_step(step: StepFunction, width: int, names: Sequence[str]) -> St
     ----------
     step : callable
         ``step(state, drives, parameters, h)``, see `plant.solvers.steps.StepFunction`.
-    width : int
-        Count of the plant's states.
-    names : sequence of str
-        Parameters to differentiate by.
 
     Returns
     -------

@@ -97,8 +97,6 @@ class Tuning:
     spread : Mapping[str, float]
         Standard deviation of each tuned level's logarithm, by state name and by channel [dimensionless]: 3 is what was
         presumed, so a level near it is one of which the log says nothing.
-    converged : bool
-        Whether the search came to rest.
     prior : Gaussian
         The belief before the first sample from which all three fared as they did [SI]: as wide as the one given, its
         constants where they were found.
@@ -130,14 +128,8 @@ def tune(
 
     Parameters
     ----------
-    record : Record
-        The log.
-    model : ProcessModel
-        The process model.
     prior : Gaussian
         Belief before the first sample [SI].
-    parameters : EhaParameters
-        The actuator's known parameters.
     channels : tuple of str, optional
         Channels to use, as in `estimation.filters.run.run_filter`.
     variances : Mapping[str, float], optional
@@ -192,8 +184,6 @@ def noise_coordinates(
     record : Record
         The log; a sensor's variance stays above that of its quantum, and the noise of differential pressure above a
         quarter of what the noise of measured motor speed makes it.
-    parameters : EhaParameters
-        The actuator.
     speed_variance : float, optional
         Measurement variance of motor speed [rad^2/s^2]; read off the log if not given.
 
@@ -225,10 +215,6 @@ def speed_noise(record: Record, p: EhaParameters, variance: float | None = None)
 
     Parameters
     ----------
-    record : Record
-        The log.
-    p : EhaParameters
-        The actuator.
     variance : float, optional
         Of measured speed [rad^2/s^2]; read off the log if not given.
 

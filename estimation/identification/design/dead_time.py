@@ -25,8 +25,6 @@ def estimate_delay(u: ArrayLike, y: ArrayLike, *, n_numerator: int = 2, n_denomi
     ----------
     u, y : array_like, shape (n,)
         Input, no gaps; output, NaN where missing.
-    n_numerator, n_denominator : int
-        Size of the model.
     most : int
         Longest delay considered [samples].
 

@@ -113,8 +113,6 @@ def multisine_for(frequencies_hz: Array, sample_time: float, limits: Limits, *, 
         Frequencies [Hz]; rounded to whole periods of the test.
     sample_time : float
         Seconds between samples [s].
-    limits : Limits
-        The peak is the highest speed.
     duration : float
         Length of the test [s].
 
@@ -157,28 +155,19 @@ def violations(model: LinearModel, u: Array, limits: Limits) -> list[str]:
         From the input to the output that `limits` bounds.
     u : ndarray, shape (n,)
         Input [input unit].
-    limits : Limits
-        What the drive may do.
-
-    Returns
-    -------
-    list of str
-        One sentence each.
     """
     output = model.simulate(u)
     path = np.cumsum(output) * model.sample_time
     swept = float(path.max() - path.min())
     idle = float(np.mean(np.abs(u) <= limits.dead_zone)) if limits.dead_zone > 0.0 else 0.0
-    found: list[str] = []
-    if np.abs(u).max() > limits.speed * (1.0 + 1e-12):
-        found.append(f"the input reaches {np.abs(u).max():.4g}, its limit is {limits.speed:.4g}")
-    if np.abs(output).max() > limits.output:
-        found.append(f"the output reaches {np.abs(output).max():.4g}, its limit is {limits.output:.4g}")
-    if swept > limits.stroke:
-        found.append(f"the stroke needed is {swept:.4g}, there is {limits.stroke:.4g}")
-    if idle > 0.5:
-        found.append(f"the input is inside the dead zone for {100.0 * idle:.0f} % of the time")
-    return found
+    reached, given = float(np.abs(u).max()), float(np.abs(output).max())
+    checks = (
+        (reached > limits.speed * (1.0 + 1e-12), f"the input reaches {reached:.4g}, its limit is {limits.speed:.4g}"),
+        (given > limits.output, f"the output reaches {given:.4g}, its limit is {limits.output:.4g}"),
+        (swept > limits.stroke, f"the stroke needed is {swept:.4g}, there is {limits.stroke:.4g}"),
+        (idle > 0.5, f"the input is inside the dead zone for {100.0 * idle:.0f} % of the time"),
+    )
+    return [said for broken, said in checks if broken]
 
 
 def predicted_covariance(model: LinearModel, u: Array, noise_std: float) -> Array:
@@ -186,8 +175,6 @@ def predicted_covariance(model: LinearModel, u: Array, noise_std: float) -> Arra
 
     Parameters
     ----------
-    model : LinearModel
-        What is expected.
     u : ndarray, shape (n,)
         Input [input unit].
     noise_std : float
@@ -221,16 +208,12 @@ def rank_inputs(
 
     Parameters
     ----------
-    model : LinearModel
-        What is expected.
     candidates : Mapping of ndarray, shape (n,)
         Inputs by name [input unit].
     noise_std : float
         Standard deviation of white output noise [output unit].
     frequencies_hz : ndarray, shape (k,)
         Where the response is wanted [Hz].
-    limits : Limits
-        What the drive may do.
 
     Returns
     -------

@@ -60,11 +60,6 @@ def rests(measured: float, linear: float) -> bool:
     measured, linear : float
         As `rest_shares` returns them [fraction].
 
-    Returns
-    -------
-    bool
-        True if something holds it.
-
     Examples
     --------
     >>> rests(0.12, 0.02), rests(0.03, 0.02)

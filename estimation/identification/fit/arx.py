@@ -36,14 +36,10 @@ def fit_arx(
         Input, no gaps; output, NaN where missing.
     sample_time : float
         Seconds between samples [s].
-    n_numerator, n_denominator : int
-        Free coefficients.
     delay : int
         Dead time [samples].
     covariance : {"white", "coloured", "auto"}
         As `fit_output_error`.
-    input_name, output_name : str
-        Channel names.
 
     Returns
     -------

@@ -23,6 +23,9 @@ from plant.errors import HydrostateError
 DIFFERENCE = 1e-6
 """Relative step of the derivative of discrete coefficients by continuous ones."""
 
+LONGEST = 10.0
+"""Dead time looked for at most [samples]."""
+
 MOST_EVALUATIONS = 60
 """Of the simulated output, a start."""
 
@@ -35,7 +38,6 @@ def fit_continuous(
     n_zeros: int,
     n_poles: int,
     dead_time: float | None = 0.0,
-    longest_dead_time: float | None = None,
     input_name: str = "input",
     output_name: str = "output",
 ) -> LinearModel:
@@ -50,11 +52,7 @@ def fit_continuous(
     n_zeros, n_poles : int
         Degrees of numerator and denominator, ``n_zeros <= n_poles``.
     dead_time : float or None
-        Known delay of the input [s]; None estimates it.
-    longest_dead_time : float, optional
-        Longest that is looked for [s]; ten samples unless told.
-    input_name, output_name : str
-        Channel names.
+        Known delay of the input [s]; None estimates it, ten samples at most.
 
     Returns
     -------
@@ -72,8 +70,7 @@ def fit_continuous(
     names = (input_name, output_name)
     given = experiments_from(u, y, names, n_excited=2 * n_poles, n_wanted=n_wanted)
     problem = _Problem(given.scaled(), sample_time, n_zeros, n_poles, dead_time)
-    longest = 10.0 * sample_time if longest_dead_time is None else longest_dead_time
-    found = [problem.descend(start) for start in problem.starts(longest)]
+    found = [problem.descend(start) for start in problem.starts()]
     values = min(found, key=lambda one: one[0])[1]
     return problem.result(values, data_hash(given, sample_time), names)
 
@@ -135,10 +132,10 @@ class _Problem:
         )
         return float(found.cost), np.asarray(found.x, dtype=np.float64)
 
-    def starts(self, longest: float) -> list[Array]:
+    def starts(self) -> list[Array]:
         """Return starts from discrete fits at several dead times: poles by their logarithms, numerator by response."""
         known = self.dead_time
-        lates = [known] if known is not None else np.linspace(0.0, longest, 7)
+        lates = [known] if known is not None else np.linspace(0.0, LONGEST * self.sample_time, 7)
         kept: list[tuple[float, Array]] = []
         for late in lates:
             whole = int(np.floor(late / self.sample_time + 1e-9))

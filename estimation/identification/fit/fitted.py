@@ -45,8 +45,6 @@ class Task:
         Seconds between samples [s].
     covariance : {"white", "coloured", "auto"}
         Which one the standard deviations use.
-    names : tuple of str
-        Input and output channel.
     n_c, n_d : int
         Coefficients of the noise model behind their 1.
     """
@@ -65,11 +63,6 @@ class Task:
         ----------
         u, y : array_like of shape (n,), or a sequence of them
             Input, no gaps; output, NaN where missing.
-
-        Returns
-        -------
-        Experiments
-            Divided by their root mean squares.
 
         Raises
         ------
@@ -105,17 +98,8 @@ class Task:
             Derivative of the prediction, numerator and denominator first.
         residual : ndarray, shape (n,)
             Prediction error; 0 where the output is missing.
-        data : Experiments
-            The scaled data.
-        structure : str
-            What was fitted.
         noise : tuple of ndarray, shapes (n_c + 1,) and (n_d + 1,), optional
             C and D, monic.
-
-        Returns
-        -------
-        LinearModel
-            With both covariances.
 
         Raises
         ------
@@ -169,15 +153,6 @@ def quality(residual: Array, data: Experiments, n_parameters: int) -> dict[str, 
     ----------
     residual : ndarray, shape (n,)
         0 where the output is missing.
-    data : Experiments
-        Scaled or not.
-    n_parameters : int
-        Free values.
-
-    Returns
-    -------
-    dict
-        In the data's own units.
     """
     rss = float(residual @ residual) * data.y_scale**2
     return {

@@ -46,16 +46,12 @@ def fit_instrumental(
         Input and output, no gaps. Of several experiments, the coefficients are fitted to all.
     sample_time : float
         Seconds between samples [s].
-    n_numerator, n_denominator : int
-        Free coefficients of B and F.
     delay : int
         Dead time [samples].
     n_c, n_d : int
         Coefficients of the noise model behind their 1.
     covariance : {"white", "coloured", "auto"}
         As `fit_output_error`.
-    input_name, output_name : str
-        Channel names.
 
     Returns
     -------

@@ -101,8 +101,6 @@ def force_error(
 
     Parameters
     ----------
-    body : RigidBody
-        Held as it is.
     position : array_like, shape (n,)
         Position [m].
     force : array_like, shape (n,)

@@ -12,9 +12,8 @@ from scipy.linalg import lstsq, svdvals
 from estimation.arrays import Array
 from estimation.identification.fit.fitted import NoEffectError
 from estimation.identification.fit.output_error import fit_output_error
-from estimation.identification.fit.validate import validate
 from estimation.identification.model.lags import lagged
-from estimation.identification.search.experiments import Signals, listed
+from estimation.identification.search.experiments import Signals
 from plant.errors import HydrostateError, LogWarning
 
 if TYPE_CHECKING:
@@ -39,8 +38,6 @@ class OrderTest:
         Of the future outputs projected on the past beside the future inputs (MOESP) [output unit].
     projected_noise_floor : float
         Likewise [output unit].
-    suggested_order : int
-        Projected singular values above their floor.
     """
 
     hankel_singular_values: Array
@@ -144,7 +141,6 @@ def order_table(
     *,
     orders: tuple[int, ...] = (1, 2, 3, 4),
     delay: int = 0,
-    cross_validate: bool = False,
 ) -> "pd.DataFrame":
     """Return the information criteria of output-error fits over orders.
 
@@ -158,15 +154,13 @@ def order_table(
         Denominator coefficients; the numerator has one more, or as many behind a delay.
     delay : int
         Dead time [samples].
-    cross_validate : bool
-        Whether each order is fitted to the first two thirds, too, and run free on the last.
 
     Returns
     -------
     pandas.DataFrame
         Indexed by order, one that explains nothing left out: ``n_parameters``,
         ``fit_percent``, ``rmse``, ``aic``, ``aicc``, ``bic`` and ``fpe`` (smaller
-        is better; AIC and FPE over-fit more often), ``cross_validation`` (fit on what was held back [%], or NaN),
+        is better; AIC and FPE over-fit more often),
         ``slowest_pole`` (largest modulus), ``cancellations`` (poles that a zero nearly cancels).
 
     Raises
@@ -195,22 +189,12 @@ def order_table(
             "aicc": deviance + 2.0 * p * n / max(n - p - 1, 1),
             "bic": deviance + float(np.log(n)) * p,
             "fpe": model.rmse**2 * (n + p) / (n - p),
-            "cross_validation": _held_out(u, y, sample_time, n_numerator, order, delay) if cross_validate else np.nan,
             "slowest_pole": float(np.abs(model.poles[0])),
             "cancellations": len(model.cancellations),
         }
     import pandas as pd
 
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("order")
-
-
-def _held_out(u: Signals, y: Signals, sample_time: float, n_numerator: int, order: int, delay: int) -> float:
-    inputs, outputs = listed(u)[0], listed(y)[0]
-    cut = 2 * inputs.size // 3
-    model = fit_output_error(
-        inputs[:cut], outputs[:cut], sample_time, n_numerator=n_numerator, n_denominator=order, delay=delay
-    )
-    return validate(model, inputs[cut:], outputs[cut:]).fit_percent
 
 
 def _require_record(u: Array, y: Array, n_wanted: int) -> None:

@@ -115,8 +115,6 @@ def minimise(structure: Structure, data: Experiments) -> Array:
 
     Parameters
     ----------
-    structure : Structure
-        The model's structure.
     data : Experiments
         Input and output of order one.
 
@@ -170,12 +168,8 @@ def descend_from(
 
     Parameters
     ----------
-    structure : Structure
-        The model's structure.
     start : ndarray, shape (n_numerator + n_denominator,) or longer
         Numerator and denominator behind its 1, with or without initial states.
-    data : Experiments
-        Input and output.
     steps : int
         Evaluations at most.
     tolerance : float
@@ -199,12 +193,8 @@ def jacobian_and_residual(structure: Structure, theta: Array, data: Experiments)
 
     Parameters
     ----------
-    structure : Structure
-        The model's structure.
     theta : ndarray, shape (p,)
         All values, as `minimise` returns them.
-    data : Experiments
-        Input and output.
 
     Returns
     -------
@@ -234,11 +224,6 @@ def liveliest_section(data: Experiments) -> Experiments:
     ----------
     data : Experiments
         One record or several; several are kept whole.
-
-    Returns
-    -------
-    Experiments
-        One record.
     """
     n_sections = max(1, data.u.size // SCREENING_SAMPLES)
     if n_sections == 1 or data.count > 1:

@@ -1,6 +1,6 @@
 """ARMAX and Box-Jenkins models: least squares of the one-step prediction, by Levenberg-Marquardt."""
 
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -21,70 +21,6 @@ MOST_STEPS = 100
 
 TOLERANCE = 1e-10
 """Share of the cost that a further step may promise at the end."""
-
-
-@dataclass(frozen=True)
-class NoiseStructure:
-    """Orders of ``y = B/F u + C/D e``.
-
-    Parameters
-    ----------
-    system : Structure
-        Of ``B/F``.
-    n_c, n_d : int
-        Coefficients of C and D behind their 1.
-    tied : bool
-        Whether ``D = F``.
-    """
-
-    system: Structure
-    n_c: int
-    n_d: int
-    tied: bool
-
-    @property
-    def n_main(self) -> int:
-        """Values beside the initial states."""
-        return self.system.n_main + self.n_c + self.n_d
-
-    @property
-    def sizes(self) -> np.ndarray:
-        """As `prediction_errors` takes them."""
-        s = self.system
-        return np.array([s.n_numerator, s.n_denominator, self.n_c, self.n_d, s.delay, s.n_initial])
-
-    def split(self, theta: Array) -> tuple[Array, Array, Array, Array]:
-        """Return numerator with denominator, denominator, C and D, behind their 1.
-
-        Parameters
-        ----------
-        theta : ndarray, shape (n_main,) or longer
-            All values.
-
-        Returns
-        -------
-        tuple of ndarray
-            Shapes (n_b + n_f,), (n_f,), (n_c,) and (n_d,).
-        """
-        at_c = self.system.n_main
-        at_d = at_c + self.n_c
-        return theta[:at_c], theta[self.system.n_numerator : at_c], theta[at_c:at_d], theta[at_d : self.n_main]
-
-    def acceptable(self, theta: Array) -> bool:
-        """Return whether the predictor is stable: C always, and F and D unless tied, when they cancel out of it.
-
-        Parameters
-        ----------
-        theta : ndarray, shape (p,)
-            All values.
-
-        Returns
-        -------
-        bool
-            False, too, where a value is not finite.
-        """
-        _, f, c, d = self.split(theta)
-        return bool(np.isfinite(theta).all() and stable(c) and (self.tied or (stable(f) and stable(d))))
 
 
 def fit_armax(
@@ -114,8 +50,6 @@ def fit_armax(
         Dead time [samples].
     covariance : {"white", "coloured", "auto"}
         As `fit_output_error`.
-    input_name, output_name : str
-        Channel names.
 
     Returns
     -------
@@ -128,8 +62,7 @@ def fit_armax(
         As `fit_output_error`.
     """
     system = Structure(n_numerator, n_denominator, delay)
-    task = Task(system, sample_time, covariance, (input_name, output_name), n_c)
-    return _fit(NoiseStructure(system, n_c, 0, tied=True), u, y, task, "ARMAX")
+    return _fit(Task(system, sample_time, covariance, (input_name, output_name), n_c), u, y, "ARMAX", tied=True)
 
 
 def fit_box_jenkins(
@@ -160,8 +93,6 @@ def fit_box_jenkins(
         Dead time [samples].
     covariance : {"white", "coloured", "auto"}
         As `fit_output_error`.
-    input_name, output_name : str
-        Channel names.
 
     Returns
     -------
@@ -175,56 +106,66 @@ def fit_box_jenkins(
     """
     system = Structure(n_numerator, n_denominator, delay)
     task = Task(system, sample_time, covariance, (input_name, output_name), n_c, n_d)
-    return _fit(NoiseStructure(system, n_c, n_d, tied=False), u, y, task, "Box-Jenkins")
+    return _fit(task, u, y, "Box-Jenkins", tied=False)
 
 
-def _fit(form: NoiseStructure, u: Signals, y: Signals, task: Task, structure: str) -> LinearModel:
-    data = task.experiments(u, y)
-    found = [_descend(form, start, data) for start in _starts(form, data)]
+def _fit(task: Task, u: Signals, y: Signals, structure: str, *, tied: bool) -> LinearModel:
+    """Fit from every start; where tied, D is F."""
+    data, form = task.experiments(u, y), task.form
+    found = [_descend(task, tied, start, data) for start in _starts(task, tied, data)]
     _, theta, error, jacobian = min(found, key=lambda one: one[0])
-    main, f, c, d = form.split(theta)
-    state = theta[form.n_main : form.n_main + form.system.n_states]
-    noise = (np.concatenate([[1.0], c]), np.concatenate([[1.0], f if form.tied else d]))
-    return task.model(np.concatenate([main, state]), jacobian, error, data, structure, noise)
+    main, f, c, d, initial = _split(task, theta)
+    noise = (np.concatenate([[1.0], c]), np.concatenate([[1.0], f if tied else d]))
+    return task.model(np.concatenate([main, initial[: form.n_states]]), jacobian, error, data, structure, noise)
 
 
-def _starts(form: NoiseStructure, data: Experiments) -> list[Array]:
+def _split(task: Task, theta: Array) -> list[Array]:
+    """Return numerator with denominator, the denominator, C and D, behind their 1, and all initial states."""
+    at_c = task.form.n_main
+    main, c, d, initial = np.split(theta, [at_c, at_c + task.n_c, at_c + task.n_c + task.n_d])
+    return [main, main[task.form.n_numerator :], c, d, initial]
+
+
+def _acceptable(task: Task, tied: bool, theta: Array) -> bool:
+    """Return whether the predictor is stable: C always, and F and D unless tied, when they cancel out of it."""
+    _, f, c, d, _ = _split(task, theta)
+    return bool(np.isfinite(theta).all() and stable(c) and (tied or (stable(f) and stable(d))))
+
+
+def _starts(task: Task, tied: bool, data: Experiments) -> list[Array]:
     """Return starts: the output-error model with the noise that it leaves, with none, and from ARX."""
-    system, longest = form.system, data.longest
-    n_b, n_f = system.n_numerator, system.n_denominator
-    output_error = minimise(system, data)
-    _, residual = jacobian_and_residual(system, output_error, data)
-    main, initial = output_error[: system.n_main], output_error[system.n_main :]
+    form, longest = task.form, data.longest
+    output_error = minimise(form, data)
+    main, initial = output_error[: form.n_main], output_error[form.n_main :]
     u, y = data.bridged()[data.slices.index(longest)]
-    arx_b, arx_f = least_squares_arx(n_b, n_f, system.delay, u, y)
-    arx = np.concatenate([arx_b[system.delay :], arx_f[1:]])
-    starts: list[Array] = []
-    for values, rest in ((main, initial), (arx, np.zeros_like(initial))):
-        noises = [(np.zeros(form.n_c), np.zeros(form.n_d))]
-        if values is main and form.n_c + form.n_d:
-            f = np.concatenate([[1.0], main[n_b:]])
-            v = residual[longest]
-            guess = noise_start(np.convolve(v, f)[: v.size] if form.tied else v, form.n_c, form.n_d)
-            noises.append((guess[0][1:], guess[1][1:]))
-        for c, d in noises:
-            start = np.concatenate([values, c, d, rest])
-            if form.acceptable(start):
-                starts.append(start)
-    return starts
+    arx_b, arx_f = least_squares_arx(form.n_numerator, form.n_denominator, form.delay, u, y)
+    quiet = np.zeros(task.n_c + task.n_d)
+    starts = [np.concatenate([main, quiet, initial])]
+    if quiet.size:
+        f, v = (
+            np.concatenate([[1.0], main[form.n_numerator :]]),
+            jacobian_and_residual(form, output_error, data)[1][longest],
+        )
+        c, d = noise_start(np.convolve(v, f)[: v.size] if tied else v, task.n_c, task.n_d)
+        starts.append(np.concatenate([main, c[1:], d[1:], initial]))
+    starts.append(np.concatenate([arx_b[form.delay :], arx_f[1:], quiet, np.zeros_like(initial)]))
+    return [start for start in starts if _acceptable(task, tied, start)]
 
 
-def _descend(form: NoiseStructure, start: Array, data: Experiments) -> tuple[float, Array, Array, Array]:
+def _descend(task: Task, tied: bool, start: Array, data: Experiments) -> tuple[float, Array, Array, Array]:
     """Return cost, values, prediction errors and Jacobian of the minimum that one start leads to."""
-    n, p = data.u.size, start.size
+    n, p, form = data.u.size, start.size, task.form
+    sizes = np.array([form.n_numerator, form.n_denominator, task.n_c, task.n_d, form.delay, form.n_initial])
 
     def predicted(theta: Array) -> tuple[float, Array, Array]:
         error, jacobian = np.zeros(n), np.zeros((n, p))
-        cost = prediction_errors(theta, form.sizes, form.tied, data.u, data.y, data.used, data.bounds, error, jacobian)
+        cost = prediction_errors(theta, sizes, tied, data.u, data.y, data.used, data.bounds, error, jacobian)
         return cost, error, jacobian
 
     def normal(theta: Array) -> tuple[float, Array, Array]:
         cost, error, jacobian = predicted(theta)
         return cost, jacobian.T @ jacobian, -(jacobian.T @ error)
 
-    cost, theta = levenberg(normal, start, form.acceptable, tolerance=TOLERANCE, most_steps=MOST_STEPS)
+    acceptable = partial(_acceptable, task, tied)
+    cost, theta = levenberg(normal, start, acceptable, tolerance=TOLERANCE, most_steps=MOST_STEPS)
     return cost, theta, *predicted(theta)[1:]

@@ -52,8 +52,6 @@ def dc_gain_interval(
         The data, as `fit_output_error` took them.
     level : float
         Probability of the interval.
-    estimate_initial_state : bool
-        As the model was fitted.
 
     Returns
     -------

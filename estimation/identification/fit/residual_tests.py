@@ -55,8 +55,6 @@ def ljung_box(residual: ArrayLike, *, n_lags: int = DEFAULT_LAGS, n_parameters: 
     ----------
     residual : array_like, shape (n,)
         NaN where missing.
-    n_lags : int
-        Lags counted.
     n_parameters : int
         Parameters of a *noise* model fitted to it; none for output error.
 

@@ -27,7 +27,7 @@ class SubspaceFit:
     ----------
     model : LinearModel
         The transfer function; subspace methods give no covariance.
-    singular_values : ndarray, shape (block_rows,)
+    singular_values : ndarray, shape (block rows,)
         Of the weighted projection [output unit].
     noise_floor : float
         Largest such value that noise alone gives [output unit].
@@ -44,8 +44,6 @@ def fit_subspace(
     sample_time: float,
     *,
     order: int | None = None,
-    direct: bool = True,
-    block_rows: int = BLOCK_ROWS,
     input_name: str = "input",
     output_name: str = "output",
 ) -> SubspaceFit:
@@ -62,12 +60,6 @@ def fit_subspace(
         Seconds between samples [s].
     order : int, optional
         Of the model; the singular values above the noise floor unless told.
-    direct : bool
-        Whether the input may act within the same sample.
-    block_rows : int
-        Block rows of past and future.
-    input_name, output_name : str
-        Channel names.
 
     Returns
     -------
@@ -79,7 +71,7 @@ def fit_subspace(
     HydrostateError
         As `fit_output_error`, if an output is missing, or if nothing rises above the noise floor.
     """
-    rows = max(block_rows, 2 * (order or 0) + 1)
+    rows = max(BLOCK_ROWS, 2 * (order or 0) + 1)
     given = experiments_from(u, y, (input_name, output_name), n_excited=rows, n_wanted=12 * rows)
     if not given.used.all():
         raise HydrostateError(
@@ -97,7 +89,7 @@ def fit_subspace(
         )
     shift = np.linalg.lstsq(left[:-1, :n], left[1:, :n], rcond=None)[0]
     f = stabilised(polynomial(np.linalg.eigvals(shift).astype(np.complex128)), data.u.size)
-    form = Structure(n + 1 if direct else n, n, 0 if direct else 1)
+    form = Structure(n + 1, n)
     theta = profile(form, f, given.u, given.y, given.used)[1]
     b, f, state = form.split(theta)
     residual = given.y - filtered(b, f, given.u, state)
@@ -107,7 +99,6 @@ def fit_subspace(
         sample_time=sample_time,
         input_name=input_name,
         output_name=output_name,
-        delay=form.delay,
         initial_state=state,
         data_hash=data_hash(given, sample_time),
         structure="subspace",

@@ -87,8 +87,6 @@ def estimate_initial_state(model: LinearModel, u: ArrayLike, y: ArrayLike) -> Ar
 
     Parameters
     ----------
-    model : LinearModel
-        Held as it is.
     u : array_like, shape (n,)
         Input, no gaps.
     y : array_like, shape (n,)
@@ -115,21 +113,12 @@ def validate(
 
     Parameters
     ----------
-    model : LinearModel
-        The model.
     u : array_like, shape (n,)
         Input, no gaps.
     y : array_like, shape (n,)
         Measured output; NaN where missing.
     fitted : bool
         Whether the model was fitted to these very data, which the cross-correlation test must know.
-    n_lags : int
-        Lags of both residual tests.
-
-    Returns
-    -------
-    Validation
-        Fit, RMSE and both tests.
     """
     inputs, outputs = np.asarray(u, dtype=np.float64), np.asarray(y, dtype=np.float64)
     state = model.initial_state if fitted else estimate_initial_state(model, inputs, outputs)

@@ -16,11 +16,6 @@ NEAR = 1e-5
 def bandwidth(model: "LinearModel") -> float | None:
     """Return the lowest frequency at which the gain is 3 dB below that at zero frequency.
 
-    Parameters
-    ----------
-    model : LinearModel
-        Any transfer function.
-
     Returns
     -------
     float or None
@@ -44,11 +39,6 @@ def bandwidth(model: "LinearModel") -> float | None:
 
 def bandwidth_std(model: "LinearModel") -> float | None:
     """Return the standard deviation of the bandwidth, first order in the covariance.
-
-    Parameters
-    ----------
-    model : LinearModel
-        Any transfer function.
 
     Returns
     -------

@@ -54,13 +54,7 @@ def to_dict(model: "LinearModel") -> dict[str, Any]:
 
 
 def to_mat(model: "LinearModel", path: Path) -> None:
-    """Write the model to a MAT file at full precision, one variable an entry of `to_dict`.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    """
+    """Write the model to a MAT file at full precision, one variable an entry of `to_dict`."""
     from scipy.io import savemat
 
     entries = to_dict(model) | {name: getattr(model, name) for name in COVARIANCES}
@@ -73,15 +67,8 @@ def from_dict(cls: "type[LinearModel]", values: Mapping[str, Any]) -> "LinearMod
 
     Parameters
     ----------
-    cls : type
-        The class.
     values : Mapping[str, Any]
         As `to_dict` returns, or as read back from JSON; what version 0.1 did not write may be absent.
-
-    Returns
-    -------
-    LinearModel
-        Equal in every bit.
 
     Raises
     ------

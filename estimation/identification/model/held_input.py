@@ -47,9 +47,8 @@ def held_input_model(
     C = padded[1:] - through * denominator[1:]
     whole = int(np.floor(dead_time / sample_time + 1e-9))
     part = max(dead_time - whole * sample_time, 0.0)
-    late, _ = _held(A, B, sample_time - part)
+    late, new_gain = _held(A, B, sample_time - part)
     early_gain = _held(A, B, part)[1]
-    new_gain = _held(A, B, sample_time - part)[1]
     whole_step = _held(A, B, sample_time)[0]
     f = np.asarray(np.real(np.poly(whole_step)), dtype=np.float64)
     b = np.zeros(n + 2)

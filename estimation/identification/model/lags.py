@@ -13,10 +13,6 @@ def lagged(x: Array, first: int, count: int) -> Array:
     ----------
     x : ndarray, shape (n,)
         A signal.
-    first : int
-        Smallest lag, in samples.
-    count : int
-        Number of lags.
 
     Returns
     -------

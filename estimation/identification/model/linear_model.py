@@ -54,8 +54,6 @@ class LinearModel:
         Seconds between samples [s]; of the data, if the model is in continuous time.
     input_name, output_name : str
         Channel names, which carry the units (``motor_speed_rad_s``).
-    delay : int
-        Dead time in samples.
     covariance : ndarray, shape (p, p), p = n_numerator + n_denominator
         Of ``[b[delay:], f[1:]]``, the one that deviations are taken from; NaN by default: not known.
     initial_state : ndarray, shape (max(len(numerator), len(denominator)) - 1,)
@@ -64,8 +62,6 @@ class LinearModel:
     fit_percent, rmse, residual_std : float
         Fit of the simulated output, root-mean-square residual (one step ahead, where C or D is fitted), and residual
         deviation with the degrees of freedom counted [output unit]; NaN where nothing was fitted.
-    n_samples : int
-        Output samples used.
     data_hash : str
         SHA-256 of the data used; empty where nothing was fitted.
     covariance_white, covariance_robust : ndarray, shape (p, p)
@@ -74,8 +70,6 @@ class LinearModel:
         How the model was fitted: ``"output-error"``, ``"ARX"``, ...; empty where it was not.
     noise_numerator, noise_denominator : ndarray, shapes (n_c + 1,) and (n_d + 1,)
         ``C`` and ``D``, monic; 1 by default.
-    continuous : bool
-        Whether the polynomials are in s.
     dead_time : float
         Of a model in continuous time [s].
     dead_time_std : float

@@ -186,11 +186,6 @@ def response_band(
         Of the coefficients.
     level : float
         Probability that a band covers.
-
-    Returns
-    -------
-    ResponseBand
-        At each frequency.
     """
     from scipy.special import ndtri
 

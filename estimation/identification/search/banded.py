@@ -152,8 +152,6 @@ def refine_banded(
         Input power of each band, positive.
     cross : ndarray of complex, shape (k,)
         Output times conjugate input, summed over each band.
-    most_steps : int
-        Evaluations a start.
 
     Returns
     -------

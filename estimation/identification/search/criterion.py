@@ -15,8 +15,6 @@ class Structure:
 
     Parameters
     ----------
-    n_numerator : int
-        Free numerator coefficients.
     n_denominator : int
         Denominator coefficients beside the leading 1; the order.
     delay : int
@@ -138,8 +136,6 @@ def predict(structure: Structure, theta: Array, u: Array) -> Array:
 
     Parameters
     ----------
-    structure : Structure
-        How many coefficients of each kind.
     theta : ndarray, shape (n_parameters,)
         All free values.
     u : ndarray, shape (n,)
@@ -163,8 +159,6 @@ def sensitivities(structure: Structure, theta: Array, u: Array) -> Array:
 
     Parameters
     ----------
-    structure : Structure
-        The model's structure.
     theta : ndarray, shape (p,)
         ``[b, f, initial state]``.
     u : ndarray, shape (n,)
@@ -206,8 +200,6 @@ def profile(structure: Structure, denominator: Array, u: Array, y: Array, used: 
 
     Parameters
     ----------
-    structure : Structure
-        The model's structure.
     denominator : ndarray, shape (n_denominator + 1,)
         Monic, stable.
     u, y : ndarray, shape (n,)

@@ -58,11 +58,6 @@ def solve_damped(gram: Array, gradient: Array, damping: float, step: Array, fact
         Receives the solution.
     factor : ndarray, shape (p, p)
         Workspace.
-
-    Returns
-    -------
-    bool
-        Whether the factorisation held.
     """
     p = gradient.size
     for i in range(p):

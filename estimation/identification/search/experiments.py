@@ -88,12 +88,6 @@ def experiments_from(u: Signals, y: Signals, names: tuple[str, str], *, n_excite
     ----------
     u, y : array_like of shape (n,), or a sequence of them
         Input, no gaps; output, NaN where missing.
-    names : tuple of str
-        Input and output channel, for messages.
-    n_excited : int
-        Coefficients that the input must excite.
-    n_wanted : int
-        Fewest output samples that will do.
 
     Returns
     -------
@@ -132,15 +126,8 @@ def data_hash(data: Experiments, sample_time: float) -> str:
 
     Parameters
     ----------
-    data : Experiments
-        The data.
     sample_time : float
         Seconds between samples [s].
-
-    Returns
-    -------
-    str
-        Hexadecimal digest.
     """
     digest = hashlib.sha256()
     parts = [data.u, data.measured(), np.array([sample_time])]

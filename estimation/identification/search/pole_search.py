@@ -5,7 +5,7 @@ periodogram. Summed once into logarithmic bands, they cost microseconds a candid
 can be tried, the best refined, and every basin of the criterion gets a start.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,8 +38,7 @@ SAME_COST = 1e-6
 """Refined candidates whose costs agree to this share have reached the same minimum."""
 
 
-@dataclass(frozen=True, eq=False)
-class BandedSpectra:
+class BandedSpectra(NamedTuple):
     """Periodograms summed into bands.
 
     Parameters
@@ -95,15 +94,6 @@ def search_poles(structure: Structure, spectra: BandedSpectra, n_samples: int) -
     less. A slow pole that a zero nearly cancels explains little power but has a basin of its own, so the
     places where a real pole is *locally* best are kept beside the globally best.
 
-    Parameters
-    ----------
-    structure : Structure
-        The model's structure.
-    spectra : BandedSpectra
-        Of the data.
-    n_samples : int
-        Length of the longest experiment.
-
     Returns
     -------
     cost : ndarray, shape (m,)
@@ -132,12 +122,8 @@ def refine(structure: Structure, denominators: Array, spectra: BandedSpectra) ->
 
     Parameters
     ----------
-    structure : Structure
-        The model's structure.
     denominators : ndarray, shape (m, n_f)
         Behind the leading 1; stable.
-    spectra : BandedSpectra
-        Of the data.
 
     Returns
     -------
@@ -148,34 +134,17 @@ def refine(structure: Structure, denominators: Array, spectra: BandedSpectra) ->
     """
     _, numerators = _explained(structure, denominators, spectra)
     starts = np.concatenate([numerators, denominators], axis=1)
-    costs, thetas = refine_banded(
-        starts,
-        structure.n_numerator,
-        structure.delay,
-        spectra.omega,
-        spectra.power,
-        spectra.cross,
-        REFINEMENTS,
-    )
+    costs, thetas = refine_banded(starts, structure.n_numerator, structure.delay, *spectra, REFINEMENTS)
     order = np.argsort(costs, kind="stable")
     order = order[np.isfinite(costs[order])]
-    kept = [index for place, index in enumerate(order) if place == 0 or _rises(costs, order[place - 1], index)]
+    rises = np.diff(costs[order]) > SAME_COST * costs[order[1:]]
+    kept = order[np.concatenate([np.ones(min(order.size, 1), dtype=bool), rises])]
     return costs[kept], thetas[kept]
 
 
-def _rises(costs: Array, before: int, index: int) -> bool:
-    return bool(costs[index] - costs[before] > SAME_COST * costs[index])
-
-
 def _explained(structure: Structure, denominators: Array, spectra: BandedSpectra) -> tuple[Array, Array]:
-    return explained_power(
-        np.ascontiguousarray(denominators),
-        structure.n_numerator,
-        structure.delay,
-        spectra.omega,
-        spectra.power,
-        spectra.cross,
-    )
+    denominators = np.ascontiguousarray(denominators)
+    return explained_power(denominators, structure.n_numerator, structure.delay, *spectra)
 
 
 def _single_candidates(

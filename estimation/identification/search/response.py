@@ -15,15 +15,8 @@ def impulse_response(f: Array, n: int, n_s: int, pad: int, pulse: Array) -> int:
     ----------
     f : ndarray, shape (n_f,)
         Denominator behind its 1.
-    n, n_s, pad : int
-        Samples, initial-state values, leading zeros.
     pulse : ndarray, shape (pad + n,) or longer
         Receives the response.
-
-    Returns
-    -------
-    int
-        Samples.
     """
     if n_s == 0:
         return 0

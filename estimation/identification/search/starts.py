@@ -31,8 +31,6 @@ def starting_values(structure: Structure, data: Experiments, count: int) -> list
 
     Parameters
     ----------
-    structure : Structure
-        The model's structure.
     data : Experiments
         Input and output of order one.
     count : int
@@ -97,8 +95,6 @@ def reduced_high_order_arx(n_denominator: int, u: Array, y: Array) -> Array:
 
     Parameters
     ----------
-    n_denominator : int
-        Order wanted.
     u, y : ndarray, shape (n,)
         Input and output, no gaps.
 

@@ -126,8 +126,6 @@ def smoothed_spectra(
     ----------
     correlations : tuple of ndarray, shape (2 n,)
         As `correlations` returns them.
-    lags : int
-        Half length of the window.
     size : int
         Length of the transform, 2 * lags or more.
 

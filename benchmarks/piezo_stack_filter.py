@@ -13,7 +13,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.piezo_stack.runs import STACK_CHANNELS, StackRuns, prepared
-from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, changed
+from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, changed, told
 from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.piezo_stack.model import STATES, at_bias
@@ -75,13 +75,8 @@ class StackTrack:
             Value and standard deviation by name [SI]; of what changes several parameters, as a factor.
         """
         p = changed(healthy, dict(zip(self.names, self.values[-1].tolist(), strict=True)))
-        found: dict[str, tuple[float, float]] = {}
-        for name, deviation in zip(self.names, self.deviations[-1].tolist(), strict=True):
-            unknown = UNKNOWNS[name]
-            value = getattr(p, unknown.names[0])
-            value = value / getattr(healthy, unknown.names[0]) if len(unknown.names) > 1 else value
-            found[name] = value, deviation * (unknown.scale or value)
-        return MappingProxyType(found)
+        deviations = zip(self.names, self.deviations[-1].tolist(), strict=True)
+        return MappingProxyType({name: told(p, healthy, name, deviation) for name, deviation in deviations})
 
 
 def filter_stack(

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.piezo_stack.filter import STATE_SIZES, filter_stack
+from benchmarks.piezo_stack_filter import STATE_SIZES, filter_stack
 from plant.errors import LogError
 from plant.log.record import Record
 from plant.piezo_stack.model import STATES
