@@ -32,6 +32,8 @@ class Experiments:
         Where the output is there.
     bounds : ndarray of int, shape (count + 1,)
         Where each experiment begins, and the end.
+    u_scale, y_scale : float
+        What input and output were divided by [input unit, output unit].
     """
 
     u: Array
