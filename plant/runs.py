@@ -4,11 +4,9 @@ from collections.abc import Mapping
 from math import ceil, isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.errors import DriveError, HydrostateError
-
-Array = NDArray[np.float64]
 
 MOST_SAMPLES = 100_000_000
 """Longest signal that is made, in samples; a longer one is taken for a mistake in a unit."""

@@ -2,18 +2,14 @@
 
 from dataclasses import replace
 from math import sqrt
-from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diaphragm_motor.signature import DRIVE, POSITION, modelled_signature, tolerance
 from estimation.trust.card import Card
 from plant.diaphragm_motor.flow import operate
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import ELECTRODES
-
-Array: TypeAlias = NDArray[np.floating[Any]]
 
 UNKNOWNS = ("bulk_modulus", "gas_fraction", "crossport_leakage", "load_force")
 """What the card asks for."""

@@ -8,17 +8,15 @@ the diaphragm-motor paper is after; what leaks past the piston does not show the
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import ceil, pi
-from typing import Literal, TypeAlias
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diaphragm_motor.maps import MIDDLE, MotorMaps
+from plant.arrays import Array
 from plant.diaphragm_motor.flow import tone
 from plant.diaphragm_motor.model import POSITION, at_rest, deflections
 from plant.diaphragm_motor.run import BENCH_SENSORS, HIGHEST_VOLTAGE, LONGEST_STEP, MotorSensors, Schedule, run_motor
-
-Array: TypeAlias = NDArray[np.float64]
 
 CYCLES = 4
 """Cycles of the drive between actions of the controller."""

@@ -7,10 +7,8 @@ its gas, and `estimation.diaphragm_motor.track` reads flow and pressure off the 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import sqrt
-from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from estimation.diaphragm_motor.signature import (
@@ -23,11 +21,10 @@ from estimation.diaphragm_motor.signature import (
     tolerance,
 )
 from estimation.diaphragm_motor.track import MotorTrack, healthy_maps, motor_blocks, track_leakage
+from plant.arrays import Floats
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import ELECTRODES
 from plant.log.record import Record
-
-Array: TypeAlias = NDArray[np.floating[Any]]
 
 CALIBRATED_SHARE = 0.2
 """What is left of both tolerances when a healthy run of the same motor has set the gains, judged [dimensionless]."""
@@ -117,7 +114,7 @@ def estimate_motor(
     )
 
 
-def _gains(calibration: Signature, healthy: DiaphragmMotorParameters) -> Array:
+def _gains(calibration: Signature, healthy: DiaphragmMotorParameters) -> Floats:
     """Return the electrodes' gains by which a healthy run differs from its model."""
     drive = calibration.drive
     model = modelled_signature(healthy, drive.frequency, drive.peak_to_peak)
@@ -129,13 +126,13 @@ def _gas_fitted(seen: Signature, healthy: DiaphragmMotorParameters) -> tuple[flo
     point = seen.drive.frequency, seen.drive.peak_to_peak
     tones = slice(0, len(seen.values) - 1)
 
-    def shown(theta: Array) -> Array:
+    def shown(theta: Floats) -> Floats:
         gas = tuple(float(np.exp(theta[0])) * share for share in healthy.gas_fraction)
         return modelled_signature(replace(healthy, gas_fraction=gas, load_force=float(theta[1])), *point)[tones]
 
     whitening = np.linalg.inv(np.linalg.cholesky((tolerance(healthy, *point) + seen.covariance)[tones, tones]))
 
-    def linearised(theta: Array) -> tuple[Array, Array]:
+    def linearised(theta: Floats) -> tuple[Floats, Floats]:
         base = shown(theta)
         slopes = np.column_stack([(shown(theta + step) - base) / step.sum() for step in np.diag(_SLOPE_STEPS)])
         return whitening @ (seen.values[tones] - base), whitening @ slopes

@@ -8,18 +8,16 @@ maps says flow and pressure: what equation 19 of the diaphragm-motor paper is af
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import tanh
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.arrays import Array, Tones
 from plant.diaphragm_motor.flow import operate
 from plant.diaphragm_motor.model import SIDE_A, at_rest
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.errors import HydrostateError
-
-Array: TypeAlias = NDArray[np.float64]
-Tones: TypeAlias = NDArray[np.complexfloating[Any, Any]]
 
 SWINGS = tuple(np.arange(0.0, 301.0, 50.0))
 """Voltages of a map, peak to peak [V]."""

@@ -11,18 +11,15 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil, pi
 from types import MappingProxyType
-from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Floats, Tones
 from plant.diaphragm_motor.flow import operate
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import ELECTRODES, HIGHEST_FREQUENCY, HIGHEST_VOLTAGE
 from plant.errors import LogError
 from plant.log.record import Record
-
-Array: TypeAlias = NDArray[np.floating[Any]]
 
 DRIVE, POSITION = "drive_voltage_v", "position_m"
 """Channels beside the electrodes."""
@@ -92,11 +89,11 @@ class Signature:
     """
 
     drive: Drive
-    values: Array
-    covariance: Array
+    values: Floats
+    covariance: Floats
 
     @property
-    def tones(self) -> NDArray[np.complexfloating[Any, Any]]:
+    def tones(self) -> Tones:
         """Electrodes' fundamentals against the drive [V]: amplitude and phase."""
         return self.values[:7] + 1j * self.values[7:14]
 
@@ -106,7 +103,7 @@ class Signature:
         return float(self.values[-1])
 
 
-def modelled_signature(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Array:
+def modelled_signature(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Floats:
     """Return a motor's signature by its model, without noise (section 7.1).
 
     Parameters
@@ -133,7 +130,7 @@ def modelled_signature(p: DiaphragmMotorParameters, frequency: float, peak_to_pe
 
 
 @lru_cache(maxsize=8)
-def tolerance(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Array:
+def tolerance(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Floats:
     """Return the covariance with which a healthy motor's signature scatters about its model.
 
     Parameters
@@ -149,7 +146,7 @@ def tolerance(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float
         Covariance of `Signature.values`.
     """
     base = modelled_signature(p, frequency, peak_to_peak)
-    columns: list[Array] = []
+    columns: list[Floats] = []
     for name, share in TOLERANCE.items():
         moved = replace(p, **{name: (1.0 + share) * getattr(p, name)})
         columns.append(modelled_signature(moved, frequency, peak_to_peak) - base)
@@ -202,7 +199,7 @@ def logged_signature(record: Record, start: float = SETTLED) -> Signature:
     return Signature(drive, values, np.diag(variances))
 
 
-def steady_drive(voltage: Array, sample_time: float) -> Drive:
+def steady_drive(voltage: Floats, sample_time: float) -> Drive:
     """Return the steady sine of a drive.
 
     Parameters
@@ -253,13 +250,13 @@ def steady_drive(voltage: Array, sample_time: float) -> Drive:
     return Drive(frequency, 2.0 * amplitude, float(np.arctan2(found[1], found[0])))
 
 
-def _sine_fit(voltage: Array, frequency: float, time: Array) -> tuple[Array, Array]:
+def _sine_fit(voltage: Floats, frequency: float, time: Floats) -> tuple[Floats, Floats]:
     angle = 2.0 * pi * frequency * time
     design = np.column_stack([np.sin(angle), np.cos(angle), np.ones(len(time))])
     return design, np.linalg.lstsq(design, voltage, rcond=None)[0]
 
 
-def fitted_tones(values: Array, angle: Array, *, trend: int) -> tuple[Array, Array]:
+def fitted_tones(values: Floats, angle: Floats, *, trend: int) -> tuple[Floats, Floats]:
     """Fit a trend and the harmonics of a drive to signals.
 
     Parameters

@@ -8,7 +8,6 @@ does not take is load. A Kalman filter follows both, 20 cycles at a time, and ho
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil, pi, sqrt, tanh
-from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -24,13 +23,12 @@ from estimation.diaphragm_motor.signature import (
     whole_cycles,
 )
 from estimation.finding import NORMAL_95
+from plant.arrays import Floats
 from plant.diaphragm_motor.flow import operate
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import ELECTRODES
 from plant.errors import LogError
 from plant.log.record import Record
-
-Array: TypeAlias = NDArray[np.floating[Any]]
 
 MIDDLE = ELECTRODES[3]
 """The electrode whose amplitude the maps are read by: it peaks with the flow (section 7.1)."""
@@ -82,11 +80,11 @@ class MotorTrack:
         Whether leakage was held because the pressure had just changed.
     """
 
-    time: Array
-    leakage: Array
-    leakage_std: Array
-    load: Array
-    load_std: Array
+    time: Floats
+    leakage: Floats
+    leakage_std: Floats
+    load: Floats
+    load_std: Floats
     held: NDArray[np.bool_]
 
     @property
@@ -152,7 +150,7 @@ class Block:
     length: float
     amplitude: float
     velocity: float
-    deviations: Array
+    deviations: Floats
 
 
 def motor_blocks(record: Record, drive: Drive) -> list[Block]:
@@ -182,7 +180,7 @@ def motor_blocks(record: Record, drive: Drive) -> list[Block]:
     angle = 2.0 * pi * drive.frequency * between * np.arange(count)
     length = count * between
     blocks: list[Block] = []
-    spreads: list[Array] = []
+    spreads: list[Floats] = []
     for start in range(first, len(record) - count + 1, count):
         both = np.column_stack([record[MIDDLE][start : start + count], record[POSITION][start : start + count]])
         found, noise = fitted_tones(both, angle, trend=1)
@@ -235,7 +233,7 @@ def track_leakage(
     return MotorTrack(time, leakage, leakage_std, load, load_std, held > 0.0)
 
 
-def _balances(block: Block, rate: float, p: DiaphragmMotorParameters, maps: HealthyMaps) -> tuple[Array, Array]:
+def _balances(block: Block, rate: float, p: DiaphragmMotorParameters, maps: HealthyMaps) -> tuple[Floats, Floats]:
     """Return the flow that is lost and the force that is left, with their covariance from the sensors' noise."""
     compliance = p.line_compliance + p.cylinder_volume / p.cylinder_bulk_modulus
     amplitude, velocity = block.amplitude, block.velocity
@@ -253,14 +251,14 @@ def _balances(block: Block, rate: float, p: DiaphragmMotorParameters, maps: Heal
     return np.array([lost, force]), slopes @ np.diag(block.deviations**2) @ slopes.T
 
 
-def _updated(state: Array, known: Array, seen: Array, design: Array, noise: Array) -> tuple[Array, Array]:
+def _updated(state: Floats, known: Floats, seen: Floats, design: Floats, noise: Floats) -> tuple[Floats, Floats]:
     """Return the Kalman filter's belief after a measurement, by Joseph's form."""
     gain = known @ design.T @ np.linalg.inv(design @ known @ design.T + noise)
     left = np.eye(len(state)) - gain @ design
     return state + gain @ (seen - design @ state), left @ known @ left.T + gain @ noise @ gain.T
 
 
-def _tilts(block: Block, state: Array, p: DiaphragmMotorParameters, maps: HealthyMaps) -> Array:
+def _tilts(block: Block, state: Floats, p: DiaphragmMotorParameters, maps: HealthyMaps) -> Floats:
     """Return how far an electrode's gain and a map that are off by their tolerance tilt leakage and load."""
     off = GAIN_TOLERANCE * block.amplitude
     pressure, flow = float(maps.pressure(block.amplitude)), float(maps.flow(block.amplitude))

@@ -10,10 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import log, pi, sqrt
-from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import minimize_scalar
 from scipy.special import chdtri
@@ -21,11 +19,10 @@ from scipy.special import chdtri
 from estimation.diaphragm_motor.signature import Signature, logged_signature, modelled_signature, tolerance
 from estimation.finding import interval_95
 from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS, MotorFault, motor_with_fault
+from plant.arrays import Floats
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.errors import LogError
 from plant.log.record import Record
-
-Array: TypeAlias = NDArray[np.floating[Any]]
 
 UNKNOWN_BELOW = 1e-3
 """Probability of so large a chi-square, under the best fault, below which the fault is called unknown."""
@@ -99,7 +96,7 @@ class MotorDiagnosis:
     unknown: bool
     freedom: int
     signature: Signature
-    expected: Array
+    expected: Floats
     lookalikes: tuple[str, ...]
 
     @property
@@ -116,7 +113,7 @@ class MotorDiagnosis:
 class _Curve:
     """A fault's signatures over its severity, whitened."""
 
-    def __init__(self, fault: MotorFault, signatures: Array, whitening: Array) -> None:
+    def __init__(self, fault: MotorFault, signatures: Floats, whitening: Floats) -> None:
         self.fault = fault
         self.at = PchipInterpolator(fault.severities, signatures @ whitening.T, axis=0)
         self.slope = self.at.derivative()
@@ -124,7 +121,7 @@ class _Curve:
         self.grid = np.linspace(least, most, _GRID)
         self.points = self.at(self.grid)
 
-    def nearest(self, seen: Array) -> tuple[float, float, float]:
+    def nearest(self, seen: Floats) -> tuple[float, float, float]:
         """Return the severity nearest to what was seen, its standard deviation, and the squared distance."""
         nearest = int(np.argmin(np.sum((self.points - seen) ** 2, axis=1)))
         between = self.grid[max(nearest - 1, 0)], self.grid[min(nearest + 1, _GRID - 1)]
@@ -141,10 +138,10 @@ class _Curve:
 
 
 @lru_cache(maxsize=4)
-def _simulated(healthy: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Mapping[str, Array]:
+def _simulated(healthy: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Mapping[str, Floats]:
     """Return every fault's signatures at its severities, and the healthy one, by the model."""
 
-    def shown(name: str, severity: float) -> Array:
+    def shown(name: str, severity: float) -> Floats:
         return modelled_signature(motor_with_fault(healthy, name, severity), frequency, peak_to_peak)
 
     curves = {name: np.array([shown(name, s) for s in fault.severities]) for name, fault in MOTOR_FAULTS.items()}
@@ -250,7 +247,7 @@ def separations(
     return apart
 
 
-def _whitening(covariance: Array) -> Array:
+def _whitening(covariance: Floats) -> Floats:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), np.float64)
 
 
@@ -260,7 +257,7 @@ def _lookalikes(best: Match, healthy: DiaphragmMotorParameters, point: tuple[flo
         return ()
     simulated = _simulated(healthy, *point)
 
-    def bent(values: Array) -> Array:
+    def bent(values: Floats) -> Floats:
         change = (values - simulated[HEALTHY])[..., :_FUNDAMENTALS]
         return change / np.maximum(np.linalg.norm(change, axis=-1, keepdims=True), _LEAST_CHANGE)
 

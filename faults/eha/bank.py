@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.identification.model.linear_model import LinearModel
 from estimation.log_checks.bridging import bridged
 from estimation.models.eha_forms import PRESSURE_FORM
 from faults.conditions import CONDITIONS, Condition, parameters_for
+from plant.arrays import Array
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
@@ -19,8 +19,6 @@ from plant.log.record import Record
 from plant.sensors.sensors import BENCH, Sensors
 from plant.solvers.steps import parameter_row
 from plant.solvers.trajectory import compile_trajectory
-
-Array = NDArray[np.float64]
 
 IDENTIFICATION_TIME = 0.001
 """Sample time of the transfer functions [s]: inferred for Table 6 (errata E14)."""

@@ -6,17 +6,15 @@ from math import inf
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from estimation.trust.identifiability import SENSED
 from faults.eha.bank import mathematical_bank, predict_run
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, Sensors, noise_variances
-
-Array = NDArray[np.float64]
 
 EQUATIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {

@@ -7,10 +7,7 @@ motion. Quantities are shares of the actuator's ratings: speed ``w``, velocity `
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from plant.arrays import Array
 
 FEATURES = 8
 """Regressors of a balance."""

@@ -6,10 +6,7 @@ threshold follows from the peaks of the sum's excursions.
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from plant.arrays import Array
 
 MEAN, VARIANCE, COUNT, SUM, PEAK, THRESHOLD, SQUARES = range(7)
 """Places in a balance's score: running mean and variance of its log NIS and blocks in them; the CUSUM, the peak of its

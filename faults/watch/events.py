@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from plant.arrays import Array
 
 LIKELY = 1.92
 """Drop of the log-likelihood at the ends of a 95 % interval: half the quantile of chi-square with one degree."""

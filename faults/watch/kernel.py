@@ -9,15 +9,13 @@ from functools import cache
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from faults.watch import balances, cusum
 from faults.watch.balances import FEATURES, count_gains, learn, regress, shift, solve
 from faults.watch.cusum import MEAN, PEAK, SQUARES, SUM, THRESHOLD, VARIANCE, accumulate, standardise, threshold
+from plant.arrays import Array
 from plant.compiled.kernel_file import load_kernel
 from plant.compiled.paste import BORROWING, kernel_text, pasted
-
-Array = NDArray[np.float64]
 
 INTERVALS = 10
 """Intervals a block."""

@@ -14,18 +14,16 @@ of k peaks is ``k (1 + h / (k s))^-k`` (a Pareto predictive law), which is set t
 from math import exp, isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
 from faults.watch.balances import FEATURES, GAINS
 from faults.watch.cusum import SUM, THRESHOLD
 from faults.watch.events import Alarm, Change, Event, Ready, change_time
 from faults.watch.kernel import CLOCK, INTERVALS, LEVELS, PARTIAL, READY, RECENT, SCORE, watch_kernel
 from faults.watch.samples import watched_samples
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
 from plant.log.record import Record
-
-Array = NDArray[np.float64]
 
 INTERVAL = 5e-3
 """Time over which samples are averaged [s], or one sample where they are further apart."""

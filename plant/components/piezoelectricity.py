@@ -6,14 +6,12 @@ eps_11 = eps_22, which the printed matrices leave open (errata M10, M11 and M12)
 """
 
 from dataclasses import dataclass
-from typing import Annotated, TypeAlias
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.units import SI
-
-Array: TypeAlias = NDArray[np.float64]
 
 PZT_5H = "PZT-5H; Erturk and Inman, Piezoelectric Energy Harvesting (2011), appendix E"
 

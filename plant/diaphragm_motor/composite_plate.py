@@ -9,17 +9,15 @@ Mechanics of Laminated Composite Plates and Shells, 2nd edition, section 3.3.
 
 from dataclasses import dataclass
 from math import pi, sqrt
-from typing import Annotated, NamedTuple, TypeAlias
+from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import iv, jv
 
+from plant.arrays import Array
 from plant.errors import RigError
 from plant.units import SI, require_numbers
-
-Array: TypeAlias = NDArray[np.float64]
 
 TABLE_1 = "Table 1"
 PZT_5H = "PZT-5H; Erturk and Inman, Piezoelectric Energy Harvesting (2011), appendix E"

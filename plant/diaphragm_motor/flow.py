@@ -2,17 +2,13 @@
 
 from dataclasses import dataclass, replace
 from math import ceil, pi
-from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array, Tones
 from plant.diaphragm_motor.model import FLOWS, SIDE_A, SIDE_B, VELOCITY, deflections
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import LONGEST_STEP, motor_drive, run_motor
-
-Array: TypeAlias = NDArray[np.float64]
-Tones: TypeAlias = NDArray[np.complexfloating[Any, Any]]
 
 SETTLING = 0.08
 """Time that a run is given to settle, in whole cycles at least as long [s]."""

@@ -12,8 +12,8 @@ from types import SimpleNamespace
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.compiled.functions import Scalar, absolute, maximum, tanh
 from plant.components.bouc_wen import power_bouc_wen_rate
 from plant.components.diaphragm import centre_deflection, chamber_compliance
@@ -22,7 +22,6 @@ from plant.components.end_stop import end_stop_force
 from plant.components.flap_valve import late_share, opening_target, orifice_drag, port_flow_after
 from plant.diaphragm_motor.parameters import DIAPHRAGMS, ROWS, VALVES, DiaphragmMotorParameters
 
-Array: TypeAlias = NDArray[np.float64]
 State: TypeAlias = tuple[Scalar, ...]
 
 STATES = (

@@ -8,9 +8,9 @@ from types import MappingProxyType
 from typing import Annotated, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from plant.arrays import Array
 from plant.diaphragm_motor.model import POSITION, STATES, MotorRow, at_rest, deflections, motor_row, motor_step
 from plant.diaphragm_motor.parameters import DIAPHRAGMS, DiaphragmMotorParameters
 from plant.errors import DriveError
@@ -19,8 +19,6 @@ from plant.runs import checked_series, require_drivable, require_finite, sample_
 from plant.sensors.sensors import require_not_negative
 from plant.solvers.trajectory import compile_trajectory
 from plant.units import SI
-
-Array: TypeAlias = NDArray[np.float64]
 
 Schedule: TypeAlias = Sequence[tuple[float, DiaphragmMotorParameters]]
 """From when on [s] which motor: a load that steps, a valve that is switched, a fault that comes. The first is at 0."""

@@ -4,12 +4,11 @@ from typing import Any, cast
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
-Values = NDArray[np.float64]
+from plant.arrays import Array
 
 
-def from_arrow(column: "pa.ChunkedArray[Any]") -> Values:
+def from_arrow(column: "pa.ChunkedArray[Any]") -> Array:
     """Return a column of Arrow's as an array of its own, NaN where it has no value.
 
     Parameters
@@ -39,7 +38,7 @@ def from_arrow(column: "pa.ChunkedArray[Any]") -> Values:
     return out
 
 
-def to_arrow(values: Values) -> "pa.Array[Any]":
+def to_arrow(values: Array) -> "pa.Array[Any]":
     """Return an array as a column of Arrow's, without a value where it is NaN.
 
     Parameters

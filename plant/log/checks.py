@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.errors import LogError
 from plant.log.columns import TIME, TRUTH
 from plant.log.notes import LogCode
@@ -20,8 +21,7 @@ MOST_MISSING = 0.05
 MOST_JITTER = 0.01
 ROUNDING = 1e-6
 
-Values = NDArray[np.float64]
-Channels = Mapping[str, Values]
+Channels = Mapping[str, Array]
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Checked:
     sample_time, start_time : float
         The clock [s].
     channels : Mapping[str, ndarray, shape (n,)]
-        Values in SI, NaN where a sample is missing.
+        Array in SI, NaN where a sample is missing.
     notes : tuple[Note, ...]
         What was resampled, masked, dropped, or looks wrong.
     """
@@ -175,7 +175,7 @@ def _uniform(columns: Channels, source: str, clock: Clock | None, notes: list[No
     return Checked(sample_time, float(time[0]), _spread(channels, slots.astype(np.int64)))
 
 
-def _merged(time: Values, channels: Channels, source: str, notes: list[Note], uneven: LogError) -> Checked:
+def _merged(time: Array, channels: Channels, source: str, notes: list[Note], uneven: LogError) -> Checked:
     """Put channels that were logged at times of their own on the clock of the fastest; else the rows are uneven.
 
     A slower channel's sample goes to the nearest tick, as interpolated there between the channel's own samples.
@@ -202,7 +202,7 @@ def _merged(time: Values, channels: Channels, source: str, notes: list[Note], un
     return Checked(on_clock.sample_time, on_clock.start_time, out)
 
 
-def _ticks(time: Values, source: str) -> Values:
+def _ticks(time: Array, source: str) -> Array:
     """Return how many sample times each step takes, after refusing all that is no whole number of them."""
     step = np.diff(time)
     if step.min() <= 0.0:
@@ -227,17 +227,17 @@ def _ticks(time: Values, source: str) -> Values:
     return ticks
 
 
-def _agrees(time: Values, clock: Clock) -> bool:
+def _agrees(time: Array, clock: Clock) -> bool:
     error = np.abs(clock.start_time + clock.sample_time * np.arange(len(time)) - time).max()
     return bool(error <= (ROUNDING + _resolution(time, clock.sample_time)) * clock.sample_time)
 
 
-def _resolution(time: Values, sample_time: float) -> float:
+def _resolution(time: Array, sample_time: float) -> float:
     """Return what rounding of the times themselves to floats can look like, in sample times."""
     return 4.0 * float(np.spacing(np.abs(time[[0, -1]]).max())) / sample_time
 
 
-def _resampled(wanted: Values, time: Values, values: Values) -> Values:
+def _resampled(wanted: Array, time: Array, values: Array) -> Array:
     """Interpolate linearly between the samples that are there; those that are missing stay missing."""
     there = np.isfinite(values)
     if not there.any():
@@ -265,7 +265,7 @@ def _derived(channels: Channels) -> Channels:
     return {**channels, wanted: channels[a] - channels[b]}
 
 
-def _slower(values: Values) -> int:
+def _slower(values: Array) -> int:
     """Return every how many samples a channel is logged, where it is slower than the clock but steady; 1 for others."""
     present = np.flatnonzero(np.isfinite(values))
     if len(present) < FEWEST_SAMPLES:

@@ -12,15 +12,14 @@ from typing import Any, BinaryIO, TextIO, cast
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 from pyarrow import csv as arrow_csv
 
+from plant.arrays import Array
 from plant.errors import LogError
 from plant.log.arrow import from_arrow, to_arrow
 from plant.log.cells import MISSING, not_a_number, number
 from plant.log.columns import TRUTH, Column
 
-Values = NDArray[np.float64]
 Choose = Callable[[Sequence[str]], Sequence[Column]]
 
 LONGEST_HEADER = 1 << 20
@@ -46,7 +45,7 @@ class Layout:
     decimal_point: str
 
 
-def read_csv(path: Path, choose: Choose) -> dict[Column, Values]:
+def read_csv(path: Path, choose: Choose) -> dict[Column, Array]:
     """Return the columns of a CSV log that ``choose`` picks by name.
 
     Parameters
@@ -59,7 +58,7 @@ def read_csv(path: Path, choose: Choose) -> dict[Column, Values]:
     Returns
     -------
     dict[Column, ndarray, shape (n,)]
-        Values as logged, NaN in empty cells.
+        Array as logged, NaN in empty cells.
 
     Raises
     ------
@@ -76,13 +75,13 @@ def read_csv(path: Path, choose: Choose) -> dict[Column, Values]:
         return _read_cells(path, layout, chosen)
 
 
-def write_csv(columns: Mapping[str, Values], file: BinaryIO, *, compressed: bool) -> None:
+def write_csv(columns: Mapping[str, Array], file: BinaryIO, *, compressed: bool) -> None:
     """Write columns as CSV, shortest digits that read back exactly, missing samples as empty cells.
 
     Parameters
     ----------
     columns : Mapping[str, ndarray, shape (n,)]
-        Values by column name.
+        Array by column name.
     file : BinaryIO
         Where to, open for writing.
     compressed : bool
@@ -122,7 +121,7 @@ def _layout(path: Path) -> Layout:
     return Layout(tuple(names), lines, delimiter, "," if comma else ".")
 
 
-def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Values]:
+def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
     labels = [str(position) for position in range(len(layout.names))]
     wanted = [labels[column.position] for column in chosen]
     table = arrow_csv.read_csv(
@@ -136,14 +135,14 @@ def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Col
             decimal_point=layout.decimal_point,
         ),
     )
-    out: dict[Column, Values] = {}
+    out: dict[Column, Array] = {}
     for column, label in zip(chosen, wanted, strict=True):
         out[column] = from_arrow(table.column(label))
         table = table.drop_columns([label])  # hands each column's memory back before the next is copied
     return out
 
 
-def _read_cells(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Values]:
+def _read_cells(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
     """Read what pyarrow will not, or say in which row and column it is no number."""
     cells = {column: array("d") for column in chosen}
     try:

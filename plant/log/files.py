@@ -10,8 +10,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.atomic import replacing
 from plant.errors import HydrostateError, LogError, LogWarning
 from plant.log.arrow import from_arrow, to_arrow
@@ -24,8 +24,7 @@ from plant.log.notes import LogCode
 from plant.log.record import Record
 from plant.notes import Note
 
-Values = NDArray[np.float64]
-Raw = tuple[dict[Column, Values], str | None]
+Raw = tuple[dict[Column, Array], str | None]
 
 SCHEMA_KEY = b"hydrostate"
 SUFFIXES = {".csv": "csv", ".txt": "csv", ".gz": "csv", ".parquet": "parquet", ".mat": "mat"}
@@ -161,7 +160,7 @@ def _read_parquet(path: Path, choose: Choose) -> Raw:
     file = pq.ParquetFile(path)
     names = file.schema_arrow.names
     text = (file.schema_arrow.metadata or {}).get(SCHEMA_KEY)
-    out: dict[Column, Values] = {}
+    out: dict[Column, Array] = {}
     for column in choose(names):
         try:
             out[column] = _floats(file.read([names[column.position]]).column(0), column, str(path))
@@ -171,14 +170,14 @@ def _read_parquet(path: Path, choose: Choose) -> Raw:
     return out, None if text is None else text.decode(errors="replace")
 
 
-def _write_parquet(columns: Mapping[str, Values], metadata: str, file: BinaryIO) -> None:
+def _write_parquet(columns: Mapping[str, Array], metadata: str, file: BinaryIO) -> None:
     import pyarrow.parquet as pq
 
     table = pa.table({name: to_arrow(values) for name, values in columns.items()})
     pq.write_table(table.replace_schema_metadata({SCHEMA_KEY: metadata.encode()}), file)
 
 
-def _floats(values: "pa.ChunkedArray[Any]", column: Column, source: str) -> Values:
+def _floats(values: "pa.ChunkedArray[Any]", column: Column, source: str) -> Array:
     kind = values.type
     if pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind):
         return from_arrow(values if kind == pa.float64() else values.cast(pa.float64(), safe=False))

@@ -6,15 +6,13 @@ from pathlib import Path
 from typing import Any, BinaryIO, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.errors import LogError
 from plant.log.cells import numbers
 from plant.log.columns import TRUTH, Column
 from plant.log.csv import Choose
 from plant.log.mat_reader import DamagedMatError, Value, read_variables
-
-Values = NDArray[np.float64]
 
 STRUCT = "record"
 METADATA = "metadata_json"
@@ -22,7 +20,7 @@ NEWER = (b"\x00\x02IM", b"\x02\x00MI")
 """Version and byte order of a MAT 7.3, which is an HDF5 file."""
 
 
-def read_mat(path: Path, choose: Choose) -> tuple[dict[Column, Values], str | None]:
+def read_mat(path: Path, choose: Choose) -> tuple[dict[Column, Array], str | None]:
     """Return the columns of a MAT log that ``choose`` picks by name, and the metadata text it carries.
 
     Parameters
@@ -35,7 +33,7 @@ def read_mat(path: Path, choose: Choose) -> tuple[dict[Column, Values], str | No
     Returns
     -------
     columns : dict[Column, ndarray, shape (n,)]
-        Values as logged.
+        Array as logged.
     metadata : str or None
         The JSON text that `write_mat` put there.
 
@@ -52,7 +50,7 @@ def read_mat(path: Path, choose: Choose) -> tuple[dict[Column, Values], str | No
     except DamagedMatError as error:
         raise LogError(f"cannot be read as mat: {error}", str(path)) from error
     names = [name for name in table if name != METADATA]
-    out: dict[Column, Values] = {}
+    out: dict[Column, Array] = {}
     for column in choose(names):
         values = np.atleast_1d(np.asarray(table[names[column.position]]))
         try:
@@ -72,13 +70,13 @@ def _table(content: Mapping[str, Value]) -> Mapping[str, Value]:
     return next(iter(structs.values())) if len(structs) == 1 and len(content) == 1 else content
 
 
-def write_mat(columns: Mapping[str, Values], metadata: str, file: BinaryIO, source: str) -> None:
+def write_mat(columns: Mapping[str, Array], metadata: str, file: BinaryIO, source: str) -> None:
     """Write columns as the fields of one struct named ``record``.
 
     Parameters
     ----------
     columns : Mapping[str, ndarray, shape (n,)]
-        Values by column name.
+        Array by column name.
     metadata : str
         JSON text, kept in the field ``metadata_json``.
     file : BinaryIO

@@ -5,12 +5,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.log.notes import LogCode
 from plant.notes import Note
-
-Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,7 @@ TRAVEL = (1e-6, 0.1)
 """Piston travel a radian of pump [m], pump displacement over piston area: 3.7e-4 for the paper's rig."""
 
 
-def implausible(sample_time: float, channels: Mapping[str, Values]) -> list[Note]:
+def implausible(sample_time: float, channels: Mapping[str, Array]) -> list[Note]:
     """Return a note for each thing that looks like a slip of units, or that nothing moves.
 
     Parameters
@@ -72,7 +70,7 @@ def implausible(sample_time: float, channels: Mapping[str, Values]) -> list[Note
     sample_time : float
         Time between samples [s].
     channels : Mapping[str, ndarray, shape (n,)]
-        Values in SI, NaN where a sample is missing.
+        Array in SI, NaN where a sample is missing.
 
     Returns
     -------
@@ -99,11 +97,11 @@ def implausible(sample_time: float, channels: Mapping[str, Values]) -> list[Note
     return slips if still is None else [still, *slips]
 
 
-def _span(values: Values) -> float:
+def _span(values: Array) -> float:
     return float(np.nanmax(values) - np.nanmin(values))
 
 
-def _still(channels: Mapping[str, Values]) -> Note | None:
+def _still(channels: Mapping[str, Array]) -> Note | None:
     if "motor_speed_rad_s" in channels and _span(channels["motor_speed_rad_s"]) == 0.0:
         return LogCode.SPEED_CONSTANT.note()
     motion = [name for name in ("position_m", "velocity_m_s") if name in channels]
@@ -112,7 +110,7 @@ def _still(channels: Mapping[str, Values]) -> Note | None:
     return None
 
 
-def _out_of_range(name: str, channels: Mapping[str, Values]) -> list[Note]:
+def _out_of_range(name: str, channels: Mapping[str, Array]) -> list[Note]:
     if name not in channels:
         return []
     values, limits = channels[name], LIMITS[name]
@@ -126,7 +124,7 @@ def _out_of_range(name: str, channels: Mapping[str, Values]) -> list[Note]:
     return []
 
 
-def _above_noise(values: Values) -> bool:
+def _above_noise(values: Array) -> bool:
     """Tell a signal from sensor noise: white noise, or its derivative, has large second differences."""
     if _span(values) == 0.0:
         return False
@@ -136,7 +134,7 @@ def _above_noise(values: Values) -> bool:
     return float(np.var(scaled)) > 4.0 * noise
 
 
-def _displaced(sample_time: float, channels: Mapping[str, Values]) -> list[Note]:
+def _displaced(sample_time: float, channels: Mapping[str, Array]) -> list[Note]:
     """Compare the position with the integral of the velocity."""
     if "position_m" not in channels or "velocity_m_s" not in channels:
         return []
@@ -147,7 +145,7 @@ def _displaced(sample_time: float, channels: Mapping[str, Values]) -> list[Note]
     return [LogCode.POSITION_AND_VELOCITY_UNITS.note(ratio=ratio, slip=slip)]
 
 
-def _pumped(sample_time: float, channels: Mapping[str, Values]) -> list[Note]:
+def _pumped(sample_time: float, channels: Mapping[str, Array]) -> list[Note]:
     """Compare the piston's motion with the pump's."""
     if "motor_speed_rad_s" not in channels:
         return []
@@ -164,13 +162,13 @@ def _pumped(sample_time: float, channels: Mapping[str, Values]) -> list[Note]:
     return [LogCode.TRAVEL_UNITS.note(travel_m=travel, least=TRAVEL[0], most=TRAVEL[1], channel=name)]
 
 
-def _integrated(sample_time: float, rate: Values) -> Values:
+def _integrated(sample_time: float, rate: Array) -> Array:
     present = np.flatnonzero(np.isfinite(rate))
     whole = rate if len(present) == len(rate) else np.interp(np.arange(len(rate)), present, rate[present])
     return np.cumsum(whole) * sample_time
 
 
-def _gain(output: Values, cause: Values, alike: float) -> float | None:
+def _gain(output: Array, cause: Array, alike: float) -> float | None:
     """Return the ratio of sizes of two signals without their trends, None where their shapes differ."""
     there = np.isfinite(output) & np.isfinite(cause)
     if there.sum() < 3 or not _above_noise(output):
@@ -182,7 +180,7 @@ def _gain(output: Values, cause: Values, alike: float) -> float | None:
     return size_y / size_x
 
 
-def _detrended(values: Values) -> Values:
+def _detrended(values: Array) -> Array:
     ramp = np.linspace(-1.0, 1.0, len(values))
     level = values - values.mean()
     return level - ramp * float(ramp @ level) / float(ramp @ ramp)

@@ -7,15 +7,13 @@ Equations (1999), chapter 7; Oustaloup, Levron, Mathieu, Nanot (2000), IEEE Tran
 """
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import convolve
 
+from plant.arrays import Array
 from plant.errors import HydrostateError
-
-Array: TypeAlias = NDArray[np.float64]
 
 
 def gl_weights(order: float, count: int) -> Array:

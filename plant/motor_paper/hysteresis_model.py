@@ -6,11 +6,12 @@ of u; at an amplitude its first harmonic is one too, with a phase that no freque
 
 from dataclasses import dataclass
 from math import pi, sqrt
-from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.compiled.functions import Scalar
 from plant.components.bouc_wen import power_bouc_wen_rate
 from plant.errors import RigError
@@ -19,8 +20,6 @@ from plant.units import SI, require_numbers
 
 if TYPE_CHECKING:
     import control
-
-Array: TypeAlias = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,13 +11,12 @@ from math import isfinite, pi
 from typing import TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import cont2discrete
 
+from plant.arrays import Array
 from plant.errors import RigError
 from plant.motor_paper.vibration_model import Matrices
 
-Array: TypeAlias = NDArray[np.float64]
 Memory = TypeVar("Memory")
 
 Controller: TypeAlias = Callable[[Memory, float], tuple[float, Memory]]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.errors import RigError
 from plant.motor_paper.fractional import oustaloup_states
 from plant.units import SI, require_numbers
@@ -19,7 +20,6 @@ from plant.units import SI, require_numbers
 if TYPE_CHECKING:
     import control
 
-Array: TypeAlias = NDArray[np.float64]
 Matrices: TypeAlias = tuple[Array, Array, Array, Array]
 """A, B, C, D of equation 13."""
 

@@ -6,17 +6,14 @@ the new velocity; with order 1 the fractional damper is the viscous one to the l
 
 from functools import cache
 from types import ModuleType
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.compiled.kernel_file import load_kernel
 from plant.compiled.paste import kernel_text, pasted
 from plant.motor_paper.fractional import fractional_history, fractional_push, gl_weights
 from plant.motor_paper.vibration_model import VibrationParameters, reduced_stiffness
-
-Array: TypeAlias = NDArray[np.float64]
 
 
 def forced_vibration(

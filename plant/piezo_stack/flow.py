@@ -1,18 +1,15 @@
 """What a run of the piezo-stack actuator shows: flow as a bench infers it, stages of a cycle, Reynolds number."""
 
-from typing import TypeAlias
-
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.components.line import reynolds_number
 from plant.errors import DriveError
 from plant.piezo_stack.model import stack_pressures
 from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.run import FINE_TIME, sine_drive
 from plant.piezo_stack.trajectory import run_stack
-
-Array: TypeAlias = NDArray[np.float64]
 
 FLOW_TIME = 0.16
 """Length of a run whose flow is measured [s]; its second half counts."""

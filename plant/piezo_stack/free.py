@@ -1,11 +1,11 @@
 """The stack alone, free to move: what the displacement experiment of the piezo-stack paper drives (equation 2)."""
 
 from math import ceil, pi, sqrt
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.compiled.functions import Scalar
 from plant.components.bouc_wen import asymmetric_bouc_wen_rate
 from plant.components.piezo_stack import lagged_force_rate, stack_force
@@ -14,8 +14,6 @@ from plant.piezo_stack.run import sine_drive
 from plant.piezo_stack.trajectory import stack_row
 from plant.solvers.steps import rk4_step
 from plant.solvers.trajectory import compile_trajectory
-
-Array: TypeAlias = NDArray[np.float64]
 
 FREE_STATES = ("stack_displacement_m", "stack_velocity_m_s", "linear_force_n", "hysteresis_m")
 """States of the free stack."""

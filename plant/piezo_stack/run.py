@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from types import MappingProxyType
-from typing import Annotated, TypeAlias
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.components.piezo_stack import stack_force
 from plant.errors import DriveError
 from plant.log.record import Record
@@ -17,8 +17,6 @@ from plant.piezo_stack.trajectory import NAME, run_stack
 from plant.runs import checked_series, require_drivable, require_frequency, sample_count, with_noise
 from plant.sensors.sensors import require_not_negative
 from plant.units import SI
-
-Array: TypeAlias = NDArray[np.float64]
 
 HIGHEST_VOLTAGE = 150.0
 """Rated voltage of the stack [V]; it cannot withstand reverse voltage either (output performance section)."""

@@ -1,18 +1,15 @@
 """Trajectories of the piezo-stack actuator: one, or several side by side (equations 1 to 22)."""
 
 from collections.abc import Iterator, Sequence
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.piezo_stack.model import STATES, StackValues, at_bias, stack_step
 from plant.piezo_stack.parameters import LONGEST_STEP, PiezoStackParameters
 from plant.runs import require_finite, steps_a_sample
 from plant.solvers.fixed_step_kernel import compile_fixed_step
 from plant.solvers.steps import parameter_row
-
-Array: TypeAlias = NDArray[np.float64]
 
 NAME = "piezo-stack"
 """What the plant is called on the command line and in metadata."""

@@ -9,12 +9,10 @@ from math import isfinite
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.errors import RigError, require_known
 from plant.log.record import Record
-
-Array = NDArray[np.float64]
 
 Kind: TypeAlias = Literal["bias", "gain", "drift", "freeze", "saturation", "dropout"]
 

@@ -2,16 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.runs import require_finite
 from plant.solvers.adaptive_kernel import compile_adaptive
 from plant.solvers.steps import Derivative, Parameters, parameter_row
-
-Array: TypeAlias = NDArray[np.float64]
 
 LANES = 8
 """Trajectories side by side in one kernel, as many as a vector register of 512 bits holds."""

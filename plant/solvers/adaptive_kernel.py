@@ -9,9 +9,7 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from typing import TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
+from plant.arrays import Array
 from plant.compiled.elimination import eliminated_jacobian
 from plant.compiled.expression import ONE, ZERO, Expression, as_expression, symbol
 from plant.compiled.functions import Scalar
@@ -23,8 +21,6 @@ from plant.compiled.simplify import fused, share_ratios, simplified
 from plant.compiled.source import INTRINSICS, lines_source, operations_source
 from plant.solvers.adaptive_loop import INNER, ROUNDEST, TINY, run_controlled, smooth
 from plant.solvers.steps import Derivative, Parameters, State, parameter_names, parameter_symbols, solve_linear
-
-Array: TypeAlias = NDArray[np.float64]
 
 Kernel: TypeAlias = Callable[[Array, Array, Array, float, Array, float, float, float, Array], None]
 """``run(starts, speed, parameter rows, sample time, weights, bend, longest, shortest, states)``, which fills states."""

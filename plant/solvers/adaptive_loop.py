@@ -1,14 +1,12 @@
 """The loop of error-controlled steps, as plain functions: `plant.solvers.adaptive_kernel` pastes them into a kernel."""
 
 from collections.abc import Callable
-from typing import Protocol, TypeAlias
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.solvers.fixed_step_loops import Operation, SideBySide, lay, share
-
-Array: TypeAlias = NDArray[np.float64]
 
 TINY = 1e-6
 """Share of a sample time within which a step ends at a sample."""

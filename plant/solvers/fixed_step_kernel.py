@@ -9,9 +9,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
+from plant.arrays import Array
 from plant.compiled.expression import as_expression, symbol
 from plant.compiled.hoist import hoisted
 from plant.compiled.intrinsics import native_width
@@ -22,8 +20,6 @@ from plant.compiled.simplify import fused, simplified
 from plant.compiled.source import INTRINSICS, lines_source, operations_source
 from plant.solvers.fixed_step_loops import lay, run_side_by_side, share
 from plant.solvers.steps import Parameters, StepFunction, parameter_names, parameter_symbols
-
-Array: TypeAlias = NDArray[np.float64]
 
 FixedStepRun: TypeAlias = Callable[[Array, Array, Array, float, int, Array], None]
 """``run(starts, drives, parameter rows, sample time, substeps, states)``, which fills states."""

@@ -8,9 +8,8 @@ from collections.abc import Callable
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array: TypeAlias = NDArray[np.float64]
+from plant.arrays import Array
 
 Operation: TypeAlias = Callable[[int, float], None]
 """``operation(address, j)``: works on numbers in memory from an address on (`plant.compiled.intrinsics.stepping`)."""

@@ -4,9 +4,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
+from plant.arrays import Array
 from plant.compiled.expression import as_expression, symbol
 from plant.compiled.hoist import hoisted
 from plant.compiled.kernel_file import load_kernel
@@ -15,8 +13,6 @@ from plant.compiled.source import INTRINSICS, lines_source, operations_source
 from plant.runs import require_finite, steps_a_sample
 from plant.solvers.fixed_step_loops import run_alone
 from plant.solvers.steps import Parameters, StepFunction, parameter_names, parameter_row, parameter_symbols
-
-Array: TypeAlias = NDArray[np.float64]
 
 Trajectory: TypeAlias = Callable[[Array, Array, Array, float, int], Array]
 """``run(initial state, drive, parameter rows, sample time, substeps) -> states, shape (n, states)``."""
