@@ -54,30 +54,6 @@ if TYPE_CHECKING:
     from estimation.trust.consistency import consistency_gate as consistency_gate
     from estimation.trust.consistency import nees as nees
 
-_PLACES = {
-    "Estimate": "filters.run",
-    "EstimateOptions": "eha.bulk_modulus",
-    "FORMS": "models.eha_forms",
-    "Finding": "finding",
-    "Gaussian": "models.gaussian",
-    "GreyBoxModel": "models.greybox",
-    "LinearModel": "identification.model.linear_model",
-    "METHODS": "filters.run",
-    "Outcome": "finding",
-    "ProcessModel": "models.model",
-    "Quantity": "finding",
-    "bulk_modulus_bound": "trust.bounds",
-    "clean_log": "log_checks.clean",
-    "consistency_gate": "trust.consistency",
-    "estimate_log": "eha.estimate",
-    "estimate_motor": "diaphragm_motor.estimate",
-    "estimate_stack": "piezo_stack.estimate",
-    "identify_record": "identification.from_record",
-    "measurement_variances": "log_checks.measurement_noise",
-    "nees": "trust.consistency",
-    "run_filter": "filters.run",
-}
-
 __all__ = [
     "FORMS",
     "METHODS",
@@ -102,4 +78,4 @@ __all__ = [
     "run_filter",
 ]
 
-__getattr__ = lazily(__name__, _PLACES)
+__getattr__ = lazily(__name__, __file__)

@@ -26,16 +26,6 @@ if TYPE_CHECKING:
     from experiments.log_pages.log import Log as Log
     from experiments.published import load as load
 
-_PLACES = {
-    "ACTUATORS": "actuators",
-    "ActuatorKind": "actuator_kind",
-    "Answer": "log_pages.answers",
-    "Log": "log_pages.log",
-    "actuator": "actuators",
-    "load": "published",
-    "main": "cli",
-}
-
 __all__ = ["ACTUATORS", "ActuatorKind", "Answer", "Log", "actuator", "load", "main"]
 
-__getattr__ = lazily(__name__, _PLACES)
+__getattr__ = lazily(__name__, __file__)

@@ -40,23 +40,6 @@ if TYPE_CHECKING:
     from faults.piezo_stack.faults import STACK_FAULTS as STACK_FAULTS
     from faults.watch.watch import watch_record as watch_record
 
-_PLACES = {
-    "CONDITIONS": "conditions",
-    "Condition": "conditions",
-    "MOTOR_FAULTS": "diaphragm_motor.faults",
-    "STACK_FAULTS": "piezo_stack.faults",
-    "diagnose_clean": "diagnosis.diagnose",
-    "diagnose_log": "diagnosis.diagnose",
-    "diagnose_motor": "diaphragm_motor.diagnose",
-    "diagnose_stack": "piezo_stack.diagnose",
-    "find_condition": "conditions",
-    "mathematical_bank": "eha.bank",
-    "parameters_for": "conditions",
-    "score_mathematical": "diagnosis.rmse",
-    "severity": "conditions",
-    "watch_record": "watch.watch",
-}
-
 __all__ = [
     "CONDITIONS",
     "MOTOR_FAULTS",
@@ -74,4 +57,4 @@ __all__ = [
     "watch_record",
 ]
 
-__getattr__ = lazily(__name__, _PLACES)
+__getattr__ = lazily(__name__, __file__)

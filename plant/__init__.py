@@ -56,31 +56,6 @@ if TYPE_CHECKING:
     from plant.units import SI as SI
     from plant.units import notes as notes
 
-_PLACES = {
-    "CircuitParameters": "eha.circuit_parameters",
-    "Code": "notes",
-    "DRIVES": "eha.drives",
-    "DiaphragmMotorParameters": "diaphragm_motor.parameters",
-    "EhaParameters": "eha.model",
-    "HydrostateError": "errors",
-    "LogError": "errors",
-    "Note": "notes",
-    "PLANTS": "eha.simulate",
-    "PiezoStackParameters": "piezo_stack.parameters",
-    "Record": "log.record",
-    "Rig": "eha.rig",
-    "SENSORS": "sensors.sensors",
-    "SI": "units",
-    "Sensors": "sensors.sensors",
-    "make_drive": "eha.drives",
-    "measure": "sensors.sensors",
-    "notes": "units",
-    "read_record": "log.files",
-    "read_rig": "eha.rig",
-    "simulate": "eha.simulate",
-    "write_record": "log.files",
-}
-
 __all__ = [
     "DRIVES",
     "PLANTS",
@@ -106,4 +81,4 @@ __all__ = [
     "write_record",
 ]
 
-__getattr__ = lazily(__name__, _PLACES)
+__getattr__ = lazily(__name__, __file__)

@@ -1,19 +1,22 @@
 """Names of a package that are imported when they are first asked for, so that importing the package costs nothing."""
 
+import ast
 from collections.abc import Callable, Mapping
+from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 
-def lazily(package: str, places: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return a package's ``__getattr__`` (PEP 562).
+def lazily(package: str, file: str) -> Callable[[str], Any]:
+    """Return a package's ``__getattr__`` (PEP 562) by the imports that it makes for type checkers alone.
 
     Parameters
     ----------
     package : str
         Its name.
-    places : Mapping[str, str]
-        Module of each of its names, below the package.
+    file : str
+        Its ``__file__``, in which every such import reads ``from package.module import name as name``.
 
     Returns
     -------
@@ -21,9 +24,14 @@ def lazily(package: str, places: Mapping[str, str]) -> Callable[[str], Any]:
         From a name to what it stands for.
     """
 
+    @cache
+    def places() -> Mapping[str, str]:
+        imports = [one for one in ast.walk(ast.parse(Path(file).read_bytes())) if isinstance(one, ast.ImportFrom)]
+        return {alias.name: str(one.module) for one in imports for alias in one.names if alias.asname == alias.name}
+
     def found(name: str) -> Any:
-        if name not in places:
+        if name not in places():
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return getattr(import_module(f"{package}.{places[name]}"), name)
+        return getattr(import_module(places()[name]), name)
 
     return found
