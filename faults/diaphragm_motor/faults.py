@@ -4,19 +4,20 @@ A fault of one valve, diaphragm, electrode or chamber is a hypothesis for each p
 each. Friction and load, and other pairs, look alike from outside: `faults.diaphragm_motor.diagnose` says which.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from operator import add
 from types import MappingProxyType
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
-from plant.diaphragm_motor.parameters import DIAPHRAGMS, VALVES, DiaphragmMotorParameters, changed
+from plant.diaphragm_motor.parameters import ROWS, DiaphragmMotorParameters, changed
 from plant.errors import HydrostateError, require_known
 
 HEALTHY = "healthy"
 """What a motor without a fault is called."""
 
-Injection: TypeAlias = Callable[[DiaphragmMotorParameters, float], DiaphragmMotorParameters]
-"""From a healthy motor and a severity to a faulty one."""
+Change: TypeAlias = Callable[[float, float], float]
+"""From a healthy value and a severity to the faulty value."""
 
 
 @dataclass(frozen=True)
@@ -29,157 +30,167 @@ class MotorFault:
         Such as ``valve_4_leak``.
     kind : str
         The same without its place: ``valve_leak``.
+    parameter : str
+        What it changes.
+    change : callable
+        How, from the healthy value and the severity.
     meaning : str
         What the severity is.
-    unit : str
-        Of the severity.
     severities : tuple of float
         Rising severities at which the fault's signature is computed [the fault's unit]; 0 is healthy.
-    inject : callable
-        Takes a healthy motor and a severity.
+    unit : str
+        Of the severity.
+    place : int
+        Which valve or diaphragm, from 1 at the inlet; 0 for all.
     """
 
     name: str
     kind: str
+    parameter: str
+    change: Change
     meaning: str
-    unit: str
     severities: tuple[float, ...]
-    inject: Injection
+    unit: str = "1"
+    place: int = 0
+
+    def inject(self, healthy: DiaphragmMotorParameters, severity: float) -> DiaphragmMotorParameters:
+        """Return the motor with the fault.
+
+        Parameters
+        ----------
+        healthy : DiaphragmMotorParameters
+            The motor without it.
+        severity : float
+            How bad it is [the fault's unit].
+
+        Returns
+        -------
+        DiaphragmMotorParameters
+            The motor with it.
+        """
+        value = getattr(healthy, self.parameter)
+        if self.place:
+            faulty = changed(value, self.place, self.change(value[self.place - 1], severity))
+        elif isinstance(value, tuple):
+            faulty = tuple(self.change(one, severity) for one in value)
+        else:
+            faulty = self.change(value, severity)
+        return replace(healthy, **{self.parameter: faulty})
 
 
-def _valve_leak(place: int) -> Injection:
-    return lambda p, s: replace(p, valve_leak=changed(p.valve_leak, place, p.valve_leak[place - 1] * (1.0 - s) + s))
+def _opened(value: float, severity: float) -> float:
+    return value * (1.0 - severity) + severity
 
 
-def _valve_blocked(place: int) -> Injection:
-    return lambda p, s: replace(p, valve_lift=changed(p.valve_lift, place, (1.0 - s) * p.valve_lift[place - 1]))
+def _reduced(value: float, severity: float) -> float:
+    return (1.0 - severity) * value
 
 
-def _depolarised(place: int) -> Injection:
-    return lambda p, s: replace(p, polarisation=changed(p.polarisation, place, (1.0 - s) * p.polarisation[place - 1]))
+def _enlarged(value: float, severity: float) -> float:
+    return (1.0 + severity) * value
 
 
-def _sensor_gain(place: int) -> Injection:
-    return lambda p, s: replace(p, sensor_gain=changed(p.sensor_gain, place, (1.0 + s) * p.sensor_gain[place - 1]))
+def _at_each_place(part: str, kind: str, parameter: str, *rest: Any) -> Iterator[MotorFault]:
+    """Yield a kind of fault at each place; `rest` is as `MotorFault` takes it."""
+    for place in range(1, ROWS[parameter] + 1):
+        yield MotorFault(f"{part}_{place}_{kind.removeprefix(f'{part}_')}", kind, parameter, *rest, place=place)
 
 
-def _gas_in_chamber(place: int) -> Injection:
-    return lambda p, s: replace(p, gas_fraction=changed(p.gas_fraction, place, p.gas_fraction[place - 1] + s))
+def _of_the_whole(name: str, *rest: Any) -> MotorFault:
+    return MotorFault(name, name, *rest)
 
 
-def _soft_clamp(p: DiaphragmMotorParameters, s: float) -> DiaphragmMotorParameters:
-    return replace(p, diaphragm_compliance=(1.0 + s) * p.diaphragm_compliance)
-
-
-LOCAL: Mapping[str, tuple[str, int, str, tuple[float, ...], Callable[[int], Injection]]] = MappingProxyType(
-    {
-        "valve_leak": (
-            "valve",
-            VALVES,
-            "opening of the shut valve; 1 is stuck open",
-            (0.0, 0.01, 0.02, 0.04, 0.07, 0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.0),
-            _valve_leak,
-        ),
-        "valve_blocked": (
-            "valve",
-            VALVES,
-            "share of its opening that the valve has lost",
-            (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9),
-            _valve_blocked,
-        ),
-        "depolarised": (
-            "diaphragm",
-            DIAPHRAGMS,
-            "share of its drive that the diaphragm has lost; 1 is dead",
-            (0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0),
-            _depolarised,
-        ),
-        "gain": ("electrode", DIAPHRAGMS, "relative change of the electrode's gain", (-1.0, 0.0, 1.0), _sensor_gain),
-        "gas": (
-            "chamber",
-            DIAPHRAGMS,
-            "gas in the chamber above the healthy share, over its volume",
-            (0.0, 0.002, 0.005, 0.01, 0.02, 0.04, 0.07, 0.1),
-            _gas_in_chamber,
-        ),
-    }
-)
-"""Faults of one place, by kind: of what, of how many, meaning and values of the severity, injection."""
-
-GLOBAL = (
-    MotorFault(
+_ALL = (
+    *_at_each_place(
+        "valve",
+        "valve_leak",
+        "valve_leak",
+        _opened,
+        "opening of the shut valve; 1 is stuck open",
+        (0.0, 0.01, 0.02, 0.04, 0.07, 0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.0),
+    ),
+    *_at_each_place(
+        "valve",
+        "valve_blocked",
+        "valve_lift",
+        _reduced,
+        "share of its opening that the valve has lost",
+        (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9),
+    ),
+    *_at_each_place(
+        "diaphragm",
+        "depolarised",
+        "polarisation",
+        _reduced,
+        "share of its drive that the diaphragm has lost; 1 is dead",
+        (0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0),
+    ),
+    *_at_each_place(
+        "electrode", "gain", "sensor_gain", _enlarged, "relative change of the electrode's gain", (-1.0, 0.0, 1.0)
+    ),
+    *_at_each_place(
+        "chamber",
+        "gas",
+        "gas_fraction",
+        add,
+        "gas in the chamber above the healthy share, over its volume",
+        (0.0, 0.002, 0.005, 0.01, 0.02, 0.04, 0.07, 0.1),
+    ),
+    _of_the_whole(
         "gas_everywhere",
-        "gas_everywhere",
+        "gas_fraction",
+        add,
         "gas in every chamber above the healthy share, over its volume",
-        "1",
         (0.0, 0.002, 0.005, 0.01, 0.02, 0.03, 0.05),
-        lambda p, s: replace(p, gas_fraction=tuple(share + s for share in p.gas_fraction)),
     ),
-    MotorFault(
+    _of_the_whole(
         "soft_clamp",
-        "soft_clamp",
+        "diaphragm_compliance",
+        _enlarged,
         "relative rise of the diaphragms' compliance",
-        "1",
         (0.0, 0.05, 0.1, 0.2, 0.3, 0.45),
-        _soft_clamp,
     ),
-    MotorFault(
+    _of_the_whole(
         "cylinder_leakage",
-        "cylinder_leakage",
+        "crossport_leakage",
+        add,
         "leakage across the piston above the healthy one",
-        "m^3/(s Pa)",
         (0.0, 2e-12, 5e-12, 1e-11, 1.5e-11, 2e-11),
-        lambda p, s: replace(p, crossport_leakage=p.crossport_leakage + s),
+        "m^3/(s Pa)",
     ),
-    MotorFault(
+    _of_the_whole(
         "friction",
-        "friction",
+        "coulomb_friction",
+        add,
         "Coulomb friction above the healthy one",
-        "N",
         (0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 18.0),
-        lambda p, s: replace(p, coulomb_friction=p.coulomb_friction + s),
-    ),
-    MotorFault(
-        "load",
-        "load",
-        "load above the one given",
         "N",
+    ),
+    _of_the_whole(
+        "load",
+        "load_force",
+        add,
+        "load above the one given",
         (-15.0, -12.0, -9.0, -6.0, -3.0, 0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 18.0),
-        lambda p, s: replace(p, load_force=p.load_force + s),
+        "N",
     ),
-    MotorFault(
+    _of_the_whole(
         "clogged_ports",
-        "clogged_ports",
+        "port_area",
+        _reduced,
         "share of their area that all ports have lost",
-        "1",
         (0.0, 0.1, 0.2, 0.3, 0.4, 0.5),
-        lambda p, s: replace(p, port_area=(1.0 - s) * p.port_area),
     ),
-    MotorFault(
+    _of_the_whole(
         "slow_valves",
-        "slow_valves",
+        "valve_lag",
+        _enlarged,
         "relative rise of the valves' time constant",
-        "1",
         (0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0),
-        lambda p, s: replace(p, valve_lag=(1.0 + s) * p.valve_lag),
     ),
 )
-"""Faults of the whole motor."""
 
-MOTOR_FAULTS: Mapping[str, MotorFault] = MappingProxyType(
-    {
-        fault.name: fault
-        for fault in (
-            *(
-                MotorFault(f"{part}_{place}_{_short}", kind, meaning, "1", severities, at(place))
-                for kind, (part, places, meaning, severities, at) in LOCAL.items()
-                for _short in [kind.removeprefix(f"{part}_")]
-                for place in range(1, places + 1)
-            ),
-            *GLOBAL,
-        )
-    }
-)
+MOTOR_FAULTS: Mapping[str, MotorFault] = MappingProxyType({fault.name: fault for fault in _ALL})
 """Every fault by name; places count from the inlet."""
 
 
