@@ -7,6 +7,7 @@ innovations of a *block* of intervals are its NIS, which feeds the CUSUM of `fau
 import math
 from functools import cache
 from types import ModuleType
+from typing import TypeAlias
 
 import numpy as np
 
@@ -16,6 +17,10 @@ from faults.watch.cusum import MEAN, PEAK, SQUARES, SUM, THRESHOLD, VARIANCE, ac
 from plant.arrays import Array
 from plant.compiled.kernel_file import load_kernel
 from plant.compiled.paste import BORROWING, kernel_text, pasted
+
+Memory: TypeAlias = tuple[Array, ...]
+"""The interval under way, clock, last intervals, information, moments and coefficients of the balances, their scores,
+counted peaks, and the last blocks' scores and gains."""
 
 INTERVALS = 10
 """Intervals a block."""
@@ -36,23 +41,9 @@ REFRESHED = 200
 """Blocks from one look at the thresholds to the next."""
 
 
-def advance(
-    rows: Array,
-    first: int,
-    setting: Array,
-    sizes: Array,
-    partial: Array,
-    clock: Array,
-    lags: Array,
-    information: Array,
-    moment: Array,
-    found: Array,
-    score: Array,
-    peaks: Array,
-    scores: Array,
-    gains: Array,
-) -> tuple[int, int]:
+def advance(rows: Array, first: int, setting: Array, sizes: Array, memory: Memory) -> tuple[int, int]:
     """Take samples from `first` on, up to the end of them or of a block with news; return where, and the news."""
+    partial, clock, lags, information, moment, found, score, _, _, gains = memory
     samples, intervals = int(sizes[0]), int(sizes[2])
     features, target, factor = np.empty((2, FEATURES)), np.empty(score.shape[0]), np.empty((FEATURES, FEATURES))
     for k in range(first, rows.shape[0]):
@@ -75,34 +66,20 @@ def advance(
                 for c in range(score.shape[0]):
                     error = learn(c, features, target, setting[0], information, moment, found)
                     score[c, SQUARES] += error * error
-                count_gains(w, v, p, int(clock[0]) % scores.shape[1], gains)
+                count_gains(w, v, p, int(clock[0]) % gains.shape[0], gains)
             shift(w, v, p, lags)
         partial[6] += 1.0
         if partial[6] < intervals:
             continue
-        news = end_block(
-            setting, sizes, partial, clock, information, moment, found, factor, score, peaks, scores, gains
-        )
+        news = end_block(setting, sizes, memory, factor)
         if news != NOTHING:
             return k + 1, news
     return rows.shape[0], NOTHING
 
 
-def end_block(
-    setting: Array,
-    sizes: Array,
-    partial: Array,
-    clock: Array,
-    information: Array,
-    moment: Array,
-    found: Array,
-    factor: Array,
-    score: Array,
-    peaks: Array,
-    scores: Array,
-    gains: Array,
-) -> int:
+def end_block(setting: Array, sizes: Array, memory: Memory, factor: Array) -> int:
     """Judge a whole block; return what it says."""
+    partial, clock, _, information, moment, found, score, peaks, scores, gains = memory
     usable, recent, learning, resume = partial[5], scores.shape[1], sizes[4], sizes[5]
     partial[5] = partial[6] = 0.0
     place = int(clock[0]) % recent
@@ -154,8 +131,9 @@ def judge(value: float, since: float, setting: Array, sizes: Array, score: Array
     return u
 
 
-def begin_again(clock: Array, information: Array, moment: Array, score: Array) -> None:
+def begin_again(memory: Memory) -> None:
     """Forget most of what the balances were, after an alarm: they are learnt again, what the peaks said is kept."""
+    _, clock, _, information, moment, _, score, _, _, _ = memory
     clock[2] = clock[1]
     information *= 0.01
     moment *= 0.01

@@ -134,13 +134,12 @@ class Watch:
             [samples, len(self.balances), INTERVALS, settle, round(learning / duration), 3 * settle], dtype=np.float64
         )
         wide = len(self.balances)
-        self._score = np.zeros((wide, SCORE))
-        self._score[:, THRESHOLD] = np.inf
-        self._scores, self._gains = np.zeros((wide, RECENT)), np.zeros((RECENT, GAINS))
-        self._peaks = np.zeros((wide, LEVELS + 1))
-        self._partial, self._clock, self._lags = np.zeros(PARTIAL), np.zeros(CLOCK), np.zeros(8)
+        balance = (FEATURES, FEATURES), (FEATURES,), (FEATURES,)
+        of_each = [np.zeros((wide, *shape)) for shape in (*balance, (SCORE,), (LEVELS + 1,), (RECENT,))]
+        self._memory = np.zeros(PARTIAL), np.zeros(CLOCK), np.zeros(8), *of_each, np.zeros((RECENT, GAINS))
+        self._partial, self._clock, *_, self._score, _, self._scores, self._gains = self._memory
         self._partial[3] = np.nan
-        self._balance = np.zeros((wide, FEATURES, FEATURES)), np.zeros((wide, FEATURES)), np.zeros((wide, FEATURES))
+        self._score[:, THRESHOLD] = np.inf
         self._open: tuple[Alarm, int, int] | None = None
 
     @property
@@ -180,20 +179,7 @@ class Watch:
             if self._open is not None:
                 due = self._open[2] * self.block - self._taken
                 stop = min(stop, place + max(due, 1))
-            place, news = kernel.advance(
-                rows[:stop],
-                place,
-                self._setting,
-                self._sizes,
-                self._partial,
-                self._clock,
-                self._lags,
-                *self._balance,
-                self._score,
-                self._peaks,
-                self._scores,
-                self._gains,
-            )
+            place, news = kernel.advance(rows[:stop], place, self._setting, self._sizes, self._memory)
             if news == READY:
                 events.append(Ready(self.time, self.thresholds))
             elif news >= 0:
@@ -217,10 +203,7 @@ class Watch:
         self._clock[0] += 1.0 if self._taken > self._clock[0] * self.block else 0.0
         self._partial[:] = 0.0
         self._partial[3] = np.nan
-        self._begin_again()
-
-    def _begin_again(self) -> None:
-        watch_kernel().begin_again(self._clock, self._balance[0], self._balance[1], self._score)
+        watch_kernel().begin_again(self._memory)
 
     @property
     def _taken(self) -> int:
@@ -241,7 +224,7 @@ class Watch:
         )
         now = int(self._clock[0])
         self._open = alarm, now - found, now + round(AFTER / duration)
-        self._begin_again()
+        watch_kernel().begin_again(self._memory)
         return alarm
 
     def _recent_scores(self, which: int) -> Array:
