@@ -85,22 +85,19 @@ class Condition:
             require_known(f"{axis} level", level, LEVELS)
 
 
-def _nine_conditions() -> Mapping[str, Condition]:
-    nine = (
-        Condition("normal", "none", "none"),
-        Condition("minor_leakage", "minor", "none"),
-        Condition("major_leakage", "major", "none"),
-        Condition("minor_friction", "none", "minor"),
-        Condition("major_friction", "none", "major"),
-        Condition("minor_leakage_minor_friction", "minor", "minor"),
-        Condition("major_leakage_minor_friction", "major", "minor"),
-        Condition("minor_leakage_major_friction", "minor", "major"),
-        Condition("major_leakage_major_friction", "major", "major"),
-    )
-    return MappingProxyType({condition.name: condition for condition in nine})
+_NINE = (
+    Condition("normal", "none", "none"),
+    Condition("minor_leakage", "minor", "none"),
+    Condition("major_leakage", "major", "none"),
+    Condition("minor_friction", "none", "minor"),
+    Condition("major_friction", "none", "major"),
+    Condition("minor_leakage_minor_friction", "minor", "minor"),
+    Condition("major_leakage_minor_friction", "major", "minor"),
+    Condition("minor_leakage_major_friction", "minor", "major"),
+    Condition("major_leakage_major_friction", "major", "major"),
+)
 
-
-CONDITIONS: Mapping[str, Condition] = _nine_conditions()
+CONDITIONS: Mapping[str, Condition] = MappingProxyType({condition.name: condition for condition in _NINE})
 """The nine conditions by name, in the order of Table 1."""
 
 
@@ -195,36 +192,6 @@ def severity(leakage: float, friction: float, base: EhaParameters = PAPER_RIG) -
     leaking = _changed(base, LEAKAGE_TABLE, leakage, _leakage_scales(base))
     rubbing = _changed(base, FRICTION_TABLE, friction, _friction_scales(base))
     return replace(base, **leaking, **rubbing)
-
-
-def nearest_level(severity: float) -> Level:
-    """Return the level whose severity is nearest: none below 0.5, minor below 1.5, else major.
-
-    Parameters
-    ----------
-    severity : float
-        Severity [dimensionless], not negative.
-
-    Returns
-    -------
-    {"none", "minor", "major"}
-        The level.
-
-    Raises
-    ------
-    HydrostateError
-        If the severity is negative or not a number.
-
-    Examples
-    --------
-    >>> nearest_level(1.4)
-    'minor'
-    """
-    if not severity >= 0.0:
-        raise HydrostateError(f"severity must not be negative, got {severity!r}")
-    if severity < 0.5:
-        return "none"
-    return "minor" if severity < 1.5 else "major"
 
 
 def _changed(

@@ -18,12 +18,6 @@ if TYPE_CHECKING:
 RPM = 0.10471975511965977
 """One revolution a minute, in rad/s."""
 
-PSI = 6894.757293168361
-"""One pound-force a square inch, in Pa."""
-
-BAR = 1e5
-"""One bar, in Pa."""
-
 LITRE_PER_MINUTE = 1e-3 / 60.0
 """One litre a minute, in m^3/s."""
 
@@ -126,7 +120,7 @@ def require_numbers(parameters: Any, *, signed: Collection[str] = (), zero: Coll
     signed : collection of str
         Those that may be negative.
     zero : collection of str
-        Those that may be zero.
+        Those that may be zero, beside those that are zero by default.
 
     Raises
     ------
@@ -134,7 +128,8 @@ def require_numbers(parameters: Any, *, signed: Collection[str] = (), zero: Coll
         If one is not what it must be, with its name.
     """
     for field in fields(parameters):
-        value, rule = getattr(parameters, field.name), {"signed": field.name in signed, "zero": field.name in zero}
+        value = getattr(parameters, field.name)
+        rule = {"signed": field.name in signed, "zero": field.name in zero or field.default == 0.0}
         if not isinstance(value, tuple | list):
             require_number(field.name, value, **rule)
             continue

@@ -26,7 +26,7 @@ PRESSURES = tuple(np.arange(0.0, 1.21e5, 1e4))
 """Differences of pressure over the piston in a map [Pa]; healthy pumps stall at 1.05e5 Pa on 200 V at 480 Hz."""
 
 AVERAGE_STEP = 2e-4
-"""Step of the averaged motion [s]."""
+"""Step of the averaged motion, and time between its samples [s]."""
 
 MIDDLE = 3
 """Place of the middle electrode, A4."""
@@ -177,11 +177,7 @@ def _pressed(p: DiaphragmMotorParameters, pressure: float) -> Array:
 
 
 def average_run(
-    maps: MotorMaps,
-    p: DiaphragmMotorParameters,
-    frequency: float,
-    swing: Array,
-    sample_time: float = AVERAGE_STEP,
+    maps: MotorMaps, p: DiaphragmMotorParameters, frequency: float, swing: Array
 ) -> tuple[Array, Array, Array]:
     """Return pressure, velocity and position of the averaged motor from rest, along a voltage (equations 2 and 18).
 
@@ -197,9 +193,7 @@ def average_run(
     frequency : float
         Of the drive [Hz].
     swing : ndarray, shape (n,)
-        Peak to peak at the samples [V].
-    sample_time : float
-        Seconds between samples, also the step [s].
+        Peak to peak at samples `AVERAGE_STEP` apart [V].
 
     Returns
     -------
@@ -211,7 +205,7 @@ def average_run(
     HydrostateError
         If frequency or voltage lie off the maps.
     """
-    area, mass, h = p.piston_area, p.moving_mass, sample_time
+    area, mass, h = p.piston_area, p.moving_mass, AVERAGE_STEP
     compliance = p.line_compliance + p.cylinder_volume / p.cylinder_bulk_modulus
     returned = (area / p.land_conductance) ** 2
     difference, velocity, position = np.zeros(len(swing)), np.zeros(len(swing)), np.zeros(len(swing))

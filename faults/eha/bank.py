@@ -100,11 +100,7 @@ def identification_run(
 
 
 def identify_bank(
-    rig: EhaParameters,
-    rng: np.random.Generator,
-    *,
-    sensors: Sensors = BENCH,
-    duration: float = IDENTIFICATION_DURATION,
+    rig: EhaParameters, rng: np.random.Generator, *, duration: float = IDENTIFICATION_DURATION
 ) -> Mapping[str, LinearModel]:
     """Identify the nine transfer functions from simulated tests, as section 4 does from its bench.
 
@@ -117,8 +113,6 @@ def identify_bank(
         The healthy actuator.
     rng : numpy.random.Generator
         Source of the drives and of sensor noise; each condition draws from a stream of its own.
-    sensors : Sensors
-        What the bench sees.
     duration : float
         Length of each test [s].
 
@@ -131,7 +125,7 @@ def identify_bank(
 
     models: dict[str, LinearModel] = {}
     for (name, condition), stream in zip(CONDITIONS.items(), rng.spawn(len(CONDITIONS)), strict=True):
-        record = identification_run(rig, condition, stream, sensors=sensors, duration=duration)
+        record = identification_run(rig, condition, stream, duration=duration)
         with warnings.catch_warnings():
             # the structure is Table 6's whatever the condition, and the bank asks for predictions, not for intervals
             warnings.simplefilter("ignore", CovarianceWarning)

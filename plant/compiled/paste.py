@@ -14,9 +14,6 @@ from functools import cache
 COMPILED = 'cache=True, nogil=True, error_model="numpy"'
 """How Numba compiles a pasted function, unless told otherwise."""
 
-REORDERED = COMPILED + ', fastmath={"reassoc", "contract", "nsz"}'
-"""The same, where sums may be reordered and fused; NaN and infinity keep their meaning."""
-
 KERNEL = "kernel"
 """Name of the parameter that stands for a kernel file."""
 

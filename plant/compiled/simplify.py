@@ -5,11 +5,15 @@ and sums of products are rounded once.
 """
 
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
+from typing import TypeAlias
 
 from plant.compiled.expression import ONE, Expression, node, ordered
 from plant.compiled.gather import gathered
 from plant.compiled.hoist import settled_nodes
+
+Nodes: TypeAlias = Mapping[int, Expression]
+"""What stands for each node that has been gone through, by its id."""
 
 FUSED = ("fma", "fnma", "fms")
 """Products with a sum, rounded once: ``a * b + c``, ``c - a * b`` and ``a * b - c``."""
@@ -63,15 +67,15 @@ def share_reciprocals(outputs: Mapping[str, Expression], fixed: Collection[str])
     order = ordered(outputs.values())
     settled = settled_nodes(order, fixed)
     uses = Counter(id(item.arguments[1]) for item in order if item.operation == "/")
-    new: dict[int, Expression] = {}
-    for item in order:
-        arguments = [new[id(argument)] for argument in item.arguments]
-        shares = item.operation == "/" and (uses[id(item.arguments[1])] > 1 or id(item.arguments[1]) in settled)
-        if shares and id(item) not in settled:
-            new[id(item)] = arguments[0] * (ONE / arguments[1])
-        else:
-            new[id(item)] = node(item.operation, *arguments, value=item.value)
-    return {name: new[id(output)] for name, output in outputs.items()}
+
+    def shared(item: Expression, new: Nodes) -> Expression | None:
+        if item.operation != "/" or id(item) in settled:
+            return None
+        above, below = item.arguments
+        serves = uses[id(below)] > 1 or id(below) in settled
+        return new[id(above)] * (ONE / new[id(below)]) if serves else None
+
+    return _rewritten(outputs, shared)
 
 
 def share_ratios(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
@@ -105,16 +109,15 @@ def share_ratios(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
     places = {id(item): place for place, item in enumerate(order)}
     pairs = {tuple(map(id, item.arguments)): item.arguments for item in order if item.operation == "/"}
     partner = {divisor: above for (number, divisor), (above, _) in pairs.items() if (divisor, number) in pairs}
-    new: dict[int, Expression] = {}
-    for item in order:
-        arguments = [new[id(argument)] for argument in item.arguments]
-        if item.operation == "/" and id(item.arguments[1]) in partner:
-            pair = item.arguments[1], partner[id(item.arguments[1])]
-            first, second = (new[id(one)] for one in sorted(pair, key=lambda one: places[id(one)]))
-            new[id(item)] = arguments[0] * (new[id(pair[1])] * (ONE / (first * second)))
-        else:
-            new[id(item)] = node(item.operation, *arguments, value=item.value)
-    return {name: new[id(output)] for name, output in outputs.items()}
+
+    def shared(item: Expression, new: Nodes) -> Expression | None:
+        if item.operation != "/" or id(item.arguments[1]) not in partner:
+            return None
+        pair = item.arguments[1], partner[id(item.arguments[1])]
+        first, second = (new[id(one)] for one in sorted(pair, key=lambda one: places[id(one)]))
+        return new[id(item.arguments[0])] * (new[id(pair[1])] * (ONE / (first * second)))
+
+    return _rewritten(outputs, shared)
 
 
 def fused(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
@@ -147,14 +150,26 @@ def fused(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
     order = ordered(outputs.values())
     uses = Counter(id(argument) for item in order for argument in item.arguments)
     uses.update(id(output) for output in outputs.values())
-    new: dict[int, Expression] = {}
-    for item in order:
-        arguments = [new[id(argument)] for argument in item.arguments]
+
+    def joined(item: Expression, new: Nodes) -> Expression | None:
         lone = [argument.operation == "*" and uses[id(argument)] == 1 for argument in item.arguments]
-        if item.operation in ("+", "-") and any(lone):
-            place = int(lone[1]) if item.operation == "-" else lone.index(True)
-            kind = FUSED[0] if item.operation == "+" else FUSED[2 - place]
-            new[id(item)] = node(kind, *arguments[place].arguments, arguments[1 - place])
-        else:
-            new[id(item)] = node(item.operation, *arguments, value=item.value)
+        if item.operation not in ("+", "-") or not any(lone):
+            return None
+        place = int(lone[1]) if item.operation == "-" else lone.index(True)
+        kind = FUSED[0] if item.operation == "+" else FUSED[2 - place]
+        product, other = (new[id(item.arguments[i])] for i in (place, 1 - place))
+        return node(kind, *product.arguments, other)
+
+    return _rewritten(outputs, joined)
+
+
+def _rewritten(
+    outputs: Mapping[str, Expression], rule: Callable[[Expression, Nodes], Expression | None]
+) -> dict[str, Expression]:
+    """Put in every node's place what a rule makes of it, operands first; where it makes nothing, the same node."""
+    new: dict[int, Expression] = {}
+    for item in ordered(outputs.values()):
+        made = rule(item, new)
+        same = (new[id(argument)] for argument in item.arguments)
+        new[id(item)] = node(item.operation, *same, value=item.value) if made is None else made
     return {name: new[id(output)] for name, output in outputs.items()}

@@ -259,29 +259,3 @@ def plate_modes(p: PlateParameters, count: int = 6) -> list[PlateMode]:
     mass = p.brass_density * p.brass_thickness + covered * p.ceramic_density * p.ceramic_thickness
     rate = sqrt(stiffness / mass) / (2.0 * pi * a**2)
     return [PlateMode(n, s, root, root * rate) for n, s, root in clamped_plate_roots(count)]
-
-
-def mode_shape(mode: PlateMode, radius: Array, angle: Array) -> Array:
-    """Return a mode's shape, largest deflection 1 (Source: Leissa 1969, equation 2.1).
-
-    Parameters
-    ----------
-    mode : PlateMode
-        The mode.
-    radius : ndarray, shape (n,)
-        Radius over the clamp's [dimensionless].
-    angle : ndarray, shape (n,)
-        Angle [rad].
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Deflection [dimensionless].
-    """
-    n, x = mode.diameters, sqrt(mode.root)
-
-    def radial(r: Array) -> Array:
-        return np.asarray(jv(n, x * r) - jv(n, x) / iv(n, x) * iv(n, x * r))
-
-    largest = float(np.max(np.abs(radial(np.linspace(0.0, 1.0, 401)))))
-    return radial(radius) / largest * np.cos(n * angle)

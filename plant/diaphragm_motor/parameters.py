@@ -138,14 +138,13 @@ MAY_BE_ZERO = frozenset(
         "valve_resistance",
         "viscous_friction",
         "coulomb_friction",
-        "spring_stiffness",
         "crossport_leakage",
         "polarisation",
         "sensor_gain",
         "gas_fraction",
     }
 )
-"""Parameters that may be zero."""
+"""Parameters that may be zero, beside those that are zero by default."""
 
 
 def changed(row: tuple[float, ...], place: int, value: float) -> tuple[float, ...]:

@@ -58,10 +58,7 @@ class VibrationParameters:
     fractional_order: Annotated[float, SI("1", "order a of the fractional damping, errata M5", "judged")] = 1.0
 
     def __post_init__(self) -> None:
-        require_numbers(
-            self,
-            zero=("load_stiffness", "cubic_stiffness", "damping", "fractional_damping", "fractional_order"),
-        )
+        require_numbers(self, zero=("load_stiffness", "damping", "fractional_order"))
         if self.fractional_order >= 2.0:
             raise RigError(f"fractional_order must be below 2, which is a mass, got {self.fractional_order!r}")
 

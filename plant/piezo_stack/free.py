@@ -7,12 +7,12 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.compiled.functions import Scalar
-from plant.components.bouc_wen import asymmetric_bouc_wen_rate
 from plant.components.piezo_stack import lagged_force_rate, stack_force
+from plant.piezo_stack.hysteresis import hysteresis_rate
 from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.run import sine_drive
 from plant.piezo_stack.trajectory import stack_row
-from plant.solvers.steps import rk4_step
+from plant.solvers.steps import State, rate_driven_step
 from plant.solvers.trajectory import compile_trajectory
 
 FREE_STATES = ("stack_displacement_m", "stack_velocity_m_s", "linear_force_n", "hysteresis_m")
@@ -22,7 +22,7 @@ _STEPS_A_PERIOD = 30.0
 """Steps in a period of the stack's own vibration."""
 
 
-def free_stack_derivative(state: tuple[Scalar, ...], voltage: Scalar, rate: Scalar, p: Any) -> tuple[Scalar, ...]:
+def free_stack_derivative(state: State, voltage: Scalar, rate: Scalar, p: Any) -> State:
     """Return the rates of a stack without load, equations 1 and 2 with errata P1 and P2.
 
     Parameters
@@ -40,18 +40,15 @@ def free_stack_derivative(state: tuple[Scalar, ...], voltage: Scalar, rate: Scal
         Rates, each a second.
     """
     x, v, driven, h = state
-    shape = p.hysteresis_phi_1, p.hysteresis_phi_2, p.hysteresis_phi_3, p.hysteresis_gamma
     return (
         v,
         stack_force(driven, h, x, v, p.stack_stiffness, p.stack_damping) / p.stack_mass,
         lagged_force_rate(driven, voltage, p.free_stroke_a_volt * p.stack_stiffness, p.stack_lag),
-        asymmetric_bouc_wen_rate(rate, h, p.hysteresis, *shape),
+        hysteresis_rate(rate, h, p),
     )
 
 
-def _free_step(state: tuple[Scalar, ...], voltages: tuple[Scalar, Scalar], p: object, h: Scalar) -> tuple[Scalar, ...]:
-    rate = (voltages[1] - voltages[0]) / h
-    return rk4_step(lambda x, u, q: free_stack_derivative(x, u, rate, q))(state, voltages, p, h)
+_free_step = rate_driven_step(free_stack_derivative)
 
 
 def run_free_stack(parameters: PiezoStackParameters, voltage: Array, sample_time: float) -> Array:

@@ -4,40 +4,33 @@ from typing import Any
 
 from plant.compiled.functions import Scalar
 from plant.components.bouc_wen import asymmetric_bouc_wen_rate
-from plant.solvers.steps import rk4_step
+from plant.solvers.steps import State, rate_driven_step
 
 
-def slow_stack_step(
-    state: tuple[Scalar, ...], voltages: tuple[Scalar, Scalar], p: Any, h: Scalar
-) -> tuple[Scalar, ...]:
-    """Return the hysteresis of a stack after a step of voltage, whatever the time it takes (equation 28, errata P1).
+def hysteresis_rate(rate: Scalar, hysteresis: Scalar, p: Any) -> Scalar:
+    """Return the rate of a stack's hysteresis, equation 1 (28) of the piezo-stack paper (errata P1).
 
     Parameters
     ----------
-    state : tuple of Expression
+    rate : float or Expression
+        Rate of the drive [V/s].
+    hysteresis : float or Expression
         Hysteresis h [m].
-    voltages : tuple of Expression
-        Drive at the step's start and end [V].
-    p : namespace of Expression
+    p : namespace of float or Expression
         The stack.
-    h : Expression
-        Step [s].
 
     Returns
     -------
-    tuple of Expression
-        Hysteresis at the step's end [m].
+    float or Expression
+        Rate of h [m/s].
     """
-    rate = (voltages[1] - voltages[0]) / h
-    shape = {
-        "alpha": p.hysteresis,
-        "phi_1": p.hysteresis_phi_1,
-        "phi_2": p.hysteresis_phi_2,
-        "phi_3": p.hysteresis_phi_3,
-        "gamma": p.hysteresis_gamma,
-    }
+    shape = p.hysteresis_phi_1, p.hysteresis_phi_2, p.hysteresis_phi_3, p.hysteresis_gamma
+    return asymmetric_bouc_wen_rate(rate, hysteresis, p.hysteresis, *shape)
 
-    def law(x: tuple[Scalar, ...], _voltage: Scalar, _p: object) -> tuple[Scalar, ...]:
-        return (asymmetric_bouc_wen_rate(rate, x[0], **shape),)
 
-    return rk4_step(law)(state, voltages, p, h)
+def _slow_derivative(state: State, _voltage: Scalar, rate: Scalar, p: Any) -> State:
+    return (hysteresis_rate(rate, state[0], p),)
+
+
+slow_stack_step = rate_driven_step(_slow_derivative)
+"""The hysteresis [m] of a stack after a step of voltage, whatever the time it takes (equation 28, errata P1)."""

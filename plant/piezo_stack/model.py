@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.compiled.functions import Scalar, sqrt, where
-from plant.components.bouc_wen import asymmetric_bouc_wen_rate
 from plant.components.end_stop import end_stop_force
 from plant.components.gas_compliance import compliant_oil_pressure
 from plant.components.line import line_flow_rate
 from plant.components.oil import oil_pressure, specific_volume
 from plant.components.piezo_stack import lagged_force_rate, stack_force
 from plant.components.reed_valve import contact_force, reed_flow
+from plant.piezo_stack.hysteresis import hysteresis_rate
 from plant.piezo_stack.parameters import PiezoStackParameters
-from plant.solvers.steps import StepFunction, rk4_step
+from plant.solvers.steps import State, rate_driven_step
 
 StackValues: TypeAlias = PiezoStackParameters | SimpleNamespace
 """What the model reads: the parameters, or a namespace of the same names holding expressions or arrays."""
@@ -109,7 +109,7 @@ def volumes(displacement: Scalar, position: Scalar, p: StackValues) -> tuple[Sca
     return chamber, high, low
 
 
-def stack_pressures(state: tuple[Scalar, ...], p: StackValues) -> StackPressures:
+def stack_pressures(state: State, p: StackValues) -> StackPressures:
     """Return the pressures, from where the oil is and the pistons stand: equation 5 with errata P4, P5 and P16.
 
     Parameters
@@ -148,10 +148,45 @@ def _reed_acceleration(
     return (push + seat - stop) / p.reed_mass
 
 
-def stack_derivative(state: tuple[Scalar, ...], voltage: Scalar, rate: Scalar, p: StackValues) -> tuple[Scalar, ...]:
-    """Return the rates of the actuator: equations 1 to 3, 8, 11, 13 to 15, 17 to 22 with errata P1 to P13 and P16.
+def _oil_flows(state: State, pressure: StackPressures, p: StackValues) -> State:
+    """Return the oil past the outlet and the inlet reed, along the delivery, return and intake line, and both leaks.
 
     Every flow carries the density of the side it comes from.
+    """
+    x, _, _, _, n_c, x_out, _, x_in, _, n_th, q_h, n_ch, position, _, n_cl, q_1, _, q_2, n_tl = state
+    chamber, high, low = volumes(x, position, p)
+    filled = n_c / chamber
+    density_th, density_tl = n_th / p.port_volume, n_tl / p.port_volume
+    density_high, density_low = n_ch / high, n_cl / low
+    density_acc = 1.0 / specific_volume(pressure.accumulator, p.bulk_modulus, p.air_fraction, p.vapour_pressure)
+
+    def past_reed(drop: Scalar, opening: Scalar, before: Scalar, behind: Scalar) -> Scalar:
+        reed = p.reed_perimeter, p.discharge_coefficient, p.density, p.laminar_drop
+        return reed_flow(drop, opening, *reed) * where(drop > 0.0, before, behind)
+
+    return (
+        past_reed(pressure.chamber - pressure.delivery, x_out, filled, density_th),
+        past_reed(pressure.intake - pressure.chamber, x_in, density_tl, filled),
+        q_h * where(q_h > 0.0, density_th, density_high),
+        q_1 * where(q_1 > 0.0, density_low, density_acc),
+        q_2 * where(q_2 > 0.0, density_acc, density_tl),
+        p.chamber_leakage * (pressure.chamber - pressure.accumulator) * filled,
+        p.crossport_leakage * (pressure.high - pressure.low) * density_high,
+    )
+
+
+def _rod_acceleration(pressure: StackPressures, position: Scalar, speed: Scalar, p: StackValues) -> Scalar:
+    """Equation 22 with errata P13."""
+    lifted = p.carriage_mass + p.load_mass
+    smoothed = sqrt(speed * speed + p.friction_speed * p.friction_speed)
+    friction = p.viscous_friction * speed + p.coulomb_friction * speed / smoothed
+    middle, reach = 0.5 * p.cylinder_length - p.cylinder_start, 0.5 * p.cylinder_length - p.end_clearance
+    stopped = end_stop_force(position - middle, speed, reach, END_STIFFNESS, END_DAMPING)
+    return ((pressure.high - pressure.low) * p.cylinder_area - friction - lifted * GRAVITY + stopped) / lifted
+
+
+def stack_derivative(state: State, voltage: Scalar, rate: Scalar, p: StackValues) -> State:
+    """Return the rates of the actuator: equations 1 to 3, 8, 11, 13 to 15, 17 to 22 with errata P1 to P13 and P16.
 
     Parameters
     ----------
@@ -169,55 +204,21 @@ def stack_derivative(state: tuple[Scalar, ...], voltage: Scalar, rate: Scalar, p
     tuple of float or Expression
         Rates of the states, each a second.
     """
-    x, v, driven, h, n_c, x_out, v_out, x_in, v_in, n_th, q_h, n_ch, position, speed, n_cl, q_1, _, q_2, n_tl = state
+    x, v, driven, h, _, x_out, v_out, x_in, v_in, _, q_h, _, position, speed, _, q_1, _, q_2, _ = state
     pressure = stack_pressures(state, p)
-    chamber, high, low = volumes(x, position, p)
-    filled = n_c / chamber
-    density_th, density_tl = n_th / p.port_volume, n_tl / p.port_volume
-    density_high, density_low = n_ch / high, n_cl / low
-    density_acc = 1.0 / specific_volume(pressure.accumulator, p.bulk_modulus, p.air_fraction, p.vapour_pressure)
-
-    def past_reed(drop: Scalar, opening: Scalar) -> Scalar:
-        return reed_flow(drop, opening, p.reed_perimeter, p.discharge_coefficient, p.density, p.laminar_drop)
+    out, into, delivered, returned, drawn, lost, crossed = _oil_flows(state, pressure, p)
+    pushed = stack_force(driven, h, x, v, p.stack_stiffness, p.stack_damping)
+    held = p.head_stiffness * x + p.head_damping * v + pressure.chamber * p.piston_area
+    out_drop, in_drop = pressure.chamber - pressure.delivery, pressure.intake - pressure.chamber
 
     def along_line(drop: Scalar, flow: Scalar, length: Scalar) -> Scalar:
         return line_flow_rate(drop, flow, length, p.line_area, p.density, p.viscosity, p.minor_losses)
 
-    out_drop, in_drop = pressure.chamber - pressure.delivery, pressure.intake - pressure.chamber
-    out = past_reed(out_drop, x_out)
-    into = past_reed(in_drop, x_in)
-    out = out * where(out_drop > 0.0, filled, density_th)
-    into = into * where(in_drop > 0.0, density_tl, filled)
-    lost = p.chamber_leakage * (pressure.chamber - pressure.accumulator) * filled
-    crossed = p.crossport_leakage * (pressure.high - pressure.low) * density_high
-    delivered = q_h * where(q_h > 0.0, density_th, density_high)
-    returned = q_1 * where(q_1 > 0.0, density_low, density_acc)
-    drawn = q_2 * where(q_2 > 0.0, density_acc, density_tl)
-
-    pushed = stack_force(driven, h, x, v, p.stack_stiffness, p.stack_damping)
-    held = p.head_stiffness * x + p.head_damping * v + pressure.chamber * p.piston_area
-    lifted = p.carriage_mass + p.load_mass
-    friction = p.viscous_friction * speed + p.coulomb_friction * speed / sqrt(
-        speed * speed + p.friction_speed * p.friction_speed
-    )
-    middle = 0.5 * p.cylinder_length - p.cylinder_start
-    stopped = end_stop_force(
-        position - middle, speed, 0.5 * p.cylinder_length - p.end_clearance, END_STIFFNESS, END_DAMPING
-    )
-    push = (pressure.high - pressure.low) * p.cylinder_area - friction - lifted * GRAVITY + stopped
     return (
         v,
         (pushed - held) / (p.stack_mass + p.head_mass),
         lagged_force_rate(driven, voltage, p.free_stroke_a_volt * p.stack_stiffness, p.stack_lag),
-        asymmetric_bouc_wen_rate(
-            rate,
-            h,
-            p.hysteresis,
-            p.hysteresis_phi_1,
-            p.hysteresis_phi_2,
-            p.hysteresis_phi_3,
-            p.hysteresis_gamma,
-        ),
+        hysteresis_rate(rate, h, p),
         into - out - lost,
         v_out,
         _reed_acceleration(out_drop, x_out, v_out, p.outlet_reed_stiffness, p.outlet_reed_gap, p),
@@ -227,7 +228,7 @@ def stack_derivative(state: tuple[Scalar, ...], voltage: Scalar, rate: Scalar, p
         along_line(pressure.delivery - pressure.high, q_h, p.delivery_length),
         delivered - crossed,
         speed,
-        push / lifted,
+        _rod_acceleration(pressure, position, speed, p),
         crossed - returned,
         along_line(pressure.low - pressure.accumulator, q_1, p.return_length),
         returned - drawn + lost,
@@ -236,31 +237,8 @@ def stack_derivative(state: tuple[Scalar, ...], voltage: Scalar, rate: Scalar, p
     )
 
 
-def stack_step(
-    state: tuple[Scalar, ...], voltages: tuple[Scalar, Scalar], p: StackValues, h: Scalar
-) -> tuple[Scalar, ...]:
-    """Return the state after a classical Runge-Kutta step of `stack_derivative`, equations 1 to 22.
-
-    Parameters
-    ----------
-    state : tuple of Expression
-        As named in `STATES`, in SI.
-    voltages : tuple of Expression
-        Drive at the step's start and end [V], linear between.
-    p : namespace of Expression
-        The actuator.
-    h : Expression
-        Step [s].
-
-    Returns
-    -------
-    tuple of Expression
-        The next state.
-    """
-    start, end = voltages
-    rate = (end - start) / h
-    step: StepFunction = rk4_step(lambda x, u, q: stack_derivative(x, u, rate, q))
-    return step(state, voltages, p, h)
+stack_step = rate_driven_step(stack_derivative)
+"""The state after a classical Runge-Kutta step of `stack_derivative`, equations 1 to 22, the drive linear over it."""
 
 
 def at_bias(p: StackValues, voltage: float = 0.0) -> NDArray[np.float64]:

@@ -5,7 +5,7 @@ catalogue, was calibrated to the published flows, or judged.
 """
 
 from dataclasses import dataclass
-from math import pi, sqrt
+from math import sqrt
 from typing import Annotated
 
 from plant.errors import RigError
@@ -30,8 +30,6 @@ class PiezoStackParameters:
     >>> p = PiezoStackParameters()
     >>> round(1e6 * p.free_stroke_a_volt * 140.0, 1)
     46.6
-    >>> round(p.reed_frequency)
-    751
     """
 
     stack_mass: Annotated[float, SI("kg", "moving mass m_0 of the stack", JUDGED)] = 0.025
@@ -117,11 +115,6 @@ class PiezoStackParameters:
             )
 
     @property
-    def reed_frequency(self) -> float:
-        """Natural frequency of the outlet reed [Hz], equation 13."""
-        return sqrt(self.outlet_reed_stiffness / self.reed_mass) / (2.0 * pi)
-
-    @property
     def moving_mass(self) -> float:
         """Mass m_c that the cylinder moves [kg], equation 22."""
         return self.carriage_mass + self.load_mass
@@ -130,21 +123,8 @@ class PiezoStackParameters:
 SIGNED = frozenset({"hysteresis_phi_1", "hysteresis_phi_2", "hysteresis_phi_3", "hysteresis_gamma"})
 """Parameters of either sign."""
 
-MAY_BE_ZERO = frozenset(
-    {
-        "hysteresis",
-        "air_fraction",
-        "outlet_reed_gap",
-        "inlet_reed_gap",
-        "minor_losses",
-        "accumulator_gas",
-        "load_mass",
-        "coulomb_friction",
-        "chamber_leakage",
-        "crossport_leakage",
-    }
-)
-"""Parameters that may be zero."""
+MAY_BE_ZERO = frozenset({"hysteresis", "air_fraction", "minor_losses", "accumulator_gas", "coulomb_friction"})
+"""Parameters that may be zero, beside those that are zero by default."""
 
 LONGEST_STEP = 2e-6
 """Step of the integrator [s]."""

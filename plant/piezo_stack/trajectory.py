@@ -40,7 +40,6 @@ def run_stack(
     sample_time: float,
     *,
     longest_step: float = LONGEST_STEP,
-    start: Array | None = None,
 ) -> Array:
     """Return the states of a run from rest at the bias pressure, by classical Runge-Kutta steps (equations 1 to 22).
 
@@ -54,8 +53,6 @@ def run_stack(
         Seconds between samples [s].
     longest_step : float
         Longest step [s].
-    start : ndarray, shape (19,), optional
-        Initial state; settled to the first voltage if not given.
 
     Returns
     -------
@@ -67,9 +64,7 @@ def run_stack(
     HydrostateError
         If the state stops being finite.
     """
-    initial = at_bias(parameters, float(voltage[0])) if start is None else start
-    row, start_, drive = stack_row(parameters)[None], initial[:, None], voltage[:, None]
-    states = run_rows(row, start_, drive, sample_time, longest_step=longest_step)[:, :, 0]
+    (states,) = run_stacks([parameters], voltage, sample_time, longest_step=longest_step)
     require_finite(states, sample_time, NAME)
     return states
 

@@ -20,6 +20,9 @@ from plant.compiled.functions import Scalar
 from plant.errors import HydrostateError
 
 State: TypeAlias = tuple[Scalar, ...]
+RateDriven: TypeAlias = Callable[[Any, Scalar, Scalar, Any], State]
+"""``derivative(state, drive, rate of the drive, parameters)``."""
+
 Derivative: TypeAlias = Callable[[Any, Scalar, Any], State]
 """``derivative(state, speed, parameters)``."""
 
@@ -209,5 +212,30 @@ def rk4_step(derivative: Derivative) -> StepFunction:
         k4 = derivative(moved(k3, 1.0), end, p)
         mean = tuple((a + 2.0 * b + 2.0 * c + d) / 6.0 for a, b, c, d in zip(k1, k2, k3, k4, strict=True))
         return moved(mean, 1.0)
+
+    return step
+
+
+def rate_driven_step(derivative: RateDriven) -> StepFunction:
+    """Build the classical Runge-Kutta step of rates that read how fast their drive rises, linear over a step.
+
+    Parameters
+    ----------
+    derivative : callable
+        As ``derivative(state, drive, rate of the drive, parameters)``.
+
+    Returns
+    -------
+    StepFunction
+        The step.
+    """
+
+    def step(state: State, drives: tuple[Scalar, Scalar], p: object, h: Scalar) -> State:
+        rise = (drives[1] - drives[0]) / h
+
+        def rates(x: State, drive: Scalar, q: object) -> State:
+            return derivative(x, drive, rise, q)
+
+        return rk4_step(rates)(state, drives, p, h)
 
     return step

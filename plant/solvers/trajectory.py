@@ -60,6 +60,7 @@ def trajectory(
 
     Examples
     --------
+    >>> import numpy as np
     >>> from dataclasses import dataclass
     >>> from plant.solvers.steps import ros2_step
     >>> @dataclass(frozen=True)

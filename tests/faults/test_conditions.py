@@ -15,7 +15,6 @@ from faults.conditions import (
     LEVELS,
     Condition,
     find_condition,
-    nearest_level,
     parameters_for,
     severity,
 )
@@ -217,20 +216,6 @@ def test_a_severity_out_of_range_is_refused_and_named(value: float) -> None:
         severity(value, 0.0)
     with pytest.raises(HydrostateError, match="friction severity must be between 0 and 5"):
         severity(0.0, value)
-
-
-@pytest.mark.parametrize(
-    ("value", "level"),
-    [(0.0, "none"), (0.49, "none"), (0.5, "minor"), (1.49, "minor"), (1.5, "major"), (9.0, "major")],
-)
-def test_the_nearest_level_changes_halfway(value: float, level: str) -> None:
-    assert nearest_level(value) == level
-
-
-@pytest.mark.parametrize("value", [-0.1, np.nan])
-def test_the_nearest_level_of_no_severity_is_refused(value: float) -> None:
-    with pytest.raises(HydrostateError, match="severity must not be negative"):
-        nearest_level(value)
 
 
 def test_an_unknown_condition_or_level_is_refused_with_the_known_ones() -> None:

@@ -5,12 +5,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plant.components.valves import pumped_flow, relief_flow
-from plant.units import PSI
 
 DISPLACEMENT, BIAS = 5.57e-7, 1.382e-5
 SPEEDS = st.floats(-300.0, 300.0)
 PRESSURES = st.floats(-1e7, 1e7)
-SETTING, CONDUCTANCE = 500.0 * PSI, 1e-8
+SETTING, CONDUCTANCE = 500.0 * 6894.757293168361, 1e-8
 
 
 @given(SPEEDS)
