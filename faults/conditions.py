@@ -40,22 +40,18 @@ class FrictionLevel:
     friction_coulomb: Annotated[float, SI("N", "Coulomb friction a_3", "Table 4")]
 
 
-LEAKAGE_TABLE: Mapping[Level, LeakageLevel] = MappingProxyType(
-    {
-        "none": LeakageLevel(leakage_coefficient=4.784e-12, flow_bias=2.413e-6),
-        "minor": LeakageLevel(leakage_coefficient=2.523e-11, flow_bias=1.382e-5),
-        "major": LeakageLevel(leakage_coefficient=6.006e-11, flow_bias=1.465e-5),
-    }
-)
+LEAKAGE_TABLE: Mapping[Level, LeakageLevel] = {
+    "none": LeakageLevel(leakage_coefficient=4.784e-12, flow_bias=2.413e-6),
+    "minor": LeakageLevel(leakage_coefficient=2.523e-11, flow_bias=1.382e-5),
+    "major": LeakageLevel(leakage_coefficient=6.006e-11, flow_bias=1.465e-5),
+}
 """Table 3, by leakage level."""
 
-FRICTION_TABLE: Mapping[Level, FrictionLevel] = MappingProxyType(
-    {
-        "none": FrictionLevel(friction_quadratic=6.589e4, friction_linear=2.144e3, friction_coulomb=436.0),
-        "minor": FrictionLevel(friction_quadratic=1.162e6, friction_linear=-7.440e3, friction_coulomb=500.0),
-        "major": FrictionLevel(friction_quadratic=4.462e6, friction_linear=1.863e4, friction_coulomb=551.0),
-    }
-)
+FRICTION_TABLE: Mapping[Level, FrictionLevel] = {
+    "none": FrictionLevel(friction_quadratic=6.589e4, friction_linear=2.144e3, friction_coulomb=436.0),
+    "minor": FrictionLevel(friction_quadratic=1.162e6, friction_linear=-7.440e3, friction_coulomb=500.0),
+    "major": FrictionLevel(friction_quadratic=4.462e6, friction_linear=1.863e4, friction_coulomb=551.0),
+}
 """Table 4, by friction level."""
 
 

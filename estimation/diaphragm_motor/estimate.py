@@ -97,20 +97,16 @@ def estimate_motor(
     trust = 1.0 if calibration is None else CALIBRATED_SHARE
     track = track_leakage(motor_blocks(read, seen.drive), pump, healthy_maps(pump, seen.drive), trust)
     share = float(np.mean(healthy.gas_fraction))
-    values = {"crossport_leakage": track.leakage[-1], "load_force": track.load[-1], "gas_fraction": gas * share}
-    deviations = {
-        "crossport_leakage": track.leakage_std[-1],
-        "load_force": track.load_std[-1],
-        "gas_fraction": gas_std * share,
-    }
+    ends = (track.leakage, track.leakage_std, track.load, track.load_std)
+    leakage, leakage_std, load, load_std = (float(one[-1]) for one in ends)
     return MotorEstimate(
-        {name: float(value) for name, value in values.items()},
-        {name: float(value) for name, value in deviations.items()},
+        {"crossport_leakage": leakage, "load_force": load, "gas_fraction": gas * share},
+        {"crossport_leakage": leakage_std, "load_force": load_std, "gas_fraction": gas_std * share},
         pattern / freedom,
         pattern <= float(chdtri(freedom, PATTERN_BELOW)),
         seen.drive,
         track,
-        replace(pump, crossport_leakage=max(0.0, values["crossport_leakage"]), load_force=values["load_force"]),
+        replace(pump, crossport_leakage=max(0.0, leakage), load_force=load),
     )
 
 

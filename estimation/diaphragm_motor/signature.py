@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil, pi
-from types import MappingProxyType
 
 import numpy as np
 
@@ -36,16 +35,14 @@ HARMONICS = 6
 STEADY = 0.01
 """Root mean square, over the sine's amplitude, by which a drive may differ from a steady sine [dimensionless]."""
 
-TOLERANCE: Mapping[str, float] = MappingProxyType(
-    {
-        "diaphragm_compliance": 0.005,
-        "volume_a_volt": 0.005,
-        "inertance": 0.005,
-        "port_area": 0.005,
-        "valve_lag": 0.005,
-        "valve_resistance": 0.02,
-    }
-)
+TOLERANCE: Mapping[str, float] = {
+    "diaphragm_compliance": 0.005,
+    "volume_a_volt": 0.005,
+    "inertance": 0.005,
+    "port_area": 0.005,
+    "valve_lag": 0.005,
+    "valve_resistance": 0.02,
+}
 """Relative standard deviations by which a healthy motor differs from its model, judged [dimensionless]."""
 
 GAIN_TOLERANCE = 0.005

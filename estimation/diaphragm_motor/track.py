@@ -54,14 +54,10 @@ class HealthyMaps:
     ----------
     flow, pressure : Polynomial
         Mean flow into the cylinder [m^3/s], pressure across its piston [Pa], of the amplitude [V].
-    least, most : float
-        Amplitudes that the maps are made of [V].
     """
 
     flow: Polynomial
     pressure: Polynomial
-    least: float
-    most: float
 
 
 @dataclass(frozen=True)
@@ -129,7 +125,7 @@ def healthy_maps(p: DiaphragmMotorParameters, drive: Drive) -> HealthyMaps:
         Polynomial.fit(amplitude, [getattr(point, name) for point in points], _DEGREE)
         for name in ("outlet_flow", "pressure")
     )
-    return HealthyMaps(flow, pressure, float(amplitude.min()), float(amplitude.max()))
+    return HealthyMaps(flow, pressure)
 
 
 @dataclass(frozen=True)

@@ -287,24 +287,15 @@ def _calibrated(seen: Signature, calibration: Signature, healthy: DiaphragmMotor
     gain = np.tile(np.abs(turn), 2)
     first = seen.tones * turn
     second = slice(_FUNDAMENTALS, 2 * _FUNDAMENTALS)
-    values = np.concatenate(
-        [
-            first.real,
-            first.imag,
-            model[second] + gain * (seen.values - calibration.values)[second],
-            [model[-1] + seen.velocity - calibration.velocity],
-        ]
-    )
+    harmonics = model[second] + gain * (seen.values - calibration.values)[second]
+    velocity = model[-1] + seen.velocity - calibration.velocity
+    values = np.concatenate([first.real, first.imag, harmonics, [velocity]])
     return replace(seen, values=values, covariance=seen.covariance + calibration.covariance)
 
 
-def _priors() -> dict[str, float]:
-    kinds = [fault.kind for fault in MOTOR_FAULTS.values()]
-    share = (1.0 - PRIOR_HEALTHY) / len(set(kinds))
-    return {name: share / kinds.count(fault.kind) for name, fault in MOTOR_FAULTS.items()}
-
-
-_PRIORS = _priors()
+_KINDS = [fault.kind for fault in MOTOR_FAULTS.values()]
+_A_KIND = (1.0 - PRIOR_HEALTHY) / len(set(_KINDS))
+_PRIORS = {name: _A_KIND / _KINDS.count(fault.kind) for name, fault in MOTOR_FAULTS.items()}
 _GRID = 201
 _FUNDAMENTALS = 14
 _LEAST_CHANGE = 1e-3

@@ -16,42 +16,36 @@ from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, Sensors, noise_variances
 
-EQUATIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "flow balance": ("speed", "position", "velocity", "dp"),
-        "force balance": ("velocity", "dp"),
-        "kinematics": ("position", "velocity"),
-        "motor_speed_rad_s": ("speed",),
-        "position_m": ("position",),
-        "velocity_m_s": ("velocity",),
-        "differential_pressure_pa": ("dp",),
-    }
-)
+EQUATIONS: Mapping[str, tuple[str, ...]] = {
+    "flow balance": ("speed", "position", "velocity", "dp"),
+    "force balance": ("velocity", "dp"),
+    "kinematics": ("position", "velocity"),
+    "motor_speed_rad_s": ("speed",),
+    "position_m": ("position",),
+    "velocity_m_s": ("velocity",),
+    "differential_pressure_pa": ("dp",),
+}
 """Equations 5.8 and 5.9 and the sensors, each with what it holds of what is not known; a rate counts as its state."""
 
-FAULTS: Mapping[str, str] = MappingProxyType(
-    {
-        "leakage": "flow balance",
-        "air": "flow balance",
-        "friction": "force balance",
-        "speed sensor": "motor_speed_rad_s",
-        "position sensor": "position_m",
-        "velocity sensor": "velocity_m_s",
-        "pressure sensor": "differential_pressure_pa",
-    }
-)
+FAULTS: Mapping[str, str] = {
+    "leakage": "flow balance",
+    "air": "flow balance",
+    "friction": "force balance",
+    "speed sensor": "motor_speed_rad_s",
+    "position sensor": "position_m",
+    "velocity sensor": "velocity_m_s",
+    "pressure sensor": "differential_pressure_pa",
+}
 """The equation that each fault breaks."""
 
-SPREAD: Mapping[str, float] = MappingProxyType(
-    {
-        "bulk_modulus": 0.2,
-        "leakage_coefficient": 0.1,
-        "flow_bias": 0.1,
-        "friction_quadratic": 0.1,
-        "friction_linear": 0.1,
-        "friction_coulomb": 0.1,
-    }
-)
+SPREAD: Mapping[str, float] = {
+    "bulk_modulus": 0.2,
+    "leakage_coefficient": 0.1,
+    "flow_bias": 0.1,
+    "friction_quadratic": 0.1,
+    "friction_linear": 0.1,
+    "friction_coulomb": 0.1,
+}
 """Relative standard deviations within a class [fraction]."""
 
 MODEL_ERROR = 0.05

@@ -18,13 +18,7 @@ from plant.piezo_stack.trajectory import NAME
 GAPS = ("outlet_reed_gap", "inlet_reed_gap")
 """Unknowns that are tried where the others leave a misfit."""
 
-GAP_STARTS: tuple[Mapping[str, float], ...] = (
-    {},
-    {"outlet_reed_gap": 0.3},
-    {"inlet_reed_gap": 0.3},
-    {"outlet_reed_gap": 1.5},
-    {"inlet_reed_gap": 1.5},
-)
+GAP_STARTS: tuple[Mapping[str, float], ...] = ({}, *({name: gap} for gap in (0.3, 1.5) for name in GAPS))
 """First guesses for them, scaled as `estimation.piezo_stack.estimate.UNKNOWNS`."""
 
 CALIBRATED = (
@@ -85,15 +79,9 @@ def diagnose_stack(
     """
     found = estimate_stack(record, healthy, channels=channels)
     if missed(found):
-        wider = estimate_stack(
-            record,
-            healthy,
-            unknowns=(*DEFAULT_UNKNOWNS, *GAPS),
-            channels=channels,
-            starts=(*STARTS, *GAP_STARTS),
-        )
-        if _worst(wider) < _worst(found):
-            found = wider
+        unknowns, starts = (*DEFAULT_UNKNOWNS, *GAPS), (*STARTS, *GAP_STARTS)
+        wider = estimate_stack(record, healthy, unknowns=unknowns, channels=channels, starts=starts)
+        found = min(found, wider, key=lambda one: max(one.misfit.values()))
     against = tuple(
         StackFaultCode.ANOTHER_ACTUATOR.note(channel=name, ratio=ratio) for name, ratio in missed(found).items()
     )
@@ -115,10 +103,6 @@ def diagnose_stack(
         faults=tuple(note for note in faults if note is not None),
         evidence=found,
     )
-
-
-def _worst(found: StackEstimate) -> float:
-    return max(found.misfit.values())
 
 
 def _level(found: StackEstimate, name: str, healthy: float, levels: Mapping[str, float]) -> str | None:

@@ -6,6 +6,7 @@ for: each chamber's balance of volume, each port's momentum, the piston's motion
 serves all seven. Pressures are above the tank's.
 """
 
+from collections.abc import Mapping
 from dataclasses import fields, make_dataclass
 from itertools import pairwise
 from types import SimpleNamespace
@@ -48,16 +49,12 @@ POLARITY = tuple(1.0 if i % 2 == 0 else -1.0 for i in range(DIAPHRAGMS))
 END_STIFFNESS, END_DAMPING = 1e6, 20.0
 """Of the cylinder's ends [N/m], [s/m]."""
 
-MotorRow = make_dataclass(
-    "MotorRow",
-    [
-        (name, float)
-        for field in fields(DiaphragmMotorParameters)
-        for name in (
-            [f"{field.name}_{i}" for i in range(1, ROWS[field.name] + 1)] if field.name in ROWS else [field.name]
-        )
-    ],
-)
+_NAMES: Mapping[str, list[str]] = {
+    field.name: [f"{field.name}_{i}" for i in range(1, ROWS[field.name] + 1)] if field.name in ROWS else [field.name]
+    for field in fields(DiaphragmMotorParameters)
+}
+
+MotorRow = make_dataclass("MotorRow", [(name, float) for names in _NAMES.values() for name in names])
 """The parameters as compiled kernels take them: each of a row's values has a name of its own."""
 
 
@@ -90,12 +87,8 @@ def gathered(flat: Any) -> SimpleNamespace:
     namespace
         The same by the names of `DiaphragmMotorParameters`.
     """
-    found = SimpleNamespace()
-    for field in fields(DiaphragmMotorParameters):
-        name = field.name
-        row = tuple(getattr(flat, f"{name}_{i}") for i in range(1, ROWS[name] + 1)) if name in ROWS else None
-        setattr(found, name, getattr(flat, name) if row is None else row)
-    return found
+    rows = {name: tuple(getattr(flat, one) for one in names) for name, names in _NAMES.items()}
+    return SimpleNamespace(**{name: row if name in ROWS else row[0] for name, row in rows.items()})
 
 
 def _drops(pressures: State, outlet: Scalar) -> list[Scalar]:
@@ -118,16 +111,9 @@ def _drags(openings: State, p: Any) -> list[Scalar]:
 
 
 def _compliances(pressures: State, p: Any) -> list[Scalar]:
-    liquid = p.chamber_volume / p.bulk_modulus
+    rest, walls = p.supply_pressure, (p.diaphragm_compliance, p.chamber_volume / p.bulk_modulus)
     return [
-        chamber_compliance(
-            p.supply_pressure + pressure,
-            p.diaphragm_compliance,
-            liquid,
-            fraction * p.chamber_volume,
-            p.gas_exponent,
-            p.supply_pressure,
-        )
+        chamber_compliance(rest + pressure, *walls, fraction * p.chamber_volume, p.gas_exponent, rest)
         for pressure, fraction in zip(pressures, p.gas_fraction, strict=True)
     ]
 

@@ -1,11 +1,14 @@
 """Cells of a log as numbers: what is one, what says that nothing was measured, and what is refused."""
 
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.errors import LogError
+from plant.log.columns import TRUTH, Column
 
 MISSING = ("", "NaN", "nan", "-NaN", "-nan", "NA", "N/A", "n/a", "#N/A", "NULL", "null", "None")
 """Cells that say that nothing was measured."""
@@ -37,7 +40,7 @@ def number(text: str) -> float:
     return float(cell)
 
 
-def numbers(values: NDArray[Any], name: str, source: str) -> NDArray[np.float64]:
+def numbers(values: NDArray[Any], name: str, source: str) -> Array:
     """Return a column as floats, shape (n,), NaN where it says that nothing was measured.
 
     Parameters
@@ -67,6 +70,36 @@ def numbers(values: NDArray[Any], name: str, source: str) -> NDArray[np.float64]
             out[row] = np.nan if value is None else number(value) if isinstance(value, str) else float(value)
         except (TypeError, ValueError) as error:
             raise not_a_number(source, name, row, value) from error
+    return out
+
+
+def each_read(columns: Iterable[Column], read: Callable[[Column], Array]) -> dict[Column, Array]:
+    """Return columns as they are read, but for simulated truth that holds no numbers.
+
+    Parameters
+    ----------
+    columns : iterable of Column
+        Those that are wanted.
+    read : callable
+        From a column to its values, shape (n,).
+
+    Returns
+    -------
+    dict[Column, ndarray of shape (n,)]
+        The values.
+
+    Raises
+    ------
+    LogError
+        If a column beside the truth holds no numbers.
+    """
+    out: dict[Column, Array] = {}
+    for column in columns:
+        try:
+            out[column] = read(column)
+        except LogError:
+            if not column.channel.startswith(TRUTH):
+                raise
     return out
 
 

@@ -15,9 +15,9 @@ from plant.arrays import Array
 from plant.atomic import replacing
 from plant.errors import HydrostateError, LogError, LogWarning
 from plant.log.arrow import from_arrow, to_arrow
-from plant.log.cells import numbers
+from plant.log.cells import each_read, numbers
 from plant.log.checks import REQUIRED, Clock, trusted
-from plant.log.columns import TIME, TRUTH, Column, converted, resolve_columns
+from plant.log.columns import TIME, Column, converted, resolve_columns
 from plant.log.csv import Choose, read_csv, write_csv
 from plant.log.mat import read_mat, write_mat
 from plant.log.notes import LogCode
@@ -160,14 +160,11 @@ def _read_parquet(path: Path, choose: Choose) -> Raw:
     file = pq.ParquetFile(path)
     names = file.schema_arrow.names
     text = (file.schema_arrow.metadata or {}).get(SCHEMA_KEY)
-    out: dict[Column, Array] = {}
-    for column in choose(names):
-        try:
-            out[column] = _floats(file.read([names[column.position]]).column(0), column, str(path))
-        except LogError:
-            if not column.channel.startswith(TRUTH):
-                raise
-    return out, None if text is None else text.decode(errors="replace")
+
+    def read(column: Column) -> Array:
+        return _floats(file.read([names[column.position]]).column(0), column, str(path))
+
+    return each_read(choose(names), read), None if text is None else text.decode(errors="replace")
 
 
 def _write_parquet(columns: Mapping[str, Array], metadata: str, file: BinaryIO) -> None:

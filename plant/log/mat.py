@@ -9,8 +9,8 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError
-from plant.log.cells import numbers
-from plant.log.columns import TRUTH, Column
+from plant.log.cells import each_read, numbers
+from plant.log.columns import Column
 from plant.log.csv import Choose
 from plant.log.mat_reader import DamagedMatError, Value, read_variables
 
@@ -50,16 +50,12 @@ def read_mat(path: Path, choose: Choose) -> tuple[dict[Column, Array], str | Non
     except DamagedMatError as error:
         raise LogError(f"cannot be read as mat: {error}", str(path)) from error
     names = [name for name in table if name != METADATA]
-    out: dict[Column, Array] = {}
-    for column in choose(names):
-        values = np.atleast_1d(np.asarray(table[names[column.position]]))
-        try:
-            out[column] = numbers(values, column.name, str(path))
-        except LogError:
-            if not column.channel.startswith(TRUTH):
-                raise
+
+    def read(column: Column) -> Array:
+        return numbers(np.atleast_1d(np.asarray(table[names[column.position]])), column.name, str(path))
+
     text = table.get(METADATA)
-    return out, text if isinstance(text, str) else None
+    return each_read(choose(names), read), text if isinstance(text, str) else None
 
 
 def _table(content: Mapping[str, Value]) -> Mapping[str, Value]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
@@ -33,17 +32,15 @@ class Plausible:
 
 
 _PRESSURE = Plausible(1e4, 1e8, "Pa", "kPa or bar read as Pa", "Pa read as kPa or bar")
-LIMITS: Mapping[str, Plausible] = MappingProxyType(
-    {
-        "motor_speed_rad_s": Plausible(0.5, 2000.0, "rad/s", "krad/s read as rad/s", "mrad/s read as rad/s"),
-        "position_m": Plausible(1e-6, 5.0, "m", "km read as m, or mm converted twice", "mm read as m"),
-        "velocity_m_s": Plausible(1e-5, 10.0, "m/s", "km/s read as m/s, or mm/s converted twice", "mm/s read as m/s"),
-        "differential_pressure_pa": _PRESSURE,
-        "pressure_a_pa": _PRESSURE,
-        "pressure_b_pa": _PRESSURE,
-        "motor_voltage_v": Plausible(1e-2, 2e3, "V", "kV read as V", "mV read as V"),
-    }
-)
+LIMITS: Mapping[str, Plausible] = {
+    "motor_speed_rad_s": Plausible(0.5, 2000.0, "rad/s", "krad/s read as rad/s", "mrad/s read as rad/s"),
+    "position_m": Plausible(1e-6, 5.0, "m", "km read as m, or mm converted twice", "mm read as m"),
+    "velocity_m_s": Plausible(1e-5, 10.0, "m/s", "km/s read as m/s, or mm/s converted twice", "mm/s read as m/s"),
+    "differential_pressure_pa": _PRESSURE,
+    "pressure_a_pa": _PRESSURE,
+    "pressure_b_pa": _PRESSURE,
+    "motor_voltage_v": Plausible(1e-2, 2e3, "V", "kV read as V", "mV read as V"),
+}
 """Each channel that has a usual magnitude; judged: a thousandfold slip of common rigs crosses a limit."""
 
 MOTION = ("motor_speed_rad_s", "position_m", "velocity_m_s")
