@@ -59,13 +59,6 @@ FRICTION_TABLE: Mapping[Level, FrictionLevel] = {
 class Condition:
     """A working condition of Table 1: a level of leakage and a level of friction.
 
-    Parameters
-    ----------
-    name : str
-        Its name in results.
-    leakage, friction : {"none", "minor", "major"}
-        The two levels.
-
     Raises
     ------
     HydrostateError
@@ -105,11 +98,6 @@ def find_condition(name: str) -> Condition:
     name : str
         One of `CONDITIONS`.
 
-    Returns
-    -------
-    Condition
-        The condition.
-
     Raises
     ------
     HydrostateError
@@ -129,8 +117,6 @@ def parameters_for(condition: Condition, base: EhaParameters = PAPER_RIG) -> Eha
 
     Parameters
     ----------
-    condition : Condition
-        The condition.
     base : EhaParameters
         The healthy actuator.
 
@@ -167,11 +153,6 @@ def severity(leakage: float, friction: float, base: EhaParameters = PAPER_RIG) -
         Severities [dimensionless], 0 to `HIGHEST_SEVERITY`.
     base : EhaParameters
         The healthy actuator.
-
-    Returns
-    -------
-    EhaParameters
-        The faulty actuator.
 
     Raises
     ------

@@ -10,8 +10,6 @@ class HydrostateError(ValueError):
 
     Parameters
     ----------
-    message : str
-        The sentence.
     source : str, optional
         The file that it is about, which stands in front of the sentence.
     """
@@ -42,8 +40,6 @@ class MissingColumnError(LogError):
         The channel, and the column that was wanted for it.
     known : str
         The columns that the log has, as a list in words.
-    source : str, optional
-        The file.
     """
 
     def __init__(self, channel: str, column: str, known: str, source: str | None = None) -> None:
@@ -68,8 +64,6 @@ class LogWarning(UserWarning):
 
     Parameters
     ----------
-    note : Note
-        What.
     source : str, optional
         The file that it is about, which stands in front of the sentence.
     """
@@ -94,14 +88,8 @@ def require_known(
 
     Parameters
     ----------
-    what : str
-        What is named.
-    name : object
-        The name.
     known : iterable of str
         Those that there are.
-    error : type
-        What is raised.
 
     Raises
     ------
@@ -118,10 +106,6 @@ def require_each_known(what: str, names: Sequence[str], known: Sequence[str]) ->
 
     Parameters
     ----------
-    what : str
-        What is named.
-    names : sequence of str
-        The names.
     known : sequence of str
         Those that there are.
 

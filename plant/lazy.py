@@ -13,8 +13,6 @@ def lazily(package: str, file: str) -> Callable[[str], Any]:
 
     Parameters
     ----------
-    package : str
-        Its name.
     file : str
         Its ``__file__``, in which every such import reads ``from package.module import name as name``.
 

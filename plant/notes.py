@@ -40,11 +40,6 @@ class Code(StrEnum):
         ----------
         **data : float, int, str, bool or None
             What the template's fields are filled with, in SI where the template does not say otherwise.
-
-        Returns
-        -------
-        Note
-            The note.
         """
         return Note(self, MappingProxyType(data))
 
@@ -87,11 +82,6 @@ def _note(code: Code, data: Mapping[str, Any]) -> Note:
 
 def distinct(notes: Iterable[Note]) -> tuple[Note, ...]:
     """Return notes in order, each once.
-
-    Parameters
-    ----------
-    notes : iterable of Note
-        The notes.
 
     Returns
     -------

@@ -23,8 +23,6 @@ def flow_change(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: flo
 
     Parameters
     ----------
-    p : DiaphragmMotorParameters
-        The motor.
     frequency, peak_to_peak : float
         Of the drive [Hz], [V].
     factor : float
@@ -52,8 +50,6 @@ def motor_card(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: floa
 
     Parameters
     ----------
-    p : DiaphragmMotorParameters
-        The motor.
     frequency, peak_to_peak : float
         Of the drive [Hz], [V].
 

@@ -155,13 +155,6 @@ def controlled_run(
         Gains; those of the class if not given.
     sensing : {"encoder", "self"}
         Where the velocity comes from.
-    sensors : MotorSensors
-        Noise.
-
-    Returns
-    -------
-    ControlledRun
-        The run.
 
     Raises
     ------

@@ -140,11 +140,6 @@ def motor_maps(
     pressures : sequence of float
         Pressure differences over the piston [Pa], rising.
 
-    Returns
-    -------
-    MotorMaps
-        The maps.
-
     Raises
     ------
     DriveError

@@ -105,8 +105,6 @@ def modelled_signature(p: DiaphragmMotorParameters, frequency: float, peak_to_pe
 
     Parameters
     ----------
-    p : DiaphragmMotorParameters
-        The motor.
     frequency, peak_to_peak : float
         Of the drive [Hz], [V].
 
@@ -288,11 +286,6 @@ def whole_cycles(samples: int, sample_time: float, frequency: float) -> int:
     sample_time, frequency : float
         Time between them [s], frequency [Hz].
 
-    Returns
-    -------
-    int
-        Cycles.
-
     Raises
     ------
     LogError
@@ -308,11 +301,6 @@ def whole_cycles(samples: int, sample_time: float, frequency: float) -> int:
 
 def require_channels(record: Record) -> None:
     """Refuse a log that lacks a channel or samples, or ends before the motor has settled.
-
-    Parameters
-    ----------
-    record : Record
-        The log.
 
     Raises
     ------

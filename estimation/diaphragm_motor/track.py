@@ -100,8 +100,6 @@ def healthy_maps(p: DiaphragmMotorParameters, drive: Drive) -> HealthyMaps:
     ----------
     p : DiaphragmMotorParameters
         The motor, its piston tight.
-    drive : Drive
-        The sine.
 
     Returns
     -------
@@ -156,8 +154,6 @@ def motor_blocks(record: Record, drive: Drive) -> list[Block]:
     ----------
     record : Record
         Middle electrode and position.
-    drive : Drive
-        The sine.
 
     Returns
     -------
@@ -197,17 +193,10 @@ def track_leakage(
     ----------
     blocks : sequence of Block
         What the log shows.
-    p : DiaphragmMotorParameters
-        The motor.
     maps : HealthyMaps
         What its pump delivers.
     trust : float
         Factor on the tolerances of the electrode's gain and of the flow [dimensionless].
-
-    Returns
-    -------
-    MotorTrack
-        Both over time.
     """
     state, known = np.array([p.crossport_leakage, 0.0]), np.diag([_FIRST_LEAKAGE**2, _FIRST_LOAD**2])
     rows: list[tuple[float, ...]] = []

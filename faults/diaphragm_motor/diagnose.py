@@ -222,8 +222,6 @@ def separations(
 
     Parameters
     ----------
-    healthy : DiaphragmMotorParameters
-        The healthy motor.
     frequency, peak_to_peak : float
         Of the drive [Hz], [V].
     sizes : Mapping[str, float]

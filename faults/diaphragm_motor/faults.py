@@ -30,16 +30,12 @@ class MotorFault:
         Such as ``valve_4_leak``.
     kind : str
         The same without its place: ``valve_leak``.
-    parameter : str
-        What it changes.
     change : callable
         How, from the healthy value and the severity.
     meaning : str
         What the severity is.
     severities : tuple of float
         Rising severities at which the fault's signature is computed [the fault's unit]; 0 is healthy.
-    unit : str
-        Of the severity.
     place : int
         Which valve or diaphragm, from 1 at the inlet; 0 for all.
     """
@@ -62,11 +58,6 @@ class MotorFault:
             The motor without it.
         severity : float
             How bad it is [the fault's unit].
-
-        Returns
-        -------
-        DiaphragmMotorParameters
-            The motor with it.
         """
         value = getattr(healthy, self.parameter)
         if self.place:
@@ -199,17 +190,10 @@ def motor_with_fault(healthy: DiaphragmMotorParameters, name: str, severity: flo
 
     Parameters
     ----------
-    healthy : DiaphragmMotorParameters
-        The healthy motor.
     name : str
         One of `MOTOR_FAULTS`.
     severity : float
         How bad [the fault's unit]; 0 is healthy.
-
-    Returns
-    -------
-    DiaphragmMotorParameters
-        The motor.
 
     Raises
     ------

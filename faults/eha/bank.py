@@ -50,8 +50,6 @@ def predict_run(record: Record, parameters: EhaParameters) -> Mapping[str, Array
     ----------
     record : Record
         The log; only its motor speed is used.
-    parameters : EhaParameters
-        The actuator.
 
     Returns
     -------

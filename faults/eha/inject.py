@@ -71,8 +71,6 @@ def with_bulk_modulus(parameters: EhaParameters, bulk_modulus: float) -> EhaPara
 
     Parameters
     ----------
-    parameters : EhaParameters
-        The actuator.
     bulk_modulus : float
         Effective bulk modulus [Pa], in the convention of equation 5.8 (errata E2).
 
@@ -116,11 +114,6 @@ def spread(
         Half-width for each of a_1, a_2, a_3 [dimensionless].
     bulk_modulus : float
         Half-width for the bulk modulus [dimensionless].
-
-    Returns
-    -------
-    EhaParameters
-        The actuator drawn.
 
     Raises
     ------

@@ -137,8 +137,6 @@ class Distances:
 
     Parameters
     ----------
-    conditions : tuple of str
-        The conditions.
     nats : ndarray, shape (conditions, conditions)
         Kullback-Leibler distance of the row's condition to the column's class [dimensionless].
     seconds : float
@@ -214,13 +212,6 @@ def condition_distances(
         Time between samples [s].
     channels : sequence of str
         Channels logged beside motor speed.
-    sensors : Sensors
-        Their noise.
-
-    Returns
-    -------
-    Distances
-        Of all pairs.
 
     Raises
     ------

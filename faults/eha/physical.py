@@ -70,11 +70,6 @@ def throttled(base: CircuitParameters, a_volts: float, b_volts: float) -> Circui
     a_volts, b_volts : float
         Control voltages of throttles A and B [V], 0 to 10: 10 V shuts.
 
-    Returns
-    -------
-    CircuitParameters
-        The circuit.
-
     Raises
     ------
     RigError
@@ -142,15 +137,8 @@ def aerated(base: CircuitParameters, air_fraction: float) -> CircuitParameters:
 
     Parameters
     ----------
-    base : CircuitParameters
-        The circuit.
     air_fraction : float
         Entrained air at atmospheric pressure [dimensionless], 0 to 0.5.
-
-    Returns
-    -------
-    CircuitParameters
-        The circuit.
 
     Raises
     ------
@@ -166,15 +154,8 @@ def drifted_relief(base: CircuitParameters, factor: float) -> CircuitParameters:
 
     Parameters
     ----------
-    base : CircuitParameters
-        The circuit.
     factor : float
         Set-point over the healthy one [dimensionless], positive, at most 2.
-
-    Returns
-    -------
-    CircuitParameters
-        The circuit.
 
     Raises
     ------

@@ -54,15 +54,8 @@ def stack_in_condition(healthy: PiezoStackParameters, name: str) -> PiezoStackPa
 
     Parameters
     ----------
-    healthy : PiezoStackParameters
-        The healthy actuator.
     name : str
         Condition name.
-
-    Returns
-    -------
-    PiezoStackParameters
-        The actuator in it.
 
     Raises
     ------
@@ -87,15 +80,8 @@ def stack_with_fault(healthy: PiezoStackParameters, name: str) -> PiezoStackPara
 
     Parameters
     ----------
-    healthy : PiezoStackParameters
-        The healthy actuator.
     name : str
         One of `STACK_FAULTS` or of the nine conditions.
-
-    Returns
-    -------
-    PiezoStackParameters
-        The actuator.
 
     Raises
     ------

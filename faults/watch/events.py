@@ -60,8 +60,6 @@ class Change:
     ----------
     time : float
         When this was told [s].
-    alarm : Alarm
-        The alarm.
     lost : tuple of float, or None
         Flow lost before and after, as a share of what the pump delivers, weighed with pressure, so that oil that is
         only squeezed comes back [fraction]; None where pressure is not logged.

@@ -143,13 +143,7 @@ def begin_again(memory: Memory) -> None:
 
 @cache
 def watch_kernel() -> ModuleType:
-    """Return the compiled kernel: `advance`, `begin_again` and `threshold`.
-
-    Returns
-    -------
-    ModuleType
-        The kernel.
-    """
+    """Return the compiled kernel: `advance`, `begin_again` and `threshold`."""
     named = ("MEAN", "VARIANCE", "COUNT", "SUM", "PEAK", "THRESHOLD", "SQUARES")
     constants = {name: getattr(cusum, name) for name in named}
     constants |= {"FEATURES": FEATURES, "BENT": balances.BENT}

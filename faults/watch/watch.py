@@ -256,17 +256,10 @@ def watch_record(
     ----------
     record : Record
         The log, with motor speed, position or velocity, and differential pressure where there is one.
-    parameters : EhaParameters
-        The actuator.
     false_alarms : float
         Rate at which a healthy log may raise alarms [1/h].
     learning : float
         Healthy running at its beginning [s].
-
-    Returns
-    -------
-    list of Ready, Alarm or Change
-        What happened.
 
     Raises
     ------

@@ -22,8 +22,6 @@ def eliminated_jacobian(outputs: Sequence[Expression], inputs: Sequence[Expressi
 
     Parameters
     ----------
-    outputs : sequence of Expression
-        What is differentiated.
     inputs : sequence of Expression
         Symbols.
 

@@ -19,8 +19,6 @@ class Expression:
     ----------
     operation : str
         ``symbol``, ``constant``, a comparison, or another operation that `plant.compiled.source` can spell.
-    arguments : tuple of Expression
-        Operands.
     value : float or str
         A constant's value [any unit], or a symbol's name.
 
@@ -106,8 +104,6 @@ def node(operation: str, *arguments: Expression, value: float | str = 0.0) -> Ex
     ----------
     operation : str
         Name of the operation.
-    *arguments : Expression
-        Operands.
     value : float or str
         A constant's value [any unit], or a symbol's name.
 
@@ -127,11 +123,6 @@ def constant(value: float) -> Expression:
     ----------
     value : float
         The number, dimensionless here.
-
-    Returns
-    -------
-    Expression
-        Its node.
     """
     return node("constant", value=float(value))
 
@@ -143,11 +134,6 @@ def symbol(name: str) -> Expression:
     ----------
     name : str
         A Python identifier.
-
-    Returns
-    -------
-    Expression
-        Its node.
     """
     return node("symbol", value=name)
 
@@ -159,11 +145,6 @@ def as_expression(value: "Expression | Number") -> Expression:
     ----------
     value : Expression or float
         What to wrap, dimensionless here.
-
-    Returns
-    -------
-    Expression
-        A node.
     """
     return value if isinstance(value, Expression) else constant(float(value))
 
@@ -205,13 +186,6 @@ def unary(operation: str, a: Expression) -> Expression:
     ----------
     operation : str
         Name of the function.
-    a : Expression
-        Its argument.
-
-    Returns
-    -------
-    Expression
-        The node.
     """
     return node(operation, a)
 
@@ -223,8 +197,6 @@ def select(condition: Expression, a: Expression, b: Expression) -> Expression:
     ----------
     condition : Expression
         A comparison.
-    a, b : Expression
-        The two values.
 
     Returns
     -------
@@ -263,11 +235,6 @@ def ordered(outputs: Iterable[Expression]) -> list[Expression]:
 
 def local_derivatives(item: Expression) -> Sequence[Expression]:
     """Return the derivative of a node with respect to each argument; signs and choices are held constant.
-
-    Parameters
-    ----------
-    item : Expression
-        An operation.
 
     Returns
     -------
@@ -311,8 +278,6 @@ def jacobian(outputs: Sequence[Expression], inputs: Sequence[Expression]) -> lis
 
     Parameters
     ----------
-    outputs : sequence of Expression
-        What is differentiated.
     inputs : sequence of Expression
         Symbols.
 

@@ -69,11 +69,6 @@ def settled_nodes(order: Sequence[Expression], fixed: Collection[str]) -> set[in
         Nodes, operands before results.
     fixed : collection of str
         Names of the symbols.
-
-    Returns
-    -------
-    set of int
-        Their ids.
     """
     settled: set[int] = set()
     for item in order:

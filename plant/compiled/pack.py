@@ -18,8 +18,6 @@ def packed_source(name: str, outputs: Mapping[str, Expression]) -> str:
 
     Parameters
     ----------
-    name : str
-        The function's name.
     outputs : Mapping[str, Expression]
         What it gives, by name.
 

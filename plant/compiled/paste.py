@@ -44,11 +44,6 @@ def pasted(
     options : str
         Arguments of ``numba.njit``.
 
-    Returns
-    -------
-    str
-        The text.
-
     Examples
     --------
     >>> def grown(size: float) -> float:
@@ -97,11 +92,6 @@ def bare_text(function: Callable[..., object]) -> str:
     ----------
     function : callable
         A function of a module.
-
-    Returns
-    -------
-    str
-        Its text.
 
     Examples
     --------

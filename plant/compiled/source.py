@@ -58,11 +58,6 @@ def statements(outputs: Mapping[str, Expression], indent: str, temporary: str = 
         Beginning of the temporaries' names. Parts of one function need different ones: Numba takes a time that grows
         with the square of the count of names assigned twice.
 
-    Returns
-    -------
-    str
-        The lines.
-
     Examples
     --------
     >>> from plant.compiled.expression import symbol
@@ -107,8 +102,6 @@ def lines_source(name: str, outputs: Mapping[str, Expression]) -> str:
 
     Parameters
     ----------
-    name : str
-        Its name.
     outputs : Mapping[str, Expression]
         What it gives, by name.
 
@@ -160,8 +153,6 @@ def spelt(item: Expression, names: Mapping[int, str]) -> str:
 
     Parameters
     ----------
-    item : Expression
-        The operation.
     names : Mapping[int, str]
         Variables of its operands, by their ids.
 
@@ -174,16 +165,5 @@ def spelt(item: Expression, names: Mapping[int, str]) -> str:
 
 
 def symbols_in(outputs: Sequence[Expression]) -> set[str]:
-    """Return the names of the symbols that the outputs depend on.
-
-    Parameters
-    ----------
-    outputs : sequence of Expression
-        The graph's ends.
-
-    Returns
-    -------
-    set of str
-        Symbol names.
-    """
+    """Return the names of the symbols that the outputs depend on."""
     return {str(item.value) for item in ordered(outputs) if item.operation == "symbol"}

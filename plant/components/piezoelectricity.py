@@ -44,11 +44,6 @@ class PoledCeramic:
 def compliance_matrix(c: PoledCeramic) -> Array:
     """Return the compliance at constant field, equations 9 and 11 with errata M11.
 
-    Parameters
-    ----------
-    c : PoledCeramic
-        The ceramic.
-
     Returns
     -------
     ndarray, shape (6, 6)
@@ -68,11 +63,6 @@ def compliance_matrix(c: PoledCeramic) -> Array:
 
 def charge_matrix(c: PoledCeramic) -> Array:
     """Return the piezoelectric constants, equation 12 with errata M12; equation 11 has the transposed matrix.
-
-    Parameters
-    ----------
-    c : PoledCeramic
-        The ceramic.
 
     Returns
     -------
@@ -94,8 +84,6 @@ def strain(stress: Array, field: Array, c: PoledCeramic) -> Array:
         T [Pa].
     field : ndarray, shape (3,)
         E [V/m].
-    c : PoledCeramic
-        The ceramic.
 
     Returns
     -------
@@ -119,8 +107,6 @@ def electric_displacement(stress: Array, field: Array, c: PoledCeramic) -> Array
         T [Pa].
     field : ndarray, shape (3,)
         E [V/m].
-    c : PoledCeramic
-        The ceramic.
 
     Returns
     -------

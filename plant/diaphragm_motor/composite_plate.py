@@ -177,11 +177,6 @@ def _bent(p: PlateParameters, pressure: float, volts: float) -> tuple[float, flo
 def plate_coefficients(p: PlateParameters) -> PlateCoefficients:
     """Return what a diaphragm gives its chamber, by composite thin-plate theory (Table 1, errata M14).
 
-    Parameters
-    ----------
-    p : PlateParameters
-        The diaphragm.
-
     Returns
     -------
     PlateCoefficients
@@ -200,11 +195,6 @@ def plate_coefficients(p: PlateParameters) -> PlateCoefficients:
 
 def clamped_plate_roots(count: int) -> list[tuple[int, int, float]]:
     """Return the lowest roots of a clamped round plate, ``J_n I_n' - J_n' I_n = 0`` at lambda (Source: Leissa 1969).
-
-    Parameters
-    ----------
-    count : int
-        How many.
 
     Returns
     -------
@@ -235,13 +225,6 @@ def plate_modes(p: PlateParameters, count: int = 6) -> list[PlateMode]:
 
     In place of the paper's finite-element figures; liquid lowers them all. Source: Leissa, Vibration of Plates (1969),
     section 2.1.
-
-    Parameters
-    ----------
-    p : PlateParameters
-        The diaphragm.
-    count : int
-        How many modes.
 
     Returns
     -------

@@ -52,11 +52,6 @@ class OperatingPoint:
 def pump_alone(parameters: DiaphragmMotorParameters) -> DiaphragmMotorParameters:
     """Return the motor with its pump running freely to tank, as its flow is measured (section 7.1).
 
-    Parameters
-    ----------
-    parameters : DiaphragmMotorParameters
-        The motor.
-
     Returns
     -------
     DiaphragmMotorParameters
@@ -106,8 +101,6 @@ def operate(
 
     Parameters
     ----------
-    parameters : DiaphragmMotorParameters
-        The motor.
     frequency : float
         Of the drive [Hz].
     peak_to_peak : float

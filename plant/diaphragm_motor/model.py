@@ -61,11 +61,6 @@ MotorRow = make_dataclass("MotorRow", [(name, float) for names in _NAMES.values(
 def motor_row(p: DiaphragmMotorParameters) -> Array:
     """Return the parameters as an array, in the order of `MotorRow` (Table 1, errata M22).
 
-    Parameters
-    ----------
-    p : DiaphragmMotorParameters
-        The motor.
-
     Returns
     -------
     ndarray, shape (parameters,)
@@ -150,8 +145,6 @@ def motor_derivative(state: State, rate: Scalar, p: Any) -> State:
         As named in `STATES`, in SI.
     rate : float or Expression
         Rate of the drive voltage [V/s]; the voltage itself acts through it alone.
-    p : DiaphragmMotorParameters or namespace of Expression
-        The motor.
 
     Returns
     -------
@@ -272,11 +265,6 @@ def _chambers_after(pressures: State, displaced: list[Scalar], p: Any) -> list[S
 def at_rest(p: Any) -> Array:
     """Return the state without drive at the tank's pressure, valves shut (section 2).
 
-    Parameters
-    ----------
-    p : DiaphragmMotorParameters
-        The motor.
-
     Returns
     -------
     ndarray, shape (28,)
@@ -301,8 +289,6 @@ def deflections(states: Array, voltage: Array, p: Any) -> Array:
         As named in `STATES`.
     voltage : ndarray, shape (n,)
         Drive of the first diaphragm [V].
-    p : DiaphragmMotorParameters
-        The motor.
 
     Returns
     -------

@@ -159,8 +159,6 @@ def run_motor(
 
     Parameters
     ----------
-    parameters : DiaphragmMotorParameters
-        The motor.
     voltage : ndarray, shape (n,)
         Drive of the first diaphragm at the samples [V], linear between.
     sample_time : float
@@ -195,8 +193,6 @@ def electrode_voltages(bent: Array, parameters: DiaphragmMotorParameters, sample
     ----------
     bent : ndarray, shape (n, 7)
         Deflections of the centres [m].
-    parameters : DiaphragmMotorParameters
-        The motor.
     sample_time : float
         Seconds between samples [s].
 

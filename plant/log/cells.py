@@ -17,11 +17,6 @@ MISSING = ("", "NaN", "nan", "-NaN", "-nan", "NA", "N/A", "n/a", "#N/A", "NULL",
 def number(text: str) -> float:
     """Return a cell of text as a number, NaN if it is empty or says that nothing was measured.
 
-    Parameters
-    ----------
-    text : str
-        The cell.
-
     Returns
     -------
     float
@@ -112,12 +107,5 @@ def not_a_number(source: str, name: str, row: int, value: object) -> LogError:
         The log and the column.
     row : int
         The row from 0; the sentence counts from 1, without the header.
-    value : object
-        What stands there.
-
-    Returns
-    -------
-    LogError
-        The error.
     """
     return LogError(f"column {name!r} must hold numbers, got {str(value)[:40]!r} in row {row + 1}", source)

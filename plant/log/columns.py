@@ -214,11 +214,6 @@ def check_columns(mapping: Mapping[str, str]) -> dict[str, str]:
     mapping : Mapping[str, str]
         ``{"position_m": "POS_MM:mm"}``.
 
-    Returns
-    -------
-    dict[str, str]
-        The same mapping.
-
     Raises
     ------
     RigError

@@ -79,8 +79,6 @@ def write_record(record: Record, path: str | Path) -> None:
 
     Parameters
     ----------
-    record : Record
-        What to write.
     path : str or Path
         Where to: the suffix says the format. An older file is replaced when the new one is complete.
 
@@ -110,11 +108,6 @@ def write_record(record: Record, path: str | Path) -> None:
 
 def sidecar(path: Path) -> Path:
     """Return the file beside a CSV that holds its metadata.
-
-    Parameters
-    ----------
-    path : Path
-        The CSV.
 
     Returns
     -------

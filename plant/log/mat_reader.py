@@ -68,11 +68,6 @@ class _Reader:
 def read_variables(content: bytes) -> dict[str, Value]:
     """Return the variables of a MAT file of version 5 to 7.
 
-    Parameters
-    ----------
-    content : bytes
-        The whole file.
-
     Returns
     -------
     dict[str, Value]

@@ -132,11 +132,6 @@ class Record:
         ----------
         **metadata : object
             JSON values by name.
-
-        Returns
-        -------
-        Record
-            The annotated record.
         """
         return Record(self.sample_time, self.channels, {**self.metadata, **metadata}, self.start_time)
 
@@ -147,11 +142,6 @@ class Record:
         ----------
         start, stop, step : int
             As in Python slicing, non-negative, ``step`` at least 1.
-
-        Returns
-        -------
-        Record
-            The part.
 
         Raises
         ------

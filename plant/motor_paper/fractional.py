@@ -23,8 +23,6 @@ def gl_weights(order: float, count: int) -> Array:
     ----------
     order : float
         Order a [dimensionless]; negative to integrate.
-    count : int
-        How many.
 
     Returns
     -------
@@ -80,11 +78,6 @@ def fractional_push(ring: Array, newest: int, sample: float) -> int:
         Place of the newest so far.
     sample : float
         The new one [any unit].
-
-    Returns
-    -------
-    int
-        Its place.
     """
     length = ring.shape[0] // 2
     newest = newest - 1 if newest > 0 else length - 1
@@ -226,11 +219,6 @@ def oustaloup_states(order: float, low_hz: float, high_hz: float, count: int = 5
         The band; two decades beyond what matters on either side for an error below one percent [Hz].
     count : int
         States, one pole and one zero each.
-
-    Returns
-    -------
-    FractionalStates
-        The linear system.
 
     Raises
     ------

@@ -201,11 +201,6 @@ def total_harmonic_distortion(lines: NDArray[np.complex128]) -> float:
 def linearised(p: HysteresisParameters) -> "control.TransferFunction":
     """Return the model for small voltages, ``k d (1 - alpha)/(m s^2 + b s + k)``, equation 20 linearised (errata M20).
 
-    Parameters
-    ----------
-    p : HysteresisParameters
-        The diaphragm.
-
     Returns
     -------
     control.TransferFunction

@@ -28,8 +28,6 @@ def band_limited_noise(rng: np.random.Generator, count: int, sample_time: float,
 
     Parameters
     ----------
-    rng : numpy.random.Generator
-        Its source.
     count : int
         Samples.
     sample_time : float
@@ -50,17 +48,10 @@ def relay(was_high: bool, error: float, width: float = 0.0) -> bool:
 
     Parameters
     ----------
-    was_high : bool
-        Whether it was.
     error : float
         What it listens to, in any unit.
     width : float
         It turns at plus and minus half of this [the error's unit].
-
-    Returns
-    -------
-    bool
-        Whether it is.
 
     Examples
     --------
@@ -131,10 +122,6 @@ def pid_step(pid: Pid, memory: PidMemory, error: float, sample_time: float) -> t
 
     Parameters
     ----------
-    pid : Pid
-        The controller.
-    memory : PidMemory
-        What it remembers.
     error : float
         Reference less measurement, in any unit.
     sample_time : float
@@ -211,11 +198,6 @@ def run_loop(
         Samples by which the command is late.
     noise : ndarray, shape (n,), optional
         Added to what is measured, in the output's unit.
-
-    Returns
-    -------
-    LoopRun
-        The run.
     """
     A, B, C, _, _ = cont2discrete(matrices, sample_time)
     n = reference.shape[0]

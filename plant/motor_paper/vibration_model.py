@@ -75,8 +75,6 @@ def reduced_stiffness(
 
     Parameters
     ----------
-    p : VibrationParameters
-        Springs.
     equation : {"mended", "printed", "printed_1_to_3"}
         With restoring springs; as equation 4 prints it; or as equations 1 to 3 as printed would give it.
 

@@ -84,8 +84,6 @@ def vibration_run(
 
     Parameters
     ----------
-    p : VibrationParameters
-        The model.
     force : ndarray, shape (n,)
         f of equation 1 [N].
     sample_time : float

@@ -92,8 +92,6 @@ def stages(states: Array, parameters: PiezoStackParameters) -> NDArray[np.int64]
     ----------
     states : ndarray, shape (n, 19)
         As named in `plant.piezo_stack.model.STATES`.
-    parameters : PiezoStackParameters
-        The actuator.
 
     Returns
     -------
@@ -115,8 +113,6 @@ def line_reynolds_numbers(states: Array, parameters: PiezoStackParameters) -> Ar
     ----------
     states : ndarray, shape (n, 19)
         As named in `plant.piezo_stack.model.STATES`.
-    parameters : PiezoStackParameters
-        The actuator.
 
     Returns
     -------

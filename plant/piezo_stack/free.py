@@ -31,8 +31,6 @@ def free_stack_derivative(state: State, voltage: Scalar, rate: Scalar, p: Any) -
         As named in `FREE_STATES`, in SI.
     voltage, rate : float or Expression
         Drive [V] and its rate [V/s].
-    p : PiezoStackParameters or namespace of Expression
-        The stack.
 
     Returns
     -------
@@ -56,8 +54,6 @@ def run_free_stack(parameters: PiezoStackParameters, voltage: Array, sample_time
 
     Parameters
     ----------
-    parameters : PiezoStackParameters
-        The stack.
     voltage : ndarray, shape (n,)
         Drive at the samples [V], linear between.
     sample_time : float
@@ -90,8 +86,6 @@ def stack_loop(
 
     Parameters
     ----------
-    parameters : PiezoStackParameters
-        The stack.
     frequency : float
         Of the drive [Hz].
     peak_to_peak : float

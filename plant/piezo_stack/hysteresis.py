@@ -16,8 +16,6 @@ def hysteresis_rate(rate: Scalar, hysteresis: Scalar, p: Any) -> Scalar:
         Rate of the drive [V/s].
     hysteresis : float or Expression
         Hysteresis h [m].
-    p : namespace of float or Expression
-        The stack.
 
     Returns
     -------

@@ -95,8 +95,6 @@ def volumes(displacement: Scalar, position: Scalar, p: StackValues) -> tuple[Sca
         Piston of the pump, x_p [m].
     position : float, ndarray or Expression
         Rod of the cylinder, from its start [m].
-    p : PiezoStackParameters or namespace
-        The actuator.
 
     Returns
     -------
@@ -116,8 +114,6 @@ def stack_pressures(state: State, p: StackValues) -> StackPressures:
     ----------
     state : tuple of float, ndarray or Expression
         As named in `STATES`, in SI.
-    p : PiezoStackParameters or namespace
-        The actuator.
 
     Returns
     -------
@@ -196,8 +192,6 @@ def stack_derivative(state: State, voltage: Scalar, rate: Scalar, p: StackValues
         Drive u [V].
     rate : float or Expression
         Its rate [V/s].
-    p : PiezoStackParameters or namespace of Expression
-        The actuator.
 
     Returns
     -------
@@ -246,8 +240,6 @@ def at_bias(p: StackValues, voltage: float = 0.0) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    p : PiezoStackParameters
-        The actuator.
     voltage : float
         Drive at the start [V]; the stack has settled to it, without hysteresis.
 

@@ -139,11 +139,6 @@ def least_port(p: PiezoStackParameters) -> float:
     An open reed at no pressure drop passes ``c_d w x sqrt(2/rho/eps)`` a pascal, which empties a stiff port at that
     rate times bulk modulus over volume. Too small a port gives flows that are finite and wrong.
 
-    Parameters
-    ----------
-    p : PiezoStackParameters
-        The actuator.
-
     Returns
     -------
     float

@@ -170,8 +170,6 @@ def simulate_stack(
 
     Parameters
     ----------
-    parameters : PiezoStackParameters
-        The actuator.
     voltage : ndarray, shape (n,)
         Drive at the samples [V], linear between.
     sample_time : float

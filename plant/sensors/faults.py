@@ -78,8 +78,6 @@ def with_fault(record: Record, fault: SensorFault, rng: np.random.Generator | No
     ----------
     record : Record
         A measured run.
-    fault : SensorFault
-        The fault.
     rng : numpy.random.Generator, optional
         Source of which samples drop out; needed for ``dropout`` only.
 

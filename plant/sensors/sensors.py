@@ -124,8 +124,6 @@ def measure(truth: Record, sensors: Sensors, rng: np.random.Generator, keep_trut
     truth : Record
         True ``motor_speed_rad_s``, ``position_m``, ``velocity_m_s``, and ``differential_pressure_pa`` where
         it is logged.
-    sensors : Sensors
-        The sensors.
     rng : numpy.random.Generator
         Parent of the channels' streams.
     keep_truth : bool
@@ -208,11 +206,6 @@ def noise_variances(sensors: Sensors) -> Mapping[str, float]:
     position's errors at both ends of the window; they are correlated from sample to sample, which a
     variance cannot say.
 
-    Parameters
-    ----------
-    sensors : Sensors
-        The sensors.
-
     Returns
     -------
     Mapping[str, float]
@@ -251,11 +244,6 @@ def drop_samples(
         Source of which samples.
     channels : sequence of str, optional
         The channels that drop out; all but the ``true_`` ones when not given.
-
-    Returns
-    -------
-    Record
-        The record with gaps.
 
     Raises
     ------

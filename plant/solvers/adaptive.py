@@ -63,10 +63,6 @@ def controlled_run(
 
     Parameters
     ----------
-    name : str
-        The plant's name.
-    control : ErrorControl
-        Its rates and sizes.
     starts : ndarray, shape (runs, states)
         Initial states in SI.
     speed : ndarray, shape (n,)
@@ -131,16 +127,12 @@ def controlled_trajectory(
 
     Parameters
     ----------
-    name : str
-        The plant's name.
     derivative : callable
         ``derivative(state, drive, parameters)``.
     start : ndarray, shape (states,)
         Initial state in SI.
     drive : ndarray, shape (n,)
         Drive at the samples [its SI unit], linear between.
-    parameters : dataclass
-        The plant's parameters.
     sample_time : float
         Seconds between samples [s].
     scales : ndarray, shape (states,)

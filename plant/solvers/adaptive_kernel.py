@@ -39,8 +39,6 @@ def rodas3_stages(
         State at the start [any unit].
     speeds : tuple of Expression
         Motor speed at the start and at the end of the step, and what it would gain at its first rate [rad/s].
-    p : namespace of Expression
-        The parameters.
     h : Expression
         Step size [s].
 

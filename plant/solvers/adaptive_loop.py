@@ -51,8 +51,6 @@ def run_controlled(
 
     Parameters
     ----------
-    kernel : ControlledKernel
-        Operations and sizes.
     initial : ndarray, shape (states, lanes)
         Initial states in SI.
     drive : ndarray, shape (n,)
@@ -129,8 +127,6 @@ def smooth(drive: Array, parameters: Array, begin: int, bend: float) -> tuple[in
         Drive at the samples [its SI unit].
     parameters : ndarray, shape (1 or n, lanes, parameters)
         Parameter rows; where they change, a piece ends.
-    begin : int
-        The sample.
     bend : float
         By how much it may leave the parabola [the drive's unit].
 
@@ -250,8 +246,6 @@ def largest(kernel: ControlledKernel, work: Array, place: int) -> float:
 
     Parameters
     ----------
-    kernel : ControlledKernel
-        Sizes.
     work : ndarray, shape (numbers,)
         All numbers.
     place : int
@@ -297,8 +291,6 @@ def keep(kernel: ControlledKernel, work: Array, place: int, states: Array, sampl
         Where the states stand.
     states : ndarray, shape (n, states, up to lanes)
         Room for them.
-    sample : int
-        The row.
     """
     count = states.shape[2]
     for i in range(kernel.WIDTH):

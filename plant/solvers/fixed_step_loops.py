@@ -88,8 +88,6 @@ def run_alone(
 
     Parameters
     ----------
-    kernel : RunKernel
-        Operations and sizes.
     initial : ndarray, shape (states,)
         Initial state in SI.
     drive : ndarray, shape (n,)
@@ -143,8 +141,6 @@ def run_side_by_side(
 
     Parameters
     ----------
-    kernel : LanesKernel
-        Operations and sizes.
     initial : ndarray, shape (states, lanes)
         Initial states in SI.
     drive : ndarray, shape (n, lanes)
@@ -188,12 +184,8 @@ def lay(kernel: SideBySide, work: Array, place: int, values: Array, count: int) 
 
     Parameters
     ----------
-    kernel : SideBySide
-        Sizes.
     work : ndarray, shape (numbers,)
         All numbers.
-    place : int
-        Where they stand.
     values : ndarray, shape (count or more, lanes)
         The numbers [any unit].
     count : int
@@ -209,12 +201,8 @@ def share(kernel: SideBySide, work: Array, place: int, values: Array | tuple[flo
 
     Parameters
     ----------
-    kernel : SideBySide
-        Sizes.
     work : ndarray, shape (numbers,)
         All numbers.
-    place : int
-        Where they stand.
     values : ndarray, shape (count,), or tuple of float
         The numbers [any unit].
     """

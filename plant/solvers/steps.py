@@ -47,16 +47,6 @@ _TAKEN = re.compile(r"[A-Za-z]_?\d+(_\d+)?|theta\d+|h|j|share|drive|rise|pace|u_
 def parameter_names(parameter_class: type[Parameters]) -> tuple[str, ...]:
     """Return the order of the columns of a parameter row.
 
-    Parameters
-    ----------
-    parameter_class : type
-        The parameters' dataclass.
-
-    Returns
-    -------
-    tuple of str
-        Its fields.
-
     Raises
     ------
     HydrostateError
@@ -71,11 +61,6 @@ def parameter_names(parameter_class: type[Parameters]) -> tuple[str, ...]:
 
 def parameter_symbols(parameter_class: type[Parameters]) -> SimpleNamespace:
     """Return a namespace with one symbol for each parameter of a plant.
-
-    Parameters
-    ----------
-    parameter_class : type
-        The parameters' dataclass.
 
     Returns
     -------
@@ -223,11 +208,6 @@ def rate_driven_step(derivative: RateDriven) -> StepFunction:
     ----------
     derivative : callable
         As ``derivative(state, drive, rate of the drive, parameters)``.
-
-    Returns
-    -------
-    StepFunction
-        The step.
     """
 
     def step(state: State, drives: tuple[Scalar, Scalar], p: object, h: Scalar) -> State:

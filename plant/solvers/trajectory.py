@@ -32,8 +32,6 @@ def trajectory(
 
     Parameters
     ----------
-    name : str
-        The plant's name.
     step : callable
         ``step(state, drives, parameters, h)``, written for symbols: of a plant's rates ``derivative(state, drive,
         parameters)`` take `plant.solvers.steps.ros2_step`, which is L-stable, or `plant.solvers.steps.rk4_step`.
@@ -41,8 +39,6 @@ def trajectory(
         Initial state in SI.
     drive : ndarray, shape (n,)
         Drive at the samples [its SI unit], linear between.
-    parameters : dataclass
-        The plant's parameters.
     sample_time : float
         Seconds between samples [s].
     longest_step : float
