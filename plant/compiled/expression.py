@@ -33,28 +33,40 @@ class Expression:
     value: float | str = 0.0
 
     def __add__(self, other: "Expression | Number") -> "Expression":
-        return _add(self, as_expression(other))
+        b = as_expression(other)
+        if self is ZERO:
+            return b
+        return self if b is ZERO else node("+", self, b)
 
     def __radd__(self, other: Number) -> "Expression":
-        return _add(as_expression(other), self)
+        return as_expression(other) + self
 
     def __sub__(self, other: "Expression | Number") -> "Expression":
-        return _subtract(self, as_expression(other))
+        b = as_expression(other)
+        if b is ZERO:
+            return self
+        return ZERO if self is b else node("-", self, b)
 
     def __rsub__(self, other: Number) -> "Expression":
-        return _subtract(as_expression(other), self)
+        return as_expression(other) - self
 
     def __mul__(self, other: "Expression | Number") -> "Expression":
-        return _multiply(self, as_expression(other))
+        b = as_expression(other)
+        if self is ZERO or b is ZERO:
+            return ZERO
+        if self is ONE:
+            return b
+        return self if b is ONE else node("*", self, b)
 
     def __rmul__(self, other: Number) -> "Expression":
-        return _multiply(as_expression(other), self)
+        return as_expression(other) * self
 
     def __truediv__(self, other: "Expression | Number") -> "Expression":
-        return _divide(self, as_expression(other))
+        b = as_expression(other)
+        return self if self is ZERO or b is ONE else node("/", self, b)
 
     def __rtruediv__(self, other: Number) -> "Expression":
-        return _divide(as_expression(other), self)
+        return as_expression(other) / self
 
     def __pow__(self, exponent: Number) -> "Expression":
         if exponent != int(exponent):
@@ -151,32 +163,6 @@ def as_expression(value: "Expression | Number") -> Expression:
 
 ZERO = constant(0.0)
 ONE = constant(1.0)
-
-
-def _add(a: Expression, b: Expression) -> Expression:
-    if a is ZERO:
-        return b
-    return a if b is ZERO else node("+", a, b)
-
-
-def _subtract(a: Expression, b: Expression) -> Expression:
-    if b is ZERO:
-        return a
-    return ZERO if a is b else node("-", a, b)
-
-
-def _multiply(a: Expression, b: Expression) -> Expression:
-    if a is ZERO or b is ZERO:
-        return ZERO
-    if a is ONE:
-        return b
-    return a if b is ONE else node("*", a, b)
-
-
-def _divide(a: Expression, b: Expression) -> Expression:
-    if a is ZERO or b is ONE:
-        return a
-    return node("/", a, b)
 
 
 def unary(operation: str, a: Expression) -> Expression:

@@ -69,18 +69,15 @@ def _written(module_name: str, source: str) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"{module_name}.py"
-        if not path.exists():
-            _write_whole(path, source)
+        return path if path.exists() else _whole(path, source)
     except OSError as error:
         logger.warning("kernels cannot be cached in %s (%s); compiling for this run only", folder, error.strerror)
-        path = Path(tempfile.mkdtemp(prefix="hydrostate-")) / f"{module_name}.py"
-        _write_whole(path, source)
-        return path
-    return path
+        return _whole(Path(tempfile.mkdtemp(prefix="hydrostate-")) / f"{module_name}.py", source)
 
 
-def _write_whole(path: Path, source: str) -> None:
+def _whole(path: Path, source: str) -> Path:
+    """Write a file that is there whole or not at all."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
     with os.fdopen(handle, "w", encoding="utf-8") as file:
         file.write(source)
-    Path(temporary).replace(path)
+    return Path(temporary).replace(path)

@@ -7,7 +7,7 @@ roots a step. Side by side runs fill the vectors by themselves.
 from collections.abc import Mapping
 
 from plant.compiled.expression import Expression, ordered
-from plant.compiled.source import spelt, symbols_in
+from plant.compiled.source import function_source, leaf, spelt
 
 PACKED: Mapping[str, str] = {"/": "ratios", "sqrt": "roots"}
 """Operations that are packed, and the functions of `plant.compiled.vector` that do it."""
@@ -59,12 +59,10 @@ def packed_source(name: str, outputs: Mapping[str, Expression]) -> str:
                 given = ", ".join(f"({', '.join(column)})" for column in columns)
                 lines.append(f"{', '.join(names[id(item)] for item in group)} = {function}({given})")
         for item in here:
-            if item.operation in ("symbol", "constant"):
-                names[id(item)] = str(item.value) if item.operation == "symbol" else repr(item.value)
+            if not item.arguments:
+                names[id(item)] = leaf(item)
             elif item.operation not in PACKED:
                 names[id(item)] = f"t{count}_"
                 count += 1
                 lines.append(f"{names[id(item)]} = {spelt(item, names)}")
-    given = ", ".join(f'"{output}": {names[id(value)]}' for output, value in outputs.items())
-    takes = ", ".join(sorted(symbols_in(list(outputs.values()))))
-    return "\n    ".join([f"def {name}({takes}):", *lines, f"return {{{given}}}"])
+    return function_source(name, outputs, lines, names)

@@ -7,21 +7,11 @@ from plant.compiled import intrinsics, vector
 from plant.compiled.expression import Expression, ordered
 
 _TEMPLATES: Mapping[str, str] = {
-    "+": "{0} + {1}",
-    "-": "{0} - {1}",
-    "*": "{0} * {1}",
-    "/": "{0} / {1}",
-    "<": "{0} < {1}",
-    "<=": "{0} <= {1}",
-    ">": "{0} > {1}",
-    ">=": "{0} >= {1}",
+    **{sign: f"{{0}} {sign} {{1}}" for sign in ("+", "-", "*", "/", "<", "<=", ">", ">=")},
+    **{name: f"math.{name}({{0}})" for name in ("sqrt", "exp", "log", "tanh")},
     "present": "{0} == {0}",
     "abs": "abs({0})",
     "sign": "(1.0 if {0} > 0.0 else (-1.0 if {0} < 0.0 else 0.0))",
-    "sqrt": "math.sqrt({0})",
-    "exp": "math.exp({0})",
-    "log": "math.log({0})",
-    "tanh": "math.tanh({0})",
     "where": "({1} if {0} else {2})",
 }
 """How each operation is spelt; a new one needs a line here and one in `expression.local_derivatives`."""
@@ -84,10 +74,8 @@ def _operations(
     """Return one line an operation; note the variable of each in `names`."""
     lines: list[str] = []
     for item in items:
-        if item.operation == "symbol":
-            names[id(item)] = str(item.value)
-        elif item.operation == "constant":
-            names[id(item)] = repr(item.value)
+        if not item.arguments:
+            names[id(item)] = leaf(item)
         else:
             operands = [names[id(argument)] for argument in item.arguments]
             # the underscore: Numba names a load of t7 at 2854 as it names one of t72 at 854
@@ -121,10 +109,24 @@ def lines_source(name: str, outputs: Mapping[str, Expression]) -> str:
         return {"x": t1_}
     """
     names: dict[int, str] = {}
-    lines = _operations(ordered(outputs.values()), names, "t", " " * 4, _CALLS)
+    return function_source(name, outputs, _operations(ordered(outputs.values()), names, "t", "", _CALLS), names)
+
+
+def function_source(
+    name: str, outputs: Mapping[str, Expression], lines: Sequence[str], names: Mapping[int, str]
+) -> str:
+    """Return lines as a function of the symbols in alphabetical order, which gives the outputs by name.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        Assignments, not indented.
+    names : Mapping[int, str]
+        Variables of the graph's nodes, by their ids.
+    """
     given = ", ".join(f'"{output}": {names[id(value)]}' for output, value in outputs.items())
     takes = ", ".join(sorted(symbols_in(list(outputs.values()))))
-    return "\n".join([f"def {name}({takes}):", *lines, f"    return {{{given}}}"])
+    return "\n    ".join([f"def {name}({takes}):", *lines, f"return {{{given}}}"])
 
 
 def operations_source(lines: Mapping[str, str], slots: Mapping[str, int], width: int) -> str:
@@ -146,6 +148,11 @@ def operations_source(lines: Mapping[str, str], slots: Mapping[str, int], width:
     """
     made = "\n".join(f"{name}_at = stepping(SLOTS, {width}, {name})" for name in lines)
     return "\n\n\n".join([*lines.values(), f"SLOTS = {dict(slots)}\n\n{made}"])
+
+
+def leaf(item: Expression) -> str:
+    """Return how a symbol or a constant is spelt."""
+    return str(item.value) if item.operation == "symbol" else repr(item.value)
 
 
 def spelt(item: Expression, names: Mapping[int, str]) -> str:

@@ -17,7 +17,7 @@ from pyarrow import csv as arrow_csv
 from plant.arrays import Array
 from plant.errors import LogError
 from plant.log.arrow import from_arrow, to_arrow
-from plant.log.cells import MISSING, not_a_number, number
+from plant.log.cells import MISSING, not_a_number, number, wrong_width
 from plant.log.columns import TRUTH, Column
 
 Choose = Callable[[Sequence[str]], Sequence[Column]]
@@ -150,11 +150,7 @@ def _read_cells(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Co
             rows = csv.reader(islice(text, layout.header_lines, None), delimiter=layout.delimiter)
             for row, values in enumerate(values for values in rows if values):
                 if len(values) != len(layout.names):
-                    raise LogError(
-                        f"every row must have {len(layout.names)} cells as the header has, "
-                        f"got {len(values)} in row {row + 1}",
-                        str(path),
-                    )
+                    raise wrong_width(str(path), len(layout.names), len(values), row)
                 for column in list(cells):
                     _append(cells, column, values[column.position], layout, path, row)
     except csv.Error as error:

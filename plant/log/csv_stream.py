@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.errors import LogError
-from plant.log.cells import not_a_number, number
+from plant.log.cells import not_a_number, number, wrong_width
 from plant.log.columns import TIME, TRUTH, Column, resolve_columns
 
 FIRST_ROWS = 50
@@ -60,10 +60,7 @@ class CsvStream:
         columns = [one for one in resolve_columns(names, mapping, source) if not one.channel.startswith(TRUTH)]
         time = [one for one in columns if one.channel == TIME]
         if not time:
-            raise LogError(
-                f"a column {TIME} is wanted, or in another unit as time_ms, got {', '.join(names)}",
-                source,
-            )
+            raise LogError(f"a column {TIME} is wanted, or in another unit as time_ms, got {', '.join(names)}", source)
         self._columns = time + [one for one in columns if one.channel != TIME]
         self.channels = tuple(one.channel for one in self._columns[1:])
         """Channels of the samples, in order."""
@@ -138,11 +135,7 @@ class CsvStream:
                 self.cut = True
                 return
             if len(cells) != self._width:
-                raise LogError(
-                    f"every row must have {self._width} cells as the header has, got {len(cells)} in "
-                    f"row {self._row + 1}",
-                    self._source,
-                )
+                raise wrong_width(self._source, self._width, len(cells), self._row)
             yield np.array([self._value(one, cells[one.position]) for one in self._columns])
             self._row += 1
 

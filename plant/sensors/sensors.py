@@ -1,7 +1,7 @@
 """Sensors: what a bench would have logged of a true run, with noise, quantisation and drop-outs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from math import isfinite
 from types import MappingProxyType
 from typing import Annotated, Any
@@ -84,17 +84,6 @@ class Sensors:
 BENCH = Sensors()
 """The sensors of the reference bench logs."""
 
-PAPER = Sensors(
-    speed_noise=0.0,
-    velocity_noise=1e-2,
-    pressure_noise=0.0,
-    pressure_quantum=0.0,
-    position_noise=1e-6,
-    position_quantum=0.0,
-    pressure=False,
-)
-"""As the paper's filter was set: R of equation 7.7, position and velocity measured, motor speed known."""
-
 IDEAL = Sensors(
     speed_noise=0.0,
     velocity_noise=0.0,
@@ -104,6 +93,9 @@ IDEAL = Sensors(
     position_quantum=0.0,
 )
 """Sensors that change nothing. Their variances are zero, which a filter cannot use."""
+
+PAPER = replace(IDEAL, velocity_noise=1e-2, position_noise=1e-6, pressure=False)
+"""As the paper's filter was set: R of equation 7.7, position and velocity measured, motor speed known."""
 
 RIG = Sensors(velocity_from_position=True)
 """The paper's rig, section 2: an optical encoder, its position differentiated, and pressure transducers; noise as on
