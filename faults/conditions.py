@@ -1,7 +1,7 @@
 """The nine conditions of Table 1 as changes of parameters, and the same two axes as continuous severity."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from math import isfinite
 from types import MappingProxyType
 from typing import Annotated, Literal, TypeAlias, get_args
@@ -39,6 +39,10 @@ class FrictionLevel:
     friction_linear: Annotated[float, SI("N s/m", "linear friction a_2", "Table 4, errata E12")]
     friction_coulomb: Annotated[float, SI("N", "Coulomb friction a_3", "Table 4")]
 
+
+LEAKAGE_COEFFICIENTS = tuple(field.name for field in fields(LeakageLevel))
+FRICTION_COEFFICIENTS = tuple(field.name for field in fields(FrictionLevel))
+"""What leakage and friction change."""
 
 LEAKAGE_TABLE: Mapping[Level, LeakageLevel] = {
     "none": LeakageLevel(leakage_coefficient=4.784e-12, flow_bias=2.413e-6),

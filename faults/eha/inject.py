@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from faults.conditions import FRICTION_COEFFICIENTS, LEAKAGE_COEFFICIENTS
 from plant.eha.model import EhaParameters
 from plant.eha.parameter_path import ParameterPath
 from plant.errors import HydrostateError
@@ -123,14 +124,8 @@ def spread(
     for name, width in (("leakage", leakage), ("friction", friction), ("bulk_modulus", bulk_modulus)):
         if not 0.0 <= width < 1.0:
             raise HydrostateError(f"{name} spread must be at least 0 and below 1, got {width!r}")
-    widths = {
-        "leakage_coefficient": leakage,
-        "flow_bias": leakage,
-        "friction_quadratic": friction,
-        "friction_linear": friction,
-        "friction_coulomb": friction,
-        "bulk_modulus": bulk_modulus,
-    }
+    leaking, rubbing = dict.fromkeys(LEAKAGE_COEFFICIENTS, leakage), dict.fromkeys(FRICTION_COEFFICIENTS, friction)
+    widths = {**leaking, **rubbing, "bulk_modulus": bulk_modulus}
     draws = rng.uniform(-1.0, 1.0, len(widths))
     changes = {
         name: getattr(parameters, name) * (1.0 + width * float(draw))

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from estimation.trust.identifiability import SENSED
+from faults.conditions import FRICTION_COEFFICIENTS, LEAKAGE_COEFFICIENTS
 from faults.eha.bank import mathematical_bank, predict_run
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -40,11 +41,7 @@ FAULTS: Mapping[str, str] = {
 
 SPREAD: Mapping[str, float] = {
     "bulk_modulus": 0.2,
-    "leakage_coefficient": 0.1,
-    "flow_bias": 0.1,
-    "friction_quadratic": 0.1,
-    "friction_linear": 0.1,
-    "friction_coulomb": 0.1,
+    **dict.fromkeys((*LEAKAGE_COEFFICIENTS, *FRICTION_COEFFICIENTS), 0.1),
 }
 """Relative standard deviations within a class [fraction]."""
 

@@ -63,12 +63,7 @@ class Sensors:
     position_noise: Annotated[float, SI("m", "position noise", BENCH_NOTES)] = 0.0
     position_quantum: Annotated[float, SI("m", "position quantum", BENCH_NOTES)] = 1e-6
     velocity_window: Annotated[
-        float,
-        SI(
-            "s",
-            "span over which position is differentiated",
-            "judged: 0.08 mm/s of noise from a 1 um encoder",
-        ),
+        float, SI("s", "span over which position is differentiated", "judged: 0.08 mm/s of noise from a 1 um encoder")
     ] = 5e-3
     velocity_from_position: Annotated[
         bool, SI("1", "velocity is differentiated position, not a sensor of its own", "section 2")

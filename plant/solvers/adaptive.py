@@ -120,8 +120,6 @@ def controlled_trajectory(
     *,
     scales: Array,
     drive_scale: float,
-    tolerance: float = TOLERANCE,
-    shortest: float | None = None,
 ) -> Array:
     """Run any plant along a drive in steps of controlled error, L-stable: for what is stiff, or sticks and slips.
 
@@ -139,10 +137,6 @@ def controlled_trajectory(
         Size of each state that errors are relative to [its SI unit].
     drive_scale : float
         Size of the drive [its SI unit].
-    tolerance : float
-        Error of a step relative to the states' sizes [dimensionless].
-    shortest : float, optional
-        Step that is taken whatever its error; a thousandth of a sample time if not given [s].
 
     Returns
     -------
@@ -167,11 +161,8 @@ def controlled_trajectory(
     >>> states[[0, 50, 100], 0].round(4).tolist()
     [0.0, 0.6321, 0.8647]
     """
-    least = 1e-3 * sample_time if shortest is None else shortest
-    control = ErrorControl(derivative, lambda _: scales, lambda _: drive_scale, lambda _: least)
+    control = ErrorControl(derivative, lambda _: scales, lambda _: drive_scale, lambda _: 1e-3 * sample_time)
     row = parameter_row(parameters)[None, None]
-    (states,) = controlled_run(
-        name, control, start[None], drive, row, sample_time, type(parameters), tolerance=tolerance
-    )
+    (states,) = controlled_run(name, control, start[None], drive, row, sample_time, type(parameters))
     require_finite(states, sample_time, name)
     return states

@@ -59,12 +59,9 @@ def rodas3_stages(
     ahead = tuple(x + 2.0 * a for x, a in zip(state, u1, strict=True))
     u3 = solve_linear(matrix, [f + scale * (a - b) for f, a, b in zip(derivative(ahead, end, p), u1, u2, strict=True)])
     nearly = tuple(x + c for x, c in zip(ahead, u3, strict=True))
+    last = derivative(nearly, end, p)
     u4 = solve_linear(
-        matrix,
-        [
-            f + scale * (a - b - 8.0 / 3.0 * c)
-            for f, a, b, c in zip(derivative(nearly, end, p), u1, u2, u3, strict=True)
-        ],
+        matrix, [f + scale * (a - b - 8.0 / 3.0 * c) for f, a, b, c in zip(last, u1, u2, u3, strict=True)]
     )
     return [[as_expression(u) for u in stage] for stage in (u1, u2, u3, u4)]
 
