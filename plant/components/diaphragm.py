@@ -4,12 +4,7 @@ from plant.compiled.functions import Scalar, exp, log
 
 
 def chamber_compliance(
-    pressure: Scalar,
-    diaphragm: Scalar,
-    liquid: Scalar,
-    gas: Scalar,
-    exponent: Scalar,
-    rest_pressure: Scalar,
+    pressure: Scalar, diaphragm: Scalar, liquid: Scalar, gas: Scalar, exponent: Scalar, rest_pressure: Scalar
 ) -> Scalar:
     """Return the volume that a chamber takes in a pascal: diaphragm, liquid and entrapped gas side by side.
 

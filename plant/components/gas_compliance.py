@@ -5,11 +5,7 @@ from plant.components.oil import ATMOSPHERE, NUCLEI
 
 
 def compliant_oil_pressure(
-    amount: Scalar,
-    volume: Scalar,
-    compliance: Scalar,
-    rest_pressure: Scalar,
-    oil: tuple[Scalar, Scalar, Scalar],
+    amount: Scalar, volume: Scalar, compliance: Scalar, rest_pressure: Scalar, oil: tuple[Scalar, Scalar, Scalar]
 ) -> Scalar:
     """Return the absolute pressure of oil in a volume that grows by the compliance times the pressure above rest.
 

@@ -6,13 +6,7 @@ PI = 3.141592653589793
 
 
 def line_flow_rate(
-    drop: Scalar,
-    flow: Scalar,
-    length: Scalar,
-    area: Scalar,
-    density: Scalar,
-    viscosity: Scalar,
-    minor_losses: Scalar,
+    drop: Scalar, flow: Scalar, length: Scalar, area: Scalar, density: Scalar, viscosity: Scalar, minor_losses: Scalar
 ) -> Scalar:
     """Return the rate of a line's flow, equations 17 and 19 to 21 of the piezo-stack paper (errata P10, P12).
 

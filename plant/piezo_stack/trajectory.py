@@ -35,11 +35,7 @@ def stack_row(parameters: StackValues) -> Array:
 
 
 def run_stack(
-    parameters: StackValues,
-    voltage: Array,
-    sample_time: float,
-    *,
-    longest_step: float = LONGEST_STEP,
+    parameters: StackValues, voltage: Array, sample_time: float, *, longest_step: float = LONGEST_STEP
 ) -> Array:
     """Return the states of a run from rest at the bias pressure, by classical Runge-Kutta steps (equations 1 to 22).
 
@@ -70,11 +66,7 @@ def run_stack(
 
 
 def run_stacks(
-    parameters: Sequence[StackValues],
-    voltages: Array,
-    sample_time: float,
-    *,
-    longest_step: float = LONGEST_STEP,
+    parameters: Sequence[StackValues], voltages: Array, sample_time: float, *, longest_step: float = LONGEST_STEP
 ) -> Iterator[Array]:
     """Run several actuators from rest at their bias, eight side by side: each as `run_stack`, to the bit.
 
