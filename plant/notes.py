@@ -7,7 +7,6 @@ Programs decide by code and data alone; no sentence is read back.
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from types import MappingProxyType
 from typing import Any
 
 
@@ -41,7 +40,7 @@ class Code(StrEnum):
         **data : float, int, str, bool or None
             What the template's fields are filled with, in SI where the template does not say otherwise.
         """
-        return Note(self, MappingProxyType(data))
+        return Note(self, data)
 
 
 @dataclass(frozen=True)
@@ -57,13 +56,10 @@ class Note:
     """
 
     code: Code
-    data: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    data: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def __str__(self) -> str:
         return self.code.template.format(**self.data)
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return _note, (self.code, dict(self.data))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the note for JSON.
@@ -74,10 +70,6 @@ class Note:
             ``code``, ``data`` and ``text``, the sentence.
         """
         return {"code": self.code.value, "data": dict(self.data), "text": str(self)}
-
-
-def _note(code: Code, data: Mapping[str, Any]) -> Note:
-    return Note(code, MappingProxyType(dict(data)))
 
 
 def distinct(notes: Iterable[Note]) -> tuple[Note, ...]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from functools import cache
 from math import isfinite
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 
 from plant.errors import RigError
 
@@ -70,8 +70,7 @@ def notes(parameter_class: type) -> Mapping[str, SI]:
     found: dict[str, SI] = {}
     for field in fields(parameter_class):
         hint = hints[field.name]
-        extras = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
-        note = next((extra for extra in extras if isinstance(extra, SI)), None)
+        note = next((extra for extra in get_args(hint) if isinstance(extra, SI)), None)
         if note is None:
             raise TypeError(f"{parameter_class.__name__}.{field.name} must carry an SI note, got {hint}")
         found[field.name] = note
