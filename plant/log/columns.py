@@ -280,8 +280,6 @@ def converted(raw: Mapping[Column, NDArray[np.float64]]) -> dict[str, NDArray[np
         Values in SI by channel.
     """
     return {
-        column.channel: values
-        if (column.factor, column.offset) == (1.0, 0.0)
-        else values * column.factor + column.offset
-        for column, values in raw.items()
+        of.channel: values if (of.factor, of.offset) == (1.0, 0.0) else values * of.factor + of.offset
+        for of, values in raw.items()
     }
