@@ -62,7 +62,7 @@ class MotorFault:
         value = getattr(healthy, self.parameter)
         if self.place:
             faulty = changed(value, self.place, self.change(value[self.place - 1], severity))
-        elif isinstance(value, tuple):
+        elif self.parameter in ROWS:
             faulty = tuple(self.change(one, severity) for one in value)
         else:
             faulty = self.change(value, severity)

@@ -22,6 +22,25 @@ Memory: TypeAlias = tuple[Array, ...]
 """The interval under way, clock, last intervals, information, moments and coefficients of the balances, their scores,
 counted peaks, and the last blocks' scores and gains."""
 
+Setting: TypeAlias = tuple[float, float, float, float, float, float]
+"""By what a balance fades in an interval, the score's memory [blocks], false alarms a block, and what speed, the
+piston's way in a sample and pressure are relative to."""
+
+Sizes: TypeAlias = tuple[int, int, int, int]
+"""Samples an interval; blocks to settle, to learn, and until scores count again."""
+
+ALLOWANCE = 0.5
+"""What a block's score must exceed for the CUSUM to rise [standard deviations]."""
+
+LARGEST_SCORE = 8.0
+"""Cap of a block's score [standard deviations]: no single block decides."""
+
+LEVEL = 0.02
+"""Distance of the levels at which peaks are counted [standard deviations]."""
+
+MOVING = 0.05
+"""Share of rated speed below which the actuator is at rest, and nothing is learnt or judged [fraction]."""
+
 INTERVALS = 10
 """Intervals a block."""
 
@@ -41,10 +60,11 @@ REFRESHED = 200
 """Blocks from one look at the thresholds to the next."""
 
 
-def advance(rows: Array, first: int, setting: Array, sizes: Array, memory: Memory) -> tuple[int, int]:
+def advance(rows: Array, first: int, setting: Setting, sizes: Sizes, memory: Memory) -> tuple[int, int]:
     """Take samples from `first` on, up to the end of them or of a block with news; return where, and the news."""
     partial, clock, lags, information, moment, found, score, _, _, gains = memory
-    samples, intervals = int(sizes[0]), int(sizes[2])
+    fade, _, _, rated_speed, rated_step, relief = setting
+    samples, _, _, _ = sizes
     features, target, factor = np.empty((2, FEATURES)), np.empty(score.shape[0]), np.empty((FEATURES, FEATURES))
     for k in range(first, rows.shape[0]):
         partial[0] += 1.0
@@ -52,24 +72,24 @@ def advance(rows: Array, first: int, setting: Array, sizes: Array, memory: Memor
         partial[2] += rows[k, 2]
         if partial[0] < samples:
             continue
-        w = partial[1] / (samples * setting[7])
-        p = partial[2] / (samples * setting[9])
-        v = (rows[k, 1] - partial[3]) / (samples * setting[8])
+        w = partial[1] / (samples * rated_speed)
+        p = partial[2] / (samples * relief)
+        v = (rows[k, 1] - partial[3]) / (samples * rated_step)
         partial[0] = partial[1] = partial[2] = 0.0
         partial[3] = rows[k, 1]
         sound = math.isfinite(w) and math.isfinite(v) and math.isfinite(p)
         partial[4] = partial[4] + 1.0 if sound else 0.0
         if sound:
             regress(w, v, p, lags, features, target)
-            if partial[4] > 3.0 and abs(w) + abs(lags[2]) + abs(v) > setting[5]:
+            if partial[4] > 3.0 and abs(w) + abs(lags[2]) + abs(v) > MOVING:
                 partial[5] += 1.0
                 for c in range(score.shape[0]):
-                    error = learn(c, features, target, setting[0], information, moment, found)
+                    error = learn(c, features, target, fade, information, moment, found)
                     score[c, SQUARES] += error * error
                 count_gains(w, v, p, int(clock[0]) % gains.shape[0], gains)
             shift(w, v, p, lags)
         partial[6] += 1.0
-        if partial[6] < intervals:
+        if partial[6] < INTERVALS:
             continue
         news = end_block(setting, sizes, memory, factor)
         if news != NOTHING:
@@ -77,15 +97,17 @@ def advance(rows: Array, first: int, setting: Array, sizes: Array, memory: Memor
     return rows.shape[0], NOTHING
 
 
-def end_block(setting: Array, sizes: Array, memory: Memory, factor: Array) -> int:
+def end_block(setting: Setting, sizes: Sizes, memory: Memory, factor: Array) -> int:
     """Judge a whole block; return what it says."""
     partial, clock, _, information, moment, found, score, peaks, scores, gains = memory
-    usable, recent, learning, resume = partial[5], scores.shape[1], sizes[4], sizes[5]
+    _, settle, learning, resume = sizes
+    _, score_memory, false_alarms, _, _, _ = setting
+    usable, recent = partial[5], scores.shape[1]
     partial[5] = partial[6] = 0.0
     place = int(clock[0]) % recent
     clock[0] += 1.0
     gains[int(clock[0]) % recent, :] = 0.0
-    if 2.0 * usable < sizes[2]:
+    if 2.0 * usable < INTERVALS:
         scores[:, place] = np.nan
         score[:, SQUARES] = 0.0
         return NOTHING
@@ -96,7 +118,7 @@ def end_block(setting: Array, sizes: Array, memory: Memory, factor: Array) -> in
         value = math.log(score[c, SQUARES] / usable + 1e-30)
         score[c, SQUARES] = 0.0
         solve(information[c], moment[c], found[c], factor)
-        scores[c, place] = judge(value, since, setting, sizes, score[c], peaks[c])
+        scores[c, place] = judge(value, since, score_memory, settle, resume, score[c], peaks[c])
         if (
             score[c, SUM] > score[c, THRESHOLD]
             and clock[1] > learning
@@ -107,8 +129,8 @@ def end_block(setting: Array, sizes: Array, memory: Memory, factor: Array) -> in
         clock[3] += 1.0
     if clock[1] >= learning and (int(clock[1]) % REFRESHED == 0 or clock[1] == learning):
         for c in range(score.shape[0]):
-            expected = setting[6] * clock[3] / score.shape[0]
-            score[c, THRESHOLD] = threshold(peaks[c, :-1], peaks[c, peaks.shape[1] - 1], setting[4], expected)
+            expected = false_alarms * clock[3] / score.shape[0]
+            score[c, THRESHOLD] = threshold(peaks[c, :-1], peaks[c, peaks.shape[1] - 1], LEVEL, expected)
         if clock[1] == learning:
             score[:, SUM : PEAK + 1] = 0.0
             return READY
@@ -117,17 +139,18 @@ def end_block(setting: Array, sizes: Array, memory: Memory, factor: Array) -> in
     return news
 
 
-def judge(value: float, since: float, setting: Array, sizes: Array, score: Array, peaks: Array) -> float:
+def judge(
+    value: float, since: float, score_memory: float, settle: int, resume: int, score: Array, peaks: Array
+) -> float:
     """Return a block's standardised score, 0 while it is learnt what is usual; add it to the CUSUM."""
-    settle, resume = sizes[3], sizes[5]
     if since <= settle:
         return 0.0
     away, u = value - score[MEAN], 0.0
     if since > 2.0 * settle:
-        u = min(away / math.sqrt(score[VARIANCE] + 1e-12), setting[3])
+        u = min(away / math.sqrt(score[VARIANCE] + 1e-12), LARGEST_SCORE)
         if since > resume:
-            accumulate(score, peaks, u, setting[2], setting[4])
-    standardise(score, away, setting[1])
+            accumulate(score, peaks, u, ALLOWANCE, LEVEL)
+    standardise(score, away, score_memory)
     return u
 
 
@@ -147,7 +170,8 @@ def watch_kernel() -> ModuleType:
     named = ("MEAN", "VARIANCE", "COUNT", "SUM", "PEAK", "THRESHOLD", "SQUARES")
     constants = {name: getattr(cusum, name) for name in named}
     constants |= {"FEATURES": FEATURES, "BENT": balances.BENT}
-    constants |= {"NOTHING": NOTHING, "READY": READY, "REFRESHED": REFRESHED}
+    constants |= {"NOTHING": NOTHING, "READY": READY, "REFRESHED": REFRESHED, "INTERVALS": INTERVALS}
+    constants |= {"ALLOWANCE": ALLOWANCE, "LARGEST_SCORE": LARGEST_SCORE, "LEVEL": LEVEL, "MOVING": MOVING}
     parts = (regress, shift, learn, count_gains, solve, accumulate, standardise, judge, end_block)
     small = pasted(*parts, constants=constants, options=BORROWING)
     large = pasted(threshold, advance, begin_again)

@@ -40,18 +40,6 @@ SCORE_MEMORY = 60.0
 SETTLE = 10.0
 """What the balances learn from before their innovations count, and then before their deviation does [s]."""
 
-ALLOWANCE = 0.5
-"""What a block's score must exceed for the CUSUM to rise [standard deviations]."""
-
-LARGEST_SCORE = 8.0
-"""Cap of a block's score [standard deviations]: no single block decides."""
-
-LEVEL = 0.02
-"""Distance of the levels at which peaks are counted [standard deviations]."""
-
-MOVING = 0.05
-"""Share of rated speed below which the actuator is at rest, and nothing is learnt or judged [fraction]."""
-
 LEARNING = 120.0
 """Healthy running before alarms can be raised [s]."""
 
@@ -115,24 +103,11 @@ class Watch:
         """Samples a block."""
         duration = self.block * sample_time
         rated_velocity = parameters.pump_displacement * parameters.rated_speed / parameters.piston_area
-        self._setting = np.array(
-            [
-                exp(-samples * sample_time / MEMORY),
-                SCORE_MEMORY / duration,
-                ALLOWANCE,
-                LARGEST_SCORE,
-                LEVEL,
-                MOVING,
-                false_alarms * duration / 3600.0,
-                parameters.rated_speed,
-                rated_velocity * sample_time,
-                parameters.relief_pressure,
-            ]
-        )
+        scales = parameters.rated_speed, rated_velocity * sample_time, parameters.relief_pressure
+        fade = exp(-samples * sample_time / MEMORY)
+        self._setting = fade, SCORE_MEMORY / duration, false_alarms * duration / 3600.0, *scales
         settle = round(SETTLE / duration)
-        self._sizes = np.array(
-            [samples, len(self.balances), INTERVALS, settle, round(learning / duration), 3 * settle], dtype=np.float64
-        )
+        self._sizes = samples, settle, round(learning / duration), 3 * settle
         wide = len(self.balances)
         balance = (FEATURES, FEATURES), (FEATURES,), (FEATURES,)
         of_each = [np.zeros((wide, *shape)) for shape in (*balance, (SCORE,), (LEVELS + 1,), (RECENT,))]
