@@ -13,10 +13,6 @@ def confusion_matrix(true: Sequence[str], found: Sequence[str], names: Collectio
 
     Parameters
     ----------
-    true : sequence of str
-        True condition of each run.
-    found : sequence of str
-        Condition that was found.
     names : collection of str
         All conditions; those of Table 1 if not given.
 

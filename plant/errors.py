@@ -86,11 +86,6 @@ def require_known(
 ) -> None:
     """Refuse a name that is not among those known.
 
-    Parameters
-    ----------
-    known : iterable of str
-        Those that there are.
-
     Raises
     ------
     HydrostateError
@@ -103,11 +98,6 @@ def require_known(
 
 def require_each_known(what: str, names: Sequence[str], known: Sequence[str]) -> None:
     """Refuse names of which one is not among those known, or comes twice.
-
-    Parameters
-    ----------
-    known : sequence of str
-        Those that there are.
 
     Raises
     ------

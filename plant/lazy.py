@@ -15,11 +15,6 @@ def lazily(package: str, file: str) -> Callable[[str], Any]:
     ----------
     file : str
         Its ``__file__``, in which every such import reads ``from package.module import name as name``.
-
-    Returns
-    -------
-    callable
-        From a name to what it stands for.
     """
 
     @cache

@@ -49,8 +49,6 @@ class Note:
 
     Parameters
     ----------
-    code : Code
-        What kind of thing.
     data : Mapping[str, float | int | str | bool | None]
         Its numbers and names, by the fields of the code's template.
     """

@@ -77,8 +77,6 @@ def require_positive(name: str, value: float, unit: str) -> None:
 
     Parameters
     ----------
-    name : str
-        What it is called in the message.
     value : float
         The number [in the unit given].
     unit : str
@@ -98,8 +96,6 @@ def require_frequency(name: str, value: float, sample_time: float) -> None:
 
     Parameters
     ----------
-    name : str
-        What it is called in the message.
     value : float
         Frequency [Hz].
     sample_time : float

@@ -82,14 +82,8 @@ def require_number(name: str, value: object, *, signed: bool = False, zero: bool
 
     Parameters
     ----------
-    name : str
-        What it is called in the message.
     value : object
         Its value [its own unit].
-    signed : bool
-        Whether it may be negative.
-    zero : bool
-        Whether it may be zero.
 
     Raises
     ------

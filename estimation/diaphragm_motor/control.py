@@ -149,12 +149,8 @@ def controlled_run(
         Of the drive [Hz].
     maps : MotorMaps
         Of the healthy motor at this frequency, for self-sensing.
-    rng : numpy.random.Generator
-        Source of sensor noise.
     controller : VelocityController, optional
         Gains; those of the class if not given.
-    sensing : {"encoder", "self"}
-        Where the velocity comes from.
 
     Raises
     ------

@@ -45,12 +45,6 @@ class MotorEstimate:
         Chi-square of the electrodes' pattern over its degrees of freedom [dimensionless].
     pattern_holds : bool
         Whether the pump is healthy but for gas, so that the maps hold.
-    drive : Drive
-        The sine that the log was taken under.
-    track : MotorTrack
-        Leakage and load over time.
-    parameters : DiaphragmMotorParameters
-        The motor with the estimates in it.
     """
 
     values: Mapping[str, float]

@@ -38,8 +38,6 @@ class MotorMaps:
 
     Parameters
     ----------
-    motor : DiaphragmMotorParameters
-        The motor that was run.
     frequencies : ndarray, shape (f,)
         Drive frequencies [Hz], rising.
     swings : ndarray, shape (v,)
@@ -183,8 +181,6 @@ def average_run(
     ----------
     maps : MotorMaps
         Of the healthy motor, or any other.
-    p : DiaphragmMotorParameters
-        The cylinder and its load.
     frequency : float
         Of the drive [Hz].
     swing : ndarray, shape (n,)

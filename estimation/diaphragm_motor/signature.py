@@ -77,8 +77,6 @@ class Signature:
 
     Parameters
     ----------
-    drive : Drive
-        The sine that it was taken under.
     values : ndarray, shape (29,)
         Fundamentals' real and imaginary parts, second harmonics' likewise [V], mean velocity [m/s].
     covariance : ndarray, shape (29, 29)

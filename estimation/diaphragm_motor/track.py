@@ -191,8 +191,6 @@ def track_leakage(
 
     Parameters
     ----------
-    blocks : sequence of Block
-        What the log shows.
     maps : HealthyMaps
         What its pump delivers.
     trust : float

@@ -79,8 +79,6 @@ class MotorDiagnosis:
     ----------
     matches : tuple of Match
         Every hypothesis, the most probable first.
-    unknown : bool
-        Whether none of them fits.
     freedom : int
         Degrees of freedom of the best one's chi-square.
     signature : Signature
@@ -179,13 +177,6 @@ def diagnose_motor(
 
 def diagnose_signature(seen: Signature, healthy: DiaphragmMotorParameters) -> MotorDiagnosis:
     """Lay a signature beside every fault's curve (`diagnose_motor`).
-
-    Parameters
-    ----------
-    seen : Signature
-        What the log shows.
-    healthy : DiaphragmMotorParameters
-        The motor as it should be.
 
     Returns
     -------

@@ -32,8 +32,6 @@ class MotorFault:
         The same without its place: ``valve_leak``.
     change : callable
         How, from the healthy value and the severity.
-    meaning : str
-        What the severity is.
     severities : tuple of float
         Rising severities at which the fault's signature is computed [the fault's unit]; 0 is healthy.
     place : int

@@ -34,11 +34,6 @@ def mathematical_bank(rig: EhaParameters) -> Mapping[str, EhaParameters]:
     ----------
     rig : EhaParameters
         The healthy actuator.
-
-    Returns
-    -------
-    Mapping[str, EhaParameters]
-        Parameters by condition name.
     """
     return MappingProxyType({name: parameters_for(condition, rig) for name, condition in CONDITIONS.items()})
 
@@ -78,12 +73,8 @@ def identification_run(
     ----------
     rig : EhaParameters
         The healthy actuator.
-    condition : Condition
-        The condition it is in.
     rng : numpy.random.Generator
         Source of the drive and of sensor noise.
-    sensors : Sensors
-        What the bench sees.
     duration : float
         Length of the test [s].
 

@@ -15,8 +15,6 @@ def abrupt(base: EhaParameters, faulty: EhaParameters, at: float) -> ParameterPa
 
     Parameters
     ----------
-    base, faulty : EhaParameters
-        The actuator before and after.
     at : float
         Time of the jump [s], positive.
 
@@ -47,8 +45,6 @@ def growing(base: EhaParameters, faulty: EhaParameters, start: float, end: float
 
     Parameters
     ----------
-    base, faulty : EhaParameters
-        The actuator before and after.
     start, end : float
         Times at which the change begins and is complete [s].
 

@@ -64,8 +64,6 @@ def diagnose_stack(
         A run that began at rest.
     healthy : PiezoStackParameters
         The actuator as it should be, at the run's bias pressure and load.
-    channels : tuple of str
-        What is used of what is logged.
 
     Returns
     -------

@@ -22,11 +22,11 @@ Memory: TypeAlias = tuple[Array, ...]
 """The interval under way, clock, last intervals, information, moments and coefficients of the balances, their scores,
 counted peaks, and the last blocks' scores and gains."""
 
-Setting: TypeAlias = tuple[float, float, float, float, float, float]
+WatchSetting: TypeAlias = tuple[float, float, float, float, float, float]
 """By what a balance fades in an interval, the score's memory [blocks], false alarms a block, and what speed, the
 piston's way in a sample and pressure are relative to."""
 
-Sizes: TypeAlias = tuple[int, int, int, int]
+WatchSizes: TypeAlias = tuple[int, int, int, int]
 """Samples an interval; blocks to settle, to learn, and until scores count again."""
 
 ALLOWANCE = 0.5
@@ -60,7 +60,7 @@ REFRESHED = 200
 """Blocks from one look at the thresholds to the next."""
 
 
-def advance(rows: Array, first: int, setting: Setting, sizes: Sizes, memory: Memory) -> tuple[int, int]:
+def advance(rows: Array, first: int, setting: WatchSetting, sizes: WatchSizes, memory: Memory) -> tuple[int, int]:
     """Take samples from `first` on, up to the end of them or of a block with news; return where, and the news."""
     partial, clock, lags, information, moment, found, score, _, _, gains = memory
     fade, _, _, rated_speed, rated_step, relief = setting
@@ -97,7 +97,7 @@ def advance(rows: Array, first: int, setting: Setting, sizes: Sizes, memory: Mem
     return rows.shape[0], NOTHING
 
 
-def end_block(setting: Setting, sizes: Sizes, memory: Memory, factor: Array) -> int:
+def end_block(setting: WatchSetting, sizes: WatchSizes, memory: Memory, factor: Array) -> int:
     """Judge a whole block; return what it says."""
     partial, clock, _, information, moment, found, score, peaks, scores, gains = memory
     _, settle, learning, resume = sizes

@@ -65,8 +65,6 @@ class Watch:
         The actuator; what it contributes are sizes, the balances are learnt.
     sample_time : float
         Time between samples [s].
-    pressure : bool
-        Whether differential pressure is logged.
     false_alarms : float
         Rate at which a healthy stream may raise alarms [1/h], of moving time.
     learning : float

@@ -114,8 +114,6 @@ def node(operation: str, *arguments: Expression, value: float | str = 0.0) -> Ex
 
     Parameters
     ----------
-    operation : str
-        Name of the operation.
     value : float or str
         A constant's value [any unit], or a symbol's name.
 
@@ -166,13 +164,7 @@ ONE = constant(1.0)
 
 
 def unary(operation: str, a: Expression) -> Expression:
-    """Return a one-argument function of a node: ``abs sign sqrt exp tanh``.
-
-    Parameters
-    ----------
-    operation : str
-        Name of the function.
-    """
+    """Return a one-argument function of a node: ``abs sign sqrt exp tanh``."""
     return node(operation, a)
 
 

@@ -67,8 +67,6 @@ def settled_nodes(order: Sequence[Expression], fixed: Collection[str]) -> set[in
     ----------
     order : sequence of Expression
         Nodes, operands before results.
-    fixed : collection of str
-        Names of the symbols.
     """
     settled: set[int] = set()
     for item in order:

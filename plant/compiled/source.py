@@ -162,11 +162,6 @@ def spelt(item: Expression, names: Mapping[int, str]) -> str:
     ----------
     names : Mapping[int, str]
         Variables of its operands, by their ids.
-
-    Returns
-    -------
-    str
-        The right side of an assignment.
     """
     return _CALLS[item.operation].format(*(names[id(argument)] for argument in item.arguments))
 

@@ -271,8 +271,6 @@ def simulate_motor(
         Drive of the first diaphragm at the samples [V], linear between.
     sample_time : float
         Seconds between samples [s].
-    sensors : MotorSensors
-        Noise of each channel.
     rng : numpy.random.Generator, optional
         Source of sensor noise; needed unless the sensors are ideal.
     keep_truth : bool

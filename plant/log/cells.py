@@ -73,8 +73,6 @@ def each_read(columns: Iterable[Column], read: Callable[[Column], Array]) -> dic
 
     Parameters
     ----------
-    columns : iterable of Column
-        Those that are wanted.
     read : callable
         From a column to its values, shape (n,).
 
@@ -108,8 +106,6 @@ def not_a_number(source: str, name: str, row: int, value: object) -> LogError:
 
     Parameters
     ----------
-    source, name : str
-        The log and the column.
     row : int
         The row from 0; the sentence counts from 1, without the header.
     """

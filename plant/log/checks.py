@@ -49,7 +49,7 @@ class Checked:
     sample_time, start_time : float
         The clock [s].
     channels : Mapping[str, ndarray, shape (n,)]
-        Array in SI, NaN where a sample is missing.
+        Values in SI, NaN where a sample is missing.
     notes : tuple[Note, ...]
         What was resampled, masked, dropped, or looks wrong.
     """
@@ -69,8 +69,6 @@ def trusted(
     ----------
     columns : Mapping[str, ndarray, shape (n,)]
         ``time_s`` and the channels, in SI.
-    source : str
-        What messages call the log.
     required : Collection[str]
         Channels that must be there; ``"position_m or velocity_m_s"`` asks for one of the two.
     clock : Clock, optional

@@ -78,8 +78,6 @@ class Column:
     ----------
     position : int
         Where it stands in the log, from 0.
-    name : str
-        Its name in the log.
     channel : str
         The channel that it becomes, or ``time_s``.
     factor, offset : float
@@ -103,13 +101,6 @@ def resolve_columns(names: Sequence[str], mapping: Mapping[str, str] | None, sou
     mapping : Mapping[str, str] or None
         Foreign names by channel, with a unit after a colon where it is not SI: ``"POS_MM:mm"``. A mapped
         channel is taken from there alone, whatever the other columns are called.
-    source : str
-        What messages call the log.
-
-    Returns
-    -------
-    tuple[Column, ...]
-        One column for each channel found.
 
     Raises
     ------

@@ -52,13 +52,11 @@ def read_csv(path: Path, choose: Choose) -> dict[Column, Array]:
     ----------
     path : Path
         A CSV with a header line, plain or compressed by gzip.
-    choose : Callable[[Sequence[str]], Sequence[Column]]
-        Picks columns from their names.
 
     Returns
     -------
     dict[Column, ndarray, shape (n,)]
-        Array as logged, NaN in empty cells.
+        Values as logged, NaN in empty cells.
 
     Raises
     ------
@@ -81,11 +79,9 @@ def write_csv(columns: Mapping[str, Array], file: BinaryIO, *, compressed: bool)
     Parameters
     ----------
     columns : Mapping[str, ndarray, shape (n,)]
-        Array by column name.
+        Values by column name.
     file : BinaryIO
         Where to, open for writing.
-    compressed : bool
-        Whether to compress by gzip.
     """
     table = pa.table({name: to_arrow(values) for name, values in columns.items()})
     if not compressed:

@@ -31,8 +31,6 @@ class CsvStream:
         Header and rows, each with the line's end that says that it is whole.
     mapping : Mapping[str, str], optional
         Foreign column by channel, see `plant.log.columns.resolve_columns`.
-    source : str
-        What messages call the stream.
 
     Raises
     ------
@@ -80,11 +78,6 @@ class CsvStream:
 
     def samples(self, most: int) -> Iterator[tuple[float, NDArray[np.float64], bool]]:
         """Yield samples, a few at a time.
-
-        Parameters
-        ----------
-        most : int
-            Most rows at once.
 
         Yields
         ------

@@ -27,13 +27,11 @@ def read_mat(path: Path, choose: Choose) -> tuple[dict[Column, Array], str | Non
     ----------
     path : Path
         A MAT file of version 5 to 7.
-    choose : Callable[[Sequence[str]], Sequence[Column]]
-        Picks columns from their names.
 
     Returns
     -------
     columns : dict[Column, ndarray, shape (n,)]
-        Array as logged.
+        Values as logged.
     metadata : str or None
         The JSON text that `write_mat` put there.
 
@@ -72,13 +70,11 @@ def write_mat(columns: Mapping[str, Array], metadata: str, file: BinaryIO, sourc
     Parameters
     ----------
     columns : Mapping[str, ndarray, shape (n,)]
-        Array by column name.
+        Values by column name.
     metadata : str
         JSON text, kept in the field ``metadata_json``.
     file : BinaryIO
         Where to, open for writing.
-    source : str
-        What messages call the file.
 
     Raises
     ------

@@ -67,7 +67,7 @@ def implausible(sample_time: float, channels: Mapping[str, Array]) -> list[Note]
     sample_time : float
         Time between samples [s].
     channels : Mapping[str, ndarray, shape (n,)]
-        Array in SI, NaN where a sample is missing.
+        Values in SI, NaN where a sample is missing.
 
     Returns
     -------

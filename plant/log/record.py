@@ -176,8 +176,6 @@ class Record:
             ``time_s`` (or time in another unit, ``time_ms``) and one column a channel.
         columns : Mapping[str, str], optional
             Foreign columns by channel: ``{"position_m": "POS_MM:mm"}``.
-        source : str
-            What messages call the frame.
         required : Collection[str]
             Channels that must be there; ``"position_m or velocity_m_s"`` asks for one of the two.
 

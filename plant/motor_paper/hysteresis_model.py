@@ -70,8 +70,6 @@ def hysteresis_loop(
 
     Parameters
     ----------
-    p : HysteresisParameters
-        Shape of the loop.
     amplitude : float
         Amplitude of the voltage [V].
     frequency : float
@@ -158,8 +156,6 @@ def harmonics(cycle: Array, count: int, cycles: int = 1) -> NDArray[np.complex12
         Whole cycles [any unit], the last sample the next one's first.
     count : int
         Harmonics wanted, the first included.
-    cycles : int
-        Cycles that the signal holds.
 
     Returns
     -------

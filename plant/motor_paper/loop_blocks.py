@@ -188,8 +188,6 @@ def run_loop(
         A, B, C, D of the model, one input and one output (equation 13).
     controller : callable
         ``controller(memory, error) -> (command, memory)``.
-    memory : any
-        What the controller remembers at first.
     reference : ndarray, shape (n,)
         What the output shall be, in its unit.
     sample_time : float

@@ -174,8 +174,6 @@ def simulate_stack(
         Drive at the samples [V], linear between.
     sample_time : float
         Seconds between samples [s].
-    sensors : StackSensors
-        Noise of each channel.
     rng : numpy.random.Generator, optional
         Source of sensor noise; needed unless the sensors are ideal.
     keep_truth : bool

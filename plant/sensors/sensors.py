@@ -227,8 +227,6 @@ def drop_samples(
         A measured run.
     fraction : float
         Fraction of the samples that go missing, 0 to 1 [dimensionless]; rounded to whole samples.
-    rng : numpy.random.Generator
-        Source of which samples.
     channels : sequence of str, optional
         The channels that drop out; all but the ``true_`` ones when not given.
 

@@ -71,8 +71,6 @@ def controlled_run(
         Parameter rows, each of which holds until the next sample.
     sample_time : float
         Seconds between samples [s].
-    parameter_class : type
-        What the parameter rows hold.
     tolerance : float
         Error of a step relative to the states' sizes [dimensionless].
     drive_tolerance : float, optional

@@ -157,11 +157,6 @@ def same(one: Array, other: Array) -> bool:
     ----------
     one, other : ndarray, shape (n, m)
         The matrices [any unit].
-
-    Returns
-    -------
-    bool
-        Whether every element is.
     """
     for i in range(one.shape[0]):
         for j in range(one.shape[1]):
