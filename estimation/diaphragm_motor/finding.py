@@ -118,14 +118,12 @@ def motor_prospect(motor: DiaphragmMotorParameters, frequency: float, peak_to_pe
     """
     card = motor_card(motor, frequency, peak_to_peak)
     gas = sum(motor.gas_fraction) / len(motor.gas_fraction)
-    known = {
-        "bulk_modulus": (motor.bulk_modulus, "Pa", motor.bulk_modulus),
-        "gas_fraction": (gas, "1", gas),
-        "crossport_leakage": (motor.crossport_leakage, SIZES["crossport_leakage"][0], LEAKAGE),
-        "load_force": (motor.load_force, SIZES["load_force"][0], LOAD),
-    }
+    std = card.relative_std
     quantities = {
-        name: Quantity(value, unit, None, card.relative_std[name] * size) for name, (value, unit, size) in known.items()
+        "bulk_modulus": Quantity(motor.bulk_modulus, "Pa", None, std["bulk_modulus"] * motor.bulk_modulus),
+        "gas_fraction": Quantity(gas, "1", None, std["gas_fraction"] * gas),
+        "crossport_leakage": Quantity(motor.crossport_leakage, "m^3/(s Pa)", None, std["crossport_leakage"] * LEAKAGE),
+        "load_force": Quantity(motor.load_force, "N", None, std["load_force"] * LOAD),
     }
     return Finding(NAME, Outcome.OK, quantities, Gate(True, ()), card.channels, evidence=card)
 

@@ -239,14 +239,10 @@ def drop_samples(
     """
     if not 0.0 <= fraction <= 1.0:
         raise RigError(f"the fraction of missing samples must be between 0 and 1, got {fraction!r}")
-    missing = rng.choice(len(record), round(fraction * len(record)), replace=False)
+    missing = np.zeros(len(record), dtype=np.bool_)
+    missing[rng.choice(len(record), round(fraction * len(record)), replace=False)] = True
     names = [name for name in record if not name.startswith("true_")] if channels is None else channels
-    gaps: dict[str, NDArray[np.float64]] = {}
-    for name in names:
-        values = record[name].copy()
-        values[missing] = np.nan
-        gaps[name] = values
-    return record.replace(**gaps)
+    return record.replace(**{name: np.where(missing, np.nan, record[name]) for name in names})
 
 
 def _noisy(values: NDArray[np.float64], deviation: float, rng: np.random.Generator) -> NDArray[np.float64]:
