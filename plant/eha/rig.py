@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from typing_extensions import TypeVar
 
 from plant.atomic import replacing
+from plant.eha.doubts import Spread, doubts_of, spreads_of
 from plant.eha.model import EhaParameters
 from plant.errors import RigError
 from plant.log.columns import check_columns
@@ -55,14 +56,18 @@ class Rig(Generic[P]):
     parameters : dataclass
         Its parameters, SI; the paper's gear-pump actuator by default.
     uncertainties : Mapping[str, float]
-        Relative standard deviation by parameter, a fraction, 0.3 for 30 %; a parameter without one is taken as known.
+        Relative standard deviation by parameter, a fraction, 0.3 for 30 %, or of the `pressure_gain`; what has none is
+        known as well as `plant.eha.doubts.DOUBTS` says.
     columns : Mapping[str, str]
         Foreign log columns by channel: ``{"position_m": "POS_MM:mm"}``.
+    measured : tuple of str
+        Entries that were measured on the bench, so that less is doubted of them.
 
     Raises
     ------
     RigError
-        If an uncertainty is of no parameter or negative, or a column's channel or unit is unknown.
+        If an uncertainty is of no parameter or negative, if what was measured is nothing that is doubted or has an
+        uncertainty too, or if a column's channel or unit is unknown.
 
     Examples
     --------
@@ -74,17 +79,27 @@ class Rig(Generic[P]):
     parameters: P = field(default_factory=EhaParameters)  # pyright: ignore[reportAssignmentType] -- P's own default
     uncertainties: Mapping[str, float] = field(default_factory=_nothing)
     columns: Mapping[str, str] = field(default_factory=_nothing)
+    measured: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        _known(self.uncertainties, _names(type(self.parameters)), "uncertainty")
+        doubted = doubts_of(self.parameters)
+        _known(self.uncertainties, dict.fromkeys((*_names(type(self.parameters)), *doubted)), "uncertainty")
+        _known(self.measured, doubted, "measured")
         for name, value in self.uncertainties.items():
             if not 0.0 <= value < float("inf"):
                 raise RigError(f"uncertainty.{name} must be 0 or more and finite, got {value!r}")
+            if name in self.measured:
+                raise RigError(f"uncertainty.{name} and measured both say how well it is known, one is wanted")
         object.__setattr__(self, "uncertainties", MappingProxyType(dict(self.uncertainties)))
         object.__setattr__(self, "columns", MappingProxyType(check_columns(self.columns)))
 
     def __reduce__(self) -> tuple[object, ...]:
-        return Rig, (self.name, self.parameters, dict(self.uncertainties), dict(self.columns))
+        return Rig, (self.name, self.parameters, dict(self.uncertainties), dict(self.columns), self.measured)
+
+    @property
+    def spreads(self) -> Mapping[str, Spread]:
+        """How far each entry may be off: what the file says of it, or what is doubted of any such figure."""
+        return spreads_of(doubts_of(self.parameters), self.uncertainties, self.measured)
 
 
 Strict = Annotated[float, Field(strict=True)]
@@ -97,6 +112,7 @@ class _RigFile(BaseModel):
 
     name: Annotated[str, Field(strict=True)] = "rig"
     plant: Annotated[str, Field(strict=True)] | None = None
+    measured: tuple[Annotated[str, Field(strict=True)], ...] = ()
     parameters: dict[str, Any] = {}
     uncertainty: dict[str, Strict] = {}
     columns: dict[str, Annotated[str, Field(strict=True)]] = {}
@@ -175,7 +191,7 @@ def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> 
         raise RigError(f"a rig of plant {plant!r} is wanted here, got one of {file.plant!r}")
     _known(file.parameters, _names(parameter_class), "parameters")
     values = _values(file.parameters, parameter_class)
-    return Rig(file.name, parameter_class(**values), file.uncertainty, file.columns)
+    return Rig(file.name, parameter_class(**values), file.uncertainty, file.columns, file.measured)
 
 
 def _values(given: Mapping[str, Any], parameter_class: type[Any]) -> dict[str, Any]:
@@ -195,7 +211,7 @@ def _known(given: Iterable[str], known: Iterable[str], section: str) -> None:
     for name in given:
         if name not in names:
             near = get_close_matches(name, names, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"wanted one of {', '.join(names)}"
+            hint = f"did you mean {near[0]!r}?" if near else f"wanted one of {', '.join(names) or 'none'}"
             raise RigError(f"{f'{section}.{name}' if section else name} is unknown, {hint}")
 
 
@@ -229,6 +245,14 @@ def rig_template(
         "# All values are SI. A parameter that is left out keeps the value shown here.",
         "",
         *(['name = "paper"'] if plant == EHA else [f'name = "{plant}"', f'plant = "{plant}"']),
+        *(
+            [
+                "# Entries that were measured on the bench; less is doubted of them, see below.",
+                "# measured = []",
+            ]
+            if doubts_of(parameter_class)
+            else []
+        ),
         "",
         "[parameters]",
     ]
@@ -236,18 +260,27 @@ def rig_template(
         value = getattr(parameters, name)
         lines.append(f"# {note.meaning} [{note.unit}]; source: {note.source}")
         lines.append(f"{name} = {list(value) if isinstance(value, tuple) else value!r}")
-    first = next(iter(notes(parameter_class))) if plant != EHA else "bulk_modulus"
     lines += [
         "",
-        "[uncertainty]",
-        "# Relative standard deviation of a parameter: 0.3 is 30 %. What is not named is taken as known.",
-        f"# {first} = 0.3",
+        *_uncertainty_lines(parameter_class),
         "",
         "[columns]",
         '# Log columns under other names, with their unit after a colon: channel = "NAME:UNIT".',
     ]
     lines += [f'# {channel} = "{example}"' for channel, example in columns.items()]
     return "\n".join(lines) + "\n"
+
+
+def _uncertainty_lines(parameter_class: type[Any]) -> list[str]:
+    """Return the section of the uncertainties: defaults as comments, each with its reason."""
+    doubts = doubts_of(parameter_class)
+    said = "has the default shown here" if doubts else "is taken as known"
+    lines = ["[uncertainty]", f"# Relative standard deviation of an entry: 0.3 is 30 %. What is not named {said}."]
+    for name, doubt in doubts.items():
+        down, up = doubt.usual
+        sides = f"{down:g} down, {up:g} up" if down != up else f"{up:g}"
+        lines += [f"# {name}: {sides}, {doubt.measured.up:g} if measured;", f"#   {doubt.reason}"]
+    return [*lines, f"# {'chamber_volume' if doubts else next(iter(notes(parameter_class)))} = 0.3"]
 
 
 def write_rig_template(path: str | Path, template: str | None = None) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from plant.eha.doubts import DOUBTS, Spread
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig, read_rig, rig_template, write_rig_template
 from plant.errors import RigError
@@ -36,7 +37,7 @@ def test_the_commented_examples_of_the_template_are_valid(tmp_path: Path) -> Non
     examples = [line for line in rig_template()[start:].splitlines() if "channel = " not in line]
     live = "\n".join(line.removeprefix("# ") if " = " in line else line for line in examples)
     rig = rig_of(tmp_path, live)
-    assert rig.uncertainties["bulk_modulus"] == 0.3
+    assert rig.uncertainties["chamber_volume"] == 0.3
     assert rig.columns["position_m"] == "POS_MM:mm"
     assert len(rig.columns) == 8
 
@@ -51,6 +52,31 @@ def test_a_rig_of_ones_own_keeps_what_it_says_and_the_papers_rest(tmp_path: Path
     assert rig.parameters == EhaParameters(piston_area=3.04e-3, flow_bias=0.0)
     assert dict(rig.uncertainties) == {"bulk_modulus": 0.3}
     assert dict(rig.columns) == {"position_m": "POS_MM:mm"}
+
+
+def test_the_template_says_what_is_doubted_of_each_entry_and_why() -> None:
+    text = rig_template()
+    for name, doubt in DOUBTS.items():
+        assert f"# {name}: " in text
+        assert doubt.reason in text
+    assert "# moving_mass: 0.1 down, 0.4 up, 0.05 if measured;" in text
+
+
+def test_what_a_rig_does_not_say_is_doubted_and_less_so_what_was_measured(tmp_path: Path) -> None:
+    assert rig_of(tmp_path, "").spreads == Rig().spreads == {name: one.usual for name, one in DOUBTS.items()}
+    rig = rig_of(tmp_path, 'measured = ["chamber_volume"]\n[uncertainty]\npressure_gain = 0.0\nrelief_pressure = 0.1\n')
+    assert rig.measured == ("chamber_volume",)
+    assert rig.spreads["chamber_volume"] == Spread(0.05, 0.05)
+    assert rig.spreads["pressure_gain"] == Spread(0.0, 0.0)
+    assert rig.spreads["relief_pressure"] == Spread(0.1, 0.1)
+    assert rig.spreads["moving_mass"] == DOUBTS["moving_mass"].usual
+
+
+def test_what_was_measured_is_surer_and_a_mass_is_sooner_too_small_than_too_large() -> None:
+    for doubt in DOUBTS.values():
+        assert max(doubt.measured) < max(doubt.usual) <= 0.4
+        assert doubt.usual.down <= doubt.usual.up
+    assert DOUBTS["moving_mass"].usual.up > DOUBTS["moving_mass"].usual.down
 
 
 @pytest.mark.parametrize("field", [field.name for field in fields(EhaParameters)])
@@ -73,6 +99,14 @@ def test_every_parameter_refuses_text(tmp_path: Path, field: str) -> None:
         ),
         ("[uncertainty]\nbulk_modulus = -0.3", r"uncertainty\.bulk_modulus must be 0 or more"),
         ("[uncertainty]\nbulk_modulus = nan", r"uncertainty\.bulk_modulus must be 0 or more"),
+        ('measured = ["chamber_volum"]', r"measured\.chamber_volum is unknown, did you mean 'chamber_volume'"),
+        ('measured = ["stroke"]', r"measured\.stroke is unknown, wanted one of pump_displacement, piston_area"),
+        ('measured = "chamber_volume"', r"measured must be a valid tuple, got 'chamber_volume'"),
+        ("measured = [3]", r"measured\.0 must be a valid string, got 3"),
+        (
+            'measured = ["moving_mass"]\n[uncertainty]\nmoving_mass = 0.1',
+            r"uncertainty\.moving_mass and measured both say how well it is known, one is wanted",
+        ),
         ("[parameters]\npiston_area = -1.0", r"piston_area must be positive, got -1\.0"),
         ("[parameters]\npiston_area = inf", r"piston_area must be a finite number"),
         ("[parameters]\npiston_area = true", r"parameters\.piston_area must be a valid number, got True"),
@@ -115,5 +149,5 @@ def test_the_template_is_written_once_and_never_over_a_file(tmp_path: Path) -> N
 
 
 def test_a_rig_survives_pickling() -> None:
-    rig = Rig("bench 2", EhaParameters(stroke=0.1), {"bulk_modulus": 0.3}, {"position_m": "P:mm"})
+    rig = Rig("bench 2", EhaParameters(stroke=0.1), {"bulk_modulus": 0.3}, {"position_m": "P:mm"}, ("moving_mass",))
     assert pickle.loads(pickle.dumps(rig)) == rig  # noqa: S301 (our own bytes)

@@ -1,0 +1,141 @@
+"""How well the entries of a gear-pump actuator's rig are known where its rig file does not say.
+
+Nobody hands over a rig file with error bars, and bulk modulus is known no better than the volume that it is counted
+over. Each entry below is what one would bet on a figure from a catalogue, and on one that was measured on the bench.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+PRESSURE_GAIN = "pressure_gain"
+"""What the gain of the differential pressure is called: an entry of its uncertainty alone, its value is 1."""
+
+
+class Spread(NamedTuple):
+    """How far an entry may be off, either way.
+
+    Parameters
+    ----------
+    down, up : float
+        Standard deviation of its logarithm below and above the value given [dimensionless].
+    """
+
+    down: float
+    up: float
+
+    @staticmethod
+    def of(one: "float | Spread") -> "Spread":
+        """Return a spread, of one number that is alike either way.
+
+        Parameters
+        ----------
+        one : float or Spread
+            Relative standard deviation [fraction].
+
+        Returns
+        -------
+        Spread
+            Itself if it is one.
+        """
+        return one if isinstance(one, Spread) else Spread(one, one)
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """What is not known of an entry, unless a rig file says so.
+
+    Parameters
+    ----------
+    usual, measured : Spread
+        Of a figure from a drawing or a catalogue, and of one that was measured on the bench.
+    reason : str
+        Where both come from.
+    """
+
+    usual: Spread
+    measured: Spread
+    reason: str
+
+
+DOUBTS: Mapping[str, Doubt] = MappingProxyType(
+    {
+        "pump_displacement": Doubt(
+            Spread.of(0.03),
+            Spread.of(0.01),
+            "judged: a catalogue gives geometric displacement, a few per cent above what is delivered; measured as "
+            "ISO 4409 class B, flow within 1.5 %",
+        ),
+        "piston_area": Doubt(
+            Spread.of(0.02),
+            Spread.of(0.003),
+            "judged: tolerances of bore and rod (ISO 286 H8, 0.1 %) are nothing beside a rod or a mean that is not the "
+            "one fitted; measured with a calliper",
+        ),
+        "chamber_volume": Doubt(
+            Spread.of(0.15),
+            Spread.of(0.05),
+            "judged: ports, hoses and the manifold are in no drawing of the cylinder, and the middle is not where the "
+            "rig file thinks; measured by filling, without what stays in as air",
+        ),
+        "moving_mass": Doubt(
+            Spread(0.1, 0.4),
+            Spread(0.05, 0.05),
+            "judged: a catalogue's piston and rod leave out the load, and oil in a line counts by the square of area "
+            "over bore (0.3 m of 12 mm line add 5 kg on 15 cm^2); measured by weighing with the load",
+        ),
+        PRESSURE_GAIN: Doubt(
+            Spread.of(0.015),
+            Spread.of(0.003),
+            "judged: ISO 4409 class C, pressure within 2.5 %, is what an industrial transmitter keeps over years and "
+            "temperature; measured against a reference gauge, class A, within 0.5 %",
+        ),
+    }
+)
+"""Of each entry that is doubted; any other is taken as known where the rig file does not say."""
+
+
+def spreads_of(doubts: Mapping[str, Doubt], given: Mapping[str, float], measured: Collection[str]) -> dict[str, Spread]:
+    """Return how far each entry may be off.
+
+    Parameters
+    ----------
+    doubts : Mapping[str, Doubt]
+        What is not known unless said.
+    given : Mapping[str, float]
+        What a rig file says: relative standard deviation [fraction].
+    measured : collection of str
+        Entries that it says were measured.
+
+    Returns
+    -------
+    dict[str, Spread]
+        By entry; what the file says goes before what is doubted of all.
+
+    Examples
+    --------
+    >>> spreads_of(DOUBTS, {"moving_mass": 0.02}, ["chamber_volume"])["chamber_volume"]
+    Spread(down=0.05, up=0.05)
+    """
+    usual = {name: one.measured if name in measured else one.usual for name, one in doubts.items()}
+    return usual | {name: Spread.of(std) for name, std in given.items()}
+
+
+def doubts_of(parameters: Any) -> Mapping[str, Doubt]:
+    """Return what is not known of an actuator's entries unless said; nothing is of another kind than the gear-pump one.
+
+    Parameters
+    ----------
+    parameters : dataclass or its type
+        The actuator's parameters [SI].
+
+    Returns
+    -------
+    Mapping[str, Doubt]
+        By entry.
+    """
+    from plant.eha.model import EhaParameters
+
+    kind = parameters if isinstance(parameters, type) else type(parameters)
+    return DOUBTS if issubclass(kind, EhaParameters) else MappingProxyType({})
