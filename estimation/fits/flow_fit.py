@@ -138,7 +138,7 @@ def fit_flow(
     best = min(fits, key=lambda fit: fit.cost)
     found, rig_std = weighed(fits)
     value, std = found["bulk_modulus"]
-    return FormFit(found, rig_std, std / value, best.chi_square[0], _objections(best))
+    return FormFit(found, rig_std, std / value, best.chi_square[0], _objections(best), best.rig_slopes)
 
 
 def _cleaned(record: Record) -> tuple[Record, Mapping[str, float]]:

@@ -1,7 +1,8 @@
 """What a fitted form says of a log, and how forms that explain it alike are weighed."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
 
@@ -32,6 +33,8 @@ class FormFit:
         Mean squared residual over the sensor's variance [dimensionless].
     reasons : tuple of Note
         What speaks against the fit.
+    rig_slopes : Mapping[str, Mapping[str, float]]
+        By uncertain entry of the rig: by how much each parameter would differ, in SI, per relative change of the entry.
     """
 
     parameters: Mapping[str, tuple[float, float]]
@@ -39,6 +42,7 @@ class FormFit:
     bound: float
     chi_square: float
     reasons: tuple[Note, ...]
+    rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=lambda: MappingProxyType({}))
 
 
 def weighed(fits: Sequence[GreyBoxFit]) -> tuple[Mapping[str, tuple[float, float]], Mapping[str, float]]:

@@ -4,8 +4,10 @@ The variance of an estimate has three parts, told apart: noise of the outputs, n
 well the rig's own parameters are known. The last two are read off the fit's linear response to them.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +64,8 @@ class GreyBoxFit:
         Mean squared normalised residual of each output; 1 where the model explains the log [dimensionless].
     autocorrelation : tuple of float
         Of neighbouring normalised residuals; 0 where the model explains the log [dimensionless].
+    rig_slopes : Mapping[str, Mapping[str, float]]
+        By uncertain entry of the rig: by how much each unknown would differ, in SI, per relative change of the entry.
     """
 
     model: GreyBoxModel
@@ -72,6 +76,7 @@ class GreyBoxFit:
     cost: float
     chi_square: tuple[float, ...]
     autocorrelation: tuple[float, ...]
+    rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=lambda: MappingProxyType({}))
 
 
 @dataclass(frozen=True)
@@ -196,7 +201,7 @@ def concluded(problem: Problem, point: Point) -> GreyBoxFit:
     model, theta = problem.model, point.theta
     errors, slopes = problem.residuals(theta), problem.slopes(theta)
     felt = np.flatnonzero(np.einsum("ij,ij->j", slopes, slopes) > LEAST_EFFECT**2)
-    noise, rig = np.full(len(theta), np.inf), np.zeros(len(theta))
+    noise, rig = np.full(len(theta), np.inf), dict[str, Array]()
     used = int(np.count_nonzero(errors))
     if len(felt) and used > len(theta):
         if len(felt) < len(theta):
@@ -211,11 +216,12 @@ def concluded(problem: Problem, point: Point) -> GreyBoxFit:
         variance = np.diag(spread) + _drive_variance(problem, theta, response)
         # the window's estimate need not be positive: then nothing is known
         noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))
-        rig[felt] = np.sqrt(_rig_variance(problem, theta, response))
+        rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in _rig_slopes(problem, theta, response)}
     sizes = dict(model.linear)
     values = model.values(theta)
     unit = np.array([sizes.get(name, values[name]) for name in model.unknowns])
     squares = np.einsum("ij,ij->i", errors, errors)
+    slopes_si = {name: dict(zip(model.unknowns, map(float, unit * one), strict=True)) for name, one in rig.items()}
     neighbours = np.einsum("ij,ij->i", errors[:, 1:], errors[:, :-1])
     seen = np.maximum(np.count_nonzero(errors, axis=1), 1)
     return GreyBoxFit(
@@ -223,7 +229,11 @@ def concluded(problem: Problem, point: Point) -> GreyBoxFit:
         theta=theta,
         values=values,
         std=dict(zip(model.unknowns, map(float, unit * noise), strict=True)),
-        rig_std=dict(zip(model.unknowns, map(float, unit * rig), strict=True)),
+        rig_std={
+            one: math.hypot(*(problem.log.uncertainties[name] * slopes_si[name][one] for name in slopes_si))
+            for one in model.unknowns
+        },
+        rig_slopes=slopes_si,
         cost=point.cost,
         chi_square=tuple(map(float, squares / seen)),
         autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),
@@ -247,14 +257,18 @@ def _drive_variance(problem: Problem, theta: Array, response: Callable[[Array], 
     return squares / DRIVE_DRAWS
 
 
-def _rig_variance(problem: Problem, theta: Array, response: Callable[[Array], Array]) -> Array | float:
-    """Return the variance that comes from the uncertain parameters of the rig, taken as independent."""
-    total, known = 0.0, problem.residuals(theta)
-    names = parameter_names(problem.model.parameters)
+def _rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Array]) -> Iterator[tuple[str, Array]]:
+    """Yield by how much the unknowns would differ per relative change of each uncertain parameter of the rig."""
+    known, names = problem.residuals(theta), parameter_names(problem.model.parameters)
     for name, relative in problem.log.uncertainties.items():
         if relative > 0.0 and name in names and name not in problem.model.unknowns:
             nudged = problem.log.parameters.copy()
             nudged[names.index(name)] *= 1.0 + RIG_NUDGE
-            shift = response(problem.residuals(theta, parameters=nudged) - known)
-            total = total + (relative / RIG_NUDGE * shift) ** 2
-    return total
+            yield name, -response(problem.residuals(theta, parameters=nudged) - known) / RIG_NUDGE
+
+
+def _spread_out(values: Array, places: NDArray[np.intp], length: int) -> Array:
+    """Return values at their places, zero elsewhere."""
+    whole = np.zeros(length)
+    whole[places] = values
+    return whole

@@ -124,7 +124,7 @@ def fit_motion(
     found, rig_std = weighed(fits)
     value, std = found["bulk_modulus"]
     believed = dict(found) | {"bulk_modulus": (value, float(np.hypot(std, STRUCTURE * value)))}
-    return FormFit(believed, rig_std, std / value, best.chi_square[0], _objections(fits, best))
+    return FormFit(believed, rig_std, std / value, best.chi_square[0], _objections(fits, best), best.rig_slopes)
 
 
 def _log(record: Record, p: EhaParameters, uncertainties: Mapping[str, float], speed_variance: float) -> GreyBoxLog:
