@@ -70,15 +70,18 @@ class Quantity:
     unit : str
         The unit; ``"1"`` for a number without one.
     ci95 : tuple of float, optional
-        Ends of its 95 % interval [in its unit].
+        Ends of its 95 % interval if the rig file is right [in its unit].
     std : float, optional
-        Its standard deviation [in its unit].
+        Its standard deviation, likewise [in its unit].
+    ci95_total : tuple of float, optional
+        Ends of its 95 % interval with what is not known of the rig [in its unit]; None where that was not asked.
     """
 
     value: float | None
     unit: str
     ci95: tuple[float, float] | None = None
     std: float | None = None
+    ci95_total: tuple[float, float] | None = None
 
     @staticmethod
     def normal(value: float, std: float, unit: str) -> "Quantity":

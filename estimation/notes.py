@@ -45,6 +45,10 @@ class EstimateCode(Code):
         "bound_too_wide",
         "the Cramér-Rao bound is {percent:.0f} % of the value, over 3 %: not observable",
     )
+    KNOWN_AS_THE_RIG = (
+        "known_as_the_rig",
+        "{quantity} is known only as well as the rig's {entry}, which makes {percent:.0f} % of its total variance",
+    )
     DIVERGED = "diverged", "the estimate stopped being finite; check units, rig parameters and the form"
     PRESSURE_RESIDUALS_LARGE = (
         "pressure_residuals_large",

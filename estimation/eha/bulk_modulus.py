@@ -9,6 +9,7 @@ import numpy as np
 
 from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide
+from estimation.eha.rig_share import fitted_responses, scaled_responses
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
 from estimation.fits.flow_fit import FLOW_CHANNELS, REPORTED, fit_flow
@@ -20,6 +21,7 @@ from estimation.log_checks.sensor_check import PRESSURE, PRESSURES
 from estimation.models.eha_forms import FORMS
 from estimation.trust.bounds import bulk_modulus_bound
 from estimation.trust.consistency import MISMATCH_NIS
+from plant.eha.doubts import Spread
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError, LogWarning
 from plant.log.record import Record
@@ -92,7 +94,7 @@ def estimate_bulk_modulus(
     record: Record,
     parameters: EhaParameters,
     *,
-    uncertainties: Mapping[str, float] | None = None,
+    uncertainties: Mapping[str, float | Spread] | None = None,
     **options: Any,
 ) -> BulkModulusEstimate:
     """Estimate effective bulk modulus from a log.
@@ -104,7 +106,7 @@ def estimate_bulk_modulus(
     takes leakage and friction as known.
 
     Bulk modulus enters as ``chamber_volume / bulk_modulus`` alone, so what is not known of the volume, and of the pump
-    and the piston, is not known of bulk modulus either; `uncertainties` carry it into the interval.
+    and the piston, is not known of bulk modulus either; `uncertainties` carry it into the total interval.
 
     Parameters
     ----------
@@ -112,8 +114,9 @@ def estimate_bulk_modulus(
         The log.
     parameters : EhaParameters
         The actuator; its bulk modulus is where the bound is taken, and the default first guess.
-    uncertainties : Mapping[str, float], optional
-        Relative standard deviation of the actuator's parameters, as a rig file has them [fraction]; none by default.
+    uncertainties : Mapping[str, float or Spread], optional
+        Relative standard deviation of the actuator's parameters, as a rig file has them [fraction], or that of their
+        logarithms down and up; none by default.
     **options
         The fields of `EstimateOptions`.
 
@@ -164,7 +167,7 @@ def estimate_clean(
     log: CleanLog,
     parameters: EhaParameters,
     options: EstimateOptions = DEFAULT_OPTIONS,
-    uncertainties: Mapping[str, float] | None = None,
+    uncertainties: Mapping[str, float | Spread] | None = None,
 ) -> BulkModulusEstimate:
     """Estimate effective bulk modulus from a log whose sensors have been looked at; see `estimate_bulk_modulus`.
 
@@ -176,8 +179,8 @@ def estimate_clean(
         The actuator.
     options : EstimateOptions
         How.
-    uncertainties : Mapping[str, float], optional
-        Relative standard deviation of the actuator's parameters [fraction].
+    uncertainties : Mapping[str, float or Spread], optional
+        How far the actuator's parameters may be off [fraction]; it decides no outcome and no gate.
 
     Returns
     -------
@@ -191,7 +194,7 @@ def estimate_clean(
     LogError
         If the log lacks what the form needs.
     """
-    known = uncertainties or {}
+    spreads = {name: Spread.of(one) for name, one in (uncertainties or {}).items()}
     guess = parameters.bulk_modulus if options.start is None else options.start
     if not (np.isfinite(guess) and guess >= 0.0 and np.isfinite(options.start_std) and options.start_std > 0.0):
         raise HydrostateError(
@@ -205,9 +208,13 @@ def estimate_clean(
         filtering = first_load(log.record, log.variances) != 0.0  # a fit begins at rest
     if form in FITTED and not filtering:
         fit, channels = FITTED[form]
-        found = _fitted(fit(log.record, parameters, guess, known, log.variances), form, channels)
+        doubted = {name: max(one) for name, one in spreads.items()} if form == "flow" else {}
+        fitted = fit(log.record, parameters, guess, doubted, log.variances)
+        found = _fitted(fitted, form, channels)
+        if form == "flow":
+            found = replace(found, responses=fitted_responses(fitted))
     elif form == "flow":
-        found = _with_rig(estimate_by_flow_filter(log, parameters, options.filter_options), known)
+        found = estimate_by_flow_filter(log, parameters, options.filter_options)
     elif options.method == LEAST_SQUARES or form == "motion":
         raise HydrostateError(
             f"the {form} form is {'filtered' if form in FORMS else 'fitted by least squares'}, "
@@ -216,8 +223,8 @@ def estimate_clean(
     else:
         model = _chosen(FORMS, form, "form")
         how = options.filter_options
-        found = _with_rig(estimate_by_filter(log, parameters, model, guess, options.start_std, how), known)
-    return _doubting_sensors(found, log)
+        found = estimate_by_filter(log, parameters, model, guess, options.start_std, how)
+    return _doubting_sensors(_with_rig(found, parameters, spreads), log)
 
 
 def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusEstimate:
@@ -275,17 +282,19 @@ def _unseen(bound: float) -> BulkModulusEstimate:
     )
 
 
-def _with_rig(found: BulkModulusEstimate, uncertainties: Mapping[str, float]) -> BulkModulusEstimate:
-    """Return a filter's estimate with the chamber volume's uncertainty in its deviation (equation 5.8)."""
-    if found.value is None or found.std is None:
-        return found
-    rig_std = found.value * uncertainties.get("chamber_volume", 0.0)
-    return replace(found, std=float(np.hypot(found.std, rig_std)), rig_std=rig_std)
+def _with_rig(
+    found: BulkModulusEstimate, parameters: EhaParameters, spreads: Mapping[str, Spread]
+) -> BulkModulusEstimate:
+    """Return an estimate with what is not known of the rig, by the laws of dimension where the fit did not say."""
+    if found.value is None or found.responses:
+        return replace(found, spreads=spreads)
+    values = {name: value for name, (value, _) in found.others.items()}
+    responses = scaled_responses(parameters, values, pressure=PRESSURE in found.channels)
+    return replace(found, responses=responses, spreads=spreads)
 
 
 def _fitted(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEstimate:
     value, std = fit.parameters["bulk_modulus"]
-    rig_std = fit.rig_std["bulk_modulus"]
     gate = Gate(not fit.reasons, fit.reasons)
     outcome = Outcome.OK
     if fit.chi_square >= MISMATCH_NIS:
@@ -296,7 +305,7 @@ def _fitted(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEs
     return BulkModulusEstimate(
         outcome=outcome,
         value=value if known else None,
-        std=float(np.hypot(std, rig_std)) if known else None,
+        std=std if known else None,
         bound=fit.bound,
         gate=gate,
         form=form,
@@ -305,7 +314,6 @@ def _fitted(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEs
         others={name: found for name, found in fit.parameters.items() if known and name in REPORTED},
         estimate=None,
         first_pass=None,
-        rig_std=rig_std if known else 0.0,
     )
 
 

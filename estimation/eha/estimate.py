@@ -1,7 +1,5 @@
 """`estimate_log(record, rig) -> Finding`: what a log of the gear-pump actuator says of its oil and leakage."""
 
-from collections.abc import Mapping
-
 from estimation.eha.bulk_modulus import DEFAULT_OPTIONS, FITTED, EstimateOptions, estimate_clean, left_out
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Finding, Outcome, Quantity
@@ -70,7 +68,7 @@ def estimated(log: CleanLog, rig: Rig, options: EstimateOptions) -> tuple[CleanL
     tuple of CleanLog and BulkModulusEstimate
         Both.
     """
-    return log, estimate_clean(log, rig.parameters, options, rig.uncertainties)
+    return log, estimate_clean(log, rig.parameters, options, rig.spreads)
 
 
 def finding_of(log: CleanLog, found: BulkModulusEstimate) -> Finding:
@@ -91,17 +89,20 @@ def finding_of(log: CleanLog, found: BulkModulusEstimate) -> Finding:
     return Finding(
         actuator=KIND,
         outcome=found.outcome,
-        quantities={"bulk_modulus": found.quantity, **_others(found.others)},
+        quantities={"bulk_modulus": found.quantity, **_others(found)},
         gate=found.gate,
         channels=found.channels,
-        notes=(*left_out(log, found), *absences(found)),
+        notes=(*left_out(log, found), *absences(found), *found.rig_notes),
         evidence=found,
     )
 
 
-def _others(found: Mapping[str, tuple[float, float]]) -> dict[str, Quantity]:
+def _others(found: BulkModulusEstimate) -> dict[str, Quantity]:
     units = {name: note.unit for name, note in parameter_notes(EhaParameters).items()}
-    return {name: Quantity.normal(value, std, units.get(name, "1")) for name, (value, std) in found.items()}
+    return {
+        name: found.with_total(name, Quantity.normal(value, std, units.get(name, "1")))
+        for name, (value, std) in found.others.items()
+    }
 
 
 def absences(found: BulkModulusEstimate) -> tuple[Note, ...]:

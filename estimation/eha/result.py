@@ -1,12 +1,15 @@
 """What an estimate of bulk modulus is: a number with its interval and verdict, or the outcome that stands instead."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 
+from estimation.eha.rig_share import Responses, rig_notes, with_total
 from estimation.filters.run import Estimate
 from estimation.finding import Gate, Outcome, Quantity, interval_95
 from estimation.notes import EstimateCode
 from estimation.tuning.tuning import Tuning
+from plant.eha.doubts import Spread
 from plant.notes import Note
 
 LARGEST_BOUND = 0.03
@@ -24,7 +27,7 @@ class BulkModulusEstimate:
     value : float or None
         Effective bulk modulus, convention of equation 5.8 (errata E2) [Pa]; None unless the outcome is ok.
     std : float or None
-        Its standard deviation, from the log's noise and from what is not known of the rig [Pa].
+        Its standard deviation from the log's noise, as if the rig file were right [Pa].
     bound : float
         Relative Cramér-Rao bound [fraction].
     gate : Gate
@@ -41,8 +44,10 @@ class BulkModulusEstimate:
         The filtered log, where a filter was used.
     first_pass : Estimate or None
         The pass that began at the first guess; the same one unless a second, begun where it ended, was likelier.
-    rig_std : float
-        The rig's part of the deviation [Pa]; zero where the rig has no uncertainties.
+    responses : Mapping[str, Responses]
+        How bulk modulus and the others would differ if the rig did, by quantity [dimensionless].
+    spreads : Mapping[str, Spread]
+        How far each entry of the rig may be off.
     tuning : Tuning or None
         Noise levels, where they were tuned to the log.
     method : str
@@ -60,18 +65,41 @@ class BulkModulusEstimate:
     others: Mapping[str, tuple[float, float]]
     estimate: Estimate | None
     first_pass: Estimate | None
-    rig_std: float = 0.0
+    responses: Mapping[str, Responses] = field(default_factory=lambda: MappingProxyType({}))
+    spreads: Mapping[str, Spread] = field(default_factory=lambda: MappingProxyType({}))
     tuning: Tuning | None = None
     method: str = "least-squares"
 
     @property
     def quantity(self) -> Quantity:
-        """Bulk modulus with its interval."""
-        return Quantity(self.value, "Pa", self.interval, self.std)
+        """Bulk modulus with its intervals."""
+        return self.with_total("bulk_modulus", Quantity(self.value, "Pa", self.interval, self.std))
+
+    @property
+    def rig_notes(self) -> tuple[Note, ...]:
+        """What is said where bulk modulus is known only as well as the rig."""
+        return rig_notes("bulk_modulus", self.quantity, self.responses.get("bulk_modulus", {}), self.spreads)
+
+    def with_total(self, name: str, one: Quantity) -> Quantity:
+        """Return one of the quantities with the interval that holds what is not known of the rig.
+
+        Parameters
+        ----------
+        name : str
+            What it is.
+        one : Quantity
+            With the interval that holds if the rig file is right [in its unit].
+
+        Returns
+        -------
+        Quantity
+            With both.
+        """
+        return with_total(one, self.responses.get(name), self.spreads)
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """The 95 % interval [Pa], or None where there is no value."""
+        """The 95 % interval if the rig file is right [Pa], or None where there is no value."""
         if self.value is None or self.std is None:
             return None
         return interval_95(self.value, self.std)

@@ -26,6 +26,7 @@ from faults.diagnosis.models_verdict import models_verdict, ranked
 from faults.diagnosis.out_of_model import reasons_against, sensors_disagree
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import severities, severities_at, what_is_not_told, with_bulk_modulus
+from faults.diagnosis.severity_total import with_totals
 from faults.eha.bank import mathematical_bank
 from faults.notes import ClassCode
 from plant.eha.model import EhaParameters
@@ -120,7 +121,7 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
     verdict = models_verdict(scores, log.record)
     found = finding_of(log, estimate)
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
-    notes = (*log.left_out, *verdict.notes, *absent)
+    notes = (*log.left_out, *verdict.notes, *absent, *estimate.rig_notes)
     found = replace(found, outcome=verdict.outcome, notes=notes, channels=scores.channels)
     if verdict.outcome is not Outcome.OK:
         return replace(found, evidence=EhaEvidence(estimate, scores, None))
@@ -142,13 +143,22 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
         probabilities=diagnosis.probabilities,
         unknown=bool(against),
         against=against,
-        severities=with_bulk_modulus(diagnosis.severity, estimate.quantity, actuator_of(rig.parameters)),
+        severities=_severities(diagnosis, estimate, rig, pressure=PRESSURE in scores.channels),
         healthy=diagnosis.healthy,
         not_told=diagnosis.not_told,
         since=diagnosis.scoreboard.onset,
         advice=advice_for(log.record, diagnosis.probabilities, against, diagnosis.not_told, scores.channels),
         evidence=EhaEvidence(estimate, scores, diagnosis),
     )
+
+
+def _severities(
+    diagnosis: Diagnosis, estimate: BulkModulusEstimate, rig: Rig, *, pressure: bool
+) -> Mapping[str, Quantity]:
+    """Return how bad it is, with the bulk modulus that was estimated, and what is not known of the rig."""
+    actuator = actuator_of(rig.parameters)
+    found = with_bulk_modulus(diagnosis.severity, estimate.quantity, actuator)
+    return with_totals(found, actuator, rig.spreads, pressure=pressure)
 
 
 def _without_circuit(found: Finding, log: CleanLog, scores: Scores, doubts: tuple[Note, ...], why: Note) -> Finding:

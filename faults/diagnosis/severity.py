@@ -134,8 +134,11 @@ def with_bulk_modulus(found: Mapping[str, Quantity], estimated: Quantity, actuat
     """
     if estimated.value is None or estimated.ci95 is None:
         return {**found, "bulk_modulus": estimated, "entrained_air": Quantity(None, UNITS["entrained_air"])}
-    low, high = (max(end, 1.0) for end in estimated.ci95)
-    air = Quantity(_air(estimated.value, actuator), UNITS["entrained_air"], (_air(high, actuator), _air(low, actuator)))
+    ends, total = (
+        None if ci is None else (_air(max(ci[1], 1.0), actuator), _air(max(ci[0], 1.0), actuator))
+        for ci in (estimated.ci95, estimated.ci95_total)
+    )
+    air = Quantity(_air(estimated.value, actuator), UNITS["entrained_air"], ends, ci95_total=total)
     return {**found, "bulk_modulus": estimated, "entrained_air": _with_air(air, estimated, actuator)}
 
 
@@ -148,11 +151,13 @@ def _air(bulk_modulus: float, actuator: Actuator) -> float:
 
 def _with_air(air: Quantity, modulus: Quantity, actuator: Actuator) -> Quantity:
     """Return the air with an interval that begins at none where bulk modulus is that of some sound actuator."""
-    if air.ci95 is None or modulus.ci95 is None:
-        return air
     unlike = actuator.circuit.bulk_modulus * (1.0 - OF_KIND)
-    lowest = air.ci95[0] if modulus.ci95[1] < unlike else 0.0
-    return Quantity(air.value, air.unit, (max(0.0, lowest), air.ci95[1]))
+
+    ends, total = (
+        None if one is None or stiff is None else (max(0.0, one[0]) if stiff[1] < unlike else 0.0, one[1])
+        for one, stiff in ((air.ci95, modulus.ci95), (air.ci95_total, modulus.ci95_total))
+    )
+    return Quantity(air.value, air.unit, ends, ci95_total=total)
 
 
 def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure: bool) -> list[Note]:

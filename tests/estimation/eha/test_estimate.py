@@ -56,21 +56,15 @@ def test_a_finding_holds_what_the_estimate_found_with_units_and_intervals() -> N
         assert (one.value, one.std) == (value, std)
         assert one.ci95 == pytest.approx((value - 1.96 * std, value + 1.96 * std), rel=1e-4)
     assert (found.condition, found.probabilities, found.advice) == (None, {}, ())
-    assert found.all_notes == ()
-
-
-def test_what_is_not_known_of_the_rig_widens_the_interval() -> None:
-    exact, vague = (estimate_log(log(), Rig(uncertainties=given)) for given in ({}, {"chamber_volume": 0.05}))
-    stds = [found.quantities["bulk_modulus"].std for found in (exact, vague)]
-    assert stds[1] > 3.0 * stds[0]
+    assert [note.code for note in found.all_notes] == [EstimateCode.KNOWN_AS_THE_RIG]
 
 
 def test_only_what_the_estimate_used_is_said_to_be_left_out() -> None:
     unused, used = (
         estimate_log(with_outliers(log(), channel), Rig()) for channel in ("velocity_m_s", "motor_speed_rad_s")
     )
-    assert unused.notes == ()
-    (note,) = used.notes
+    assert [note.code for note in unused.notes] == [EstimateCode.KNOWN_AS_THE_RIG]
+    note, _ = used.notes
     assert note == SensorCode.OUTLIERS_LEFT_OUT.note(channel="motor_speed_rad_s", count=20, total=3000)
 
 
@@ -80,7 +74,7 @@ def test_what_it_costs_not_to_use_the_pressure_is_noted(form: str) -> None:
     seen = record if form == "acceleration" else record.replace(**{PRESSURE: None})
     found = estimate_log(seen, Rig(), EstimateOptions(form=form))
     cost = EstimateCode.PRESSURE_UNUSED if form == "acceleration" else EstimateCode.PRESSURE_ABSENT
-    assert [note.code for note in found.notes] == [cost]
+    assert [note.code for note in found.notes if note.code != EstimateCode.KNOWN_AS_THE_RIG] == [cost]
     assert {EstimateCode.PRESSURE_UNUSED, EstimateCode.PRESSURE_ABSENT}.isdisjoint(
         note.code for note in estimate_log(record, Rig()).notes
     )

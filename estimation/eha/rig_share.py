@@ -1,0 +1,166 @@
+"""What a result owes to the rig file: how it would differ if an entry did, and the interval with all that is unknown.
+
+A response is the relative change of a quantity per relative change of a rig entry. The flow form's fit gives its own;
+everything else takes the laws of dimension below. They are exact in what they say of scale:
+
+- volume over bulk modulus is all that any balance holds, so bulk modulus goes with the volume;
+- with pressure logged, all flows may grow together: leakage grows, compliance V/beta too, so bulk modulus falls as the
+  displacement grows; a sensor that reads high makes bulk modulus too large and leakage too small;
+- without it mass, friction, pressures and bulk modulus may grow together, and leakage fall: the mass holds the scale.
+
+Leakage is a small difference of two flows: an error of the pump's or the piston's counts by pumped flow over leakage.
+How the ratio of the two flows acts on bulk modulus hangs on the drive; the laws let the displacement carry it.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+from estimation.finding import NORMAL_95, Quantity
+from estimation.fits.form_fit import FormFit
+from estimation.notes import EstimateCode
+from plant.eha.doubts import PRESSURE_GAIN, Spread
+from plant.eha.model import EhaParameters
+from plant.eha.steady_state import steady_state
+from plant.notes import Note
+
+Responses = Mapping[str, float]
+"""Relative change of a quantity per relative change of a rig entry, by entry [dimensionless]."""
+
+GAIN: Mapping[str, float] = MappingProxyType({"bulk_modulus": -1.0, "leakage_coefficient": 1.0})
+"""Responses to the gain of the pressure sensor."""
+
+MOSTLY_RIG = 2.0
+"""Ratio of the total interval to the one given the rig above which a note names the entry [dimensionless]."""
+
+
+def fitted_responses(fit: FormFit) -> Mapping[str, Responses]:
+    """Return responses of what the flow form found, from the fit's own linear response.
+
+    Parameters
+    ----------
+    fit : FormFit
+        The fit.
+
+    Returns
+    -------
+    Mapping[str, Responses]
+        By quantity.
+    """
+    return {
+        name: {entry: slopes[name] / value for entry, slopes in fit.rig_slopes.items() if value}
+        | {PRESSURE_GAIN: GAIN.get(name, 0.0)}
+        for name, (value, _) in fit.parameters.items()
+    }
+
+
+def scaled_responses(
+    parameters: EhaParameters, found: Mapping[str, float], *, pressure: bool
+) -> Mapping[str, Responses]:
+    """Return responses by the laws of dimension.
+
+    Parameters
+    ----------
+    parameters : EhaParameters
+        The actuator.
+    found : Mapping[str, float]
+        What was found of it, by parameter [SI].
+    pressure : bool
+        Whether differential pressure was used.
+
+    Returns
+    -------
+    Mapping[str, Responses]
+        By quantity; none of what no law is known of.
+    """
+    p = replace(parameters, **{name: value for name, value in found.items() if hasattr(parameters, name)})
+    velocity, settled = steady_state(p.rated_speed, p)
+    pumped, swept = p.pump_displacement * p.rated_speed, p.piston_area * velocity
+    leaked, biased = (max(flow, 1e-3 * pumped) for flow in (p.leakage_coefficient * settled, p.flow_bias))
+    scale: Responses = {"piston_area": 1.0, PRESSURE_GAIN: -1.0} if pressure else {"moving_mass": 1.0}
+    held: Responses = {PRESSURE_GAIN: 1.0} if pressure else {"moving_mass": -1.0}
+    own = 0.0 if pressure else 1.0
+    oil: Responses = {PRESSURE_GAIN: -1.0} if pressure else {"moving_mass": 1.0, "piston_area": -1.0}
+    return {
+        "bulk_modulus": {"chamber_volume": 1.0, "pump_displacement": -1.0, **oil},
+        "leakage_coefficient": {"pump_displacement": pumped / leaked, "piston_area": own - swept / leaked, **held},
+        "flow_bias": {"pump_displacement": pumped / biased, "piston_area": -swept / biased},
+        **dict.fromkeys(("friction_quadratic", "friction_linear", "friction_coulomb"), scale),
+    }
+
+
+def _reaches(responses: Responses, spreads: Mapping[str, Spread]) -> dict[str, tuple[float, float]]:
+    """Return how far each entry moves a quantity down and up within its own 95 % [fraction of the quantity]."""
+    found: dict[str, tuple[float, float]] = {}
+    for entry, power in responses.items():
+        down, up = spreads.get(entry, (0.0, 0.0))
+        lower, upper = (down, up) if power > 0.0 else (up, down)
+        found[entry] = abs(power) * -math.expm1(-NORMAL_95 * lower), abs(power) * math.expm1(NORMAL_95 * upper)
+    return found
+
+
+def with_total(
+    one: Quantity, responses: Responses | None, spreads: Mapping[str, Spread], size: float | None = None
+) -> Quantity:
+    """Return a quantity with its total interval: noise and every entry of the rig, taken as independent.
+
+    An entry's logarithm is normal, so its ends are ``value * exp(-1.96 s)`` and ``value * exp(1.96 s)``; distances of
+    the ends from the value add in squares.
+
+    Parameters
+    ----------
+    one : Quantity
+        With the interval that holds if the rig file is right.
+    responses : Responses or None
+        Of the quantity [dimensionless]; None where they are not known.
+    spreads : Mapping[str, Spread]
+        How far each entry may be off.
+    size : float, optional
+        What the responses are relative to, for a quantity that counts from a healthy actuator's [in its unit]; the
+        value itself if not given, which then stays positive.
+
+    Returns
+    -------
+    Quantity
+        With ``ci95_total``; without it where there is no interval, or its responses are not known.
+    """
+    if one.value is None or one.ci95 is None or responses is None:
+        return one
+    reaches = _reaches(responses, spreads).values()
+    down, up = (abs(one.value if size is None else size) * math.hypot(*ends) for ends in zip(*reaches, strict=True))
+    low = one.value - math.hypot(one.value - one.ci95[0], down) if down else one.ci95[0]
+    high = one.value + math.hypot(one.ci95[1] - one.value, up) if up else one.ci95[1]
+    if size is None and one.value > 0.0:
+        low = max(low, min(one.ci95[0], 0.0))
+    return replace(one, ci95_total=(low, high))
+
+
+def rig_notes(name: str, one: Quantity, responses: Responses, spreads: Mapping[str, Spread]) -> tuple[Note, ...]:
+    """Return a note where a quantity is known only as well as the rig.
+
+    Parameters
+    ----------
+    name : str
+        The quantity.
+    one : Quantity
+        With both intervals.
+    responses : Responses
+        Of the quantity [dimensionless].
+    spreads : Mapping[str, Spread]
+        How far each entry may be off.
+
+    Returns
+    -------
+    tuple of Note
+        One at most, with the entry that makes most of the total.
+    """
+    if one.value is None or one.ci95 is None or one.ci95_total is None:
+        return ()
+    given, total = (high - low for low, high in (one.ci95, one.ci95_total))
+    if not total > MOSTLY_RIG * given:
+        return ()
+    squares = {entry: (one.value * (down + up)) ** 2 for entry, (down, up) in _reaches(responses, spreads).items()}
+    entry = max(squares, key=lambda name: squares[name])
+    share = 100.0 * squares[entry] / (sum(squares.values()) + given**2)
+    return (EstimateCode.KNOWN_AS_THE_RIG.note(quantity=name, entry=entry, percent=share),)

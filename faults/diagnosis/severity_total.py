@@ -1,0 +1,75 @@
+"""What severities owe to the rig file: total intervals, by laws of scale that hold in the steady state.
+
+At rated speed the pumped flow that does not move the piston leaks, so leakage answers an error of displacement or area
+by pumped flow over leakage; the velocity that is lost answers it one to one. Friction is area times pressure, and the
+gain of the sensor is that of the pressure. Without pressure the missing flow is the product of leakage and pressure:
+what a wrong ratio adds goes into either, so each is given it in full, which is too much; the scale itself is held by
+how alike actuators of one kind are, which the interval given the rig holds already.
+"""
+
+from collections.abc import Mapping
+
+from estimation.eha.rig_share import Responses, with_total
+from estimation.finding import Quantity
+from faults.diagnosis.class_fit import Actuator
+from plant.components.friction import quadratic_friction
+from plant.eha.doubts import PRESSURE_GAIN, Spread
+
+LEAST_LEAKAGE = 1e-2
+"""Least share of the pumped flow that counts as leaking [fraction]."""
+
+
+def with_totals(
+    found: Mapping[str, Quantity], actuator: Actuator, spreads: Mapping[str, Spread], *, pressure: bool
+) -> Mapping[str, Quantity]:
+    """Return severities with their total intervals; bulk modulus and the air bring theirs along.
+
+    Parameters
+    ----------
+    found : Mapping[str, Quantity]
+        Severities, by the names of `faults.diagnosis.severity.UNITS`.
+    actuator : Actuator
+        The healthy actuator.
+    spreads : Mapping[str, Spread]
+        How far each entry of the rig may be off.
+    pressure : bool
+        Whether differential pressure is used.
+
+    Returns
+    -------
+    Mapping[str, Quantity]
+        The same, each with both intervals; without the total where the velocity that is lost is not determined.
+    """
+    lost = found["velocity_lost"].value
+    if lost is None:
+        return found
+    laws, whole = _laws(lost, actuator, pressure=pressure), _whole(found, actuator)
+    return {**found, **{name: with_total(found[name], law, spreads, whole.get(name)) for name, law in laws.items()}}
+
+
+def _laws(lost: float, actuator: Actuator, *, pressure: bool) -> Mapping[str, Responses]:
+    """Return responses of severities, to the whole of which they are a part."""
+    healthy = actuator.circuit
+    swept = healthy.piston_area * actuator.rated * (1.0 - lost / 100.0)
+    pumped = healthy.pump_displacement * healthy.rated_speed
+    ratio = pumped / max(pumped - swept, LEAST_LEAKAGE * pumped)
+    flows: Responses = {"pump_displacement": ratio, "piston_area": 1.0 - ratio}
+    gauge: Responses = {"pump_displacement": 1.0, "piston_area": 1.0, PRESSURE_GAIN: -1.0}
+    return {
+        "leakage_flow": {**flows, PRESSURE_GAIN: 1.0} if pressure else flows,
+        "velocity_lost": {"pump_displacement": 1.0, "piston_area": -1.0},
+        "added_friction": gauge if pressure else flows,
+        "pressure_rise": gauge if pressure else flows,
+    }
+
+
+def _whole(found: Mapping[str, Quantity], actuator: Actuator) -> Mapping[str, float]:
+    """Return what each severity is the excess or the lack of, in its unit."""
+    p = actuator.circuit
+    sound = float(quadratic_friction(actuator.rated, 1.0, p.friction_quadratic, p.friction_linear, p.friction_coulomb))
+    value = {name: one.value or 0.0 for name, one in found.items()}
+    return {
+        "velocity_lost": 100.0 - value["velocity_lost"],
+        "added_friction": sound + value["added_friction"],
+        "pressure_rise": 100.0 + value["pressure_rise"],
+    }

@@ -1,0 +1,165 @@
+"""What a result owes to the rig: responses against refits, and total intervals that cover where the rig is wrong."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from estimation.eha.estimate import estimate_log
+from estimation.eha.rig_share import fitted_responses, scaled_responses, with_total
+from estimation.finding import Quantity
+from estimation.fits.flow_fit import fit_flow
+from estimation.notes import EstimateCode
+from faults.conditions import CONDITIONS, parameters_for
+from plant.eha.doubts import DOUBTS, PRESSURE_GAIN, Spread
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.eha.simulate import LUMPED, simulate
+from plant.eha.steady_state import steady_state
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+HEALTHY = EhaParameters()
+PRESSURE = "differential_pressure_pa"
+ENTRIES = ("pump_displacement", "piston_area", "chamber_volume")
+
+
+def log(p: EhaParameters, drive: str = "steps", seed: int = 8, duration: float = 3.0) -> Record:
+    rng = np.random.default_rng(seed)
+    return simulate(LUMPED, make_drive(drive, duration, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+
+
+def changed(record: Record, entry: str, factor: float) -> tuple[Record, EhaParameters]:
+    """Return a log and a rig whose entry is larger; a gain that is believed larger makes the pressure smaller."""
+    if entry == PRESSURE_GAIN:
+        return record.replace(**{PRESSURE: record[PRESSURE] / factor}), HEALTHY
+    return record, replace(HEALTHY, **{entry: factor * asdict(HEALTHY)[entry]})
+
+
+@pytest.mark.parametrize("entry", [*ENTRIES, PRESSURE_GAIN])
+def test_the_fits_response_to_an_entry_is_that_of_a_refit(entry: str) -> None:
+    record = log(parameters_for(CONDITIONS["major_leakage"]))
+    first = fit_flow(record, HEALTHY, 2e8, dict.fromkeys(ENTRIES, 0.1))
+    again = fit_flow(*changed(record, entry, 1.01), 2e8)
+    for name in ("bulk_modulus", "leakage_coefficient"):
+        moved = math.log(again.parameters[name][0] / first.parameters[name][0]) / math.log(1.01)
+        assert fitted_responses(first)[name][entry] == pytest.approx(moved, rel=0.3, abs=0.15)
+
+
+FILTERS = {"pressure": "with pressure", "acceleration": "without it"}
+
+
+@pytest.mark.parametrize("form", FILTERS)
+@pytest.mark.parametrize("entry", ["chamber_volume", PRESSURE_GAIN])
+def test_a_filters_bulk_modulus_goes_with_the_volume_and_against_the_gain(form: str, entry: str) -> None:
+    record, pressure = log(HEALTHY, duration=6.0), FILTERS[form] == "with pressure"
+    moved = [
+        estimate_bulk_modulus(seen, rig, form=form, method="ekf").value
+        for seen, rig in (changed(record, entry, factor) for factor in (1.0, 1.02))
+    ]
+    law = scaled_responses(HEALTHY, {}, pressure=pressure)["bulk_modulus"]
+    assert moved[0]
+    assert moved[1]
+    assert math.log(moved[1] / moved[0]) / math.log(1.02) == pytest.approx(law.get(entry, 0.0), abs=0.1)
+
+
+@pytest.mark.slow
+def test_without_pressure_the_mass_holds_the_scale() -> None:
+    record = log(HEALTHY, duration=4.0).replace(**{PRESSURE: None})
+    heavy = replace(HEALTHY, moving_mass=1.3 * HEALTHY.moving_mass)
+    found = [estimate_bulk_modulus(record, rig, form="motion") for rig in (HEALTHY, heavy)]
+    values = [{"bulk_modulus": one.value or 0.0, **{name: v for name, (v, _) in one.others.items()}} for one in found]
+    for name in ("bulk_modulus", "leakage_coefficient"):
+        moved = math.log(values[1][name] / values[0][name]) / math.log(1.3)
+        assert found[0].responses[name]["moving_mass"] == pytest.approx(moved, abs=0.15)
+
+
+@pytest.mark.parametrize(("pressure", "scale"), [(True, 1.0), (False, 2.0)])
+def test_displacement_and_area_that_grow_together_scale_all_flows(pressure: bool, scale: float) -> None:
+    laws = scaled_responses(HEALTHY, {}, pressure=pressure)
+    oil, leakage = laws["bulk_modulus"], laws["leakage_coefficient"]
+    assert oil["pump_displacement"] + oil.get("piston_area", 0.0) == -scale
+    leaked = HEALTHY.leakage_coefficient * steady_state(HEALTHY.rated_speed, HEALTHY)[1]
+    not_scaled = HEALTHY.flow_bias / leaked  # the bias stays, so leakage takes what it would have grown by
+    assert leakage["pump_displacement"] + leakage["piston_area"] == pytest.approx(scale + not_scaled)
+
+
+def quantity(value: float, std: float) -> Quantity:
+    return Quantity.normal(value, std, "Pa")
+
+
+def test_without_doubt_the_total_interval_is_the_one_given_the_rig() -> None:
+    one = with_total(quantity(2e8, 1e6), {"chamber_volume": 1.0}, {})
+    assert one.ci95_total == one.ci95
+
+
+def test_a_law_of_scale_makes_the_interval_of_a_logarithm() -> None:
+    one = with_total(quantity(2e8, 0.0), {"chamber_volume": 1.0}, {"chamber_volume": Spread.of(0.15)})
+    assert one.ci95_total == pytest.approx((2e8 * math.exp(-1.96 * 0.15), 2e8 * math.exp(1.96 * 0.15)), rel=1e-4)
+
+
+def test_what_goes_against_an_entry_turns_its_sides_about() -> None:
+    one = with_total(quantity(1.0, 0.0), {"moving_mass": -1.0}, {"moving_mass": Spread(0.1, 0.4)})
+    assert one.ci95_total == pytest.approx((math.exp(-1.96 * 0.4), math.exp(1.96 * 0.1)), rel=1e-4)
+
+
+def test_a_small_difference_of_flows_may_be_nothing_but_not_less() -> None:
+    one = with_total(quantity(5e-12, 1e-13), {"pump_displacement": 60.0}, {"pump_displacement": Spread.of(0.03)})
+    assert one.ci95_total is not None
+    assert one.ci95_total[0] == 0.0
+    assert one.ci95_total[1] == pytest.approx(5e-12 * (1.0 + 60.0 * math.expm1(1.96 * 0.03)), rel=1e-3)
+
+
+def test_a_quantity_of_which_no_law_is_known_has_no_total_interval() -> None:
+    assert with_total(quantity(1.0, 0.1), None, {"chamber_volume": Spread.of(0.15)}).ci95_total is None
+
+
+def test_the_rig_widens_the_total_alone_and_decides_no_outcome_and_no_gate() -> None:
+    exact, usual, vague = (
+        estimate_log(log(HEALTHY), Rig(uncertainties=given))
+        for given in (dict.fromkeys(DOUBTS, 0.0), {}, {"chamber_volume": 2.0})
+    )
+    for found in (usual, vague):
+        assert (found.outcome, found.gate) == (exact.outcome, exact.gate)
+        for name, one in found.quantities.items():
+            assert (one.value, one.std) == (exact.quantities[name].value, exact.quantities[name].std)
+            assert one.ci95 == exact.quantities[name].ci95 == exact.quantities[name].ci95_total
+            assert one.ci95
+            assert one.ci95_total
+            assert one.ci95_total[0] < one.ci95[0] < one.ci95[1] < one.ci95_total[1]
+
+
+def noted(given: Mapping[str, float], measured: tuple[str, ...] = ()) -> list[tuple[str, float]]:
+    found = estimate_log(log(HEALTHY), Rig(uncertainties=given, measured=measured))
+    return [(n.data["entry"], n.data["percent"]) for n in found.notes if n.code == EstimateCode.KNOWN_AS_THE_RIG]
+
+
+def test_a_note_names_the_entry_that_bulk_modulus_is_known_as_well_as() -> None:
+    assert noted(dict.fromkeys(DOUBTS, 0.0)) == []
+    ((entry, percent),) = noted({})
+    assert entry == "chamber_volume"
+    assert 80.0 < percent < 100.0
+    ((entry, _),) = noted({"chamber_volume": 0.001, "pump_displacement": 0.1})
+    assert entry == "pump_displacement"
+    ((_, measured),) = noted({}, ("chamber_volume",))
+    assert measured < percent
+
+
+@pytest.mark.parametrize(("logs", "least", "most"), [(8, 7, 2), pytest.param(60, 54, 12, marks=pytest.mark.slow)])
+def test_total_intervals_cover_where_rigs_are_as_wrong_as_they_are_said_to_be(logs: int, least: int, most: int) -> None:
+    rng, covered, given = np.random.default_rng(5), 0, 0
+    for trial in range(logs):
+        wrong = {name: math.exp(DOUBTS[name].usual.up * rng.standard_normal()) for name in (*ENTRIES, PRESSURE_GAIN)}
+        true = replace(HEALTHY, **{name: wrong[name] * asdict(HEALTHY)[name] for name in ENTRIES})
+        record = log(true, ("steps", "prbs")[trial % 2], seed=trial)
+        found = estimate_log(record.replace(**{PRESSURE: wrong[PRESSURE_GAIN] * record[PRESSURE]}), Rig())
+        one = found.quantities["bulk_modulus"]
+        assert one.ci95_total is not None
+        covered += one.ci95_total[0] <= true.bulk_modulus <= one.ci95_total[1]
+        given += one.covers(true.bulk_modulus)
+    assert covered >= least
+    assert given <= most

@@ -1,0 +1,93 @@
+"""What severities owe to the rig file: laws of scale, tried by diagnosing again with another rig."""
+
+from dataclasses import asdict, replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from estimation.finding import Quantity
+from estimation.log_checks.clean import clean_log
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.diagnose import actuator_of, diagnose_clean, diagnose_log
+from faults.diagnosis.severity import with_bulk_modulus
+from faults.diagnosis.severity_total import with_totals
+from plant.eha.doubts import PRESSURE_GAIN, Spread
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.eha.simulate import LUMPED, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+HEALTHY = EhaParameters()
+PRESSURE = "differential_pressure_pa"
+STEP = 0.02
+ASKED = ("leakage_flow", "velocity_lost", "added_friction", "pressure_rise")
+
+
+@cache
+def log() -> Record:
+    p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(8)
+    return simulate(LUMPED, make_drive("steps", 5.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+
+
+def severities_of(entry: str = "", factor: float = 1.0) -> dict[str, Quantity]:
+    """Return severities under a rig of which an entry is larger."""
+    record, rig = log(), HEALTHY
+    if entry == PRESSURE_GAIN:
+        record = record.replace(**{PRESSURE: record[PRESSURE] / factor})
+    elif entry:
+        rig = replace(rig, **{entry: factor * asdict(rig)[entry]})
+    return dict(diagnose_clean(clean_log(record, rig), actuator_of(rig)).severity)
+
+
+def added_by(entry: str) -> dict[str, float]:
+    """Return by how much an entry that may be 2 % off moves each severity, by the laws."""
+    found = {name: one.value for name, one in severities_of().items() if one.value is not None}
+    bare = {name: Quantity(value, "1", (value, value)) for name, value in found.items()}
+    spread = {entry: Spread.of(float(np.log1p(STEP)) / 1.96)}
+    moved = with_totals(bare, actuator_of(HEALTHY), spread, pressure=True)
+    return {name: (moved[name].ci95_total or (0.0, 0.0))[1] - found[name] for name in ASKED}
+
+
+@pytest.mark.parametrize("entry", ["pump_displacement", "piston_area", PRESSURE_GAIN])
+def test_laws_of_scale_are_what_another_rig_would_say_or_more(entry: str) -> None:
+    first, again, law = severities_of(), severities_of(entry, 1.0 + STEP), added_by(entry)
+    for name in ASKED:
+        moved = abs((again[name].value or 0.0) - (first[name].value or 0.0))
+        size = max(abs(first[name].value or 0.0), 1.0)
+        assert moved < 1.5 * law[name] + 0.01 * size, name
+
+
+def test_leakage_and_velocity_answer_the_ratio_of_displacement_and_area_as_much_as_the_laws_say() -> None:
+    first, again, law = severities_of(), severities_of("pump_displacement", 1.0 + STEP), added_by("pump_displacement")
+    for name in ("leakage_flow", "velocity_lost"):
+        moved = (again[name].value or 0.0) - (first[name].value or 0.0)
+        assert moved == pytest.approx(law[name], rel=0.4)
+
+
+def test_a_diagnosis_has_both_intervals_of_every_severity_and_the_totals_hold_the_others() -> None:
+    found = diagnose_log(log(), Rig())
+    for name, one in found.severities.items():
+        assert one.ci95 is not None, name
+        assert one.ci95_total is not None, name
+        assert one.ci95_total[0] <= one.ci95[0] <= one.ci95[1] <= one.ci95_total[1], name
+    assert found.severities["bulk_modulus"] == found.quantities["bulk_modulus"]
+    assert found.condition == "minor_leakage"
+    assert not found.unknown
+
+
+def test_the_air_follows_the_total_interval_of_bulk_modulus() -> None:
+    estimated = Quantity(1.5e8, "Pa", (1.49e8, 1.51e8), 5e5, (1.1e8, 2.05e8))
+    air = with_bulk_modulus({}, estimated, actuator_of(HEALTHY))["entrained_air"]
+    assert air.ci95 is not None
+    assert air.ci95_total is not None
+    assert air.ci95[0] > 0.0
+    assert air.ci95_total[0] == 0.0
+    assert air.ci95_total[1] > 2.0 * air.ci95[1]
+
+
+def test_where_the_velocity_lost_is_not_determined_there_are_no_totals() -> None:
+    none = {name: Quantity(None, "1") for name in ASKED}
+    assert with_totals(none, actuator_of(HEALTHY), Rig().spreads, pressure=True) == none
