@@ -206,7 +206,6 @@ def _estimated(record: Record, parameters: EhaParameters, work: Work, prepared: 
         method=work.method,
         start=work.start_pa,
         start_std=work.start_std_pa,
-        uncertainties=prepared.rig.uncertainties,
     )
     reasons = [str(note) for note in found.gate.reasons] if found.value is not None else [OUTCOMES[found.outcome]]
     row: Row = {"outcome": found.outcome.value, "reason": "; ".join(reasons) or None, "trusted": found.gate.passed}

@@ -80,22 +80,25 @@ def _draw_severities(found: "Finding") -> tuple[Figure, str]:
             axis.barh([0.0], [value], height=0.8, color=SKY)
             error = [[max(value - low, 0.0)], [max(high - value, 0.0)]]
             axis.errorbar([value], [0.0], xerr=error, fmt="none", ecolor=BLACK, elinewidth=1.6, capsize=5.0)
+            total = [scale * end for end in one.ci95_total or one.ci95 or ()]
+            axis.plot(total, [0.0, 0.0], color=BLACK, lw=0.7)
             axis.axvline(sound, color=VERMILION, ls="--", lw=1.4)
-            reach = max(abs(number) for number in (value, low, high, sound)) or 1.0
-            least, most = min(0.0, low, sound), max(value, high, sound)
+            reach = max(abs(number) for number in (value, *total, sound)) or 1.0
+            least, most = min(0.0, *total, sound), max(value, *total, sound)
             axis.set(xlim=(1.08 * least - 0.01 * reach, 1.08 * most + 0.01 * reach), ylim=(-0.6, 0.6))
             unit = "MPa" if one.unit == "Pa" else one.unit
             axis.set_yticks([0.0], [f"{SHOWN[name].replace(', at most', '')} [{unit}]"])
             axis.tick_params(axis="y", length=0)
             axis.grid(visible=False, axis="y")
-            words = amount({"value": numbers[0], "unit": one.unit, "ci95": numbers[1:]})
-            axis.text(1.02, 0.5, words, transform=axis.transAxes, va="center", fontsize=8.5)
+            words = amount({**vars(one), "ci95_total": one.ci95_total or [None, None]})
+            axis.text(1.02, 0.5, words.replace("; ", ";\n"), transform=axis.transAxes, va="center", fontsize=8.5)
         handles = [
             Patch(color=SKY, label="estimate"),
             Line2D([], [], color=BLACK, lw=1.6, label="95 % interval"),
+            Line2D([], [], color=BLACK, lw=0.7, label="with the rig's"),
             Line2D([], [], color=VERMILION, ls="--", lw=1.4, label="healthy actuator"),
         ]
-        figure.legend(handles=handles, loc="upper right", ncols=3, bbox_to_anchor=(1.0, 1.0))
+        figure.legend(handles=handles, loc="upper right", ncols=4, bbox_to_anchor=(1.0, 1.0))
     return figure, "Each on a scale of its own; the estimate and its interval in figures on the right."
 
 

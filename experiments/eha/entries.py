@@ -1,6 +1,5 @@
 """Findings of the gear-pump actuator as entries of the JSON contract; later versions add entries and rename none."""
 
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +11,7 @@ if TYPE_CHECKING:
     from estimation.finding import Finding, Quantity
     from faults.diagnosis.diagnose import EhaEvidence
 
-NO_QUANTITY: Mapping[str, Any] = {"value": None, "std": None, "ci95": None}
+NO_QUANTITY: Mapping[str, Any] = {"value": None, "std": None, "ci95": None, "ci95_total": None}
 
 NO_ESTIMATE: Mapping[str, Any] = {
     "bulk_modulus_pa": NO_QUANTITY,
@@ -42,8 +41,8 @@ NO_DIAGNOSIS: Mapping[str, Any] = {
     "notes": [],
 }
 
-COSTS = frozenset({"pressure_absent", "pressure_unused", "pressure_absent_class"})
-"""Codes of what an absent channel costs: of all logs alike, so said once."""
+COSTS = frozenset({"pressure_absent", "pressure_unused", "pressure_absent_class", "known_as_the_rig"})
+"""Codes of what an absent channel costs, or a rig that is not well known: of all logs alike, so said once."""
 
 NO_CLASS = frozenset({"models_alike", "models_diverged"})
 """Codes of why a log is in no class: said as its message, not beside it."""
@@ -137,11 +136,12 @@ def diagnosis_entries(found: "Finding") -> dict[str, Any]:
 
 
 def _quantity(one: "Quantity") -> dict[str, Any]:
-    return {"value": one.value, "std": one.std, "ci95": one.ci95}
+    return {"value": one.value, "std": one.std, "ci95": one.ci95, "ci95_total": one.ci95_total}
 
 
 def _severity(one: "Quantity") -> dict[str, Any]:
-    return {"value": one.value, "unit": one.unit, "ci95": [None, None] if one.ci95 is None else list(one.ci95)}
+    ends, total = (list(ci or (None, None)) for ci in (one.ci95, one.ci95_total))
+    return {"value": one.value, "unit": one.unit, "ci95": ends, "ci95_total": total}
 
 
 def _notes(found: "Finding") -> dict[str, Any]:
@@ -159,13 +159,16 @@ def _estimate_message(found: "Finding") -> str:
         return clauses([OUTCOMES[found.outcome]])
     low, high = (1e-6 * end for end in modulus.ci95)
     said = [f"bulk modulus {1e-6 * modulus.value:.2f} MPa, 95 % interval {low:.2f} to {high:.2f} MPa"]
+    if modulus.ci95_total is not None:
+        low, high = (1e-6 * end for end in modulus.ci95_total)
+        said[0] += f", {low:.0f} to {high:.0f} MPa with what is not known of the rig"
     if not found.gate.passed:
         said.append(f"not to be relied on: {clauses(str(note) for note in found.gate.reasons)}")
     return clauses(said)
 
 
 def costs(results: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return what absent channels cost, each sentence with the number of logs that it is true of.
+    """Return what absent channels or an unknown rig cost, each sentence with the number of logs that it is true of.
 
     Parameters
     ----------
@@ -175,8 +178,10 @@ def costs(results: Iterable[Mapping[str, Any]]) -> list[str]:
     Returns
     -------
     list[str]
-        A sentence a kind of absence.
+        A sentence a kind of absence or entry of the rig; its share is that of the first of the logs.
     """
     results = list(results)
-    said = Counter(note["text"] for result in results for note in result["notes"] if note["code"] in COSTS)
-    return [f"{count} of {len(results)} logs: {text}" for text, count in said.items()]
+    said: dict[tuple[str, str | None], list[str]] = {}
+    for note in (one for result in results for one in result["notes"] if one["code"] in COSTS):
+        said.setdefault((note["code"], note["data"].get("entry")), []).append(note["text"])
+    return [f"{len(texts)} of {len(results)} logs: {texts[0]}" for texts in said.values()]

@@ -30,7 +30,7 @@ def estimates_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
         As given to the verb; none matters here.
     """
     del options
-    shown = table("log", "bulk modulus [MPa]", "95 % interval [MPa]", "bound [%]", "verdict")
+    shown = table("log", "bulk modulus [MPa]", "95 % interval [MPa]", "with the rig's [MPa]", "bound [%]", "verdict")
     for name, result in zip(short_names(results), results, strict=True):
         shown.add_row(name, *_cells(result))
     yield shown
@@ -47,10 +47,13 @@ def _cells(result: Result) -> list[str]:
     verdict = result["outcome"].replace("_", " ")
     bound = f"{result['bound_percent']:.2g}"
     if modulus["value"] is None:
-        return ["-", "-", bound, verdict]
-    low, high = (f"{1e-6 * end:.2f}" for end in modulus["ci95"])
+        return ["-", "-", "-", bound, verdict]
+    given, total = (
+        "-" if ends is None else f"{1e-6 * ends[0]:.{digits}f} to {1e-6 * ends[1]:.{digits}f}"
+        for ends, digits in ((modulus["ci95"], 2), (modulus["ci95_total"], 0))
+    )
     trusted = verdict if result["gate"]["passed"] else "doubtful"
-    return [f"{1e-6 * modulus['value']:.2f}", f"{low} to {high}", bound, trusted]
+    return [f"{1e-6 * modulus['value']:.2f}", given, total, bound, trusted]
 
 
 def diagnoses_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "Iterable[RenderableType]":

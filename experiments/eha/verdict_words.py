@@ -91,19 +91,25 @@ def amount(one: Mapping[str, Any]) -> str:
     Parameters
     ----------
     one : Mapping
-        ``value``, ``unit`` and ``ci95``.
+        ``value``, ``unit``, ``ci95`` and, where it is wider, ``ci95_total``.
 
     Examples
     --------
     >>> amount({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8]})
     '207.0 MPa (205.0 to 209.0)'
+    >>> amount({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8], "ci95_total": [1.5e8, 2.8e8]})
+    '207.0 MPa (205.0 to 209.0; with the rig 150.0 to 280.0)'
     """
     if any(number is None or not math.isfinite(number) for number in (one["value"], *one["ci95"])):
         return "not determined"
     scale, unit = (1e-6, "MPa") if one["unit"] == "Pa" else (1.0, one["unit"])
     value, low, high = (scale * float(number) for number in (one["value"], *one["ci95"]))
     decimals = min(max(1 - math.floor(math.log10(high - low)), 0), 4) if high > low else 2
-    return f"{value:.{decimals}f} {unit} ({low:.{decimals}f} to {high:.{decimals}f})"
+    said = f"{low:.{decimals}f} to {high:.{decimals}f}"
+    total = [None if end is None else f"{scale * end:.{decimals}f}" for end in one.get("ci95_total", [None])]
+    if None not in total and " to ".join(map(str, total)) != said:
+        said += f"; with the rig {total[0]} to {total[1]}"
+    return f"{value:.{decimals}f} {unit} ({said})"
 
 
 def believed(result: Mapping[str, Any]) -> str:

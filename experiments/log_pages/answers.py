@@ -118,13 +118,18 @@ class Answer(Shown):
         Returns
         -------
         pandas.DataFrame
-            By name: value, ends of the 95 % interval, unit.
+            By name: value, ends of the 95 % interval given the rig and in total, unit.
         """
         import pandas as pd
 
         every = {**self.finding.quantities, **self.finding.severities}
-        rows = {name: (one.value, *(one.ci95 or (None, None)), one.unit) for name, one in every.items()}
-        return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "ci95_low", "ci95_high", "unit"])
+        absent = (None, None)
+        rows = {
+            name: (one.value, *(one.ci95 or absent), *(one.ci95_total or absent), one.unit)
+            for name, one in every.items()
+        }
+        ends = [f"{interval}_{end}" for interval in ("ci95", "ci95_total") for end in ("low", "high")]
+        return pd.DataFrame.from_dict(rows, orient="index", columns=["value", *ends, "unit"])
 
     def plot(self) -> "list[Axes]":
         """Draw the probabilities, where there are some, and every quantity with its interval.

@@ -58,9 +58,10 @@ def quantity_entry(one: "Quantity") -> dict[str, Any]:
     Returns
     -------
     dict[str, Any]
-        ``value``, ``unit``, ``std`` and ``ci95``.
+        ``value``, ``unit``, ``std``, ``ci95`` and ``ci95_total``.
     """
-    return {"value": one.value, "unit": one.unit, "std": one.std, "ci95": None if one.ci95 is None else list(one.ci95)}
+    ends = {name: None if ci is None else list(ci) for name, ci in (("ci95", one.ci95), ("ci95_total", one.ci95_total))}
+    return {"value": one.value, "unit": one.unit, "std": one.std, **ends}
 
 
 def gate_entry(gate: "Gate") -> dict[str, Any]:

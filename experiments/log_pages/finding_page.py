@@ -57,7 +57,13 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
         ),
     }
     columns = {
-        "quantities": ("quantity", "value", Column("interval", "95 % interval"), "unit"),
+        "quantities": (
+            "quantity",
+            "value",
+            Column("interval", "95 % interval"),
+            Column("total", "with what is not known of the rig"),
+            "unit",
+        ),
         "probabilities": ("condition", Column("percent", "probability", "%")),
     }
     return render_page("log_pages/finding.html", facts, columns, {"figures/measured.svg": svg_of(figure)})
@@ -83,9 +89,14 @@ def _row(name: str, one: "Quantity") -> dict[str, str]:
     return {
         "quantity": name.replace("_", " "),
         "value": number(one.value),
-        "interval": MISSING if one.ci95 is None else f"{number(one.ci95[0])} to {number(one.ci95[1])}",
+        "interval": _ends(one.ci95),
+        "total": _ends(one.ci95_total),
         "unit": pretty_unit(one.unit),
     }
+
+
+def _ends(interval: tuple[float, float] | None) -> str:
+    return MISSING if interval is None else f"{number(interval[0])} to {number(interval[1])}"
 
 
 def _draw_channels(record: "Record", names: Sequence[str]) -> Figure:

@@ -44,7 +44,8 @@ def disagreement(log: Path) -> str:
     estimated, diagnosed = answers(log)
     said = [name for name in ("bulk_modulus_pa", "gate") if estimated[name] != diagnosed[name]]
     modulus = estimated["bulk_modulus_pa"]
-    shown = {"value": modulus["value"], "unit": "Pa", "ci95": modulus["ci95"] or [None, None]}
+    ends = {name: modulus[name] or [None, None] for name in ("ci95", "ci95_total")}
+    shown = {"value": modulus["value"], "unit": "Pa", **ends}
     if diagnosed.get("severity", {}).get("bulk_modulus", shown) != shown:
         said.append("severity.bulk_modulus")
     refused = estimated["outcome"] in (Outcome.OK, Outcome.MISMATCH) and not estimated["gate"]["passed"]

@@ -130,7 +130,7 @@ def test_estimate_keeps_its_contract(
     assert set(one) >= {"file", "outcome", "bulk_modulus_pa", "nis", "method", "form", "gate", "bound_percent"}
     assert set(one) >= {"condition", "channels", "warnings", "message"}
     assert one["outcome"] in OUTCOME_WORDS
-    assert set(one["bulk_modulus_pa"]) == {"value", "std", "ci95"}
+    assert set(one["bulk_modulus_pa"]) == {"value", "std", "ci95", "ci95_total"}
     assert set(one["gate"]) == {"passed", "reasons"}
     assert one["gate"] == {"passed": True, "reasons": []}
     assert set(one["nis"]) <= set(one["channels"]) == channels
@@ -156,7 +156,7 @@ def test_both_engines_and_both_forms_can_be_chosen(folder: Path) -> None:
 def test_no_number_is_given_where_none_is_observable(sine: Path) -> None:
     (one,) = results("estimate", sine)
     assert one["outcome"] == "not_observable"
-    assert one["bulk_modulus_pa"] == {"value": None, "std": None, "ci95": None}
+    assert one["bulk_modulus_pa"] == {"value": None, "std": None, "ci95": None, "ci95_total": None}
     assert one["bound_percent"] > 3.0
     shown = invoke("estimate", sine)
     assert shown.exit_code == 0

@@ -58,11 +58,15 @@ def test_the_codes_that_entries_know_by_name_are_codes() -> None:
 def test_an_estimate_has_the_entries_that_it_promises() -> None:
     entries = estimate_entries(estimate_log(log(), Rig()))
     assert set(entries) | TOLD_BY_THE_VERB == set(NO_ESTIMATE) | ALWAYS
-    assert set(entries["bulk_modulus_pa"]) == {"value", "std", "ci95"}
+    assert set(entries["bulk_modulus_pa"]) == {"value", "std", "ci95", "ci95_total"}
     assert set(entries["states"]) == {"leakage_coefficient", "flow_bias"}
     assert entries["leakage_coefficient_m3_s_pa"] == entries["states"]["leakage_coefficient"]
     assert entries["gate"] == {"passed": True, "reasons": []}
-    assert (entries["warnings"], entries["notes"]) == ([], [])
+    assert (entries["warnings"], codes(entries)) == ([], [EstimateCode.KNOWN_AS_THE_RIG])
+    low, high = entries["bulk_modulus_pa"]["ci95"]
+    least, most = entries["bulk_modulus_pa"]["ci95_total"]
+    assert least < low < high < most
+    assert f"{1e-6 * least:.0f} to {1e-6 * most:.0f} MPa with what is not known of the rig" in entries["message"]
 
 
 def test_notes_are_codes_with_data_that_json_takes() -> None:
@@ -85,6 +89,11 @@ def test_a_diagnosis_has_the_entries_that_it_promises() -> None:
     entries = diagnosis_entries(diagnose_log(log(), Rig()))
     assert set(entries) == set(NO_DIAGNOSIS) | ALWAYS
     assert (entries["condition"], entries["unknown"]) == ("minor_leakage", False)
+    for one in entries["severity"].values():
+        assert set(one) == {"value", "unit", "ci95", "ci95_total"}
+    modulus, severity = entries["bulk_modulus_pa"], entries["severity"]["bulk_modulus"]
+    assert list(modulus["ci95_total"]) == severity["ci95_total"]
+    assert EstimateCode.KNOWN_AS_THE_RIG in codes(entries)
 
 
 def test_a_log_at_rest_is_in_no_class_and_its_message_alone_says_why() -> None:
@@ -144,8 +153,14 @@ def test_what_an_absent_channel_costs_is_a_note_and_said_once_of_all_logs() -> N
     assert ClassCode.PRESSURE_ABSENT_CLASS in codes(entries)
     assert str(ClassCode.PRESSURE_ABSENT_CLASS.note()) not in entries["warnings"]
     sound = diagnosis_entries(diagnose_log(log(), Rig()))
-    (said,) = costs([entries, sound, entries])
-    assert said == f"2 of 3 logs: {ClassCode.PRESSURE_ABSENT_CLASS.note()}"
+    said = costs([entries, sound, entries])
+    assert f"2 of 3 logs: {ClassCode.PRESSURE_ABSENT_CLASS.note()}" in said
+
+
+def test_an_entry_of_the_rig_is_named_once_of_all_logs_that_it_limits() -> None:
+    found = [estimate_entries(estimate_log(log(condition), Rig())) for condition in ("normal", "major_leakage")]
+    (said,) = costs(found)
+    assert said.startswith("2 of 2 logs: bulk_modulus is known only as well as the rig's chamber_volume, which makes ")
 
 
 def test_nominal_models_that_miss_a_log_are_named_beside_what_the_circuit_says() -> None:

@@ -86,6 +86,11 @@ def test_nominal_models_alone_name_the_nearest_with_its_margin(against: tuple[No
 
 def test_a_severity_that_is_not_told_is_not_determined() -> None:
     entries = diagnosis_entries(found_as("normal"))
-    assert entries["severity"]["entrained_air"] == {"value": None, "unit": "%", "ci95": [None, None]}
+    assert entries["severity"]["entrained_air"] == {
+        "value": None,
+        "unit": "%",
+        "ci95": [None, None],
+        "ci95_total": [None, None],
+    }
     assert amount(entries["severity"]["entrained_air"]) == "not determined"
     assert amount(entries["severity"]["leakage_flow"]) == "1.00 L/min (0.90 to 1.10)"
