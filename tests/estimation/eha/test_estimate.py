@@ -42,7 +42,7 @@ def with_outliers(record: Record, channel: str, count: int = 20) -> Record:
 
 def test_a_finding_holds_what_the_estimate_found_with_units_and_intervals() -> None:
     found = estimate_log(log(), Rig())
-    alone = estimate_bulk_modulus(log(), HEALTHY)
+    alone = estimate_bulk_modulus(log(), HEALTHY, uncertainties=Rig().spreads)
     assert (found.actuator, found.outcome, found.channels) == ("eha", Outcome.OK, ("position_m", PRESSURE))
     assert found.quantities["bulk_modulus"] == alone.quantity
     assert found.gate == alone.gate
