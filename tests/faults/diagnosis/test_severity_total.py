@@ -91,3 +91,11 @@ def test_the_air_follows_the_total_interval_of_bulk_modulus() -> None:
 def test_where_the_velocity_lost_is_not_determined_there_are_no_totals() -> None:
     none = {name: Quantity(None, "1") for name in ASKED}
     assert with_totals(none, actuator_of(HEALTHY), Rig().spreads, pressure=True) == none
+
+
+def test_without_pressure_the_gain_of_its_sensor_widens_nothing() -> None:
+    found, doubted = severities_of(), {PRESSURE_GAIN: Spread.of(0.1)}
+    seen, unseen = (with_totals(found, actuator_of(HEALTHY), doubted, pressure=logged) for logged in (True, False))
+    for name in ("leakage_flow", "added_friction", "pressure_rise"):
+        assert unseen[name].ci95_total == unseen[name].ci95
+        assert seen[name].ci95_total != seen[name].ci95
