@@ -106,3 +106,58 @@ class EstimateCode(Code):
         "pressure_unused",
         "the acceleration form does not use differential_pressure_pa, and breaks down at reversals (errata E9)",
     )
+
+
+class RigCode(Code):
+    """Notes on a rig, its oil or its logger that differ from what the rig file says, and explain the log."""
+
+    PRESSURE_LATE = (
+        "pressure_late",
+        "differential_pressure_pa comes {late_ms:.2f} +- {half_width_ms:.2f} ms late: lag or delay of its sensor; "
+        "it was brought forward",
+    )
+    PRESSURE_OFFSET = (
+        "pressure_offset",
+        "differential_pressure_pa reads {offset_pa:.4g} +- {half_width_pa:.2g} Pa too much; the offset was taken off",
+    )
+    ENCODER_ZERO = (
+        "encoder_zero",
+        "position_m reads {zero_mm:.1f} +- {half_width_mm:.1f} mm in the middle of the stroke; it was shifted",
+    )
+    AREA_TO_DISPLACEMENT = (
+        "area_to_displacement",
+        "pump displacement over piston area is {percent:.2f} +- {half_width:.2f} % of what the rig file says: one of "
+        "the two is wrong, and the log does not tell which",
+    )
+    PUMP_WORN = (
+        "pump_worn",
+        "the pump delivers {percent:.1f} +- {half_width:.1f} % of its displacement: it is worn, or displacement or "
+        "piston area in the rig file is wrong",
+    )
+    VOLUME_DIFFERS = (
+        "volume_differs",
+        "the chambers hold {percent:.0f} +- {half_width:.0f} % of the volume that the rig file says",
+    )
+    STARTS_UNDER_LOAD = (
+        "starts_under_load",
+        "the log begins under a differential pressure of {pressure_pa:.3g} Pa, a load of {force_n:.3g} N",
+    )
+    AIR_ENTRAINED = (
+        "air_entrained",
+        "the oil holds {percent:.2g} +- {half_width:.2g} % of air at atmospheric pressure; without it its bulk modulus "
+        "is {liquid_pa:.3g} Pa",
+    )
+    LEAKAGE_GROWS = (
+        "leakage_grows",
+        "leakage changes over the log by a factor of {factor:.2f}, from {first:.3g} to {last:.3g} m^3/(s Pa): it "
+        "grows, or the oil warms",
+    )
+    MAKEUP_BLOCKED = "makeup_blocked", "the make-up valve of chamber {side} feeds next to nothing: it is stuck shut"
+    PORT_DRAINS = (
+        "port_drains",
+        "chamber {side} loses {drain:.3g} m^3/(s Pa) to the inner circuit: its make-up valve leaks or is stuck open",
+    )
+    EXPLAINED_OTHERWISE = (
+        "explained_otherwise",
+        "{count} other explanation(s) fit the log about as well; the interval holds them",
+    )

@@ -204,15 +204,11 @@ def estimate_clean(
     form = ("pressure" if filtering else _automatic(log.record)) if automatic else options.form
     if automatic and form == "motion" and (bound := rigid_bound(log, parameters)) > LARGEST_BOUND:
         return _doubting_sensors(_unseen(bound), log)
-    if form == "flow" and options.method == "auto" and not filtering:
-        filtering = first_load(log.record, log.variances) != 0.0  # a fit begins at rest
-    if form in FITTED and not filtering:
-        fit, channels = FITTED[form]
-        doubted = {name: max(one) for name, one in spreads.items()} if form == "flow" else {}
-        fitted = fit(log.record, parameters, guess, doubted, log.variances)
-        found = _fitted(fitted, form, channels)
+    fit = None if filtering else _fit(log, parameters, form, guess, spreads, chosen=options.method == LEAST_SQUARES)
+    if fit is not None:
+        found = _fitted(fit, form, FITTED[form][1])
         if form == "flow":
-            found = replace(found, responses=fitted_responses(fitted))
+            found = replace(found, responses=fitted_responses(fit))
     elif form == "flow":
         found = estimate_by_flow_filter(log, parameters, options.filter_options)
     elif options.method == LEAST_SQUARES or form == "motion":
@@ -225,6 +221,23 @@ def estimate_clean(
         how = options.filter_options
         found = estimate_by_filter(log, parameters, model, guess, options.start_std, how)
     return _doubting_sensors(_with_rig(found, parameters, spreads), log)
+
+
+def _fit(
+    log: CleanLog, parameters: EhaParameters, form: str, guess: float, spreads: Mapping[str, Spread], *, chosen: bool
+) -> FormFit | None:
+    """Return the fit of a form; none where it has none, or the log begins under a load that the form does not explain.
+
+    Whoever has chosen least squares gets it, whatever the log begins with.
+    """
+    if form not in FITTED:
+        return None
+    if form != "flow":
+        return FITTED[form][0](log.record, parameters, guess, {}, log.variances)
+    doubted = {name: max(one) for name, one in spreads.items()}
+    loaded = not chosen and first_load(log.record, log.variances) != 0.0
+    fit = fit_flow(log.record, parameters, guess, doubted, log.variances, loaded=loaded)
+    return fit if fit.explanation is not None or not loaded else None
 
 
 def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusEstimate:
@@ -314,6 +327,7 @@ def _fitted(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEs
         others={name: found for name, found in fit.parameters.items() if known and name in REPORTED},
         estimate=None,
         first_pass=None,
+        explanation=fit.explanation,
     )
 
 

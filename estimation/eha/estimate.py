@@ -1,6 +1,7 @@
 """`estimate_log(record, rig) -> Finding`: what a log of the gear-pump actuator says of its oil and leakage."""
 
 from estimation.eha.bulk_modulus import DEFAULT_OPTIONS, FITTED, EstimateOptions, estimate_clean, left_out
+from estimation.eha.explained import notes_of
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Finding, Outcome, Quantity
 from estimation.log_checks.clean import CleanLog, clean_log
@@ -48,7 +49,7 @@ def estimate_log(record: Record, rig: Rig, options: EstimateOptions = DEFAULT_OP
     LogError
         If the log lacks what the form needs.
     """
-    return finding_of(*estimated(clean_log(record, rig.parameters), rig, options))
+    return finding_of(*estimated(clean_log(record, rig.parameters), rig, options), rig)
 
 
 def estimated(log: CleanLog, rig: Rig, options: EstimateOptions) -> tuple[CleanLog, BulkModulusEstimate]:
@@ -71,7 +72,7 @@ def estimated(log: CleanLog, rig: Rig, options: EstimateOptions) -> tuple[CleanL
     return log, estimate_clean(log, rig.parameters, options, rig.spreads)
 
 
-def finding_of(log: CleanLog, found: BulkModulusEstimate) -> Finding:
+def finding_of(log: CleanLog, found: BulkModulusEstimate, rig: Rig) -> Finding:
     """Return what an estimate says, as a finding.
 
     Parameters
@@ -80,6 +81,8 @@ def finding_of(log: CleanLog, found: BulkModulusEstimate) -> Finding:
         The log.
     found : BulkModulusEstimate
         Its estimate.
+    rig : Rig
+        The actuator, as its file has it.
 
     Returns
     -------
@@ -92,7 +95,7 @@ def finding_of(log: CleanLog, found: BulkModulusEstimate) -> Finding:
         quantities={"bulk_modulus": found.quantity, **_others(found)},
         gate=found.gate,
         channels=found.channels,
-        notes=(*left_out(log, found), *absences(found), *found.rig_notes),
+        notes=(*left_out(log, found), *absences(found), *explained(found, rig.parameters), *found.rig_notes),
         evidence=found,
     )
 
@@ -103,6 +106,24 @@ def _others(found: BulkModulusEstimate) -> dict[str, Quantity]:
         name: found.with_total(name, Quantity.normal(value, std, units.get(name, "1")))
         for name, (value, std) in found.others.items()
     }
+
+
+def explained(found: BulkModulusEstimate, parameters: EhaParameters) -> tuple[Note, ...]:
+    """Return what is strange about rig, oil or logger and explains a log.
+
+    Parameters
+    ----------
+    found : BulkModulusEstimate
+        The estimate.
+    parameters : EhaParameters
+        The actuator, as its rig file has it.
+
+    Returns
+    -------
+    tuple of Note
+        None for a plain log.
+    """
+    return () if found.explanation is None else notes_of(found.explanation, parameters)
 
 
 def absences(found: BulkModulusEstimate) -> tuple[Note, ...]:

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from estimation.eha.rig_share import Responses, rig_notes, with_total
 from estimation.filters.run import Estimate
 from estimation.finding import Gate, Outcome, Quantity, interval_95
+from estimation.fits.hypotheses import Explanation
 from estimation.notes import EstimateCode
 from estimation.tuning.tuning import Tuning
 from plant.eha.doubts import Spread
@@ -50,6 +51,8 @@ class BulkModulusEstimate:
         How far each entry of the rig may be off.
     tuning : Tuning or None
         Noise levels, where they were tuned to the log.
+    explanation : Explanation or None
+        What is strange about rig, oil or logger, where that explains the log.
     method : str
         How it was estimated: ``least-squares``, or a filter of `estimation.filters.run.METHODS`.
     """
@@ -68,6 +71,7 @@ class BulkModulusEstimate:
     responses: Mapping[str, Responses] = field(default_factory=lambda: MappingProxyType({}))
     spreads: Mapping[str, Spread] = field(default_factory=lambda: MappingProxyType({}))
     tuning: Tuning | None = None
+    explanation: Explanation | None = None
     method: str = "least-squares"
 
     @property

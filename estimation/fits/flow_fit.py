@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.fits.descent import descend
-from estimation.fits.form_fit import LONGEST_STEP, FormFit, weighed
+from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed
 from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, roughly
 from estimation.fits.greybox_problem import GreyBoxLog, Problem, greybox_log, search_bounds
+from estimation.fits.hypotheses import WORTH, explain
 from estimation.log_checks.bridging import bridged, gaps
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.outliers import without_outliers
@@ -28,9 +29,6 @@ FLOW_CHANNELS = ("position_m", "differential_pressure_pa")
 
 REPORTED = ("leakage_coefficient", "flow_bias")
 """What is worth telling of the parameters found along with bulk modulus."""
-
-FAULTS_TRIED = ((1.0, 1.0), (5.0, 6.0), (12.5, 6.0))
-"""Leakage and flow bias of the starts, as multiples of the healthy actuator's: the spread of Table 3."""
 
 MAKEUP_TRIED = (1e-9, 1e-13)
 """Make-up conductances of the starts [m^3/(s Pa)]: a circuit with make-up valves, and one without."""
@@ -82,15 +80,18 @@ def fit_flow(
     bulk_modulus: float,
     uncertainties: Mapping[str, float] | None = None,
     variances: Mapping[str, float] | None = None,
+    *,
+    loaded: bool = False,
 ) -> FormFit:
     """Fit the flow form to a log, balanced by volume and by mass, and weigh the two.
 
+    A log that it does not explain is asked what is strange about rig, oil or logger (`estimation.fits.hypotheses`).
     Gross outliers are taken out, and what the pump delivered while its speed is missing is read off the pressure after.
 
     Parameters
     ----------
     record : Record
-        The log, with position and differential pressure; it begins at rest.
+        The log, with position and differential pressure.
     parameters : EhaParameters
         Geometry and pump are taken from it; leakage and flow bias are first guesses.
     bulk_modulus : float
@@ -100,6 +101,8 @@ def fit_flow(
     variances : Mapping[str, float], optional
         Measurement variances of the channels of a log whose gross outliers are missing already [SI squared]; both are
         done here if not given.
+    loaded : bool
+        Whether the log begins under load, and not at rest.
 
     Returns
     -------
@@ -138,7 +141,18 @@ def fit_flow(
     best = min(fits, key=lambda fit: fit.cost)
     found, rig_std = weighed(fits)
     value, std = found["bulk_modulus"]
-    return FormFit(found, rig_std, std / value, best.chi_square[0], _objections(best), best.rig_slopes)
+    objections = _objections(best)
+    if objections or loaded:
+        strange = explain(log, parameters, best.values, _explains, loaded=loaded)
+        one = strange.fit
+        if _explains(one) and one.cost < best.cost - WORTH:
+            bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
+            return FormFit(strange.values, strange.rig_std, bound, one.chi_square[0], (), one.rig_slopes, strange)
+    return FormFit(found, rig_std, std / value, best.chi_square[0], objections, best.rig_slopes)
+
+
+def _explains(fit: GreyBoxFit) -> bool:
+    return not _objections(fit)
 
 
 def _cleaned(record: Record) -> tuple[Record, Mapping[str, float]]:

@@ -3,14 +3,21 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from estimation.fits.greybox_fit import GreyBoxFit
 from plant.notes import Note
 
+if TYPE_CHECKING:
+    from estimation.fits.hypotheses import Explanation
+
 LONGEST_STEP = 2.5e-4
 """Longest step of a form [s]; slower logs are sub-stepped."""
+
+FAULTS_TRIED = ((1.0, 1.0), (5.0, 6.0), (12.5, 6.0))
+"""Leakage and flow bias of the starts, as multiples of the healthy actuator's: the spread of Table 3."""
 
 TEMPER = 5.0
 """What a difference of log-likelihood is divided by before models are weighed. None is exact: on a log of the circuit
@@ -35,6 +42,8 @@ class FormFit:
         What speaks against the fit.
     rig_slopes : Mapping[str, Mapping[str, float]]
         By uncertain entry of the rig: by how much each parameter would differ, in SI, per relative change of the entry.
+    explanation : Explanation or None
+        What was added to the form to explain the log; None where nothing had to be.
     """
 
     parameters: Mapping[str, tuple[float, float]]
@@ -43,6 +52,7 @@ class FormFit:
     chi_square: float
     reasons: tuple[Note, ...]
     rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=lambda: MappingProxyType({}))
+    explanation: "Explanation | None" = None
 
 
 def weighed(fits: Sequence[GreyBoxFit]) -> tuple[Mapping[str, tuple[float, float]], Mapping[str, float]]:
@@ -67,7 +77,7 @@ def weighed(fits: Sequence[GreyBoxFit]) -> tuple[Mapping[str, tuple[float, float
     weights /= np.sum(weights)
     best = fits[int(np.argmin(costs))]
     found: dict[str, tuple[float, float]] = {}
-    for name in best.values:
+    for name in (name for name in best.values if all(name in fit.values for fit in fits)):
         values = np.array([fit.values[name] for fit in fits])
         stds = np.array([fit.std[name] for fit in fits])
         mean = float(weights @ values)

@@ -159,10 +159,10 @@ def roughly(problem: Problem, guesses: Sequence[Array], search: Search, bounds: 
         The best point, with its cost at those model steps.
     """
     log = problem.log.coarsened()
-    whole = Problem(problem.model, log)
+    whole = problem.on(log)
 
     def descended(guess: Array, samples: int, evaluations: int) -> Point:
-        part = Problem(problem.model, log.beginning(samples)) if samples < len(log.measured) else whole
+        part = problem.on(log.beginning(samples)) if samples < len(log.measured) else whole
         return descend(part.at, guess, evaluations, bounds, NEAR_ENOUGH)
 
     if len(guesses) > 1:
@@ -245,7 +245,7 @@ def _drive_variance(problem: Problem, theta: Array, response: Callable[[Array], 
     log = problem.log
     if not any(spread > 0.0 for spread in log.drive_std):
         return 0.0
-    rough = Problem(problem.model, log.coarsened())
+    rough = problem.on(log.coarsened())
     undisturbed = rough.residuals(theta)
     rng = np.random.default_rng(0)  # the same draws for every log, so that a result can be repeated
     shaken, squares = np.empty_like(log.drives), 0.0

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.fits.descent import Point
-from estimation.fits.greybox_loops import compile_kernel
+from estimation.fits.greybox_loops import Kernel, compile_kernel
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.greybox import GreyBoxModel
@@ -225,13 +225,28 @@ class Problem:
         One over the variance of each coordinate before the log is seen; zero where nothing is known [dimensionless].
     """
 
-    def __init__(self, model: GreyBoxModel, log: GreyBoxLog) -> None:
+    def __init__(self, model: GreyBoxModel, log: GreyBoxLog, kernel: Kernel | None = None) -> None:
         self.model, self.log = model, log
-        self._kernel = compile_kernel(model)
+        self._kernel = kernel or compile_kernel(model)
         self._block = max(1, round(BLOCK / log.sample_time))
         presumed = [log.presumed.get(name, (1.0, np.inf)) for name in model.unknowns]
         self._presumed = np.array([np.log(value) for value, _ in presumed])
         self.prior = np.array([deviation**-2.0 for _, deviation in presumed])
+
+    def on(self, log: GreyBoxLog) -> "Problem":
+        """Return the same problem of another log.
+
+        Parameters
+        ----------
+        log : GreyBoxLog
+            The log.
+
+        Returns
+        -------
+        Problem
+            The problem.
+        """
+        return type(self)(self.model, log)
 
     def at(self, theta: Array) -> Point:
         """Return the misfit at a point.

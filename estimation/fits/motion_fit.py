@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.fits.descent import Point, descend
-from estimation.fits.flow_fit import DRAIN_START, FAULTS_TRIED, LEAD_START, LEAST_LEAKAGE
-from estimation.fits.form_fit import LONGEST_STEP, FormFit, weighed
+from estimation.fits.flow_fit import DRAIN_START, LEAD_START, LEAST_LEAKAGE
+from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_problem import GreyBoxLog, OutputNoise, Problem, search_bounds
 from estimation.log_checks.bridging import bridged

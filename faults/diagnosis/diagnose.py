@@ -11,7 +11,8 @@ from functools import lru_cache
 import numpy as np
 
 from estimation.eha.bulk_modulus import EstimateOptions
-from estimation.eha.estimate import estimated, finding_of, refused
+from estimation.eha.estimate import estimated, explained, finding_of, refused
+from estimation.eha.explained import OUTSIDE, rig_set_right, set_right
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Finding, Outcome, Quantity
 from estimation.identification.model.linear_model import LinearModel
@@ -117,15 +118,19 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
     """
     log = clean_log(record, rig.parameters)
     estimate = estimated(log, rig, EstimateOptions())[1]
+    found, strange = finding_of(log, estimate, rig), explained(estimate, rig.parameters)
+    outside = tuple(note for note in strange if note.code in OUTSIDE)
+    if estimate.explanation is not None:
+        log = set_right(log, estimate.explanation)
+        rig = replace(rig, parameters=rig_set_right(rig.parameters, estimate.explanation))
     scores = score_mathematical(log.record, mathematical_bank(rig.parameters))
     verdict = models_verdict(scores, log.record)
-    found = finding_of(log, estimate)
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
-    notes = (*log.left_out, *verdict.notes, *absent, *estimate.rig_notes)
+    notes = (*log.left_out, *strange, *verdict.notes, *absent, *estimate.rig_notes)
     found = replace(found, outcome=verdict.outcome, notes=notes, channels=scores.channels)
     if verdict.outcome is not Outcome.OK:
         return replace(found, evidence=EhaEvidence(estimate, scores, None))
-    doubts = (*refused(estimate), *log.objections)
+    doubts = (*refused(estimate), *outside, *log.objections)
     try:
         diagnosis = diagnose_clean(log, actuator_of(rig.parameters))
     except RigError as error:

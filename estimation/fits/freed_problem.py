@@ -1,0 +1,82 @@
+"""The least-squares problem of a model in which any of the parameters may be free: derivatives by finite differences.
+
+`Problem` has exact sensitivities written into its kernel, which takes a kernel for each set of unknowns. Here one
+kernel without unknowns serves every hypothesis.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.fits.greybox_loops import compile_kernel
+from estimation.fits.greybox_problem import OUTLIER, GreyBoxLog, Problem
+from estimation.models.greybox import GreyBoxModel
+from plant.arrays import Array
+from plant.solvers.steps import parameter_names
+
+NUDGE = 1e-5
+"""Step of the finite differences in the fitted coordinates [dimensionless]."""
+
+STRAIGHT = 1e-3
+"""Weight in ``J'J`` of a residual that counts linearly, as in the kernel of `Problem` [dimensionless]."""
+
+
+class FreedProblem(Problem):
+    """The least-squares problem of one log with some parameters of a model free.
+
+    Parameters
+    ----------
+    model : GreyBoxModel
+        A model without unknowns.
+    log : GreyBoxLog
+        The log; its parameters hold the values of what is not free.
+    free : sequence of str
+        Parameters that are fitted.
+    linear : Mapping[str, float]
+        Typical sizes of parameters that are not fitted as logarithms [SI].
+    """
+
+    def __init__(self, model: GreyBoxModel, log: GreyBoxLog, free: Sequence[str], linear: Mapping[str, float]) -> None:
+        sizes = tuple((name, linear[name]) for name in free if name in linear)
+        super().__init__(replace(model, unknowns=tuple(free), linear=sizes), log, compile_kernel(model))
+        self._bare, self._sizes = model, linear
+        self._columns = [parameter_names(model.parameters).index(name) for name in free]
+
+    def on(self, log: GreyBoxLog) -> "FreedProblem":
+        """Return the same problem of another log; see `Problem.on`."""
+        return FreedProblem(self._bare, log, self.model.unknowns, self._sizes)
+
+    def _run(
+        self,
+        theta: Array,
+        errors: Array,
+        slopes: Array,
+        drives: Array | None = None,
+        parameters: Array | None = None,
+    ) -> tuple[float, Array, Array]:
+        parameters = self.log.parameters if parameters is None else parameters
+        here = self._errors(theta, drives, parameters)
+        if errors.size:
+            errors[...] = here
+            if not slopes.size:
+                return 0.0, np.zeros(0), np.zeros((0, 0))
+        columns = np.empty((*here.shape, len(theta)))
+        for i in range(len(theta)):
+            nudged = theta.copy()
+            nudged[i] += NUDGE
+            columns[..., i] = (self._errors(nudged, drives, parameters) - here) / NUDGE
+        if slopes.size:
+            slopes[...] = columns
+        weight = np.minimum(1.0, OUTLIER / np.maximum(np.abs(here), OUTLIER))
+        cost = float(np.sum((1.0 - 0.5 * weight) * weight * here**2))
+        bend = np.where(weight < 1.0, STRAIGHT, 1.0)
+        gradient = np.einsum("obi,ob->i", columns, weight * here)
+        return cost, gradient, np.tril(np.tensordot(columns * bend[..., None], columns, axes=([0, 1], [0, 1])))
+
+    def _errors(self, theta: Array, drives: Array | None, parameters: Array) -> Array:
+        row = parameters.copy()
+        row[self._columns] = list(self.model.values(theta).values())
+        errors = self._room()
+        super()._run(np.empty(0), errors, np.empty((0, 0, 0)), drives, row)
+        return errors

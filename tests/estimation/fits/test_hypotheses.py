@@ -1,0 +1,116 @@
+"""A log that the plain flow form does not explain says what is strange about rig, oil or logger."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from estimation.eha.explained import notes_of, rig_set_right, set_right
+from estimation.fits.flow_fit import fit_flow
+from estimation.fits.hypotheses import Explanation
+from estimation.log_checks.clean import clean_log
+from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters
+from estimation.notes import RigCode
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+HEALTHY = EhaParameters()
+PRESSURE = "differential_pressure_pa"
+
+
+def log(drive: str = "multisine", duration: float = 4.0, parameters: EhaParameters = HEALTHY) -> Record:
+    rng = np.random.default_rng(5)
+    return simulate(
+        CIRCUIT, make_drive(drive, duration, 1e-3, parameters, rng), 1e-3, parameters, sensors=BENCH, rng=rng
+    )
+
+
+def explained(record: Record, rig: EhaParameters = HEALTHY) -> Explanation:
+    clean = clean_log(record, rig)
+    fit = fit_flow(clean.record, rig, rig.bulk_modulus, {}, clean.variances)
+    assert fit.explanation is not None, fit.reasons
+    value, _ = fit.parameters["bulk_modulus"]
+    assert abs(value / HEALTHY.bulk_modulus - 1.0) < 0.01
+    assert not fit.reasons
+    return fit.explanation
+
+
+def lagging(record: Record, lag: float) -> Record:
+    share = 1.0 - np.exp(-record.sample_time / lag)
+    return record.replace(**{PRESSURE: lfilter([share], [1.0, share - 1.0], record[PRESSURE])})
+
+
+def late(record: Record, samples: int) -> Record:
+    return record.replace(**{PRESSURE: np.concatenate([np.zeros(samples), record[PRESSURE][:-samples]])})
+
+
+def test_a_plain_log_is_not_asked() -> None:
+    clean = clean_log(log(), HEALTHY)
+    assert fit_flow(clean.record, HEALTHY, HEALTHY.bulk_modulus, {}, clean.variances).explanation is None
+
+
+def test_a_late_pressure_is_named_with_its_delay_and_brought_forward() -> None:
+    record = log()
+    found = explained(late(record, 5))
+    assert found.names == ("pressure_late",)
+    (note,) = notes_of(found, HEALTHY)
+    assert note.code is RigCode.PRESSURE_LATE
+    assert note.data["late_ms"] == pytest.approx(5.0, abs=0.3)
+    mended = set_right(clean_log(late(record, 5), HEALTHY), found).record[PRESSURE]
+    there = np.isfinite(mended)
+    assert np.std((mended - record[PRESSURE])[there]) < 0.1 * np.std(record[PRESSURE])
+
+
+def test_a_lag_and_a_delay_are_known_by_their_sum() -> None:
+    (note,) = notes_of(explained(late(lagging(log(), 2e-3), 3)), HEALTHY)
+    assert note.code is RigCode.PRESSURE_LATE
+    assert note.data["late_ms"] == pytest.approx(5.0, abs=0.6)
+
+
+def test_a_pressure_offset_of_one_bar_is_named_and_taken_off() -> None:
+    record = log()
+    off = record.replace(**{PRESSURE: record[PRESSURE] + 1e5})
+    found = explained(off)
+    assert found.names == ("pressure_offset",)
+    assert notes_of(found, HEALTHY)[0].data["offset_pa"] == pytest.approx(1e5, rel=0.02)
+    mended = set_right(clean_log(off, HEALTHY), found).record[PRESSURE]
+    assert np.mean(mended - record[PRESSURE]) == pytest.approx(0.0, abs=2e3)
+
+
+def test_an_encoder_that_was_homed_at_the_end_stop_is_named_and_shifted() -> None:
+    record = log("steps", 6.0)
+    found = explained(record.replace(position_m=record["position_m"] + 0.12))
+    assert "encoder_zero" in found.names
+    shifted = set_right(clean_log(record.replace(position_m=record["position_m"] + 0.12), HEALTHY), found)
+    assert np.mean(shifted.record["position_m"] - record["position_m"]) == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("share", "code"), [(1.04, RigCode.AREA_TO_DISPLACEMENT), (0.8, RigCode.PUMP_WORN)])
+def test_a_pump_that_delivers_otherwise_is_named_by_the_ratio(share: float, code: RigCode) -> None:
+    record = log("steps", 6.0, replace(HEALTHY, pump_displacement=share * HEALTHY.pump_displacement))
+    found = explained(record)
+    (note,) = notes_of(found, HEALTHY)
+    assert note.code is code
+    assert note.data["percent"] == pytest.approx(100.0 * share, abs=0.5)
+    assert rig_set_right(HEALTHY, found).pump_displacement / HEALTHY.pump_displacement == pytest.approx(share, abs=5e-3)
+
+
+@pytest.mark.slow
+def test_a_log_that_begins_under_load_says_so() -> None:
+    record = log()
+    begun = record.slice(1500, len(record))
+    found = explained(begun)
+    assert "start_load" in found.names
+
+
+def test_absent_additions_leave_the_plain_form() -> None:
+    absent = WideFlowParameters()
+    assert WIDE_FLOW_FORM.initial(absent)[0] == HEALTHY.accumulator_pressure
+    now, drives = (3e5, 2e5, 0.0), ((50.0, 50.0), (0.01, 0.0101), (0.5, 0.5), 1e-3)
+    grown = WIDE_FLOW_FORM.rates(now, drives, replace(absent, leakage_growth=1.0), 0.0)
+    plain = WIDE_FLOW_FORM.rates(now, drives, absent, 0.0)
+    assert grown[0] < plain[0]
