@@ -54,7 +54,7 @@ def read_record(
     ------
     LogError
         If the file cannot be read, a column is missing, double, or in an unknown unit, or its values cannot
-        be trusted: text, infinities, over 5 % missing, time that is not increasing and uniform within 1 %.
+        be trusted: text, infinities, over 5 % missing, time that does not increase or is no clock's.
 
     Warns
     -----

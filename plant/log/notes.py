@@ -10,7 +10,18 @@ class LogCode(Code):
         "time_missing",
         "{channel} is missing in {count} of {total} samples ({percent:.2g} %); those rows are left out",
     )
-    TIME_JITTERS = "time_jitters", "{channel} jitters by {percent:.2g} % of {sample_time_s:.6g} s; resampled"
+    TIME_JITTERS = (
+        "time_jitters",
+        "{channel} jitters by {percent:.2g} % of {sample_time_s:.6g} s at most, {rms_percent:.2g} % rms; resampled",
+    )
+    TIME_ROUNDED = (
+        "time_rounded",
+        "{channel} was rounded to {quantum_s:.2g} s; put back on the {sample_time_s:.6g} s behind it",
+    )
+    TIME_REPEATS = (
+        "time_repeats",
+        "{channel} repeats the row before in {count} of {total} rows ({percent:.2g} %); those rows are left out",
+    )
     TIMES_OF_THEIR_OWN = (
         "times_of_their_own",
         "channels have times of their own; put on the {sample_time_s:.6g} s of {channel}",

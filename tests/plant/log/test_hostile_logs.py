@@ -126,12 +126,16 @@ def test_time_that_runs_backward_is_refused(tmp_path: Path) -> None:
     refused(log(tmp_path, rows=changed(50, 0, "0.010")), "time_s must increase, got 0.01 in row 51 after 0.049")
 
 
-def test_a_duplicated_row_is_refused(tmp_path: Path) -> None:
-    refused(log(tmp_path, rows=[*ROWS[:40], ROWS[39], *ROWS[40:]]), "time_s must increase, got 0.039 in row 41")
+def test_a_copied_row_is_left_out_with_a_warning(tmp_path: Path) -> None:
+    with pytest.warns(LogWarning) as caught:
+        record = read_record(log(tmp_path, rows=[*ROWS[:40], ROWS[39], *ROWS[40:]]))
+    assert [one.message.note.code for one in caught] == [LogCode.TIME_REPEATS]
+    assert len(record) == N
 
 
-def test_uneven_time_is_refused(tmp_path: Path) -> None:
-    refused(log(tmp_path, rows=changed(50, 0, "0.0503")), "time_s must be uniform within 1 %")
+def test_uneven_time_is_resampled_with_a_warning(tmp_path: Path) -> None:
+    with pytest.warns(LogWarning, match=r"time_s jitters by 30 % of 0\.001 s at most"):
+        assert len(read_record(log(tmp_path, rows=changed(50, 0, "0.0503")))) == N
 
 
 def test_left_out_rows_are_masked_with_a_warning(tmp_path: Path) -> None:

@@ -1,0 +1,205 @@
+"""Stamps that jitter or were rounded: the uniform clock behind them, and what the samples are on it."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Values = NDArray[np.float64]
+
+GAP = 1.5
+"""Steps longer than this many sample times, and than stamps jitter, leave samples out [dimensionless]."""
+
+BEYOND_JITTER = 3.5
+"""Standard deviations of the steps, beyond one sample time, that jitter alone does not reach [dimensionless]."""
+
+POINTS = 5
+"""Samples of which a slope is taken [count]."""
+
+FILLED = 0.15
+"""Least standard deviation of stamps about a uniform clock, over their quantum, that rounding to it leaves; it is 0.29
+where all remainders are alike [dimensionless]."""
+
+ROUNDED = 1.25
+"""Most that rounding leaves of stamps about a uniform clock, end to end, over their quantum [dimensionless]."""
+
+
+class Grid(NamedTuple):
+    """A uniform clock for stamps that jitter: its times, what is a gap in them, and how far the steps scatter.
+
+    Parameters
+    ----------
+    times : ndarray, shape (n,)
+        Uniform times [s].
+    sample_time : float
+        Time between them [s].
+    widest : float
+        Longest step that leaves no sample out [s].
+    scatter, most : float
+        Root mean square and largest deviation of a step from the sample time, over it [fraction].
+    """
+
+    times: Values
+    sample_time: float
+    widest: float
+    scatter: float
+    most: float
+
+    def lacking(self, time: Values) -> NDArray[np.bool_]:
+        """Return at which times of the clock a gap between samples leaves nothing to go by.
+
+        Parameters
+        ----------
+        time : ndarray, shape (m,)
+            When the samples were taken [s].
+
+        Returns
+        -------
+        ndarray of bool, shape (n,)
+            True where nothing is known.
+        """
+        after = np.clip(np.searchsorted(time, self.times), 1, len(time) - 1)
+        before, behind = self.times - time[after - 1], time[after] - self.times
+        far = np.minimum(np.abs(before), np.abs(behind)) > 0.5 * self.sample_time
+        return far & (before + behind > self.widest) | (np.minimum(before, behind) < -0.5 * self.sample_time)
+
+
+def usual_step(step: Values) -> float:
+    """Return the mean of the steps near their median, since the median of rounded steps is rounded.
+
+    Parameters
+    ----------
+    step : ndarray, shape (n,)
+        Steps between stamps [s].
+
+    Returns
+    -------
+    float
+        Their usual size [s].
+    """
+    middle = float(np.partition(step, len(step) // 2)[len(step) // 2])
+    return float(np.mean(step[np.abs(step - middle) <= 0.5 * middle]))
+
+
+def grid_of(time: Values) -> Grid:
+    """Return the uniform clock for stamps that increase.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        The stamps [s].
+
+    Returns
+    -------
+    Grid
+        From the first stamp to the last.
+    """
+    step = np.diff(time)
+    near = step[step < GAP * usual_step(step)]
+    usual = float(np.mean(near))
+    widest = max(GAP, 1.0 + BEYOND_JITTER * float(np.std(near)) / usual) * usual
+    single = step[step <= widest]
+    count = max(1, round(float(time[-1] - time[0]) / float(np.mean(single))))
+    sample_time = float(time[-1] - time[0]) / count
+    off = single / sample_time - 1.0
+    times = time[0] + sample_time * np.arange(count + 1)
+    return Grid(times, sample_time, widest, float(np.sqrt(np.mean(off**2))), float(np.max(np.abs(off))))
+
+
+def resampled(grid: Grid, time: Values, values: Values) -> Values:
+    """Return a channel on a uniform clock: each time has its nearest sample, moved along the local slope.
+
+    The slope is that of a cubic fitted to five samples, so a sample that is moved by a tenth of the sample time keeps
+    its noise: white, and larger by 1 % of its variance. Interpolation would average the noise of neighbours, and what
+    is read off the log afterwards would be too small. Values on a sensor's quanta stay on them.
+
+    Parameters
+    ----------
+    grid : Grid
+        The clock.
+    time : ndarray, shape (m,)
+        When the samples were taken [s], increasing.
+    values : ndarray, shape (m,)
+        The samples [any unit]; NaN where missing.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Values on the clock; NaN in gaps.
+    """
+    there = np.isfinite(values)
+    t, y = time[there], values[there]
+    if len(t) < 2:
+        return np.full(len(grid.times), np.nan)
+    out = np.interp(grid.times, t, y)
+    if len(t) >= POINTS:
+        after = np.clip(np.searchsorted(t, grid.times), 1, len(t) - 1)
+        nearest = after - (grid.times - t[after - 1] < t[after] - grid.times)
+        slopes, whole = _slopes(t, y)
+        moved = y[nearest] + slopes[nearest] * (grid.times - t[nearest])
+        out = np.where(whole[nearest], moved, out)
+    out = _on_quanta(out, y)
+    out[grid.lacking(t)] = np.nan
+    return out
+
+
+def _slopes(t: Values, y: Values) -> tuple[Values, NDArray[np.bool_]]:
+    """Return the slope of a cubic through five samples at each, and whether no gap lies between them."""
+    half, usual = POINTS // 2, float(np.median(np.diff(t)))
+    first = np.clip(np.arange(len(t)) - half, 0, len(t) - POINTS)
+    rows = first[:, None] + np.arange(POINTS)
+    apart = (t[rows] - t[:, None]) / usual
+    powers = apart[:, :, None] ** np.arange(4)
+    normal = np.swapaxes(powers, 1, 2) @ powers
+    right = np.swapaxes(powers, 1, 2) @ (y[rows] - y[:, None])[:, :, None]
+    whole = np.ptp(t[rows], axis=1) <= GAP * (POINTS - 1) * usual
+    normal[~whole] = np.eye(4)
+    slopes: Values = np.linalg.solve(normal, right)[:, 1, 0].astype(np.float64) / usual
+    return slopes, whole
+
+
+def _on_quanta(found: Values, measured: Values) -> Values:
+    """Round to the quantum of a sensor where all that it measured is a whole number of them."""
+    steps = np.abs(np.diff(measured))
+    quantum = float(np.min(steps[steps > 0.0], initial=np.inf))
+    counts = (measured - measured[0]) / quantum
+    if not np.isfinite(quantum) or np.max(np.abs(counts - np.rint(counts))) > 1e-3:
+        return found
+    return measured[0] + quantum * np.rint((found - measured[0]) / quantum)
+
+
+def rounded_clock(time: Values, slots: Values) -> tuple[float, float, float] | None:
+    """Return the uniform clock whose times, rounded, are a log's stamps; None if rounding does not explain them.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        The stamps [s].
+    slots : ndarray, shape (n,)
+        Which tick of the clock each is [count].
+
+    Returns
+    -------
+    tuple of float, or None
+        Start, sample time and quantum [s].
+
+    Examples
+    --------
+    >>> ticks = np.arange(100.0)
+    >>> start, sample_time, quantum = rounded_clock(np.round(3e-4 * ticks, 3), ticks)
+    >>> round(sample_time, 6), round(quantum, 6)
+    (0.0003, 0.001)
+    """
+    step = np.diff(time)
+    fine = max(1e-9 * abs(float(np.mean(step))), 8.0 * float(np.spacing(np.abs(time[[0, -1]]).max())))
+    apart = np.diff(np.unique(np.rint(step / fine))) * fine
+    if not len(apart) or float(np.min(step)) < 0.0:
+        return None
+    quantum = float(np.min(apart))
+    if np.max(np.abs(step / quantum - np.rint(step / quantum))) > 0.01:
+        return None
+    centred = slots - slots.mean()
+    sample_time = float(centred @ time) / float(centred @ centred)
+    left = time - sample_time * slots
+    explained = np.ptp(left) <= ROUNDED * quantum and np.std(left) >= FILLED * quantum
+    return (float(left.mean()), sample_time, quantum) if explained and sample_time > 0.0 else None
