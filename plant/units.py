@@ -103,7 +103,9 @@ def require_number(name: str, value: object, *, signed: bool = False, zero: bool
         raise RigError(f"{name} must {'not be negative' if zero else 'be positive'}, got {value!r}")
 
 
-def require_numbers(parameters: Any, *, signed: Collection[str] = (), zero: Collection[str] = ()) -> None:
+def require_numbers(
+    parameters: Any, *, signed: Collection[str] = (), zero: Collection[str] = (), unknown: Collection[str] = ()
+) -> None:
     """Refuse a set of parameters with a number, or a row of them, that is not finite or not of its sign.
 
     Parameters
@@ -114,6 +116,8 @@ def require_numbers(parameters: Any, *, signed: Collection[str] = (), zero: Coll
         Those that may be negative.
     zero : collection of str
         Those that may be zero, beside those that are zero by default.
+    unknown : collection of str
+        Those that may be None.
 
     Raises
     ------
@@ -123,6 +127,8 @@ def require_numbers(parameters: Any, *, signed: Collection[str] = (), zero: Coll
     for field in fields(parameters):
         value = getattr(parameters, field.name)
         rule = {"signed": field.name in signed, "zero": field.name in zero or field.default == 0.0}
+        if value is None and field.name in unknown:
+            continue
         if not isinstance(value, tuple | list):
             require_number(field.name, value, **rule)
             continue

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from plant.components.oil import oil_pressure
-from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.circuit_parameters import CircuitParameters, longest_stroke
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT
 from plant.errors import LogError
@@ -40,6 +40,9 @@ LONGEST = 30.0
 
 RATE = 1e-3
 """Sample time to which faster logs are averaged [s]."""
+
+AT_STOP = 0.02
+"""A log shows a stop if its piston turned this near to one, as a share of half the stroke [fraction]."""
 
 TOLERANCE, DRIVE_TOLERANCE = 1e-4, 2e-3
 """Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_run`: far below what is
@@ -89,6 +92,12 @@ class Blocks:
     def travel(self) -> float:
         """How far the piston moves to and fro [m]."""
         return float(np.ptp(np.cumsum(np.nan_to_num(self.velocity)))) * self.block * self.sample_time
+
+    @property
+    def reach(self) -> float:
+        """How far the piston goes from where the log begins [m], to either side."""
+        gone = np.cumsum(np.nan_to_num(self.velocity)) * self.block * self.sample_time
+        return float(np.max(np.abs(gone), initial=0.0))
 
     @property
     def first(self) -> int:
@@ -242,6 +251,7 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
     if blocks.earlier is not None:
         until, row = blocks.earlier
         rows = np.where(np.arange(len(blocks.speed))[:, None, None] < until, row, rows)
+    rows = _between_stops(blocks, rows)
     starts = np.array([CIRCUIT.start(row) for row in rows[0]])
     runs = controlled_run(
         CIRCUIT.name,
@@ -255,6 +265,19 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
         drive_tolerance=DRIVE_TOLERANCE,
     )
     return np.array([_outputs(blocks, states, rows[:, i]) for i, states in enumerate(runs)])
+
+
+def _between_stops(blocks: Blocks, rows: Array) -> Array:
+    """Return circuits with the stops of the rig's stroke where the log may show one, without stops elsewhere.
+
+    A piston that turned back before it came to a stop, or that went past it, shows none.
+    """
+    stroke, area, volume = (_COLUMN[name] for name in ("stroke", "piston_area", "chamber_volume"))
+    half = 0.5 * rows[..., stroke]
+    shown = np.abs(blocks.reach - half) <= AT_STOP * half
+    rows = rows.copy()
+    rows[..., stroke] = np.where(shown, 2.0 * half, longest_stroke(rows[..., volume], rows[..., area]))
+    return rows
 
 
 def _outputs(blocks: Blocks, states: Array, row: Array) -> Array:

@@ -1,14 +1,14 @@
 """A circuit fitted to a log, with a prior so weak that the log decides wherever it can."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuit_runs import COORDINATES, Blocks, coordinates_of, parameter_rows, predicted
-from plant.eha.circuit_parameters import CircuitParameters, circuit_of
+from plant.eha.circuit_parameters import CircuitParameters, circuit_of, longest_stroke
 from plant.eha.model import EhaParameters
 from plant.eha.steady_state import steady_state
 
@@ -93,7 +93,10 @@ class Actuator:
         """
         rated = steady_state(rig.rated_speed, rig)[0]
         points = [coordinates_of(parameters_for(condition, rig), rated) for condition in CONDITIONS.values()]
-        return Actuator(circuit_of(rig), rated, np.array(points))
+        circuit = circuit_of(rig)
+        if rig.stroke is None:
+            circuit = replace(circuit, stroke=longest_stroke(circuit.chamber_volume, circuit.piston_area))
+        return Actuator(circuit, rated, np.array(points))
 
 
 @dataclass(frozen=True, eq=False)

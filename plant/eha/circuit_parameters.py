@@ -1,12 +1,17 @@
 """Parameters of the circuit-level plant: those of the actuator, and what the lumped plant leaves out."""
 
 from dataclasses import asdict, dataclass, fields
-from typing import Annotated
+from typing import Annotated, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from plant.components.oil import ATMOSPHERE, specific_volume
-from plant.eha.model import EhaParameters
+from plant.eha.model import JUDGED_STROKE, EhaParameters
 from plant.errors import RigError
 from plant.units import SI, require_number
+
+Number = TypeVar("Number", float, NDArray[np.float64])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +34,7 @@ class CircuitParameters(EhaParameters):
     2.2724e-12
     """
 
+    stroke: Annotated[float, SI("m", "full stroke of the piston", "judged: the paper gives none")] = JUDGED_STROKE
     pump_crossport_leakage: Annotated[
         float, SI("m^3/(s Pa)", "cross-port leakage xi of the pump", "judged: half of Table 3's L_t when normal")
     ] = 2.392e-12
@@ -166,6 +172,22 @@ def oil_demand(p: CircuitParameters) -> float:
     return 4.0 * p.chamber_volume * (1.0 / high - 1.0 / low) if high > 0.0 else float("inf")
 
 
+def longest_stroke(chamber_volume: Number, piston_area: Number) -> Number:
+    """Return the stroke that the chambers of an actuator have room for.
+
+    Parameters
+    ----------
+    chamber_volume, piston_area : float or ndarray of any shape
+        Half of a chamber in mid-stroke [m^3], and area [m^2].
+
+    Returns
+    -------
+    float or ndarray of that shape
+        Full stroke [m].
+    """
+    return 4.0 * _FULLEST * chamber_volume / piston_area
+
+
 def circuit_of(p: EhaParameters) -> CircuitParameters:
     """Return the circuit around an actuator: itself if it is one, else with the paper's rest, scaled to fit.
 
@@ -198,7 +220,7 @@ def circuit_of(p: EhaParameters) -> CircuitParameters:
     compliance = p.chamber_volume / p.bulk_modulus * paper.bulk_modulus / paper.chamber_volume
     size = max(1.0, compliance * max(1.0, p.relief_pressure / paper.relief_pressure))
     return CircuitParameters(
-        **asdict(p),
+        **{name: value for name, value in asdict(p).items() if value is not None},
         pump_crossport_leakage=share * paper.pump_crossport_leakage,
         pump_case_leakage=share * paper.pump_case_leakage,
         accumulator_gas=size * paper.accumulator_gas,

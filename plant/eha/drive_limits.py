@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.eha.model import EhaParameters
+from plant.eha.model import JUDGED_STROKE, EhaParameters
 from plant.errors import DriveError
 from plant.runs import require_positive
 
@@ -51,5 +51,6 @@ def check_drive(speed: NDArray[np.float64], sample_time: float, parameters: EhaP
     swept = parameters.pump_displacement / parameters.piston_area * sample_time
     position = np.concatenate(([0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])))) * swept
     needed = float(np.ptp(position))
-    if needed > parameters.stroke * (1.0 + LIMIT_SLACK):
-        raise DriveError(f"the drive needs {needed:.4g} m of stroke, the actuator has {parameters.stroke:g} m")
+    stroke = parameters.stroke or JUDGED_STROKE
+    if needed > stroke * (1.0 + LIMIT_SLACK):
+        raise DriveError(f"the drive needs {needed:.4g} m of stroke, the actuator has {stroke:g} m")

@@ -57,16 +57,21 @@ class EhaParameters:
         float, SI("rad/(s V)", "motor speed a volt of command", "section 7: 4 V is 1200 rpm, errata E1")
     ] = 31.41592653589793
     motor_speed_limit: Annotated[float, SI("rad/s", "highest motor speed", "section 4: 8 V input mean")] = 251.4
-    stroke: Annotated[float, SI("m", "full stroke of the piston", "judged: the paper gives none")] = 0.25
+    stroke: Annotated[float | None, SI("m", "full stroke of the piston, where it is known", "the paper gives none")] = (
+        None
+    )
 
     def __post_init__(self) -> None:
-        require_numbers(self, signed=("friction_linear",), zero=MAY_BE_ZERO)
+        require_numbers(self, signed=("friction_linear",), zero=MAY_BE_ZERO, unknown=("stroke",))
 
     @property
     def rated_speed(self) -> float:
         """Motor speed at the paper's 4 V [rad/s]."""
         return 4.0 * self.motor_speed_per_volt
 
+
+JUDGED_STROKE = 0.25
+"""Stroke [m] of a simulated actuator whose own is not known: the paper gives none."""
 
 MAY_BE_ZERO = frozenset(
     {

@@ -259,7 +259,8 @@ def rig_template(
     for name, note in notes(parameter_class).items():
         value = getattr(parameters, name)
         lines.append(f"# {note.meaning} [{note.unit}]; source: {note.source}")
-        lines.append(f"{name} = {list(value) if isinstance(value, tuple) else value!r}")
+        known = list(value) if isinstance(value, tuple) else value
+        lines.append(f"# {name} = NUMBER" if known is None else f"{name} = {known!r}")
     lines += [
         "",
         *_uncertainty_lines(parameter_class),

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.circuit_runs import BLOCK, blocks_of, coordinates_of, parameter_rows
+from faults.diagnosis.circuit_runs import BLOCK, blocks_of, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.class_fit import Actuator
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
 from plant.errors import LogError
 from plant.log.record import Record
 
@@ -21,7 +22,7 @@ def test_every_condition_comes_back_from_its_coordinates(name: str) -> None:
     (row,) = parameter_rows(coordinates_of(true, ACTUATOR.rated)[None], ACTUATOR.circuit, ACTUATOR.rated)
     found = dict(zip(CircuitParameters.__dataclass_fields__, row.tolist(), strict=True))
     for field in CircuitParameters.__dataclass_fields__:
-        if field != "motor_lag":  # the logged speed is the motor's own
+        if field not in ("motor_lag", "stroke"):  # the logged speed is the motor's own, and no stop is known
             assert found[field] == pytest.approx(getattr(true, field), rel=1e-9), field
 
 
@@ -55,3 +56,14 @@ def test_position_is_preferred_and_its_absence_borne() -> None:
 def test_a_log_of_a_few_samples_is_refused() -> None:
     with pytest.raises(LogError, match=r"8 blocks of 0\.01 s or more, got 0\.049 s"):
         blocks_of(Record(1e-3, {"motor_speed_rad_s": SPEED[:50], "velocity_m_s": SPEED[:50]}))
+
+
+@pytest.mark.parametrize(("stroke", "given"), [(1.0, None), (1.0, 0.1), (1.0, 0.25), (0.1, 0.1)])
+def test_a_circuit_has_the_stops_that_the_log_shows_and_no_others(stroke: float, given: float | None) -> None:
+    speed = np.repeat([100.0, -60.0], 4000)
+    log = simulate(CIRCUIT, speed, 1e-3, EhaParameters(stroke=stroke))
+    actuator = Actuator.of(EhaParameters(stroke=given))
+    blocks = blocks_of(log)
+    (found,) = predicted(blocks, parameter_rows(actuator.conditions[:1], actuator.circuit, actuator.rated))
+    off = (found - blocks.outputs)[blocks.first :]
+    assert np.all(np.sqrt(np.mean(off**2, axis=0)) < 0.05 * np.sqrt(np.mean(blocks.outputs**2, axis=0)))

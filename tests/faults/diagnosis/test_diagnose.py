@@ -1,6 +1,7 @@
 """Verdicts on logs whose truth is known."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
-from plant.sensors.sensors import RIG
+from plant.sensors.sensors import BENCH, RIG
 
 HEALTHY = EhaParameters()
 ACTUATOR = Actuator.of(HEALTHY)
@@ -46,6 +47,18 @@ def test_every_log_of_a_seed_gets_its_class_and_none_is_flagged(population: list
     assert [one.condition for one in found] == [log.condition for log in population]
     assert [one.against for one in found] == [()] * len(found)
     assert all(sum(one.probabilities.values()) == pytest.approx(1.0) for one in found)
+
+
+@pytest.mark.parametrize(
+    ("condition", "fastest"), [("normal", 70.0), ("normal", 91.0), ("major_friction", 88.0), ("minor_leakage", 130.0)]
+)
+def test_a_log_that_travels_150_to_200_mm_gets_its_class(condition: str, fastest: float) -> None:
+    speed = fastest * np.repeat([0.48, 1.0, 0.72, 1.0, -1.0, -0.56, -1.0, -0.8], 2000)
+    truth = replace(parameters_for(CONDITIONS[condition]), stroke=1.0)
+    record = simulate(CIRCUIT, speed, 1e-3, truth, sensors=BENCH, rng=np.random.default_rng(1))
+    assert np.ptp(record["position_m"]) > 0.145
+    found = diagnosed(record)
+    assert (found.condition, found.against) == (condition, ())
 
 
 @pytest.mark.slow

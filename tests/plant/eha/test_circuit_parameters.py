@@ -7,7 +7,7 @@ import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of, oil_demand
-from plant.eha.model import EhaParameters
+from plant.eha.model import JUDGED_STROKE, EhaParameters
 from plant.errors import RigError
 from plant.units import notes
 
@@ -17,7 +17,8 @@ PAPER = CircuitParameters()
 def test_the_circuit_keeps_the_actuator_it_is_made_around() -> None:
     actuator = EhaParameters(bulk_modulus=1.5e8, piston_area=1.2e-3, leakage_coefficient=1e-12)
     circuit = circuit_of(actuator)
-    assert {name: asdict(circuit)[name] for name in asdict(actuator)} == asdict(actuator)
+    assert {name: asdict(circuit)[name] for name in asdict(actuator)} == {**asdict(actuator), "stroke": JUDGED_STROKE}
+    assert circuit_of(replace(actuator, stroke=0.3)).stroke == 0.3
 
 
 def test_a_circuit_stays_as_it_is() -> None:

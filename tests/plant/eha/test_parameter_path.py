@@ -18,7 +18,7 @@ BULK_MODULUS = NAMES.index("bulk_modulus")
 def test_a_constant_path_is_one_row_in_the_order_of_the_fields() -> None:
     path = ParameterPath.constant(HEALTHY)
     assert path.is_constant
-    np.testing.assert_array_equal(path.sample(np.arange(5.0)), [astuple(HEALTHY)])
+    np.testing.assert_array_equal(path.sample(np.arange(5.0)), np.array([astuple(HEALTHY)], dtype=np.float64))
 
 
 def test_a_path_between_equal_parameters_is_constant() -> None:
@@ -41,7 +41,7 @@ def test_linear_growth_passes_through_the_given_parameters_and_holds_beyond() ->
 def test_every_sample_of_a_path_is_a_valid_actuator_between_its_ends(time: float, growth: Growth) -> None:
     worn = replace(HEALTHY, friction_linear=-7.44e3, leakage_coefficient=6e-11)
     (row,) = ParameterPath((0.0, 5.0), (HEALTHY, worn), growth).sample([time])
-    sampled = EhaParameters(**dict(zip(NAMES, row.tolist(), strict=True)))
+    sampled = EhaParameters(**{**dict(zip(NAMES, row.tolist(), strict=True)), "stroke": None})
     assert worn.friction_linear <= sampled.friction_linear <= HEALTHY.friction_linear
     assert sampled.piston_area == HEALTHY.piston_area
 

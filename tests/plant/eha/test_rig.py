@@ -28,7 +28,7 @@ def test_the_template_gives_the_papers_parameters_exactly(tmp_path: Path) -> Non
 def test_every_parameter_of_the_template_has_its_unit_meaning_and_source() -> None:
     lines = rig_template().splitlines()
     for name, note in notes(EhaParameters).items():
-        row = next(index for index, line in enumerate(lines) if line.startswith(f"{name} = "))
+        row = next(index for index, line in enumerate(lines) if line.removeprefix("# ").startswith(f"{name} = "))
         assert all(part in lines[row - 1] for part in (f"[{note.unit}]", note.meaning, note.source))
 
 
