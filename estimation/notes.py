@@ -33,6 +33,26 @@ class SensorCode(Code):
     )
 
 
+class ChannelCode(Code):
+    """Notes on channels whose sign, unit or name is wrong: the log is another's than it says, and nothing follows."""
+
+    CHANNEL_REVERSED = (
+        "channel_reversed",
+        "{channel} counts the other way: its correlation with what it should follow is {correlation:.2f} beside "
+        "{against}; give the column with a minus before its unit (--columns CHANNEL=NAME:-UNIT)",
+    )
+    CHANNELS_SWAPPED = (
+        "channels_swapped",
+        "{channel} and {other} are swapped: the second one's slope is the first (correlation {correlation:.2f}); "
+        "name the columns (--columns CHANNEL=NAME)",
+    )
+    CHANNEL_UNIT = (
+        "channel_unit",
+        "{channel} reads {factor:.3g} times what {against} asks for, which looks like {slip}; "
+        "give the column's unit (--columns CHANNEL=NAME:UNIT)",
+    )
+
+
 class EstimateCode(Code):
     """Notes on an estimate of bulk modulus: what speaks against it, or what it lacks."""
 

@@ -67,6 +67,10 @@ class AdviceCode(Code):
     """What to do or to measure next."""
 
     CHECK_SENSOR = "check_sensor", "check the sensor of {channels} and its wiring, then log again"
+    MEND_COLUMNS = (
+        "mend_columns",
+        "correct the sign, unit or name of {channels} with --columns, then read the same log again",
+    )
     CHECK_RIG = "check_rig", "compare the rig file with the actuator (geometry, pump, relief setting), then log again"
     FIT_DOUBTED = "fit_doubted", "the model does not follow this log: check units, signs and the rig file first"
     LOG_PRESSURE = "log_pressure", "log differential pressure: it narrows leakage and friction several times"

@@ -159,7 +159,8 @@ def conversion_to(unit: str, wanted: str) -> tuple[float, float]:
     Parameters
     ----------
     unit : str
-        The unit that the values come in, e.g. ``"mm"``, ``"rpm"``, ``"bar"``.
+        The unit that the values come in, e.g. ``"mm"``, ``"rpm"``, ``"bar"``; ``"-rpm"`` for a sensor that counts the
+        other way.
     wanted : str
         The unit that is wanted, e.g. ``"m"``.
 
@@ -175,12 +176,17 @@ def conversion_to(unit: str, wanted: str) -> tuple[float, float]:
 
     Examples
     --------
+    >>> conversion_to("-rad/s", "rad/s")
+    (-1.0, 0.0)
     >>> factor, offset = conversion_to("mm", "m")
     >>> round(factor, 12), offset
     (0.001, 0.0)
     """
     import pint
 
+    if unit.startswith("-"):
+        factor, offset = conversion_to(unit[1:], wanted)
+        return -factor, offset
     registry = unit_registry()
     name = LOWER_CASE.get(unit, unit)
     try:

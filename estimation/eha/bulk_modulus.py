@@ -202,6 +202,8 @@ def estimate_clean(
         )
     automatic, filtering = options.form == "auto", options.filtering
     form = ("pressure" if filtering else _automatic(log.record)) if automatic else options.form
+    if log.mistakes:
+        return _misread(log, form)
     if automatic and form == "motion" and (bound := rigid_bound(log, parameters)) > LARGEST_BOUND:
         return _doubting_sensors(_unseen(bound), log)
     fit = None if filtering else _fit(log, parameters, form, guess, spreads, chosen=options.method == LEAST_SQUARES)
@@ -288,6 +290,23 @@ def _unseen(bound: float) -> BulkModulusEstimate:
         gate=Gate(False, (too_wide(bound),)),
         form="motion",
         channels=MOTION_CHANNELS,
+        nis={},
+        others={},
+        estimate=None,
+        first_pass=None,
+    )
+
+
+def _misread(log: CleanLog, form: str) -> BulkModulusEstimate:
+    """Return no number: of a log whose channels are not what they are called nothing follows."""
+    return BulkModulusEstimate(
+        outcome=Outcome.MISMATCH,
+        value=None,
+        std=None,
+        bound=np.nan,
+        gate=Gate(False, log.mistakes),
+        form=form,
+        channels=tuple(name for name in FLOW_CHANNELS if name in log.record),
         nis={},
         others={},
         estimate=None,

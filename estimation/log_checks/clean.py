@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from estimation.log_checks.channel_physics import channel_mistakes
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.outliers import without_gross_outliers
 from estimation.log_checks.sensor_check import PRESSURE, PRESSURES, sensor_objections, without_saturated
@@ -28,12 +29,15 @@ class CleanLog:
         What was left out of it.
     objections : tuple of Note
         Sensors that have stopped telling the truth; each note names its ``channel``.
+    mistakes : tuple of Note
+        Channels with a wrong sign, unit or name. With one, nothing is concluded from the log.
     """
 
     record: Record
     variances: Mapping[str, float]
     left_out: tuple[Note, ...]
     objections: tuple[Note, ...]
+    mistakes: tuple[Note, ...] = ()
 
     def objections_to(self, channels: tuple[str, ...]) -> tuple[Note, ...]:
         """Return what speaks against the sensors of some channels.
@@ -71,6 +75,8 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     if PRESSURE in sound:
         sound, clipped = without_saturated(sound, parameters)
     known = [name for name in dict.fromkeys((*CLEANED, *PRESSURES)) if name in sound]
-    return CleanLog(
-        sound, measurement_variances(sound, known), (*outliers, *clipped), sensor_objections(sound, parameters)
-    )
+    objections = sensor_objections(sound, parameters)
+    dead = any(note.data["channel"] == PRESSURE for note in objections)
+    mistakes = channel_mistakes(sound.replace(**{PRESSURE: None}) if dead else sound, parameters)
+    objections = () if mistakes else objections  # a sensor cannot be judged by channels of another meaning
+    return CleanLog(sound, measurement_variances(sound, known), (*outliers, *clipped), objections, mistakes)

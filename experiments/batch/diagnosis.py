@@ -4,7 +4,7 @@ import warnings
 from typing import Any
 
 from estimation.finding import Finding, Outcome
-from estimation.notes import SensorCode
+from estimation.notes import ChannelCode, SensorCode
 from faults.diagnosis.diagnose import diagnose_log
 from faults.notes import ClassCode
 from plant.eha.rig import Rig
@@ -14,7 +14,13 @@ from plant.log.record import Record
 TOLD_APART = 1.001
 """Least ratio of the best class's probability to the runner-up's at which a class is named [dimensionless]."""
 
-WHY_NONE = {ClassCode.MODELS_ALIKE, ClassCode.MODELS_DIVERGED, ClassCode.NO_CIRCUIT, ClassCode.NO_PROBABILITIES}
+WHY_NONE = {
+    ClassCode.MODELS_ALIKE,
+    ClassCode.MODELS_DIVERGED,
+    ClassCode.NO_CIRCUIT,
+    ClassCode.NO_PROBABILITIES,
+    *ChannelCode,
+}
 
 
 def diagnosed(record: Record, rig: Rig) -> dict[str, Any]:
@@ -55,6 +61,6 @@ def diagnosed(record: Record, rig: Rig) -> dict[str, Any]:
 
 def _without_class(found: Finding) -> dict[str, Any]:
     """Return the entries of a log for which there are no probabilities: it holds too little, or no circuit fits."""
-    said = "; ".join(str(note) for note in found.notes if note.code in WHY_NONE)
+    said = "; ".join(str(note) for note in (*found.notes, *found.against) if note.code in WHY_NONE)
     outcome = Outcome.FAILED if found.outcome is Outcome.OK else found.outcome
     return {"outcome": outcome.value, "reason": said, "trusted": False}

@@ -96,6 +96,7 @@ def diagnosis_entries(found: "Finding") -> dict[str, Any]:
         The entries of `NO_DIAGNOSIS`, with outcome, message and warnings. Where the condition changed within the log
         ``since_s``, ``since_ci95_s`` and ``condition_before`` say when; else they are None.
     """
+    from estimation.finding import Outcome
     from experiments.eha.verdict_words import headline, models_said
     from faults.diagnosis.models_verdict import margin, ranked
 
@@ -121,6 +122,8 @@ def diagnosis_entries(found: "Finding") -> dict[str, Any]:
     }
     if found.condition is None:
         return {**entries, "message": clauses(str(note) for note in found.notes if note.code in NO_CLASS)}
+    if not judged and found.outcome is Outcome.MISMATCH:
+        return {**entries, "message": clauses(str(note) for note in found.against)}
     if not judged:
         return {**entries, "message": models_said(entries)}
     since = found.since
@@ -153,10 +156,12 @@ def _notes(found: "Finding") -> dict[str, Any]:
 
 def _estimate_message(found: "Finding") -> str:
     from estimation.finding import OUTCOMES
+    from estimation.notes import ChannelCode
 
     modulus = found.quantities["bulk_modulus"]
     if modulus.value is None or modulus.ci95 is None:
-        return clauses([OUTCOMES[found.outcome]])
+        mistakes = [str(note) for note in found.gate.reasons if isinstance(note.code, ChannelCode)]
+        return clauses(mistakes or [OUTCOMES[found.outcome]])
     low, high = (1e-6 * end for end in modulus.ci95)
     said = [f"bulk modulus {1e-6 * modulus.value:.2f} MPa, 95 % interval {low:.2f} to {high:.2f} MPa"]
     if modulus.ci95_total is not None:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from estimation.log_checks.sensor_check import PRESSURE
-from estimation.notes import EstimateCode, SensorCode
+from estimation.notes import ChannelCode, EstimateCode, SensorCode
 from faults.notes import AdviceCode, AgainstCode, ClassCode
 from plant.log.record import Record
 from plant.notes import Note
@@ -115,6 +115,9 @@ def advice_for(
 
 def _mended(doubts: list[Note]) -> tuple[Note, ...]:
     """Return what to mend before the next log: the sensors that are accused, else rig file and units."""
+    if any(isinstance(note.code, ChannelCode) for note in doubts):
+        named = dict.fromkeys(str(note.data["channel"]) for note in doubts if isinstance(note.code, ChannelCode))
+        return (AdviceCode.MEND_COLUMNS.note(channels=" and ".join(named)),)
     accused = dict.fromkeys(str(note.data["channel"]) for note in doubts if "channel" in note.data and _of_sensor(note))
     if any(note.code == SensorCode.SENSORS_DISAGREE for note in doubts):
         accused |= {"position_m": None, "velocity_m_s": None}

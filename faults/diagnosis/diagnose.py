@@ -128,6 +128,8 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
     notes = (*log.left_out, *strange, *verdict.notes, *absent, *estimate.rig_notes)
     found = replace(found, outcome=verdict.outcome, notes=notes, channels=scores.channels)
+    if log.mistakes:
+        return _misread(found, log, scores)
     if verdict.outcome is not Outcome.OK:
         return replace(found, evidence=EhaEvidence(estimate, scores, None))
     doubts = (*refused(estimate), *outside, *log.objections)
@@ -157,6 +159,7 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
     )
 
 
+<<<<<<< HEAD
 def _severities(
     diagnosis: Diagnosis, estimate: BulkModulusEstimate, rig: Rig, *, pressure: bool
 ) -> Mapping[str, Quantity]:
@@ -164,6 +167,19 @@ def _severities(
     actuator = actuator_of(rig.parameters)
     found = with_bulk_modulus(diagnosis.severity, estimate.quantity, actuator)
     return with_totals(found, actuator, rig.spreads, pressure=pressure)
+=======
+def _misread(found: Finding, log: CleanLog, scores: Scores) -> Finding:
+    """Return a finding of a log whose channels are not what they are called: unknown, and what to mend."""
+    return replace(
+        found,
+        outcome=Outcome.MISMATCH,
+        condition=ranked(scores)[0][0],
+        unknown=True,
+        against=log.mistakes,
+        advice=advice_for(log.record, {}, log.mistakes, (), scores.channels),
+        evidence=EhaEvidence(found.evidence, scores, None),
+    )
+>>>>>>> 361d8d2 (Channels with a wrong sign, unit or name are named before anything is fitted, and nothing else is concluded)
 
 
 def _without_circuit(found: Finding, log: CleanLog, scores: Scores, doubts: tuple[Note, ...], why: Note) -> Finding:

@@ -1,0 +1,206 @@
+"""Channels averaged over blocks, and how two of them move together: what physics of the channels is judged by."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.log_checks.bridging import bridged
+from estimation.log_checks.sensor_check import PRESSURE
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+Array = NDArray[np.float64]
+
+FEWEST_SAMPLES, FEWEST_BLOCKS = 5, 20
+"""Samples in a block, and blocks of which something is concluded, at least [count]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelBlocks:
+    """A log's channels over blocks; None for a channel that is not logged.
+
+    Parameters
+    ----------
+    length : float
+        Length of a block [s].
+    pumped : ndarray, shape (n,), or None
+        What the pump displaces [m^3/s].
+    slope : ndarray, shape (n,), or None
+        Slope of position [m/s].
+    position : ndarray, shape (n,), or None
+        Mean position [m].
+    velocity : ndarray, shape (n,), or None
+        Mean velocity [m/s].
+    velocity_slope : ndarray, shape (n,), or None
+        Slope of velocity [m/s^2].
+    pressure : ndarray, shape (n,), or None
+        Mean differential pressure [Pa].
+    pressure_slope : ndarray, shape (n,), or None
+        Its slope [Pa/s].
+    """
+
+    length: float
+    pumped: Array | None
+    slope: Array | None
+    position: Array | None
+    velocity: Array | None
+    velocity_slope: Array | None
+    pressure: Array | None
+    pressure_slope: Array | None
+
+    @property
+    def piston(self) -> Array | None:
+        """Velocity of the piston [m/s], of position where that is logged."""
+        return self.velocity if self.slope is None else self.slope
+
+
+def channel_blocks(record: Record, p: EhaParameters, length: float) -> ChannelBlocks:
+    """Return a log in blocks of a length, or of a few samples where those are longer.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    p : EhaParameters
+        The actuator, for its pump.
+    length : float
+        Length of a block [s].
+
+    Returns
+    -------
+    ChannelBlocks
+        Means and slopes.
+    """
+    size = max(FEWEST_SAMPLES, round(length / record.sample_time))
+    span = size * record.sample_time
+
+    def mean(name: str) -> Array | None:
+        whole = _whole(record, name)
+        count = (len(record) - 1) // size
+        return None if whole is None else whole[: count * size].reshape(count, size).mean(axis=1)
+
+    def slope(name: str) -> Array | None:
+        whole = _whole(record, name)
+        return None if whole is None else np.diff(whole[::size][: (len(record) - 1) // size + 1]) / span
+
+    speed = mean("motor_speed_rad_s")
+    return ChannelBlocks(
+        span,
+        None if speed is None else p.pump_displacement * speed,
+        slope("position_m"),
+        mean("position_m"),
+        mean("velocity_m_s"),
+        slope("velocity_m_s"),
+        mean(PRESSURE),
+        slope(PRESSURE),
+    )
+
+
+def _whole(record: Record, name: str) -> Array | None:
+    if name not in record or not np.any(np.isfinite(record[name])):
+        return None
+    return bridged(record[name])
+
+
+def alike(y: Array | None, x: Array | None) -> tuple[float, float]:
+    """Return how two signals move together about their means: correlation, and ratio of sizes with its sign.
+
+    Parameters
+    ----------
+    y, x : ndarray, shape (n,), or None
+        The signals [any unit].
+
+    Returns
+    -------
+    tuple of float
+        Correlation [dimensionless] and size of y over that of x [their units]; zeros where one is absent or still.
+    """
+    if y is None or x is None or len(y) < FEWEST_BLOCKS:
+        return 0.0, 0.0
+    about_y, about_x = y - y.mean(), x - x.mean()
+    size_y, size_x = float(np.linalg.norm(about_y)), float(np.linalg.norm(about_x))
+    if size_y == 0.0 or size_x == 0.0:
+        return 0.0, 0.0
+    correlation = float(about_y @ about_x) / (size_y * size_x)
+    return correlation, float(np.sign(correlation)) * size_y / size_x
+
+
+def gone_together(piston: Array | None, pumped: Array | None) -> tuple[float, float]:
+    """Return the same of where the piston went and what was pumped, without what drifts: slow motion counts most.
+
+    Parameters
+    ----------
+    piston, pumped : ndarray, shape (n,), or None
+        Velocity [m/s] and flow [m^3/s].
+
+    Returns
+    -------
+    tuple of float
+        Correlation [dimensionless] and ratio of sizes [1/m^2].
+    """
+    if piston is None or pumped is None or len(piston) < FEWEST_BLOCKS:
+        return 0.0, 0.0
+    ramp = np.linspace(-1.0, 1.0, len(piston))
+    drift = np.linalg.qr(np.column_stack([np.ones_like(ramp), ramp, ramp**2]))[0]
+    sums = (np.cumsum(one) for one in (piston, pumped))
+    return alike(*(one - drift @ (drift.T @ one) for one in sums))
+
+
+class FlowBalance(NamedTuple):
+    """What the pumped flow goes into, by least squares: motion, leakage, flow bias and compression.
+
+    Parameters
+    ----------
+    swept : float
+        Times the piston's own flow that are pumped to move it; 1 for a sound log [dimensionless].
+    swept_std : float
+        Its standard deviation [dimensionless].
+    compressed : float
+        Times the rig's compressibility [dimensionless].
+    compressed_std : float
+        Its standard deviation [dimensionless].
+    explained : float
+        Share of the pumped flow's variance that is explained [fraction].
+    """
+
+    swept: float
+    swept_std: float
+    compressed: float
+    compressed_std: float
+    explained: float
+
+
+def flow_balance(blocks: ChannelBlocks, p: EhaParameters) -> FlowBalance | None:
+    """Return what the pumped flow goes into; None where pump, piston or pressure is not logged, or the pump rests.
+
+    Parameters
+    ----------
+    blocks : ChannelBlocks
+        The log.
+    p : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    FlowBalance or None
+        The balance.
+    """
+    flow, piston, pressure, slope = blocks.pumped, blocks.piston, blocks.pressure, blocks.pressure_slope
+    if flow is None or piston is None or pressure is None or slope is None or len(flow) < FEWEST_BLOCKS:
+        return None
+    compliance = p.chamber_volume / p.bulk_modulus
+    parts = [p.piston_area * piston, compliance * slope, pressure, np.sign(flow), np.ones_like(flow)]
+    columns = np.column_stack(parts)
+    sizes = np.linalg.norm(columns, axis=0)
+    if np.ptp(flow) == 0.0:
+        return None
+    sizes[sizes == 0.0] = 1.0
+    scaled = columns / sizes
+    inverse = np.linalg.pinv(scaled.T @ scaled)
+    found = inverse @ (scaled.T @ flow)
+    left = float(np.var(flow - scaled @ found))
+    value, std = found / sizes, np.sqrt(left * np.diag(inverse)) / sizes
+    told = [float(one[k]) for k in (0, 1) for one in (value, std)]
+    return FlowBalance(told[0], told[1], told[2], told[3], 1.0 - left / float(np.var(flow)))

@@ -1,0 +1,227 @@
+"""Channels with a wrong sign, unit or name, told by what no actuator does; looked for before anything is fitted.
+
+Velocity is the slope of position. The piston goes where the pump sends it, and not farther than the pumped oil takes
+it, while leakage and friction may take any share. What is pumped moves the piston once, and compresses oil as pressure
+rises. A factor counts only near one that a slip of units makes, and far from what a wrong rig file does.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from estimation.log_checks.channel_blocks import (
+    ChannelBlocks,
+    FlowBalance,
+    alike,
+    channel_blocks,
+    flow_balance,
+    gone_together,
+)
+from estimation.log_checks.measurement_noise import position_variance
+from estimation.log_checks.sensor_check import PRESSURE
+from estimation.notes import ChannelCode
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from plant.notes import Note
+
+SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
+
+SHORT, MIDDLE, LONG = 0.01, 0.02, 0.05
+"""Blocks over which velocity is compared with position, flows are balanced, and the piston follows the pump [s]."""
+
+NEAR = 1.15
+"""Factor by which a ratio of two sensors of one motion may miss that of a slip of units [dimensionless]."""
+
+LEAST, MOST, LOST = 0.6, 1.3, 0.5
+"""What a balance may make of a slip's factor, and what a piston that loses flow leaves of it [fraction]."""
+
+TINY = 1e-3
+"""Factor of a length from which a piston seems to stand, which without pressure no leakage is taken for."""
+
+SURE, OPPOSED = 0.9, -0.6
+"""Correlations of one motion measured twice, and of a piston with a pump that goes the other way."""
+
+FARTHEST = 3.0
+"""Times the pumped flow that no piston moves, whatever is wrong in the rig file [dimensionless]."""
+
+RPM = 60.0 / (2.0 * np.pi)
+TURNS: Mapping[float, str] = {1.0 / RPM: "rpm read as rad/s", RPM: "rad/s read as rpm"}
+"""Slips of the speed's unit, by how many times too far the piston then seems to go."""
+
+LENGTHS: Mapping[float, str] = {
+    10.0: "mm read as cm",
+    100.0: "cm read as m",
+    1e3: "mm read as m",
+    1e6: "um read as m",
+    0.1: "cm read as mm",
+    0.01: "m read as cm",
+    1e-3: "m read as mm",
+    1e-6: "m read as um",
+}
+"""Slips of a length's unit, by the factor that they make."""
+
+EXPLAINED, KNOWN, TOLD = 0.9, 0.1, 4.0
+"""Share of the flow that a balance must explain, relative deviation at which its factor counts, and deviations from
+zero at which a sign does."""
+
+RESOLVED = 1e3
+"""Deviations of its noise that a position in a wrong unit spans; a stuck piston spans fewer [dimensionless]."""
+
+PRESSURE_OFF = 50.0
+"""Times the rig's compressibility, or its inverse, that comes of a unit of pressure and of no oil [dimensionless]."""
+
+
+def channel_mistakes(record: Record, p: EhaParameters) -> tuple[Note, ...]:
+    """Return a note for each channel whose sign, unit or name is wrong.
+
+    Parameters
+    ----------
+    record : Record
+        The log, without the channels whose sensors are accused.
+    p : EhaParameters
+        The healthy actuator.
+
+    Returns
+    -------
+    tuple of Note
+        None for a sound log, however leaky or stuck the actuator.
+    """
+    short, middle, long = (channel_blocks(record, p, length) for length in (SHORT, MIDDLE, LONG))
+    found = _swapped(short) or _motions_disagree(short, long, p)
+    if found:
+        return found
+    balance = flow_balance(middle, p)
+    if balance is not None and balance.explained < EXPLAINED:
+        balance = None
+    return _reversed(record, long, balance) or _pump_units(record, long, p, balance) or _pressure_units(middle, balance)
+
+
+def _near(ratio: float, slips: Mapping[float, str], least: float = 1.0 / NEAR, most: float = NEAR) -> float | None:
+    """Return the factor of the slip that a ratio is near, None if there is none."""
+    close = [one for one in slips if least <= ratio / one <= most]
+    return min(close, key=lambda one: abs(np.log(ratio / one)), default=None)
+
+
+def _swapped(short: ChannelBlocks) -> tuple[Note, ...]:
+    there, ratio = alike(short.velocity_slope, short.position)
+    here, _ = alike(short.slope, short.velocity)
+    if there < SURE or not 1.0 / NEAR <= ratio <= NEAR or here > 0.5:
+        return ()
+    return (ChannelCode.CHANNELS_SWAPPED.note(channel=POSITION, other=VELOCITY, correlation=there),)
+
+
+def _motions_disagree(short: ChannelBlocks, long: ChannelBlocks, p: EhaParameters) -> tuple[Note, ...]:
+    """Compare the slope of position with velocity, and both with the pump to say which is wrong."""
+    same, ratio = alike(short.slope, short.velocity)
+    if abs(same) < SURE:
+        return ()
+    with_pump = {
+        POSITION: gone_together(long.slope, long.pumped),
+        VELOCITY: gone_together(long.velocity, long.pumped),
+    }
+    found: list[Note] = []
+    if ratio < 0.0:
+        against = [name for name, (correlation, _) in with_pump.items() if correlation < -0.5]
+        channel = against[0] if len(against) == 1 else f"{VELOCITY} or {POSITION}"
+        other = POSITION if channel == VELOCITY else VELOCITY
+        found.append(ChannelCode.CHANNEL_REVERSED.note(channel=channel, against=other, correlation=same))
+    factor = _near(abs(ratio), LENGTHS)
+    if factor is not None:
+        large, small = (POSITION, VELOCITY) if factor > 1.0 else (VELOCITY, POSITION)
+        too_far = p.piston_area * abs(with_pump[large][1]) > FARTHEST
+        guilty, other = (large, small) if too_far else (small, large)
+        times = abs(ratio) if guilty == POSITION else 1.0 / abs(ratio)
+        found.append(_unit(guilty, other, times, LENGTHS[factor if guilty == POSITION else _inverse(factor)]))
+    return tuple(found)
+
+
+def _inverse(factor: float) -> float:
+    return min(LENGTHS, key=lambda one: abs(np.log(one * factor)))
+
+
+def _unit(channel: str, against: str, factor: float, slip: str) -> Note:
+    return ChannelCode.CHANNEL_UNIT.note(channel=channel, against=against, factor=factor, slip=slip)
+
+
+def _moved(record: Record) -> str:
+    return " and ".join(name for name in (POSITION, VELOCITY) if name in record)
+
+
+def _reversed(record: Record, long: ChannelBlocks, balance: FlowBalance | None) -> tuple[Note, ...]:
+    """Say which of pump, piston and pressure counts the other way: two of the three go together.
+
+    Oil yields to pressure, so a negative compressibility says that pump and pressure oppose each other.
+    """
+    together, _ = gone_together(long.piston, long.pumped)
+    apart, with_pump = together < OPPOSED and alike(long.piston, long.pumped)[0] < 0.0, together > -OPPOSED
+    opposed = with_pressure = False
+    if balance is not None:
+        opposed = balance.compressed < -TOLD * balance.compressed_std
+        with_pressure = balance.compressed > TOLD * balance.compressed_std
+        apart = apart or (together < 0.0 and balance.swept < -max(TOLD * balance.swept_std, 0.3))
+        with_pump = with_pump or balance.swept > max(TOLD * balance.swept_std, 0.3)
+    moved = _moved(record)
+    if apart:
+        channel = SPEED if opposed else moved if with_pressure else f"{SPEED} or {moved}"
+        against = SPEED if channel == moved else moved
+    elif opposed:
+        channel, against = (PRESSURE if with_pump else f"{PRESSURE} or {SPEED}"), SPEED
+    else:
+        return ()
+    return (ChannelCode.CHANNEL_REVERSED.note(channel=channel, against=against, correlation=together),)
+
+
+def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: FlowBalance | None) -> tuple[Note, ...]:
+    """Compare how far the piston goes with what is pumped, leakage and compression counted where pressure is logged."""
+    together, ratio = gone_together(long.piston, long.pumped)
+    gone = times = p.piston_area * ratio
+    far = gone > FARTHEST
+    if balance is not None and 0.0 < balance.swept_std < KNOWN * balance.swept:
+        times = 1.0 / balance.swept
+        far = far and times > 1.0
+        turn, length = (_near(times, slips, 1.0 / MOST, 1.0 / (LOST if far else LEAST)) for slips in (TURNS, LENGTHS))
+        believed = (far or times < 1.0,) * 2
+    elif far and together > -OPPOSED:
+        turn, length = (_near(times, slips, LOST) for slips in (TURNS, LENGTHS))
+        believed = True, True
+    elif together > SURE and balance is None:
+        turn, length = None, _near(times, LENGTHS)
+        believed = False, times < TINY * NEAR and _resolved(record, long)
+    else:
+        turn = length = None
+        believed = False, False
+    if together > -OPPOSED and _too_fast(record, p) and gone < NEAR * min(TURNS):
+        turn, believed = min(TURNS), (True, believed[1])
+    moved = _moved(record)
+    slips: list[tuple[str, str, float]] = []
+    if turn is not None and believed[0]:
+        slips.append((SPEED, TURNS[turn], 1.0 / turn))
+    if length is not None and believed[1] and not (slips and " and " in moved):  # two that agree are right
+        slips.append((moved, LENGTHS[length], length))
+    if not slips:
+        return ()
+    channel, slip = " or ".join(one[0] for one in slips), " or ".join(one[1] for one in slips)
+    return (_unit(channel, moved if channel == SPEED else SPEED, slips[0][2], slip),)
+
+
+def _too_fast(record: Record, p: EhaParameters) -> bool:
+    return SPEED in record and float(np.nanmax(np.abs(record[SPEED]))) > FARTHEST * p.motor_speed_limit
+
+
+def _resolved(record: Record, long: ChannelBlocks) -> bool:
+    """Return whether a position that hardly moves is finer than a stuck piston's could be."""
+    if long.position is None:
+        return False
+    noise = position_variance(record[POSITION]) ** 0.5
+    return float(np.ptp(long.position)) > RESOLVED * noise > 0.0
+
+
+def _pressure_units(middle: ChannelBlocks, balance: FlowBalance | None) -> tuple[Note, ...]:
+    """Judge the unit of pressure by how much oil it seems to compress."""
+    if middle.pressure is None or balance is None or balance.compressed < TOLD * balance.compressed_std:
+        return ()
+    if 1.0 / PRESSURE_OFF < balance.compressed < PRESSURE_OFF:
+        return ()
+    small = balance.compressed > 1.0
+    slip = "kPa, psi, bar or MPa read as Pa" if small else "Pa read as kPa, psi, bar or MPa"
+    return (_unit(PRESSURE, SPEED, 1.0 / balance.compressed, slip),)

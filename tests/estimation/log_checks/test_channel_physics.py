@@ -1,0 +1,121 @@
+"""A channel with a wrong sign, unit or name is named; a sound log is not accused, whatever its actuator has."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from itertools import product
+
+import numpy as np
+import pytest
+
+from estimation.eha.estimate import estimate_log
+from estimation.finding import Outcome
+from estimation.log_checks.channel_physics import channel_mistakes
+from estimation.notes import ChannelCode
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.diagnose import diagnose_log
+from faults.notes import AdviceCode
+from plant.eha.drives import DRIVES, make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.eha.simulate import LUMPED, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+HEALTHY = EhaParameters()
+SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
+PRESSURE = "differential_pressure_pa"
+RPM = 60.0 / (2.0 * np.pi)
+VIEWS = ((), (PRESSURE,), (VELOCITY,), (POSITION,), (PRESSURE, VELOCITY))
+"""Channels that are not logged."""
+
+
+@cache
+def run(condition: str = "normal", drive: str = "steps", leakage: float = 1.0, load: float = 0.0) -> Record:
+    p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(3)
+    p = replace(p, leakage_coefficient=leakage * p.leakage_coefficient)
+    log = simulate(LUMPED, make_drive(drive, 6.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    return log.replace(**{PRESSURE: log[PRESSURE] + load / p.piston_area})
+
+
+def scaled(channel: str, factor: float) -> Callable[[Record], Record]:
+    return lambda log: log.replace(**{channel: factor * log[channel]})
+
+
+def swapped(log: Record) -> Record:
+    return log.replace(**{POSITION: log[VELOCITY], VELOCITY: log[POSITION]})
+
+
+@pytest.mark.parametrize("leakage", [1.0, 8.0])
+@pytest.mark.parametrize("drive", list(DRIVES))
+@pytest.mark.parametrize("condition", ["normal", "major_leakage", "major_friction", "major_leakage_major_friction"])
+def test_sound_logs_are_not_accused(condition: str, drive: str, leakage: float) -> None:
+    for absent, load in product(VIEWS, (0.0, 2e3)):
+        log = run(condition, drive, leakage, load)
+        assert channel_mistakes(log.replace(**dict.fromkeys(absent)), HEALTHY) == ()
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"piston_area": 0.96 * HEALTHY.piston_area},
+        {"chamber_volume": 0.75 * HEALTHY.chamber_volume},
+        {"pump_displacement": 1.25 * HEALTHY.pump_displacement},
+        {"piston_area": HEALTHY.piston_area / 3.0},
+        {"piston_area": 3.0 * HEALTHY.piston_area, "chamber_volume": 3.0 * HEALTHY.chamber_volume},
+        {"pump_displacement": 4.0 * HEALTHY.pump_displacement},
+        {"bulk_modulus": 4.0 * HEALTHY.bulk_modulus},
+    ],
+    ids=str,
+)
+def test_a_wrong_rig_file_accuses_no_channel(wrong: dict[str, float]) -> None:
+    for condition, drive, absent in product(("normal", "major_leakage"), ("steps", "prbs"), VIEWS):
+        log = run(condition, drive).replace(**dict.fromkeys(absent))
+        assert channel_mistakes(log, replace(HEALTHY, **wrong)) == ()
+
+
+@pytest.mark.parametrize("condition", ["normal", "minor_leakage", "minor_friction"])
+@pytest.mark.parametrize(
+    ("mistake", "code", "channel"),
+    [
+        (scaled(SPEED, -1.0), ChannelCode.CHANNEL_REVERSED, SPEED),
+        (scaled(PRESSURE, -1.0), ChannelCode.CHANNEL_REVERSED, PRESSURE),
+        (scaled(VELOCITY, -1.0), ChannelCode.CHANNEL_REVERSED, VELOCITY),
+        (scaled(POSITION, -1.0), ChannelCode.CHANNEL_REVERSED, POSITION),
+        (swapped, ChannelCode.CHANNELS_SWAPPED, POSITION),
+        (scaled(SPEED, RPM), ChannelCode.CHANNEL_UNIT, SPEED),
+        (scaled(SPEED, 1.0 / RPM), ChannelCode.CHANNEL_UNIT, SPEED),
+        (scaled(POSITION, 1e3), ChannelCode.CHANNEL_UNIT, POSITION),
+        (scaled(POSITION, 0.1), ChannelCode.CHANNEL_UNIT, POSITION),
+        (scaled(VELOCITY, 1e3), ChannelCode.CHANNEL_UNIT, VELOCITY),
+        (scaled(PRESSURE, 1e-5), ChannelCode.CHANNEL_UNIT, PRESSURE),
+        (scaled(PRESSURE, 1e3), ChannelCode.CHANNEL_UNIT, PRESSURE),
+    ],
+)
+def test_a_mistake_is_named(
+    mistake: Callable[[Record], Record], code: ChannelCode, channel: str, condition: str
+) -> None:
+    for drive in ("steps", "prbs"):
+        (said,) = channel_mistakes(mistake(run(condition, drive)), HEALTHY)
+        assert (said.code, said.data["channel"]) == (code, channel)
+
+
+@pytest.mark.parametrize("mistake", [scaled(SPEED, -1.0), swapped, scaled(POSITION, -1.0), scaled(VELOCITY, 1e3)])
+def test_a_mistake_shows_without_pressure(mistake: Callable[[Record], Record]) -> None:
+    for drive in ("steps", "prbs"):
+        assert channel_mistakes(mistake(run(drive=drive)).replace(**{PRESSURE: None}), HEALTHY)
+
+
+@pytest.mark.parametrize("pressure", [True, False], ids=["with pressure", "without"])
+def test_nothing_else_is_concluded_from_a_log_with_a_mistake(*, pressure: bool) -> None:
+    log = scaled(SPEED, -1.0)(run())
+    log = log if pressure else log.replace(**{PRESSURE: None})
+    for found in (estimate_log(log, Rig()), diagnose_log(log, Rig())):
+        assert found.outcome is Outcome.MISMATCH
+        assert not found.gate.passed
+        assert [note.code for note in found.gate.reasons] == [ChannelCode.CHANNEL_REVERSED]
+        assert {name: one.value for name, one in found.quantities.items()} == {"bulk_modulus": None}
+        assert not found.severities
+        assert not found.probabilities
+    assert found.unknown
+    assert [note.code for note in found.advice] == [AdviceCode.MEND_COLUMNS]
