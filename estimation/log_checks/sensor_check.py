@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.log_checks.bridging import bridged
+from estimation.log_checks.frozen_encoder import jumped, missed_motion
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.notes import SensorCode
 from plant.eha.model import EhaParameters
@@ -62,7 +63,7 @@ CLIPPED = 0.98
 """A pressure held above this share of its largest is at the end of its range or at the relief valve [fraction]."""
 
 UNDELIVERED = 5.0
-"""Pumped volume that neither motion nor the oil's compression explains, over what compression can take [fraction]."""
+"""Quanta of the encoder by which a velocity sensor must show motion [dimensionless]."""
 
 
 def sensor_objections(record: Record, parameters: EhaParameters) -> tuple[Note, ...]:
@@ -187,48 +188,37 @@ def _says_frozen(channel: str, stretch: slice, record: Record) -> Note:
 
 
 def _frozen_position(record: Record, p: EhaParameters) -> Note | None:
-    """Compare a still encoder with what the other sensors say moved meanwhile.
-
-    A stuck piston is still too; then the pump only compresses oil and feeds the leak, which takes a bounded volume.
-    """
+    """Compare a still encoder with what the other sensors say moved meanwhile; a stuck piston's is still too."""
     if "position_m" not in record:
         return None
     stretch = _longest_hold(record["position_m"], record.sample_time)
     if stretch is None:
         return None
-    speed = bridged(record["motor_speed_rad_s"])[stretch] if "motor_speed_rad_s" in record else np.zeros(1)
-    pumped = _pumped(speed, p)
-    highest = p.relief_pressure
-    if PRESSURE in record:
-        there = np.isfinite(record[PRESSURE])
-        if np.mean(there[stretch]) > 0.5 * np.mean(there):  # else it may have been any
-            highest = float(np.nanmax(np.abs(record[PRESSURE][stretch])))
-    taken = 2.0 * highest * p.chamber_volume / p.bulk_modulus
-    moved = np.cumsum(pumped - np.sign(pumped) * p.leakage_coefficient * highest) * record.sample_time
-    swing = float(np.max(moved) - np.min(moved))
-    slid = _slid(record, stretch)
-    if swing < UNDELIVERED * taken and not slid:
-        return None
-    return _says_frozen("position_m", stretch, record)
+    slid, rests = _slid(record, stretch)
+    if slid or jumped(record, stretch, p) or (not rests and missed_motion(record, stretch, p)):
+        return _says_frozen("position_m", stretch, record)
+    return None
 
 
-def _slid(record: Record, stretch: slice) -> bool:
-    """Return whether measured velocity shows motion over the stretch.
+def _slid(record: Record, stretch: slice) -> tuple[bool, bool]:
+    """Return whether measured velocity shows motion over the stretch, and whether a live sensor shows rest.
 
-    Velocity may be differentiated from the encoder over a window, so the ends of the stretch do not count.
+    Velocity may be differentiated from the encoder over a window, so the ends of the stretch do not count, and a
+    velocity that is still too says nothing.
     """
     if "velocity_m_s" not in record:
-        return False
+        return False, False
     quarter = (stretch.stop - stretch.start) // 4
     velocity = record["velocity_m_s"][stretch.start + quarter : stretch.stop - quarter]
     velocity = velocity[np.isfinite(velocity)]
     if len(velocity) < FEWEST_HELD:
-        return False
+        return False, False
     noise = float(np.std(np.diff(velocity))) / 2.0**0.5
     step = 0.5 * (stretch.stop - stretch.start) * record.sample_time / len(velocity)
     travelled = np.cumsum(velocity) * step
     allowed = 6.0 * noise * step * len(velocity) ** 0.5
-    return bool(np.ptp(travelled) > max(allowed, UNDELIVERED * _quantum(record["position_m"])))
+    slid = bool(np.ptp(travelled) > max(allowed, UNDELIVERED * _quantum(record["position_m"])))
+    return slid, not slid and noise > 0.0
 
 
 def _quantum(values: Array) -> float:

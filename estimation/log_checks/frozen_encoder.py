@@ -1,0 +1,123 @@
+"""Does a still encoder miss a motion? Judged by what the log itself says that leakage takes, not by a healthy one's."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.log_checks.bridging import bridged
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+Array = NDArray[np.float64]
+
+PRESSURE = "differential_pressure_pa"
+
+BLOCK, FEWEST = 0.02, 25
+"""Length of the blocks over which flows are balanced [s], and blocks outside of the hold that are needed [count]."""
+
+WINDOW = 0.5
+"""Stretches of a hold that are judged, each by itself [s]: over more of it losses would be uncertain by as much."""
+
+LOSSES_KNOWN, FLOW_KNOWN, DEVIATIONS = 0.25, 0.05, 3.0
+"""Share by which losses may differ within the hold, share by which pump and piston may be off, and deviations of the
+losses, that are allowed for."""
+
+SHORTEST_TRAVEL = 5e-4
+"""Missed travel below which nothing is concluded: the seals give way by less [m]."""
+
+AT_RELIEF = 0.9
+"""Share of the relief setting from which the valve may take all that is pumped [fraction]."""
+
+JUMP, BEYOND_PUMP = 10.0, 5.0
+"""A step after a hold is a jump if it is so many times any other, and so many times what the pump can move."""
+
+
+def jumped(record: Record, hold: slice, p: EhaParameters) -> bool:
+    """Return whether the encoder comes out of a hold with a jump that no piston makes.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with position.
+    hold : slice
+        Samples over which it is still.
+    p : EhaParameters
+        The actuator, for what its pump moves.
+
+    Returns
+    -------
+    bool
+        False too where the log ends with the hold.
+    """
+    present = np.flatnonzero(np.isfinite(record["position_m"]))
+    rate = np.abs(np.diff(record["position_m"][present])) / (np.diff(present) * record.sample_time)
+    after = int(np.searchsorted(present, hold.stop)) - 1
+    if not 0 <= after < len(rate) or "motor_speed_rad_s" not in record:
+        return False
+    others = np.delete(rate, after)
+    fastest = float(np.nanmax(np.abs(record["motor_speed_rad_s"]))) * p.pump_displacement / p.piston_area
+    return bool(rate[after] > max(JUMP * float(np.max(others, initial=0.0)), BEYOND_PUMP * fastest))
+
+
+def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
+    """Return whether the pump delivers more within a hold than leakage, compression and the relief valve take.
+
+    Leakage, flow bias and compressibility come from the rest of the log, in which the encoder tells where the oil goes.
+    Without pressure, or with too little of a rest, leakage may have taken all.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with position.
+    hold : slice
+        Samples over which position is still.
+    p : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    bool
+        Whether the piston must have moved.
+    """
+    if PRESSURE not in record or "motor_speed_rad_s" not in record:
+        return False
+    there = np.isfinite(record[PRESSURE])
+    if not np.any(there) or np.mean(there[hold]) <= 0.5 * np.mean(there):  # it may have been any
+        return False
+    size = max(2, round(BLOCK / record.sample_time))
+    span, count = size * record.sample_time, (len(record) - 1) // size
+    speed, pressure = (_means(bridged(record[name]), size, count) for name in ("motor_speed_rad_s", PRESSURE))
+    swept, rise = (np.diff(bridged(record[name])[::size][: count + 1]) for name in ("position_m", PRESSURE))
+    pumped = p.pump_displacement * speed
+    losses = np.column_stack([pressure, np.where(np.abs(pumped) > 0.0, np.sign(pumped), 0.0), rise / span])
+    blocks = np.arange(count)
+    within = (blocks * size >= hold.start) & ((blocks + 1) * size <= hold.stop)
+    away = ((blocks + 1) * size < hold.start) | (blocks * size > hold.stop)
+    least = p.piston_area * SHORTEST_TRAVEL
+    relieved = np.abs(pressure) > AT_RELIEF * p.relief_pressure
+    away &= ~relieved
+    if np.count_nonzero(away) < FEWEST or not np.any(within):
+        return False
+    value, std = _fitted(losses[away], pumped[away] - p.piston_area * swept[away] / span)
+    lost = np.sign(pumped) * np.minimum(np.abs(losses[:, :2] @ value[:2]), np.abs(pumped))
+    left = np.where(relieved, 0.0, pumped - lost - losses[:, 2] * value[2])[within]
+    uncertain = DEVIATIONS * np.abs(losses[within]) @ std + LOSSES_KNOWN * np.abs(lost[within])
+    allowed = uncertain + FLOW_KNOWN * np.abs(pumped[within])
+    length = max(1, round(WINDOW / span))
+    return any(
+        abs(float(np.sum(left[k : k + length]))) > float(np.sum(allowed[k : k + length])) + least / span
+        for k in range(0, max(1, len(left) - length + 1), max(1, length // 2))
+    )
+
+
+def _means(values: Array, size: int, count: int) -> Array:
+    return values[: count * size].reshape(count, size).mean(axis=1)
+
+
+def _fitted(columns: Array, found: Array) -> tuple[Array, Array]:
+    """Return coefficients that are not negative, with their deviations."""
+    sizes = np.linalg.norm(columns, axis=0)
+    sizes[sizes == 0.0] = 1.0
+    inverse = np.linalg.pinv((columns / sizes).T @ (columns / sizes))
+    value = np.maximum(inverse @ ((columns / sizes).T @ found), 0.0)
+    left = float(np.mean((found - (columns / sizes) @ value) ** 2))
+    return value / sizes, np.sqrt(left * np.maximum(np.diag(inverse), 0.0)) / sizes

@@ -1,0 +1,66 @@
+"""A still encoder is accused only of a motion that leakage cannot explain, however leaky the actuator is."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.sensor_check import sensor_objections
+from estimation.notes import SensorCode
+from faults.conditions import CONDITIONS, parameters_for
+from plant.eha.drives import DRIVES, make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import LUMPED, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+HEALTHY = EhaParameters()
+POSITION, VELOCITY, PRESSURE = "position_m", "velocity_m_s", "differential_pressure_pa"
+VIEWS = pytest.mark.parametrize("absent", [(), (PRESSURE,), (VELOCITY,), (VELOCITY, PRESSURE)], ids=str)
+LEAKAGES = pytest.mark.parametrize("leakage", [1.0, 4.0, 8.0, 12.0, 20.0])
+
+
+@cache
+def run(leakage: float, drive: str, condition: str = "normal") -> Record:
+    p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(5)
+    p = replace(p, leakage_coefficient=leakage * p.leakage_coefficient)
+    return simulate(LUMPED, make_drive(drive, 8.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+
+
+def frozen(log: Record, length: int) -> tuple[Record, int]:
+    """Return the log with an encoder that freezes while the piston goes farthest, and when."""
+    position = log[POSITION].copy()
+    start = 500 + int(np.argmax(np.abs(position[1000:-1000] - position[500:-1500])))
+    position[start : start + length] = position[start]
+    return log.replace(**{POSITION: position}), start
+
+
+@LEAKAGES
+@pytest.mark.parametrize("drive", list(DRIVES))
+@VIEWS
+def test_a_sound_encoder_is_not_accused(absent: tuple[str, ...], drive: str, leakage: float) -> None:
+    for condition in ("normal", "major_friction", "major_leakage"):
+        log = run(leakage, drive, condition).replace(**dict.fromkeys(absent))
+        assert sensor_objections(log, HEALTHY) == ()
+
+
+@LEAKAGES
+@pytest.mark.parametrize("drive", ["steps", "prbs"])
+@VIEWS
+def test_an_encoder_that_freezes_for_half_a_second_on_the_move_is_named(
+    absent: tuple[str, ...], drive: str, leakage: float
+) -> None:
+    log, start = frozen(run(leakage, drive), 500)
+    (said,) = sensor_objections(log.replace(**dict.fromkeys(absent)), HEALTHY)
+    assert (said.code, said.data["channel"]) == (SensorCode.SENSOR_FROZE, POSITION)
+    assert said.data["begin_s"] == pytest.approx(1e-3 * start, abs=2e-3)
+
+
+@pytest.mark.parametrize("leakage", [1.0, 4.0, 8.0])
+@pytest.mark.parametrize("absent", [(), (PRESSURE,), (VELOCITY,)], ids=str)
+def test_an_encoder_that_freezes_for_good_is_named(absent: tuple[str, ...], leakage: float) -> None:
+    log, _ = frozen(run(leakage, "steps"), 8000)
+    assert [note.data["channel"] for note in sensor_objections(log.replace(**dict.fromkeys(absent)), HEALTHY)] == [
+        POSITION
+    ]
