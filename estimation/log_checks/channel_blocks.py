@@ -127,6 +127,29 @@ def alike(y: Array | None, x: Array | None) -> tuple[float, float]:
     return correlation, float(np.sign(correlation)) * size_y / size_x
 
 
+def power_of(pressure: Array | None, flow: Array | None, piston: Array | None) -> float:
+    """Return how pressure goes with the pumped flow, without what a constant load and a spring put on it.
+
+    What slides and leaks takes power, whatever the load; a load gives back what it took.
+
+    Parameters
+    ----------
+    pressure, flow, piston : ndarray, shape (n,), or None
+        Differential pressure [Pa], pumped flow [m^3/s] and velocity [m/s].
+
+    Returns
+    -------
+    float
+        Correlation [dimensionless]; 0 where one is absent.
+    """
+    if pressure is None or piston is None:
+        return 0.0
+    travelled = np.cumsum(piston)
+    far, level = travelled - travelled.mean(), pressure - pressure.mean()
+    size = float(far @ far)
+    return alike(flow, level - far * float(far @ level) / size if size > 0.0 else level)[0]
+
+
 def gone_together(piston: Array | None, pumped: Array | None) -> tuple[float, float]:
     """Return the same of where the piston went and what was pumped, without what drifts: slow motion counts most.
 
@@ -200,7 +223,10 @@ def flow_balance(blocks: ChannelBlocks, p: EhaParameters) -> FlowBalance | None:
     scaled = columns / sizes
     inverse = np.linalg.pinv(scaled.T @ scaled)
     found = inverse @ (scaled.T @ flow)
-    left = float(np.var(flow - scaled @ found))
-    value, std = found / sizes, np.sqrt(left * np.diag(inverse)) / sizes
+    rest = flow - scaled @ found
+    left = float(np.var(rest))
+    lasting = float(np.clip(alike(rest[1:], rest[:-1])[0], 0.0, 0.99))
+    variance = left * (1.0 + lasting) / (1.0 - lasting)  # as many blocks fewer as neighbours repeat each other
+    value, std = found / sizes, np.sqrt(variance * np.diag(inverse)) / sizes
     told = [float(one[k]) for k in (0, 1) for one in (value, std)]
     return FlowBalance(told[0], told[1], told[2], told[3], 1.0 - left / float(np.var(flow)))

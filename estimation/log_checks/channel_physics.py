@@ -16,6 +16,7 @@ from estimation.log_checks.channel_blocks import (
     channel_blocks,
     flow_balance,
     gone_together,
+    power_of,
 )
 from estimation.log_checks.measurement_noise import position_variance
 from estimation.log_checks.sensor_check import PRESSURE
@@ -38,8 +39,9 @@ LEAST, MOST, LOST = 0.6, 1.3, 0.5
 TINY = 1e-3
 """Factor of a length from which a piston seems to stand, which without pressure no leakage is taken for."""
 
-SURE, OPPOSED = 0.9, -0.6
-"""Correlations of one motion measured twice, and of a piston with a pump that goes the other way."""
+SURE, FOLLOWS, OPPOSED = 0.9, 0.6, -0.3
+"""Correlations of one motion measured twice, of a piston with its pump, and with one that counts the other way: what
+yields and slides never goes against its drive, neither in the long run nor from block to block."""
 
 FARTHEST = 3.0
 """Times the pumped flow that no piston moves, whatever is wrong in the rig file [dimensionless]."""
@@ -93,7 +95,9 @@ def channel_mistakes(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     balance = flow_balance(middle, p)
     if balance is not None and balance.explained < EXPLAINED:
         balance = None
-    return _reversed(record, long, balance) or _pump_units(record, long, p, balance) or _pressure_units(middle, balance)
+    return (
+        _reversed(record, long, balance) or _pump_units(record, long, p, balance) or _pressure_units(middle, p, balance)
+    )
 
 
 def _near(ratio: float, slips: Mapping[float, str], least: float = 1.0 / NEAR, most: float = NEAR) -> float | None:
@@ -150,13 +154,15 @@ def _moved(record: Record) -> str:
 def _reversed(record: Record, long: ChannelBlocks, balance: FlowBalance | None) -> tuple[Note, ...]:
     """Say which of pump, piston and pressure counts the other way: two of the three go together.
 
-    Oil yields to pressure, so a negative compressibility says that pump and pressure oppose each other.
+    Oil yields to pressure, and what slides and leaks takes power: where neither is so, pump and pressure are opposed.
     """
     together, _ = gone_together(long.piston, long.pumped)
-    apart, with_pump = together < OPPOSED and alike(long.piston, long.pumped)[0] < 0.0, together > -OPPOSED
+    apart = together < OPPOSED and alike(long.piston, long.pumped)[0] < OPPOSED
+    with_pump = together > FOLLOWS
     opposed = with_pressure = False
     if balance is not None:
-        opposed = balance.compressed < -TOLD * balance.compressed_std
+        power = power_of(long.pressure, long.pumped, long.piston)
+        opposed = power < 0.0 and balance.compressed < -TOLD * balance.compressed_std
         with_pressure = balance.compressed > TOLD * balance.compressed_std
         apart = apart or (together < 0.0 and balance.swept < -max(TOLD * balance.swept_std, 0.3))
         with_pump = with_pump or balance.swept > max(TOLD * balance.swept_std, 0.3)
@@ -165,6 +171,7 @@ def _reversed(record: Record, long: ChannelBlocks, balance: FlowBalance | None) 
         channel = SPEED if opposed else moved if with_pressure else f"{SPEED} or {moved}"
         against = SPEED if channel == moved else moved
     elif opposed:
+        together = power_of(long.pressure, long.pumped, long.piston)
         channel, against = (PRESSURE if with_pump else f"{PRESSURE} or {SPEED}"), SPEED
     else:
         return ()
@@ -181,7 +188,7 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
         far = far and times > 1.0
         turn, length = (_near(times, slips, 1.0 / MOST, 1.0 / (LOST if far else LEAST)) for slips in (TURNS, LENGTHS))
         believed = (far or times < 1.0,) * 2
-    elif far and together > -OPPOSED:
+    elif far and together > FOLLOWS:
         turn, length = (_near(times, slips, LOST) for slips in (TURNS, LENGTHS))
         believed = True, True
     elif together > SURE and balance is None:
@@ -190,13 +197,15 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
     else:
         turn = length = None
         believed = False, False
-    if together > -OPPOSED and _too_fast(record, p) and gone < NEAR * min(TURNS):
+    if together > FOLLOWS and _too_fast(record, p) and gone < NEAR * min(TURNS):
         turn, believed = min(TURNS), (True, believed[1])
     moved = _moved(record)
     slips: list[tuple[str, str, float]] = []
-    if turn is not None and believed[0]:
+    if turn is not None and believed[0] and gone < NEAR * turn:
         slips.append((SPEED, TURNS[turn], 1.0 / turn))
-    if length is not None and believed[1] and not (slips and " and " in moved):  # two that agree are right
+    if (
+        length is not None and believed[1] and gone < NEAR * length and not (slips and " and " in moved)
+    ):  # two that agree are right
         slips.append((moved, LENGTHS[length], length))
     if not slips:
         return ()
@@ -216,12 +225,15 @@ def _resolved(record: Record, long: ChannelBlocks) -> bool:
     return float(np.ptp(long.position)) > RESOLVED * noise > 0.0
 
 
-def _pressure_units(middle: ChannelBlocks, balance: FlowBalance | None) -> tuple[Note, ...]:
-    """Judge the unit of pressure by how much oil it seems to compress."""
+def _pressure_units(middle: ChannelBlocks, p: EhaParameters, balance: FlowBalance | None) -> tuple[Note, ...]:
+    """Judge the unit of pressure by how much oil it seems to compress, and by what sliding takes."""
     if middle.pressure is None or balance is None or balance.compressed < TOLD * balance.compressed_std:
         return ()
-    if 1.0 / PRESSURE_OFF < balance.compressed < PRESSURE_OFF:
+    sliding = max(p.friction_coulomb / p.piston_area, 0.05 * p.relief_pressure)
+    size = float(np.sqrt(np.mean(middle.pressure**2))) / sliding
+    small = size * PRESSURE_OFF < 1.0 and balance.compressed > PRESSURE_OFF
+    large = size > PRESSURE_OFF and balance.compressed * PRESSURE_OFF < 1.0
+    if not (small or large):
         return ()
-    small = balance.compressed > 1.0
     slip = "kPa, psi, bar or MPa read as Pa" if small else "Pa read as kPa, psi, bar or MPa"
     return (_unit(PRESSURE, SPEED, 1.0 / balance.compressed, slip),)

@@ -159,7 +159,6 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
     )
 
 
-<<<<<<< HEAD
 def _severities(
     diagnosis: Diagnosis, estimate: BulkModulusEstimate, rig: Rig, *, pressure: bool
 ) -> Mapping[str, Quantity]:
@@ -167,7 +166,8 @@ def _severities(
     actuator = actuator_of(rig.parameters)
     found = with_bulk_modulus(diagnosis.severity, estimate.quantity, actuator)
     return with_totals(found, actuator, rig.spreads, pressure=pressure)
-=======
+
+
 def _misread(found: Finding, log: CleanLog, scores: Scores) -> Finding:
     """Return a finding of a log whose channels are not what they are called: unknown, and what to mend."""
     return replace(
@@ -179,7 +179,6 @@ def _misread(found: Finding, log: CleanLog, scores: Scores) -> Finding:
         advice=advice_for(log.record, {}, log.mistakes, (), scores.channels),
         evidence=EhaEvidence(found.evidence, scores, None),
     )
->>>>>>> 361d8d2 (Channels with a wrong sign, unit or name are named before anything is fitted, and nothing else is concluded)
 
 
 def _without_circuit(found: Finding, log: CleanLog, scores: Scores, doubts: tuple[Note, ...], why: Note) -> Finding:

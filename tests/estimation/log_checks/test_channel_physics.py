@@ -18,7 +18,7 @@ from faults.notes import AdviceCode
 from plant.eha.drives import DRIVES, make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
-from plant.eha.simulate import LUMPED, simulate
+from plant.eha.simulate import LUMPED, REDUCED, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
@@ -53,6 +53,13 @@ def test_sound_logs_are_not_accused(condition: str, drive: str, leakage: float) 
     for absent, load in product(VIEWS, (0.0, 2e3)):
         log = run(condition, drive, leakage, load)
         assert channel_mistakes(log.replace(**dict.fromkeys(absent)), HEALTHY) == ()
+
+
+@pytest.mark.parametrize("condition", list(CONDITIONS))
+def test_one_slow_sine_in_which_all_flows_look_alike_accuses_no_channel(condition: str) -> None:
+    p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(3)
+    log = simulate(REDUCED, make_drive("sine", 6.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    assert channel_mistakes(log, HEALTHY) == ()
 
 
 @pytest.mark.parametrize(
