@@ -177,6 +177,10 @@ class RigCode(Code):
         "port_drains",
         "chamber {side} loses {drain:.3g} m^3/(s Pa) to the inner circuit: its make-up valve leaks or is stuck open",
     )
+    CHECKS_CRACK = (
+        "checks_crack",
+        "the make-up valves open {crack_pa:.3g} +- {half_width_pa:.2g} Pa below the rig file's accumulator pressure",
+    )
     EXPLAINED_OTHERWISE = (
         "explained_otherwise",
         "{count} other explanation(s) fit the log about as well; the interval holds them",

@@ -101,6 +101,11 @@ def _blocked(found: Explanation, _: EhaParameters) -> Note:
     return RigCode.MAKEUP_BLOCKED.note(side="B" if found.values["makeup_share_b"][0] < 1.0 else "A")
 
 
+def _crack(found: Explanation, _: EhaParameters) -> Note:
+    value = found.values["crack_pressure"][0]
+    return RigCode.CHECKS_CRACK.note(crack_pa=value, half_width_pa=_half_width(found, "crack_pressure"))
+
+
 def _drains(side: str) -> Callable[[Explanation, EhaParameters], Note]:
     def note(found: Explanation, _: EhaParameters) -> Note:
         share = found.values[f"drain_share_{side}"][0]
@@ -119,6 +124,7 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "air": _air,
     "leakage_growth": _growth,
     "makeup_blocked": _blocked,
+    "checks_crack": _crack,
     "port_a_drains": _drains("a"),
     "port_b_drains": _drains("b"),
 }

@@ -143,7 +143,8 @@ def fit_flow(
     value, std = found["bulk_modulus"]
     objections = _objections(best)
     if objections or loaded:
-        strange = explain(log, parameters, best.values, _explains, loaded=loaded)
+        usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
+        strange = explain(log, parameters, [best.values, *usual], _explains, loaded=loaded)
         one = strange.fit
         if _explains(one) and one.cost < best.cost - WORTH:
             bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]

@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 
 from estimation.fits.descent import descend
-from estimation.fits.form_fit import FAULTS_TRIED, weighed
+from estimation.fits.form_fit import weighed
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_problem import GreyBoxLog, search_bounds
@@ -45,7 +45,7 @@ class Hypothesis:
     delays: tuple[float, ...] = (0.0,)
 
 
-START_LOAD = Hypothesis("start_load", ("start_pressure",))
+START_LOAD = Hypothesis("start_load", ("start_pressure", "start_level"))
 
 HYPOTHESES = (
     Hypothesis("pressure_late", ("pressure_lag",), ({"pressure_lag": 1e-3},), (0.0, 2e-3, 5e-3, 9e-3)),
@@ -63,6 +63,7 @@ HYPOTHESES = (
         ("makeup_share_b",),
         ({"makeup_share_b": 1e-4}, {"makeup_share_b": 1e4, "makeup_conductance": 1e-13}),
     ),
+    Hypothesis("checks_crack", ("crack_pressure",), ({"crack_pressure": 1e4},)),
     Hypothesis("port_a_drains", ("drain_share_a",), ({"drain_share_a": 1e2},)),
     Hypothesis("port_b_drains", ("drain_share_b",), ({"drain_share_b": 1e2},)),
 )
@@ -74,8 +75,10 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "pressure_offset": (-1e7, 1e7),
     "position_zero": (-1.0, 1.0),
     "start_pressure": (-1e7, 1e7),
+    "start_level": (-2.5e5, 1e7),
     "air_softness": (0.0, 1e5),
     "leakage_growth": (-1.0, 100.0),
+    "crack_pressure": (-1e5, 2e5),
     "leakage_bend": (-100.0, 100.0),
 }
 """Least and largest values where physics gives them [SI]."""
@@ -155,7 +158,7 @@ Accepted: TypeAlias = Callable[[GreyBoxFit], bool]
 def explain(
     log: GreyBoxLog,
     parameters: EhaParameters,
-    plain: Mapping[str, float],
+    starts: Sequence[Mapping[str, float]],
     accepted: Accepted,
     *,
     loaded: bool = False,
@@ -168,8 +171,8 @@ def explain(
         The log, as the plain flow form sees it.
     parameters : EhaParameters
         The actuator.
-    plain : Mapping[str, float]
-        What the plain form found [SI].
+    starts : sequence of Mapping[str, float]
+        First guesses of the plain form's unknowns [SI].
     accepted : callable
         ``accepted(fit)``: whether a fit explains the log.
     loaded : bool
@@ -181,15 +184,13 @@ def explain(
         The likeliest; whether it explains the log is for the gate to say.
     """
     wide = _widened(log, parameters)
-    healthy = {name: plain[name] for name in FLOW_FORM.unknowns}
-    starts = (healthy, *({**healthy, **fault} for fault in _faults(parameters)))
     tried = (START_LOAD,) if loaded else HYPOTHESES
     finished = _likeliest(wide, (_screened(wide, (one,), starts) for one in tried))
     first = finished[0]
     if not accepted(first.fit):
         late = delayed(wide, first.delay)
         others = [one for one in HYPOTHESES if one not in first.together]
-        pairs = _likeliest(late, (_screened(late, (*first.together, one), (first.values,)) for one in others))
+        pairs = _likeliest(late, (_screened(late, (*first.together, one), [first.values]) for one in others))
         better = (one for one in pairs if one.cost < first.cost - WORTH)
         finished = _ranked([first, *(replace(one, delay=first.delay + one.delay) for one in better)])
     best = finished[0]
@@ -218,12 +219,6 @@ def _problem(log: GreyBoxLog, together: Sequence[Hypothesis]) -> FreedProblem:
 
 def _ranked(tried: Iterable[_Tried]) -> list[_Tried]:
     return sorted(tried, key=lambda one: one.cost)
-
-
-def _faults(p: EhaParameters) -> Iterator[Mapping[str, float]]:
-    """Yield leakages and flow biases of starts, the spread of Table 3 beyond the healthy one."""
-    for worse, biased in FAULTS_TRIED[1:]:
-        yield {"leakage_coefficient": worse * p.leakage_coefficient, "flow_bias": biased * p.flow_bias}
 
 
 def _screened(

@@ -34,9 +34,13 @@ class WideFlowParameters(EhaParameters):
     pressure_offset: Annotated[float, SI("Pa", "offset of the differential pressure", "fitted")] = 0.0
     position_zero: Annotated[float, SI("m", "encoder's reading in the middle position", "fitted")] = 0.0
     start_pressure: Annotated[float, SI("Pa", "differential pressure before the first sample", "fitted")] = 0.0
+    start_level: Annotated[
+        float, SI("Pa", "pressure of the lower side before the first sample, over the accumulator's", "fitted")
+    ] = 0.0
     air_softness: Annotated[float, SI("Pa", "a of 1/beta(p) = 1/beta + a/p^2", "fitted")] = 0.0
     leakage_growth: Annotated[float, SI("1", "growth of leakage over the log, of its first value", "fitted")] = 0.0
     leakage_bend: Annotated[float, SI("1", "part of that growth which goes with time squared", "fitted")] = 0.0
+    crack_pressure: Annotated[float, SI("Pa", "drop at which the make-up valves crack", "fitted")] = 0.0
     makeup_share_b: Annotated[float, SI("1", "conductance of valve B over that of A", "fitted")] = 1.0
     drain_share_a: Annotated[float, SI("1", "drain of port A over the case leakage", "fitted")] = 1.0
     drain_share_b: Annotated[float, SI("1", "drain of port B over the case leakage", "fitted")] = 1.0
@@ -87,11 +91,15 @@ def _fed(
     """Return what the inner circuit feeds into a chamber: through its check valve, a pilot, less the case drain."""
     drop, makeup = supply - chamber, p.makeup_conductance * makeup_share
     piloted = where(other > chamber, p.pilot_share * makeup * drop, 0.0)
-    return check_valve_flow(drop, makeup, p.makeup_opening) + piloted + p.case_leakage * drain_share * drop
+    return (
+        check_valve_flow(drop - p.crack_pressure, makeup, p.makeup_opening)
+        + piloted
+        + p.case_leakage * drain_share * drop
+    )
 
 
 def _at_rest(p: SimpleNamespace) -> tuple[Scalar, ...]:
-    held, supply = p.start_pressure, p.accumulator_pressure
+    held, supply = p.start_pressure, p.accumulator_pressure + p.start_level
     return supply + maximum(held, 0.0), supply + maximum(-held, 0.0), -p.pressure_offset
 
 
@@ -119,8 +127,10 @@ LINEAR = {
     "pressure_offset": 1e4,
     "position_zero": 1e-2,
     "start_pressure": 1e5,
+    "start_level": 1e4,
     "air_softness": 1e2,
     "leakage_growth": 1.0,
     "leakage_bend": 1.0,
+    "crack_pressure": 1e4,
 }
 """Parameters that may be zero or negative, each with a typical size [SI]."""
