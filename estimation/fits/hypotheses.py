@@ -45,13 +45,16 @@ class Hypothesis:
     delays: tuple[float, ...] = (0.0,)
 
 
+DELIVERY = Hypothesis("delivery", ("pump_displacement",))
+"""Asked of every log: a pump that delivers less may pass for leakage, with bulk modulus a fifth too low."""
+
 START_LOAD = Hypothesis("start_load", ("start_pressure", "start_level"))
 
 HYPOTHESES = (
     Hypothesis("pressure_late", ("pressure_lag",), ({"pressure_lag": 1e-3},), (0.0, 2e-3, 5e-3, 9e-3)),
     Hypothesis("pressure_offset", ("pressure_offset",)),
     Hypothesis("encoder_zero", ("position_zero",), ({"position_zero": -0.06}, {"position_zero": 0.06})),
-    Hypothesis("delivery", ("pump_displacement",)),
+    DELIVERY,
     Hypothesis("volume", ("chamber_volume",)),
     START_LOAD,
     Hypothesis("air", ("air_softness",), ({"air_softness": 1e2}, {"air_softness": 1e3})),
@@ -161,7 +164,7 @@ def explain(
     starts: Sequence[Mapping[str, float]],
     accepted: Accepted,
     *,
-    loaded: bool = False,
+    asked: Sequence[Hypothesis] = HYPOTHESES,
 ) -> Explanation:
     """Return the hypotheses that explain a log best, alone or two together.
 
@@ -175,8 +178,8 @@ def explain(
         First guesses of the plain form's unknowns [SI].
     accepted : callable
         ``accepted(fit)``: whether a fit explains the log.
-    loaded : bool
-        Whether the log begins under load, which is then no hypothesis but known.
+    asked : sequence of Hypothesis
+        What is tried alone; pairs are with any other.
 
     Returns
     -------
@@ -184,8 +187,7 @@ def explain(
         The likeliest; whether it explains the log is for the gate to say.
     """
     wide = _widened(log, parameters)
-    tried = (START_LOAD,) if loaded else HYPOTHESES
-    finished = _likeliest(wide, (_screened(wide, (one,), starts) for one in tried))
+    finished = _likeliest(wide, (_screened(wide, (one,), starts) for one in asked))
     first = finished[0]
     if not accepted(first.fit):
         late = delayed(wide, first.delay)
@@ -198,6 +200,32 @@ def explain(
     found, rig_std = weighed([best.fit, *(one.fit for one in rivals)])
     values = {name: (value, best.fit.std[name]) for name, value in best.fit.values.items()} | dict(found)
     return Explanation(tuple(one.name for one in best.together), values, best.delay, best.fit, rig_std, len(rivals))
+
+
+def promised(log: GreyBoxLog, parameters: EhaParameters, plain: Mapping[str, float], one: Hypothesis) -> float:
+    """Return the gain in log-likelihood that a hypothesis promises beside the plain fit, to first order.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    plain : Mapping[str, float]
+        What the plain form found [SI].
+    one : Hypothesis
+        What is asked.
+
+    Returns
+    -------
+    float
+        Rao's score statistic over two [dimensionless].
+    """
+    wide = _widened(log, parameters)
+    problem = _problem(wide, (one,))
+    absent = dict(zip(parameter_names(WideFlowParameters), wide.parameters, strict=True))
+    point = problem.at(problem.model.theta({**absent, **plain}))
+    return 0.5 * float(point.gradient @ np.linalg.lstsq(point.gram, point.gradient, rcond=None)[0])
 
 
 def _widened(log: GreyBoxLog, parameters: EhaParameters) -> GreyBoxLog:
