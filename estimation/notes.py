@@ -177,6 +177,10 @@ class RigCode(Code):
         "port_drains",
         "chamber {side} loses {drain:.3g} m^3/(s Pa) to the inner circuit: its make-up valve leaks or is stuck open",
     )
+    OIL_STIFFER = (
+        "oil_stiffer",
+        "bulk modulus is {ratio:.3g} times that of the rig file; the conditions are compared around the measured one",
+    )
     CHECKS_CRACK = (
         "checks_crack",
         "the make-up valves open {crack_pa:.3g} +- {half_width_pa:.2g} Pa below the rig file's accumulator pressure",

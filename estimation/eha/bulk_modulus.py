@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
-from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide
+from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide, without_number
 from estimation.eha.rig_share import fitted_responses, scaled_responses
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
@@ -205,7 +205,8 @@ def estimate_clean(
     if log.mistakes:
         return _misread(log, form)
     if automatic and form == "motion" and (bound := rigid_bound(log, parameters)) > LARGEST_BOUND:
-        return _doubting_sensors(_unseen(bound), log)
+        unseen = without_number(Outcome.NOT_OBSERVABLE, (too_wide(bound),), form, MOTION_CHANNELS, bound)
+        return _doubting_sensors(unseen, log)
     fit = None if filtering else _fit(log, parameters, form, guess, spreads, chosen=options.method == LEAST_SQUARES)
     if fit is not None:
         found = _fitted(fit, form, FITTED[form][1])
@@ -281,37 +282,10 @@ def rigid_bound(log: CleanLog, parameters: EhaParameters) -> float:
     return std / parameters.bulk_modulus
 
 
-def _unseen(bound: float) -> BulkModulusEstimate:
-    return BulkModulusEstimate(
-        outcome=Outcome.NOT_OBSERVABLE,
-        value=None,
-        std=None,
-        bound=bound,
-        gate=Gate(False, (too_wide(bound),)),
-        form="motion",
-        channels=MOTION_CHANNELS,
-        nis={},
-        others={},
-        estimate=None,
-        first_pass=None,
-    )
-
-
 def _misread(log: CleanLog, form: str) -> BulkModulusEstimate:
     """Return no number: of a log whose channels are not what they are called nothing follows."""
-    return BulkModulusEstimate(
-        outcome=Outcome.MISMATCH,
-        value=None,
-        std=None,
-        bound=np.nan,
-        gate=Gate(False, log.mistakes),
-        form=form,
-        channels=tuple(name for name in FLOW_CHANNELS if name in log.record),
-        nis={},
-        others={},
-        estimate=None,
-        first_pass=None,
-    )
+    used = tuple(name for name in FLOW_CHANNELS if name in log.record)
+    return without_number(Outcome.MISMATCH, log.mistakes, form, used)
 
 
 def _with_rig(

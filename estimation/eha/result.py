@@ -123,3 +123,41 @@ def too_wide(bound: float) -> Note:
         The note.
     """
     return EstimateCode.BOUND_TOO_WIDE.note(percent=100.0 * min(bound, 9.99))
+
+
+def without_number(
+    outcome: Outcome, reasons: tuple[Note, ...], form: str, channels: tuple[str, ...], bound: float = float("nan")
+) -> BulkModulusEstimate:
+    """Return an estimate that gives no number.
+
+    Parameters
+    ----------
+    outcome : Outcome
+        How it went.
+    reasons : tuple of Note
+        Why.
+    form : str
+        What would have been believed of the actuator.
+    channels : tuple of str
+        Channels that were looked at beside motor speed.
+    bound : float
+        Relative Cramér-Rao bound [fraction]; NaN where it was not asked for.
+
+    Returns
+    -------
+    BulkModulusEstimate
+        With its gate shut.
+    """
+    return BulkModulusEstimate(
+        outcome=outcome,
+        value=None,
+        std=None,
+        bound=bound,
+        gate=Gate(False, reasons),
+        form=form,
+        channels=channels,
+        nis={},
+        others={},
+        estimate=None,
+        first_pass=None,
+    )

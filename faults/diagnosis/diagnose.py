@@ -18,13 +18,14 @@ from estimation.finding import Finding, Outcome, Quantity
 from estimation.identification.model.linear_model import LinearModel
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.log_checks.sensor_check import PRESSURE
+from estimation.notes import RigCode
 from faults.diagnosis.advice import advice_for
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import region_scores
 from faults.diagnosis.evidence import Scoreboard, weigh
 from faults.diagnosis.models_verdict import models_verdict, ranked
-from faults.diagnosis.out_of_model import reasons_against, sensors_disagree
+from faults.diagnosis.out_of_model import SOFT, reasons_against, sensors_disagree
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import severities, severities_at, what_is_not_told, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
@@ -123,6 +124,10 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
     if estimate.explanation is not None:
         log = set_right(log, estimate.explanation)
         rig = replace(rig, parameters=rig_set_right(rig.parameters, estimate.explanation))
+    if estimate.gate.passed and estimate.value is not None and estimate.value > rig.parameters.bulk_modulus / SOFT:
+        # oil stiffer than the rig's is no fault: the circuit is fitted around what was measured
+        strange = (*strange, RigCode.OIL_STIFFER.note(ratio=estimate.value / rig.parameters.bulk_modulus))
+        rig = replace(rig, parameters=replace(rig.parameters, bulk_modulus=estimate.value))
     scores = score_mathematical(log.record, mathematical_bank(rig.parameters))
     verdict = models_verdict(scores, log.record)
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
