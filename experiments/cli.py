@@ -29,6 +29,7 @@ from experiments.diaphragm_motor import command as diaphragm_motor
 from experiments.library import command as library
 from experiments.motor_paper import command as motor_paper
 from experiments.nine_conditions import command as nine_conditions
+from experiments.open_benchmark import command as open_benchmark
 from experiments.piezo_stack import command as piezo_stack
 
 OBJECTS_AT_START = 500_000
@@ -98,6 +99,7 @@ VERBS = (
 for module in VERBS:
     app.add_typer(module.commands)
 app.add_typer(conditions.rig_commands, name="rig")
+app.add_typer(open_benchmark.commands, name="benchmark")
 
 
 def main() -> None:

@@ -1,0 +1,50 @@
+"""`hydrostate benchmark`: logs of the open benchmark with their truth, and what kinds there are."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from experiments.command.json_output import json_text
+from experiments.command.options import Json
+from experiments.command.terminal import emit
+
+commands = typer.Typer(no_args_is_help=True, help="Logs with their truth, to compare methods on.")
+
+
+@commands.command(epilog="Example: hydrostate benchmark make --kind plain --kind worn_pump --count 5 --out logs")
+def make(
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="DIR", help="A folder of each kind goes below it.")
+    ] = Path("open-benchmark"),
+    kind: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KIND", help="A kind, may be given several times.", show_default="all"),
+    ] = None,
+    split: Annotated[str, typer.Option(metavar="SPLIT", help="training, validation or test.")] = "test",
+    count: Annotated[int, typer.Option(metavar="N", help="Logs of each kind.")] = 10,
+    as_json: Json = False,
+) -> None:
+    """Write logs with truth.csv, and a rig file where the actuator is not the paper's; same options, same bits.
+
+    Physics, sensors and loggers share no model with what estimates and diagnoses here.
+    """
+    from experiments.open_benchmark.folders import write_set
+    from experiments.open_benchmark.kinds import KINDS, VERSION
+
+    written = [str(write_set(name, split, count, out)) for name in kind or KINDS]
+    done = [{"outcome": "ok", "truth": path, "logs": count, "split": split, "version": VERSION} for path in written]
+    emit(json_text(done) if as_json else "\n".join(written))
+
+
+@commands.command(epilog="Example: hydrostate benchmark kinds")
+def kinds(as_json: Json = False) -> None:
+    """List the kinds of log: what is strange in each, and which verdicts are right."""
+    from experiments.open_benchmark.kinds import KINDS
+
+    if as_json:
+        listed = [{"kind": k.name, "strange": k.strange, "accept": k.accept, "named": k.named} for k in KINDS.values()]
+        emit(json_text(listed))
+        return
+    widest = max(map(len, KINDS))
+    emit("\n".join(f"{k.name:{widest}}  {k.strange}; right: {', '.join(k.accept)}" for k in KINDS.values()))

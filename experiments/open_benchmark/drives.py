@@ -1,0 +1,131 @@
+"""What is asked of the motor, or of the position loop, at every tick; each keeps the piston within its travel."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.open_benchmark.run import TICK
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Room:
+    """What a drive may use.
+
+    Parameters
+    ----------
+    duration : float
+        [s].
+    rated : float
+        Motor speed at 4 V [rad/s].
+    travel : float
+        How far the piston may go to either side [m].
+    glide : float
+        Rough velocity of the piston over motor speed [m/rad].
+    """
+
+    duration: float
+    rated: float
+    travel: float
+    glide: float
+
+    @property
+    def ticks(self) -> int:
+        """Count of rows of a course."""
+        return round(self.duration / TICK)
+
+
+def _held(room: Room, hold: Callable[[], float], level: Callable[[float], float]) -> Array:
+    """Return levels that are held; `level` hears where the piston may be [m], and one that leads too far is turned."""
+    speed, at, where = np.zeros(room.ticks), 0, 0.0
+    while at < room.ticks:
+        seconds = hold()
+        asked = level(where)
+        if abs(where + room.glide * asked * seconds) > room.travel:
+            asked = -abs(asked) * np.sign(where)
+        ticks = max(1, round(seconds / TICK))
+        speed[at : at + ticks] = asked
+        where += room.glide * asked * seconds
+        at += ticks
+    return speed
+
+
+def steps(room: Room, rng: np.random.Generator) -> Array:
+    """Return steps of 30 to 100 % of the rated speed, some of them pauses; shape (n,) [rad/s]."""
+    longest = np.clip(room.travel / (room.glide * room.rated), 0.4, 3.0)
+
+    def level(_: float) -> float:
+        paused = rng.random() < 0.12
+        return 0.0 if paused else float(rng.choice((-1.0, 1.0)) * rng.uniform(0.3, 1.0) * room.rated)
+
+    return _held(room, lambda: float(rng.uniform(0.3, 1.0) * longest), level)
+
+
+def prbs(room: Room, rng: np.random.Generator) -> Array:
+    """Return a binary signal held 20 to 100 ms, drawn towards one random place after the other; shape (n,) [rad/s]."""
+    hold, amplitude = float(rng.choice((0.02, 0.05, 0.1))), rng.uniform(0.5, 1.0) * room.rated
+    goals = list(rng.uniform(-room.travel, room.travel, 4 * room.ticks))
+
+    def level(where: float) -> float:
+        if abs(goals[-1] - where) < room.glide * amplitude * 0.2:
+            goals.pop()
+        towards = np.sign(goals[-1] - where)
+        return float(amplitude * (towards if rng.random() < 0.7 else -towards))
+
+    return _held(room, lambda: hold, level)
+
+
+def multisine(room: Room, rng: np.random.Generator) -> Array:
+    """Return twelve sines from 0.2 to 25 Hz of random phase, weaker the faster; shape (n,) [rad/s]."""
+    time = TICK * np.arange(room.ticks)
+    lowest = np.clip(0.5 * room.glide * room.rated / (2.0 * np.pi * room.travel), 0.05, 1.0)
+    signal = np.zeros(room.ticks)
+    for f in np.geomspace(lowest, 25.0, 12):
+        signal += f**-0.2 * np.sin(2.0 * np.pi * (f * time + rng.random()))
+    return rng.uniform(0.8, 1.0) * room.rated * signal / np.max(np.abs(signal))
+
+
+def sines(room: Room, rng: np.random.Generator) -> Array:
+    """Return a slow sine that uses the travel, and a faster one on it; shape (n,) [rad/s]."""
+    time = TICK * np.arange(room.ticks)
+    slow = np.clip(0.6 * room.glide * room.rated / (2.0 * np.pi * room.travel), 0.05, 1.0)
+    phase, fast = rng.choice((0.0, 0.5)), rng.uniform(2.0, 6.0)
+    return room.rated * (0.6 * np.sin(2.0 * np.pi * (slow * time + phase)) + 0.4 * np.sin(2.0 * np.pi * fast * time))
+
+
+def position_steps(room: Room, rng: np.random.Generator) -> Array:
+    """Return positions that are held until the loop may have reached them; shape (n,) [m]."""
+    asked, at, last = np.zeros(room.ticks), 0, 0.0
+    while at < room.ticks:
+        goal = rng.uniform(-1.0, 1.0) * room.travel
+        ticks = round((abs(goal - last) / (room.glide * room.rated) + rng.uniform(0.2, 0.8)) / TICK)
+        asked[at : at + ticks] = goal
+        at, last = at + ticks, goal
+    return asked
+
+
+def tracking(room: Room, rng: np.random.Generator) -> Array:
+    """Return a position that follows four sines, at up to 80 % of the rated speed; shape (n,) [m]."""
+    time = TICK * np.arange(room.ticks)
+    signal = np.zeros(room.ticks)
+    for f in np.geomspace(0.15, 3.0, 4) * rng.uniform(0.8, 1.2):
+        signal += np.sin(2.0 * np.pi * (f * time + rng.random())) / f
+    signal -= signal[0]
+    fastest = 0.8 * room.glide * room.rated / (np.max(np.abs(np.diff(signal))) / TICK)
+    return signal * min(fastest, room.travel / np.max(np.abs(signal)))
+
+
+Draw = Callable[[Room, np.random.Generator], Array]
+
+OPEN: Mapping[str, Draw] = MappingProxyType({"steps": steps, "multisine": multisine, "prbs": prbs, "sines": sines})
+"""Drives that ask for a motor speed."""
+
+CLOSED: Mapping[str, Draw] = MappingProxyType({"posn": position_steps, "track": tracking})
+"""Drives that ask for a position."""
+
+DRIVES: Mapping[str, Draw] = MappingProxyType({**OPEN, **CLOSED})
+"""Every drive by the name that the truth has for it."""

@@ -1,0 +1,121 @@
+"""Kinds with a fault or a change that none of the nine conditions has."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from experiments.open_benchmark.friction import steady_friction
+from experiments.open_benchmark.kind import MAYBE, UNKNOWN, Draw, Kind
+from experiments.open_benchmark.setups import Setup
+from faults.conditions import LEAKAGE_TABLE
+
+OUTSIDE = (UNKNOWN,)
+"""The verdict on what is none of the nine."""
+
+
+def _machine(**changes: float) -> Draw:
+    return lambda setup, _: setup.with_machine(**changes)
+
+
+def _leaking_seat(setup: Setup, rng: np.random.Generator) -> Setup:
+    return setup.with_machine(seat_leak_a=rng.uniform(0.5, 2.0) * LEAKAGE_TABLE["major"].leakage_coefficient)
+
+
+def _low_relief(setup: Setup, rng: np.random.Generator) -> Setup:
+    """Set the relief valve between what breaks the piston loose and what it takes near its rated speed."""
+    m = setup.machine
+    fast = 0.75 * setup.rated_speed * m.displacement / m.area_a
+    blocks, film = steady_friction(fast, 1.0, m)
+    force = m.coulomb + rng.uniform(0.2, 0.5) * (blocks + film - m.coulomb)
+    return setup.with_machine(relief=force / m.area_a)
+
+
+STARVING = (
+    *("minor_friction", "major_friction", "minor_leakage_minor_friction"),
+    *("minor_leakage_major_friction", "major_leakage_major_friction"),
+)
+"""Conditions whose pressures empty a chamber that draws no make-up."""
+
+FAULTY = (
+    Kind(
+        "worn_pump",
+        "worn pump: 80 % of the flow, no more leakage",
+        _machine(efficiency=0.8),
+        OUTSIDE,
+        r"\bpump|efficien|displacement",
+        severity=False,
+    ),
+    Kind(
+        "makeup_check_stuck_shut",
+        "make-up check of side B stuck shut: it boils",
+        lambda setup, _: replace(setup.with_machine(check_b=0.0), forward_first=True),
+        OUTSIDE,
+        r"make-?up|\bcheck|cavitat|vapou?r",
+        conditions=STARVING,
+        severity=False,
+    ),
+    Kind(
+        "makeup_check_leaks",
+        "make-up check of side A leaks",
+        _leaking_seat,
+        OUTSIDE,
+        r"make-?up|\bcheck|one side",
+        severity=False,
+    ),
+    Kind(
+        "relief_set_low",
+        "relief valve opens at the pressure of a slow piston",
+        _low_relief,
+        OUTSIDE,
+        r"relief",
+        severity=False,
+    ),
+    Kind(
+        "intermittent_friction",
+        "Coulomb friction three- to sixfold in six bursts",
+        lambda setup, rng: setup.with_change(bursts=6, grip=rng.uniform(3.0, 6.0)),
+        (UNKNOWN, "minor_friction", "major_friction"),
+        r"intermittent|burst|at times|now and then|stick",
+        conditions=("normal",),
+        severity=False,
+    ),
+    Kind(
+        "entrained_air",
+        "0.5 to 3 % of entrained air",
+        lambda setup, rng: setup.with_change(air=rng.uniform(0.005, 0.03)),
+        MAYBE,
+        r"\bair\b",
+    ),
+    Kind(
+        "air_midway",
+        "1 to 4 % of air gets in between 40 and 60 % of the log",
+        lambda setup, rng: setup.with_change(late_air=rng.uniform(0.01, 0.04), late_from=rng.uniform(0.4, 0.6)),
+        OUTSIDE,
+        r"\bair\b|soften|chang",
+        severity=False,
+    ),
+    Kind(
+        "leakage_grows",
+        "leakage grows from none to major over the log",
+        lambda setup, _: setup.with_change(wear=LEAKAGE_TABLE["major"].leakage_coefficient / setup.machine.leakage),
+        (UNKNOWN, "minor_leakage", "major_leakage"),
+        r"grow|trend|ris|drift|chang",
+        conditions=("normal",),
+        severity=False,
+    ),
+    Kind(
+        "oil_warms",
+        "viscosity halves over the log",
+        lambda setup, _: setup.with_change(viscosity=0.5),
+        named=r"viscos|warm|trend|drift|chang",
+        severity=False,
+    ),
+    Kind(
+        "leakage_partly_turbulent",
+        "30 % of the leakage is turbulent at 5 bar",
+        _machine(turbulent=0.3),
+        MAYBE,
+        severity=False,
+    ),
+)
+"""Kinds with a fault beyond the nine, or a change within the log."""

@@ -1,0 +1,116 @@
+"""Writes sets of logs as folders: a file a log, `truth.csv`, and a rig file where one is handed over."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from experiments.open_benchmark.kinds import VERSION, Made, make
+from faults.conditions import CONDITIONS
+from plant.errors import HydrostateError
+
+TRUTH = "truth.csv"
+
+RIG = "rig.toml"
+
+
+def truth_of(made: Made, split: str, index: int) -> dict[str, Any]:
+    """Return the row of `truth.csv` for a log: coefficients are those in the middle of it.
+
+    Parameters
+    ----------
+    made : Made
+        The log.
+    split : str
+        One of `SPLITS`.
+    index : int
+        Which log of its kind and split.
+
+    Returns
+    -------
+    dict[str, Any]
+        SI units by name, and words.
+    """
+    kind, setup, m, change = made.kind, made.setup, made.setup.machine, made.setup.change
+    condition, states = CONDITIONS[setup.condition], made.states
+    low, high = made.bulk_modulus
+    return {
+        "file": f"run{index:03d}.csv",
+        "set": kind.name,
+        "note": kind.strange,
+        "input": setup.drive,
+        "sample_time_s": setup.logger.sample_time,
+        "leakage": condition.leakage,
+        "friction": condition.friction,
+        "leak_coeff": m.leakage * np.sqrt(change.wear / change.viscosity),
+        "flow_bias": m.flow_bias,
+        "a1": m.quadratic,
+        "a2": m.linear * np.sqrt(change.viscosity),
+        "a3": m.coulomb,
+        "bulk_modulus_pa": np.sqrt(low * high),
+        "beta_lo": low,
+        "beta_hi": high,
+        "accept": ";".join(kind.accepted(setup.condition)),
+        "rig": RIG if setup.rig else "",
+        "columns": "",
+        "sev": int(kind.severity),
+        "vmax": np.max(np.abs(states[:, 3])),
+        "dpmax": np.max(np.abs(states[:, 4] - states[:, 5])),
+        "xmin": np.min(states[:, 2]),
+        "xmax": np.max(states[:, 2]),
+        "version": VERSION,
+        "split": split,
+        "index": index,
+        "condition": setup.condition,
+        "named": kind.named,
+    }
+
+
+def rig_text(name: str, note: str, entries: Mapping[str, float]) -> str:
+    """Return a rig file that says no more than it must; entries in SI units."""
+    lines = [f"# {note}", f'name = "{name}"', "", "[parameters]"]
+    return "\n".join([*lines, *(f"{entry} = {value!r}" for entry, value in entries.items())]) + "\n"
+
+
+def write_set(kind: str, split: str, count: int, out: Path) -> Path:
+    """Write the first logs of a kind and split as a folder of the kind's name.
+
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+    split : str
+        One of `SPLITS`.
+    count : int
+        Count of logs.
+    out : Path
+        Where the folder goes.
+
+    Returns
+    -------
+    Path
+        The folder's `truth.csv`.
+
+    Raises
+    ------
+    HydrostateError
+        If there is no such kind or split, or the folder cannot be written.
+    """
+    if count < 1:
+        raise HydrostateError(f"count must be at least 1, got {count!r}")
+    folder, rows = out / kind, list[dict[str, Any]]()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for index in range(count):
+            made = make(kind, split, index)
+            row = truth_of(made, split, index)
+            made.log.to_csv(folder / str(row["file"]), index=False, float_format="%.9g", lineterminator="\n")
+            if made.setup.rig:
+                (folder / RIG).write_text(rig_text(kind, made.kind.strange, made.setup.rig), "utf-8")
+            rows.append(row)
+        pd.DataFrame(rows).to_csv(folder / TRUTH, index=False, lineterminator="\n")
+    except OSError as error:
+        raise HydrostateError(f"{folder}: cannot be written: {error.strerror or error}") from error
+    return folder / TRUTH

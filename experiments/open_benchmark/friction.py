@@ -1,0 +1,81 @@
+"""Friction of spring-loaded blocks (Iwan, J. Appl. Mech. 33, 1966): each sticks until its spring is stretched enough.
+
+It remembers every reversal and needs no rate of its own; while all blocks slip it is the condition's steady curve.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.open_benchmark.machine import Machine
+
+Array = NDArray[np.float64]
+
+SLIPS = (0.25, 0.6, 1.15, 2.0)
+"""Stretch at which each block slips, in units of `Machine.presliding`; every block carries the same share."""
+
+MICRO_DAMPING = 0.3
+"""Damping of the blocks that stick, as a share of the critical one [dimensionless]."""
+
+
+def stretched(stretch: Array, moved: float, m: Machine, out: Array) -> None:
+    """Write how far the springs are stretched after the piston moved.
+
+    Parameters
+    ----------
+    stretch, out : ndarray, shape (4,)
+        Before and after [m].
+    moved : float
+        By how much [m].
+    m : Machine
+        The actuator.
+    """
+    for i in range(len(SLIPS)):
+        most = SLIPS[i] * m.presliding
+        out[i] = min(max(stretch[i] + moved, -most), most)
+
+
+def steady_friction(speed: float, viscosity: float, m: Machine) -> tuple[float, float]:
+    """Return what the blocks and what the oil film carry in steady sliding [N], together a_1 v^2 + a_2 v + a_3.
+
+    Where a_2 is negative (errata E12) the blocks carry the fall, down to half of a_3.
+
+    Parameters
+    ----------
+    speed : float
+        Of the piston, without sign [m/s].
+    viscosity : float
+        Over that at the start [dimensionless].
+    m : Machine
+        The actuator.
+    """
+    blocks = max(m.coulomb + min(m.linear, 0.0) * speed, 0.5 * m.coulomb)
+    whole = m.coulomb + (m.linear * viscosity + m.quadratic * speed) * speed
+    return blocks, whole - blocks
+
+
+def friction_force(velocity: float, stretch: Array, viscosity: float, rough: float, m: Machine) -> float:
+    """Return the friction force [N].
+
+    Parameters
+    ----------
+    velocity : float
+        Of the piston [m/s].
+    stretch : ndarray, shape (4,)
+        Of the springs [m].
+    viscosity, rough : float
+        Viscosity and grip of the blocks over those at the start [dimensionless].
+    m : Machine
+        The actuator.
+    """
+    blocks, film = steady_friction(abs(velocity), viscosity, m)
+    share, sticking = 0.0, 0.0
+    for i in range(len(SLIPS)):
+        part = stretch[i] / (SLIPS[i] * m.presliding)
+        share += part / len(SLIPS)
+        if abs(part) < 1.0:
+            sticking += 1.0 / (len(SLIPS) * SLIPS[i])
+    spring = sticking * m.coulomb / m.presliding
+    damping = 2.0 * MICRO_DAMPING * math.sqrt(spring * m.mass)
+    return rough * blocks * share + damping * velocity + math.copysign(film, velocity)

@@ -1,0 +1,107 @@
+"""Every kind of log by name, the splits, and the log that kind, split and index stand for."""
+
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from experiments.open_benchmark.faulty import FAULTY
+from experiments.open_benchmark.kind import Kind
+from experiments.open_benchmark.loggers import LOGGERS
+from experiments.open_benchmark.machine import Machine
+from experiments.open_benchmark.oil import stiffness
+from experiments.open_benchmark.rigs import RIGS
+from experiments.open_benchmark.run import run
+from experiments.open_benchmark.setups import Setup, course_of, draw_plain
+from plant.errors import HydrostateError, require_known
+
+VERSION = "1.0"
+"""Of the open benchmark: any change of a log, however small, is a new one."""
+
+SPLITS = ("training", "validation", "test")
+"""What may be looked at, what choices may be made on, and what is scored."""
+
+KINDS: Mapping[str, Kind] = MappingProxyType({kind.name: kind for kind in (*LOGGERS, *RIGS, *FAULTY)})
+"""Every kind by name."""
+
+STRIDE = 4
+"""Step through a kind's conditions from log to log, so that few logs hold unlike ones; prime to how many there are."""
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """One log and what was true.
+
+    Parameters
+    ----------
+    kind : Kind
+        Its kind.
+    setup : Setup
+        What it was made of.
+    log : pandas.DataFrame, shape (samples, channels)
+        As its file has it.
+    states : ndarray, shape (m, 7)
+        The run, as named in `STATES`, in their units.
+    bulk_modulus : tuple of float
+        Effective, lowest and highest that acted [Pa].
+    """
+
+    kind: Kind
+    setup: Setup
+    log: pd.DataFrame
+    states: NDArray[np.float64]
+    bulk_modulus: tuple[float, float]
+
+
+def seed_of(kind: str, split: str, index: int) -> list[int]:
+    """Return what seeds a log: no two of kind, split and index share it.
+
+    Examples
+    --------
+    >>> seed_of("plain", "test", 3)[1:]
+    [2, 3]
+    """
+    require_known("kind", kind, KINDS)
+    require_known("split", split, SPLITS)
+    if index < 0:
+        raise HydrostateError(f"index must not be negative, got {index!r}")
+    return [zlib.crc32(kind.encode()), SPLITS.index(split), index]
+
+
+def make(kind: str, split: str, index: int) -> Made:
+    """Return a log; the same kind, split and index give the same bits.
+
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+    split : str
+        One of `SPLITS`.
+    index : int
+        Which log, from 0.
+    """
+    drawing, driving, logging = np.random.default_rng(seed_of(kind, split, index)).spawn(3)
+    one = KINDS[kind]
+    condition = one.conditions[STRIDE * index % len(one.conditions)]
+    drive = one.drives[index % len(one.drives)]
+    setup = one.draw(draw_plain(condition, drive, drawing), drawing)
+    course = course_of(setup, driving)
+    states = run(setup.machine, course)
+    return Made(one, setup, setup.logger.log(states, logging), states, _stiffnesses(setup, states, course[:, 3]))
+
+
+def _stiffnesses(setup: Setup, states: NDArray[np.float64], air: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the ends of bulk modulus over a run, one percent of the pressures left out at either end.
+
+    It is the oil's at atmospheric pressure by the project's convention, unless air or a stiffening oil change it.
+    """
+    m = setup.machine
+    if np.max(air) == 0.0 and m.stiffening == Machine().stiffening:
+        return m.bulk_modulus, m.bulk_modulus
+    pressures = np.maximum(np.quantile(states[:, 4:6], (0.01, 0.99)), m.vapour)
+    ends = [stiffness(float(p), float(a), m) for p in pressures for a in (np.min(air), np.max(air))]
+    return min(ends), max(ends)

@@ -1,0 +1,129 @@
+"""Sensors and logger: what stands in the file of a run, with all that a bench adds."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from experiments.open_benchmark.run import RECORD, STATES
+from plant.errors import HydrostateError
+
+Array = NDArray[np.float64]
+
+SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
+DIFFERENCE, PRESSURE_A, PRESSURE_B = "differential_pressure_pa", "pressure_a_pa", "pressure_b_pa"
+PRESSURES = (DIFFERENCE, PRESSURE_A, PRESSURE_B)
+PLAIN = (SPEED, POSITION, VELOCITY, DIFFERENCE)
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """What one channel does to its quantity, in the channel's own unit.
+
+    Parameters
+    ----------
+    noise, quantum : float
+        Standard deviation, and resolution; 0 resolves all [unit of the channel].
+    gain : float
+        What is logged over what is true, less the offset [dimensionless].
+    offset : float
+        What is logged of nothing [unit of the channel].
+    lag, delay : float
+        Of first order, and pure [s].
+    """
+
+    noise: float = 0.0
+    quantum: float = 0.0
+    gain: float = 1.0
+    offset: float = 0.0
+    lag: float = 0.0
+    delay: float = 0.0
+
+    def read(self, time: Array, fine: Array, values: Array, rng: np.random.Generator) -> Array:
+        """Return what is logged.
+
+        Parameters
+        ----------
+        time : ndarray, shape (n,)
+            When it samples [s].
+        fine, values : ndarray, shape (m,)
+            When the run has its quantity [s], and it [unit of the channel].
+        rng : numpy.random.Generator
+            Source of noise.
+        """
+        sensed = _lagged(values, self.lag / RECORD) if self.lag > 0.0 else values
+        sampled = np.interp(time - self.delay, fine, sensed)
+        logged = self.gain * sampled + self.offset + self.noise * rng.standard_normal(len(time))
+        return self.quantum * np.round(logged / self.quantum) if self.quantum > 0.0 else logged
+
+
+def _lagged(values: Array, records: float) -> Array:
+    """Return values behind a first-order lag of so many records."""
+    from scipy.signal import lfilter
+
+    pole = np.exp(-1.0 / records)
+    return np.asarray(lfilter([1.0 - pole], [1.0, -pole], values - values[0])) + values[0]
+
+
+def _sensors() -> Mapping[str, Sensor]:
+    pressures = {name: Sensor(noise=5e3, quantum=500.0) for name in PRESSURES}
+    motion = {SPEED: Sensor(noise=0.05), POSITION: Sensor(quantum=1e-6), VELOCITY: Sensor(noise=1e-3)}
+    return MappingProxyType({**motion, **pressures})
+
+
+@dataclass(frozen=True)
+class Logger:
+    """A logger with its sensors.
+
+    Parameters
+    ----------
+    sensors : Mapping[str, Sensor]
+        By channel.
+    channels : tuple of str
+        What is logged, in the order of the columns.
+    headings : Mapping[str, str]
+        What a column is called where it is not what its channel is.
+    sample_time : float
+        [s].
+    jitter : float
+        Half width of what the clock is off, a fraction of the sample time; it is logged truly.
+    begin : float
+        How long the machine runs before the log begins [s].
+    """
+
+    sensors: Mapping[str, Sensor] = field(default_factory=_sensors)
+    channels: tuple[str, ...] = PLAIN
+    headings: Mapping[str, str] = field(default_factory=dict[str, str])
+    sample_time: float = 1e-3
+    jitter: float = 0.0
+    begin: float = 0.0
+
+    def log(self, states: Array, rng: np.random.Generator) -> pd.DataFrame:
+        """Return the log of a run, shape (samples, 1 + channels), columns as they are called in its file.
+
+        Parameters
+        ----------
+        states : ndarray, shape (m, 7)
+            The run, as named in `STATES`.
+        rng : numpy.random.Generator
+            Source of noise and jitter.
+        """
+        if not np.all(np.isfinite(states)):
+            raise HydrostateError("a run of the open benchmark must stay finite, got one that ran away")
+        fine = RECORD * np.arange(len(states), dtype=np.float64)
+        true = dict(zip(STATES, states.T, strict=True))
+        a, b = true["pressure_a"], true["pressure_b"]
+        quantities = {SPEED: true["motor_speed"], POSITION: true["position"], VELOCITY: true["velocity"]}
+        quantities |= {DIFFERENCE: a - b, PRESSURE_A: a, PRESSURE_B: b}
+        count = round((fine[-1] + RECORD - self.begin) / self.sample_time)
+        clock = self.sample_time * np.arange(count)
+        if self.jitter > 0.0:
+            clock[1:-1] += self.jitter * self.sample_time * rng.uniform(-1.0, 1.0, count - 2)
+        columns = {"time_s": clock}
+        for name in self.channels:
+            read = self.sensors[name].read(self.begin + clock, fine, quantities[name], rng)
+            columns[self.headings.get(name, name)] = read
+        return pd.DataFrame(columns)

@@ -1,0 +1,104 @@
+"""Kinds whose actuator is the rig file's, and whose sensors or logger add something."""
+
+from experiments.open_benchmark.drives import CLOSED
+from experiments.open_benchmark.kind import MAYBE, UNKNOWN, Draw, Kind
+from experiments.open_benchmark.logger import (
+    DIFFERENCE,
+    POSITION,
+    PRESSURE_A,
+    PRESSURE_B,
+    PRESSURES,
+    SPEED,
+    VELOCITY,
+)
+
+
+def _channels(*names: str) -> Draw:
+    return lambda setup, _: setup.with_logger(channels=names)
+
+
+def _pressure(**changes: float) -> Draw:
+    return lambda setup, _: setup.with_sensor(PRESSURES, **changes)
+
+
+def _sensor(channel: str, **changes: float) -> Draw:
+    return lambda setup, _: setup.with_sensor((channel,), **changes)
+
+
+RPM = 30.0 / 3.141592653589793
+"""Revolutions a minute in a radian a second."""
+
+LOGGERS = (
+    Kind("plain", "nothing: the paper's actuator, travel up to 200 mm"),
+    Kind("closed_loop", "closed position loop, no load", drives=tuple(CLOSED)),
+    Kind("no_velocity", "no velocity column", _channels(SPEED, POSITION, DIFFERENCE)),
+    Kind(
+        "chamber_pressures",
+        "two chamber pressures in place of their difference",
+        _channels(SPEED, POSITION, VELOCITY, PRESSURE_A, PRESSURE_B),
+    ),
+    Kind(
+        "coarse_converters",
+        "16-bit encoder over 500 mm, 12-bit pressure over +-250 bar",
+        lambda setup, _: setup.with_sensor((POSITION,), quantum=0.5 / 2**16).with_sensor(
+            PRESSURES, quantum=5e7 / 2**12
+        ),
+    ),
+    Kind("logged_at_5_kHz", "logged at 5 kHz", lambda setup, _: setup.with_logger(sample_time=2e-4)),
+    Kind(
+        "clock_jitters",
+        "sampling instants jitter by 20 % of a period, logged truly",
+        lambda setup, _: setup.with_logger(jitter=0.2),
+    ),
+    Kind(
+        "begins_in_motion",
+        "the log begins 1 to 3 s after the machine",
+        lambda setup, rng: setup.with_logger(begin=round(rng.uniform(1.0, 3.0), 3)),
+    ),
+    Kind(
+        "pressure_lags_2_ms",
+        "2 ms first-order lag in differential pressure",
+        _pressure(lag=2e-3),
+        named=r"\b(?:lag|late|delay)",
+    ),
+    Kind("pressure_5_ms_late", "differential pressure 5 ms late", _pressure(delay=5e-3), named=r"\b(?:lag|late|delay)"),
+    Kind("pressure_1_bar_off", "differential pressure 1 bar high", _pressure(offset=1e5), named=r"offset|zero|bias"),
+    Kind("pressure_gain_3_percent_high", "pressure reads 3 % high", _pressure(gain=1.03)),
+    Kind(
+        "pressure_gain_20_percent_high",
+        "pressure reads 20 % high",
+        _pressure(gain=1.2),
+        MAYBE,
+        r"\bgain|\bscale",
+        severity=False,
+    ),
+    Kind(
+        "position_zero_at_stop",
+        "encoder homed at the end stop, 60 to 260 mm from the middle",
+        lambda setup, _: setup.with_sensor((POSITION,), offset=0.5 * setup.machine.stroke),
+        named=r"offset|zero|middle",
+    ),
+    Kind(
+        "speed_sign_reversed",
+        "motor speed counts the other way",
+        _sensor(SPEED, gain=-1.0),
+        (UNKNOWN,),
+        r"sign|revers|other way|opposite",
+    ),
+    Kind("speed_in_rpm", "rpm under the heading of rad/s", _sensor(SPEED, gain=RPM), (UNKNOWN,), r"rpm|unit|rev"),
+    Kind(
+        "pressure_reversed",
+        "differential pressure counts the other way",
+        _pressure(gain=-1.0),
+        (UNKNOWN,),
+        r"sign|revers|other way|opposite",
+    ),
+    Kind(
+        "position_velocity_swapped",
+        "position and velocity under each other's headings",
+        lambda setup, _: setup.with_logger(headings={POSITION: VELOCITY, VELOCITY: POSITION}),
+        (UNKNOWN,),
+        r"swap|exchang|mixed up|each other",
+    ),
+)
+"""Kinds that the rig file describes, by sensor and logger."""
