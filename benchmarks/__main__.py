@@ -21,6 +21,7 @@ NAMES = (
     "diaphragm_motor",
     "diaphragm_faults",
     "diagnosis",
+    "open_benchmark",
     "batch_scale",
     "archive",
 )

@@ -1,0 +1,56 @@
+"""What ships, on the open benchmark: a line a kind of log, with pressure and without.
+
+Logs are made of the split that is asked for; ``--folder`` scores sets that are there. Silent errors and false unknowns
+are wanted to be none with pressure. A log without pressure takes long, so few of them are scored.
+"""
+
+import argparse
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from experiments.open_benchmark.folders import write_set
+from experiments.open_benchmark.kinds import KINDS, SPLITS, VERSION
+from experiments.open_benchmark.score import score_set, summary
+
+NONE_WANTED = ("silent_beta", "silent_class", "false_unknown")
+"""Counts that are wanted to be zero where pressure is logged."""
+
+
+def main(arguments: list[str]) -> int:
+    """Print a line a kind, and the counts that shall be none; return how many are not."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--kind", nargs="+", default=list(KINDS), choices=list(KINDS), metavar="KIND")
+    parser.add_argument("--split", default="validation", choices=SPLITS)
+    parser.add_argument("--count", type=int, default=3, help="logs of each kind")
+    parser.add_argument("--without", type=int, default=0, help="of them scored without pressure too")
+    parser.add_argument("--folder", nargs="+", type=Path, default=[], help="sets to score in place of made ones")
+    parser.add_argument("--rows", type=Path, help="CSV file for a row a log")
+    options = parser.parse_args(arguments)
+    print(f"open benchmark {VERSION}, {options.split if not options.folder else 'given'} sets", flush=True)
+    with tempfile.TemporaryDirectory() as made:
+        rows = scored(options, Path(made))
+    if options.rows:
+        pd.DataFrame(rows).to_csv(options.rows, index=False)
+    table = summary(rows)
+    counts = table[table["pressure"]][list(NONE_WANTED)].sum()
+    for name, count in counts.items():
+        print(f"with pressure, {name}: {count} of {table['logs'][table['pressure']].sum()} (none wanted)")
+    return int((counts > 0).sum())
+
+
+def scored(options: argparse.Namespace, made: Path) -> Sequence[dict[str, Any]]:
+    """Return a row a log, printing each set's line as it comes."""
+    rows: list[dict[str, Any]] = []
+    for place in options.folder or options.kind:
+        folder = place if options.folder else write_set(place, options.split, options.count, made).parent
+        for pressure, count in ((True, options.count), (False, options.without)):
+            found = list(score_set(folder, count, pressure=pressure))
+            if found:
+                line = summary(found).to_string(index=False, header=not rows, float_format="%.3g", col_space=6)
+                print(line, flush=True)
+            rows += found
+    return rows

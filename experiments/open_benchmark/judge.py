@@ -1,0 +1,95 @@
+"""What a verdict on one log is worth, against its truth: definitions of silent errors, coverage and false unknowns."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+OFF = 0.05
+"""Error of bulk modulus from which a silent one counts [fraction]."""
+
+WIDTHS = 3.0
+"""And in half widths of its 95 % interval [dimensionless]."""
+
+SURE = 0.9
+"""Probability over which a wrong class is a silent error."""
+
+NO_NUMBER = ("failed", "diverged")
+
+Entries = Mapping[str, Any]
+
+
+def judge_bulk_modulus(said: Entries, truth: Entries) -> dict[str, Any]:
+    """Return what an estimate is worth; the truth of bulk modulus may be a range, and its nearer end counts.
+
+    Parameters
+    ----------
+    said : Mapping
+        Entries of the JSON contract.
+    truth : Mapping
+        A row of `truth.csv`, SI units.
+
+    Returns
+    -------
+    dict[str, Any]
+        ``error`` [fraction] and ``covered`` (given the rig, and in total), None where there is no number; ``flagged``,
+        ``silent``; ``narrow`` is silent however small the error.
+    """
+    gate, quantity = said.get("gate") or {}, said.get("bulk_modulus_pa") or {}
+    flagged = not gate.get("passed", True) or said["outcome"] in NO_NUMBER
+    value = quantity.get("value")
+    row = {"outcome": said["outcome"], "flagged": flagged, "error": None, "covered": None, "covered_total": None}
+    if value is None:
+        return {**row, "silent_beta": False, "narrow": False}
+    low, high = float(truth["beta_lo"]), float(truth["beta_hi"])
+    near = min(max(value, low), high)
+    given = quantity["ci95"]
+    total = quantity.get("ci95_total") or given
+    wide = abs(value - near) > WIDTHS * 0.5 * (total[1] - total[0])
+    trusted = not flagged and said["outcome"] == "ok" and wide
+    return row | {
+        "error": value / near - 1.0,
+        "covered": given[0] <= high and given[1] >= low,
+        "covered_total": total[0] <= high and total[1] >= low,
+        "silent_beta": trusted and abs(value / near - 1.0) > OFF,
+        "narrow": trusted,
+    }
+
+
+def judge_class(said: Entries, truth: Entries) -> dict[str, Any]:
+    """Return what a diagnosis is worth.
+
+    Parameters
+    ----------
+    said : Mapping
+        Entries of the JSON contract.
+    truth : Mapping
+        A row of `truth.csv`; ``accept`` holds the verdicts that are right.
+
+    Returns
+    -------
+    dict[str, Any]
+        ``verdict`` is right, wrong, unknown, none or failed; ``right`` also where unknown is acceptable.
+    """
+    accept, got = str(truth["accept"]).split(";"), said.get("condition")
+    if got is None:
+        verdict = "none" if said["outcome"] == "not_observable" else "failed"
+        return {"verdict": verdict, "right": False, "silent_class": False, "false_unknown": False}
+    unknown = bool(said.get("unknown"))
+    sure = (said.get("probabilities") or {}).get(got, 0.0) > SURE
+    verdict = "unknown" if unknown else "right" if got in accept else "wrong"
+    return {
+        "verdict": verdict,
+        "right": ("unknown" if unknown else got) in accept,
+        "silent_class": verdict == "wrong" and sure,
+        "false_unknown": unknown and "unknown" not in accept,
+    }
+
+
+def named(pattern: str, *said: Entries) -> bool | None:
+    """Return whether what was said of a log names its cause; None where nothing need be named."""
+    if not pattern:
+        return None
+    sentences = [str(one.get("message") or "") for one in said]
+    for one in said:
+        sentences += [str(text) for text in (*(one.get("warnings") or ()), *(one.get("reasons") or ()))]
+    return re.search(pattern, "\n".join(sentences), re.IGNORECASE) is not None

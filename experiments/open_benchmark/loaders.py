@@ -1,0 +1,85 @@
+"""Reads sets of logs into pandas, and into the arrays ``(X, y, groups)`` that scikit-learn takes."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from experiments.open_benchmark.folders import TRUTH
+from experiments.open_benchmark.logger import DIFFERENCE, PLAIN, PRESSURE_A, PRESSURE_B
+from plant.errors import HydrostateError
+
+Array = NDArray[np.float64]
+
+
+def read_truth(folder: Path) -> pd.DataFrame:
+    """Return the truth of a set, a row a log; what is not said is an empty text.
+
+    Parameters
+    ----------
+    folder : Path
+        With `truth.csv`.
+
+    Raises
+    ------
+    HydrostateError
+        If there is none.
+    """
+    path = folder / TRUTH
+    if not path.is_file():
+        raise HydrostateError(f"{folder}: a folder with {TRUTH} is wanted, as `hydrostate benchmark make` writes it")
+    return pd.read_csv(path, keep_default_na=False)
+
+
+def rows_of(truth: pd.DataFrame) -> list[dict[str, Any]]:
+    """Return the rows of a truth, by the names of its columns."""
+    return [{str(name): value for name, value in row.items()} for row in truth.to_dict("records")]
+
+
+def read_logs(folder: Path) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
+    """Yield the truth of each log of a set, and the log as its file has it.
+
+    Parameters
+    ----------
+    folder : Path
+        With `truth.csv`.
+    """
+    for truth in rows_of(read_truth(folder)):
+        yield truth, pd.read_csv(folder / str(truth["file"]))
+
+
+def read_arrays(
+    folders: Sequence[Path], duration: float = 10.0, sample_time: float = 1e-3
+) -> tuple[Array, NDArray[np.str_], NDArray[np.str_]]:
+    """Return logs as scikit-learn wants them: the first seconds of each on one clock.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Sets, each with `truth.csv`.
+    duration, sample_time : float
+        How much of each log, and its clock [s]; a shorter log holds its last values.
+
+    Returns
+    -------
+    X : ndarray, shape (logs, 4 samples)
+        Motor speed, position, velocity and differential pressure, one behind the other, SI; NaN where not logged.
+    y : ndarray, shape (logs,)
+        The condition of each.
+    groups : ndarray, shape (logs,)
+        Its set.
+    """
+    clock = np.arange(0.0, duration, sample_time)
+    series, conditions, groups = list[Array](), list[str](), list[str]()
+    for folder in folders:
+        for truth, log in read_logs(folder):
+            if DIFFERENCE not in log and PRESSURE_A in log:
+                log[DIFFERENCE] = log[PRESSURE_A] - log[PRESSURE_B]
+            channels = [log.get(name, pd.Series(np.nan, log.index)) for name in PLAIN]
+            series.append(np.concatenate([np.interp(clock, log["time_s"], one) for one in channels]))
+            conditions.append(str(truth["condition"]))
+            groups.append(folder.name)
+    return np.array(series), np.array(conditions), np.array(groups)

@@ -1,0 +1,132 @@
+"""Scores what ships on sets of logs: every log is read, estimated and diagnosed as a user would, with its rig file."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import pandas as pd
+
+from experiments.log_pages.log import Log
+from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class, named
+from experiments.open_benchmark.loaders import read_truth, rows_of
+from faults.diagnosis.circuit_runs import coordinates_of
+from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.severity import severities_at
+from plant.eha.model import EhaParameters
+from plant.errors import HydrostateError
+
+FAILED: Mapping[str, Any] = {"outcome": "failed"}
+
+COEFFICIENTS: Mapping[str, str] = {
+    "leakage_coefficient": "leak_coeff",
+    "flow_bias": "flow_bias",
+    "bulk_modulus": "bulk_modulus_pa",
+    "friction_quadratic": "a1",
+    "friction_linear": "a2",
+    "friction_coulomb": "a3",
+}
+"""Parameters that a truth gives, by its column."""
+
+
+def score_set(folder: Path, count: int, *, pressure: bool) -> Iterator[dict[str, Any]]:
+    """Yield a row for each of the first logs of a set.
+
+    Parameters
+    ----------
+    folder : Path
+        With `truth.csv`.
+    count : int
+        Of logs, at most.
+    pressure : bool
+        Whether pressure may be used.
+
+    Yields
+    ------
+    dict[str, Any]
+        What `judge_bulk_modulus` and `judge_class` give, severities covered of how many, and processor time [s].
+    """
+    for truth in rows_of(read_truth(folder).head(count)):
+        began = process_time()
+        estimate, diagnosis, rig = _answers(folder, truth, pressure)
+        row = {"set": folder.name, "file": truth["file"], "input": truth["input"], "pressure": pressure}
+        row |= judge_bulk_modulus(estimate, truth) | judge_class(diagnosis, truth)
+        row["named"] = named(str(truth.get("named", "")), estimate, diagnosis)
+        hits = _severities(diagnosis, truth, rig) if int(truth["sev"] or 0) else []
+        yield {**row, "severities": len(hits), "covered_severities": sum(hits), "seconds": process_time() - began}
+
+
+def _answers(folder: Path, truth: Mapping[str, Any], pressure: bool) -> tuple[Any, Any, EhaParameters]:
+    """Return the entries of both verbs, and the healthy actuator that they were told."""
+    from hydrostate import read
+
+    rig = folder / truth["rig"] if truth["rig"] else None
+    try:
+        log = read(folder / truth["file"], rig=rig)
+    except HydrostateError as error:
+        failed = {**FAILED, "message": str(error)}
+        return failed, failed, EhaParameters()
+    return _asked(log, "estimate", pressure), _asked(log, "diagnose", pressure), log.rig.parameters
+
+
+def _asked(log: Log, verb: str, pressure: bool) -> Mapping[str, Any]:
+    try:
+        return getattr(log, verb)(no_pressure=not pressure).to_dict()
+    except HydrostateError as error:
+        return {**FAILED, "message": str(error)}
+
+
+@lru_cache(maxsize=32)
+def _actuator(healthy: EhaParameters) -> Actuator:
+    return Actuator.of(healthy)
+
+
+def _severities(said: Mapping[str, Any], truth: Mapping[str, Any], healthy: EhaParameters) -> list[bool]:
+    """Return which severities' intervals cover what they truly are, by the project's own definition of each."""
+    from dataclasses import replace
+
+    actuator = _actuator(healthy)
+    true = replace(healthy, **{name: float(truth[column]) for name, column in COEFFICIENTS.items()})
+    exact = severities_at(coordinates_of(true, actuator.rated), actuator)
+    told = {name: one["ci95"] for name, one in (said.get("severity") or {}).items() if name != "entrained_air"}
+    ends = {name: ci for name, ci in told.items() if ci is not None and None not in ci}
+    return [ci[0] <= exact[name] <= ci[1] for name, ci in ends.items()]
+
+
+def summary(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """Return one line a set and sensors: counts, errors [%] and processor time a log [s].
+
+    Parameters
+    ----------
+    rows : sequence of Mapping
+        As `score_set` yields them.
+    """
+    lines: list[dict[str, Any]] = []
+    for (name, pressure), part in pd.DataFrame(rows).groupby(["set", "pressure"], sort=False):
+        sizes = 100.0 * part["error"].dropna().astype(float).abs()
+        told = part["named"].dropna()
+        lines.append(
+            {
+                "set": name,
+                "pressure": pressure,
+                "logs": len(part),
+                "numbers": len(sizes),
+                "median_%": sizes.median(),
+                "max_%": sizes.max(),
+                "covered": int(part["covered"].eq(True).sum()),
+                "covered_total": int(part["covered_total"].eq(True).sum()),
+                "flagged": int(part["flagged"].sum()),
+                "silent_beta": int(part["silent_beta"].sum()),
+                "narrow": int(part["narrow"].sum()),
+                "right": int(part["right"].sum()),
+                "unknown": int(part["verdict"].eq("unknown").sum()),
+                "false_unknown": int(part["false_unknown"].sum()),
+                "wrong": int(part["verdict"].isin(["wrong", "failed"]).sum()),
+                "silent_class": int(part["silent_class"].sum()),
+                "named": f"{int(told.sum())}/{len(told)}" if len(told) else "-",
+                "severities_%": 100.0 * part["covered_severities"].sum() / max(1, part["severities"].sum()),
+                "seconds": part["seconds"].mean(),
+            }
+        )
+    return pd.DataFrame(lines)
