@@ -39,12 +39,14 @@ class Room:
         return round(self.duration / TICK)
 
 
-def _held(room: Room, hold: Callable[[], float], level: Callable[[float], float]) -> Array:
-    """Return levels that are held; `level` hears where the piston may be [m], and one that leads too far is turned."""
+def _held(room: Room, move: Callable[[float], tuple[float, float]]) -> Array:
+    """Return speeds that are held; `move` hears where the piston may be [m] and returns for how long [s] which speed.
+
+    A speed that would lead too far is turned.
+    """
     speed, at, where = np.zeros(room.ticks), 0, 0.0
     while at < room.ticks:
-        seconds = hold()
-        asked = level(where)
+        seconds, asked = move(where)
         if abs(where + room.glide * asked * seconds) > room.travel:
             asked = -abs(asked) * np.sign(where)
         ticks = max(1, round(seconds / TICK))
@@ -55,14 +57,15 @@ def _held(room: Room, hold: Callable[[], float], level: Callable[[float], float]
 
 
 def steps(room: Room, rng: np.random.Generator) -> Array:
-    """Return steps of 30 to 100 % of the rated speed, some of them pauses; shape (n,) [rad/s]."""
+    """Return steps of 30 to 100 % of the rated speed with short pauses; shape (n,) [rad/s]."""
     longest = np.clip(room.travel / (room.glide * room.rated), 0.4, 3.0)
 
-    def level(_: float) -> float:
-        paused = rng.random() < 0.12
-        return 0.0 if paused else float(rng.choice((-1.0, 1.0)) * rng.uniform(0.3, 1.0) * room.rated)
+    def move(_: float) -> tuple[float, float]:
+        if rng.random() < 0.12:
+            return float(rng.uniform(0.1, 0.4)), 0.0
+        return float(rng.uniform(0.3, 1.0) * longest), float(rng.choice((-1, 1)) * rng.uniform(0.3, 1.0) * room.rated)
 
-    return _held(room, lambda: float(rng.uniform(0.3, 1.0) * longest), level)
+    return _held(room, move)
 
 
 def prbs(room: Room, rng: np.random.Generator) -> Array:
@@ -70,13 +73,13 @@ def prbs(room: Room, rng: np.random.Generator) -> Array:
     hold, amplitude = float(rng.choice((0.02, 0.05, 0.1))), rng.uniform(0.5, 1.0) * room.rated
     goals = list(rng.uniform(-room.travel, room.travel, 4 * room.ticks))
 
-    def level(where: float) -> float:
+    def move(where: float) -> tuple[float, float]:
         if abs(goals[-1] - where) < room.glide * amplitude * 0.2:
             goals.pop()
         towards = np.sign(goals[-1] - where)
-        return float(amplitude * (towards if rng.random() < 0.7 else -towards))
+        return hold, float(amplitude * (towards if rng.random() < 0.7 else -towards))
 
-    return _held(room, lambda: hold, level)
+    return _held(room, move)
 
 
 def multisine(room: Room, rng: np.random.Generator) -> Array:

@@ -2,7 +2,7 @@
 
 import math
 
-from experiments.open_benchmark.machine import LIFT, PRELOAD, VOID, Machine
+from experiments.open_benchmark.machine import LIFT, PRELOAD, Machine
 from experiments.open_benchmark.oil import specific_volume
 
 
@@ -52,9 +52,19 @@ def pump_flow(speed: float, angle: float, m: Machine) -> float:
     return math.copysign(max(abs(geometric) - m.flow_bias, 0.0), geometric)
 
 
-def filling(pressure: float, m: Machine) -> float:
-    """Return how full a pump's teeth get at this pressure of its inlet, absolute [Pa]: boiling oil is mostly vapour."""
-    return 1.0 if pressure >= m.vapour else math.exp((pressure - m.vapour) / VOID)
+def filling(pressure: float, air: float, m: Machine) -> float:
+    """Return how full a pump's teeth get, boiling oil being partly vapour [fraction].
+
+    Parameters
+    ----------
+    pressure : float
+        Stretch pressure of the inlet, absolute [Pa].
+    air : float
+        At atmospheric pressure, a unit of oil [dimensionless].
+    m : Machine
+        The actuator.
+    """
+    return 1.0 if pressure >= m.vapour else specific_volume(m.vapour, air, m) / specific_volume(pressure, air, m)
 
 
 def leakage_flow(drop: float, coefficient: float, m: Machine) -> float:
@@ -85,7 +95,7 @@ def oil_flows(
     pump : tuple of float
         Motor speed [rad/s] and shaft angle [rad].
     pressures : tuple of float
-        Absolute, of chamber A, chamber B and the accumulator [Pa].
+        Of chamber A and B the stretch pressures, and the accumulator's, absolute [Pa].
     thin : float
         By how many times the oil and wear let more through than the machine says [dimensionless].
     air : float
@@ -93,11 +103,13 @@ def oil_flows(
     m : Machine
         The actuator.
     """
-    a, b, supply = pressures
-    density_a, density_b = 1.0 / specific_volume(a, air, m), 1.0 / specific_volume(b, air, m)
+    supply = pressures[2]
+    density_a, density_b = 1.0 / specific_volume(pressures[0], air, m), 1.0 / specific_volume(pressures[1], air, m)
     density = 1.0 / specific_volume(supply, air, m)
+    a, b = max(pressures[0], m.vapour), max(pressures[1], m.vapour)
     delivered = pump_flow(pump[0], pump[1], m)
-    pumped = delivered * (density_a * filling(b, m) if delivered > 0.0 else density_b * filling(a, m))
+    fill_a, fill_b = filling(pressures[1], air, m), filling(pressures[0], air, m)
+    pumped = delivered * (density_a * fill_a if delivered > 0.0 else density_b * fill_b)
     drop = a - b
     across = leakage_flow(drop, thin * (m.leakage - 0.5 * m.drain), m)
     across += math.copysign(m.relief_slope * max(abs(drop) - m.relief, 0.0), drop)

@@ -45,7 +45,7 @@ class Made:
     log : pandas.DataFrame, shape (samples, channels)
         As its file has it.
     states : ndarray, shape (m, 7)
-        The run, as named in `STATES`, in their units.
+        The run, as named in `STATES`, in their units, pressures as they act.
     bulk_modulus : tuple of float
         Effective, lowest and highest that acted [Pa].
     """
@@ -91,6 +91,7 @@ def make(kind: str, split: str, index: int) -> Made:
     setup = one.draw(draw_plain(condition, drive, drawing), drawing)
     course = course_of(setup, driving)
     states = run(setup.machine, course)
+    states[:, 4:6] = np.maximum(states[:, 4:6], setup.machine.vapour)
     return Made(one, setup, setup.logger.log(states, logging), states, _stiffnesses(setup, states, course[:, 3]))
 
 

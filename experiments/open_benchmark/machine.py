@@ -17,9 +17,6 @@ PRELOAD = 2e3
 LIFT = 2e4
 """Pressure from where a check valve cracks to where it is wide open [Pa]."""
 
-VOID = 1e4
-"""Stiffness of a chamber that boils: its pressure falls by so much while its volume grows e-fold [Pa]."""
-
 
 class Machine(NamedTuple):
     """One actuator, the paper's in the normal condition by default; chamber A drives it forward.

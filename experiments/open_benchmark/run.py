@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from experiments.open_benchmark.flows import check_flow, filling, leakage_flow, oil_flows, orifice_flow, pump_flow
 from experiments.open_benchmark.friction import MICRO_DAMPING, SLIPS, friction_force, steady_friction, stretched
-from experiments.open_benchmark.machine import ATMOSPHERE, LIFT, PRELOAD, VOID, Machine
-from experiments.open_benchmark.oil import air_space, liquid_space, specific_volume, stiffness
+from experiments.open_benchmark.machine import ATMOSPHERE, LIFT, PRELOAD, Machine
+from experiments.open_benchmark.oil import THINNEST, air_space, liquid_space, specific_volume, stiffened, stiffness
 from plant.compiled.kernel_file import load_kernel
 from plant.compiled.paste import kernel_text, pasted
 
 STATES = ("motor_speed", "shaft_angle", "position", "velocity", "pressure_a", "pressure_b", "made_up")
-"""The states: rad/s, rad, m, m/s, Pa, Pa, and oil that left the accumulator [m^3]."""
+"""The states: rad/s, rad, m, m/s, stretch pressures of the chambers [Pa], and oil that left the accumulator [m^3]."""
 
 COURSE = ("demand", "viscosity", "wear", "air", "rough")
 """What changes in time: speed asked for [rad/s] or position [m]; viscosity, leakage and grip over those at the start;
@@ -76,7 +76,8 @@ def rates(y: Array, stretch: Array, now: Array, demand: float, m: Machine, out: 
     out[0] = clipped((demand - speed) / m.motor_lag, -m.acceleration - slowed, m.acceleration - slowed)
     out[1] = speed
     out[2] = v
-    push = m.area_a * (a - ATMOSPHERE) - m.area_b * (b - ATMOSPHERE) - m.load - m.spring * x + stop_force(x, v, m)
+    felt_a, felt_b = max(a, m.vapour) - ATMOSPHERE, max(b, m.vapour) - ATMOSPHERE
+    push = m.area_a * felt_a - m.area_b * felt_b - m.load - m.spring * x + stop_force(x, v, m)
     out[3] = (push - friction_force(v, stretch, viscosity, rough, m)) / m.mass
     into_a, into_b, made = oil_flows((speed, angle), (a, b, supply), wear / viscosity, air, m)
     grows_a = into_a * specific_volume(a, air, m) - m.area_a * v
@@ -149,7 +150,7 @@ def trajectory(m: Machine, course: Array, y: Array, stretch: Array, substeps: in
 
 
 PARTS = (
-    *(clipped, air_space, liquid_space, specific_volume, stiffness),
+    *(clipped, air_space, stiffened, liquid_space, specific_volume, stiffness),
     *(orifice_flow, check_flow, pump_flow, filling, leakage_flow, oil_flows),
     *(stretched, steady_friction, friction_force, stop_force, rates, advance, trajectory),
 )
@@ -159,8 +160,8 @@ PARTS = (
 @cache
 def compiled() -> Callable[..., Any]:
     """Return `trajectory`, compiled."""
-    constants = {"ATMOSPHERE": ATMOSPHERE, "LIFT": LIFT, "PRELOAD": PRELOAD, "VOID": VOID, "RECORD": RECORD}
-    constants |= {"SLIPS": SLIPS, "MICRO_DAMPING": MICRO_DAMPING, "FIELDS": Machine._fields}
+    constants = {"ATMOSPHERE": ATMOSPHERE, "LIFT": LIFT, "PRELOAD": PRELOAD, "RECORD": RECORD}
+    constants |= {"SLIPS": SLIPS, "MICRO_DAMPING": MICRO_DAMPING, "THINNEST": THINNEST, "FIELDS": Machine._fields}
     text = kernel_text("a run of the open benchmark's actuator", pasted(*PARTS, constants=constants))
     return load_kernel("open_benchmark", text).trajectory
 

@@ -1,0 +1,135 @@
+"""Kinds of logs: the same bits for the same name, no seed in two splits, every one written and read back."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
+from math import gcd
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hydrostate as hs
+from experiments.open_benchmark import kinds, rigs
+from experiments.open_benchmark.drives import DRIVES
+from experiments.open_benchmark.folders import truth_of, write_set
+from experiments.open_benchmark.kinds import KINDS, SPLITS, STRIDE, VERSION, make, seed_of
+from experiments.open_benchmark.loaders import read_arrays, read_logs, read_truth
+from experiments.open_benchmark.logger import DIFFERENCE, SPEED
+from experiments.open_benchmark.setups import draw_plain
+from faults.conditions import CONDITIONS
+from plant.errors import HydrostateError
+
+COLUMNS = [
+    *(
+        "file",
+        "set",
+        "note",
+        "input",
+        "sample_time_s",
+        "leakage",
+        "friction",
+        "leak_coeff",
+        "flow_bias",
+        "a1",
+        "a2",
+        "a3",
+    ),
+    *("bulk_modulus_pa", "beta_lo", "beta_hi", "accept", "rig", "columns", "sev", "vmax", "dpmax", "xmin", "xmax"),
+]
+"""What the truth of strange rigs has, which `score.py` reads."""
+
+
+@pytest.fixture
+def _short(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Make logs of two seconds."""
+    for module in (kinds, rigs):
+        monkeypatch.setattr(module, "draw_plain", lambda *given: replace(draw_plain(*given), duration=2.0))
+    return
+
+
+@pytest.mark.usefixtures("_short")
+def test_the_same_name_gives_the_same_bits_and_another_index_others() -> None:
+    first, again, other = make("plain", "test", 3), make("plain", "test", 3), make("plain", "test", 4)
+    assert first.log.equals(again.log)
+    assert not first.log.equals(other.log)
+
+
+def test_no_two_logs_share_a_seed() -> None:
+    seeds = [tuple(seed_of(kind, split, index)) for kind, split, index in product(KINDS, SPLITS, range(5))]
+    assert len(set(seeds)) == len(seeds)
+
+
+@pytest.mark.parametrize(
+    ("kind", "split", "index"), [("plane", "test", 0), ("plain", "tests", 0), ("plain", "test", -1)]
+)
+def test_what_is_not_there_is_refused(kind: str, split: str, index: int) -> None:
+    with pytest.raises(HydrostateError):
+        make(kind, split, index)
+
+
+def test_every_kind_reaches_its_conditions_and_names_ones_that_are_there() -> None:
+    for kind in KINDS.values():
+        assert gcd(STRIDE, len(kind.conditions)) == 1
+        assert {*kind.accept, *kind.conditions} <= {*CONDITIONS, "condition", "unknown"}
+        assert set(kind.drives) <= set(DRIVES)
+
+
+@pytest.mark.usefixtures("_short")
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_is_written_and_read_back(kind: str, tmp_path: Path) -> None:
+    write_set(kind, "validation", 1, tmp_path)
+    truth = read_truth(tmp_path / kind)
+    assert list(truth.columns)[: len(COLUMNS)] == COLUMNS
+    (row,) = truth.to_dict("records")
+    assert str(row["version"]) == VERSION
+    assert row["beta_lo"] <= row["bulk_modulus_pa"] <= row["beta_hi"]
+    assert 0.0 < row["vmax"] < 1.0
+    ((_, log),) = read_logs(tmp_path / kind)
+    assert {"time_s", SPEED} <= set(log.columns)
+    assert np.isfinite(log.to_numpy()).all()
+    assert log["time_s"].iloc[-1] == pytest.approx(2.0, rel=0.01)
+
+
+@pytest.mark.usefixtures("_short")
+@pytest.mark.parametrize("kind", ["plain", "chamber_pressures", "single_rod"])
+def test_the_project_reads_what_was_written(kind: str, tmp_path: Path) -> None:
+    write_set(kind, "validation", 1, tmp_path)
+    (row,) = read_truth(tmp_path / kind).to_dict("records")
+    log = hs.read(tmp_path / kind / row["file"], rig=tmp_path / kind / row["rig"] if row["rig"] else None)
+    assert len(log) == 2000
+
+
+@pytest.mark.usefixtures("_short")
+def test_logs_become_frames_and_arrays(tmp_path: Path) -> None:
+    folders = [
+        write_set(kind, "training", 2, tmp_path).parent for kind in ("plain", "chamber_pressures", "no_velocity")
+    ]
+    X, y, groups = read_arrays(folders, duration=1.5, sample_time=2e-3)
+    assert X.shape == (6, 4 * 750)
+    assert list(groups[::2]) == ["plain", "chamber_pressures", "no_velocity"]
+    assert set(y) <= set(CONDITIONS)
+    assert np.isnan(X[-1, 1500:2250]).all()
+    assert np.isfinite(X[2]).all()
+    truth, log = next(read_logs(folders[0]))
+    assert truth["condition"] == y[0]
+    assert len(log) == 2000
+    with pytest.raises(HydrostateError, match=r"truth\.csv"):
+        read_truth(tmp_path)
+
+
+@pytest.mark.usefixtures("_short")
+def test_sensors_do_what_their_kind_says() -> None:
+    plain = make("plain", "test", 0)
+    states = plain.states[::10]
+    assert np.std(plain.log[SPEED] - states[:, 0]) == pytest.approx(0.05, rel=0.1)
+    late = make("pressure_5_ms_late", "test", 0)
+    true = (late.states[:, 4] - late.states[:, 5])[::10]
+    assert np.std(late.log[DIFFERENCE].to_numpy()[5:] - true[:-5]) == pytest.approx(5e3, rel=0.1)
+
+
+@pytest.mark.usefixtures("_short")
+def test_the_truth_of_what_changes_is_that_of_the_middle() -> None:
+    grown = make("leakage_grows", "test", 0)
+    healthy, row = grown.setup.machine.leakage, truth_of(grown, "test", 0)
+    assert row["leak_coeff"] == pytest.approx(np.sqrt(healthy * 6.006e-11))
