@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from experiments.command.json_output import json_text
-from experiments.command.options import Json
+from experiments.command.options import Json, require_positive
+from experiments.command.studies import Folder, finish_study
 from experiments.command.terminal import emit
 
 commands = typer.Typer(no_args_is_help=True, help="Logs with their truth, to compare methods on.")
@@ -48,3 +49,21 @@ def kinds(as_json: Json = False) -> None:
         return
     widest = max(map(len, KINDS))
     emit("\n".join(f"{k.name:{widest}}  {k.strange}; right: {', '.join(k.accept)}" for k in KINDS.values()))
+
+
+@commands.command(epilog="Example: hydrostate benchmark baselines --out results/open-benchmark --training 90 --test 9")
+def baselines(
+    out: Folder = Path("results/open-benchmark"),
+    training: Annotated[int, typer.Option(metavar="N", help="Plain logs to learn from.")] = 360,
+    test: Annotated[int, typer.Option(metavar="N", help="Logs of each kind to judge.")] = 18,
+    as_json: Json = False,
+) -> None:
+    """Judge ways to name a condition beside `diagnose`: RMSE as published, learners on features and random kernels.
+
+    Takes some ten minutes. The last line of standard output is the manifest's path.
+    """
+    require_positive("--training", training, "logs")
+    require_positive("--test", test, "logs")
+    from experiments.open_benchmark.study import BASELINES, BaselineSettings
+
+    finish_study(BASELINES, BaselineSettings(training, test), out, as_json=as_json)

@@ -1,0 +1,142 @@
+"""The baselines beside what ships: who names the condition of plain logs, of strange ones, and of none of the nine."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from experiments.open_benchmark.baselines import LEARNT, Array, Names
+from experiments.open_benchmark.folders import write_set
+from experiments.open_benchmark.kinds import KINDS, VERSION
+from experiments.open_benchmark.loaders import read_arrays, read_truth, rows_of
+from experiments.open_benchmark.score import score_set
+from experiments.page.tables import Column
+from experiments.running.progress import Track
+from experiments.running.study import Found, Study
+from faults.diagnosis.rmse import score_mathematical
+from faults.eha.bank import mathematical_bank
+from plant.eha.model import EhaParameters
+from plant.errors import HydrostateError
+from plant.log.files import read_record
+
+STRANGE = (
+    *("plain", "closed_loop", "stiff_oil", "rig_mass_wrong", "pressure_lags_2_ms", "pressure_gain_20_percent_high"),
+    *("worn_pump", "makeup_check_leaks", "pressure_reversed"),
+)
+"""Kinds of the page, from what was learnt to what is none of the nine."""
+
+SERIES = (8.0, 4e-3)
+"""How much of a log the learners see, and on which clock [s]."""
+
+
+@dataclass(frozen=True)
+class BaselineSettings:
+    """How much is learnt and judged.
+
+    Parameters
+    ----------
+    training : int
+        Plain logs to learn from; nine are one of each condition [count].
+    test : int
+        Logs of each kind to judge [count].
+    """
+
+    training: int = 360
+    test: int = 18
+
+
+def find(settings: BaselineSettings, track: Track) -> Found:
+    """Return the share of right verdicts, by method and kind.
+
+    Parameters
+    ----------
+    settings : BaselineSettings
+        How much.
+    track : callable
+        Shows progress.
+    """
+    with TemporaryDirectory() as place:
+        home = Path(place)
+        seen = write_set("plain", "training", settings.training, home / "training").parent
+        judged = [
+            write_set(kind, "test", settings.test, home).parent for kind in track(STRANGE, description="making logs")
+        ]
+        verdicts = {**learnt([seen], judged), "smallest RMSE, as published": by_rmse(judged)}
+        shares: list[dict[str, Any]] = [
+            {"method": name, **right_shares(judged, said)} for name, said in verdicts.items()
+        ]
+        ours: dict[str, Any] = {"method": "hydrostate diagnose"}
+        for folder in track(judged, description="diagnosing"):
+            rows = list(score_set(folder, settings.test, pressure=True))
+            ours[folder.name] = 100.0 * float(np.mean([row["right"] for row in rows]))
+    return Found({"baselines": pd.DataFrame([*shares, ours])})
+
+
+def learnt(seen: Sequence[Path], judged: Sequence[Path]) -> dict[str, Names]:
+    """Return the verdicts of every learner that is installed, on the logs of the sets in their order.
+
+    Parameters
+    ----------
+    seen, judged : sequence of Path
+        Sets to learn from, and to judge.
+    """
+    X, y, _ = read_arrays(seen, *SERIES)
+    other = _series(read_arrays(judged, *SERIES)[0])
+    found: dict[str, Names] = {}
+    for name, learn in LEARNT.items():
+        try:
+            found[name] = learn(_series(X), y)(other)
+        except HydrostateError:
+            continue
+    return found
+
+
+def _series(X: Array) -> Array:
+    """Return series by channel, what is not logged as zero; shape (logs, 4, samples), SI."""
+    return np.nan_to_num(X.reshape(len(X), 4, -1))
+
+
+def by_rmse(judged: Iterable[Path]) -> Names:
+    """Return the condition whose lumped model misses each log least, as in the paper's Table 5.
+
+    Parameters
+    ----------
+    judged : iterable of Path
+        Sets.
+    """
+    bank = mathematical_bank(EhaParameters())
+    files = [folder / str(row["file"]) for folder in judged for row in rows_of(read_truth(folder))]
+    return np.array([score_mathematical(read_record(file), bank).condition for file in files])
+
+
+def right_shares(judged: Sequence[Path], said: Names) -> dict[str, float]:
+    """Return how often a method that never says "unknown" is right [%], by set.
+
+    Parameters
+    ----------
+    judged : sequence of Path
+        Sets.
+    said : ndarray, shape (logs,)
+        Its verdicts, set by set.
+    """
+    shares, at = dict[str, float](), 0
+    for folder in judged:
+        accepted = [str(row["accept"]).split(";") for row in rows_of(read_truth(folder))]
+        hits = [verdict in accept for verdict, accept in zip(said[at : at + len(accepted)], accepted, strict=True)]
+        shares[folder.name], at = 100.0 * float(np.mean(hits)), at + len(accepted)
+    return shares
+
+
+BASELINES = Study(
+    "open-benchmark",
+    "open_benchmark/report.html",
+    find,
+    {},
+    {"baselines": ("method", *(Column(kind, kind.replace("_", " "), "%", digits=3) for kind in STRANGE))},
+    {"version": VERSION, "kinds": {name: KINDS[name].strange for name in STRANGE}},
+)
+"""Baselines on the open benchmark."""
