@@ -51,6 +51,11 @@ def random_kernels(count: int, samples: int, rng: np.random.Generator) -> list[t
         Of kernels, and of a series.
     rng : numpy.random.Generator
         Source of all.
+
+    Returns
+    -------
+    list of tuple
+        Weights, shape (9,), shares, shape (4,), dilation and bias of each.
     """
     drawn: list[tuple[Array, Array, int, float]] = []
     for _ in range(count):
@@ -68,8 +73,8 @@ def kernel_features(series: Array, kernels: list[tuple[Array, Array, int, float]
     ----------
     series : ndarray, shape (logs, 4, samples)
         Each channel over its size in the training logs [dimensionless].
-    kernels : list of tuple
-        As `random_kernels` draws them.
+    kernels : list of tuple, weights of shape (9,), shares of shape (4,)
+        As `random_kernels` draws them [dimensionless].
 
     Returns
     -------

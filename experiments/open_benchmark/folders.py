@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from experiments.open_benchmark.kinds import VERSION, Made, make
+from experiments.open_benchmark.kinds import VERSION, Made, make, seed_of
 from faults.conditions import CONDITIONS
 from plant.errors import HydrostateError
 
@@ -69,7 +69,15 @@ def truth_of(made: Made, split: str, index: int) -> dict[str, Any]:
 
 
 def rig_text(name: str, note: str, entries: Mapping[str, float]) -> str:
-    """Return a rig file that says no more than it must; entries in SI units."""
+    """Return a rig file that says no more than it must.
+
+    Parameters
+    ----------
+    name, note : str
+        What the rig is called, and a comment above it.
+    entries : Mapping[str, float]
+        Its parameters, SI.
+    """
     lines = [f"# {note}", f'name = "{name}"', "", "[parameters]"]
     return "\n".join([*lines, *(f"{entry} = {value!r}" for entry, value in entries.items())]) + "\n"
 
@@ -100,6 +108,7 @@ def write_set(kind: str, split: str, count: int, out: Path) -> Path:
     """
     if count < 1:
         raise HydrostateError(f"count must be at least 1, got {count!r}")
+    seed_of(kind, split, count - 1)
     folder, rows = out / kind, list[dict[str, Any]]()
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -53,6 +53,11 @@ class Sensor:
             When the run has its quantity [s], and it [unit of the channel].
         rng : numpy.random.Generator
             Source of noise.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            [unit of the channel].
         """
         sensed = _lagged(values, self.lag / RECORD) if self.lag > 0.0 else values
         sampled = np.interp(time - self.delay, fine, sensed)

@@ -199,7 +199,14 @@ def run(m: Machine, course: Array, start: Array | None = None, refine: int = 1) 
 
 
 def substeps_for(m: Machine, speed: float) -> int:
-    """Return steps a record of at most 20 us that keep the film's decay at this motor speed [rad/s] stable twice over.
+    """Return steps a record of at most 20 us that keep the decay of the oil film stable twice over.
+
+    Parameters
+    ----------
+    m : Machine
+        The actuator.
+    speed : float
+        Highest motor speed [rad/s].
 
     Examples
     --------

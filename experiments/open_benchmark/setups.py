@@ -93,11 +93,25 @@ class Setup:
     rated_speed: float = EhaParameters().rated_speed
 
     def with_machine(self, **changes: float) -> "Setup":
-        """Return a setup whose machine has other values, SI."""
+        """Return a setup whose machine differs.
+
+        Parameters
+        ----------
+        **changes : float
+            Values by field, SI.
+        """
         return replace(self, machine=self.machine._replace(**changes))
 
     def with_sensor(self, channels: tuple[str, ...], **changes: float) -> "Setup":
-        """Return a setup whose channels have other sensors; values in the channels' units."""
+        """Return a setup whose channels have other sensors.
+
+        Parameters
+        ----------
+        channels : tuple of str
+            Which.
+        **changes : float
+            Fields of `Sensor` [unit of the channel].
+        """
         sensors = dict(self.logger.sensors)
         sensors |= {name: replace(sensors[name], **changes) for name in channels}
         return self.with_logger(sensors=sensors)
@@ -180,6 +194,11 @@ def course_of(setup: Setup, rng: np.random.Generator) -> Array:
         The log.
     rng : numpy.random.Generator
         Source of the drive and of when friction grips.
+
+    Returns
+    -------
+    ndarray, shape (n, 5)
+        A row every `TICK`.
     """
     m, change = setup.machine, setup.change
     glide = 0.75 * m.efficiency * m.displacement / max(m.area_a, m.area_b)

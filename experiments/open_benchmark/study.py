@@ -83,6 +83,11 @@ def learnt(seen: Sequence[Path], judged: Sequence[Path]) -> dict[str, Names]:
     ----------
     seen, judged : sequence of Path
         Sets to learn from, and to judge.
+
+    Returns
+    -------
+    dict of ndarray, shape (logs,)
+        Conditions by learner.
     """
     X, y, _ = read_arrays(seen, *SERIES)
     other = _series(read_arrays(judged, *SERIES)[0])
@@ -107,6 +112,11 @@ def by_rmse(judged: Iterable[Path]) -> Names:
     ----------
     judged : iterable of Path
         Sets.
+
+    Returns
+    -------
+    ndarray, shape (logs,)
+        Conditions.
     """
     bank = mathematical_bank(EhaParameters())
     files = [folder / str(row["file"]) for folder in judged for row in rows_of(read_truth(folder))]
@@ -122,6 +132,11 @@ def right_shares(judged: Sequence[Path], said: Names) -> dict[str, float]:
         Sets.
     said : ndarray, shape (logs,)
         Its verdicts, set by set.
+
+    Returns
+    -------
+    dict[str, float]
+        [%].
     """
     shares, at = dict[str, float](), 0
     for folder in judged:

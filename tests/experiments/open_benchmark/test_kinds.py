@@ -1,7 +1,5 @@
 """Kinds of logs: the same bits for the same name, no seed in two splits, every one written and read back."""
 
-from collections.abc import Iterator
-from dataclasses import replace
 from itertools import product
 from math import gcd
 from pathlib import Path
@@ -10,13 +8,11 @@ import numpy as np
 import pytest
 
 import hydrostate as hs
-from experiments.open_benchmark import kinds, rigs
 from experiments.open_benchmark.drives import DRIVES
 from experiments.open_benchmark.folders import truth_of, write_set
 from experiments.open_benchmark.kinds import KINDS, SPLITS, STRIDE, VERSION, make, seed_of
 from experiments.open_benchmark.loaders import read_arrays, read_logs, read_truth
 from experiments.open_benchmark.logger import DIFFERENCE, SPEED
-from experiments.open_benchmark.setups import draw_plain
 from faults.conditions import CONDITIONS
 from plant.errors import HydrostateError
 
@@ -38,14 +34,6 @@ COLUMNS = [
     *("bulk_modulus_pa", "beta_lo", "beta_hi", "accept", "rig", "columns", "sev", "vmax", "dpmax", "xmin", "xmax"),
 ]
 """What the truth of strange rigs has, which `score.py` reads."""
-
-
-@pytest.fixture
-def _short(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Make logs of two seconds."""
-    for module in (kinds, rigs):
-        monkeypatch.setattr(module, "draw_plain", lambda *given: replace(draw_plain(*given), duration=2.0))
-    return
 
 
 @pytest.mark.usefixtures("_short")

@@ -1,0 +1,14 @@
+"""Logs of two seconds in place of ten and twenty."""
+
+from dataclasses import replace
+
+import pytest
+
+from experiments.open_benchmark import kinds, rigs
+from experiments.open_benchmark.setups import draw_plain
+
+
+@pytest.fixture
+def _short(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (kinds, rigs):
+        monkeypatch.setattr(module, "draw_plain", lambda *given: replace(draw_plain(*given), duration=2.0))

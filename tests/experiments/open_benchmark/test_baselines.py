@@ -1,0 +1,66 @@
+"""Baselines learn what is there to learn, and the table counts their right verdicts."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.typing import NDArray
+
+from experiments.open_benchmark.baselines import LEARNT, forest_on_features, ridge_classifier
+from experiments.open_benchmark.features import simple_features
+from experiments.open_benchmark.study import right_shares
+from plant.errors import HydrostateError
+
+Array = NDArray[np.float64]
+
+
+def waves(seed: int, each: int = 12) -> tuple[Array, NDArray[np.str_]]:
+    """Return logs whose velocity follows the motor, or does so late and less."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0.0, 8.0, 400)
+    logs, names = list[Array](), list[str]()
+    for _ in range(each):
+        f, phase = rng.uniform(0.5, 1.5), rng.uniform(0.0, 6.0)
+        for name, share, late in (("normal", 1.0, 0.0), ("minor_leakage", 0.7, 0.6)):
+            speed = 100.0 * np.sin(f * t + phase)
+            velocity = share * 4e-4 * 100.0 * np.sin(f * t + phase - late)
+            pressure = 4e5 * np.tanh(velocity / 1e-3)
+            logs.append(np.stack([speed, np.cumsum(velocity) * 0.02, velocity, pressure]) * rng.normal(1.0, 0.01))
+            names.append(name)
+    return np.array(logs), np.array(names)
+
+
+@pytest.mark.parametrize("name", LEARNT)
+def test_what_learns_tells_two_kinds_of_logs_apart(name: str) -> None:
+    if "forest" in name:
+        pytest.importorskip("sklearn", reason="scikit-learn is not installed (extra rig-examples)")
+    verdicts = LEARNT[name](*waves(0))
+    series, wanted = waves(1)
+    assert np.mean(verdicts(series) == wanted) >= 0.9
+
+
+def test_the_forest_says_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "sklearn.ensemble", None)
+    with pytest.raises(HydrostateError, match="rig-examples"):
+        forest_on_features(*waves(0, each=1))
+
+
+def test_a_ridge_of_noise_stays_at_the_shares_of_the_classes() -> None:
+    rng = np.random.default_rng(0)
+    y = np.array(["a"] * 30 + ["b"] * 10)
+    verdicts = ridge_classifier(rng.standard_normal((40, 200)), y)
+    assert np.mean(verdicts(rng.standard_normal((200, 200))) == "a") > 0.6
+
+
+def test_features_are_finite_for_a_channel_that_is_not_logged() -> None:
+    series, _ = waves(2, each=2)
+    series[:, 2] = 0.0
+    assert np.isfinite(simple_features(series)).all()
+
+
+def test_right_verdicts_are_those_that_the_truth_accepts(tmp_path: Path) -> None:
+    truth = pd.DataFrame({"file": ["a", "b"], "accept": ["normal;unknown", "unknown"]})
+    truth.to_csv(tmp_path / "truth.csv", index=False)
+    assert right_shares([tmp_path], np.array(["normal", "normal"])) == {tmp_path.name: 50.0}
