@@ -28,6 +28,12 @@ def _sensor(channel: str, **changes: float) -> Draw:
 RPM = 30.0 / 3.141592653589793
 """Revolutions a minute in a radian a second."""
 
+LATE = r"\b(?:lags?|late|delay)"
+"""Words for a channel behind the others."""
+
+REVERSED = r"\bsign\b|reversed|other way|opposite"
+"""Words for one that counts the wrong way."""
+
 LOGGERS = (
     Kind("plain", "nothing: the paper's actuator, travel up to 200 mm"),
     Kind("closed_loop", "closed position loop, no load", drives=tuple(CLOSED)),
@@ -59,39 +65,50 @@ LOGGERS = (
         "pressure_lags_2_ms",
         "2 ms first-order lag in differential pressure",
         _pressure(lag=2e-3),
-        named=r"\b(?:lag|late|delay)",
+        named=LATE,
     ),
-    Kind("pressure_5_ms_late", "differential pressure 5 ms late", _pressure(delay=5e-3), named=r"\b(?:lag|late|delay)"),
-    Kind("pressure_1_bar_off", "differential pressure 1 bar high", _pressure(offset=1e5), named=r"offset|zero|bias"),
+    Kind("pressure_5_ms_late", "differential pressure 5 ms late", _pressure(delay=5e-3), named=LATE),
+    Kind(
+        "pressure_1_bar_off",
+        "differential pressure 1 bar high",
+        _pressure(offset=1e5),
+        named=r"\boffset|zero point|\bbar (?:high|off)",
+    ),
     Kind("pressure_gain_3_percent_high", "pressure reads 3 % high", _pressure(gain=1.03)),
     Kind(
         "pressure_gain_20_percent_high",
         "pressure reads 20 % high",
         _pressure(gain=1.2),
         MAYBE,
-        r"\bgain|\bscale",
+        r"\bgain\b",
         severity=False,
     ),
     Kind(
         "position_zero_at_stop",
         "encoder homed at the end stop, 60 to 260 mm from the middle",
         lambda setup, _: setup.with_sensor((POSITION,), offset=0.5 * setup.machine.stroke),
-        named=r"offset|zero|middle",
+        named=r"\boffset|\bzero|\bhomed",
     ),
     Kind(
         "speed_sign_reversed",
         "motor speed counts the other way",
         _sensor(SPEED, gain=-1.0),
         (UNKNOWN,),
-        r"sign|revers|other way|opposite",
+        REVERSED,
     ),
-    Kind("speed_in_rpm", "rpm under the heading of rad/s", _sensor(SPEED, gain=RPM), (UNKNOWN,), r"rpm|unit|rev"),
+    Kind(
+        "speed_in_rpm",
+        "rpm under the heading of rad/s",
+        _sensor(SPEED, gain=RPM),
+        (UNKNOWN,),
+        r"\brpm\b|revolutions|r/min",
+    ),
     Kind(
         "pressure_reversed",
         "differential pressure counts the other way",
         _pressure(gain=-1.0),
         (UNKNOWN,),
-        r"sign|revers|other way|opposite",
+        REVERSED,
     ),
     Kind(
         "position_velocity_swapped",
