@@ -43,7 +43,6 @@ FAULTY = (
         _machine(efficiency=0.8),
         OUTSIDE,
         r"\bpump|efficien|\bworn",
-        severity=False,
     ),
     Kind(
         "makeup_check_stuck_shut",
@@ -52,7 +51,6 @@ FAULTY = (
         OUTSIDE,
         r"make-?up|check valve|cavitat|vapou?r",
         conditions=STARVING,
-        severity=False,
     ),
     Kind(
         "makeup_check_leaks",
@@ -60,7 +58,6 @@ FAULTY = (
         _leaking_seat,
         OUTSIDE,
         r"make-?up|check valve|one side",
-        severity=False,
     ),
     Kind(
         "relief_set_low",
@@ -68,7 +65,6 @@ FAULTY = (
         _low_relief,
         OUTSIDE,
         r"relief",
-        severity=False,
     ),
     Kind(
         "intermittent_friction",
@@ -77,7 +73,6 @@ FAULTY = (
         (UNKNOWN, "minor_friction", "major_friction"),
         r"intermittent|burst|at times|comes and goes",
         conditions=("normal",),
-        severity=False,
     ),
     Kind(
         "entrained_air",
@@ -92,7 +87,6 @@ FAULTY = (
         lambda setup, rng: setup.with_change(late_air=rng.uniform(0.01, 0.04), late_from=rng.uniform(0.4, 0.6)),
         OUTSIDE,
         r"\bair\b|soften",
-        severity=False,
     ),
     Kind(
         "leakage_grows",
@@ -101,7 +95,6 @@ FAULTY = (
         (UNKNOWN, "minor_leakage", "major_leakage"),
         r"\bgrow|\btrend|\bdrift",
         conditions=("normal",),
-        severity=False,
     ),
     Kind(
         "oil_warms",

@@ -55,7 +55,7 @@ def truth_of(made: Made, split: str, index: int) -> dict[str, Any]:
         "accept": ";".join(kind.accepted(setup.condition)),
         "rig": RIG if setup.rig else "",
         "columns": "",
-        "sev": int(kind.severity),
+        "sev": int(kind.severity and setup.condition in kind.accepted(setup.condition)),
         "vmax": np.max(np.abs(states[:, 3])),
         "dpmax": np.max(np.abs(states[:, 4] - states[:, 5])),
         "xmin": np.min(states[:, 2]),

@@ -47,7 +47,7 @@ class Kind:
     conditions : tuple of str
         Conditions of the logs, in turn.
     severity : bool
-        Whether the severities of the condition are those of the log.
+        Whether the severities of the condition are those of the log, where its condition is a right verdict.
     """
 
     name: str

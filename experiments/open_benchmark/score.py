@@ -91,7 +91,9 @@ def _severities(said: Mapping[str, Any], truth: Mapping[str, Any], healthy: EhaP
     exact = severities_at(coordinates_of(true, actuator.rated), actuator)
     told = {name: one["ci95"] for name, one in (said.get("severity") or {}).items() if name != "entrained_air"}
     ends = {name: ci for name, ci in told.items() if ci is not None and None not in ci}
-    return [ci[0] <= exact[name] <= ci[1] for name, ci in ends.items()]
+    oil = float(truth["beta_lo"]), float(truth["beta_hi"])
+    ranges = {name: oil if name == "bulk_modulus" else (exact[name], exact[name]) for name in ends}
+    return [ci[0] <= ranges[name][1] and ci[1] >= ranges[name][0] for name, ci in ends.items()]
 
 
 def summary(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
