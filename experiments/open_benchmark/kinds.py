@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from experiments.open_benchmark.draws import course_of, draw_plain
 from experiments.open_benchmark.faulty import FAULTY
 from experiments.open_benchmark.kind import Kind
 from experiments.open_benchmark.loggers import LOGGERS
@@ -16,7 +17,7 @@ from experiments.open_benchmark.machine import Machine
 from experiments.open_benchmark.oil import stiffness
 from experiments.open_benchmark.rigs import RIGS
 from experiments.open_benchmark.run import run
-from experiments.open_benchmark.setups import Setup, course_of, draw_plain
+from experiments.open_benchmark.setups import Setup
 from plant.errors import HydrostateError, require_known
 
 VERSION = "1.0"

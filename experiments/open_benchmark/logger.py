@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from experiments.open_benchmark.run import RECORD, STATES
+from experiments.open_benchmark.equations import STATES
+from experiments.open_benchmark.run import RECORD
 from plant.errors import HydrostateError
 
 Array = NDArray[np.float64]

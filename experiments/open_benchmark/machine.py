@@ -1,4 +1,4 @@
-"""The actuator that the open benchmark runs: what its equations in `oil`, `flows`, `friction` and `run` need, SI.
+"""The actuator that the open benchmark runs: what its equations in `oil`, `flows`, `friction` and `equations` need, SI.
 
 These files share no model with `plant/` and `estimation/`: pressures are the states and densities follow, friction is a
 row of spring-loaded blocks, check valves are orifices that crack open, and the motor has a current limit.

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from experiments.open_benchmark import kinds, rigs
-from experiments.open_benchmark.setups import draw_plain
+from experiments.open_benchmark.draws import draw_plain
 
 
 @pytest.fixture

@@ -43,6 +43,21 @@ def test_the_same_name_gives_the_same_bits_and_another_index_others() -> None:
     assert not first.log.equals(other.log)
 
 
+@pytest.mark.parametrize(
+    ("kind", "modulus", "position"),
+    [
+        ("plain", 262456034.33, 0.0150873958),
+        ("entrained_air", 160625410.79, 0.0028890304),
+        ("single_rod", 169516984.38, 0.0563541723),
+    ],
+)
+def test_logs_are_those_of_the_version(kind: str, modulus: float, position: float) -> None:
+    assert VERSION == "1.0", "a new version has new figures here"
+    made = make(kind, "test", 1)
+    assert made.setup.machine.bulk_modulus == pytest.approx(modulus, rel=1e-9)
+    assert made.states[-1, 2] == pytest.approx(position, rel=1e-5)
+
+
 def test_no_two_logs_share_a_seed() -> None:
     seeds = [tuple(seed_of(kind, split, index)) for kind, split, index in product(KINDS, SPLITS, range(5))]
     assert len(set(seeds)) == len(seeds)

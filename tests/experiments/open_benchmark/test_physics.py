@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from experiments.open_benchmark.equations import rates
 from experiments.open_benchmark.flows import check_flow, filling, leakage_flow, orifice_flow, pump_flow
 from experiments.open_benchmark.friction import SLIPS, friction_force, steady_friction
 from experiments.open_benchmark.machine import ATMOSPHERE, Machine
 from experiments.open_benchmark.oil import specific_volume, stiffness
-from experiments.open_benchmark.run import RECORD, TICK, at_rest, rates, run
+from experiments.open_benchmark.run import RECORD, TICK, at_rest, run
 
 Array = NDArray[np.float64]
 
