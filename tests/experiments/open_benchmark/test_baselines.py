@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from experiments.open_benchmark.baselines import LEARNT, forest_on_features, ridge_classifier
 from experiments.open_benchmark.features import simple_features
-from experiments.open_benchmark.study import right_shares
+from experiments.open_benchmark.study import BASELINES, STRANGE, BaselineSettings, right_shares
+from experiments.running.study import Found, write_result
 from plant.errors import HydrostateError
 
 Array = NDArray[np.float64]
@@ -64,3 +65,11 @@ def test_right_verdicts_are_those_that_the_truth_accepts(tmp_path: Path) -> None
     truth = pd.DataFrame({"file": ["a", "b"], "accept": ["normal;unknown", "unknown"]})
     truth.to_csv(tmp_path / "truth.csv", index=False)
     assert right_shares([tmp_path], np.array(["normal", "normal"])) == {tmp_path.name: 50.0}
+
+
+def test_the_page_has_a_row_a_method_and_says_what_is_strange(tmp_path: Path) -> None:
+    table = pd.DataFrame([{"method": "hydrostate diagnose", **dict.fromkeys(STRANGE, 50.0)}])
+    write_result(BASELINES, BaselineSettings(9, 1), Found({"baselines": table}), tmp_path / "page")
+    page = (tmp_path / "page" / "report.html").read_text("utf-8")
+    assert "hydrostate diagnose" in page
+    assert "worn pump: 80" in page.replace("\N{NO-BREAK SPACE}", " ")
