@@ -71,6 +71,18 @@ RIGS = (
     Kind("stiff_oil", "bulk modulus 0.7e9 to 1.5e9, rig file unedited", _oil(0.7e9, 1.5e9)),
     Kind("soft_oil", "bulk modulus 4e7 to 6e7, rig file unedited", _oil(4e7, 6e7), MAYBE),
     Kind(
+        "oil_stiffens",
+        "bulk modulus grows by 5 to 12 Pa a pascal, as mineral oil's does",
+        lambda setup, rng: setup.with_machine(stiffening=rng.uniform(5.0, 12.0)),
+        MAYBE,
+    ),
+    Kind(
+        "checks_crack_late",
+        "make-up checks open 10 to 30 kPa below the accumulator's pressure",
+        lambda setup, rng: setup.with_machine(crack_a=rng.uniform(1e4, 3e4), crack_b=rng.uniform(1e4, 3e4)),
+        MAYBE,
+    ),
+    Kind(
         "rig_volume_25_percent_low", "dead volume a third above the rig file's", _scaled(volume_a=4 / 3, volume_b=4 / 3)
     ),
     Kind("rig_area_4_percent_high", "area 4 % under the rig file's", _scaled(area_a=1 / 1.04, area_b=1 / 1.04)),
