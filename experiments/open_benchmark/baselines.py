@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.open_benchmark.features import kernel_features, random_kernels, simple_features
+from plant.arrays import Array
 from plant.errors import HydrostateError
 
-Array = NDArray[np.float64]
 Names = NDArray[np.str_]
 Verdicts = Callable[[Array], Names]
 """From series, shape (logs, 4, samples), to the condition of each."""

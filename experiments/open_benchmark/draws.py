@@ -1,16 +1,14 @@
 """What a plain log is made of, drawn at random, and the course of any."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.open_benchmark.drives import CLOSED, DRIVES, Room
 from experiments.open_benchmark.machine import Machine, machine_of
 from experiments.open_benchmark.run import TICK
 from experiments.open_benchmark.setups import Setup
 from faults.conditions import CONDITIONS, parameters_for
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
-
-Array = NDArray[np.float64]
 
 SPREAD = 0.05
 """Half width of leakage, flow bias and friction about their condition's [fraction]."""

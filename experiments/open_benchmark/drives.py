@@ -5,11 +5,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.open_benchmark.run import TICK
-
-Array = NDArray[np.float64]
+from plant.arrays import Array
 
 
 @dataclass(frozen=True)

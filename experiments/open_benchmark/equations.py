@@ -2,13 +2,11 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from experiments.open_benchmark.flows import oil_flows
 from experiments.open_benchmark.friction import friction_force
 from experiments.open_benchmark.machine import ATMOSPHERE, Machine
 from experiments.open_benchmark.oil import specific_volume, stiffness
+from plant.arrays import Array
 
 STATES = ("motor_speed", "shaft_angle", "position", "velocity", "pressure_a", "pressure_b", "made_up")
 """The states: rad/s, rad, m, m/s, stretch pressures of the chambers [Pa], and oil that left the accumulator [m^3]."""
@@ -16,8 +14,6 @@ STATES = ("motor_speed", "shaft_angle", "position", "velocity", "pressure_a", "p
 COURSE = ("demand", "viscosity", "wear", "air", "rough")
 """What changes in time: speed asked for [rad/s] or position [m]; viscosity, leakage and grip over those at the start;
 entrained air, a unit of oil [all dimensionless]."""
-
-Array = NDArray[np.float64]
 
 
 def clipped(value: float, low: float, high: float) -> float:

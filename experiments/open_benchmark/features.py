@@ -1,9 +1,8 @@
 """Features of a log that need no model of it: what it looks like, and how random kernels respond to it."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from plant.arrays import Array
 
 QUANTILES = (0.02, 0.25, 0.5, 0.75, 0.98)
 

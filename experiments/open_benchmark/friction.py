@@ -5,12 +5,8 @@ It remembers every reversal and needs no rate of its own; while all blocks slip 
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from experiments.open_benchmark.machine import Machine
-
-Array = NDArray[np.float64]
+from plant.arrays import Array
 
 SLIPS = (0.25, 0.6, 1.15, 2.0)
 """Stretch at which each block slips, in units of `Machine.presliding`; every block carries the same share."""

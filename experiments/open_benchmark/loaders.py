@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from experiments.open_benchmark.folders import TRUTH
 from experiments.open_benchmark.logger import DIFFERENCE, PLAIN, PRESSURE_A, PRESSURE_B
+from plant.arrays import Array
 from plant.errors import HydrostateError
-
-Array = NDArray[np.float64]
 
 
 def read_truth(folder: Path) -> pd.DataFrame:

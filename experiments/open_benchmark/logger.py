@@ -6,13 +6,11 @@ from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from experiments.open_benchmark.equations import STATES
 from experiments.open_benchmark.run import RECORD
+from plant.arrays import Array
 from plant.errors import HydrostateError
-
-Array = NDArray[np.float64]
 
 SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
 DIFFERENCE, PRESSURE_A, PRESSURE_B = "differential_pressure_pa", "pressure_a_pa", "pressure_b_pa"

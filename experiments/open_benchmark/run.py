@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from experiments.open_benchmark.equations import STATES, Array, clipped, rates, stop_force
+from experiments.open_benchmark.equations import STATES, clipped, rates, stop_force
 from experiments.open_benchmark.flows import check_flow, filling, leakage_flow, oil_flows, orifice_flow, pump_flow
 from experiments.open_benchmark.friction import MICRO_DAMPING, SLIPS, friction_force, steady_friction, stretched
 from experiments.open_benchmark.machine import ATMOSPHERE, LIFT, PRELOAD, Machine
 from experiments.open_benchmark.oil import THINNEST, air_space, liquid_space, specific_volume, stiffened, stiffness
+from plant.arrays import Array
 from plant.compiled.kernel_file import load_kernel
 from plant.compiled.paste import kernel_text, pasted
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from experiments.open_benchmark.baselines import LEARNT, Array, Names
+from experiments.open_benchmark.baselines import LEARNT, Names
 from experiments.open_benchmark.folders import write_set
 from experiments.open_benchmark.kinds import KINDS, VERSION
 from experiments.open_benchmark.loaders import read_arrays, read_truth, rows_of
@@ -19,6 +19,7 @@ from experiments.running.progress import Track
 from experiments.running.study import Found, Study
 from faults.diagnosis.rmse import score_mathematical
 from faults.eha.bank import mathematical_bank
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
 from plant.log.files import read_record

@@ -12,9 +12,8 @@ from experiments.open_benchmark.baselines import LEARNT, forest_on_features, rid
 from experiments.open_benchmark.features import simple_features
 from experiments.open_benchmark.study import BASELINES, STRANGE, BaselineSettings, right_shares
 from experiments.running.study import Found, write_result
+from plant.arrays import Array
 from plant.errors import HydrostateError
-
-Array = NDArray[np.float64]
 
 
 def waves(seed: int, each: int = 12) -> tuple[Array, NDArray[np.str_]]:

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from experiments.open_benchmark.equations import rates
 from experiments.open_benchmark.flows import check_flow, filling, leakage_flow, orifice_flow, pump_flow
@@ -10,8 +9,7 @@ from experiments.open_benchmark.friction import SLIPS, friction_force, steady_fr
 from experiments.open_benchmark.machine import ATMOSPHERE, Machine
 from experiments.open_benchmark.oil import specific_volume, stiffness
 from experiments.open_benchmark.run import RECORD, TICK, at_rest, run
-
-Array = NDArray[np.float64]
+from plant.arrays import Array
 
 LOSSLESS = Machine(
     leakage=0.0, drain=0.0, check_a=0.0, check_b=0.0, flow_bias=0.0, quadratic=0.0, linear=0.0, coulomb=1e-9
