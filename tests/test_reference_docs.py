@@ -126,9 +126,10 @@ def _is_unit(text: str) -> bool:
 
 def parameter_table(parameter_class: type) -> str:
     """Write the notes on a parameter dataclass as a Markdown table."""
-    defaults = {field.name: field.default for field in fields(parameter_class)}
+    given = {field.name: field.default for field in fields(parameter_class)}
+    defaults = {name: "none" if value is None else f"{value:g}" for name, value in given.items()}
     rows = [
-        f"| `{name}` | {note.unit} | {defaults[name]:g} | {note.meaning} | {note.source} |"
+        f"| `{name}` | {note.unit} | {defaults[name]} | {note.meaning} | {note.source} |"
         for name, note in notes(parameter_class).items()
     ]
     return "\n".join(["| name | unit | default | meaning | source |", "|---|---|---|---|---|", *rows])

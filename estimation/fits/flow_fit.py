@@ -11,7 +11,7 @@ from estimation.fits.descent import descend
 from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed
 from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, roughly
 from estimation.fits.greybox_problem import GreyBoxLog, Problem, greybox_log, search_bounds
-from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, START_LOAD, WORTH, explain, promised
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, START_LOAD, WORTH, explain, promised
 from estimation.log_checks.bridging import bridged, gaps
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.outliers import without_outliers
@@ -145,8 +145,9 @@ def fit_flow(
     asked = HYPOTHESES if objections else ()
     if loaded:
         asked = (START_LOAD,)
-    elif not objections and promised(log, parameters, best.values, DELIVERY) > WORTH:
-        asked = (DELIVERY,)
+    elif not objections:
+        gain, size = promised(log, parameters, best.values, DELIVERY)
+        asked = (DELIVERY,) if gain > WORTH and size > LEAST_DELIVERY else ()
     if asked:
         usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
         strange = explain(log, parameters, [best.values, *usual], _explains, asked=asked)

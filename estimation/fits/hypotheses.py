@@ -99,6 +99,9 @@ FINALISTS, CARRIED = 3, 2
 FINEST_DELAY = 1e-3
 """Step in which a delay is sought [s]; what is left of it goes into the lag."""
 
+LEAST_DELIVERY = 5e-3
+"""Relative change of the pump's delivery below which it is not freed: no rig file is surer [fraction]."""
+
 CLOSE = 60.0
 """Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""
 
@@ -202,8 +205,10 @@ def explain(
     return Explanation(tuple(one.name for one in best.together), values, best.delay, best.fit, rig_std, len(rivals))
 
 
-def promised(log: GreyBoxLog, parameters: EhaParameters, plain: Mapping[str, float], one: Hypothesis) -> float:
-    """Return the gain in log-likelihood that a hypothesis promises beside the plain fit, to first order.
+def promised(
+    log: GreyBoxLog, parameters: EhaParameters, plain: Mapping[str, float], one: Hypothesis
+) -> tuple[float, float]:
+    """Return what a hypothesis promises beside the plain fit, to first order.
 
     Parameters
     ----------
@@ -218,14 +223,16 @@ def promised(log: GreyBoxLog, parameters: EhaParameters, plain: Mapping[str, flo
 
     Returns
     -------
-    float
-        Rao's score statistic over two [dimensionless].
+    tuple of float
+        Gain in log-likelihood, Rao's score statistic over two [dimensionless], and how far what is freed first would
+        move in its fitted coordinate: for a logarithm a relative change [dimensionless].
     """
     wide = _widened(log, parameters)
     problem = _problem(wide, (one,))
     absent = dict(zip(parameter_names(WideFlowParameters), wide.parameters, strict=True))
     point = problem.at(problem.model.theta({**absent, **plain}))
-    return 0.5 * float(point.gradient @ np.linalg.lstsq(point.gram, point.gradient, rcond=None)[0])
+    step = np.linalg.lstsq(point.gram, point.gradient, rcond=None)[0]
+    return 0.5 * float(point.gradient @ step), float(abs(step[problem.model.unknowns.index(one.free[0])]))
 
 
 def _widened(log: GreyBoxLog, parameters: EhaParameters) -> GreyBoxLog:

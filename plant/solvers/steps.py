@@ -85,7 +85,7 @@ def parameter_row(
     Returns
     -------
     ndarray, shape (parameters,)
-        Their values in SI.
+        Their values in SI; infinite where one is not known.
 
     Examples
     --------
@@ -98,7 +98,8 @@ def parameter_row(
     [2.0, 80.0]
     """
     whose: Any = parameter_class or type(parameters)
-    return np.array([getattr(parameters, name) for name in parameter_names(whose)], dtype=np.float64)
+    values = (getattr(parameters, name) for name in parameter_names(whose))
+    return np.array([np.inf if value is None else value for value in values], dtype=np.float64)
 
 
 def solve_linear(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]) -> list[Scalar]:

@@ -53,7 +53,7 @@ def test_drives_are_ranked_the_best_first() -> None:
 
 def test_the_rigs_uncertain_volume_bounds_bulk_modulus(tmp_path: Path) -> None:
     rig = tmp_path / "rig.toml"
-    rig.write_text(rig_template().replace("# bulk_modulus = 0.3", "chamber_volume = 0.05"), encoding="utf-8")
+    rig.write_text(rig_template().replace("[uncertainty]", "[uncertainty]\nchamber_volume = 0.05"), encoding="utf-8")
     (found,) = results("--rig", rig)
     assert found["relative_std_percent"]["bulk_modulus"] == pytest.approx(5.0, rel=0.01)
     assert found["without_rig_uncertainty_percent"]["bulk_modulus"] < 0.1

@@ -147,11 +147,10 @@ def test_what_a_pressure_sensor_could_not_show_is_named_and_the_estimate_stands(
         low, high = one["bulk_modulus_pa"]["ci95"]
         assert abs(one["bulk_modulus_pa"]["value"] - 2.07e8) < 0.75 * (high - low)  # three standard deviations
         assert one["gate"]["passed"]
-        (note,) = one["notes"]
-        assert note["code"] == code
+        (note,) = (note for note in one["notes"] if note["code"] == code)
         assert note["data"]["channel"] == channel
         assert note["data"] == wanted.get(code, note["data"])
-        assert one["warnings"] == [note["text"]]
+        assert note["text"] in one["warnings"]
 
 
 @pytest.mark.parametrize(

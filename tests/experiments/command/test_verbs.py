@@ -10,7 +10,7 @@ from typer.testing import CliRunner, Result
 import faults.eha.bank
 from estimation.finding import OUTCOMES
 from estimation.identification.model.linear_model import LinearModel
-from estimation.notes import EstimateCode
+from estimation.notes import EstimateCode, RigCode
 from experiments.cli import app
 from faults.conditions import CONDITIONS
 from faults.notes import AdviceCode, AgainstCode, ClassCode
@@ -318,7 +318,7 @@ def test_an_actuator_that_is_not_the_papers_comes_back_through_its_rig_file(fold
     (asked,) = results("diagnose", folder / "theirs.csv", "--columns", columns, "--columns", f"{PRESSURE}=DP_BAR:bar")
     assert asked["channels"] == ["velocity_m_s", PRESSURE]
     assert asked["unknown"]
-    assert AgainstCode.NONE_FITS in codes(asked)
+    assert RigCode.PUMP_WORN in codes(asked)
 
 
 def test_the_flow_form_needs_no_condition_and_finds_the_leakage(steps: dict[str, Path]) -> None:

@@ -10,8 +10,8 @@ from faults.eha.inject import abrupt, growing, spread, with_bulk_modulus
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError, RigError
 
-RIG = EhaParameters()
-FAULTY = parameters_for(CONDITIONS["major_leakage_minor_friction"])
+RIG = EhaParameters(stroke=0.25)
+FAULTY = parameters_for(CONDITIONS["major_leakage_minor_friction"], RIG)
 NAMES = [field.name for field in fields(EhaParameters)]
 HALF_WIDTHS = {
     "leakage_coefficient": 0.1,
@@ -63,7 +63,7 @@ def test_a_fault_that_ends_growing_before_it_starts_is_refused(start: float, end
 @given(seed=st.integers(0, 2**32 - 1), condition=st.sampled_from(list(CONDITIONS.values())))
 @settings(max_examples=50)
 def test_spread_stays_within_its_widths_and_leaves_geometry_and_pump(seed: int, condition: Condition) -> None:
-    nominal = parameters_for(condition)
+    nominal = parameters_for(condition, RIG)
     drawn = spread(nominal, np.random.default_rng(seed))
     for name, value in asdict(nominal).items():
         assert abs(getattr(drawn, name) / value - 1.0) <= HALF_WIDTHS.get(name, 0.0) * (1.0 + 1e-12)
