@@ -240,7 +240,8 @@ def _fit(
     doubted = {name: max(one) for name, one in spreads.items()}
     loaded = not chosen and first_load(log.record, log.variances) != 0.0
     fit = fit_flow(log.record, parameters, guess, doubted, log.variances, loaded=loaded)
-    return fit if fit.explanation is not None or not loaded else None
+    explained = fit.explanation is not None and fit.bound <= LARGEST_BOUND
+    return fit if explained or not loaded else None  # a filter needs no state at rest
 
 
 def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusEstimate:

@@ -183,7 +183,6 @@ def test_the_logs_bring_up_notes_of_every_kind(
         "none_fits",
         "unexplained",
         "friction_not_visible",
-        "models_alike",
         "check_sensor",
         "fit_doubted",
         "closer_speeds",
