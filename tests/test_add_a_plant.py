@@ -34,7 +34,7 @@ def blocks(language: str) -> list[str]:
 
 
 def registry_line() -> str:
-    (line,) = (block for block in blocks("python") if block.startswith("        "))
+    (line,) = (block for block in blocks("python") if block.startswith("    "))
     return line
 
 
@@ -59,7 +59,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / path).write_text(text, encoding="utf-8")
     registry = folder / REGISTRY
     others = registry.read_text(encoding="utf-8")
-    last = '        "diaphragm-motor": "experiments.diaphragm_motor.kind:DIAPHRAGM_MOTOR",\n'
+    last = '    "diaphragm-motor": "experiments.diaphragm_motor.kind:DIAPHRAGM_MOTOR",\n'
     assert last in others
     registry.write_text(others.replace(last, last + registry_line()), encoding="utf-8")
     (folder / "spring-study.toml").write_text(blocks("toml")[0], encoding="utf-8")
