@@ -99,7 +99,7 @@ FINALISTS, CARRIED = 3, 2
 FINEST_DELAY = 1e-3
 """Step in which a delay is sought [s]; what is left of it goes into the lag."""
 
-LEAST_DELIVERY = 5e-3
+LEAST_DELIVERY = 1e-2
 """Relative change of the pump's delivery below which it is not freed: no rig file is surer [fraction]."""
 
 CLOSE = 60.0
