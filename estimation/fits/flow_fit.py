@@ -70,6 +70,9 @@ LONG_GAP = 5
 FELT_GAP = 0.1
 """A gap in speed matters where what it leaves open moves pressure by this share of its noise or more [fraction]."""
 
+MOST_ASKED = 200_000
+"""A longer log is not asked what is strange about it: the answer takes minutes [samples]."""
+
 UNLIKELY = 36.0
 """Difference of log-likelihood from which a form of the balance counts for nothing beside the other [dimensionless]."""
 
@@ -143,7 +146,9 @@ def fit_flow(
     value, std = found["bulk_modulus"]
     objections = _objections(best)
     asked = HYPOTHESES if objections else ()
-    if loaded:
+    if len(record) > MOST_ASKED:
+        asked = ()
+    elif loaded:
         asked = (START_LOAD,)
     elif not objections:
         gain, size = promised(log, parameters, best.values, DELIVERY)
