@@ -70,7 +70,7 @@ LONG_GAP = 5
 FELT_GAP = 0.1
 """A gap in speed matters where what it leaves open moves pressure by this share of its noise or more [fraction]."""
 
-MOST_ASKED = 200_000
+MOST_ASKED = 50_000
 """A longer log is not asked what is strange about it: the answer takes minutes [samples]."""
 
 UNLIKELY = 36.0
