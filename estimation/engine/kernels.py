@@ -6,7 +6,6 @@ compute in plain IEEE arithmetic, fused where the lines say so: a filter gives t
 """
 
 from functools import cache
-from types import ModuleType
 
 from estimation.engine import lanes as lanes_loop
 from estimation.engine.lanes import flush, keep, lay_side_by_side, run, steps, take
@@ -14,10 +13,12 @@ from estimation.engine.layout import Halves, halves_of, layout
 from estimation.engine.rule import Rule
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import ordered
-from plant.compiled.intrinsics import native_width
-from plant.compiled.kernel_file import load_kernel
+from plant.compiled.native.load import NativeKernel, load_native
+from plant.compiled.native.machine import native_width
+from plant.compiled.native.operations import ROWS
+from plant.compiled.native.signature import signature
 from plant.compiled.paste import BORROWING, INLINED, kernel_text, pasted
-from plant.compiled.source import INTRINSICS, lines_source, operations_source
+from plant.compiled.source import lines_source, operations_source
 
 LANES = 32
 """Filters side by side: as many as keep a vector unit busy; fewer leave it waiting, more do not help."""
@@ -54,11 +55,10 @@ def kernel_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...], la
     sizes = {"LANES": lanes, "LINE": line, "WIDTH": width, "STATES": model.width, "DRIVES": d, "CHANNELS": m}
     sizes |= {"BEFORE": line * begin, "AFTER": line * (begin + d), "SAMPLE": line * (begin + 2 * d)}
     sizes |= {"PRODUCT": slots["product0"], "SEEN": begin + 2 * d + m}
-    settings = {"FLUSH": lanes_loop.FLUSH, "LARGE": lanes_loop.LARGE, "AHEAD": lanes_loop.AHEAD}
+    settings = {"FLUSH": lanes_loop.FLUSH, "LARGE": lanes_loop.LARGE, "AHEAD": lanes_loop.AHEAD, "ROWS": ROWS}
     written = {"prepare": halves.constants, "predict": halves.predict, "update": halves.update}
     lines = {name: lines_source(name, outputs) for name, outputs in written.items()}
     parts = (
-        INTRINSICS,
         operations_source(lines, slots, width),
         f"both_at = stepping(SLOTS, {width}, predict, update)\nmove = moving({width})",
         pasted(take, keep, flush, constants={**sizes, **settings}, options=BORROWING),
@@ -69,7 +69,7 @@ def kernel_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...], la
 
 
 @cache
-def compile_kernel(rule: Rule, model: ProcessModel, channels: tuple[str, ...], lanes: int = 1) -> ModuleType:
+def compile_kernel(rule: Rule, model: ProcessModel, channels: tuple[str, ...], lanes: int = 1) -> NativeKernel:
     """Generate and load the kernel that runs so many filters side by side.
 
     Parameters
@@ -79,7 +79,29 @@ def compile_kernel(rule: Rule, model: ProcessModel, channels: tuple[str, ...], l
 
     Returns
     -------
-    ModuleType
+    NativeKernel
         The kernel; `estimation.engine.runner` and `estimation.filters.batch` call it.
     """
-    return load_kernel(f"{rule.name}_{model.name}_{lanes}", kernel_source(rule, model, channels, lanes))
+    track = f"ndarray, shape (rows, {model.width}{f', {lanes}' if lanes > 1 else ''})"
+    logs, seen = f"ndarray, shape ({len(channels)}, {lanes})", "ndarray, shape (samples, seen)"
+    results = f"results : tuple ({'; '.join((track, track, logs, seen, seen))})"
+    entries = {"steps": signature(f"{_STEPS}\n{results}")}
+    if lanes > 1:
+        entries["run"] = signature(f"{_RUN.format(lanes=lanes)}\n{results}")
+    made_of = rule, model, channels, lanes
+    return load_native(f"{rule.name}_{model.name}_{lanes}", lambda: kernel_source(*made_of), entries, made_of)
+
+
+_STEPS = """
+work : ndarray, shape (numbers,)
+drives, measured, begin, first, end, substeps, every : int
+"""
+"""What `estimation.engine.lanes.steps` takes, beside its results."""
+
+_RUN = """
+work : ndarray, shape (numbers,)
+drives, measured : ndarray of int, shape ({lanes},)
+rows : ndarray, shape (channels, samples a time, {lanes})
+samples, substeps, every : int
+"""
+"""What `estimation.engine.lanes.run` takes, beside its results."""

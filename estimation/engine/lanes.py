@@ -4,15 +4,12 @@ All is addressed in bytes: what filters carry and compute from stands in one fla
 in a line, line after line. Several lanes are stepped at a time, where they stand.
 """
 
-# An intrinsic's first parameter is the compiler's own, and no caller gives it.
-# pyright: reportCallIssue=false
-
 import math
 from collections.abc import Callable
 from typing import Protocol, TypeAlias
 
 from estimation.arrays import Array, IntArray
-from plant.compiled.intrinsics import ROWS, transpose
+from plant.compiled.native.operations import ROWS
 
 AHEAD = 512
 """Bytes of each log that are fetched ahead of their use: the memory answers within a few samples of all lanes."""
@@ -45,6 +42,8 @@ class LanesKernel(Protocol):
         ``predict_at(address, j)``: take filters, from their first symbol on, through sub-step j; likewise the others.
     move : callable
         ``move(source, target)``: copy as many numbers as a step takes.
+    transpose : callable
+        ``transpose(places, offset, ahead, target, stride)``, see `plant.compiled.native.operations.transpose`.
     """
 
     LANES: int
@@ -63,6 +62,7 @@ class LanesKernel(Protocol):
     update_at: Callable[[int, float], None]
     both_at: Callable[[int, float], None]
     move: Callable[[int, int], None]
+    transpose: Callable[[int, int, int, int, int], None]
 
 
 def steps(
@@ -162,4 +162,4 @@ def lay_side_by_side(kernel: LanesKernel, places: IntArray, begin: int, width: i
     line = kernel.LINE
     for lane in range(0, line, 8 * ROWS):
         for i in range(0, ROWS * width, ROWS):
-            transpose(places.ctypes.data + lane, 8 * (begin * width + i), AHEAD, rows + line * i + lane, line)
+            kernel.transpose(places.ctypes.data + lane, 8 * (begin * width + i), AHEAD, rows + line * i + lane, line)

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import fields
-from types import ModuleType
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from estimation.engine.contract import FilterProblem, Trace, empty_trace
 from estimation.engine.kernels import compile_kernel
 from estimation.engine.layout import Layout, layout, upper_triangle
 from estimation.engine.rule import Rule, chosen_settings, weighing
+from plant.compiled.native.load import NativeKernel
 
 
 def constant_row(problem: FilterProblem, settings: dict[str, float]) -> Array:
@@ -75,7 +75,7 @@ def run_rule(rule: Rule, problem: FilterProblem) -> Trace:
     return read_off(places, [problem], work, logs, [trace])[0]
 
 
-def prepared(rule: Rule, lanes: Sequence[FilterProblem]) -> tuple[Layout, ModuleType, Array]:
+def prepared(rule: Rule, lanes: Sequence[FilterProblem]) -> tuple[Layout, NativeKernel, Array]:
     """Return layout and kernel of a rule, and what the kernel works in before the first sample.
 
     Parameters
@@ -87,7 +87,7 @@ def prepared(rule: Rule, lanes: Sequence[FilterProblem]) -> tuple[Layout, Module
     -------
     places : Layout
         The kernel's layout.
-    kernel : module
+    kernel : NativeKernel
         Compiled.
     work : ndarray, shape (slots, lanes)
         Its buffer [dimensionless].

@@ -22,6 +22,9 @@ RIDGE = 1e-6
 LEAST_GAIN = 1e-3
 """Half the sum of squares that a further step must promise: less moves no unknown by a twentieth of its deviation."""
 
+SHORTENED = 12
+"""How often at most a step is shortened that promises a loss."""
+
 POOR, GOOD = 0.25, 0.75
 """Shares of a step's promise below which the radius shrinks to that part of it, and above which it grows."""
 
@@ -54,6 +57,7 @@ def descend(
     evaluations: int,
     bounds: tuple[Array, Array],
     least_gain: float = LEAST_GAIN,
+    radius: float = FIRST_RADIUS,
 ) -> Point:
     """Return the least cost downhill from a start: Gauss-Newton steps within a trust region and bounds.
 
@@ -72,6 +76,8 @@ def descend(
         Lowest and highest coordinates [dimensionless].
     least_gain : float
         Cost that a further step must promise [dimensionless].
+    radius : float
+        Length of the longest first step [dimensionless].
 
     Returns
     -------
@@ -88,11 +94,17 @@ def descend(
     >>> descend(valley, np.array([-1.2, 1.0]), 40, (-far, far)).theta.round(1).tolist()
     [1.0, 1.0]
     """
-    best, radius = at(np.clip(start, *bounds)), FIRST_RADIUS
+    best = at(np.clip(start, *bounds))
     for _ in range(evaluations - 1):
         curvature = best.gram + np.diag(np.abs(best.gradient) / REACH)
         step = _step(best, curvature, radius, bounds)
-        promised = float(-best.gradient @ step - 0.5 * step @ curvature @ step)
+        promised = _promise(best, curvature, step)
+        for _ in range(SHORTENED):
+            if promised >= 0.0:
+                break
+            radius = POOR * float(np.linalg.norm(step))  # a step that a bound has bent uphill, where it is long
+            step = _step(best, curvature, radius, bounds)
+            promised = _promise(best, curvature, step)
         if promised < least_gain:
             break
         tried = at(best.theta + step)
@@ -104,6 +116,11 @@ def descend(
         if gain > 0.0:
             best = tried
     return best
+
+
+def _promise(point: Point, curvature: Array, step: Array) -> float:
+    """Return by how much a step lowers the quadratic model."""
+    return float(-point.gradient @ step - 0.5 * step @ curvature @ step)
 
 
 def _step(point: Point, curvature: Array, radius: float, bounds: tuple[Array, Array]) -> Array:

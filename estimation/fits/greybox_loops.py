@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.expression import ONE, ZERO, Expression, as_expression, jacobian, symbol, unary
 from plant.compiled.functions import Scalar
-from plant.compiled.kernel_file import load_kernel
+from plant.compiled.native.load import load_native
+from plant.compiled.native.signature import signature
 from plant.compiled.source import statements
 from plant.solvers.steps import parameter_names, parameter_symbols, ros2_step
 
@@ -28,7 +29,6 @@ _KERNEL = '''"""Generated: misfit of the {name} model, with its sensitivities.""
 
 import math
 
-import numba
 import numpy as np
 
 RUNAWAY = 1e6
@@ -36,7 +36,6 @@ SETTLED = 1e-4
 STRAIGHT = 1e-3
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
 def absorb(row, level, gain, scale, outlier, gradient, gram):
     for j in range(row.size):
         innovation = row[j] - level[j]
@@ -53,7 +52,6 @@ def absorb(row, level, gain, scale, outlier, gradient, gram):
     return (1.0 - 0.5 * weight) * weight * error * error
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={{"reassoc", "contract", "nsz"}})
 def run(
     theta, drives, measured, parameters, sample_time, substeps, block, variance, walk, gaps, outlier, errors, slopes
 ):
@@ -92,6 +90,22 @@ def run(
     return cost, gradient, gram
 '''
 
+_TAKES = """
+theta : ndarray, shape ({unknowns},)
+drives : ndarray, shape (n, {channels})
+measured : ndarray, shape (n, {outputs})
+parameters : ndarray, shape (parameters,)
+sample_time : float
+substeps : ndarray of int, shape (n,)
+block : int
+variance, walk : ndarray, shape ({outputs},)
+gaps : ndarray, shape (gaps, 3)
+outlier : float
+errors : ndarray, shape (errors, blocks)
+slopes : ndarray, shape (slopes, slope blocks, slope unknowns)
+"""
+"""What the kernel takes."""
+
 
 @cache
 def compile_kernel(model: GreyBoxModel) -> Kernel:
@@ -113,6 +127,12 @@ def compile_kernel(model: GreyBoxModel) -> Kernel:
         which blocks that count linearly hardly count.
         Fills errors (outputs, blocks) and slopes (outputs, blocks, unknowns), each unless it is empty.
     """
+    takes = _TAKES.format(unknowns=len(model.unknowns), outputs=len(model.outputs), channels=len(model.drives))
+    return load_native(f"fit_{model.name}", lambda: _source(model), {"run": signature(takes)}, model).run
+
+
+def _source(model: GreyBoxModel) -> str:
+    """Write the kernel."""
     theta = [symbol(f"theta{i}") for i in range(len(model.unknowns))]
     sizes = dict(model.linear)
     fitted = {
@@ -124,7 +144,7 @@ def compile_kernel(model: GreyBoxModel) -> Kernel:
     state = [symbol(f"x{i}") for i in range(len(start))]
     moved = _step(model, state, p)
     outputs = [as_expression(value) for value in model.observe(tuple(state))]
-    source = _KERNEL.format(
+    return _KERNEL.format(
         name=model.name,
         outputs=len(outputs),
         unknowns=len(theta),
@@ -144,7 +164,6 @@ def compile_kernel(model: GreyBoxModel) -> Kernel:
         carry=_loosened(model) if model.jump else "",
         observe=_observation(model, outputs, state, theta),
     )
-    return load_kernel(f"fit_{model.name}", source).run
 
 
 def _step(model: GreyBoxModel, state: Sequence[Expression], p: SimpleNamespace) -> list[Expression]:

@@ -8,22 +8,11 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import llvmlite.binding
 import numba
 from llvmlite import ir
 from numba.extending import intrinsic
 
 from plant.compiled.vector import DOUBLE, SHORT, WORD, Vector, vector_type
-
-ROWS = 8
-"""Samples of as many logs that `transpose` turns at a time."""
-
-
-def native_width() -> int:
-    """Return how many numbers stand in one of the processor's vectors."""
-    features = llvmlite.binding.get_host_cpu_features()
-    return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
-
 
 Lines = Callable[..., Mapping[str, Any]]
 """Straight lines: from values by name to results by name."""
@@ -216,36 +205,3 @@ def moving(width: int) -> Any:
         return numba.void(numba.int64, numba.int64), code
 
     return move
-
-
-def _transpose(_: Any, places: Any, offset: Any, ahead: Any, target: Any, stride: Any) -> Any:  # noqa: ARG001  types
-    def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        places, offset, ahead, target, stride = arguments
-        byte, vector, order, every = ir.IntType(8), vector_type(ROWS), ir.VectorType(SHORT, ROWS), range(ROWS)
-        hint = ir.FunctionType(ir.VoidType(), [byte.as_pointer(), SHORT, SHORT, SHORT])
-        prefetch = builder.module.declare_intrinsic("llvm.prefetch", [byte.as_pointer()], hint)
-        rows: list[Any] = []
-        for lane in every:
-            begin = builder.add(builder.load(_place(builder, places, WORD(8 * lane), WORD)), offset)
-            rows.append(builder.load(_place(builder, begin, WORD(0), vector), align=8))
-            flags = SHORT(0), SHORT(2), SHORT(1)  # to read, into the second cache, data
-            builder.call(prefetch, [_place(builder, begin, ahead, byte), *flags])
-        for span in (1, 2, 4):  # exchange what stands off the diagonal of every 2 by 2 blocks of this size
-            kept = [k + ROWS - span if k & span else k for k in every]
-            for low in (lane for lane in every if not lane & span):
-                pair = rows[low], rows[low + span]
-                rows[low] = builder.shuffle_vector(*pair, order(kept))
-                rows[low + span] = builder.shuffle_vector(*pair, order([k + span for k in kept]))
-        for row in every:
-            builder.store(rows[row], _place(builder, target, builder.mul(stride, WORD(row)), vector), align=8)
-        return context.get_dummy_value()
-
-    return numba.void(numba.int64, numba.int64, numba.int64, numba.int64, numba.int64), code
-
-
-transpose = intrinsic(_transpose)
-"""``transpose(places, offset, ahead, target, stride)``: copy 8 numbers from each of 8 places into 8 rows of 8.
-
-All in bytes: the address of the places' addresses, what is added to each, how far ahead of there is fetched into the
-cache, the address of the first row, and that from row to row.
-"""

@@ -14,19 +14,13 @@ import threading
 from pathlib import Path
 from types import ModuleType
 
-import numba
-import platformdirs
+from plant.atomic import replacing
+from plant.compiled.kernel_folder import cache_folder, objection
 
 logger = logging.getLogger("hydrostate")
 
 _LOADING = threading.Lock()
 """Held while a kernel file is written and imported, so that threads share one module."""
-
-
-def cache_folder() -> Path:
-    """Return the folder of generated kernels: ``HYDROSTATE_CACHE``, or the user's cache directory."""
-    chosen = os.environ.get("HYDROSTATE_CACHE")
-    return Path(chosen) if chosen else Path(platformdirs.user_cache_dir("hydrostate"))
 
 
 def load_kernel(name: str, source: str) -> ModuleType:
@@ -44,6 +38,8 @@ def load_kernel(name: str, source: str) -> ModuleType:
     ModuleType
         The imported file. Calling its functions compiles them, unless an earlier process did.
     """
+    import numba
+
     digest = hashlib.sha256(f"{numba.__version__}\n{source}".encode()).hexdigest()[:16]
     module_name = f"hydrostate_{name}_{digest}"
     with _LOADING:
@@ -51,6 +47,8 @@ def load_kernel(name: str, source: str) -> ModuleType:
 
 
 def _imported(module_name: str, source: str) -> ModuleType:
+    from plant.compiled.numba_cache import check
+
     path = _written(module_name, source)
     if not any((path.parent / "__pycache__").glob(f"{module_name}.*.nbi")):  # Numba's index of what it has compiled
         logger.info("compiling the kernel %s", module_name)
@@ -60,24 +58,34 @@ def _imported(module_name: str, source: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[module_name] = module
     spec.loader.exec_module(module)
+    check(module)
     return module
 
 
 def _written(module_name: str, source: str) -> Path:
-    """Return the kernel's file; where the cache folder cannot be written, one in a temporary folder."""
+    """Return the kernel's file; where the cache folder cannot be written or trusted, one in a temporary folder."""
     folder = cache_folder()
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        path = folder / f"{module_name}.py"
-        return path if path.exists() else _whole(path, source)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        reason = objection(folder.stat())
+        if reason is None:
+            return _whole(folder / f"{module_name}.py", source)
+        logger.warning("compiled kernels in %s are not used, for %s: compiling for this run only", folder, reason)
     except OSError as error:
         logger.warning("kernels cannot be cached in %s (%s); compiling for this run only", folder, error.strerror)
-        return _whole(Path(tempfile.mkdtemp(prefix="hydrostate-")) / f"{module_name}.py", source)
+    return _whole(Path(tempfile.mkdtemp(prefix="hydrostate-")) / f"{module_name}.py", source)
 
 
 def _whole(path: Path, source: str) -> Path:
-    """Write a file that is there whole or not at all."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(source)
-    return Path(temporary).replace(path)
+    """Write a file that is there whole or not at all, unless it is there as it should be."""
+    try:
+        with path.open("rb") as file:
+            if objection(os.fstat(file.fileno())) is None and file.read() == source.encode():
+                return path
+    except OSError:
+        pass
+    with replacing(path) as file:
+        if hasattr(os, "fchmod"):
+            os.fchmod(file.fileno(), 0o600)
+        file.write(source.encode())
+    return path

@@ -117,6 +117,7 @@ def bare_text(function: Callable[..., object]) -> str:
     if ast.get_docstring(definition) is not None:
         definition.body = definition.body[1:] or [ast.Pass()]
     definition.returns = None
+    definition.decorator_list = []
     arguments = definition.args
     arguments.args = [argument for argument in arguments.args if argument.arg != KERNEL]
     for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):

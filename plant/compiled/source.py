@@ -1,9 +1,8 @@
 """Writes an expression graph as straight-line Python that Numba compiles."""
 
-import inspect
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
-from plant.compiled import intrinsics, vector
 from plant.compiled.expression import Expression, ordered
 
 _TEMPLATES: Mapping[str, str] = {
@@ -29,8 +28,10 @@ _CALLS: Mapping[str, str] = {
 }
 """How each operation is spelt by them."""
 
-INTRINSICS = inspect.getsource(vector) + inspect.getsource(intrinsics).replace(f"from {vector.__name__}", "# from")
-"""What a kernel begins with that calls them: it contains all that it calls."""
+_TEXTS = [Path(__file__).with_name(f"{name}.py").read_text("utf-8") for name in ("vector", "intrinsics")]
+
+INTRINSICS = "".join(_TEXTS).replace("from plant.compiled.vector", "# from")
+"""What a kernel begins with that Numba compiles and that calls them: it contains all that it calls."""
 
 
 def statements(outputs: Mapping[str, Expression], indent: str, temporary: str = "t") -> str:

@@ -14,11 +14,12 @@ from plant.compiled.elimination import eliminated_jacobian
 from plant.compiled.expression import ONE, ZERO, Expression, as_expression, symbol
 from plant.compiled.functions import Scalar
 from plant.compiled.hoist import hoisted
-from plant.compiled.intrinsics import native_width
-from plant.compiled.kernel_file import load_kernel
+from plant.compiled.native.load import load_native
+from plant.compiled.native.machine import native_width
+from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import MERGED, kernel_text, pasted
 from plant.compiled.simplify import fused, share_ratios, simplified
-from plant.compiled.source import INTRINSICS, lines_source, operations_source
+from plant.compiled.source import lines_source, operations_source
 from plant.solvers.adaptive_loop import INNER, ROUNDEST, TINY, run_controlled, smooth
 from plant.solvers.steps import Derivative, Parameters, State, parameter_names, parameter_symbols, solve_linear
 
@@ -127,6 +128,14 @@ def compile_adaptive(
         ``run(starts (states, lanes), speed (n,) [rad/s], parameters (1 or n, lanes, parameters), sample time [s],
         weights (states,), bend [rad/s], longest and shortest step [samples], states (n, states, up to lanes))``.
     """
+    made_of = name, derivative, width, parameter_class, lanes
+    takes = signature_of(run_controlled, lanes=lanes, states=width)
+    entries = {"run_controlled": takes}
+    return load_native(f"{name}_adaptive_{lanes}", lambda: _text(*made_of), entries, made_of).run_controlled
+
+
+def _text(name: str, derivative: Derivative, width: int, parameter_class: type[Parameters], lanes: int) -> str:
+    """Write the kernel."""
     names = parameter_names(parameter_class)
     outputs = _outputs(derivative, width, parameter_symbols(parameter_class))
     outputs = simplified(share_ratios(outputs), set(names))
@@ -145,10 +154,9 @@ def compile_adaptive(
     }
     sizes = {"LANES": lanes, "VECTOR": vector, "WIDTH": width, "COLUMNS": len(names), "NUMBERS": lanes * len(every)}
     parts = (
-        INTRINSICS,
         operations_source(lines, slots, vector) + f"\nmove = moving({lanes})",
         pasted(*INNER, constants={**sizes, "TINY": TINY, "ROUNDEST": ROUNDEST}, options=MERGED),
         pasted(smooth, run_controlled),
     )
     title = f"trajectories of the {name} plant in steps of controlled error, {lanes} side by side"
-    return load_kernel(f"{name}_adaptive_{lanes}", kernel_text(title, *parts)).run_controlled
+    return kernel_text(title, *parts)

@@ -12,12 +12,13 @@ from typing import TypeAlias
 from plant.arrays import Array
 from plant.compiled.expression import as_expression, symbol
 from plant.compiled.hoist import hoisted
-from plant.compiled.intrinsics import native_width
-from plant.compiled.kernel_file import load_kernel
+from plant.compiled.native.load import load_native
+from plant.compiled.native.machine import native_width
+from plant.compiled.native.signature import signature_of
 from plant.compiled.pack import packed_source
 from plant.compiled.paste import MERGED, kernel_text, pasted
 from plant.compiled.simplify import fused, simplified
-from plant.compiled.source import INTRINSICS, lines_source, operations_source
+from plant.compiled.source import lines_source, operations_source
 from plant.solvers.fixed_step_loops import lay, run_side_by_side, share
 from plant.solvers.steps import Parameters, StepFunction, parameter_names, parameter_symbols
 
@@ -63,9 +64,11 @@ def compile_fixed_step(
     sizes = {"LANES": lanes, "VECTOR": vector, "WIDTH": width, "COLUMNS": len(names), "NUMBERS": lanes * len(every)}
     title = f"trajectories of the {name} plant in fixed steps, {lanes} side by side"
     parts = (
-        INTRINSICS,
         operations_source(lines, slots, vector),
         pasted(lay, share, constants=sizes, options=MERGED),
         pasted(run_side_by_side),
     )
-    return load_kernel(f"{name}_fixed_step_{lanes}", kernel_text(title, *parts)).run_side_by_side
+    takes = signature_of(run_side_by_side, lanes=lanes, states=width)
+    return load_native(
+        f"{name}_fixed_step_{lanes}", kernel_text(title, *parts), {"run_side_by_side": takes}
+    ).run_side_by_side

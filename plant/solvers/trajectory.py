@@ -7,9 +7,10 @@ from typing import TypeAlias
 from plant.arrays import Array
 from plant.compiled.expression import as_expression, symbol
 from plant.compiled.hoist import hoisted
-from plant.compiled.kernel_file import load_kernel
+from plant.compiled.native.load import load_native
+from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import kernel_text, pasted
-from plant.compiled.source import INTRINSICS, lines_source, operations_source
+from plant.compiled.source import lines_source, operations_source
 from plant.runs import require_finite, steps_a_sample
 from plant.solvers.fixed_step_loops import run_alone
 from plant.solvers.steps import Parameters, StepFunction, parameter_names, parameter_row, parameter_symbols
@@ -105,10 +106,10 @@ def compile_trajectory(name: str, step: StepFunction, width: int, parameter_clas
     every = [*given[:width], "h", *names, *fixed]
     slots = {name: i for i, name in enumerate(every)}
     parts = (
-        INTRINSICS,
         operations_source({"settle": lines_source("settle", fixed)}, slots, 1),
         lines_source("step", stepped),
         f"load = loading({width})\nadvance = advancing({given}, SLOTS, step, {width})",
         pasted(run_alone, constants={"WIDTH": width, "COLUMNS": len(names), "NUMBERS": len(every)}),
     )
-    return load_kernel(name, kernel_text(f"trajectory of the {name} plant", *parts)).run_alone
+    text = kernel_text(f"trajectory of the {name} plant", *parts)
+    return load_native(name, text, {"run_alone": signature_of(run_alone, states=width)}).run_alone

@@ -1,14 +1,14 @@
 """The loop of filters side by side is Python: run as it is written, it gives what its kernel gives, to the last bit."""
 
+import ctypes
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 
-from estimation.engine import lanes, runner
+from estimation.engine import kernels, lanes, runner
 from estimation.engine.kernels import compile_kernel
 from estimation.filters.ekf import ekf
 from estimation.filters.run import filter_problem
@@ -16,13 +16,7 @@ from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
-
-INSTRUCTIONS = ("prepare_at", "predict_at", "update_at", "both_at", "move")
-
-
-def callable_in_python(instruction: Any) -> Any:
-    """An instruction is known to compiled code only."""
-    return numba.njit(lambda first, second: instruction(first, second))
+from tests.kernels import functions_of, on_memory, text_of
 
 
 def test_one_filter(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -37,9 +31,11 @@ def test_one_filter(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> No
     compiled = ekf(problem)
 
     def in_python(*what: Any) -> SimpleNamespace:
-        kernel = compile_kernel(*what)
-        instructions = {name: callable_in_python(getattr(kernel, name)) for name in INSTRUCTIONS}
-        plain = SimpleNamespace(**{**vars(kernel), **instructions})
+        file = functions_of(text_of(monkeypatch, kernels, lambda: compile_kernel.__wrapped__(*what)))
+        halves = {"prepare_at": [file.prepare], "predict_at": [file.predict], "update_at": [file.update]}
+        halves["both_at"] = [file.predict, file.update]
+        plain = SimpleNamespace(**{**vars(file), **{name: on_memory(file, *lines) for name, lines in halves.items()}})
+        plain.move = lambda source, target: ctypes.memmove(target, source, 8)
         plain.steps = lambda *arguments: lanes.steps(plain, *arguments)
         return plain
 

@@ -21,18 +21,14 @@ DEAR = {
     "filterpy",
     "jinja2",
     "matplotlib",
+    "numba",
     "pandas",
     "pint",
     "rich",
-    "scipy.interpolate",
-    "scipy.ndimage",
-    "scipy.optimize",
-    "scipy.signal",
-    "scipy.stats",
+    "scipy",
     "statsmodels",
 }
-"""Modules that no verb needs for its JSON; what Typer and Numba import by themselves (pydantic, scipy.linalg) is not
-ours to leave out."""
+"""Modules that no verb needs for its JSON; what Typer imports by itself (pydantic) is not ours to leave out."""
 
 TELLING = """
 import sys

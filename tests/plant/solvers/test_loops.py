@@ -2,24 +2,23 @@
 
 import ctypes
 import inspect
-import sys
-from collections.abc import Callable
 from dataclasses import dataclass
-from types import FunctionType, ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from plant.compiled import vector
 from plant.compiled.functions import Scalar, absolute
+from plant.solvers import adaptive_kernel, fixed_step_kernel, trajectory
 from plant.solvers.adaptive_kernel import compile_adaptive
 from plant.solvers.adaptive_loop import growth, run_controlled, smooth, within
 from plant.solvers.fixed_step_kernel import compile_fixed_step
 from plant.solvers.fixed_step_loops import run_alone, run_side_by_side
 from plant.solvers.steps import rk4_step
 from plant.solvers.trajectory import compile_trajectory
+from tests.kernels import functions_of, in_python, on_memory, text_of
 
 Array = NDArray[np.float64]
 
@@ -42,41 +41,17 @@ STARTS = np.linspace(0.0, 0.1, 16).reshape(2, 8)
 T = 0.02
 
 
-def file_of(run: Callable[..., Any]) -> ModuleType:
-    return sys.modules[run.__module__]
-
-
-def in_python(lines: FunctionType) -> Callable[..., Any]:
-    """Lines of a kernel, on floats."""
-    by_hand = {"fma": lambda a, b, c: a * b + c, "ratios": lambda a, b: [x / y for x, y in zip(a, b, strict=True)]}
-    return FunctionType(lines.__code__, {**vars(vector), **by_hand})
-
-
-def on_memory(file: ModuleType, lines: FunctionType) -> Callable[[int, float], None]:
-    """Lines of a kernel as an operation on numbers in memory, one at a time."""
-    names, computed = inspect.signature(lines).parameters, in_python(lines)
-
-    def operation(address: int, j: float) -> None:
-        def at(name: str) -> ctypes.c_double:
-            return ctypes.c_double.from_address(address + 8 * file.SLOTS[name])
-
-        for name, value in computed(*(j if name == "j" else at(name).value for name in names)).items():
-            if name in file.SLOTS:
-                at(name).value = value
-
-    return operation
-
-
-def kernel_in_python(file: ModuleType, *names: str, **others: Any) -> Any:
+def kernel_in_python(file: SimpleNamespace, *names: str, **others: Any) -> Any:
     sizes = {name: getattr(file, name) for name in ("LANES", "WIDTH", "COLUMNS", "NUMBERS") if hasattr(file, name)}
     operations = {f"{name}_at": on_memory(file, getattr(file, name)) for name in names}
     return SimpleNamespace(**sizes, **operations, VECTOR=1, **others)
 
 
 @pytest.mark.parametrize("rows", [1, 40], ids=["constant", "changing"])
-def test_one_run(rows: int) -> None:
-    run = compile_trajectory("damper", rk4_step(rates), 2, Damper)
-    file, width = file_of(run), 2
+def test_one_run(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: Any = "damper", rk4_step(rates), 2, Damper
+    run, width = compile_trajectory(*given), 2
+    file = functions_of(text_of(monkeypatch, trajectory, lambda: compile_trajectory.__wrapped__(*given)))
     step = in_python(file.step)
 
     def advance(numbers: tuple[float, ...], address: int) -> tuple[float, ...]:
@@ -101,9 +76,11 @@ def test_one_run(rows: int) -> None:
     np.testing.assert_array_equal(run_alone(plain, *given), run(*given))
 
 
-def test_runs_side_by_side() -> None:
-    run = compile_fixed_step("damper", rk4_step(rates), 2, Damper, 8)
-    plain = kernel_in_python(file_of(run), "settle", "step")
+def test_runs_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: Any = "damper", rk4_step(rates), 2, Damper, 8
+    run = compile_fixed_step(*given)
+    text = text_of(monkeypatch, fixed_step_kernel, lambda: compile_fixed_step.__wrapped__(*given))
+    plain = kernel_in_python(functions_of(text), "settle", "step")
     drives = np.ascontiguousarray(np.outer(DRIVE, np.linspace(0.5, 1.5, 8)))
     found, wanted = np.empty((len(DRIVE), 2, 5)), np.empty((len(DRIVE), 2, 5))
     run_side_by_side(plain, STARTS, drives, ROWS, T, 3, found)
@@ -112,13 +89,15 @@ def test_runs_side_by_side() -> None:
 
 
 @pytest.mark.parametrize(("lanes", "kept", "rows"), [(1, 1, 1), (8, 8, 1), (8, 3, 40)])
-def test_steps_of_controlled_error(lanes: int, kept: int, rows: int) -> None:
-    run = compile_adaptive("damper", rates, 2, Damper, lanes)
+def test_steps_of_controlled_error(lanes: int, kept: int, rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    model: Any = "damper", rates, 2, Damper, lanes
+    run = compile_adaptive(*model)
+    text = text_of(monkeypatch, adaptive_kernel, lambda: compile_adaptive.__wrapped__(*model))
 
     def move(source: int, target: int) -> None:
         ctypes.memmove(target, source, 8 * lanes)
 
-    plain = kernel_in_python(file_of(run), "settle", "stages", "between", move=move)
+    plain = kernel_in_python(functions_of(text), "settle", "stages", "between", move=move)
     parameters = np.repeat(ROWS[None, :lanes], rows, 0)
     parameters[rows // 2 :, :, 1] = 60.0
     starts = np.ascontiguousarray(STARTS[:, :lanes])

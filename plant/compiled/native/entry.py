@@ -1,0 +1,221 @@
+"""A compiled kernel as Python calls it: what is given is checked and laid out, what comes back is copied out."""
+
+import ctypes
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NoReturn, TypeAlias
+
+import numpy as np
+
+from plant.compiled.native.kinds import BOOL, COMPLEX, FLOAT, INT, AnyKind, ArrayKind, ScalarKind, Several
+from plant.compiled.native.signature import Argument, Signature
+
+Call: TypeAlias = Callable[[Any, Any], None]
+
+_DTYPES = {
+    FLOAT: np.dtype(np.float64),
+    INT: np.dtype(np.int64),
+    BOOL: np.dtype(np.bool_),
+    COMPLEX: np.dtype(np.complex128),
+}
+_CODES = {FLOAT: "d", INT: "q", BOOL: "q", COMPLEX: "dd"}
+
+
+def _code(kind: AnyKind) -> str:
+    """Return how a kind's parts are packed."""
+    match kind:
+        case ScalarKind():
+            return _CODES[kind]
+        case ArrayKind():
+            return "Q" + "q" * kind.rank
+        case Several():
+            return "".join(map(_code, kind.items))
+        case _:
+            raise TypeError(f"a kernel is not entered with a {kind.name}")
+
+
+@dataclass
+class _Given:
+    """Arguments while they are laid out.
+
+    Parameters
+    ----------
+    numbers : list
+        Their parts.
+    arrays : list of (str, int, int, bool)
+        Arguments, their ends in memory, and whether they are changed.
+    back : list of (ndarray, ndarray)
+        Copies whose changes go back to where they were made from.
+    copies : list of ndarray
+        All copies, which must live while the kernel runs.
+    lengths : dict
+        What named lengths are, and the argument that said so.
+    """
+
+    numbers: list[Any]
+    arrays: list[tuple[str, int, int, bool]]
+    back: list[tuple[Any, Any]]
+    copies: list[Any]
+    lengths: dict[str, tuple[int, str]]
+
+
+class Entry:
+    """A compiled function of a kernel.
+
+    Parameters
+    ----------
+    name : str
+        Kernel and function, for errors.
+    takes : tuple of Argument
+        Its arguments.
+    returns : AnyKind
+        Its result.
+    written : frozenset of str
+        Arguments whose arrays it changes.
+    call, release : callable
+        The machine code, and what frees the arrays that it made.
+    """
+
+    def __init__(
+        self, name: str, takes: Signature, returns: AnyKind, written: frozenset[str], call: Call, release: Call
+    ) -> None:
+        self.__name__ = name
+        self._takes, self._returns, self._written = takes, returns, written
+        self._call, self._release = call, release
+        self._plan = [(one, _dtype(one.kind), one.name in written) for one in takes]
+        self._layout = struct.Struct("=" + "".join(_code(argument.kind) for argument in takes))
+        self._results = struct.Struct("=" + _code(returns))
+        self._room = ctypes.c_char * (self._results.size + 8)
+
+    def __call__(self, *given: Any) -> Any:
+        """Run the kernel; Python's lock is not held meanwhile.
+
+        Raises
+        ------
+        TypeError
+            If an argument is of another kind than the kernel was compiled for.
+        ValueError
+            If an array has another shape, or overlaps with one that is changed.
+        """
+        if len(given) != len(self._takes):
+            names = ", ".join(argument.name for argument in self._takes)
+            raise TypeError(f"{self.__name__} takes {len(self._takes)} arguments ({names}), got {len(given)}")
+        laid = _Given([], [], [], [], {})
+        for (argument, dtype, changed), value in zip(self._plan, given, strict=True):
+            if type(value) is np.ndarray and value.dtype is dtype and value.flags.carray:
+                self._place(argument, value, laid, changed=changed)
+            else:
+                self._lay(argument, value, laid, changed=changed)
+        if self._written:
+            self._apart(laid)
+        room = self._room()
+        try:
+            packed = self._layout.pack(*laid.numbers)
+        except struct.error:
+            self._fail("a whole number", "64 bits", "more")
+        self._call(packed, room)
+        for array, copy in laid.back:
+            array[...] = copy
+        if not self._results.size:
+            return None
+        parts = iter(self._results.unpack_from(room))
+        result = _result(self._returns, parts)
+        pointer = ctypes.addressof(room) + self._results.size
+        if ctypes.c_void_p.from_address(pointer).value:
+            self._release(pointer, None)
+        return result
+
+    def _fail(self, what: str, wanted: str, came: str) -> NoReturn:
+        raise TypeError(f"{self.__name__}: {what} must be {wanted}, got {came}")
+
+    def _lay(self, argument: Argument, value: Any, laid: _Given, *, changed: bool) -> None:
+        kind = argument.kind
+        if isinstance(kind, ArrayKind):
+            self._lay_array(argument, kind, value, laid, changed=changed)
+        elif isinstance(kind, Several):
+            if len(value) != len(argument.items):
+                self._fail(argument.name, f"a tuple of {len(argument.items)}", f"{len(value)} items")
+            for item, one in zip(argument.items, value, strict=True):
+                self._lay(item, one, laid, changed=changed)
+        elif kind == FLOAT and isinstance(value, float | int | np.floating | np.integer):
+            laid.numbers.append(value)
+        elif (kind == INT and isinstance(value, int | np.integer)) or (
+            kind == BOOL and isinstance(value, bool | np.bool_)
+        ):
+            laid.numbers.append(int(value))
+        else:
+            self._fail(argument.name, f"a number ({kind.name})", repr(value))
+
+    def _lay_array(self, argument: Argument, kind: ArrayKind, value: Any, laid: _Given, *, changed: bool) -> None:
+        dtype = _dtype(kind)
+        if not isinstance(value, np.ndarray) or value.ndim != kind.rank:
+            came = f"{value.ndim}-dimensional" if isinstance(value, np.ndarray) else type(value).__name__
+            self._fail(argument.name, f"an {kind.name}", came)
+        array: Any = value
+        if array.dtype != dtype or not (array.flags.c_contiguous and array.flags.aligned):
+            if not np.can_cast(array.dtype, dtype, "equiv" if changed else "safe"):
+                self._fail(argument.name, f"an array of {dtype}", f"one of {array.dtype}")
+            array = np.require(array, dtype, ["C", "A"])
+            laid.copies.append(array)
+            if changed:
+                laid.back.append((value, array))
+        if changed and not value.flags.writeable:
+            self._fail(argument.name, "an array that may be changed", "one that is read-only")
+        self._place(argument, array, laid, changed=changed)
+
+    def _place(self, argument: Argument, array: Any, laid: _Given, *, changed: bool) -> None:
+        """Lay out an array that is as it should be, but for its shape."""
+        shape = array.shape
+        if len(shape) != len(argument.lengths):
+            self._fail(argument.name, f"an {argument.kind.name}", f"{len(shape)}-dimensional")
+        for axis, wanted in enumerate(argument.lengths):
+            if wanted is not None:
+                self._measure(argument.name, axis, wanted, shape[axis], laid)
+        address = array.ctypes.data
+        laid.numbers.append(address)
+        laid.numbers.extend(shape)
+        laid.arrays.append((argument.name, address, address + array.nbytes, changed))
+
+    def _measure(self, name: str, axis: int, wanted: int | str, length: int, laid: _Given) -> None:
+        if wanted == length:
+            return
+        if isinstance(wanted, str):
+            known, by = laid.lengths.setdefault(wanted, (length, name))
+            if known == length:
+                return
+            wanted = f"{known} ({wanted}, as of {by})"
+        raise ValueError(f"{self.__name__}: axis {axis} of {name} must have length {wanted}, got {length}")
+
+    def _apart(self, laid: _Given) -> None:
+        """Make sure that what is changed is nothing else's memory, for the machine code takes it so."""
+        for name, begin, end, changed in laid.arrays:
+            if not changed:
+                continue
+            for other, first, last, _ in laid.arrays:
+                if other != name and begin < last and first < end and begin < end and first < last:
+                    raise ValueError(f"{self.__name__}: {name} and {other} must not share memory")
+
+
+def _dtype(kind: AnyKind) -> Any:
+    """Return what an array's numbers are, of an array."""
+    return _DTYPES[kind.element] if isinstance(kind, ArrayKind) else None
+
+
+def _result(kind: AnyKind, parts: Any) -> Any:
+    """Return a result from its parts."""
+    if isinstance(kind, Several):
+        return tuple(_result(item, parts) for item in kind.items)
+    if isinstance(kind, ArrayKind):
+        address = next(parts)
+        return _copied(address, [next(parts) for _ in range(kind.rank)], _DTYPES[kind.element])
+    if kind == COMPLEX:
+        return complex(next(parts), next(parts))
+    return bool(next(parts)) if kind == BOOL else next(parts)
+
+
+def _copied(address: int, shape: Sequence[int], dtype: Any) -> Any:
+    """Return an array of its own from memory that is about to be freed."""
+    result = np.empty(shape, dtype)
+    ctypes.memmove(result.ctypes.data, address, result.nbytes)
+    return result

@@ -1,0 +1,220 @@
+"""Kinds of values that a kernel computes with, and how each is spelt in LLVM's intermediate representation."""
+
+import struct
+from dataclasses import dataclass
+from typing import TypeAlias
+
+
+class KernelError(Exception):
+    """A kernel that cannot be compiled: it names the line, what was wanted and what came."""
+
+    placed = False
+
+    def within(self, place: str) -> "KernelError":
+        """Return the error with the innermost place at which it arose."""
+        if self.placed:
+            return self
+        error = KernelError(f"{place}: {self}")
+        error.placed = True
+        return error
+
+
+@dataclass(frozen=True, eq=False)
+class ScalarKind:
+    """A single number; there is one of each kind.
+
+    Parameters
+    ----------
+    parts : tuple of str
+        LLVM types of what it consists of, in registers.
+    stored : str
+        LLVM type that it has in an array.
+    size : int
+        Its bytes there.
+    """
+
+    name: str
+    parts: tuple[str, ...]
+    stored: str
+    size: int
+
+
+FLOAT = ScalarKind("float", ("double",), "double", 8)
+INT = ScalarKind("int", ("i64",), "i64", 8)
+BOOL = ScalarKind("bool", ("i1",), "i8", 1)
+COMPLEX = ScalarKind("complex", ("double", "double"), "{ double, double }", 16)
+SCALARS = {kind.name: kind for kind in (FLOAT, INT, BOOL, COMPLEX)}
+
+
+@dataclass(frozen=True)
+class ArrayKind:
+    """An array: a pointer, its lengths and, unless it is packed row by row, its strides [elements].
+
+    Parameters
+    ----------
+    packed : bool
+        Whether rows follow each other without gaps.
+    """
+
+    element: ScalarKind
+    rank: int
+    packed: bool = True
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """LLVM types of what it consists of."""
+        return ("ptr", *["i64"] * (self.rank if self.packed else 2 * self.rank))
+
+    @property
+    def name(self) -> str:
+        """How an error spells it."""
+        return f"array of {self.element.name}, {self.rank}-dimensional"
+
+
+@dataclass(frozen=True)
+class Slice:
+    """A part of an axis, by its ends."""
+
+    parts: tuple[str, ...] = ("i64", "i64")
+    name: str = "slice"
+
+
+@dataclass(frozen=True)
+class Range:
+    """What a loop counts through: begin, end, step."""
+
+    parts: tuple[str, ...] = ("i64", "i64", "i64")
+    name: str = "range"
+
+
+@dataclass(frozen=True)
+class Several:
+    """A tuple."""
+
+    items: tuple["AnyKind", ...]
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """LLVM types of what it consists of."""
+        return tuple(part for item in self.items for part in item.parts)
+
+    @property
+    def name(self) -> str:
+        """How an error spells it."""
+        return f"({', '.join(item.name for item in self.items)})"
+
+
+AnyKind: TypeAlias = ScalarKind | ArrayKind | Slice | Range | Several
+
+NOTHING = Several(())
+"""What a function without a result returns."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """A value: its kind, and the registers or constants that hold its parts.
+
+    Parameters
+    ----------
+    origin : frozenset of str
+        The function's parameters in whose memory an array may lie.
+    """
+
+    kind: AnyKind
+    parts: tuple[str, ...]
+    origin: frozenset[str] = frozenset()
+
+    @property
+    def array(self) -> ArrayKind:
+        """Its kind, of an array."""
+        if not isinstance(self.kind, ArrayKind):
+            raise KernelError(f"an array is wanted, got {self.kind.name}")
+        return self.kind
+
+    @property
+    def lengths(self) -> tuple[str, ...]:
+        """Lengths of an array's axes."""
+        return self.parts[1 : 1 + self.array.rank]
+
+    @property
+    def items(self) -> "tuple[Held, ...]":
+        """What a tuple holds."""
+        if not isinstance(self.kind, Several):
+            raise KernelError(f"a tuple is wanted, got {self.kind.name}")
+        found: list[Held] = []
+        place = 0
+        for kind in self.kind.items:
+            found.append(Held(kind, self.parts[place : place + len(kind.parts)], self.origin))
+            place += len(kind.parts)
+        return tuple(found)
+
+
+def structure(kind: AnyKind) -> str:
+    """Return the LLVM type of a function's result."""
+    parts = kind.parts
+    return "void" if not parts else parts[0] if len(parts) == 1 else f"{{ {', '.join(parts)} }}"
+
+
+def several(values: "tuple[Held, ...] | list[Held]") -> Held:
+    """Return values as a tuple."""
+    parts = tuple(part for value in values for part in value.parts)
+    origin = frozenset[str]().union(*(value.origin for value in values))
+    return Held(Several(tuple(value.kind for value in values)), parts, origin)
+
+
+def double(number: float) -> str:
+    """Return how a number is spelt, to the bit.
+
+    Parameters
+    ----------
+    number : float
+        The number [any unit].
+    """
+    (bits,) = struct.unpack("<Q", struct.pack("<d", number))
+    return f"0x{bits:016X}"
+
+
+def number(value: object) -> Held:
+    """Return a constant as a value."""
+    match value:
+        case bool():
+            return Held(BOOL, ("true" if value else "false",))
+        case int():
+            return Held(INT, (str(value),))
+        case float():
+            return Held(FLOAT, (double(value),))
+        case complex():
+            return Held(COMPLEX, (double(value.real), double(value.imag)))
+        case tuple():
+            return several([number(item) for item in value])
+        case _:
+            raise KernelError(f"a kernel has numbers and tuples of them as constants, got {value!r}")
+
+
+def is_literal(part: str) -> bool:
+    """Return whether a whole number is known while the kernel is compiled."""
+    return part.lstrip("-").isdigit()
+
+
+_ORDER = (BOOL, INT, FLOAT, COMPLEX)
+
+
+def joined(name: str, a: AnyKind | None, b: AnyKind) -> AnyKind:
+    """Return the kind of a variable that holds two kinds of values.
+
+    Raises
+    ------
+    KernelError
+        If no kind holds both.
+    """
+    if a is None or a == b:
+        return b
+    match a, b:
+        case ScalarKind(), ScalarKind() if BOOL not in (a, b):
+            return _ORDER[max(_ORDER.index(a), _ORDER.index(b))]
+        case ArrayKind(), ArrayKind() if (a.element, a.rank) == (b.element, b.rank):
+            return ArrayKind(a.element, a.rank, packed=False)
+        case Several(), Several() if len(a.items) == len(b.items):
+            return Several(tuple(joined(name, *pair) for pair in zip(a.items, b.items, strict=True)))
+        case _:
+            raise KernelError(f"{name} is once {a.name} and once {b.name}: it needs two names")

@@ -1,0 +1,187 @@
+"""Operations on numbers in memory that a kernel makes of its lines: steps, copies, transposes."""
+
+import ast
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from plant.compiled.native.kinds import FLOAT, INT, NOTHING, Held, several
+from plant.compiled.native.lines import Lines, names_of, vector
+from plant.compiled.native.operators import convert
+from plant.compiled.native.scope import Scope
+
+ROWS = 8
+"""Samples of as many logs that `transpose` turns at a time."""
+
+Functions = Mapping[str, ast.FunctionDef]
+Operation = Callable[[Scope, Sequence[Held]], Held]
+"""Writes the operation on values that are given."""
+
+NONE = Held(NOTHING, ())
+
+
+def place(scope: Scope, address: str, distance: int | str) -> str:
+    """Return a pointer to what stands at a distance in bytes from an address."""
+    return scope.op(f"inttoptr i64 {scope.op(f'add i64 {address}, {distance}')} to ptr")
+
+
+def operation_of(node: ast.Call, functions: Functions, constants: Mapping[str, object]) -> Operation | None:
+    """Return the operation that a call in a kernel's text makes, if it makes one.
+
+    Parameters
+    ----------
+    functions : Mapping[str, ast.FunctionDef]
+        The kernel's functions, among them lines.
+    constants : Mapping[str, object]
+        What names stand for.
+    """
+
+    def value(part: ast.expr) -> Any:
+        return constants[part.id] if isinstance(part, ast.Name) else ast.literal_eval(part)
+
+    def lines(part: ast.expr) -> ast.FunctionDef:
+        return functions[ast.unparse(part)]
+
+    match ast.unparse(node.func), node.args:
+        case "stepping", [slots, width, *parts]:
+            return stepping(value(slots), value(width), [lines(part) for part in parts])
+        case "moving", [width]:
+            return moving(value(width))
+        case "loading", [count]:
+            return loading(value(count))
+        case "advancing", [given, slots, part, _]:
+            return advancing(value(given), value(slots), lines(part))
+        case "function_of", [part, _]:
+            return function_of(lines(part))
+        case _:
+            return None
+
+
+def stepping(slots: Mapping[str, int], width: int, parts: Sequence[ast.FunctionDef]) -> Operation:
+    """Return ``step(address, j)``: lines one after the other, each from what stands and from those before.
+
+    It is a function of its own, for its lines are many and may be called from several places.
+    """
+    kind = vector(width)
+
+    def body(scope: Scope) -> None:
+        known = {"j": _spread(scope, "%j", width)}
+        results: dict[str, str] = {}
+        for part in parts:
+            for name in names_of(part):
+                if name not in known:
+                    known[name] = scope.op(f"load {kind}, ptr {place(scope, '%at', 8 * slots[name])}, align 8")
+            found = Lines(scope, width, known).results(part)
+            results |= found
+            known |= found
+        for name, register in results.items():
+            if name in slots:
+                scope.line(f"store {kind} {register}, ptr {place(scope, '%at', 8 * slots[name])}, align 8")
+        scope.line("ret void")
+
+    made: list[str] = []
+
+    def operation(scope: Scope, given: Sequence[Held]) -> Held:
+        if not made:
+            made.append(scope.program.separate("step", "i64 %at, double %j", body))
+        address, j = convert(scope, given[0], INT).parts[0], convert(scope, given[1], FLOAT).parts[0]
+        scope.line(f"call void @{made[0]}(i64 {address}, double {j})")
+        return NONE
+
+    return operation
+
+
+def _spread(scope: Scope, number: str, width: int) -> str:
+    """Return a vector that holds a number in each place."""
+    if width == 1:
+        return number
+    kind = vector(width)
+    single = scope.op(f"insertelement {kind} undef, double {number}, i32 0")
+    return scope.op(f"shufflevector {kind} {single}, {kind} undef, <{width} x i32> zeroinitializer")
+
+
+def moving(width: int) -> Operation:
+    """Return ``move(source, target)``, which copies so many numbers."""
+    kind = vector(width)
+
+    def operation(scope: Scope, given: Sequence[Held]) -> Held:
+        source, target = (place(scope, one.parts[0], 0) for one in given)
+        scope.line(f"store {kind} {scope.op(f'load {kind}, ptr {source}, align 8')}, ptr {target}, align 8")
+        return NONE
+
+    return operation
+
+
+def loading(count: int) -> Operation:
+    """Return ``load(address)``: a tuple of so many numbers that stand one after the other."""
+
+    def operation(scope: Scope, given: Sequence[Held]) -> Held:
+        places = [place(scope, given[0].parts[0], 8 * k) for k in range(count)]
+        return several([Held(FLOAT, (scope.op(f"load double, ptr {one}"),)) for one in places])
+
+    return operation
+
+
+def store(scope: Scope, given: Sequence[Held]) -> Held:
+    """Write a tuple's numbers, one after the other: ``store(numbers, address)``."""
+    for k, number in enumerate(given[0].items):
+        register = convert(scope, number, FLOAT).parts[0]
+        scope.line(f"store double {register}, ptr {place(scope, given[1].parts[0], 8 * k)}")
+    return NONE
+
+
+def advancing(names: Sequence[str], slots: Mapping[str, int], part: ast.FunctionDef) -> Operation:
+    """Return ``advance((a, b), address)``: lines on a tuple of numbers, and on numbers in memory."""
+
+    def operation(scope: Scope, given: Sequence[Held]) -> Held:
+        numbers = dict(zip(names, (convert(scope, one, FLOAT).parts[0] for one in given[0].items), strict=True))
+        for name in names_of(part):
+            if name not in numbers:
+                numbers[name] = scope.op(f"load double, ptr {place(scope, given[1].parts[0], 8 * slots[name])}")
+        return several([Held(FLOAT, (one,)) for one in Lines(scope, 1, numbers).results(part).values()])
+
+    return operation
+
+
+def function_of(part: ast.FunctionDef) -> Operation:
+    """Return ``function((a, b))``: lines on a tuple of numbers, in the order of their names."""
+
+    def operation(scope: Scope, given: Sequence[Held]) -> Held:
+        numbers = (convert(scope, one, FLOAT).parts[0] for one in given[0].items)
+        found = Lines(scope, 1, dict(zip(names_of(part), numbers, strict=True))).results(part)
+        return several([Held(FLOAT, (one,)) for one in found.values()])
+
+    return operation
+
+
+def transpose(scope: Scope, given: Sequence[Held]) -> Held:
+    """Copy 8 numbers from each of 8 places into 8 rows of 8: ``transpose(places, offset, ahead, target, stride)``.
+
+    All in bytes: the address of the places' addresses, what is added to each, how far ahead of there is fetched into
+    the cache, the address of the first row, and that from row to row.
+    """
+    places, offset, ahead, target, stride = (one.parts[0] for one in given)
+    kind, every = vector(ROWS), range(ROWS)
+    scope.program.declare("declare void @llvm.prefetch.p0(ptr, i32, i32, i32)")
+    rows: list[str] = []
+    for lane in every:
+        begin = scope.op(f"add i64 {scope.op(f'load i64, ptr {place(scope, places, 8 * lane)}')}, {offset}")
+        rows.append(scope.op(f"load {kind}, ptr {place(scope, begin, 0)}, align 8"))
+        # to read, into the second cache, data
+        scope.line(f"call void @llvm.prefetch.p0(ptr {place(scope, begin, ahead)}, i32 0, i32 2, i32 1)")
+    for span in (1, 2, 4):  # exchange what stands off the diagonal of every 2 by 2 blocks of this size
+        kept = [k + ROWS - span if k & span else k for k in every]
+        for low in (lane for lane in every if not lane & span):
+            pair = f"{kind} {rows[low]}, {kind} {rows[low + span]}"
+            orders = (kept, [k + span for k in kept])
+            rows[low], rows[low + span] = (
+                scope.op(f"shufflevector {pair}, <8 x i32> <{', '.join(f'i32 {k}' for k in order)}>")
+                for order in orders
+            )
+    for row in every:
+        here = place(scope, target, scope.op(f"mul i64 {stride}, {row}"))
+        scope.line(f"store {kind} {rows[row]}, ptr {here}, align 8")
+    return NONE
+
+
+GIVEN: Mapping[str, Operation] = {"store": store, "transpose": transpose}
+"""Operations that every kernel has."""

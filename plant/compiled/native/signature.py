@@ -1,0 +1,167 @@
+"""What a kernel takes, read off its documentation: kinds of its arguments, and the shapes that are checked.
+
+The parameters' section of a numpydoc text says it all: ``drive : ndarray, shape (n,)``. So shapes are said once.
+"""
+
+import ast
+import inspect
+import re
+import textwrap
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from plant.compiled.native.kinds import BOOL, COMPLEX, FLOAT, INT, AnyKind, ArrayKind, ScalarKind, Several
+
+Length: TypeAlias = int | str | None
+"""Of an axis: a number, a name that has one value in all arguments, or nothing that is checked."""
+
+_ENTRY = re.compile(r"^(\w[\w, ]*?) : (.+)$")
+_SHAPED = re.compile(r"^ndarray(?: of (int|bool|complex))?, shapes? (\(.*\))")
+_ELEMENTS = {"int": INT, "bool": BOOL, "complex": COMPLEX, None: FLOAT}
+_NUMBERS = {"float": FLOAT, "int": INT, "bool": BOOL}
+_HINTED: Mapping[object, ScalarKind] = {float: FLOAT, int: INT, bool: BOOL}
+
+
+@dataclass(frozen=True)
+class Argument:
+    """One argument of a kernel.
+
+    Parameters
+    ----------
+    lengths : tuple
+        Of an array's axes.
+    items : tuple of Argument
+        Of a tuple.
+    """
+
+    name: str
+    kind: AnyKind
+    lengths: tuple[Length, ...] = ()
+    items: "tuple[Argument, ...]" = ()
+
+
+Signature: TypeAlias = tuple[Argument, ...]
+
+
+def signature(documentation: str) -> Signature:
+    r"""Read a kernel's arguments off the parameters of a numpydoc text.
+
+    Parameters
+    ----------
+    documentation : str
+        Entries such as ``drive : ndarray, shape (n, 2)``; a whole number or a name as a length is checked, what else
+        stands there (``up to lanes``) is not. What begins with white space is an explanation.
+
+    Raises
+    ------
+    ValueError
+        If an entry is neither a number nor an array with its shape.
+
+    Examples
+    --------
+    >>> for argument in signature("rows : ndarray, shape (n, 2)\nsteps : int"):
+    ...     print(argument.name, argument.kind.name, argument.lengths)
+    rows array of float, 2-dimensional ('n', 2)
+    steps int ()
+    """
+    found: list[Argument] = []
+    for line in documentation.splitlines():
+        match = _ENTRY.match(line)
+        if match:
+            names = match[1].split(", ")
+            found += [_argument(name, match[2], place) for place, name in enumerate(names)]
+    return tuple(found)
+
+
+def _argument(name: str, text: str, place: int = 0) -> Argument:
+    """Read one argument; of several shapes it has the one in its place."""
+    if text.startswith("tuple ("):
+        items = tuple(_argument(f"{name}[{k}]", one) for k, one in enumerate(text[7:-1].split("; ")))
+        return Argument(name, Several(tuple(item.kind for item in items)), items=items)
+    shaped = _SHAPED.match(text)
+    if shaped:
+        shapes = re.findall(r"\(([^()]*)\)", shaped[2])
+        shape = shapes[place] if place < len(shapes) and len(shapes) > 1 else shapes[0]
+        lengths = tuple(_length(one) for one in shape.split(",") if one.strip())
+        return Argument(name, ArrayKind(_ELEMENTS[shaped[1]], len(lengths)), lengths)
+    kind = _NUMBERS.get(text)
+    if kind is None:
+        raise ValueError(f"{name} must be a number or an array with its shape, got {text!r}")
+    return Argument(name, kind)
+
+
+def _length(text: str) -> Length:
+    text = text.strip()
+    if text.isdigit():
+        return int(text)
+    return text if text.isidentifier() else None
+
+
+def signature_of(function: Callable[..., object], **lengths: int) -> Signature:
+    """Return what a documented function takes.
+
+    Parameters
+    ----------
+    function : callable
+        A function of a module, whose numpydoc text has all arrays; one named ``kernel`` is left out.
+    **lengths : int
+        Values of names that stand for lengths in it.
+
+    Raises
+    ------
+    ValueError
+        If the text and the function differ in their parameters.
+
+    Examples
+    --------
+    >>> def mean(values: object, first: int) -> float:
+    ...     '''Return a mean.
+    ...
+    ...     Parameters
+    ...     ----------
+    ...     values : ndarray, shape (n,)
+    ...         Numbers.
+    ...     first : int
+    ...         Where to begin.
+    ...     '''
+    >>> [argument.name for argument in signature_of(mean)]
+    ['values', 'first']
+    """
+    text = inspect.getdoc(function) or _documentation(function)
+    section = text.partition("Parameters\n----------\n")[2]
+    section = re.split(r"\n\n\w+\n-{3,}\n", section)[0]
+    found = {argument.name: argument for argument in signature(section)}
+    names = [
+        name
+        for name, one in inspect.signature(function).parameters.items()
+        if name != "kernel" and one.kind is not one.KEYWORD_ONLY
+    ]
+    hinted = {name: _HINTED[hint] for name, hint in function.__annotations__.items() if hint in _HINTED}
+    found = {name: Argument(name, kind) for name, kind in hinted.items() if name in names} | found
+    if set(names) != set(found):
+        raise ValueError(f"{function.__qualname__} takes {names}, its documentation has {list(found)}")
+    return tuple(_with(found[name], lengths) for name in names)
+
+
+def _with(argument: Argument, lengths: dict[str, int]) -> Argument:
+    known = tuple(lengths.get(one, one) if isinstance(one, str) else one for one in argument.lengths)
+    return Argument(argument.name, argument.kind, known, argument.items)
+
+
+def _documentation(function: Callable[..., object]) -> str:
+    """Return a function's documentation where Python has thrown it away (``python -OO``)."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+    node = tree.body[0]
+    return (ast.get_docstring(node) if isinstance(node, ast.FunctionDef) else None) or ""
+
+
+def spelt(kind: AnyKind) -> object:
+    """Return a kind as JSON holds it."""
+    match kind:
+        case ScalarKind():
+            return kind.name
+        case ArrayKind():
+            return [kind.element.name, kind.rank]
+        case _:
+            return {"items": [spelt(item) for item in kind.items]} if isinstance(kind, Several) else kind.name

@@ -1,0 +1,120 @@
+"""Machine code in the cache folder: written whole, and run only if it is ours, undamaged and of this very kernel."""
+
+import hashlib
+import json
+import logging
+import os
+import stat
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from plant.atomic import replacing
+from plant.compiled.kernel_folder import cache_folder, objection
+
+logger = logging.getLogger("hydrostate")
+
+MAGIC = b"hydrostate machine code 1\n"
+
+LARGEST = 1 << 26
+"""No kernel's machine code is larger [bytes]."""
+
+
+def path_of(name: str, key: str) -> Path:
+    """Return the file of a kernel.
+
+    Parameters
+    ----------
+    name : str
+        What the kernel is.
+    key : str
+        Hash of all that its machine code depends on.
+    """
+    return cache_folder() / f"hydrostate_{name}_{key[:16]}.machine"
+
+
+def recalled(name: str, key: str) -> tuple[Mapping[str, Any], bytes] | None:
+    """Return description and machine code of a kernel, or None where they are to be made anew.
+
+    A file that is empty, cut off, damaged, of another kernel, no regular file, or another user's, is as good as none.
+
+    Parameters
+    ----------
+    name, key : str
+        See `path_of`.
+    """
+    if _refused(cache_folder()):
+        return None
+    content = _own(path_of(name, key))
+    size = len(MAGIC) + 64
+    if content is None or not content.startswith(MAGIC) or len(content) < size:
+        return None
+    body = content[size:]
+    if content[len(MAGIC) : size] != hashlib.sha256(body).hexdigest().encode():
+        return None
+    head, _, code = body.partition(b"\n")
+    description = json.loads(head)
+    return (description, code) if description.get("key") == key else None
+
+
+def _own(path: Path) -> bytes | None:
+    """Return the content of a regular file that belongs to this user and that no other may write to."""
+    flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    try:
+        handle = os.open(path, flags)
+    except OSError:
+        return None
+    found = os.fstat(handle)
+    if not stat.S_ISREG(found.st_mode) or found.st_size > LARGEST or objection(found) is not None:
+        os.close(handle)
+        return None
+    with os.fdopen(handle, "rb") as file:
+        try:
+            return file.read(LARGEST)
+        except OSError:
+            return None
+
+
+@cache
+def _refused(folder: Path) -> bool:
+    """Return whether what is in a folder may not be run, and say so once."""
+    try:
+        found = folder.stat()
+    except OSError:
+        return False
+    reason = objection(found)
+    if reason is not None:
+        logger.warning("compiled kernels in %s are not used, for %s: compiling for this run only", folder, reason)
+    return reason is not None
+
+
+def kept(name: str, key: str, description: Mapping[str, Any], code: bytes) -> None:
+    """Keep a kernel for later runs; where the folder cannot be written, say so once and do without.
+
+    Parameters
+    ----------
+    name, key : str
+        See `path_of`.
+    description : Mapping[str, Any]
+        What belongs to the machine code.
+    code : bytes
+        An object file.
+    """
+    folder = cache_folder()
+    if _refused(folder):
+        return
+    body = json.dumps({**description, "key": key}).encode() + b"\n" + code
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with replacing(path_of(name, key)) as file:
+            if hasattr(os, "fchmod"):
+                os.fchmod(file.fileno(), 0o600)
+            file.write(MAGIC + hashlib.sha256(body).hexdigest().encode() + body)
+    except OSError as error:
+        _say_once(folder, error.strerror or str(error))
+
+
+@cache
+def _say_once(folder: Path, reason: str) -> None:
+    logger.warning("kernels cannot be cached in %s (%s); compiling for this run only", folder, reason)

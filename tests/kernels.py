@@ -1,0 +1,87 @@
+"""Texts of kernels, caught as they are compiled, so that tests can run their parts in Python."""
+
+import ast
+import ctypes
+import inspect
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from types import FunctionType, ModuleType, SimpleNamespace
+from typing import Any
+
+import pytest
+
+from plant.compiled import vector
+
+
+def text_of(monkeypatch: pytest.MonkeyPatch, module: ModuleType, compile_it: Callable[[], object]) -> str:
+    """The text that a module hands to the compiler."""
+    texts: list[str] = []
+    load = module.load_native
+
+    def caught(name: str, text: Any, entries: Any, made_of: object = None) -> Any:
+        texts.append(text if isinstance(text, str) else text())
+        return load(name, text, entries, made_of)
+
+    monkeypatch.setattr(module, "load_native", caught)
+    compile_it()
+    (text,) = texts
+    return text
+
+
+def functions_of(text: str) -> SimpleNamespace:
+    """A kernel's constants and functions, as Python."""
+    tree = ast.parse(text)
+    kept = [node for node in tree.body if not _is_made(node) and not _is_numba(node)]
+    for node in kept:
+        if isinstance(node, ast.FunctionDef):
+            node.decorator_list = []
+    names: dict[str, Any] = {}
+    exec(compile(ast.Module(kept, []), "kernel", "exec"), names)  # noqa: S102  our own text
+    return SimpleNamespace(**names)
+
+
+def _is_made(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Assign) and isinstance(node.value, ast.Call)
+
+
+def fma(a: float, b: float, c: float) -> float:
+    """Rounded once."""
+    if not all(map(math.isfinite, (a, b, c))):
+        return a * b + c
+    exact = Fraction(a) * Fraction(b) + Fraction(c)
+    return float(exact) if exact else a * b + c
+
+
+def in_python(lines: FunctionType) -> Callable[..., Any]:
+    """Lines of a kernel, on floats."""
+    by_hand = {
+        "fma": fma,
+        "present": lambda x: x == x,
+        "ratios": lambda a, b: [x / y for x, y in zip(a, b, strict=True)],
+    }
+    return FunctionType(lines.__code__, {**vars(vector), **by_hand})
+
+
+def on_memory(file: SimpleNamespace, *lines: FunctionType) -> Callable[[int, float], None]:
+    """Lines of a kernel, one after the other, as an operation on numbers in memory, one at a time."""
+
+    def operation(address: int, j: float) -> None:
+        def at(name: str) -> ctypes.c_double:
+            return ctypes.c_double.from_address(address + 8 * file.SLOTS[name])
+
+        known, results = {"j": j}, dict[str, float]()
+        for part in lines:
+            names = inspect.signature(part).parameters
+            known |= {name: at(name).value for name in names if name not in known}
+            results |= in_python(part)(*(known[name] for name in names))
+            known |= results
+        for name, value in results.items():
+            if name in file.SLOTS:
+                at(name).value = value
+
+    return operation
+
+
+def _is_numba(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Import) and node.names[0].name == "numba"

@@ -1,0 +1,126 @@
+"""A kernel has one signature, and says what is wrong with what it is given."""
+
+import threading
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+
+from plant.compiled.native.load import load_native
+from plant.compiled.native.signature import signature, signature_of
+
+TEXT = """
+def add(values, more, times, total):
+    for k in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            total[k, j] = values[k, j] + times * more[k]
+    return total[0, 0]
+"""
+TAKES = """
+values : ndarray, shape (n, m)
+more : ndarray, shape (n,)
+times : float
+total : ndarray, shape (n, m)
+"""
+
+
+@pytest.fixture(scope="module")
+def add() -> Any:
+    return load_native("add", TEXT, {"add": signature(TAKES)}).add
+
+
+VALUES, MORE = np.arange(6.0).reshape(3, 2), np.array([1.0, 2.0, 3.0])
+
+
+def test_whole_numbers_and_single_precision_are_taken_for_floats(add: Any) -> None:
+    total = np.empty((3, 2))
+    assert add(VALUES.astype(np.float32), np.array([1, 2, 3]), 2, total) == 2.0
+    np.testing.assert_array_equal(total, VALUES + 2.0 * MORE[:, None])
+
+
+def test_arrays_with_gaps_are_copied_and_what_is_changed_goes_back(add: Any) -> None:
+    room = np.zeros((3, 4))
+    add(np.asfortranarray(VALUES), np.repeat(MORE, 2)[::2], 1.0, room[:, 1:3])
+    np.testing.assert_array_equal(room[:, 1:3], VALUES + MORE[:, None])
+    assert not room[:, [0, 3]].any()
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "told"),
+    [
+        ((VALUES, MORE, 1.0), TypeError, r"add\.add takes 4 arguments \(values, more, times, total\), got 3"),
+        ((VALUES[0], MORE, 1.0, VALUES), TypeError, "values must be an array of float, 2-dimensional, got 1-dim"),
+        ((VALUES, [1.0, 2.0, 3.0], 1.0, VALUES), TypeError, "more must be .* got list"),
+        ((VALUES * 1j, MORE, 1.0, VALUES), TypeError, "values must be an array of float64, got one of complex128"),
+        ((VALUES, MORE, "1", VALUES), TypeError, r"times must be a number \(float\), got '1'"),
+        ((VALUES, MORE[:2], 1.0, VALUES + 0.0), ValueError, r"axis 0 of more must have length 3 \(n, as of values\)"),
+        (
+            (VALUES, MORE, 1.0, np.zeros((3, 2), np.int64)),
+            TypeError,
+            "total must be an array of float64, got one of int64",
+        ),
+        ((VALUES, MORE, 1.0, VALUES), ValueError, "total and values must not share memory"),
+        ((VALUES, MORE, 1.0, np.broadcast_to(0.0, (3, 2))), TypeError, "total must be .* changed, got .* read-only"),
+    ],
+)
+def test_what_does_not_fit_is_named(add: Any, given: tuple[Any, ...], error: type[Exception], told: str) -> None:
+    with pytest.raises(error, match=told):
+        add(*given)
+
+
+def test_python_runs_on_while_a_kernel_runs() -> None:
+    text = "def turn(n):\n    x = 0.5\n    for k in range(n):\n        x = 3.7 * x * (1.0 - x)\n    return x\n"
+    turn = load_native("turn", text, {"turn": signature("n : int")}).turn
+    begin = time.perf_counter()
+    turn(10_000_000)
+    count = int(1e7 * max(1.0, 0.2 / (time.perf_counter() - begin)))
+    thread = threading.Thread(target=turn, args=(count,))
+    thread.start()
+    ticks = 0
+    while thread.is_alive():
+        time.sleep(0.001)
+        ticks += 1
+    assert ticks > 5
+
+
+def test_a_signature_is_read_off_the_documentation() -> None:
+    def scaled(
+        kernel: object, rows: object, drive: object, near: object, far: object, step: float, states: object
+    ) -> None:
+        """Scale.
+
+        Parameters
+        ----------
+        rows : ndarray of int, shape (1 or n, lanes)
+            Rows.
+        drive, states : ndarray, shape (n, width)
+            Drive: with a colon.
+        near, far : ndarray, shapes (n,) and (n, 4), or longer
+            Two.
+        step : float
+            Step [s].
+
+        Returns
+        -------
+        nothing : int
+        """
+
+    rows, drive, near, far, step, states = signature_of(scaled, width=3)
+    assert (near.lengths, far.lengths) == (("n",), ("n", 4))
+    assert rows.lengths == (None, "lanes")
+    assert drive.lengths == states.lengths == ("n", 3)
+    assert (rows.kind.name, step.kind.name) == ("array of int, 2-dimensional", "float")
+
+
+def test_a_parameter_without_documentation_is_no_signature() -> None:
+    def bare(x: float, y: np.ndarray[Any, Any]) -> None:
+        """Do.
+
+        Parameters
+        ----------
+        x : float
+        """
+
+    with pytest.raises(ValueError, match=r"takes \['x', 'y'\], its documentation has \['x'\]"):
+        signature_of(bare)

@@ -1,0 +1,73 @@
+"""A text is not written again where all that it follows from is as it was."""
+
+from pathlib import Path
+
+import pytest
+
+from plant.compiled.native import load, recipes
+from plant.compiled.native.load import load_native
+from plant.compiled.native.recipes import identity
+from plant.compiled.native.signature import signature
+from plant.components.valves import pumped_flow
+from plant.eha.model import EhaParameters
+
+TEXT = "def scale(x):\n    return 3.0 * x\n"
+
+
+@pytest.fixture
+def written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Texts that were written."""
+    monkeypatch.setenv("HYDROSTATE_CACHE", str(tmp_path))
+    return []
+
+
+def scale(written: list[str], made_of: object) -> float:
+    """As a new process would run it."""
+    load._LOADED.clear()
+
+    def text() -> str:
+        written.append(TEXT)
+        return TEXT
+
+    return load_native("scale", text, {"scale": signature("x : float")}, made_of).scale(2.0)
+
+
+def test_a_text_is_written_once_where_sources_are_trusted(written: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recipes, "_trusted", [True])
+    assert [scale(written, (pumped_flow, 1)) for _ in range(3)] == [6.0] * 3
+    assert len(written) == 1
+    scale(written, (pumped_flow, 2))
+    assert len(written) == 2
+
+
+def test_it_is_written_again_where_a_source_has_changed(written: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recipes, "_trusted", [True])
+    scale(written, 1)
+    monkeypatch.setattr(recipes, "_sources", lambda: "changed")
+    scale(written, 1)
+    assert len(written) == 2
+
+
+def test_it_is_always_written_where_sources_are_not_trusted(written: list[str]) -> None:
+    assert [scale(written, 1), scale(written, 1)] == [6.0, 6.0]
+    assert len(written) == 2
+
+
+def test_a_recipe_without_its_kernel_is_none(
+    written: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recipes, "_trusted", [True])
+    scale(written, 1)
+    for path in tmp_path.glob("hydrostate_scale_[!r]*"):
+        path.write_bytes(b"damaged")
+    assert scale(written, 1) == 6.0
+    assert len(written) == 2
+
+
+def test_only_what_the_sources_say_is_known() -> None:
+    assert identity((EhaParameters, pumped_flow)) == (
+        "(plant.eha.model:EhaParameters, plant.components.valves:pumped_flow)"
+    )
+    assert identity(EhaParameters()) != identity(EhaParameters(piston_area=2e-3))
+    for unknown in (lambda x: x, Path("x"), test_only_what_the_sources_say_is_known, [object()]):
+        assert identity(unknown) is None
