@@ -40,15 +40,21 @@ class MissingColumnError(LogError):
         The channel, and the column that was wanted for it.
     known : str
         The columns that the log has, as a list in words.
+    hint : str
+        Which of them may be meant, as a clause with its semicolon.
     """
 
-    def __init__(self, channel: str, column: str, known: str, source: str | None = None) -> None:
-        wanted = f"column {column!r} is wanted for {channel}, the log has {known}"
-        super().__init__(f"{wanted}; name one of them as {channel}=NAME:UNIT", source)
-        self.channel, self.column, self.known = channel, column, known
+    def __init__(self, channel: str, column: str, known: str, source: str | None = None, hint: str = "") -> None:
+        wanted = f"column {column[:80]!r} is wanted for {channel}, the log has {known}"
+        super().__init__(f"{wanted}; name one of them as {channel}=NAME:UNIT{hint}", source)
+        self.channel, self.column, self.known, self.hint = channel, column, known, hint
 
     def __reduce__(self) -> tuple[object, ...]:
-        return MissingColumnError, (self.channel, self.column, self.known, self.source)
+        return MissingColumnError, (self.channel, self.column, self.known, self.source, self.hint)
+
+
+class NoChannelError(LogError):
+    """A log lacks the channels of an actuator; as a log of anything it may still be read."""
 
 
 class RigError(HydrostateError):

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 
 from plant.errors import RigError
+from plant.unit_text import plain_unit
 
 if TYPE_CHECKING:
     import pint
@@ -20,6 +21,10 @@ RPM = 0.10471975511965977
 
 LITRE_PER_MINUTE = 1e-3 / 60.0
 """One litre a minute, in m^3/s."""
+
+
+SMALLEST, LARGEST = 1e-40, 1e40
+"""Sizes of parameters [SI] beyond which they are no actuator's, whatever they measure."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +106,8 @@ def require_number(name: str, value: object, *, signed: bool = False, zero: bool
         raise RigError(f"{name} must be a finite number, got {value!r}")
     if not signed and (value < 0.0 or (value == 0.0 and not zero)):
         raise RigError(f"{name} must {'not be negative' if zero else 'be positive'}, got {value!r}")
+    if abs(value) > LARGEST or (value and abs(value) < SMALLEST and not (zero or signed)):  # squares are numbers still
+        raise RigError(f"{name} must be from {SMALLEST:g} to {LARGEST:g} in size, got {value!r}")
 
 
 def require_numbers(
@@ -182,13 +189,13 @@ def conversion_to(unit: str, wanted: str) -> tuple[float, float]:
     >>> round(factor, 12), offset
     (0.001, 0.0)
     """
-    import pint
-
     if unit.startswith("-"):
         factor, offset = conversion_to(unit[1:], wanted)
         return -factor, offset
+    name = plain_unit(LOWER_CASE.get(unit, unit), angular=wanted == "rad/s")
+    import pint
+
     registry = unit_registry()
-    name = LOWER_CASE.get(unit, unit)
     try:
         zero = float(registry.Quantity(0.0, name).to(wanted).magnitude)
         one = float(registry.Quantity(1.0, name).to(wanted).magnitude)

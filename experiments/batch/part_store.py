@@ -121,7 +121,8 @@ class PartStore:
         except OSError as error:
             raise HydrostateError(f"store {self.name} cannot be read: {error.strerror or error}") from error
         except (ValueError, KeyError, TypeError) as error:
-            raise HydrostateError(f"store {self.name}: {MANIFEST} is not one of a batch study") from error
+            way = "; delete it, and the same command goes on from the parts" if self._parts() else ""
+            raise HydrostateError(f"store {self.name}: {MANIFEST} is not one of a batch study{way}") from error
         if known != FORMAT:
             raise HydrostateError(f"store {self.name} must be of format {FORMAT}, got {known!r}")
         return content
@@ -204,8 +205,8 @@ class PartStore:
         return [name for name in self.folder.files(PARTS) if name.endswith(".parquet")]
 
     def _check(self) -> None:
-        """Refuse a folder that holds other work."""
-        if self.manifest() is not None:
+        """Refuse a folder that holds other work; a store whose manifest was deleted is known by its cases and parts."""
+        if self.manifest() is not None or (CASES in self.folder.files() and self._parts()):
             return
         strangers = [
             name

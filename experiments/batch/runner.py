@@ -55,6 +55,10 @@ class _Batch:
             return None
         return self.suspects.popleft() if self.suspects else next(self.tasks, None)
 
+    def left(self) -> bool:
+        """Return whether a task was not begun; an interruption after the last one stops nothing."""
+        return bool(self.suspects) or next(self.tasks, None) is not None
+
     def keep(self, task: Task, part: Part) -> None:
         self.store.add(part.content, task.keys)
         self.tally.done += len(task.keys)
@@ -114,7 +118,7 @@ def run_batch(
                 batch = _Batch(store, plan.tasks(done, width), stop, on_part, max_failures)
             if not _drained(batch, executor, width):
                 continue
-        if stop.is_set() and not batch.tally.stopped:
+        if stop.is_set() and not batch.tally.stopped and batch.left():
             batch.tally.stopped = "interrupted"
         return batch.tally
 

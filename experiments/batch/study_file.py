@@ -19,6 +19,7 @@ from plant.eha.drives import DRIVES
 from plant.eha.simulate import PLANTS
 from plant.errors import HydrostateError
 from plant.sensors.sensors import SENSORS
+from plant.small_file import small_file
 
 SHIPPED = "experiments.batch.studies"
 
@@ -33,6 +34,10 @@ class StudyError(HydrostateError):
 
 class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+
+NAME = r"^[^./\\\x00-\x1f\x7f][^/\\\x00-\x1f\x7f]*$"
+"""A study's name, which is a folder's too: without slashes and control characters, and no dot in front."""
 
 
 def _other_kind(info: ValidationInfo) -> ActuatorKind | None:
@@ -171,7 +176,7 @@ class Study(_Table):
         The healthy actuator's rig file, relative to the study file; empty for the paper's.
     """
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Annotated[str, Field(min_length=1, max_length=100, pattern=NAME)]
     question: str = ""
     plant: str = DEFAULT
     rig: str = ""
@@ -206,7 +211,7 @@ def read_study(path: str | Path) -> Study:
     """
     path = study_path(path)
     try:
-        content = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        content = tomllib.loads(small_file(path).decode("utf-8-sig"))
     except OSError as error:
         raise StudyError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:

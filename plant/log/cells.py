@@ -56,7 +56,12 @@ def numbers(values: NDArray[Any], name: str, source: str) -> Array:
         If the column is not one-dimensional, or a value is not a real number; it names the first.
     """
     if values.ndim != 1:
-        raise LogError(f"column {name!r} must be one-dimensional, got shape {values.shape}", source)
+        raise LogError(f"column {name[:80]!r} must be one-dimensional, got shape {values.shape}", source)
+    if values.dtype.kind == "c":
+        if (imaginary := np.imag(values) != 0.0).any():
+            row = int(np.argmax(imaginary))
+            raise not_a_number(source, name, row, values[row])
+        values = np.real(values)
     if values.dtype.kind in "fiub":
         return np.ascontiguousarray(values, dtype=np.float64)
     out = np.empty(len(values))
@@ -109,4 +114,4 @@ def not_a_number(source: str, name: str, row: int, value: object) -> LogError:
     row : int
         The row from 0; the sentence counts from 1, without the header.
     """
-    return LogError(f"column {name!r} must hold numbers, got {str(value)[:40]!r} in row {row + 1}", source)
+    return LogError(f"column {name[:80]!r} must hold numbers, got {str(value)[:40]!r} in row {row + 1}", source)

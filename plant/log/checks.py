@@ -5,13 +5,16 @@ from collections.abc import Collection
 import numpy as np
 
 from plant.arrays import Array
-from plant.errors import LogError
+from plant.errors import LogError, NoChannelError
 from plant.log.clock import FEWEST_SAMPLES, MOST_MISSING, Channels, Checked, long_enough, on_uniform_clock
 from plant.log.clock import Clock as Clock
 from plant.log.columns import TIME, TRUTH
 from plant.log.notes import LogCode
 from plant.log.plausibility import implausible
 from plant.notes import Note
+
+SHORTEST, LONGEST = 1e-8, 1e4
+"""Sample times of logs [s]; nothing is computed of others."""
 
 REQUIRED = ("motor_speed_rad_s", "position_m or velocity_m_s")
 """Channels that a log must hold: all of these, either one where a line says "or"."""
@@ -58,11 +61,24 @@ def trusted(
         timed = _rows_with_time(complete, source, notes)
         on_clock = on_uniform_clock(timed, source, clock, notes)
         channels = _masked(on_clock.channels, required, source, notes)
+        if not SHORTEST <= on_clock.sample_time <= LONGEST:
+            raise LogError(
+                f"the sample time must be from {SHORTEST:g} s to {LONGEST:g} s, got {on_clock.sample_time:.3g} s; "
+                f"check the unit of {TIME}",
+                source,
+            )
         notes += implausible(on_clock.sample_time, channels)
     return Checked(on_clock.sample_time, on_clock.start_time, channels, tuple(notes))
 
 
-def _alternatives(wanted: str) -> list[str]:
+def alternatives(wanted: str) -> list[str]:
+    """Return the channels of which one is wanted.
+
+    Parameters
+    ----------
+    wanted : str
+        Such as ``"position_m or velocity_m_s"``.
+    """
     return [name.strip() for name in wanted.split(" or ")]
 
 
@@ -71,12 +87,12 @@ def _counted(count: int, total: int) -> dict[str, float]:
 
 
 def _present(columns: Channels, required: Collection[str], source: str) -> None:
-    missing = [wanted for wanted in required if not any(name in columns for name in _alternatives(wanted))]
+    missing = [wanted for wanted in required if not any(name in columns for name in alternatives(wanted))]
     if missing:
         known = ", ".join(columns) or "none that is known"
-        raise LogError(f"column {' and '.join(missing)} is missing, the log has {known}", source)
+        raise NoChannelError(f"column {' and '.join(missing)} is missing, the log has {known}", source)
     if set(columns) <= {TIME}:
-        raise LogError(f"at least one channel is wanted beside {TIME}, the log has none that is known", source)
+        raise NoChannelError(f"at least one channel is wanted beside {TIME}, the log has none that is known", source)
 
 
 def _finite(columns: Channels, source: str) -> None:
@@ -132,7 +148,7 @@ def _masked(channels: Channels, required: Collection[str], source: str, notes: l
             notes.append(LogCode.CHANNEL_SLOWER.note(channel=name, rows=rows))
             continue
         del kept[name]
-        if not all(any(other in kept for other in _alternatives(wanted)) for wanted in required):
+        if not all(any(other in kept for other in alternatives(wanted)) for wanted in required):
             raise LogError(f"{name} is missing in {_share(count, total)}, at most 5 % may be", source)
         notes.append(LogCode.CHANNEL_LEFT_OUT.note(channel=name, **_counted(count, total)))
     if not kept:

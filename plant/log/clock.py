@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from plant.errors import LogError
 from plant.log.columns import TIME
-from plant.log.jitter import grid_of, resampled, rounded_clock, usual_step
+from plant.log.jitter import GAP, grid_of, resampled, rounded_clock, usual_step
 from plant.log.notes import LogCode
 from plant.notes import Note
 
@@ -90,6 +90,7 @@ def on_uniform_clock(columns: Channels, source: str, clock: Clock | None, notes:
     channels = {name: values for name, values in columns.items() if name != TIME}
     if clock is not None and _agrees(time, clock):
         return Checked(clock.sample_time, clock.start_time, channels)
+    _steps_of_a_clock(time, source)
     if _own_times(channels):
         return _merged(time, channels, source, notes)
     ticks = _whole_ticks(time)
@@ -102,6 +103,19 @@ def on_uniform_clock(columns: Channels, source: str, clock: Clock | None, notes:
         return _mended(time, channels, source, notes)
     slots = np.concatenate(([0.0], np.cumsum(ticks)))
     return Checked(sample_time, float(time[0]), _spread(channels, slots.astype(np.int64)))
+
+
+def _steps_of_a_clock(time: Values, source: str) -> None:
+    """Refuse stamps whose steps are too large for a number."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        step = np.diff(time)
+        span = float(time[-1] - time[0])
+    if not (np.isfinite(step).all() and np.isfinite(span)):
+        row = int(np.argmin(np.isfinite(step)))
+        raise LogError(
+            f"steps of {TIME} must be finite, got {time[row + 1]:.6g} s after {time[row]:.6g} s in row {row + 2}",
+            source,
+        )
 
 
 def _mended(time: Values, channels: Channels, source: str, notes: list[Note]) -> Checked:
@@ -137,6 +151,10 @@ def _without(again: NDArray[np.int64], time: Values, channels: Channels, source:
 
 
 def _resampled(time: Values, channels: Channels, source: str, notes: list[Note]) -> Checked:
+    shortest = GAP * usual_step(np.diff(time))
+    if not shortest > 0.0:
+        raise _not_increasing(time, source)
+    _few_left_out(len(time), (float(time[-1]) - float(time[0])) / shortest, source)
     grid = grid_of(time)
     if not grid.scatter <= MOST_JITTER:
         raise LogError(
@@ -208,8 +226,9 @@ def _whole_ticks(time: Values) -> Values | None:
 
 
 def _few_left_out(there: int, total: float, source: str) -> None:
-    if total - there > MOST_MISSING * total:
-        raise LogError(f"{TIME} leaves out {total - there:.0f} of {total:.0f} samples, wanted at most 5 %", source)
+    if not there >= (1.0 - MOST_MISSING) * total:
+        said = "{:.0f} of {:.0f}" if total < 1e15 else "{:.3g} of {:.3g}"
+        raise LogError(f"{TIME} leaves out {said.format(total - there, total)} samples, wanted at most 5 %", source)
 
 
 def _agrees(time: Values, clock: Clock) -> bool:

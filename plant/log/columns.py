@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.errors import HydrostateError, LogError, MissingColumnError, RigError
+from plant.log.headings import Heading, cleaned
 from plant.units import conversion_to
 
 CHANNELS: Mapping[str, str] = MappingProxyType(
@@ -32,6 +33,9 @@ CHANNELS: Mapping[str, str] = MappingProxyType(
 
 TIME = "time_s"
 """The column that says when; it becomes the record's clock."""
+
+TIMES = ("t", "time", "times", "timestamp", "timestamps", "time_stamp", "zeit", "temps", "elapsed_time", "x_value")
+"""What a time column is called where its unit stands beside the name."""
 
 TRUTH = "true_"
 """Columns that begin so hold simulated truth, and are kept as they are."""
@@ -91,13 +95,16 @@ class Column:
     offset: float = 0.0
 
 
-def resolve_columns(names: Sequence[str], mapping: Mapping[str, str] | None, source: str) -> tuple[Column, ...]:
+def resolve_columns(
+    names: "Sequence[str | Heading]", mapping: Mapping[str, str] | None, source: str
+) -> tuple[Column, ...]:
     """Return the columns of a log that become channels; all others are left unread.
 
     Parameters
     ----------
-    names : Sequence[str]
-        Column names, in the order of the log.
+    names : Sequence[str or Heading]
+        Column names, in the order of the log. ``Motor speed [rpm]`` is the motor's speed: a channel's name in any
+        case, with its unit in brackets or said by the file.
     mapping : Mapping[str, str] or None
         Foreign names by channel, with a unit after a colon where it is not SI: ``"POS_MM:mm"``. A mapped
         channel is taken from there alone, whatever the other columns are called.
@@ -112,24 +119,23 @@ def resolve_columns(names: Sequence[str], mapping: Mapping[str, str] | None, sou
     >>> [column.channel for column in resolve_columns(["time_ms", "note", "position_mm"], None, "a.csv")]
     ['time_s', 'position_m']
     """
-    clean = [name.strip().removeprefix("\ufeff").strip() for name in names]
+    clean = cleaned(names)
+    stamped = [position for position, heading in enumerate(clean) if heading.stamped]
     found = {channel: _foreign(clean, channel, spec, source) for channel, spec in (mapping or {}).items()}
     taken = {column.position for column in found.values()}
     strange: list[tuple[str, LogError]] = []
-    for position, name in enumerate(clean):
-        if position in taken:
-            continue
-        channel = _channel_of(name)
+    for position, heading in enumerate(clean):
+        channel = None if position in taken else TIME if stamped == [position] else _channel_of(heading)
         if channel is None or channel in (mapping or {}):
             continue
         try:
-            column = _by_suffix(position, name, channel, source)
+            column = _own(position, heading, channel, source)
         except LogError as error:
             strange.append((channel, error))
             continue
         if channel in found:
             raise LogError(
-                f"columns {found[channel].name!r} and {name!r} both give {channel}, wanted one; "
+                f"columns {found[channel].name[:80]!r} and {heading.name[:80]!r} both give {channel}, wanted one; "
                 f"name the right one as {channel}=NAME:UNIT",
                 source,
             )
@@ -140,36 +146,61 @@ def resolve_columns(names: Sequence[str], mapping: Mapping[str, str] | None, sou
     return tuple(found.values())
 
 
-def _channel_of(name: str) -> str | None:
+def _channel_of(heading: Heading) -> str | None:
+    name = heading.name
     if name in UNITS or (name.startswith(TRUTH) and name != TRUTH):
         return name
+    if heading.unit is not None and (known := STEMS.get(heading.stem + "_")):
+        return known
+    if heading.stem in TIMES and heading.unit is not None and is_time(heading.unit):
+        return TIME
     stems = [stem for stem in STEMS if name.startswith(stem)]
-    return STEMS[max(stems, key=len)] if stems else None
+    return STEMS[max(stems, key=len)] if stems and heading.name == heading.bare else None
 
 
-def _by_suffix(position: int, name: str, channel: str, source: str) -> Column:
-    if name == channel:
+def _own(position: int, heading: Heading, channel: str, source: str) -> Column:
+    """Return the column of a channel's own name, converted by the unit that it says."""
+    name = heading.name
+    if channel.startswith(TRUTH):
+        return Column(position, name, channel)
+    if heading.stamped:
         return Column(position, name, channel)
     stem = next(stem for stem, owner in STEMS.items() if owner == channel)
-    suffix = name.removeprefix(stem)
-    unit = re.sub(r"([A-Za-z])([234])(?![0-9])", r"\1^\2", suffix.replace("_per_", "/").replace("_", "/"))
+    unit = heading.unit
+    if name != channel and heading.stem + "_" != stem and not (channel == TIME and heading.stem in TIMES):
+        suffix = name.removeprefix(stem)
+        unit = re.sub(r"([A-Za-z])([234])(?![0-9])", r"\1^\2", suffix.replace("_per_", "/").replace("_", "/"))
+    if unit is None:
+        return Column(position, name, channel)
     factor, offset = _conversion(unit, channel, name, source)
+    if name == channel and (factor, offset) != (1.0, 0.0):
+        raise LogError(
+            f"column {name[:80]!r} says {UNITS[channel]} by its name and {unit} beside it, wanted one; "
+            f"name the right one as {channel}=NAME:UNIT",
+            source,
+        )
     return Column(position, name, channel, factor, offset)
 
 
-def _foreign(names: Sequence[str], channel: str, spec: str, source: str) -> Column:
+def _foreign(headings: Sequence[Heading], channel: str, spec: str, source: str) -> Column:
     _known_channel(channel, lambda message: LogError(message, source))
+    names, bares = [one.name for one in headings], [one.bare for one in headings]
     name, unit = _name_and_unit(spec)
     if spec in names:
         name, unit = spec, None
     positions = [position for position, other in enumerate(names) if other == name]
+    positions = positions or [position for position, other in enumerate(bares) if other == name]
     if not positions:
-        raise MissingColumnError(channel, name, _listed(names), source)
+        raise MissingColumnError(channel, name, listed(names), source)
     if len(positions) > 1:
-        raise LogError(f"column {name!r} is wanted once for {channel}, the log has it {len(positions)} times", source)
+        raise LogError(
+            f"column {name[:80]!r} is wanted once for {channel}, the log has it {len(positions)} times", source
+        )
+    heading = headings[positions[0]]
+    unit = heading.unit if unit is None else unit
     if unit is None or channel.startswith(TRUTH):
-        return Column(positions[0], name, channel)
-    return Column(positions[0], name, channel, *_conversion(unit, channel, name, source))
+        return Column(positions[0], heading.name, channel)
+    return Column(positions[0], heading.name, channel, *_conversion(unit, channel, heading.name, source))
 
 
 def _name_and_unit(spec: str) -> tuple[str, str | None]:
@@ -177,11 +208,20 @@ def _name_and_unit(spec: str) -> tuple[str, str | None]:
     return (name.strip(), unit.strip()) if colon else (spec.strip(), None)
 
 
+def is_time(unit: str) -> bool:
+    """Return whether a unit is one of time."""
+    try:
+        conversion_to(unit, "s")
+    except ValueError:
+        return False
+    return True
+
+
 def _conversion(unit: str, channel: str, name: str, source: str) -> tuple[float, float]:
     try:
         return conversion_to(unit, UNITS[channel])
     except ValueError as error:
-        raise LogError(f"column {name!r} cannot become {channel}: {error}", source) from error
+        raise LogError(f"column {name[:80]!r} cannot become {channel}: {error}", source) from error
 
 
 def _known_channel(channel: str, error: Callable[[str], HydrostateError]) -> None:
@@ -192,7 +232,8 @@ def _known_channel(channel: str, error: Callable[[str], HydrostateError]) -> Non
     raise error(f"channel {channel!r} is unknown, {hint}")
 
 
-def _listed(names: Collection[str], limit: int = 12) -> str:
+def listed(names: Collection[str], limit: int = 12) -> str:
+    """Return names as a list in words, the first few of many."""
     shown = ", ".join(repr(name[:40]) for name in list(names)[:limit])
     return (shown or "no columns") + (f" and {len(names) - limit} more" if len(names) > limit else "")
 
@@ -219,7 +260,7 @@ def check_columns(mapping: Mapping[str, str]) -> dict[str, str]:
             try:
                 conversion_to(unit, UNITS[channel])
             except ValueError as error:
-                raise RigError(f"{channel}={spec}: {error}") from error
+                raise RigError(f"{channel}={spec[:80]!r}: {error}") from error
     return dict(mapping)
 
 

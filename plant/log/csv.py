@@ -1,11 +1,11 @@
-"""CSV logs: commas, semicolons or tabs; fast through pyarrow, and cell by cell to name what is wrong."""
+"""CSV logs: what they hold as numbers; fast through pyarrow, and cell by cell to name what is wrong."""
 
 import csv
 import gzip
+import io
 from array import array
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO, cast
@@ -19,58 +19,42 @@ from plant.errors import LogError
 from plant.log.arrow import from_arrow, to_arrow
 from plant.log.cells import MISSING, not_a_number, number, wrong_width
 from plant.log.columns import TRUTH, Column
+from plant.log.csv_layout import BLANKS, Layout, layout_of
+from plant.log.packed import opened, packing_of
+from plant.log.table import Table
 
-Choose = Callable[[Sequence[str]], Sequence[Column]]
 
-LONGEST_HEADER = 1 << 20
-
-
-@dataclass(frozen=True)
-class Layout:
-    """How a CSV is written.
+def open_csv(path: Path, metadata: str | None) -> Table:
+    """Open a text log: a CSV, or the like with tabs, semicolons or blanks, plain or packed by gzip or zstd.
 
     Parameters
     ----------
-    names : tuple[str, ...]
-        Column names, as the header gives them.
-    header_lines : int
-        Lines down to the header, with it.
-    delimiter, decimal_point : str
-        One character each.
-    """
-
-    names: tuple[str, ...]
-    header_lines: int
-    delimiter: str
-    decimal_point: str
-
-
-def read_csv(path: Path, choose: Choose) -> dict[Column, Array]:
-    """Return the columns of a CSV log that ``choose`` picks by name.
-
-    Parameters
-    ----------
-    path : Path
-        A CSV with a header line, plain or compressed by gzip.
-
-    Returns
-    -------
-    dict[Column, ndarray, shape (n,)]
-        Values as logged, NaN in empty cells.
+    metadata : str or None
+        What stands beside it.
 
     Raises
     ------
     LogError
-        If the file is empty or no text, a row has too few or too many cells, or a number is none.
+        If the file is empty or no text.
     OSError
         If the file cannot be read.
     """
-    layout = _layout(path)
-    chosen = list(choose(layout.names))
-    try:
-        return _read_fast(path, layout, chosen)
-    except pa.ArrowInvalid:
-        return _read_cells(path, layout, chosen)
+    layout = layout_of(path)
+
+    def read(chosen: Sequence[Column]) -> dict[Column, Array]:
+        return _read(path, layout, chosen)
+
+    return Table(str(path), layout.headings, read, metadata)
+
+
+def _read(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
+    """Return columns as logged, NaN in empty cells; refuse a row of another width, or a cell that is no number."""
+    if layout.delimiter != BLANKS:
+        try:
+            return _read_fast(path, layout, chosen)
+        except (pa.ArrowInvalid, UnicodeError):  # stray bytes of another encoding harm nobody outside their cell
+            pass
+    return _read_cells(path, layout, chosen)
 
 
 def write_csv(columns: Mapping[str, Array], file: BinaryIO, *, compressed: bool) -> None:
@@ -92,71 +76,93 @@ def write_csv(columns: Mapping[str, Array], file: BinaryIO, *, compressed: bool)
 
 
 @contextmanager
-def _text(path: Path) -> Generator[TextIO]:
-    opener = gzip.open if path.suffix.lower() == ".gz" else Path.open
-    with opener(path, "rt", encoding="utf-8-sig", errors="replace") as text:
-        yield cast(TextIO, text)
+def _text(path: Path, layout: Layout) -> Generator[TextIO]:
+    encoding = "utf-8-sig" if layout.encoding == "utf-8" else layout.encoding
+    with opened(path) as file, io.TextIOWrapper(file, encoding=encoding, errors="replace", newline=None) as text:
+        yield text
 
 
-def _layout(path: Path) -> Layout:
-    with _text(path) as text:
-        lines = 0
-        while True:
-            header = text.readline(LONGEST_HEADER)
-            lines += 1
-            if not header:
-                raise LogError("a header line is wanted, the file is empty", str(path))
-            if header.strip():
-                break
-        first = text.readline(LONGEST_HEADER)
-    if "\0" in header + first or header.count("\ufffd") > 0.1 * len(header):
-        raise LogError("a text file is wanted for a CSV log, got binary data", str(path))
-    delimiter = max(",;\t", key=header.count)
-    comma = delimiter != "," and "," in first and "." not in first
-    names = next(csv.reader([header], delimiter=delimiter))
-    return Layout(tuple(names), lines, delimiter, "," if comma else ".")
+@contextmanager
+def _bytes(path: Path) -> Generator[Any]:
+    """Open what pyarrow reads: the file itself where it can, since it reads that in parallel."""
+    if packing_of(path) is None:
+        yield path
+        return
+    with opened(path) as file:
+        yield pa.PythonFile(cast(io.BufferedIOBase, file), mode="r")
 
 
 def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
-    labels = [str(position) for position in range(len(layout.names))]
+    labels = [str(position) for position in range(len(layout.headings))]
     wanted = [labels[column.position] for column in chosen]
-    table = arrow_csv.read_csv(
-        path,
-        read_options=arrow_csv.ReadOptions(column_names=labels, skip_rows=layout.header_lines),
-        parse_options=arrow_csv.ParseOptions(delimiter=layout.delimiter),
-        convert_options=arrow_csv.ConvertOptions(
-            include_columns=wanted,
-            column_types=dict.fromkeys(wanted, pa.float64()),
-            null_values=list(MISSING),
-            decimal_point=layout.decimal_point,
-        ),
-    )
+    texts = {labels[place] for place in layout.stamped}
+    kinds: dict[str, Any] = {one: pa.string() if one in texts else pa.float64() for one in wanted}
+    with _bytes(path) as source:
+        table = arrow_csv.read_csv(
+            source,
+            read_options=arrow_csv.ReadOptions(
+                column_names=labels,
+                skip_rows=layout.skipped,
+                encoding=layout.encoding if layout.encoding.startswith("utf-16") else "utf8",
+            ),
+            parse_options=arrow_csv.ParseOptions(delimiter=layout.delimiter),
+            convert_options=arrow_csv.ConvertOptions(
+                include_columns=wanted,
+                column_types=kinds,
+                null_values=list(MISSING),
+                decimal_point=layout.decimal_point,
+            ),
+        )
     out: dict[Column, Array] = {}
     for column, label in zip(chosen, wanted, strict=True):
-        out[column] = from_arrow(table.column(label))
+        if label in texts:
+            out[column] = _stamps(table.column(label).to_pylist(), column, path)
+        else:
+            out[column] = from_arrow(table.column(label))
         table = table.drop_columns([label])  # hands each column's memory back before the next is copied
     return out
 
 
+def _stamps(cells: Sequence[str | None], column: Column, path: Path) -> Any:
+    from plant.log.stamps import read_stamps
+
+    return read_stamps(
+        [cell or "" for cell in cells], lambda row, cell: not_a_number(str(path), column.name, row, cell)
+    )
+
+
+def _rows(text: TextIO, layout: Layout) -> Iterator[list[str]]:
+    lines = islice(text, layout.skipped, None)
+    if layout.delimiter == BLANKS:
+        return (line.split() for line in lines)
+    return csv.reader(lines, delimiter=layout.delimiter)
+
+
 def _read_cells(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
     """Read what pyarrow will not, or say in which row and column it is no number."""
-    cells = {column: array("d") for column in chosen}
+    stamped = [column for column in chosen if column.position in layout.stamped]
+    cells: dict[Column, Any] = {column: [] if column in stamped else array("d") for column in chosen}
     try:
-        with _text(path) as text:
-            rows = csv.reader(islice(text, layout.header_lines, None), delimiter=layout.delimiter)
-            for row, values in enumerate(values for values in rows if values):
-                if len(values) != len(layout.names):
-                    raise wrong_width(str(path), len(layout.names), len(values), row)
+        with _text(path, layout) as text:
+            for row, values in enumerate(values for values in _rows(text, layout) if values):
+                if len(values) != len(layout.headings):
+                    raise wrong_width(str(path), len(layout.headings), len(values), row)
                 for column in list(cells):
-                    _append(cells, column, values[column.position], layout, path, row)
+                    if column in stamped:
+                        cells[column].append(values[column.position])
+                    else:
+                        _append(cells, column, values[column.position], layout, path, row)
     except csv.Error as error:
         raise LogError(f"cannot be read as CSV: {error}", str(path)) from error
-    return {column: np.frombuffer(values, dtype=np.float64) for column, values in cells.items()}
+    return {
+        column: _stamps(values, column, path) if column in stamped else np.frombuffer(values, dtype=np.float64)
+        for column, values in cells.items()
+    }
 
 
 def _append(cells: dict[Column, Any], column: Column, cell: str, layout: Layout, path: Path, row: int) -> None:
     try:
-        cells[column].append(number(cell.replace(layout.decimal_point, ".")))
+        cells[column].append(number(cell if layout.decimal_point == "." else cell.replace(",", ".")))
     except ValueError as error:
         if not column.channel.startswith(TRUTH):
             raise not_a_number(str(path), column.name, row, cell) from error

@@ -63,7 +63,7 @@ class CsvStream:
         self.channels = tuple(one.channel for one in self._columns[1:])
         """Channels of the samples, in order."""
         self.cut = False
-        """Whether the stream ended within a row, which is left out."""
+        """Whether the stream ended within a row, or without its line's end; that row is left out."""
         rows = self._rows()
         first = list(islice(rows, FIRST_ROWS))
         if len(first) < 2:
@@ -124,7 +124,7 @@ class CsvStream:
             cells = line.rstrip("\r\n").split(self._delimiter)
             if '"' in line:
                 cells = next(csv.reader([line], delimiter=self._delimiter))
-            if not line.endswith("\n") and len(cells) < self._width:
+            if not line.endswith(("\n", "\r")):  # it may end in the middle of a digit
                 self.cut = True
                 return
             if len(cells) != self._width:

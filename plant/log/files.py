@@ -3,52 +3,57 @@
 import json
 import math
 import warnings
-from collections.abc import Collection, Mapping
-from functools import partial
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
-from plant.arrays import Array
 from plant.atomic import replacing
-from plant.errors import HydrostateError, LogError, LogWarning
-from plant.log.arrow import from_arrow, to_arrow
-from plant.log.cells import each_read, numbers
+from plant.errors import LogError, LogWarning
 from plant.log.checks import REQUIRED, Clock, trusted
-from plant.log.columns import TIME, Column, converted, resolve_columns
-from plant.log.csv import Choose, read_csv, write_csv
-from plant.log.mat import read_mat, write_mat
+from plant.log.columns import TIME
+from plant.log.csv import write_csv
+from plant.log.formats import open_tables
 from plant.log.notes import LogCode
 from plant.log.record import Record
+from plant.log.tables import gathered
 from plant.notes import Note
 
-Raw = tuple[dict[Column, Array], str | None]
-
-SCHEMA_KEY = b"hydrostate"
 SUFFIXES = {".csv": "csv", ".txt": "csv", ".gz": "csv", ".parquet": "parquet", ".mat": "mat"}
-"""File formats by suffix."""
+"""File formats that are written, by suffix."""
 
 
 def read_record(
-    path: str | Path, *, columns: Mapping[str, str] | None = None, required: Collection[str] = REQUIRED
+    path: str | Path,
+    *,
+    columns: Mapping[str, str] | None = None,
+    required: Collection[str] = REQUIRED,
+    sample_time: float | None = None,
+    beside: Sequence[str | Path] = (),
 ) -> Record:
     """Read a log, convert its columns to SI, and refuse it if it cannot be trusted.
 
     Parameters
     ----------
     path : str or Path
-        A ``.csv`` or ``.txt`` (also ``.gz``), ``.parquet``, or ``.mat`` (versions 5 to 7) file.
+        Text with cells apart by commas, semicolons, tabs or blanks (also packed by gzip or zstd), Parquet, Feather or
+        MAT; with the extra ``bench`` also XLSX, TDMS, MDF, HDF5 and MAT 7.3. The content says which, not the name.
     columns : Mapping[str, str], optional
-        Foreign columns by channel, with a unit where it is not SI: ``{"position_m": "POS_MM:mm"}``.
+        Foreign columns by channel, with a unit where the file gives none and it is not SI:
+        ``{"position_m": "POS_MM:mm"}``.
     required : Collection[str]
         Channels that must be there beside time; ``"position_m or velocity_m_s"`` asks for one of the two.
+    sample_time : float, optional
+        Time between rows [s] of a log that has no time.
+    beside : Sequence[str or Path]
+        Files of other loggers of the same test, whose channels are put on one clock with these.
 
     Returns
     -------
     Record
-        The log on a uniform clock, NaN where a sample is missing, with the metadata it was written with.
+        The log on a uniform clock, NaN where a sample is missing, with the metadata it was written with; where its
+        stamps are dates, ``began`` among them says when the first row was taken.
 
     Raises
     ------
@@ -62,14 +67,17 @@ def read_record(
         If samples were masked or resampled, a channel was left out, or a unit looks wrong.
     """
     path = Path(path)
-    choose = partial(resolve_columns, mapping=columns, source=str(path))
-    raw, text = _raw(path, choose)
-    document, notes = _document(text)
-    clock = _clock(document)
-    checked = trusted(converted(raw), source=str(path), required=required, clock=clock)
-    for note in (*notes, *checked.notes):
+    if sample_time is not None and not (math.isfinite(sample_time) and sample_time > 0.0):
+        raise LogError(f"sample_time must be positive and finite, got {sample_time!r}", str(path))
+    tables = [table for one in (path, *map(Path, beside)) for table in open_tables(one, _beside(one))]
+    found = gathered(tables, columns, required, str(path), sample_time)
+    document, notes = _document(next((one.metadata for one in tables if one.metadata), None))
+    clock = None if beside else _clock(document)
+    checked = trusted(found.columns, source=str(path), required=required, clock=clock)
+    for note in (*notes, *found.notes, *checked.notes):
         warnings.warn(LogWarning(note, str(path)), stacklevel=2)
-    return Record(checked.sample_time, checked.channels, document.get("metadata", {}), checked.start_time)
+    began = {} if found.began is None else {"began": found.began}
+    return Record(checked.sample_time, checked.channels, {**began, **document.get("metadata", {})}, checked.start_time)
 
 
 def write_record(record: Record, path: str | Path) -> None:
@@ -97,9 +105,13 @@ def write_record(record: Record, path: str | Path) -> None:
                 notes.write(document.encode())
                 write_csv(table, file, compressed=path.suffix.lower() == ".gz")
         elif kind == "parquet":
+            from plant.log.parquet import write_parquet
+
             with replacing(path) as file:
-                _write_parquet(table, document, file)
+                write_parquet(table, document, file)
         else:
+            from plant.log.mat import write_mat
+
             with replacing(path) as file:
                 write_mat(table, document, file, str(path))
     except OSError as error:
@@ -120,58 +132,17 @@ def sidecar(path: Path) -> Path:
 def _kind(path: Path) -> str:
     kind = SUFFIXES.get(path.suffix.lower())
     if kind is None:
-        raise LogError(f"a log ends in {', '.join(SUFFIXES)}, got {path.suffix or 'no suffix'}", str(path))
+        raise LogError(f"a log is written as {', '.join(SUFFIXES)}, got {path.suffix or 'no suffix'}", str(path))
     return kind
 
 
-def _raw(path: Path, choose: Choose) -> Raw:
+def _beside(path: Path) -> str | None:
+    """Return the metadata beside a CSV, None where there are none."""
+    notes = sidecar(path)
     try:
-        if path.is_dir():
-            raise LogError("a file is wanted, got a directory", str(path))
-        if not path.exists():
-            raise LogError("there is no such file", str(path))
-        kind = _kind(path)
-        if kind == "csv":
-            notes = sidecar(path)
-            return read_csv(path, choose), notes.read_text(errors="replace") if notes.is_file() else None
-        with path.open("rb") as file:
-            if not file.read(1):
-                raise LogError("the file is empty", str(path))
-        return _read_parquet(path, choose) if kind == "parquet" else read_mat(path, choose)
-    except HydrostateError:
-        raise
-    except PermissionError as error:
-        raise LogError("there is no permission to read it", str(path)) from error
-    except Exception as error:  # parsers of damaged files raise whatever they stumble over
-        said = " ".join(str(error).split())[:200] or type(error).__name__
-        raise LogError(f"cannot be read as {path.suffix.lower()[1:]}: {said}", str(path)) from error
-
-
-def _read_parquet(path: Path, choose: Choose) -> Raw:
-    import pyarrow.parquet as pq
-
-    file = pq.ParquetFile(path)
-    names = file.schema_arrow.names
-    text = (file.schema_arrow.metadata or {}).get(SCHEMA_KEY)
-
-    def read(column: Column) -> Array:
-        return _floats(file.read([names[column.position]]).column(0), column, str(path))
-
-    return each_read(choose(names), read), None if text is None else text.decode(errors="replace")
-
-
-def _write_parquet(columns: Mapping[str, Array], metadata: str, file: BinaryIO) -> None:
-    import pyarrow.parquet as pq
-
-    table = pa.table({name: to_arrow(values) for name, values in columns.items()})
-    pq.write_table(table.replace_schema_metadata({SCHEMA_KEY: metadata.encode()}), file)
-
-
-def _floats(values: "pa.ChunkedArray[Any]", column: Column, source: str) -> Array:
-    kind = values.type
-    if pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind):
-        return from_arrow(values if kind == pa.float64() else values.cast(pa.float64(), safe=False))
-    return numbers(np.array(values.to_pylist(), dtype=object), column.name, source)
+        return notes.read_text(errors="replace") if notes.is_file() else None
+    except (OSError, ValueError):
+        return None
 
 
 def _encoded(record: Record, path: Path) -> str:

@@ -16,6 +16,9 @@ BEYOND_JITTER = 3.5
 POINTS = 5
 """Samples of which a slope is taken [count]."""
 
+FEWEST_QUANTA = 5
+"""Steps of a rounded clock, at least [count]; fewer are gaps."""
+
 FILLED = 0.15
 """Least standard deviation of stamps about a uniform clock, over their quantum, that rounding to it leaves; it is 0.29
 where all remainders are alike [dimensionless]."""
@@ -196,10 +199,17 @@ def rounded_clock(time: Values, slots: Values) -> tuple[float, float, float] | N
     if not len(apart) or float(np.min(step)) < 0.0:
         return None
     quantum = float(np.min(apart))
-    if np.max(np.abs(step / quantum - np.rint(step / quantum))) > 0.01:
+    quanta = np.rint(step / quantum)
+    if np.max(np.abs(step / quantum - quanta)) > 0.01 or np.count_nonzero(quanta) < FEWEST_QUANTA:
         return None
     centred = slots - slots.mean()
     sample_time = float(centred @ time) / float(centred @ centred)
-    left = time - sample_time * slots
-    explained = np.ptp(left) <= ROUNDED * quantum and np.std(left) >= FILLED * quantum
-    return (float(left.mean()), sample_time, quantum) if explained and sample_time > 0.0 else None
+    if not sample_time > 0.0:
+        return None
+    ticks = max(1.0, np.rint(quantum / sample_time))
+    for tried in (quantum / ticks, sample_time):  # a whole number of samples a quantum, if the stamps allow it
+        left = time - tried * slots
+        most = 1.0 + 1e-6 if tried is not sample_time else ROUNDED
+        if np.ptp(left) <= most * quantum and np.std(left) >= FILLED * quantum:
+            return float(left.mean()), float(tried), quantum
+    return None

@@ -1,7 +1,7 @@
-"""MAT logs, to version 7: one struct whose fields are columns, or plain variables."""
+"""MAT logs: structs whose fields are columns, or plain variables; versions 5 to 7 here, 7.3 as the HDF5 it is."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -9,59 +9,125 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError
-from plant.log.cells import each_read, numbers
-from plant.log.columns import Column
-from plant.log.csv import Choose
 from plant.log.mat_reader import DamagedMatError, Value, read_variables
+from plant.log.table import Table, table_of
 
 STRUCT = "record"
 METADATA = "metadata_json"
-NEWER = (b"\x00\x02IM", b"\x02\x00MI")
-"""Version and byte order of a MAT 7.3, which is an HDF5 file."""
+
+MOST_SPREAD = 64
+"""Columns of the widest matrix that is read as columns."""
+
+OBJECTS = (
+    "it holds no vector of numbers; a table, timetable or timeseries can only be read by MATLAB: save its columns as "
+    "the fields of a struct, s.time_s = seconds(t.Time); s.position_m = t.Position; save('log.mat', '-struct', 's')"
+)
 
 
-def read_mat(path: Path, choose: Choose) -> tuple[dict[Column, Array], str | None]:
-    """Return the columns of a MAT log that ``choose`` picks by name, and the metadata text it carries.
-
-    Parameters
-    ----------
-    path : Path
-        A MAT file of version 5 to 7.
+def open_mat(path: Path) -> tuple[Table, ...]:
+    """Open a MAT file of version 5 to 7.
 
     Returns
     -------
-    columns : dict[Column, ndarray, shape (n,)]
-        Values as logged.
-    metadata : str or None
-        The JSON text that `write_mat` put there.
+    tuple of Table
+        One a struct, and one of the plain variables.
 
     Raises
     ------
     LogError
-        If it is of another version or damaged, or a column is no vector of real numbers.
+        If it is of another version or damaged, or holds no numbers.
     """
-    content = path.read_bytes()
-    if content[124:128] in NEWER:
-        raise LogError("MAT files to version 7 are read, got 7.3; save it with '-v7'", str(path))
     try:
-        table = _table(read_variables(content))
+        content = read_variables(path.read_bytes(), str(path))
     except DamagedMatError as error:
         raise LogError(f"cannot be read as mat: {error}", str(path)) from error
-    names = [name for name in table if name != METADATA]
-
-    def read(column: Column) -> Array:
-        return numbers(np.atleast_1d(np.asarray(table[names[column.position]])), column.name, str(path))
-
-    text = table.get(METADATA)
-    return each_read(choose(names), read), text if isinstance(text, str) else None
+    return tables_of(content, str(path))
 
 
-def _table(content: Mapping[str, Value]) -> Mapping[str, Value]:
-    """Return the struct that holds the columns: the one named record, the only one, or the file itself."""
+def tables_of(content: Mapping[str, Value], source: str) -> tuple[Table, ...]:
+    """Return the tables of the variables of a MAT file.
+
+    Parameters
+    ----------
+    content : Mapping[str, ndarray of any shape, str, Mapping or Sequence]
+        Variables by name; structs are mappings.
+    source : str
+        What messages call the file.
+
+    Raises
+    ------
+    LogError
+        If there are no numbers.
+    """
+    if isinstance(record := content.get(STRUCT), Mapping):
+        content = {STRUCT: record}
+    made: list[Table] = []
+    plain = {name: value for name, value in content.items() if not isinstance(value, Mapping)}
     structs = {name: value for name, value in content.items() if isinstance(value, Mapping)}
-    if STRUCT in structs:
-        return structs[STRUCT]
-    return next(iter(structs.values())) if len(structs) == 1 and len(content) == 1 else content
+    for name, value in {"": plain, **structs}.items():
+        columns, units = _columns(value)
+        text = value.get(METADATA)
+        if columns:
+            said = text if isinstance(text, str) else None
+            made.append(table_of(source, columns, units=units, metadata=said, label=name))
+    if not made:
+        raise LogError(OBJECTS, source)
+    return tuple(made)
+
+
+def _columns(struct: Mapping[str, Value], above: str = "") -> tuple[dict[str, Any], dict[str, str | None]]:
+    """Return a struct's columns by name, fields of structs within it as ``outer.inner``, and what units it gives."""
+    columns: dict[str, Any] = {}
+    units: dict[str, str | None] = {}
+    if "time" in struct and "signals" in struct:
+        return _simulink(struct)
+    for name, value in struct.items():
+        if isinstance(value, Mapping):
+            inner, said = _columns(value, f"{above}{name}.")
+            columns |= inner
+            units |= said
+        elif isinstance(value, np.ndarray):
+            columns |= spread(above + name, value)
+    return columns, units
+
+
+def _simulink(struct: Mapping[str, Value]) -> tuple[dict[str, Any], dict[str, str | None]]:
+    """Return the columns of what Simulink calls a structure with time: its time is in seconds."""
+    columns: dict[str, Any] = {"time": struct["time"]}
+    signals = struct["signals"]
+    many: Sequence[Any] = signals if isinstance(signals, Sequence) and not isinstance(signals, str) else [signals]
+    for number, one in enumerate(many, start=1):
+        if isinstance(one, Mapping) and isinstance(one.get("values"), np.ndarray):
+            label = one.get("label")
+            columns |= spread(label if isinstance(label, str) and label.strip() else f"signal {number}", one["values"])
+    return columns, {"time": "s"}
+
+
+def spread(name: str, values: Any) -> dict[str, Any]:
+    """Return a vector under its name, a matrix that is longer than wide as one column a column of it.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    values : ndarray
+        Any array.
+
+    Returns
+    -------
+    dict[str, ndarray]
+        Columns by name; none for a single number.
+
+    Examples
+    --------
+    >>> list(spread("data", np.zeros((9, 2)))), list(spread("gain", np.array(1.0)))
+    (['data 1', 'data 2'], [])
+    """
+    if values.size < 2:
+        return {}
+    if values.ndim == 2 and values.shape[1] < values.shape[0] and values.shape[1] <= MOST_SPREAD:
+        return {f"{name} {place + 1}": values[:, place] for place in range(values.shape[1])}
+    return {name: values}
 
 
 def write_mat(columns: Mapping[str, Array], metadata: str, file: BinaryIO, source: str) -> None:

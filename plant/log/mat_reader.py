@@ -5,7 +5,7 @@ The MathWorks; what is not read here (cells, objects, sparse matrices) is skippe
 """
 
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
 from typing import Literal
@@ -13,7 +13,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Value = NDArray[np.generic] | str | Mapping[str, "Value"] | None
+from plant.log.packed import inflated, most_unpacked
+
+Value = NDArray[np.generic] | str | Mapping[str, "Value"] | Sequence["Value"] | None
 
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
@@ -21,6 +23,10 @@ MATRIX, COMPRESSED = 14, 15
 STRUCT, CHAR, FIRST_NUMERIC, LAST_NUMERIC = 2, 4, 6, 15
 COMPLEX = 0x0800
 HEADER = 128
+NEWER = (b"\x00\x02IM", b"\x02\x00MI")
+"""Version and byte order of a MAT 7.3."""
+
+DEEPEST = 20
 
 
 class DamagedMatError(ValueError):
@@ -34,6 +40,7 @@ class _Reader:
     data: memoryview
     order: Literal["little", "big"]
     at: int = 0
+    depth: int = 0
 
     def integer(self, at: int) -> int:
         return int.from_bytes(self.data[at : at + 4], self.order)
@@ -62,11 +69,18 @@ class _Reader:
         return np.frombuffer(content[: len(content) // dtype.itemsize * dtype.itemsize], dtype)
 
     def inside(self, content: memoryview) -> "_Reader":
-        return _Reader(content, self.order)
+        if self.depth > DEEPEST:
+            raise DamagedMatError(f"structs within structs, over {DEEPEST} deep")
+        return _Reader(content, self.order, depth=self.depth + 1)
 
 
-def read_variables(content: bytes) -> dict[str, Value]:
+def read_variables(content: bytes, source: str = "the file") -> dict[str, Value]:
     """Return the variables of a MAT file of version 5 to 7.
+
+    Parameters
+    ----------
+    source : str
+        What messages call it.
 
     Returns
     -------
@@ -77,21 +91,26 @@ def read_variables(content: bytes) -> dict[str, Value]:
     ------
     DamagedMatError
         If the file is of another version, ends too early, or contradicts itself.
+    LogError
+        If it unpacks to more than a log does.
     """
+    if content[HEADER - 4 : HEADER] in NEWER:
+        raise DamagedMatError("a MAT file of version 7.3 that holds no HDF5")
     mark = content[HEADER - 2 : HEADER]
     if mark not in (b"IM", b"MI"):
         raise DamagedMatError("no mark of a MAT file of version 5 to 7")
     order: Literal["little", "big"] = "little" if mark == b"IM" else "big"
-    variables = _variables(_Reader(memoryview(content), order, HEADER))
+    variables = _variables(_Reader(memoryview(content), order, HEADER), most_unpacked(len(content)), source)
     return {name: value for name, value in variables if name}
 
 
-def _variables(reader: _Reader) -> Iterator[tuple[str, Value]]:
+def _variables(reader: _Reader, most: int, source: str) -> Iterator[tuple[str, Value]]:
     while reader.more():
         kind, content = reader.element()
         if kind == COMPRESSED:
             try:
-                unpacked = zlib.decompress(content)
+                unpacked = inflated(content, most, source)
+                most -= len(unpacked)
             except zlib.error as error:
                 raise DamagedMatError(f"a compressed variable cannot be unpacked: {error}") from error
             kind, content = reader.inside(memoryview(unpacked)).element()
@@ -111,7 +130,8 @@ def _matrix(reader: _Reader) -> tuple[str, Value]:
     if kind == CHAR:
         return name, _text(reader)
     if kind == STRUCT:
-        return name, _struct(reader) if prod(shape) == 1 else None
+        structs = _structs(reader, prod(shape))
+        return name, structs[0] if len(structs) == 1 else structs
     values = _shaped(reader.numbers(), shape)
     if not is_complex:
         return name, values
@@ -132,14 +152,23 @@ def _text(reader: _Reader) -> str:
     return bytes(content).decode(encoding, errors="replace")
 
 
-def _struct(reader: _Reader) -> Mapping[str, Value]:
+def _structs(reader: _Reader, count: int) -> list[Mapping[str, Value]]:
+    """Return the structs of an array of them, which have the same fields."""
     width, (_, labels) = reader.numbers(), reader.element()
     if len(width) != 1 or int(width[0]) < 1:
         raise DamagedMatError("a struct without a length of its field names")
     size = int(width[0])
-    fields: dict[str, Value] = {}
-    for start in range(0, len(labels), size):
-        name = bytes(labels[start : start + size]).split(b"\0", 1)[0].decode("latin-1")
-        kind, content = reader.element()
-        fields[name] = _matrix(reader.inside(content))[1] if kind == MATRIX and len(content) else None
-    return fields
+    names = [
+        bytes(labels[start : start + size]).split(b"\0", 1)[0].decode("latin-1")
+        for start in range(0, len(labels), size)
+    ]
+    structs: list[Mapping[str, Value]] = []
+    for _ in range(count):
+        fields: dict[str, Value] = {}
+        for name in names:
+            kind, content = reader.element()
+            fields[name] = _matrix(reader.inside(content))[1] if kind == MATRIX and len(content) else None
+        if not fields:
+            break
+        structs.append(fields)
+    return structs

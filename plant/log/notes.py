@@ -26,6 +26,11 @@ class LogCode(Code):
         "times_of_their_own",
         "channels have times of their own; put on the {sample_time_s:.6g} s of {channel}",
     )
+    LOGGERS_MERGED = (
+        "loggers_merged",
+        "{loggers} were put together for the {duration_s:.4g} s in which they overlap, on a clock of "
+        "{sample_time_s:.6g} s",
+    )
     SAMPLES_MASKED = (
         "samples_masked",
         "{channel} is missing in {count} of {total} samples ({percent:.2g} %); they are masked",
@@ -57,4 +62,8 @@ class LogCode(Code):
         "travel_units",
         "the piston travels {travel_m:.2g} m a radian of the pump, {least:g} to {most:g} is usual; looks like a wrong "
         "unit of {channel} or speed",
+    )
+    CLOCK_ASSUMED = (
+        "clock_assumed",
+        "the log has no column of time: its samples are taken to be {sample_time_s:g} s apart",
     )

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from plant.arrays import Array
+from plant.errors import LogError
+from plant.log.columns import TRUTH
 from plant.log.notes import LogCode
 from plant.notes import Note
 
@@ -57,6 +59,41 @@ ALIKE, ALIKE_SUMS = 0.5, 0.9
 
 TRAVEL = (1e-6, 0.1)
 """Piston travel a radian of pump [m], pump displacement over piston area: 3.7e-4 for the paper's rig."""
+
+
+LARGEST, SMALLEST = 1e15, 1e-30
+"""Sizes [SI] beyond which a value is no sensor's, whatever it measures."""
+
+
+def require_measurable(channels: Mapping[str, Array], source: str) -> None:
+    """Refuse values that no sensor gives; what is computed of them would be no number.
+
+    Parameters
+    ----------
+    channels : Mapping[str, ndarray, shape (n,)]
+        Values in SI; columns of simulated truth are passed over.
+    source : str
+        What messages call the log.
+
+    Raises
+    ------
+    LogError
+        If a value is too large, or a channel is nothing but values too small.
+
+    Examples
+    --------
+    >>> require_measurable({"position_m": np.array([0.0, 1e200])}, "a.csv")
+    Traceback (most recent call last):
+    plant.errors.LogError: a.csv: position_m reaches 1e+200, no sensor gives more than 1e+15 (SI); check its column
+    """
+    for name, values in channels.items():
+        size = 0.0 if name.startswith(TRUTH) or np.isnan(values).all() else float(np.nanmax(np.abs(values)))
+        if size > LARGEST:
+            said = f"reaches {size:.3g}, no sensor gives more than {LARGEST:g} (SI)"
+            raise LogError(f"{name} {said}; check its column", source)
+        if 0.0 < size < SMALLEST:
+            said = f"reaches only {size:.3g}, no sensor gives less than {SMALLEST:g} (SI)"
+            raise LogError(f"{name} {said}; check its column", source)
 
 
 def implausible(sample_time: float, channels: Mapping[str, Array]) -> list[Note]:

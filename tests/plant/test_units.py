@@ -1,6 +1,7 @@
 import pytest
 
-from plant.units import LITRE_PER_MINUTE, RPM, conversion_to
+from plant.errors import RigError
+from plant.units import LITRE_PER_MINUTE, RPM, conversion_to, require_number
 
 
 @pytest.mark.parametrize(
@@ -42,3 +43,9 @@ def test_hertz_is_no_angular_speed() -> None:
 def test_a_speed_of_a_shaft_is_no_frequency() -> None:
     with pytest.raises(ValueError, match="angle"):
         conversion_to("rad/s", "Hz")
+
+
+@pytest.mark.parametrize("value", [1e-190, 1e209, 1e300])
+def test_a_parameter_of_no_actuators_size_is_refused(value: float) -> None:
+    with pytest.raises(RigError, match=r"piston_area must be from 1e-40 to 1e\+40 in size"):
+        require_number("piston_area", value)

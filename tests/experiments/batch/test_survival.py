@@ -112,6 +112,36 @@ def test_a_batch_killed_at_twenty_random_moments_ends_as_if_undisturbed(
     assert not list(parts.glob(".*"))
 
 
+def test_a_batch_struck_at_thirty_moments_spread_over_its_parts_loses_and_doubles_no_row(
+    tmp_path: Path, driver: "subprocess.Popen[str]"
+) -> None:
+    undisturbed, store = open_store(tmp_path / "undisturbed"), open_store(tmp_path / "store")
+    run_into(undisturbed, small_plan(**LONGER))
+    command = ("batch", study_file(tmp_path, LONGER), "--workers", 1, "--out", store.name)
+    parts, moments = Path(store.name) / "parts", random.Random(7)  # noqa: S311 -- no secret
+    for number in range(30):
+        child = begin(driver, *command)
+        _wait_for(lambda number=number: len(list(parts.glob("*.parquet"))) > 11 * number)
+        time.sleep(moments.uniform(0.0, 0.02))
+        os.kill(child, signal.SIGTERM if number % 6 == 1 else signal.SIGKILL)
+        end(driver)
+        if number % 3 == 0:  # as when the power fails: a part that was written just then is cut
+            last = max(parts.glob("*.parquet"), key=lambda path: path.stat().st_mtime_ns)
+            last.write_bytes(last.read_bytes()[: moments.randrange(last.stat().st_size)])
+    begin(driver, *command)
+    assert end(driver) == 0
+    assert store.rows().equals(undisturbed.rows())
+    assert rows_in_parts(store) == len(small_plan(**LONGER))
+
+
+def test_two_workers_end_with_exit_code_0_every_time(tmp_path: Path) -> None:
+    study = study_file(tmp_path, {**LONGER, "seeds": 8})
+    command = [sys.executable, "-m", "experiments.cli", "batch", study, "--workers", "2", "--out"]
+    for number in range(3):
+        done = subprocess.run([*command, tmp_path / f"store{number}"], capture_output=True, text=True, check=False)  # noqa: S603 -- our own command
+        assert done.returncode == 0, done.stderr
+
+
 def test_a_killed_batch_leaves_no_workers_behind(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "experiments.cli", "batch", study_file(tmp_path, {**LONGER, "seeds": 4000})]
     store = open_store(tmp_path / "store")

@@ -231,15 +231,15 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    for verb in ("write_csv", "_write_parquet", "write_mat"):
-        monkeypatch.setattr(f"plant.log.files.{verb}", full)
+    for place in ("files.write_csv", "parquet.write_parquet", "mat.write_mat"):
+        monkeypatch.setattr(f"plant.log.{place}", full)
     with pytest.raises(LogError, match=rf"{name}: cannot be written: No space left"):
         write_record(example(motor_voltage_v=SPEED), path)
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
 
 
 def test_what_cannot_be_written_is_refused_in_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"a log ends in \.csv.*got \.xlsx"):
+    with pytest.raises(LogError, match=r"a log is written as \.csv.*got \.xlsx"):
         write_record(example(), tmp_path / "run.xlsx")
     with pytest.raises(LogError, match="cannot be written: No such file"):
         write_record(example(), tmp_path / "nowhere" / "run.csv")

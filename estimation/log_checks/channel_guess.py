@@ -1,0 +1,252 @@
+"""Which column of a strange log is which channel, guessed by name, by unit, and by what only that channel does.
+
+Time increases. The slope of position is velocity, and follows the pump. Differential pressure is one port's less the
+other's, and has the sign of the motion, since friction has. A unit that no file gives is guessed by the usual size.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.notes import GuessCode
+from plant.eha.model import EhaParameters
+from plant.log.columns import CHANNELS, TIME, UNITS
+from plant.log.guess import Guess, guessed, points_by_name
+from plant.log.headings import Heading
+from plant.log.inspection import clock_facts
+from plant.log.plausibility import LIMITS, SAMPLE_TIME
+from plant.notes import Note
+from plant.units import conversion_to
+
+SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
+PRESSURE, PORTS, VOLTAGE = "differential_pressure_pa", ("pressure_a_pa", "pressure_b_pa"), "motor_voltage_v"
+
+BLOCKS = 300
+"""Blocks that a log is averaged over [count]."""
+
+SURE, FOLLOWS, WEAKLY = 0.95, 0.7, 0.3
+"""Correlations of a slope with what it is, of what follows, and of a pressure with the motion."""
+
+CLOCK, STILL, SLOPE, RUNNER_UP, DIFFERENCE, TREND = 4.0, -3.0, 4.0, 2.5, 5.0, 1.5
+"""What is said by: a clock, a column that stays the same, a slope, what follows it less well, a difference of two
+columns, and a pressure that goes with the motion [log-odds]; judged."""
+
+CANDIDATES: Mapping[str, Sequence[str]] = {
+    TIME: ("s", "ms", "us"),
+    SPEED: ("rad/s", "rpm"),
+    POSITION: ("m", "mm", "um"),
+    VELOCITY: ("m/s", "mm/s"),
+    PRESSURE: ("Pa", "bar", "kPa"),
+    **dict.fromkeys(PORTS, ("Pa", "bar", "kPa")),
+    VOLTAGE: ("V", "mV"),
+}
+"""Units that are tried where a file gives none, the usual ones first."""
+
+UNIT_DOUBT = 0.7
+"""What a guess is worth whose unit was guessed too [fraction]; judged."""
+
+
+@dataclass(frozen=True)
+class ChannelGuess:
+    """Which column a channel may be, and why.
+
+    Parameters
+    ----------
+    guess : Guess
+        Column, unit and probability.
+    why : tuple of Note
+        What speaks for it.
+    """
+
+    guess: Guess
+    why: tuple[Note, ...] = ()
+
+
+def guess_channels(
+    headings: Sequence[Heading],
+    columns: Mapping[int, Any],
+    p: EhaParameters,
+    channels: Collection[str] = (TIME, *CHANNELS),
+) -> tuple[ChannelGuess, ...]:
+    """Return which column each channel may be, and how sure that is.
+
+    Parameters
+    ----------
+    headings : sequence of Heading
+        What the columns are called.
+    columns : Mapping[int, ndarray of shape (n,)]
+        Values as logged of those that hold numbers or dates, by their place.
+    p : EhaParameters
+        The actuator, for how far its piston goes a turn of its pump.
+    channels : collection of str
+        Channels that are looked for.
+
+    Returns
+    -------
+    tuple of ChannelGuess
+        Each channel and each column once.
+    """
+    points: dict[str, dict[int, float]] = {}
+    for channel in channels:
+        said = {place: points_by_name(headings[place], channel) for place in columns}
+        points[channel] = {place: worth for place, worth in said.items() if worth is not None}
+    why: dict[tuple[str, int], list[Note]] = {}
+    with np.errstate(over="ignore", invalid="ignore"):  # columns may hold anything
+        _by_clock(points, columns, why)
+        time = max(points.get(TIME, {}), key=lambda place: points[TIME][place], default=None)
+        means = _means({place: one for place, one in columns.items() if place != time and one.dtype.kind != "M"})
+        _by_motion(points, means, why)
+        _by_pressure(points, means, why)
+        found = [one for one in guessed(points, headings) if one.sure >= 0.05]
+        return _with_units(found, headings, columns, why, p)
+
+
+def _add(points: dict[str, dict[int, float]], channel: str, place: int, worth: float) -> bool:
+    """Add to what speaks for a column, where its unit allows it."""
+    if place not in points.get(channel, {}):
+        return False
+    points[channel][place] += worth
+    return True
+
+
+def _by_clock(points: dict[str, dict[int, float]], columns: Mapping[int, Any], why: dict[Any, list[Note]]) -> None:
+    for place, values in columns.items():
+        facts = clock_facts(values)
+        steady = facts is not None and facts.backward == 0 and facts.jitter < 0.4 and facts.repeats < 0.9 * len(values)
+        if not steady or facts is None:
+            _add(points, TIME, place, 2.0 * STILL)
+        elif _add(points, TIME, place, CLOCK):
+            why.setdefault((TIME, place), []).append(GuessCode.INCREASES.note(step=facts.step))
+
+
+def _means(columns: Mapping[int, Any]) -> dict[int, Array]:
+    """Return columns averaged over blocks and scaled to one; those that stay the same are left out."""
+    out: dict[int, Array] = {}
+    for place, values in columns.items():
+        there = np.isfinite(values)
+        if there.sum() < 20 or len(values) < 20:
+            continue
+        whole = np.interp(np.arange(len(values)), np.flatnonzero(there), values[there])
+        length = max(1, len(whole) // BLOCKS)
+        blocks = whole[: len(whole) // length * length].reshape(-1, length)
+        largest = float(np.abs(blocks).max())
+        if not 0.0 < largest < 1e200:
+            continue
+        mean = (blocks / largest).mean(axis=1)
+        if float(np.ptp(mean)) > 1e-9:
+            out[place] = mean
+    return out
+
+
+def _alike(one: Array, other: Array) -> float:
+    """Return the correlation of two columns."""
+    x, y = one - one.mean(), other - other.mean()
+    size = float(np.linalg.norm(x) * np.linalg.norm(y))
+    return float(x @ y) / size if size > 0.0 else 0.0
+
+
+def _middle(values: Array) -> Array:
+    return 0.5 * (values[1:] + values[:-1])
+
+
+def _by_motion(points: dict[str, dict[int, float]], means: Mapping[int, Array], why: dict[Any, list[Note]]) -> None:
+    """Find the column whose slope others are: position, of which velocity is the slope and the pump's speed follows."""
+    followers: dict[int, list[tuple[float, int]]] = {}
+    for place in points.get(POSITION, {}).keys() & means.keys():
+        slope = np.diff(means[place])
+        like = [(_alike(slope, _middle(means[other])), other) for other in means if other != place]
+        followers[place] = sorted((one for one in like if abs(one[0]) > FOLLOWS), key=lambda one: -abs(one[0]))
+    sure = {place: found for place, found in followers.items() if found and abs(found[0][0]) > SURE}
+    for place, found in sure.items():
+        first, second = found[0], found[1] if len(found) > 1 else None
+        if _add(points, POSITION, place, SLOPE):
+            note = GuessCode.HAS_SLOPE.note(column=first[1] + 1, correlation=first[0])
+            why.setdefault((POSITION, place), []).append(note)
+        worth = SLOPE if second is not None else RUNNER_UP
+        if _add(points, VELOCITY, first[1], worth):
+            note = GuessCode.IS_SLOPE.note(column=place + 1, correlation=first[0])
+            why.setdefault((VELOCITY, first[1]), []).append(note)
+        for correlation, other in found[1:] if second is not None else found:
+            if _add(points, SPEED, other, RUNNER_UP):
+                note = GuessCode.FOLLOWS.note(column=place + 1, correlation=correlation)
+                why.setdefault((SPEED, other), []).append(note)
+
+
+def _by_pressure(points: dict[str, dict[int, float]], means: Mapping[int, Array], why: dict[Any, list[Note]]) -> None:
+    """Find pressures: one that is the difference of two others, or goes with the pump."""
+    pressed = [place for place in points.get(PRESSURE, {}) if place in means]
+    pump = max(points.get(SPEED, {}), key=lambda place: points[SPEED][place], default=None)
+    for place in pressed:
+        for one in pressed:
+            for other in pressed:
+                if len({place, one, other}) == 3 and one < other and _is_difference(means, place, one, other):
+                    _add(points, PRESSURE, place, DIFFERENCE)
+                    note = GuessCode.IS_DIFFERENCE.note(one=one + 1, other=other + 1)
+                    why.setdefault((PRESSURE, place), []).append(note)
+        if pump in means and pump is not None and place != pump:
+            correlation = _alike(means[place], means[pump])
+            if abs(correlation) > WEAKLY and _add(points, PRESSURE, place, TREND):
+                note = GuessCode.FOLLOWS.note(column=pump + 1, correlation=correlation)
+                why.setdefault((PRESSURE, place), []).append(note)
+
+
+def _is_difference(means: Mapping[int, Array], place: int, one: int, other: int) -> bool:
+    """Return whether a column is the difference of two others, each at a scale of its own."""
+    basis = np.stack([means[one], means[other], np.ones(len(means[one]))], axis=1)
+    if len(basis) < 10 or abs(_alike(means[one], means[other])) > 0.999:
+        return False
+    solution, *_ = np.linalg.lstsq(basis, means[place], rcond=None)
+    left = means[place] - basis @ solution
+    return bool(np.std(left) < 0.02 * np.std(means[place]) and solution[0] * solution[1] < 0.0)
+
+
+def _with_units(
+    found: Sequence[Guess],
+    headings: Sequence[Heading],
+    columns: Mapping[int, Any],
+    why: Mapping[tuple[str, int], Sequence[Note]],
+    p: EhaParameters,
+) -> tuple[ChannelGuess, ...]:
+    made: list[ChannelGuess] = []
+    for one in found:
+        notes = list(why.get((one.channel, one.place), ()))
+        heading = headings[one.place]
+        if heading.stamped:
+            notes = [GuessCode.DATES.note()]
+        elif (one.unit is None and heading.name != one.channel) and one.channel in CANDIDATES:
+            unit = _unit_of(one.channel, columns[one.place], p)
+            notes.append(GuessCode.UNIT_GUESSED.note(unit=unit))
+            one = Guess(one.channel, one.place, one.name, unit, one.points, UNIT_DOUBT * one.sure)
+        elif one.unit is not None:
+            notes.append(GuessCode.UNIT_FITS.note(unit=one.unit))
+        named = points_by_name(Heading(heading.name), one.channel)
+        if named is not None and named >= 2.5:
+            notes.insert(0, GuessCode.CALLED_SO.note(channel=one.channel))
+        made.append(ChannelGuess(one, tuple(notes)))
+    return tuple(made)
+
+
+def _unit_of(channel: str, values: Array, p: EhaParameters) -> str:
+    """Return the unit in which a channel has a usual size, the first of those that are tried where several have."""
+    present = values[np.isfinite(values)]
+    if not len(present):
+        return UNITS[channel]
+    if channel == TIME:
+        facts = clock_facts(values)
+        step = 0.0 if facts is None else facts.step
+        return next((one for one in CANDIDATES[TIME] if SAMPLE_TIME[0] <= step * _factor(one, "s") <= 0.1), "s")
+    size = float(np.ptp(present)) if channel == POSITION else float(np.abs(present).max())
+    least, most = LIMITS[channel].least, LIMITS[channel].most
+    if channel == SPEED:
+        most = 2.0 * p.motor_speed_limit
+    if channel in (POSITION, VELOCITY):
+        least, most = 1e-4, 2.0
+    wanted = UNITS[channel]
+    return next((one for one in CANDIDATES[channel] if least <= size * _factor(one, wanted) <= most), wanted)
+
+
+def _factor(unit: str, wanted: str) -> float:
+    return conversion_to(unit, wanted)[0]

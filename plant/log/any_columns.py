@@ -1,0 +1,160 @@
+"""Logs of anything: columns by whatever name they have, in whatever unit, beside a column of time or none."""
+
+import re
+import warnings
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+
+from plant.arrays import Array
+from plant.errors import LogError, LogWarning
+from plant.log.checks import Clock, trusted
+from plant.log.columns import TIME, UNITS, Column, listed, resolve_columns
+from plant.log.formats import open_tables
+from plant.log.headings import Heading, cleaned
+from plant.log.notes import LogCode
+from plant.log.plausibility import implausible
+from plant.log.record import Record
+from plant.log.table import Table
+
+SECONDS: Mapping[str, float] = {
+    **dict.fromkeys(("", "s", "sec", "second", "seconds"), 1.0),
+    "ms": 1e-3,
+    "msec": 1e-3,
+    "us": 1e-6,
+    "usec": 1e-6,
+    "min": 60.0,
+    "h": 3600.0,
+}
+"""Units of a column of time, in seconds."""
+
+TIME_STEM = re.compile(rf"(?:t|time|timestamp|zeit)(?:_({'|'.join(one for one in SECONDS if one)}))?")
+"""What a column of time is called, in lower case and without brackets: ``t``, ``time_ms``."""
+
+
+def read_any(path: str | Path, names: Sequence[str] | None = None, *, sample_time: float | None = None) -> Record:
+    """Read columns of a log as they stand, without knowing what they are.
+
+    Parameters
+    ----------
+    path : str or Path
+        A log in any format that is read.
+    names : sequence of str, optional
+        Columns wanted; a name that is a known channel may stand in another unit, ``motor_speed_rpm`` for
+        ``motor_speed_rad_s``. Every column that holds numbers unless told.
+    sample_time : float, optional
+        Time between samples [s]; a column of time is then not read. Without either, samples are 1 s apart.
+
+    Returns
+    -------
+    Record
+        On a uniform clock, NaN where a sample is missing; values in the units of the log.
+
+    Raises
+    ------
+    LogError
+        If the file cannot be read, a column is missing or holds no numbers, or time is no clock's.
+
+    Warns
+    -----
+    LogWarning
+        If something was mended, or there is no time.
+    """
+    source = str(path)
+    table = _table(open_tables(Path(path)), names)
+    headings = cleaned(table.headings)
+    time = None if sample_time is not None else _time_column(headings)
+    columns = _every(table, headings) if names is None else _wanted(table, headings, names, source)
+    if not columns:
+        raise LogError("a column of numbers is wanted, the log has none", source)
+    clock = None
+    if time is not None:
+        columns[TIME] = _seconds(table, time)
+    else:
+        step = sample_time if sample_time is not None else table.step
+        if step is None:
+            warnings.warn(LogWarning(LogCode.CLOCK_ASSUMED.note(sample_time_s=1.0), source), stacklevel=2)
+        clock = Clock(1.0 if step is None else step, 0.0)
+        columns[TIME] = clock.sample_time * np.arange(len(next(iter(columns.values()))), dtype=np.float64)
+    checked = trusted(columns, source=source, required=tuple(names or ()), clock=clock)
+    # nobody knows what these columns are, so no unit of theirs looks wrong
+    amiss = implausible(checked.sample_time, checked.channels)
+    for note in (one for one in checked.notes if one not in amiss):
+        warnings.warn(LogWarning(note, source), stacklevel=2)
+    kept = {name: checked.channels[name] for name in names or checked.channels}
+    return Record(checked.sample_time, kept, start_time=checked.start_time)
+
+
+def _table(tables: Sequence[Table], names: Sequence[str] | None) -> Table:
+    """Return the table that has most of the columns wanted, or most columns."""
+
+    def rank(table: Table) -> tuple[int, int]:
+        own = {one.name.lower() for one in cleaned(table.headings)}
+        return sum(name.lower() in own for name in names or ()), len(own)
+
+    return max(tables, key=rank)
+
+
+def _every(table: Table, headings: Sequence[Heading]) -> dict[str, Array]:
+    """Return every column of numbers that has a name of its own and is not time."""
+    found: dict[str, Array] = {}
+    for place, values in table.numbers().items():
+        name = headings[place].name
+        if name and values.dtype.kind != "M" and not _is_time(headings[place]) and name not in found:
+            found[name] = values
+    return found
+
+
+def _wanted(table: Table, headings: Sequence[Heading], names: Sequence[str], source: str) -> dict[str, Array]:
+    chosen = [_named(headings, name, source) for name in dict.fromkeys(names)]
+    raw = table.read(chosen)
+    found: dict[str, Array] = {}
+    for column in chosen:
+        if column not in raw or raw[column].dtype.kind == "M":
+            raise LogError(f"column {column.name!r} must hold numbers", source)
+        plain = (column.factor, column.offset) == (1.0, 0.0)
+        found[column.channel] = raw[column] if plain else raw[column] * column.factor + column.offset
+    return found
+
+
+def _named(headings: Sequence[Heading], name: str, source: str) -> Column:
+    known = [one.name for one in headings]
+    positions = [k for k, other in enumerate(known) if other == name]
+    positions = positions or [k for k, other in enumerate(known) if other.lower() == name.lower()]
+    positions = positions or [k for k, other in enumerate(headings) if other.bare.lower() == name.lower()]
+    if len(positions) == 1:
+        return Column(positions[0], known[positions[0]], name)
+    if positions:
+        raise LogError(f"column {name!r} is wanted once, the log has it {len(positions)} times", source)
+    if name in UNITS:
+        for column in resolve_columns(headings, None, source):
+            if column.channel == name:
+                return column
+    near = get_close_matches(name, known, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    raise LogError(f"column {name!r} is wanted, the log has {listed(known)}{hint}", source)
+
+
+def _is_time(heading: Heading) -> bool:
+    return heading.stamped or TIME_STEM.fullmatch(heading.stem) is not None
+
+
+def _time_column(headings: Sequence[Heading]) -> Column | None:
+    for place, heading in enumerate(headings):
+        matched = TIME_STEM.fullmatch(heading.stem)
+        if matched is not None or heading.stamped:
+            unit = (matched and matched.group(1)) or heading.unit or ""
+            return Column(place, heading.name, TIME, SECONDS.get(unit.lower(), 1.0))
+    return None
+
+
+def _seconds(table: Table, column: Column) -> Array:
+    """Return time in seconds; dates count from the first."""
+    values = table.read([column])[column]
+    if values.dtype.kind != "M":
+        return values * column.factor
+    missing = np.isnat(values)
+    elapsed = (values - values[~missing][0]) / np.timedelta64(1, "ns") * 1e-9
+    return np.where(missing, np.nan, elapsed)

@@ -1,0 +1,261 @@
+"""Which column is which channel, guessed by what it is called and in what unit; what it does is looked at later."""
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from plant.errors import NoChannelError
+from plant.log.columns import CHANNELS, TIME, UNITS, listed
+from plant.log.headings import Heading
+from plant.units import conversion_to
+
+NAMES: Mapping[str, tuple[tuple[str, float], ...]] = {
+    TIME: (
+        (r"(^|_)(time|zeit|zeitstempel|time_?stamps?|temps|tiempo|uhrzeit|clock|elapsed|datetime)(_|$)", 4.0),
+        (r"^(t|date|datum|x_value)(_|$)", 3.0),
+    ),
+    "motor_speed_rad_s": (
+        (r"(motor|mot|pump\w*|shaft|servo|drive|welle|moteur).*(speed|rpm|drehzahl|omega|vel\w*|spd|_n$|_w$)", 5.0),
+        (r"drehzahl|(^|_)rpm(_|$)|omega|angular|regime|(^|_)n_?(mot\w*|pump\w*|ist|act)(_|$)", 4.0),
+        (r"^(speed|spd|n|w|nmot|revs?)(_|$)", 2.5),
+    ),
+    "position_m": (
+        (
+            r"position|(^|_|kolben)weg(_|$)|(^|_|kolben)hub(_|$)|stroke|displacement|lvdt|deplacement|travel|extension",
+            4.0,
+        ),
+        (r"(^|_)(pos|lvdt|enc\w*|s_ist|x_ist|x_?p|x_?cyl\w*|x_?piston)(_|$)", 3.5),
+        (r"^(x|s|y)(_|$)", 1.5),
+    ),
+    "velocity_m_s": (
+        (
+            r"velocity|geschwindigkeit|(piston|rod|cyl\w*|kolben).*(speed|vel|_v$)|x_?dot|(^|_)v_?(ist|act|kolben|p)(_|$)",
+            4.0,
+        ),
+        (r"(^|_)vel(_|$)|vitesse", 3.0),
+        (r"^(v|speed)(_|$)", 1.5),
+    ),
+    "differential_pressure_pa": (
+        (
+            r"diff\w*_?(press|druck)|delta_?p|(press\w*|druck)_?diff|(^|_)dp(_|$)|(load|last)_?(press|druck)|(^|_)p_?(load|diff|l)(_|$)",
+            5.0,
+        ),
+        (r"^(p|press\w*|druck)(_|$)", 1.0),
+    ),
+    "pressure_a_pa": ((r"(^|_)p(ress\w*)?_?(a|1)(_|$)|druck_?(a|1)(_|$)|(chamber|port|side|kammer)_?(a|1)(_|$)", 4.0),),
+    "pressure_b_pa": ((r"(^|_)p(ress\w*)?_?(b|2)(_|$)|druck_?(b|2)(_|$)|(chamber|port|side|kammer)_?(b|2)(_|$)", 4.0),),
+    "motor_voltage_v": ((r"volt|spannung|tension|(^|_)u(_|$)|(^|_)u_?mot", 3.0),),
+}
+"""What each channel is called on benches, and how much such a name says [log-odds]; judged."""
+
+OTHERWISE = re.compile(
+    r"(^|_)(soll\w*|set\w*|sp|ref\w*|cmd|command\w*|demand|target|desired|err\w*|max|min|limit|std|temp\w*|status|flag|"
+    r"count\w*|index|filter\w*)(_|$)"
+)
+"""Words of columns that are not the measured channel: set points, errors, temperatures."""
+
+NOT_IT, UNIT_FITS, NONE_OF_THEM = -4.0, 3.0, 2.0
+"""What such a word says, what a unit says, and that none of the columns may be the channel [log-odds]; judged."""
+
+SHOWN = 0.5
+"""Probability from which an error names a guess."""
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Which column a channel may be.
+
+    Parameters
+    ----------
+    channel : str
+        The channel.
+    place : int
+        Where the column stands, from 0.
+    name : str
+        What it is called.
+    unit : str or None
+        Its unit as far as known.
+    points : float
+        What speaks for it [dimensionless]: log-odds.
+    sure : float
+        Probability, of all columns and of none [fraction].
+    """
+
+    channel: str
+    place: int
+    name: str
+    unit: str | None
+    points: float
+    sure: float = 0.0
+
+    @property
+    def spec(self) -> str:
+        """The column as a rig file or ``--columns`` names it."""
+        return self.name if self.unit is None else f"{self.name}:{self.unit}"
+
+
+def points_by_name(heading: Heading, channel: str) -> float | None:
+    """Return what name and unit of a column say for its being a channel.
+
+    Parameters
+    ----------
+    heading : Heading
+        The column.
+    channel : str
+        Of `plant.log.columns.UNITS`.
+
+    Returns
+    -------
+    float or None
+        Log-odds [dimensionless]; None where its unit is of something else.
+
+    Examples
+    --------
+    >>> points_by_name(Heading("Motordrehzahl [U/min]"), "motor_speed_rad_s")
+    8.0
+    """
+    if heading.stamped:
+        return 8.0 if channel == TIME else None
+    unit = unit_of(heading)
+    fits = unit is not None and _fits(unit, UNITS[channel])
+    if unit is not None and not fits:
+        return None
+    name = heading.stem
+    own = channel.removesuffix("_" + UNITS[channel].replace("/", "_").replace("^", "").lower())
+    if name == own or heading.name == channel:
+        said = 6.0
+    elif channel in NAMES:
+        said = max((worth for pattern, worth in NAMES[channel] if re.search(pattern, name)), default=0.0)
+    else:
+        words = own.split("_")
+        said = 4.0 * sum(word in name.split("_") for word in words) / len(words)
+    if OTHERWISE.search(name) and name != own:
+        said += NOT_IT
+    return said + (UNIT_FITS if fits else 0.0)
+
+
+_SUFFIX = re.compile(
+    r"(?:^|_)(rpm|mm_s|cm_s|m_s|rad_s|deg_s|mm|cm|um|ms|us|sec|bar|mbar|kpa|mpa|psi|pa|volts?|mv|rev_min)$"
+)
+
+
+def unit_of(heading: Heading) -> str | None:
+    """Return the unit of a column, that which its name ends in where nothing else says one.
+
+    Examples
+    --------
+    >>> unit_of(Heading("POS_MM")), unit_of(Heading("V_KOLBEN_MM_S")), unit_of(Heading("p_A"))
+    ('mm', 'mm/s', None)
+    """
+    if heading.unit is not None or heading.stamped:
+        return heading.unit
+    found = _SUFFIX.search(heading.stem)
+    return None if found is None else found[1].replace("_", "/")
+
+
+@cache
+def _fits(unit: str, wanted: str) -> bool:
+    try:
+        conversion_to(unit, wanted)
+    except ValueError:
+        return False
+    return True
+
+
+def guessed(points: Mapping[str, Mapping[int, float]], headings: Sequence[Heading]) -> tuple[Guess, ...]:
+    """Return the most probable column of each channel, each column once, the surest channel first.
+
+    Parameters
+    ----------
+    points : Mapping[str, Mapping[int, float]]
+        What speaks for each column by its place, by channel [dimensionless]: log-odds.
+    headings : sequence of Heading
+        The columns.
+
+    Returns
+    -------
+    tuple of Guess
+        Channels without a column that anything speaks for are left out.
+    """
+    left = {channel: dict(columns) for channel, columns in points.items()}
+    found: list[Guess] = []
+    while True:
+        best = max(
+            ((worth, channel, place) for channel, columns in left.items() for place, worth in columns.items()),
+            default=(0.0, "", -1),
+        )
+        worth, channel, place = best
+        if worth <= 0.0:
+            return tuple(found)
+        rivals = np.array([NONE_OF_THEM, *points[channel].values()])
+        sure = float(np.exp(worth - np.logaddexp.reduce(rivals)))
+        heading = headings[place]
+        found.append(Guess(channel, place, heading.name, None if heading.stamped else unit_of(heading), worth, sure))
+        del left[channel]
+        for columns in left.values():
+            columns.pop(place, None)
+
+
+def guess_by_name(headings: Sequence[Heading], channels: Collection[str] = (TIME, *CHANNELS)) -> tuple[Guess, ...]:
+    """Return which column each channel may be, by name and unit alone.
+
+    Parameters
+    ----------
+    headings : sequence of Heading
+        What the columns are called.
+    channels : collection of str
+        Channels that are looked for.
+
+    Returns
+    -------
+    tuple of Guess
+        One a channel that is there, perhaps.
+
+    Examples
+    --------
+    >>> [(one.channel, one.spec) for one in guess_by_name([Heading("Zeit [ms]"), Heading("Weg [mm]")])]
+    [('time_s', 'Zeit [ms]:ms'), ('position_m', 'Weg [mm]:mm')]
+    """
+    points: dict[str, dict[int, float]] = {}
+    for channel in channels:
+        said = {place: points_by_name(heading, channel) for place, heading in enumerate(headings)}
+        points[channel] = {place: worth for place, worth in said.items() if worth is not None and worth > 0.0}
+    return guessed(points, headings)
+
+
+def missing_channels(wanted: Sequence[str], headings: Sequence[Heading], source: str) -> NoChannelError:
+    """Return the error for channels that a log lacks: what it has, what may be meant, and what shows more.
+
+    Parameters
+    ----------
+    wanted : sequence of str
+        Channels; ``"position_m or velocity_m_s"`` is one of two.
+    headings : sequence of Heading
+        What the columns of the log are called.
+    source : str
+        The log.
+    """
+    names = listed([one.name for one in headings])
+    timeless = "; a log without time is read with --sample-time" if TIME in wanted else ""
+    hint = hint_of([name for one in wanted for name in one.split(" or ")], headings)
+    return NoChannelError(f"column {' and '.join(wanted)} is missing, the log has {names}{hint}{timeless}", source)
+
+
+def hint_of(channels: Sequence[str], headings: Sequence[Heading]) -> str:
+    """Return which columns may be meant, as an option, and the command that shows more.
+
+    Parameters
+    ----------
+    channels : sequence of str
+        Channels that are missing.
+    headings : sequence of Heading
+        What the columns are called.
+    """
+    known = [one for one in channels if one in UNITS]
+    found = [one for one in guess_by_name(headings, known) if one.sure >= SHOWN and one.spec.isprintable()]
+    option = ",".join(f"{one.channel}={one.spec[:60]}" for one in found)
+    may = f"; perhaps --columns '{option}'" if option else ""
+    return f"{may}; `hydrostate inspect FILE` shows its columns and guesses which is which"

@@ -1,0 +1,106 @@
+"""What a log calls a column: its name, and the unit that stands in brackets, in a row of units or in an attribute."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from plant.unit_text import plain_unit
+
+_BRACKETED = re.compile(r"^(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]{0,40})\]|\((?P<round>[^()]{0,40})\))$")
+_AFTER = re.compile(r"^(?P<name>.*\S)(?:\s+/\s*|\s*,\s+|\s+in\s+)(?P<unit>\S{1,20})$")
+_NO_UNIT = ("", "-", "--", "[-]", "[]", "1", "n/a", "none")
+
+
+@dataclass(frozen=True)
+class Heading:
+    """What a column is called.
+
+    Parameters
+    ----------
+    name : str
+        The whole name.
+    said : str or None
+        Unit that the file gives beside the name; None where it gives none.
+    stamped : bool
+        Whether it holds dates or times of the day.
+    """
+
+    name: str
+    said: str | None = None
+    stamped: bool = False
+
+    @property
+    def unit(self) -> str | None:
+        """Unit of the column as the file gives it, or None."""
+        return self.said if self.said is not None else _split(self.name)[1]
+
+    @property
+    def bare(self) -> str:
+        """The name without its unit."""
+        return _split(self.name)[0]
+
+    @property
+    def stem(self) -> str:
+        """The bare name in lower case, its words joined by underscores."""
+        parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", self.bare)
+        return re.sub(r"[\W_]+", "_", parted.lower()).strip("_")
+
+
+def _split(name: str) -> tuple[str, str | None]:
+    if found := _BRACKETED.match(name):
+        inside = found["square"] if found["square"] is not None else found["round"]
+        if found["square"] is not None or is_unit(inside):
+            return found["name"].strip(), unit_or_none(inside)
+    if (found := _AFTER.match(name)) and is_unit(found["unit"]):
+        return found["name"].strip(), found["unit"]
+    return name.strip(), None
+
+
+def unit_or_none(text: str) -> str | None:
+    """Return what a file says as a unit, None where it says that there is none."""
+    return None if text.strip().lower() in _NO_UNIT else text.strip()
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a text is spelt as a unit is, and names one that a bench uses.
+
+    Examples
+    --------
+    >>> is_unit("mm/s"), is_unit("actual"), is_unit("9**9")
+    (True, False, False)
+    """
+    text = text.strip().strip("[]()").strip()
+    try:
+        spelt = plain_unit(text, angular=True)
+    except ValueError:
+        return False
+    words = re.findall(r"[^\W\d_]+|°[CF]?|%", spelt)
+    return bool(words) and all(word in _KNOWN or word.lstrip("kmMGuµnhc") in _SCALED for word in words)
+
+
+_SCALED = frozenset(("m", "s", "A", "V", "N", "g", "J", "W", "Pa", "Hz", "rad", "bar", "Ω", "l", "L"))
+_KNOWN = _SCALED | frozenset(
+    (
+        *("rpm", "rev", "turn", "revolution", "min", "sec", "msec", "usec", "h", "d", "hour", "minute", "day"),
+        *("psi", "kgf", "lbf", "atm", "torr", "mmHg", "pascal", "in", "inch", "ft", "mils", "mm", "cm", "meter"),
+        *("metre", "deg", "degree", "radian", "°", "degC", "degF", "°C", "°F", "K", "kelvin", "volt", "newton"),
+        *("second", "lpm", "%"),
+    )
+)
+
+
+def cleaned(names: Sequence["str | Heading"]) -> list[Heading]:
+    """Return names as headings, without blanks and marks around them.
+
+    Parameters
+    ----------
+    names : sequence of str or Heading
+        As the file gives them.
+
+    Returns
+    -------
+    list of Heading
+        One a column, in order.
+    """
+    given = [one if isinstance(one, Heading) else Heading(one) for one in names]
+    return [replace(one, name=one.name.strip().removeprefix("\ufeff").strip()) for one in given]

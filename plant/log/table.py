@@ -1,0 +1,93 @@
+"""`Table`: a log file, open, with one clock: what its columns are called, and a way to read some of them."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from plant.arrays import Array
+from plant.errors import LogError
+from plant.log.columns import TRUTH, Column
+from plant.log.headings import Heading
+
+Read: TypeAlias = Callable[[Sequence[Column]], dict[Column, Array]]
+"""From columns to their values as logged; a column of the truth that holds no numbers is left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A log file, or a group of channels in one, whose columns share a clock.
+
+    Parameters
+    ----------
+    source : str
+        What messages call it.
+    headings : tuple of Heading
+        What its columns are called.
+    read : callable
+        From columns to their values: numbers, shape (n,), or times as datetime64[ns].
+    metadata : str or None
+        The JSON text that `plant.log.files.write_record` left.
+    step : float or None
+        Time between rows [s], where the file gives it in place of stamps.
+    began : datetime64 or None
+        When its first row was taken, where the file gives a step.
+    label : str
+        What the group, struct or sheet is called in the file.
+    """
+
+    source: str
+    headings: tuple[Heading, ...]
+    read: Read
+    metadata: str | None = None
+    step: float | None = None
+    began: np.datetime64 | None = None
+    label: str = ""
+
+    def numbers(self) -> dict[int, Array]:
+        """Return every column that holds numbers or times.
+
+        Returns
+        -------
+        dict[int, ndarray of shape (n,)]
+            Values as logged, by the column's place; a column of text is left out.
+        """
+        columns = [Column(place, one.name, f"{TRUTH}{place}") for place, one in enumerate(self.headings)]
+        try:
+            found = self.read(columns)
+        except LogError:
+            found = {}
+            for column in columns:
+                try:
+                    found |= self.read([column])
+                except LogError:
+                    continue
+        return {column.position: values for column, values in found.items()}
+
+
+def table_of(
+    source: str, named: Mapping[str, Any], *, units: Mapping[str, str | None] | None = None, **more: Any
+) -> Table:
+    """Return a table of columns that are in memory, or are read one by one.
+
+    Parameters
+    ----------
+    named : Mapping[str, ndarray or callable]
+        Values by name, or what reads them.
+    units : Mapping[str, str or None], optional
+        Unit by name, where the file gives it.
+    **more
+        As `Table` takes them.
+    """
+    from plant.log.cells import each_read, numbers
+
+    names = list(named)
+
+    def read_one(column: Column) -> Array:
+        values = named[names[column.position]]
+        got = np.atleast_1d(np.asarray(values() if callable(values) else values))
+        return got.astype("datetime64[ns]") if got.dtype.kind == "M" else numbers(got, column.name, source)
+
+    headings = tuple(Heading(name, (units or {}).get(name)) for name in names)
+    return Table(source, headings, lambda columns: each_read(columns, read_one), **more)

@@ -1,0 +1,218 @@
+"""The tables of a log, a logger or a group each: which column is which, when its rows were taken, one clock."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from plant.arrays import Array
+from plant.errors import LogError, MissingColumnError
+from plant.log.checks import alternatives
+from plant.log.columns import TIME, TRUTH, Column, converted, listed, resolve_columns
+from plant.log.guess import hint_of, missing_channels
+from plant.log.headings import Heading, cleaned
+from plant.log.merging import Timed, merged
+from plant.log.table import Table
+from plant.notes import Note
+
+Chosen = Sequence[tuple[Table, tuple[Column, ...]]]
+
+
+@dataclass(frozen=True, eq=False)
+class Gathered:
+    """What is in the tables of a log.
+
+    Parameters
+    ----------
+    columns : Mapping[str, ndarray, shape (n,)]
+        ``time_s`` and the channels, in SI.
+    began : str or None
+        When the first row was taken, in ISO 8601, where the log says so; ``time_s`` counts from there.
+    notes : tuple of Note
+        What was put together.
+    """
+
+    columns: Mapping[str, Array]
+    began: str | None = None
+    notes: tuple[Note, ...] = ()
+
+
+def gathered(
+    tables: Sequence[Table],
+    mapping: Mapping[str, str] | None,
+    required: Collection[str],
+    source: str,
+    sample_time: float | None = None,
+) -> Gathered:
+    """Return the channels of a log, converted to SI.
+
+    Parameters
+    ----------
+    tables : sequence of Table
+        Its tables.
+    mapping : Mapping[str, str] or None
+        Foreign columns by channel; ``GROUP/NAME`` where two groups have one of that name.
+    required : collection of str
+        Channels that must be there, see `plant.log.checks.trusted`.
+    source : str
+        What messages call the log.
+    sample_time : float, optional
+        Time between rows [s], of a log that has no time.
+
+    Returns
+    -------
+    Gathered
+        Channels on one time.
+
+    Raises
+    ------
+    LogError
+        If a column is missing, double or no number, or there is no time.
+    """
+    headings = [one for table in tables for one in table.headings]
+    try:
+        chosen = resolve_tables(tables, mapping, source)
+    except MissingColumnError as error:
+        hint = hint_of([error.channel], headings)
+        raise MissingColumnError(error.channel, error.column, error.known, source, hint) from error
+    found = [column.channel for _, columns in chosen for column in columns]
+    lacking = [wanted for wanted in required if not any(name in found for name in alternatives(wanted))]
+    timeless = TIME not in found and sample_time is None and not any(table.step for table, _ in chosen)
+    if timeless or lacking:
+        wanted = [TIME] * timeless + lacking
+        raise missing_channels(wanted, headings, source)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is no finite number is refused or noted later
+        parts = [(table, _read(table, columns)) for table, columns in chosen]
+    timed = [_timed(table, values, parts, sample_time, source) for table, values in parts]
+    together = merged(timed, source)
+    columns, began = _from_start(together.channels)
+    return Gathered(columns, began, together.notes)
+
+
+def resolve_tables(tables: Sequence[Table], mapping: Mapping[str, str] | None, source: str) -> Chosen:
+    """Return the columns of each table that become channels; tables without any are left out.
+
+    Parameters
+    ----------
+    tables : sequence of Table
+        Tables of one log.
+    mapping : Mapping[str, str] or None
+        Foreign columns by channel.
+    source : str
+        What messages call the log.
+
+    Raises
+    ------
+    LogError
+        If a mapped column is missing, or two columns give one channel.
+    """
+    mapping = dict(mapping or {})
+    if len(tables) == 1:
+        return [(tables[0], resolve_columns(_labelled(tables[0], mapping), mapping, source))]
+    chosen: list[tuple[Table, tuple[Column, ...]]] = []
+    taken: set[str] = set()
+    for table in tables:
+        headings = _labelled(table, mapping)
+        own = {channel: spec for channel, spec in mapping.items() if _has(headings, channel, spec)}
+        taken |= own.keys()
+        columns = resolve_columns(headings, own, source)
+        kept = tuple(one for one in columns if one.channel not in mapping or one.channel in own)
+        if any(one.channel != TIME for one in kept):
+            chosen.append((table, kept))
+    for channel in mapping.keys() - taken:
+        names = [one.name for table in tables for one in table.headings]
+        raise MissingColumnError(
+            channel, mapping[channel].rpartition(":")[0] or mapping[channel], listed(names), source
+        )
+    _once(chosen, source)
+    return chosen or [(table, ()) for table in tables[:1]]
+
+
+def _labelled(table: Table, mapping: Mapping[str, str]) -> Sequence[Heading]:
+    """Return headings, with the group before a name that the mapping gives it to."""
+    if not table.label:
+        return table.headings
+    asked = [spec for spec in mapping.values() if spec.startswith(f"{table.label}/")]
+    if not asked:
+        return table.headings
+    full = [Heading(f"{table.label}/{one.name}", one.unit, one.stamped) for one in table.headings]
+    return [
+        there if any(spec.rpartition(":")[0] == there.name or spec == there.name for spec in asked) else one
+        for one, there in zip(table.headings, full, strict=True)
+    ]
+
+
+def _has(headings: Sequence[Heading], channel: str, spec: str) -> bool:
+    try:
+        resolve_columns(cleaned(headings), {channel: spec}, "")
+    except MissingColumnError:
+        return False
+    except LogError:
+        return True
+    return True
+
+
+def _once(chosen: Chosen, source: str) -> None:
+    """Refuse a channel that two tables have."""
+    owners: dict[str, Table] = {}
+    for table, columns in chosen:
+        for column in columns:
+            if column.channel != TIME and (first := owners.setdefault(column.channel, table)) is not table:
+                places = f"{first.label or first.source!r} and {table.label or table.source!r}"
+                raise LogError(
+                    f"{places} both give {column.channel}, wanted one; "
+                    f"name the right one as {column.channel}=GROUP/NAME:UNIT",
+                    source,
+                )
+
+
+def _read(table: Table, columns: Sequence[Column]) -> dict[str, Array]:
+    raw = table.read(columns)
+    stamps = {column: values for column, values in raw.items() if values.dtype.kind == "M"}
+    for column in stamps:
+        if column.channel != TIME and not column.channel.startswith(TRUTH):
+            raise LogError(f"column {column.name!r} must hold numbers, got dates", table.source)
+    numbers = {column: values for column, values in raw.items() if column not in stamps}
+    return converted(numbers) | {column.channel: values for column, values in stamps.items()}
+
+
+def _timed(
+    table: Table,
+    values: dict[str, Array],
+    parts: Sequence[tuple[Table, dict[str, Array]]],
+    sample_time: float | None,
+    source: str,
+) -> Timed:
+    """Return a table's channels with their time: its own, its step, that of a table as long, or what was asked for."""
+    channels = {name: one for name, one in values.items() if name != TIME}
+    rows = len(next(iter(values.values()), ()))
+    if TIME in values:
+        return Timed(table.source, values[TIME], channels, table.label)
+    step = table.step or sample_time
+    if table.step is None:
+        alike = [other[TIME] for _, other in parts if TIME in other and len(other[TIME]) == rows]
+        if len(alike) == 1:
+            return Timed(table.source, alike[0], channels, table.label)
+    if step is None:
+        raise missing_channels([TIME], list(table.headings), source)
+    time: Any = step * np.arange(rows)
+    if table.began is not None:
+        time = table.began + np.rint(1e9 * time).astype("timedelta64[ns]")
+    return Timed(table.source, time, channels, table.label)
+
+
+def _from_start(columns: Mapping[str, Any]) -> tuple[dict[str, Array], str | None]:
+    """Return times of the day as seconds from the first, and when that was."""
+    out = dict(columns)
+    time: Any = out.get(TIME)
+    if time is None or time.dtype.kind != "M":
+        return out, None
+    there = ~np.isnat(time)
+    if not there.any():
+        out[TIME] = np.full(len(time), np.nan)
+        return out, None
+    first = time[int(np.argmax(there))]
+    seconds = (time - first).astype(np.int64) * 1e-9
+    out[TIME] = np.where(there, seconds, np.nan)
+    return out, str(np.datetime_as_string(first, unit="us")) + "Z"

@@ -1,0 +1,41 @@
+"""Runs one mutated input: what is wrong with what it brings up, if anything."""
+
+import signal
+import warnings
+from collections.abc import Callable
+from typing import NoReturn
+
+from plant.errors import HydrostateError
+
+LONGEST = 10.0
+"""Seconds that one input may take."""
+
+
+class HangError(BaseException):
+    """It took too long."""
+
+
+def _hang(*_: object) -> NoReturn:
+    raise HangError
+
+
+def limited(use: Callable[[], object]) -> str:
+    """Use an input; return what is wrong, empty where it was accepted or refused in one sentence."""
+    before = signal.signal(signal.SIGALRM, _hang)
+    signal.setitimer(signal.ITIMER_REAL, LONGEST)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            use()
+    except HydrostateError as error:
+        said = str(error)
+        if "\x1b" in said or len(said) > 2500 or "an internal error" in said:
+            return f"a sentence of {len(said)} characters: {said[:200]!r}"
+    except HangError:
+        return f"over {LONGEST:g} s"
+    except Exception as error:
+        return f"{type(error).__name__}: {str(error)[:300]}"
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    return ""

@@ -1,0 +1,43 @@
+"""A small log in every format, from which files are mutated."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from tests.ways import written
+from tests.ways.written import SI
+
+N = 60
+KINDS: Mapping[str, str] = {
+    "csv": "plain",
+    "semicolons": "decimal_comma",
+    "dates": "zones",
+    "units": "units_row",
+    "utf16": "utf16",
+    "parquet": "parquet",
+    "feather": "feather",
+    "mat": "mat5",
+    "mat73": "mat73",
+    "simulink": "simulink",
+    "tdms": "tdms",
+    "xlsx": "xlsx",
+    "hdf5": "hdf5",
+    "mdf": "mdf4",
+    "gzip": "gzipped",
+    "zstd": "zstd",
+}
+"""What writes each, of `tests.ways.written`."""
+
+
+def seeds(folder: Path) -> dict[str, tuple[str, bytes]]:
+    """Return the name and the content of a log of every kind."""
+    time = 1e-3 * np.arange(N)
+    wave = np.sin(200.0 * time)
+    log = pd.DataFrame(dict(zip(SI, (time, 90.0 * wave, 1e-3 * (1.0 - wave), 0.03 * wave, 3e5 * wave), strict=True)))
+    made: dict[str, tuple[str, bytes]] = {}
+    for kind, name in KINDS.items():
+        path: Path = getattr(written, name)(log, folder)
+        made[kind] = (path.name, path.read_bytes())
+    return made

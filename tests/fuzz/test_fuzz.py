@@ -1,0 +1,35 @@
+"""A reduced run of the fuzzers, which are run at length as ``python -m tests.fuzz.files`` and ``tests.fuzz.texts``."""
+
+import numpy as np
+import pytest
+
+from tests.fuzz import files, texts
+from tests.fuzz.guard import limited
+from tests.fuzz.mutations import CELLS, mutated
+
+
+def test_a_seed_makes_the_same_mutation_again() -> None:
+    first, second = (mutated(b"time_s,position_m\n0,1\n", np.random.default_rng(7), CELLS) for _ in range(2))
+    assert first == second
+
+
+def test_what_is_no_sentence_is_called_wrong() -> None:
+    def broken() -> None:
+        raise ZeroDivisionError
+
+    assert limited(broken).startswith("ZeroDivisionError")
+
+
+def test_a_few_mutated_files_and_texts_end_in_a_record_or_a_sentence() -> None:
+    assert files.run(32, first=1_000_000) == []
+    assert texts.run(30, 0, first=1_000_000) == []
+
+
+@pytest.mark.slow
+def test_many_mutated_files_end_in_a_record_or_a_sentence() -> None:
+    assert files.run(1600) == []
+
+
+@pytest.mark.slow
+def test_many_mutated_texts_and_streams_end_in_one_sentence() -> None:
+    assert texts.run(600, 100) == []

@@ -1,0 +1,58 @@
+"""Logs of anything: whatever their columns are called, they are read as they stand."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from plant.errors import LogError, LogWarning
+from plant.log.any_columns import read_any
+
+
+def written(path: Path, header: str, *columns: object) -> Path:
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="")
+    return path
+
+
+RAMP = np.arange(20.0)
+
+
+def test_columns_are_read_in_their_own_units_beside_time_in_any(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv", "Time [ms],Valve (%),bar", 2.0 * RAMP, RAMP, RAMP**2)
+    record = read_any(path, ["Valve (%)", "bar"])
+    assert record.sample_time == pytest.approx(2e-3)
+    assert list(record) == ["Valve (%)", "bar"]
+    assert record["bar"][-1] == 361.0
+
+
+def test_every_column_of_numbers_is_read_where_none_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t,u,note,y\n" + "".join(f"{k},{k * k},text,{-k}\n" for k in range(15)))
+    assert list(read_any(path)) == ["u", "y"]
+
+
+def test_a_log_without_time_takes_the_sample_time_or_says_that_it_is_assumed(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv", "u,y", RAMP, RAMP)
+    assert read_any(path, sample_time=4.0).sample_time == 4.0
+    with pytest.warns(LogWarning, match="no column of time"):
+        assert read_any(path).sample_time == 1.0
+
+
+def test_a_slow_clock_is_no_slip_of_units(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    assert read_any(written(tmp_path / "a.csv", "t_s,u", 2.0 * RAMP, RAMP), ["u"]).sample_time == 2.0
+    assert len(recwarn) == 0
+
+
+def test_a_known_channel_in_another_unit_is_found_by_its_name(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv", "time_s,motor_speed_rpm", RAMP, 60.0 * RAMP)
+    assert read_any(path, ["motor_speed_rad_s"])["motor_speed_rad_s"][1] == pytest.approx(2.0 * np.pi)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("valv", "column 'valv' is wanted, the log has 't', 'valve', 'x', 'x'; did you mean 'valve'"), ("x", "2 times")],
+)
+def test_a_column_that_is_not_there_once_is_refused(name: str, said: str, tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv", "t,valve,x,x", RAMP, RAMP, RAMP, RAMP)
+    with pytest.raises(LogError, match=said):
+        read_any(path, [name])

@@ -1,0 +1,139 @@
+"""Files made to hang, to fill the memory or to bring up an internal error are refused in one sentence."""
+
+import gzip
+import os
+import socket
+import struct
+import tracemalloc
+import warnings
+import zlib
+from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import scipy.io
+
+import plant.log.packed as packed
+from experiments.command.logs import read_log
+from plant.errors import LogError, LogWarning
+from plant.log.files import read_record
+
+N = 400
+TIME = 1e-3 * np.arange(N)
+HEADER = "time_s,motor_speed_rad_s,position_m"
+
+
+def log(path: Path, time: np.ndarray = TIME, speed: float = 1.0) -> Path:
+    rows = (f"{t!r},{speed * (k % 7)},{1e-3 * (k % 5)}\n" for k, t in enumerate(time.tolist()))
+    path.write_text(f"{HEADER}\n{''.join(rows)}")
+    return path
+
+
+def refused(path: Path, said: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        with pytest.raises(LogError, match=said):
+            read_log(path, {}, {})
+
+
+def test_a_pipe_and_a_socket_called_csv_are_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "x.csv")
+    refused(tmp_path / "x.csv", "a file is wanted, got a pipe")
+    place = Path(os.path.relpath(tmp_path / "s.csv")) if len(str(tmp_path)) < 90 else tmp_path / "s.csv"
+    with socket.socket(socket.AF_UNIX) as one:
+        one.bind(str(place))
+        refused(place, "a file is wanted, got a socket")
+
+
+def test_a_device_is_not_read() -> None:
+    refused(Path("/dev/zero"), "a file is wanted, got a device")
+
+
+@pytest.fixture
+def small_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(packed, "ALWAYS", 1 << 20)
+
+
+@pytest.mark.usefixtures("small_limits")
+@pytest.mark.parametrize("kind", ["gz", "zst", "mat", "xlsx", "parquet"])
+def test_a_bomb_unpacks_to_a_limit_and_no_further(tmp_path: Path, kind: str) -> None:
+    path, zeros = tmp_path / f"bomb.{kind}", bytes(60 << 20)
+    if kind == "gz":
+        path.write_bytes(gzip.compress(f"{HEADER}\n".encode() + b"0,0,0\n" * (8 << 20)))
+    elif kind == "zst":
+        with pa.CompressedOutputStream(str(path), "zstd") as file:
+            file.write(f"{HEADER}\n".encode() + b"0,0,0\n" * (8 << 20))
+    elif kind == "mat":
+        inner = struct.pack("<II", 14, len(zeros)) + zeros
+        squeezed = zlib.compress(inner)
+        head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+        path.write_bytes(head + struct.pack("<II", 15, len(squeezed)) + squeezed)
+    elif kind == "xlsx":
+        with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+            archive.writestr("xl/workbook.xml", zeros)
+    else:
+        columns = dict.fromkeys(HEADER.split(","), pa.array(np.zeros(4 << 20)))
+        pq.write_table(pa.table(columns), path, compression="zstd")
+    del zeros
+    tracemalloc.start()
+    try:
+        refused(path, "it unpacks to more than .* MB, the most that is read of a packed file")
+        assert tracemalloc.get_traced_memory()[1] < 40 << 20
+    finally:
+        tracemalloc.stop()
+
+
+STAMPS = {
+    "a stamp of 1e308": np.append(TIME[:-1], 1e308),
+    "stamps from -1e308 to 1e308": np.concatenate([-1e308 * np.linspace(1.0, 0.1, 200), 1e306 * np.arange(90)]),
+    "steps of 1 ns and a gap": np.concatenate([1e-9 * np.arange(10), 1.0 + 1e-9 * np.arange(N - 10)]),
+    "a jump of thirty years": np.concatenate([TIME[:100], 1e9 + TIME[100:]]),
+    "exponential": np.exp(1.5 * np.arange(N)),
+    "a sample time of 1.6e11 s": 1.6e11 * np.arange(N),
+    "a sample time of 1e-300 s": 1e-300 * np.arange(N),
+}
+
+
+@pytest.mark.parametrize("kind", STAMPS)
+def test_stamps_that_no_clock_gives_are_refused(tmp_path: Path, kind: str) -> None:
+    refused(log(tmp_path / "a.csv", STAMPS[kind]), "time_s")
+
+
+@pytest.mark.parametrize("speed", [1e200, 1e-200, 1e17])
+def test_values_that_no_sensor_gives_are_refused(tmp_path: Path, speed: float) -> None:
+    refused(log(tmp_path / "a.csv", speed=speed), "motor_speed_rad_s reaches .*, no sensor gives")
+
+
+@pytest.mark.parametrize("field", ["9" * 200_000, '"' + "x" * 200_000 + '"', "x" * 200_000])
+def test_a_field_of_200_kb_is_refused_with_a_short_sentence(tmp_path: Path, field: str) -> None:
+    lines = log(tmp_path / "a.csv").read_text().splitlines()
+    (tmp_path / "a.csv").write_text("\n".join([*lines[:20], f"0.019,{field},0", *lines[21:]]))
+    with pytest.raises(LogError) as caught:
+        read_record(tmp_path / "a.csv")
+    assert len(str(caught.value)) < 600
+
+
+@pytest.mark.parametrize("name", ["x" * 200_000, "position_" + "m*" * 100_000])
+def test_a_header_of_200_kb_is_refused_with_a_short_sentence(tmp_path: Path, name: str) -> None:
+    text = log(tmp_path / "a.csv").read_text().replace("position_m", name)
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(LogError) as caught:
+        read_record(tmp_path / "a.csv")
+    assert len(str(caught.value)) < 1000
+
+
+def test_lines_that_end_in_carriage_returns_are_read(tmp_path: Path) -> None:
+    path = log(tmp_path / "a.csv")
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        assert len(read_record(path)) == N
+
+
+def test_complex_numbers_do_not_lose_their_imaginary_part(tmp_path: Path) -> None:
+    columns = {"time_s": TIME, "motor_speed_rad_s": np.arange(N) + 0j, "position_m": TIME + 1j}
+    scipy.io.savemat(tmp_path / "a.mat", columns)
+    refused(tmp_path / "a.mat", r"column 'position_m' must hold numbers, got '.*1j\)?' in row 1")

@@ -1,0 +1,104 @@
+"""One log, written in 25 ways with the real writers, is one Record: read unaided, or by the block of `inspect`."""
+
+import json
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+import hydrostate as hs
+from experiments.cli import app
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import LUMPED, simulate
+from plant.errors import LogError, LogWarning
+from plant.log.files import read_record
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+from tests.ways.written import SI, WAYS, T, Way, rounded, with_a_copied_row
+
+READ = {name: way for name, way in WAYS.items() if not way.refused}
+REFUSED = {name: way for name, way in WAYS.items() if way.refused}
+
+
+@pytest.fixture(scope="module")
+def log() -> pd.DataFrame:
+    healthy, rng = EhaParameters(), np.random.default_rng(5)
+    drive = make_drive("prbs", 4.0, T, healthy, rng)
+    record = simulate(LUMPED, drive, T, healthy, sensors=BENCH, rng=rng)
+    return record.slice(0, 4000).to_frame()[list(SI)]
+
+
+def options_of(way: Way, path: Path) -> dict[str, Any]:
+    options = dict(way.options)
+    if "beside" in options:
+        options["beside"] = [path.parent / name for name in options["beside"]]
+    if way.inspected:
+        options["columns"] = inspected(path)["columns"]
+    return options
+
+
+def inspected(path: Path) -> Mapping[str, Any]:
+    done = CliRunner().invoke(app, ["inspect", str(path), "--json"])
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout)[0]
+
+
+def assert_same(record: Record, log: pd.DataFrame) -> None:
+    assert record.sample_time == pytest.approx(T, rel=1e-6)
+    assert len(record) == len(log)
+    for name in SI[1:]:
+        size = float(np.abs(log[name]).max())
+        np.testing.assert_allclose(record[name], log[name], rtol=0.0, atol=1e-6 * size, err_msg=name)
+
+
+def test_there_are_25_ways_of_which_23_are_read() -> None:
+    assert (len(READ), len(REFUSED)) == (23, 2)
+
+
+@pytest.mark.parametrize("name", READ)
+def test_a_log_is_one_record_however_it_is_written(name: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    path = READ[name].write(log, tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        assert_same(read_record(path, **options_of(READ[name], path)), log)
+
+
+@pytest.mark.parametrize("name", READ)
+def test_inspect_finds_every_channel_however_the_log_is_written(name: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    path = READ[name].write(log, tmp_path)
+    found = inspected(path)
+    wanted = set(SI) - ({"differential_pressure_pa"} if name == "two loggers" else set())
+    wanted -= {"time_s"} if name in ("no time", "TDMS with a step") else set()
+    assert wanted <= found["columns"].keys()
+    assert found["reads"] or "--sample-time" in found["message"]
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_read_is_refused_with_the_remedy(name: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=REFUSED[name].refused):
+        read_record(REFUSED[name].write(log, tmp_path))
+
+
+@pytest.mark.parametrize("write", [rounded, with_a_copied_row])
+def test_rounded_and_copied_stamps_are_mended_with_a_note(write: Any, log: pd.DataFrame, tmp_path: Path) -> None:
+    with pytest.warns(LogWarning) as caught:
+        record = read_record(write(log, tmp_path))
+    assert [one.message.note.code for one in caught] in (["time_rounded"], ["time_repeats"])
+    assert_same(record, log)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", READ)
+def test_a_log_gives_one_estimate_however_it_is_written(name: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    path = READ[name].write(log, tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        found = hs.read(path, **options_of(READ[name], path)).estimate()
+    wanted = hs.Log(Record(T, {name: log[name].to_numpy() for name in SI[1:]}), hs.Rig()).estimate()
+    assert found.bulk_modulus.value == pytest.approx(wanted.bulk_modulus.value, rel=1e-6)
