@@ -11,11 +11,13 @@ from numpy.typing import ArrayLike
 from estimation.arrays import Array
 from estimation.identification.design.dead_time import estimate_delay
 from estimation.identification.fit.arx import fit_arx
+from estimation.identification.fit.continuous import fit_continuous
 from estimation.identification.fit.fitted import CovarianceKind
 from estimation.identification.fit.instrumental import fit_instrumental
 from estimation.identification.fit.order import order_table
 from estimation.identification.fit.output_error import fit_output_error
 from estimation.identification.fit.prediction_error import fit_armax, fit_box_jenkins
+from estimation.identification.fit.subspace import fit_subspace
 from estimation.identification.fit.validate import fit_percent, validate
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.experiments import Signals, listed
@@ -24,7 +26,7 @@ from plant.errors import HydrostateError, LogWarning
 if TYPE_CHECKING:
     import pandas as pd
 
-StructureName: TypeAlias = Literal["ARX", "ARMAX", "output-error", "Box-Jenkins", "SRIV"]
+StructureName: TypeAlias = Literal["ARX", "ARMAX", "output-error", "Box-Jenkins", "SRIV", "subspace", "continuous"]
 
 STRUCTURES: tuple[StructureName, ...] = ("ARX", "ARMAX", "output-error", "Box-Jenkins")
 """The four of section 4."""
@@ -190,7 +192,7 @@ def fit_structure(name: str, u: Signals, y: Signals, sample_time: float, form: d
     Parameters
     ----------
     name : str
-        One of `STRUCTURES`, or SRIV.
+        One of `STRUCTURES`, SRIV, subspace or continuous.
     u, y : array_like of shape (n,), or a sequence of them
         Input and output.
     sample_time : float
@@ -202,12 +204,38 @@ def fit_structure(name: str, u: Signals, y: Signals, sample_time: float, form: d
     return _FITS[name](u, y, sample_time, **form, **dict.fromkeys(_NOISE.get(name, ()), noise))
 
 
+def _subspace(
+    u: Signals, y: Signals, sample_time: float, *, n_denominator: int, input_name: str, output_name: str, **_: Any
+) -> LinearModel:
+    names = {"input_name": input_name, "output_name": output_name}
+    return fit_subspace(listed(u)[0], listed(y)[0], sample_time, order=n_denominator, **names).model
+
+
+def _continuous(
+    u: Signals,
+    y: Signals,
+    sample_time: float,
+    *,
+    n_denominator: int,
+    delay: int,
+    input_name: str,
+    output_name: str,
+    **_: Any,
+) -> LinearModel:
+    """Fit a strictly proper model; a held input answers one sample late without any dead time."""
+    names = {"input_name": input_name, "output_name": output_name}
+    late, n = max(delay - 1, 0) * sample_time, n_denominator
+    return fit_continuous(u, y, sample_time, n_zeros=n - 1, n_poles=n, dead_time=late, **names)
+
+
 _FITS: dict[str, Callable[..., LinearModel]] = {
     "ARX": fit_arx,
     "ARMAX": fit_armax,
     "output-error": fit_output_error,
     "Box-Jenkins": fit_box_jenkins,
     "SRIV": fit_instrumental,
+    "subspace": _subspace,
+    "continuous": _continuous,
 }
 
 _NOISE = {"ARMAX": ("n_c",), "Box-Jenkins": ("n_c", "n_d")}

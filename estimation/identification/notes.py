@@ -41,3 +41,27 @@ class IdentificationCode(Code):
         "the pole {pole} and the zero {zero} nearly cancel ({deviations:.1f} standard deviations apart): intervals "
         "from the covariance cover too little; use dc_gain_interval, or a lower order",
     )
+    TIME_CONSTANT_BEYOND_RECORD = (
+        "time_constant_beyond_record",
+        "the model of order {order} has a time constant of {time_constant_s:.3g} s and the longest record lasts "
+        "{duration_s:.3g} s: no simpler model was to be had, and its steady gain means nothing",
+    )
+    SLOW_MODELS_PASSED_OVER = (
+        "slow_models_passed_over",
+        "{count} models with a time constant beyond the record of {duration_s:.3g} s are passed over for a simpler one",
+    )
+    INTEGRATES = (
+        "integrates",
+        "{output!r} integrates its input over the whole record: the model has a pole next to one, so its steady gain "
+        "means nothing",
+    )
+    SIMPLER_MODEL_TAKEN = (
+        "simpler_model_taken",
+        "in the model of order {order} a pole and a zero nearly cancel, or its gain is not determined; one of order "
+        "{taken} does nearly as well on what was held back, and is taken",
+    )
+    NO_FIT = (
+        "no_fit",
+        "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): nothing that it says "
+        "is to be believed",
+    )

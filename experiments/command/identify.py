@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from experiments.command.identify_any import Asked, identify_any, names, simulate_any
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, read_log, run_logs
 from experiments.command.options import (
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
     from estimation.identification.choose import StructureName
     from estimation.identification.model.linear_model import LinearModel
 
+INPUT, OUTPUT = "motor_speed_rad_s", "velocity_m_s"
+"""Channels that are related where none are named."""
+
 TABLE_6_TIME = 1e-3
 """Sample time of Table 6 as we read it [s] (errata E14)."""
 
@@ -44,9 +48,12 @@ STRUCTURES: "Mapping[str, StructureName | None]" = {
     "arx": "ARX",
     "armax": "ARMAX",
     "box-jenkins": "Box-Jenkins",
+    "instrumental": "SRIV",
+    "subspace": "subspace",
+    "continuous": "continuous",
     "auto": None,
 }
-"""What ``--structure`` takes; auto compares the other four on data held back."""
+"""What ``--structure`` takes; auto compares the first four on data held back."""
 
 HIGHEST_ORDER = 4
 """``--order auto`` compares orders up to this by BIC."""
@@ -70,21 +77,62 @@ commands = typer.Typer()
 def identify(
     logs: Logs,
     structure: Annotated[
-        str, option("NAME", f"{', '.join(STRUCTURES)}; auto takes the best on data held back.")
+        str,
+        option(
+            "NAME",
+            f"{', '.join([*STRUCTURES, 'narx'])}; auto takes the best on data held back, narx is polynomial and needs "
+            "--input and --output.",
+        ),
     ] = "output-error",
-    order: Annotated[str, option("INT|auto", "Order of the denominator; auto asks BIC.")] = "2",
+    order: Annotated[
+        str | None,
+        option(
+            "INT|auto",
+            "Order of the denominator; auto asks BIC. With --input and --output, free runs on blocks held back choose "
+            "it.",
+            show_default="2; auto with --input",
+        ),
+    ] = None,
     numerator: Annotated[
         int | None, option("INT", "Coefficients of the numerator; one more than the order unless told.", min=1)
     ] = None,
-    delay: Annotated[str, option("INT|auto", "Dead time [samples of the model].")] = "0",
-    sample_time: Annotated[
-        float | None, option("S", "Of the model [s]; 1e-3 (Table 6), or the log's where that is longer.")
+    delay: Annotated[
+        str | None, option("INT|auto", "Dead time [samples of the model].", show_default="0; auto with --input")
     ] = None,
+    sample_time: Annotated[
+        float | None,
+        option(
+            "S",
+            "Of the model [s], and of a log without time; 1e-3 (Table 6), or the log's. With --input, of logs without "
+            "time alone.",
+        ),
+    ] = None,
+    resample: Annotated[float | None, option("S", "With --input: sample time of the model [s]; the log's.")] = None,
     filter_hz: Annotated[
         float | None, option("HZ", "Zero-phase low-pass of input and output before the fit [Hz]; none if not given.")
     ] = None,
-    input_channel: Annotated[str, option("CHANNEL", "Input.", "--input")] = "motor_speed_rad_s",
-    output_channel: Annotated[str, option("CHANNEL", "Output.", "--output")] = "velocity_m_s",
+    inputs: Annotated[
+        list[str] | None,
+        option(
+            "COLUMN",
+            "Input: any column, in whatever unit; repeat it, or separate several by commas.",
+            "--input",
+            show_default="motor_speed_rad_s",
+        ),
+    ] = None,
+    outputs: Annotated[
+        list[str] | None,
+        option("COLUMN", "Output, likewise; one model an output.", "--output", show_default="velocity_m_s"),
+    ] = None,
+    validate: Annotated[
+        list[Path] | None, option("LOG", "With --input: a log that the model is tested on, not fitted to.")
+    ] = None,
+    simulate: Annotated[
+        Path | None, option("MODEL", "Simulate this saved model (a file of --out) on the logs, instead of a fit.")
+    ] = None,
+    simulated: Annotated[
+        Path | None, option("CSV", "With --input or --simulate: write time, inputs, measured and simulated output.")
+    ] = None,
     figure: Annotated[
         Path | None, option("PNG", "Draw measured beside simulated, the residual, its correlations, the gain.")
     ] = None,
@@ -94,14 +142,41 @@ def identify(
     seed: Seed = SEED,
     as_json: Json = False,
 ) -> None:
-    """Identify the discrete transfer function from motor speed [rad/s] to velocity [m/s] of each log.
+    """Identify the discrete transfer function from motor speed [rad/s] to velocity [m/s] of each log, or any relation.
 
-    An output-error fit with covariance; the defaults are the form of Table 6. Differential pressure is not used, so
-    its absence costs nothing. Nothing here is random, so the seed changes nothing. `--out library.json` writes one
-    entry a log at full precision, which `LinearModel.from_dict` reads.
+    With --input and --output any columns are related, whatever they are called and measured in: several logs are then
+    experiments of one model an output, with offset and initial states; order, dead time and structure are chosen by the
+    free run on blocks held back. fit and rms error are always those of the free run.
+
+    Without, an output-error fit with covariance; the defaults are the form of Table 6. Differential pressure is not
+    used, so its absence costs nothing. Nothing here is random, so the seed changes nothing. `--out library.json` writes
+    one entry a log at full precision, which `LinearModel.from_dict` reads.
     """
     from estimation.identification.from_record import identify_record, record_signals
+    from plant.errors import NoChannelError
 
+    any_columns = (inputs is not None or outputs is not None or simulate is not None) and rig is None and not columns
+    if any_columns or structure in ("narx",):
+        asked = Asked(
+            names(inputs),
+            names(outputs),
+            structure=structure,
+            order=_given("--order", order, 1),
+            delay=_given("--delay", delay, 0),
+            numerator=numerator,
+            sample_time=sample_time,
+            resampled=resample,
+            validate=tuple(validate or ()),
+            figure=figure,
+            simulated=simulated,
+        )
+        if simulate is not None:
+            simulate_any(logs, simulate, asked, as_json=as_json, out=out)
+        identify_any(logs, asked, as_json=as_json, out=out)
+    order, delay = order or "2", delay or "0"
+    input_channel, output_channel = (
+        (names(one) or (default,))[0] for one, default in ((inputs, INPUT), (outputs, OUTPUT))
+    )
     form = _form(structure, order, delay, numerator)
     form["covariance"] = "auto" if filter_hz is None else "coloured"
     require_positive("--sample-time", sample_time, "s")
@@ -111,12 +186,16 @@ def identify(
     chosen = {"input": input_channel, "output": output_channel, "rig": bench.name, "seed": seed}
 
     def work(log: Path) -> Result:
-        record = read_log(log, bench.columns, mapping)
+        try:
+            record = read_log(log, bench.columns, mapping, sample_time=sample_time)
+        except NoChannelError as error:
+            hint = "--input COLUMN --output COLUMN relates any others"
+            raise NoChannelError(f"{error.message}; {hint}", error.source) from error
         taken: dict[str, Any] = {"output": output_channel, "input": input_channel, "filter_cutoff_hz": filter_hz}
         taken["sample_time"] = max(TABLE_6_TIME, record.sample_time) if sample_time is None else sample_time
         model = identify_record(record, **taken, **form)
         u, y = record_signals(record, **taken)
-        return {**chosen, **_entries(model), **_judged(model, u, y, log, figure_path(figure, log, len(logs)))}
+        return {**chosen, **linear_entries(model), **_judged(model, u, y, log, figure_path(figure, log, len(logs)))}
 
     batch = run_logs(logs, work, {**NOTHING, **chosen}, "identifying")
     finish(batch, _screen, as_json=as_json, out=out)
@@ -163,7 +242,12 @@ def whole_or_auto(option: str, text: str, least: int) -> int | None:
     return int(text)
 
 
-def _entries(model: "LinearModel") -> dict[str, Any]:
+def _given(option: str, text: str | None, least: int) -> int | None:
+    return None if text is None else whole_or_auto(option, text, least)
+
+
+def linear_entries(model: "LinearModel") -> dict[str, Any]:
+    """Return a transfer function by the names of the JSON contract."""
     bandwidth = model.bandwidth_hz
     extent = "not below the Nyquist frequency" if bandwidth is None else f"{bandwidth:.3g} Hz"
     return {
@@ -197,7 +281,7 @@ def _judged(model: "LinearModel", u: "Array", y: "Array", log: Path, figure: Pat
     if not model.is_stable:
         return entries | {"validation": NOTHING["validation"]}
     part = slice(0, MOST_TESTED)
-    found = validate(model, u[part], y[part], fitted=fitted)
+    found = validate(model.discretised() if model.continuous else model, u[part], y[part], fitted=fitted)
     if figure is not None:
         from experiments.log_pages.identified import write_identified
 

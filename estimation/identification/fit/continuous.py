@@ -1,7 +1,6 @@
 """Transfer functions in continuous time with dead time, fitted to sampled data whose input is held between samples."""
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from estimation.arrays import Array
 from estimation.identification.fit.covariances import covariances
@@ -126,6 +125,8 @@ class _Problem:
             columns, _ = self.parts(values)
             free, initial = columns[:, : values.size], columns[:, values.size :]
             return -(free - initial @ np.linalg.lstsq(initial, free, rcond=None)[0])
+
+        from scipy.optimize import least_squares  # takes longer to import than a discrete model to fit
 
         found = least_squares(
             residual, start, jac=jacobian, method="lm", x_scale="jac", xtol=1e-10, ftol=1e-10, max_nfev=MOST_EVALUATIONS

@@ -1,10 +1,10 @@
 """Covariance of fitted coefficients: for a white residual, and robust where it is coloured."""
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from estimation.arrays import Array, BoolArray
 from estimation.identification.search.experiments import Experiments
+from estimation.identification.search.linear import inverse_of_triangle
 
 
 def covariances(jacobian: Array, residual: Array, data: Experiments) -> tuple[Array, Array, bool]:
@@ -33,13 +33,10 @@ def covariances(jacobian: Array, residual: Array, data: Experiments) -> tuple[Ar
     felt = scale > 0.0
     scale[~felt] = 1.0
     columns = (jacobian / scale)[:, felt]
-    triangle = np.linalg.qr(columns, mode="r")
+    triangle = np.asarray(np.linalg.qr(columns, mode="r"), dtype=np.float64)
     n_parameters = columns.shape[1]
     determined = bool(np.linalg.matrix_rank(triangle) == n_parameters)
-    if determined:
-        inverse = np.asarray(solve_triangular(triangle, np.eye(n_parameters)), dtype=np.float64)
-    else:
-        inverse = np.linalg.pinv(triangle)
+    inverse = inverse_of_triangle(triangle) if determined else np.linalg.pinv(triangle)
     # orthonormal columns: the sandwich is then not squared, and stays positive where coefficients are nearly tied
     upright = columns @ inverse
     freedom = data.n_used - n_parameters

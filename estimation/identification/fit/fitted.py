@@ -124,8 +124,9 @@ class Task:
         if noise is None:
             _require_effect(float(residual @ residual), float(data.y @ data.y), data.n_used, n_main, self.names)
         else:
-            simulated = _simulated_fit(b, f, state, data)
-            found |= {"noise_numerator": noise[0], "noise_denominator": noise[1], "fit_percent": simulated}
+            fit, error = _simulated_fit(b, f, state, data)
+            found |= {"noise_numerator": noise[0], "noise_denominator": noise[1], "fit_percent": fit}
+            found |= {"rmse": error * data.y_scale, "one_step_rmse": found["rmse"]}
         whole = replace(data, u=data.u * data.u_scale, y=data.y * data.y_scale)
         model = LinearModel(
             numerator=b * gain,
@@ -177,13 +178,16 @@ def _require_effect(rss: float, power: float, n_used: int, n_parameters: int, na
         )
 
 
-def _simulated_fit(b: Array, f: Array, state: Array, data: Experiments) -> float:
-    """Return the fit of the first experiment's simulation from the fitted initial state; NaN where it overflows."""
+def _simulated_fit(b: Array, f: Array, state: Array, data: Experiments) -> tuple[float, float]:
+    """Return fit and rms error of the first experiment's free run from the fitted initial state; NaN on overflow."""
     part = data.slices[0]
     with np.errstate(over="ignore", invalid="ignore"):
         residual = np.where(data.used[part], data.y[part] - filtered(b, f, data.u[part], state), 0.0)
         total = float(residual @ residual)
-    return _fit_percent(residual, data.y[part][data.used[part]]) if np.isfinite(total) else float("nan")
+    if not np.isfinite(total):
+        return float("nan"), float("nan")
+    measured = data.y[part][data.used[part]]
+    return _fit_percent(residual, measured), float(np.sqrt(total / measured.size))
 
 
 def _warn(model: LinearModel, determined: bool) -> None:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike
-from scipy.linalg import lstsq, svdvals
 
 from estimation.arrays import Array
 from estimation.identification.fit.fitted import NoEffectError
 from estimation.identification.fit.output_error import fit_output_error
 from estimation.identification.model.lags import lagged
 from estimation.identification.search.experiments import Signals
+from estimation.identification.search.linear import least_squares
 from plant.errors import HydrostateError, LogWarning
 
 if TYPE_CHECKING:
@@ -122,7 +122,7 @@ def order_test(
     noise = _surrogates(residual[lags:], inputs.size, generator)
 
     responses = _impulse_responses(inputs, np.concatenate([outputs[None, :], noise]), lags)
-    values = [svdvals(sliding_window_view(g[1:], lags // 2)) for g in responses]
+    values = [np.linalg.svdvals(sliding_window_view(g[1:], lags // 2)) for g in responses]
     projected = _projected_values(inputs, np.concatenate([outputs[None, :], noise]), outputs, n_rows)
     floor = float(max(value[0] for value in projected[1:]))
     return OrderTest(
@@ -219,7 +219,7 @@ def _impulse_responses(u: Array, outputs: Array, n_lags: int) -> Array:
     spectrum = np.conj(np.fft.rfft(outputs[:, begin:], size))
     # sum_t y_t u_(t-k), for t from `begin` on
     correlation = np.fft.irfft(spectrum * np.fft.rfft(u, size), size)[:, :n_lags][:, ::-1]
-    return lstsq(gram, correlation.T)[0].T
+    return least_squares(gram, correlation.T).T
 
 
 def _lag_gram(u: Array, n_lags: int) -> Array:
@@ -255,4 +255,4 @@ def _projected_values(u: Array, outputs: Array, past: Array, n_rows: int) -> lis
 
     known = np.concatenate([block(u, n_rows), block(u, 0), block(past, 0)], axis=1)
     basis = np.linalg.qr(known)[0][:, n_rows:]
-    return [np.asarray(svdvals(basis.T @ block(y, n_rows)) / np.sqrt(width)) for y in outputs]
+    return [np.asarray(np.linalg.svdvals(basis.T @ block(y, n_rows)) / np.sqrt(width)) for y in outputs]

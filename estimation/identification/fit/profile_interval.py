@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import gammaincinv
 
 from estimation.arrays import Array
 from estimation.identification.fit.output_error import descend_from
@@ -19,6 +18,7 @@ from estimation.identification.search.descent import normal_equations, stable
 from estimation.identification.search.experiments import Experiments, Signals, experiments_from
 from estimation.identification.search.levenberg import levenberg
 from estimation.identification.search.starts import starting_values
+from estimation.trust.chi_square import chi_square_quantile
 from plant.errors import HydrostateError
 
 OTHER_STARTS = 6
@@ -79,10 +79,10 @@ def dc_gain_interval(
     variance = least / (data.n_used - best.size)
     # where a cancelled pole lies is chosen after the fact, among many places: one more degree of freedom each
     freedom = 1 + len(model.cancellations)
-    quantile = 2.0 * float(gammaincinv(0.5 * freedom, level))  # of chi-square
+    quantile = chi_square_quantile(level, freedom)
     allowed = least + quantile * variance * _stretch(model)
     gain = float(best[:n_b].sum() / (1.0 + best[n_b : n_b + form.n_denominator].sum()))
-    first = max(model.dc_gain_std / unit, 1e-6 * abs(gain)) * np.sqrt(2.0 * gammaincinv(0.5, level))
+    first = max(model.dc_gain_std / unit, 1e-6 * abs(gain)) * chi_square_quantile(level, 1) ** 0.5
     others = [descend_from(form, start, data, 12)[1] for start in starts[1:]]
     ends: list[float] = []
     for side in (-1.0, 1.0):

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import chdtrc
 
 from estimation.arrays import Array
 from estimation.identification.model.lags import lagged
+from estimation.trust.chi_square import chi_square_tail
 from plant.errors import HydrostateError
 
 DEFAULT_LAGS = 25
@@ -224,4 +224,4 @@ def _without(absorbed: Array, columns: Array) -> Array:
 
 
 def _chi_square(statistic: float, freedom: int) -> ResidualTest:
-    return ResidualTest(statistic, freedom, float(chdtrc(freedom, statistic)))
+    return ResidualTest(statistic, freedom, chi_square_tail(statistic, freedom))

@@ -90,7 +90,16 @@ def _padded(model: "LinearModel") -> list[Array]:
     return [np.pad(values, (0, length - values.size)) for values in (model.numerator, model.denominator)]
 
 
-_LATE = ("structure", "noise_numerator", "noise_denominator", "continuous", "dead_time", "dead_time_std")
+_LATE = (
+    "structure",
+    "noise_numerator",
+    "noise_denominator",
+    "continuous",
+    "dead_time",
+    "dead_time_std",
+    "offset",
+    "one_step_rmse",
+)
 _NAMES = (
     *("numerator", "denominator", "sample_time", "input_name", "output_name", "delay", "fit_percent", *COVARIANCES),
     *("initial_state", "rmse", "residual_std", "n_samples", "data_hash", *_LATE),

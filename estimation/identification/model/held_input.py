@@ -1,7 +1,6 @@
 """The exact discrete model of a continuous one whose input is held between samples."""
 
 import numpy as np
-from scipy.linalg import expm
 
 from estimation.arrays import Array
 
@@ -66,6 +65,8 @@ def held_input_model(
 
 
 def _held(A: Array, B: Array, duration: float) -> tuple[Array, Array]:
+    from scipy.linalg import expm  # takes longer to import than a discrete model to fit
+
     n = A.shape[0]
     block = np.zeros((n + 1, n + 1))
     block[:n, :n], block[:n, n:] = A * duration, B * duration

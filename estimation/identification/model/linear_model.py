@@ -60,8 +60,8 @@ class LinearModel:
         State at the first sample of the (first) fitted record, in the output's unit, as `scipy.signal.lfilter` takes
         it; zero by default.
     fit_percent, rmse, residual_std : float
-        Fit of the simulated output, root-mean-square residual (one step ahead, where C or D is fitted), and residual
-        deviation with the degrees of freedom counted [output unit]; NaN where nothing was fitted.
+        Fit and root-mean-square error of the free run, and deviation of the residual (one step ahead, where C or D is
+        fitted) with the degrees of freedom counted [output unit]; NaN where nothing was fitted.
     data_hash : str
         SHA-256 of the data used; empty where nothing was fitted.
     covariance_white, covariance_robust : ndarray, shape (p, p)
@@ -74,6 +74,8 @@ class LinearModel:
         Of a model in continuous time [s].
     dead_time_std : float
         Its standard deviation [s]; NaN where it was not fitted.
+    offset, one_step_rmse : float
+        Output at rest where the input is zero; error one step ahead, NaN without C and D [output unit].
 
     Raises
     ------
@@ -110,6 +112,8 @@ class LinearModel:
     continuous: bool = False
     dead_time: float = 0.0
     dead_time_std: float = float("nan")
+    offset: float = 0.0
+    one_step_rmse: float = float("nan")
 
     to_control, to_ss, to_dict, to_mat = to_control, to_ss, to_dict, to_mat
     from_dict = classmethod(from_dict)
@@ -283,9 +287,9 @@ class LinearModel:
         """
         values = np.asarray(u, dtype=np.float64)
         if self.continuous:
-            return self.discretised().simulate(values)
+            return self.offset + self.discretised().simulate(values)
         state = np.zeros_like(self.initial_state) if initial is None else np.asarray(initial, dtype=np.float64)
-        return filtered(self.numerator, self.denominator, values, state)
+        return self.offset + filtered(self.numerator, self.denominator, values, state)
 
     def predict(self, u: ArrayLike, y: ArrayLike) -> Array:
         """Return the one-step-ahead prediction of the output by the noise model, from rest.
@@ -341,4 +345,4 @@ class LinearModel:
             Time from 0 [s], and output [output unit per input unit].
         """
         n = max(1, round(duration / self.sample_time)) + 1
-        return self.sample_time * np.arange(n, dtype=np.float64), self.simulate(np.ones(n))
+        return self.sample_time * np.arange(n, dtype=np.float64), self.simulate(np.ones(n)) - self.offset

@@ -3,11 +3,11 @@
 scipy.signal drags in scipy.stats, and takes longer to import than a model to fit.
 """
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.arrays import Array
+from plant.compiled.native.loops import natively
 
 
 def filtered(numerator: ArrayLike, denominator: ArrayLike, series: ArrayLike, state: ArrayLike | None = None) -> Array:
@@ -44,9 +44,48 @@ def filtered(numerator: ArrayLike, denominator: ArrayLike, series: ArrayLike, st
     return u
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+def decayed(denominator: Array, series: Array, state: Array) -> Array:
+    """Return what ``1/F`` makes of a series, without the checks and the padding of `filtered`.
+
+    Parameters
+    ----------
+    denominator : ndarray, shape (n + 1,)
+        Monic, n at least 1.
+    series : ndarray, shape (n_samples,)
+        Input.
+    state : ndarray, shape (n,)
+        State before the first sample, of the observer form.
+
+    Returns
+    -------
+    ndarray, shape (n_samples,)
+        Output.
+
+    Examples
+    --------
+    >>> decayed(np.array([1.0, -0.5]), np.array([1.0, 0.0, 0.0]), np.zeros(1)).tolist()
+    [1.0, 0.5, 0.25]
+    """
+    b = np.zeros(denominator.size)
+    b[0] = 1.0
+    out = series.copy()
+    _run(b, denominator, out, state.copy())
+    return out
+
+
+@natively()
 def _run(b: Array, f: Array, u: Array, z: Array) -> None:
-    """Write the output over the input (transposed direct form II); the state follows."""
+    """Write the output over the input (transposed direct form II); the state follows.
+
+    Parameters
+    ----------
+    b, f : ndarray, shape (order + 1,)
+        Coefficients.
+    u : ndarray, shape (n,)
+        Input, receives the output.
+    z : ndarray, shape (order,)
+        State.
+    """
     last = z.size - 1
     for k in range(u.size):
         now = u[k]

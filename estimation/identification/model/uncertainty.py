@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.arrays import Array, ComplexArray
+from estimation.trust.chi_square import chi_square_quantile
 
 CANCELS = 4.0
 """A pole and a zero that are closer than this many standard deviations of their distance are near cancellation."""
@@ -187,12 +188,10 @@ def response_band(
     level : float
         Probability that a band covers.
     """
-    from scipy.special import ndtri
-
     gain = np.abs(response)
     turned = gradient * np.where(gain > 0.0, np.conj(response) / np.where(gain > 0.0, gain, 1.0), 1.0)[:, None]
     spread = complex_std(turned, covariance)
-    reach = float(ndtri(0.5 + 0.5 * level)) * spread.real
+    reach = chi_square_quantile(level, 1) ** 0.5 * spread.real
     with np.errstate(divide="ignore", invalid="ignore"):
         phase = spread.imag / gain
     return ResponseBand(frequency_hz, response, spread.real, phase, np.maximum(gain - reach, 0.0), gain + reach)

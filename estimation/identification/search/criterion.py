@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lstsq
 
 from estimation.arrays import Array, BoolArray, ComplexArray, IntArray
 from estimation.identification.model.recursion import filtered
+from estimation.identification.search.linear import least_squares
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ def profile(structure: Structure, denominator: Array, u: Array, y: Array, used: 
     scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
     scale[scale == 0.0] = 1.0
     columns = columns / scale
-    values = lstsq(columns.T @ columns, columns.T @ target)[0]
+    values = least_squares(columns.T @ columns, columns.T @ target)
     residual = target - columns @ values
     values = values / scale
     return float(residual @ residual), np.concatenate([values[:n_b], denominator[1:], values[n_b:]])

@@ -1,11 +1,11 @@
 """First guesses of an ARMA noise model (Hannan and Rissanen, 1982)."""
 
 import numpy as np
-from scipy.linalg import lstsq
 
 from estimation.arrays import Array
 from estimation.identification.model.lags import lagged
 from estimation.identification.search.criterion import stabilised
+from estimation.identification.search.linear import least_squares
 
 LONG = 30
 """Coefficients of the long autoregression whose residual stands for the innovations."""
@@ -33,10 +33,10 @@ def noise_start(v: Array, n_c: int, n_d: int) -> tuple[Array, Array]:
     long = max(1, min(LONG, v.size // 20))
     columns = lagged(v, 1, long)[long:]
     innovation = np.zeros(v.size)
-    innovation[long:] = v[long:] - columns @ lstsq(columns.T @ columns, columns.T @ v[long:])[0]
+    innovation[long:] = v[long:] - columns @ least_squares(columns.T @ columns, columns.T @ v[long:])
     begin = long + max(n_c, n_d)
     regressors = np.concatenate([-lagged(v, 1, n_d), lagged(innovation, 1, n_c)], axis=1)[begin:]
-    values = lstsq(regressors.T @ regressors, regressors.T @ v[begin:])[0]
+    values = least_squares(regressors.T @ regressors, regressors.T @ v[begin:])
     d = np.concatenate([[1.0], values[:n_d]])
     c = np.concatenate([[1.0], values[n_d:]])
     return stabilised(c, v.size), stabilised(d, v.size)

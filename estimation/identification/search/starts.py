@@ -7,13 +7,14 @@ banded spectra, and a search over pole positions (`estimation.identification.sea
 """
 
 import numpy as np
-from scipy.linalg import hankel, lstsq
+from numpy.lib.stride_tricks import sliding_window_view
 
 from estimation.arrays import Array
 from estimation.identification.model.lags import lagged
 from estimation.identification.model.recursion import filtered
 from estimation.identification.search.criterion import Structure, polynomial, stabilised
 from estimation.identification.search.experiments import Experiments
+from estimation.identification.search.linear import least_squares
 from estimation.identification.search.pole_search import banded_spectra, refine, reflected, search_poles
 
 HIGH_ORDER = 30
@@ -82,7 +83,7 @@ def least_squares_arx(n_numerator: int, n_denominator: int, delay: int, u: Array
     regressors = np.concatenate([-lagged(y, 1, n_denominator), lagged(u, delay, n_numerator)], axis=1)
     begin = max(n_denominator, delay + n_numerator - 1)
     regressors, target = regressors[begin:], y[begin:]
-    values = lstsq(regressors.T @ regressors, regressors.T @ target)[0]
+    values = least_squares(regressors.T @ regressors, regressors.T @ target)
     f, b = values[:n_denominator], values[n_denominator:]
     return np.concatenate([np.zeros(delay), b]), np.concatenate([[1.0], f])
 
@@ -109,6 +110,6 @@ def reduced_high_order_arx(n_denominator: int, u: Array, y: Array) -> Array:
     pulse[0] = 1.0
     response = filtered(b, stabilised(f, u.size), pulse)[1:]
     half = (response.size + 1) // 2
-    left = np.linalg.svd(hankel(response[:half], response[half - 1 :]))[0][:, :n_denominator]
-    shift = lstsq(left[:-1], left[1:])[0]
+    left = np.linalg.svd(sliding_window_view(response, response.size - half + 1))[0][:, :n_denominator]
+    shift = least_squares(left[:-1], left[1:])
     return polynomial(np.linalg.eigvals(shift).astype(np.complex128))

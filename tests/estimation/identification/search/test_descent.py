@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from estimation.identification import LinearModel
+from estimation.identification.search import descent
 from estimation.identification.search.criterion import Structure, is_stable, predict, sensitivities
 from estimation.identification.search.descent import descend, normal_equations, solve_damped, stable
 
@@ -49,3 +50,22 @@ def test_descent_ends_where_no_step_helps(plant_30hz: LinearModel) -> None:
     jacobian = sensitivities(Structure(2, 2, 1), theta, u)
     residual = y - predict(Structure(2, 2, 1), theta, u)
     assert np.abs(jacobian.T @ residual / np.sqrt(np.diag(gram))).max() < 1e-4 * np.sqrt(cost)
+
+
+def test_machine_code_computes_what_python_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(5)
+    u, f = rng.normal(size=80), np.array([-1.2, 0.5])
+    sizes, bounds = np.array([2, 2, 1, 2]), np.array([0, 50, 80])
+    theta = np.concatenate([[0.4, -0.1], f, 0.1 * rng.normal(size=4)])
+    y, weight = rng.normal(size=80), (rng.random(80) > 0.1).astype(float)
+    sums = [(np.empty((8, 8)), np.empty(8)) for _ in range(2)]
+    normal_equations(theta, sizes, u, y, weight, bounds, *sums[0])
+    plain = normal_equations.__wrapped__  # type: ignore[attr-defined]  # as it is written
+    for name in ("impulse_response", "respond", "_add_products"):
+        monkeypatch.setattr(descent, name, getattr(descent, name).__wrapped__)
+    found, wanted = (
+        run(theta, sizes, u, y, weight, bounds, *sums[k]) for k, run in enumerate((normal_equations, plain))
+    )
+    assert found == pytest.approx(wanted, rel=1e-12)
+    np.testing.assert_allclose(np.tril(sums[0][0]), np.tril(sums[1][0]), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(sums[0][1], sums[1][1], rtol=1e-9, atol=1e-12)

@@ -1,0 +1,123 @@
+"""Runs in a peer's own environment, which knows nothing of this project: fits a set, writes the free run on its tests.
+
+``python identification_sets_peer.py PEER SET.npz RESULT.npz``
+"""
+
+import sys
+import warnings
+
+import numpy as np
+
+
+def state_space_run(A, B, C, D, u, y):
+    """Return the free run from the initial state that suits the measured output best."""
+    n = A.shape[0]
+    x, free, driven = np.zeros(n), np.zeros((len(u), n)), np.zeros(len(u))
+    power = np.eye(n)
+    for t in range(len(u)):
+        driven[t] = (C @ x + D @ u[t])[0]
+        x = A @ x + B @ u[t]
+        free[t] = (C @ power)[0]
+        power = A @ power
+    start = np.linalg.lstsq(free, y - driven, rcond=None)[0]
+    return driven + free @ start
+
+
+def held_out(fit, run, sizes, u, y):
+    """Return the size that best runs free on the last third, fitted to the rest."""
+    cut = 2 * len(y) // 3
+    errors = {}
+    for size in sizes:
+        try:
+            found = run(fit(u[:cut], y[:cut], size), u[cut:], y[cut:])
+            errors[size] = float(np.mean((found - y[cut:]) ** 2))
+        except Exception:
+            errors[size] = np.inf
+        if not np.isfinite(errors[size]):
+            errors[size] = np.inf
+    return min(errors, key=errors.get)
+
+
+def sippy(u, y, tests):
+    """N4SID of sippy-unipi, its order by the last third."""
+    from sippy_unipi import system_identification
+
+    def fit(u, y, n):
+        found = system_identification(y, u.T, "N4SID", SS_fixed_order=n)
+        return [np.asarray(one) for one in (found.A, found.B, found.C, found.D)]
+
+    def run(model, u, y):
+        return state_space_run(*model, u, y)
+
+    model = fit(u, y, held_out(fit, run, (1, 2, 3, 4, 5, 6), u, y))
+    return [run(model, *test) for test in tests]
+
+
+def jax_sysid(u, y, tests):
+    """Linear state space of jax-sysid by simulation error, its order by the last third."""
+    import jax
+    from jax_sysid.models import LinearModel
+
+    jax.config.update("jax_enable_x64", True)
+
+    def fit(u, y, n):
+        model = LinearModel(n, 1, u.shape[1], feedthrough=True)
+        model.loss(rho_x0=1e-8, rho_th=1e-8)
+        model.optimization(adam_epochs=500, lbfgs_epochs=1000, iprint=-1)
+        model.fit(y.reshape(-1, 1), u)
+        return [np.asarray(one, dtype=float) for one in model.ssdata()]
+
+    def run(model, u, y):
+        return state_space_run(*model, u, y)
+
+    model = fit(u, y, held_out(fit, run, (2, 4), u, y))
+    return [run(model, *test) for test in tests]
+
+
+def sysidentpy(u, y, tests):
+    """Polynomial NARX of SysIdentPy by FROLS, lags and degree by the last third."""
+    from sysidentpy.basis_function import Polynomial
+    from sysidentpy.model_structure_selection import FROLS
+    from sysidentpy.parameter_estimation import LeastSquares
+
+    def fit(u, y, size):
+        lags, degree = size
+        xlag = lags if u.shape[1] == 1 else [list(range(1, lags + 1))] * u.shape[1]
+        model = FROLS(
+            order_selection=True,
+            n_info_values=20,
+            info_criteria="bic",
+            estimator=LeastSquares(),
+            ylag=lags,
+            xlag=xlag,
+            basis_function=Polynomial(degree=degree),
+        )
+        model.fit(X=u, y=y.reshape(-1, 1))
+        return model
+
+    def run(model, u, y):
+        return np.ravel(model.predict(X=u, y=y[: model.max_lag].reshape(-1, 1)))
+
+    sizes = [(lags, degree) for lags in (1, 2, 3, 4) for degree in (1, 2, 3) if lags * (1 + u.shape[1]) * degree < 30]
+    model = fit(u, y, held_out(fit, run, sizes, u, y))
+    return [run(model, *test) for test in tests]
+
+
+PEERS = {"sippy": sippy, "jax-sysid": jax_sysid, "sysidentpy": sysidentpy}
+
+
+def main(name, data, result):
+    """Fit one set with one peer, in the scale of order one."""
+    warnings.simplefilter("ignore")
+    stored = np.load(data)
+    u, y = stored["u"], stored["y"]
+    u_mean, u_std, y_mean, y_std = u.mean(axis=0), u.std(axis=0), y.mean(), y.std()
+    tests = [
+        ((stored[f"u{k}"] - u_mean) / u_std, (stored[f"y{k}"] - y_mean) / y_std) for k in range(int(stored["tests"]))
+    ]
+    runs = PEERS[name]((u - u_mean) / u_std, (y - y_mean) / y_std, tests)
+    np.savez(result, **{f"y{k}": y_mean + y_std * np.asarray(run) for k, run in enumerate(runs)})
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

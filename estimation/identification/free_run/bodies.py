@@ -1,0 +1,233 @@
+"""What runs free inside a model, in the data's scale: a linear body and a polynomial one, each with its JSON form."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from estimation.arrays import Array, IntArray
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem
+from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, Variables, first_values, products
+
+START_STEPS = 12
+"""Refinements of the first outputs of a polynomial run."""
+
+
+class Body(Protocol):
+    """What a structure must offer to be simulated, judged and saved."""
+
+    kind: ClassVar[str]
+
+    @property
+    def n_values(self) -> int:
+        """Fitted coefficients."""
+        ...
+
+    def run(self, u: Array, y: Array) -> Array:
+        """Return the free run, shape (n,), from the state that suits the outputs that are there best."""
+        ...
+
+    def one_step(self, u: Array, y: Array) -> Array:
+        """Return the prediction one step ahead, shape (n,)."""
+        ...
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return JSON values."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class LinearBody:
+    """Transfer functions with one denominator, and an offset.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (p,)
+        Numerators, denominator behind its 1, offset.
+    """
+
+    form: Form
+    theta: Array
+    kind: ClassVar[str] = "linear"
+
+    @property
+    def n_values(self) -> int:
+        """Fitted coefficients."""
+        return self.theta.size
+
+    @property
+    def f(self) -> Array:
+        """Denominator, monic."""
+        n_b = self.form.n_b
+        return np.concatenate([[1.0], self.theta[n_b : n_b + self.form.order]])
+
+    def run(self, u: Array, y: Array) -> Array:
+        """Return the free run, its initial state by least squares of the outputs that are there.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n, m)
+            Inputs, scaled.
+        y : ndarray, shape (n,)
+            Output, scaled; NaN where missing.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output, scaled.
+        """
+        form, n_b = self.form, self.form.n_b
+        columns = Problem(form, Channels((), "", 1.0, (u,), (y,))).linear_columns(self.f)
+        driven = columns[:, : n_b + 1] @ np.concatenate([self.theta[:n_b], self.theta[-1:]])
+        known = np.isfinite(y)
+        if np.count_nonzero(known) <= form.order:
+            return driven
+        free = columns[:, n_b + 1 :]
+        return driven + free @ np.linalg.lstsq(free[known], (y - driven)[known], rcond=None)[0]
+
+    def one_step(self, u: Array, y: Array) -> Array:
+        """Return the free run: noise is taken to be the sensor's, so what was measured before tells nothing.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n, m)
+            Inputs, scaled.
+        y : ndarray, shape (n,)
+            Output, scaled; NaN where missing.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output, scaled.
+        """
+        return self.run(u, y)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return JSON values."""
+        form = self.form
+        return {
+            "order": form.order,
+            "sizes": list(form.sizes),
+            "delays": list(form.delays),
+            "values": self.theta.tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> "LinearBody":
+        """Return the body that `to_dict` wrote."""
+        form = Form(int(values["order"]), tuple(values["sizes"]), tuple(values["delays"]))
+        return cls(form, np.array(values["values"], dtype=np.float64))
+
+    @classmethod
+    def of(cls, fit: LinearFit) -> "LinearBody":
+        """Return the body of a fit."""
+        return cls(fit.form, fit.theta[: fit.form.n_values])
+
+
+@dataclass(frozen=True, eq=False)
+class PolynomialBody:
+    """A sum of products of lagged signals.
+
+    Parameters
+    ----------
+    terms : ndarray of int, shape (k, d)
+        Variables that each term multiplies; -1 stands for 1.
+    coefficients : ndarray, shape (k,)
+        One a term.
+    """
+
+    variables: Variables
+    terms: IntArray
+    coefficients: Array
+    kind: ClassVar[str] = "polynomial"
+
+    @property
+    def n_values(self) -> int:
+        """Fitted coefficients."""
+        return self.coefficients.size
+
+    def run(self, u: Array, y: Array) -> Array:
+        """Return the free run, its first outputs fitted to those that are there; NaN from where it runs away.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n, m)
+            Inputs, scaled.
+        y : ndarray, shape (n,)
+            Output, scaled; NaN where missing.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output, scaled.
+        """
+        data = Channels((), "", 1.0, (np.ascontiguousarray(u),), (y,))
+        runs, k = Runs(self.variables, self.terms, data), self.coefficients.size
+        known = runs.used
+        start = first_values(y, self.variables.n_start)
+        best, cost = np.full(y.size, np.nan), np.inf
+        for _ in range(START_STEPS if np.count_nonzero(known) > 4 * start.size else 1):
+            ran = runs.run(np.concatenate([self.coefficients, start]))
+            if ran is None:
+                break
+            left = (y - ran[0])[known]
+            now = float(left @ left)
+            if not now < cost * (1.0 - 1e-6):
+                break
+            best, cost = ran[0], now
+            moved = runs.sensitivities(*ran, self.terms, starts=True)[known][:, k:]
+            if not np.isfinite(moved).all():
+                break
+            start = start + np.linalg.lstsq(moved, left, rcond=None)[0]
+        return best
+
+    def one_step(self, u: Array, y: Array) -> Array:
+        """Return what the measured past gives for the next output; NaN where some of it is missing.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n, m)
+            Inputs, scaled.
+        y : ndarray, shape (n,)
+            Output, scaled; NaN where missing.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output, scaled.
+        """
+        out = products(self.variables, self.terms, u, y) @ self.coefficients
+        out[: self.variables.n_start] = np.nan
+        return out
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return JSON values."""
+        one = self.variables
+        return {
+            "source": one.source.tolist(),
+            "lag": one.lag.tolist(),
+            "limits": one.limits.tolist(),
+            "terms": [[int(v) for v in term if v >= 0] for term in self.terms],
+            "values": self.coefficients.tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> "PolynomialBody":
+        """Return the body that `to_dict` wrote."""
+        source, lag = (np.array(values[name], dtype=np.int64) for name in ("source", "lag"))
+        variables = Variables(source, lag, np.array(values["limits"], dtype=np.float64).reshape(-1, 2))
+        terms = np.full((len(values["terms"]), 3), -1, dtype=np.int64)
+        for row, term in zip(terms, values["terms"], strict=True):
+            row[: len(term)] = term
+        return cls(variables, terms, np.array(values["values"], dtype=np.float64))
+
+    @classmethod
+    def of(cls, fit: PolynomialFit) -> "PolynomialBody":
+        """Return the body of a fit."""
+        return cls(fit.variables, fit.terms, fit.coefficients)
+
+
+BODIES: Mapping[str, Any] = {LinearBody.kind: LinearBody, PolynomialBody.kind: PolynomialBody}
+"""Bodies by their name in JSON."""

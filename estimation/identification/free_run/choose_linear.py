@@ -1,0 +1,243 @@
+"""Order and dead time of a linear model by its free run on blocks held back, information criteria beside."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.arrays import Array, BoolArray
+from estimation.identification.free_run.data import Channels, blocks
+from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem, extended, fit_linear, quick_fit
+
+BLOCKS = 4
+"""Blocks of every log, each held back once."""
+
+CLEARLY = 0.01
+"""Share by which a larger model must do better on what was held back."""
+
+DEAD_TIME = 0.03
+"""Share by which a dead time of more than one sample must do better."""
+
+PATIENCE = 2
+"""Orders without gain after which no higher one is tried."""
+
+FORMS = 4
+"""Ways of laying out the numerators that are tried at the first two orders; the best two at higher ones."""
+
+LONGEST_DELAY = 20
+"""Dead time looked for at most [samples]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A form with what speaks for it.
+
+    Parameters
+    ----------
+    held_back : float
+        Root-mean-square free-run error of the blocks held back, over the output's deviation [dimensionless].
+    block_errors : tuple of float
+        The same of each block; NaN where one holds nothing [dimensionless].
+    bic, aic : float
+        Information criteria of the free run [dimensionless].
+    doubt : str
+        Why it may not be taken; empty where it may.
+    """
+
+    fit: LinearFit
+    held_back: float
+    block_errors: tuple[float, ...]
+    bic: float
+    aic: float
+    doubt: str
+
+    @property
+    def price(self) -> float:
+        """Held-back error by which candidates are compared [dimensionless]: a dead time has its price."""
+        return self.held_back * (1.0 + DEAD_TIME * (max(self.form.delays) > 1))
+
+    @property
+    def form(self) -> Form:
+        """Size of the model."""
+        return self.fit.form
+
+
+def held_back_blocks(fit: LinearFit, data: Channels) -> tuple[float, ...]:
+    """Return the root-mean-square free-run error of each block held back, simulated by a fit to the others.
+
+    Parameters
+    ----------
+    fit : LinearFit
+        Of all data; each fit begins at it.
+    data : Channels
+        Scaled.
+
+    Returns
+    -------
+    tuple of float
+        Over the output's deviation, one a block.
+    """
+    target = np.concatenate(data.y)
+    errors: list[float] = []
+    for masks in blocks(data, BLOCKS):
+        mask = np.concatenate(masks) & np.isfinite(target)
+        part = fit_linear(fit.form, data.without(masks), [fit.f])
+        errors.append(block_error(Problem(fit.form, data).jacobian(part.theta)[0] - target, mask))
+    return tuple(errors)
+
+
+def block_error(error: Array, mask: BoolArray) -> float:
+    """Return the root mean square of an error where a block was held back; NaN where the block holds nothing.
+
+    Parameters
+    ----------
+    error : ndarray, shape (n,)
+        Simulated less measured.
+    mask : ndarray of bool, shape (n,)
+        Where it was held back.
+
+    Returns
+    -------
+    float
+        In the error's unit.
+    """
+    return float(np.sqrt(np.mean(error[mask] ** 2))) if mask.any() else float("nan")
+
+
+def pooled(errors: Sequence[float]) -> float:
+    """Return the root mean square over blocks; infinite where there are none.
+
+    Parameters
+    ----------
+    errors : sequence of float
+        One a block [dimensionless].
+
+    Returns
+    -------
+    float
+        Likewise.
+
+    Examples
+    --------
+    >>> round(pooled([3.0, 4.0, float("nan")]) ** 2, 6)
+    12.5
+    """
+    known = [error**2 for error in errors if not np.isnan(error)]
+    return float(np.sqrt(np.mean(known))) if known else float("inf")
+
+
+def candidate(fit: LinearFit, data: Channels) -> Candidate:
+    """Return a fit with its held-back error, criteria, and what is doubtful in it."""
+    n, p = data.n_samples, fit.theta.size
+    deviance = n * float(np.log(max(fit.cost, 1e-300) / n))
+    errors = held_back_blocks(fit, data)
+    criteria = (deviance + p * float(np.log(n)), deviance + 2.0 * p)
+    return Candidate(fit, pooled(errors), errors, *criteria, doubt_of(fit, data))
+
+
+def doubt_of(fit: LinearFit, data: Channels) -> str:
+    """Return why a linear model may not be taken: ``time_constant``, ``no_fit``, or nothing."""
+    output, n = np.concatenate(data.y), data.n_samples
+    spread = float(np.nansum((output - np.nanmean(output)) ** 2))
+    gained = n * float(np.log(spread / max(fit.cost, 1e-300 * spread)))
+    if gained < fit.theta.size * float(np.log(n)):
+        return "no_fit"
+    radius = float(np.abs(np.roots(fit.f)).max()) if fit.form.order else 0.0
+    if radius >= 1.0 or (radius > 0.0 and -1.0 / np.log(radius) > data.longest):
+        return "time_constant"
+    return ""
+
+
+def estimate_delays(data: Channels, longest: int = LONGEST_DELAY) -> tuple[int, ...]:
+    """Return the dead time of each input with which models of second order fit best, one input after the other.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    """
+    m = len(data.inputs)
+    most = min(longest, data.longest // 20)
+    delays = [1] * m
+    for index in range(m):
+        costs: list[float] = []
+        for delay in range(most + 1):
+            tried = tuple(delay if k == index else one for k, one in enumerate(delays))
+            costs.append(quick_fit(Form(2, (2,) * m, tried), data))
+        least = min(costs)
+        delays[index] = next(k for k, cost in enumerate(costs) if cost <= 1.005 * least)
+    return tuple(delays)
+
+
+def linear_candidates(
+    data: Channels, orders: Sequence[int], delays: tuple[int, ...] | None, sizes: int | None = None
+) -> list[Candidate]:
+    """Return linear models over orders and dead times, each judged on blocks held back.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    orders : sequence of int
+        Orders tried, rising; ended early where two in a row bring nothing.
+    delays : tuple of int or None
+        Dead time of each input [samples]; None estimates it, and tries none and one sample beside.
+    sizes : int, optional
+        Numerator coefficients of each input; as many as the order, or one more, unless told.
+    """
+    m = len(data.inputs)
+    late = delays or estimate_delays(data)
+    found: list[Candidate] = []
+    previous: list[Array] = []
+    best, idle = np.inf, 0
+    kinds = list(range(FORMS if delays is None and sizes is None else 1))
+    for order in orders:
+        forms = [form for kind, form in enumerate(_forms(order, late, m, sizes)) if kind in kinds]
+        fits = [_best_start(form, data, previous) for form in forms]
+        tried = [candidate(fit, data) for fit in fits]
+        found += tried
+        previous = [start for fit in fits for start in extended(fit)]
+        if len(found) >= 2 * FORMS:
+            ranked = np.argsort([one.held_back for one in tried], kind="stable")
+            kinds = [kinds[int(k)] for k in ranked[:2] if int(k) < len(kinds)]
+        now = min((one.held_back for one in tried if not one.doubt), default=np.inf)
+        idle = 0 if now < (1.0 - CLEARLY) * best else idle + 1
+        best = min(best, now)
+        if idle >= PATIENCE:
+            break
+    return found
+
+
+def _best_start(form: Form, data: Channels, previous: Sequence[Array]) -> LinearFit:
+    fits = [fit_linear(form, data)]
+    if previous:
+        fits.append(fit_linear(form, data, previous))
+    return min(fits, key=lambda fit: fit.cost)
+
+
+def _forms(order: int, late: tuple[int, ...], m: int, sizes: int | None) -> list[Form]:
+    """Return forms of one order: behind the estimated dead time, and behind none or one sample."""
+    if sizes is not None:
+        return [Form(order, (sizes,) * m, late)]
+    return [
+        Form(order, tuple(order + (delay == 0) for delay in late), late),
+        Form(order, (order + 1,) * m, late),
+        Form(order, (order + 1,) * m, (0,) * m),
+        Form(order, (order,) * m, (1,) * m),
+    ]
+
+
+def chosen(candidates: Sequence[Candidate]) -> Candidate:
+    """Return the smallest model that does nearly as well on held-back blocks as the best one that may be taken.
+
+    A dead time of more than one sample was searched among many, and must do better than none by more than chance.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+        One at least; where all are doubtful, the best of them is returned.
+    """
+    sound = [one for one in candidates if not one.doubt] or list(candidates)
+    least = min(one.price for one in sound)
+    near = [one for one in sound if one.price <= (1.0 + CLEARLY) * least]
+    return min(near, key=lambda one: (one.form.n_values, one.held_back))

@@ -1,0 +1,143 @@
+"""How many products a polynomial model is given: grown on blocks side by side, ended where held-back runs get worse."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.identification.free_run.choose_linear import BLOCKS, Candidate, block_error, pooled
+from estimation.identification.free_run.data import Channels, blocks
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs
+from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, is_wild, one_more, without_term
+
+MOST_TERMS = 20
+"""Products beside the linear terms."""
+
+PATIENCE = 4
+"""Products without gain on what was held back after which no more are added."""
+
+CLEARLY = 0.01
+"""Share by which further products must do better on what was held back."""
+
+HIGHEST_BASE = 4
+"""Order of the linear model that products are added to."""
+
+BASES, SCREENED, KEPT = 6, 3, 2
+"""Linear models that products are added to, how many products they are given first, and how many models go on."""
+
+
+@dataclass(frozen=True, eq=False)
+class PolynomialCandidate:
+    """A polynomial fit with its held-back error.
+
+    Parameters
+    ----------
+    held_back : float
+        Root-mean-square free-run error of the blocks held back, over the output's deviation [dimensionless].
+    block_errors : tuple of float
+        The same of each block; NaN where one holds nothing [dimensionless].
+    bic : float
+        Information criterion of the free run [dimensionless].
+    """
+
+    fit: PolynomialFit
+    held_back: float
+    block_errors: tuple[float, ...]
+    bic: float
+
+
+def polynomial_candidates(linear: Sequence[Candidate], data: Channels) -> list[PolynomialCandidate]:
+    """Return polynomial models that begin at several linear ones; those that do best after a few products go on.
+
+    Parameters
+    ----------
+    linear : sequence of Candidate
+        Judged on blocks of the same data.
+    data : Channels
+        Scaled.
+    """
+    growths = [_Growth(base, whole, data) for base in _bases(linear) if (whole := begun(base.fit, data)) is not None]
+    screened = [growth for growth in growths if growth.advance(SCREENED)]
+    best = sorted(screened, key=lambda one: min(one.errors))[:KEPT]
+    for growth in best:
+        growth.advance(MOST_TERMS)
+    return [growth.finished() for growth in best]
+
+
+def _bases(linear: Sequence[Candidate]) -> list[Candidate]:
+    """Return the best linear models of each order, with dead time and without."""
+    best: dict[tuple[int, bool], Candidate] = {}
+    for one in linear:
+        kind = (one.form.order, max(one.form.delays) > 1)
+        if kind[0] <= HIGHEST_BASE and not one.doubt and (kind not in best or one.held_back < best[kind].held_back):
+            best[kind] = one
+    sound = list(best.values()) or list(linear)[:1]
+    return sorted(sound, key=lambda one: one.held_back)[:BASES]
+
+
+class _Growth:
+    """Polynomial models of one base that grow on each block's data side by side."""
+
+    def __init__(self, base: Candidate, whole: PolynomialFit, data: Channels) -> None:
+        self.path, self.data = [whole], data
+        self.masks = blocks(data, BLOCKS)
+        self.parts = [data.without(mask) for mask in self.masks]
+        self.fits = [begun(fit_linear(base.form, part, [base.fit.f]), part) for part in self.parts]
+        self.block_errors = [self._held_back()]
+
+    @property
+    def errors(self) -> list[float]:
+        """Held-back error by the number of products."""
+        return [pooled(one) for one in self.block_errors]
+
+    def advance(self, most: int) -> bool:
+        """Add products until there are as many as wanted, or more bring nothing; return whether it runs free at all."""
+        if not np.isfinite(self.errors[0]):
+            return False
+        pool = candidate_terms(self.path[0].variables)
+        while len(self.errors) <= most and len(self.errors) - 1 - int(np.argmin(self.errors)) < PATIENCE:
+            self.fits = [
+                None if fit is None else one_more(fit, pool, part) or fit
+                for fit, part in zip(self.fits, self.parts, strict=True)
+            ]
+            more = one_more(self.path[-1], pool, self.data)
+            if more is None:
+                break
+            self.path.append(more)
+            wild = is_wild(more, self.data)
+            self.block_errors.append((float("inf"),) * len(self.masks) if wild else self._held_back())
+        return True
+
+    def finished(self) -> PolynomialCandidate:
+        """Return the model of all data with as many products as held-back blocks ask for, pruned."""
+        errors = self.errors
+        least = min(errors)
+        count = next(k for k, error in enumerate(errors) if error <= (1.0 + CLEARLY) * least)
+        fit = _pruned(self.path[count], self.data)
+        fit = Runs(fit.variables, fit.terms, self.data).fit(fit.theta, FINAL_STEPS) or fit
+        n, p = self.data.n_samples, fit.theta.size
+        bic = n * float(np.log(fit.cost / n)) + p * float(np.log(n))
+        return PolynomialCandidate(fit, errors[count], self.block_errors[count], bic)
+
+    def _held_back(self) -> tuple[float, ...]:
+        target, errors = np.concatenate(self.data.y), list[float]()
+        for fit, mask in zip(self.fits, self.masks, strict=True):
+            ran = None if fit is None else Runs(fit.variables, fit.terms, self.data).run(fit.theta)
+            if ran is None:
+                return (float("inf"),) * len(self.masks)
+            errors.append(block_error(ran[0] - target, np.concatenate(mask) & np.isfinite(target)))
+        return tuple(errors)
+
+
+def _pruned(fit: PolynomialFit, data: Channels) -> PolynomialFit:
+    """Return a fit without the products that the free run's information criterion does not miss."""
+    price = float(np.log(data.n_samples)) / data.n_samples
+    index = fit.terms.shape[0] - 1
+    while index >= 0:
+        if fit.terms[index, 1] >= 0:
+            less = without_term(fit, index, data)
+            if less is not None and np.log(less.cost / fit.cost) < price and not is_wild(less, data):
+                fit = less
+        index -= 1
+    return fit

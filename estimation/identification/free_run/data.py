@@ -1,0 +1,173 @@
+"""Inputs and outputs of one or more logs as free-run fits take them: scaled, with blocks that may be held back."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.arrays import Array, BoolArray
+from plant.errors import HydrostateError
+
+FEWEST = 20
+"""Samples of an output that a fit needs at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """Inputs and one output of one or more logs on one sample time.
+
+    Parameters
+    ----------
+    inputs, output : tuple of str, str
+        Names of the channels.
+    sample_time : float
+        Seconds between samples [s].
+    u : tuple of ndarray, shape (n, m)
+        Inputs of each log, no gaps.
+    y : tuple of ndarray, shape (n,)
+        Output of each log; NaN where missing.
+    """
+
+    inputs: tuple[str, ...]
+    output: str
+    sample_time: float
+    u: tuple[Array, ...]
+    y: tuple[Array, ...]
+
+    @property
+    def n_samples(self) -> int:
+        """Outputs that are there."""
+        return sum(int(np.isfinite(y).sum()) for y in self.y)
+
+    @property
+    def longest(self) -> int:
+        """Samples of the longest log."""
+        return max(y.size for y in self.y)
+
+    @property
+    def duration(self) -> float:
+        """Length of the longest log [s]."""
+        return self.longest * self.sample_time
+
+    def without(self, masks: Sequence[BoolArray]) -> "Channels":
+        """Return the same channels with outputs held back.
+
+        Parameters
+        ----------
+        masks : sequence of ndarray of bool, shape (n,)
+            Where outputs of each log become NaN.
+        """
+        return replace(self, y=tuple(np.where(mask, np.nan, y) for y, mask in zip(self.y, masks, strict=True)))
+
+
+def channels_from(
+    u: Sequence[Array], y: Sequence[Array], sample_time: float, inputs: Sequence[str], output: str
+) -> Channels:
+    """Return channels after checking them.
+
+    Parameters
+    ----------
+    u : sequence of ndarray, shape (n, m)
+        Inputs of each log.
+    y : sequence of ndarray, shape (n,)
+        Output of each log; NaN where missing.
+    sample_time : float
+        Seconds between samples [s].
+    inputs, output : sequence of str, str
+        Their names.
+
+    Raises
+    ------
+    HydrostateError
+        If shapes disagree, an input is not finite, or input or output does not vary.
+    """
+    kept = Channels(
+        tuple(inputs),
+        output,
+        float(sample_time),
+        tuple(np.asarray(one, dtype=np.float64).reshape(len(one), -1) for one in u),
+        tuple(np.asarray(one, dtype=np.float64) for one in y),
+    )
+    if not (np.isfinite(sample_time) and sample_time > 0.0):
+        raise HydrostateError(f"sample_time must be positive and finite, got {sample_time!r}")
+    if not kept.u or len(kept.u) != len(kept.y):
+        raise HydrostateError(f"as many inputs as outputs are wanted, got {len(kept.u)} and {len(kept.y)}")
+    for one_u, one_y in zip(kept.u, kept.y, strict=True):
+        if one_u.shape != (one_y.size, len(kept.inputs)):
+            raise HydrostateError(
+                f"inputs {', '.join(inputs)} of shape {(one_y.size, len(kept.inputs))} are wanted beside "
+                f"{output!r}, got {one_u.shape}"
+            )
+        if not np.isfinite(one_u).all():
+            raise HydrostateError(f"inputs {', '.join(inputs)} must be finite at every sample")
+        if np.isinf(one_y).any():
+            raise HydrostateError(f"output {output!r} must be finite or missing (NaN), got infinite values")
+    if kept.n_samples < FEWEST:
+        raise HydrostateError(f"output {output!r} needs {FEWEST} samples or more, got {kept.n_samples}")
+    _require_variation(np.concatenate(kept.y), output)
+    for index, name in enumerate(inputs):
+        _require_variation(np.concatenate([one[:, index] for one in kept.u]), name)
+    return kept
+
+
+def _require_variation(values: Array, name: str) -> None:
+    if np.nanmin(values) == np.nanmax(values):
+        raise HydrostateError(f"channel {name!r} must vary, got {np.nanmin(values):g} throughout")
+
+
+@dataclass(frozen=True, eq=False)
+class Scaling:
+    """Means and standard deviations by which channels are brought to order one.
+
+    Parameters
+    ----------
+    u_mean, u_std : ndarray, shape (m,)
+        Of the inputs.
+    y_mean, y_std : float
+        Of the output [output unit].
+    """
+
+    u_mean: Array
+    u_std: Array
+    y_mean: float
+    y_std: float
+
+
+def scaled(data: Channels) -> tuple[Channels, Scaling]:
+    """Return channels of zero mean and unit deviation, and what was taken off.
+
+    Returns
+    -------
+    tuple of Channels and Scaling
+        The scaled channels, and their scaling.
+    """
+    together, outputs = np.concatenate(data.u), np.concatenate(data.y)
+    by = Scaling(together.mean(axis=0), together.std(axis=0), float(np.nanmean(outputs)), float(np.nanstd(outputs)))
+    return in_scale(data, by), by
+
+
+def in_scale(data: Channels, by: Scaling) -> Channels:
+    """Return channels brought to a scaling that is already known."""
+    return replace(
+        data,
+        u=tuple((one - by.u_mean) / by.u_std for one in data.u),
+        y=tuple((one - by.y_mean) / by.y_std for one in data.y),
+    )
+
+
+def blocks(data: Channels, count: int) -> list[list[BoolArray]]:
+    """Return masks that hold back one block of every log after the other, but for the first.
+
+    The first block is never held back: nothing else tells the initial state.
+
+    Parameters
+    ----------
+    count : int
+        Blocks that are held back.
+
+    Returns
+    -------
+    list of list of ndarray of bool, shape (n,)
+        One mask a log, for each block.
+    """
+    return [[np.arange(y.size) * (count + 1) // max(y.size, 1) == 1 + index for y in data.y] for index in range(count)]

@@ -1,0 +1,273 @@
+"""From channels to the model that generalises: candidates judged by free runs on blocks held back."""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from estimation.identification.free_run.bodies import LinearBody, PolynomialBody
+from estimation.identification.free_run.choose_linear import Candidate, chosen, linear_candidates
+from estimation.identification.free_run.choose_polynomial import PolynomialCandidate, polynomial_candidates
+from estimation.identification.free_run.data import Channels, Scaling, scaled
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
+from estimation.identification.free_run.other_structures import ADOPTED, adopt
+from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, Runs
+from estimation.identification.free_run.transfer_function import linear_model
+from estimation.identification.notes import IdentificationCode
+from plant.errors import HydrostateError, LogWarning
+from plant.notes import Note
+
+FREE_STRUCTURES = ("output-error", "narx", "auto", *ADOPTED)
+"""Structures between any channels; auto chooses between the first two."""
+
+WARNED = (IdentificationCode.TIME_CONSTANT_BEYOND_RECORD, IdentificationCode.NO_FIT, IdentificationCode.INTEGRATES)
+"""Notes that are raised as warnings too; the others say only what was passed over."""
+
+HIGHEST = 6
+"""Order of a linear model at most, where the data choose."""
+
+MOST_CHOSEN, MOST_FITTED = 10_000, 100_000
+"""Samples on which structures are compared, and on which a polynomial model is fitted at the end."""
+
+CLEAR_MARGIN = 0.15
+"""Share by which a nonlinear model must do better than the linear one on what was held back."""
+
+NEARLY_AS_GOOD = 0.02
+"""Share of held-back error that is given up for a model without cancelling or undetermined parts."""
+
+INTEGRATING = 0.7
+"""A pole at one is believed where it leaves less than this share of the best other model's held-back error."""
+
+
+BELIEVED = 0.5
+"""Likewise, of the output's deviation, where no other model may be taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """A model with what it was chosen by.
+
+    Parameters
+    ----------
+    quality : FreeRunQuality
+        On the data that it was fitted to.
+    held_back_percent : float
+        Fit of the free run on blocks held back, each by a fit to the others; NaN where there were none.
+    candidates : tuple of dict
+        Everything that was compared: structure, order, delays, held-back fit and information criteria.
+    notes : tuple of Note
+        What was passed over, or is doubtful.
+    sound : bool
+        Whether the model may be believed.
+    """
+
+    model: FreeRunModel
+    quality: FreeRunQuality
+    held_back_percent: float
+    candidates: tuple[dict[str, Any], ...]
+    notes: tuple[Note, ...]
+    sound: bool
+
+
+def identify_channels(
+    data: Channels,
+    *,
+    structure: str = "output-error",
+    order: int | None = None,
+    delay: int | None = None,
+    n_numerator: int | None = None,
+) -> Identified:
+    """Identify the relation from inputs to one output, with offset, initial states and what the data say of both.
+
+    Parameters
+    ----------
+    data : Channels
+        One log or several.
+    structure : str
+        ``"output-error"``: linear; ``"narx"``: polynomial, its terms chosen by the free run; ``"auto"``: linear,
+        unless the polynomial one is clearly better on blocks held back. Of one input also the keys of
+        `other_structures.ADOPTED`, at the order that output error is given.
+    order, delay, n_numerator : int, optional
+        Of every input; chosen by the free run on blocks held back where not given.
+
+    Returns
+    -------
+    Identified
+        Model, quality and candidates.
+
+    Raises
+    ------
+    HydrostateError
+        If the structure is not known or nothing can be fitted.
+
+    Warns
+    -----
+    LogWarning
+        If the model is not to be believed, or its steady gain means nothing.
+    """
+    if structure not in FREE_STRUCTURES:
+        raise HydrostateError(f"structure must be one of {', '.join(FREE_STRUCTURES)}, got {structure!r}")
+    with threadpool_limits(limits=1, user_api="blas"):
+        found = _identified(data, structure, order, delay, n_numerator)
+    for note in found.notes:
+        if note.code in WARNED:
+            warnings.warn(LogWarning(note), stacklevel=2)
+    return found
+
+
+def _identified(
+    data: Channels, structure: str, order: int | None, delay: int | None, n_numerator: int | None
+) -> Identified:
+    whole, by = scaled(data)
+    part = section(whole, MOST_CHOSEN)
+    orders = range(1, HIGHEST + 1) if order is None else (order,)
+    delays = None if delay is None else (delay,) * len(data.inputs)
+    linear = linear_candidates(part, list(orders), delays, n_numerator)
+    best, notes = _believable(linear, part, by)
+    rows = [_row(one) for one in linear]
+    sound = not best.doubt
+    if structure in ADOPTED:
+        return _adopted(structure, best, data, by, rows)
+    body, held_back, named = LinearBody.of(best.fit), best.held_back, "output-error"
+    if structure != "output-error":
+        polynomial = polynomial_candidates(linear if sound else [best], part)
+        rows += [_polynomial_row(one) for one in polynomial]
+        better = min(polynomial, key=lambda one: one.held_back, default=None)
+        if better is None and structure == "narx":
+            raise HydrostateError(f"no polynomial model of {data.output!r} runs free without growing beyond bounds")
+        if better is not None and (structure == "narx" or not sound or _clearly_better(better, best)):
+            body, held_back, named = _refitted(better, whole), better.held_back, "narx"
+            sound, notes = np.isfinite(held_back) and held_back < 1.0, []
+    transfer = None
+    if isinstance(body, LinearBody):
+        fit = fit_linear(best.form, whole, [best.fit.f])
+        body = LinearBody.of(fit)
+        transfer = linear_model(fit, whole, by) if len(data.inputs) == 1 else None
+    model = FreeRunModel(data.inputs, data.output, data.sample_time, named, by, body, transfer)
+    quality = model.quality(data.u, data.y)
+    empty = isinstance(body, LinearBody) and best.doubt == "no_fit"
+    if empty or not quality.fit_percent > 0.0 or not held_back < 1.0:
+        notes = [*notes, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
+        sound = False
+    return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(rows), tuple(notes), bool(sound))
+
+
+def _adopted(structure: str, best: Candidate, data: Channels, by: Scaling, rows: list[dict[str, Any]]) -> Identified:
+    """Return a structure that is not fitted by its free run, at the order of the best output-error model."""
+    body, linear, held_back = adopt(structure, best.form, data, by)
+    model = FreeRunModel(data.inputs, data.output, data.sample_time, structure, by, body, linear)
+    quality = model.quality(data.u, data.y)
+    sound = quality.fit_percent > 0.0 and held_back < 1.0
+    notes = () if sound else (IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent),)
+    return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(rows), notes, sound)
+
+
+def _believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> tuple[Candidate, list[Note]]:
+    """Return the candidate that may be believed, and notes on those that were passed over for it."""
+    notes: list[Note] = []
+    best = chosen(candidates)
+    tempting = min(candidates, key=lambda one: one.held_back)
+    bar = BELIEVED if best.doubt else INTEGRATING * best.held_back
+    if tempting.doubt == "time_constant" and tempting.held_back < bar:
+        return replace(tempting, doubt=""), [IdentificationCode.INTEGRATES.note(output=data.output)]
+    if best.doubt == "time_constant":
+        radius = float(np.abs(np.roots(best.fit.f)).max())
+        slowest = -data.sample_time / float(np.log(radius)) if radius < 1.0 else float("inf")
+        notes.append(
+            IdentificationCode.TIME_CONSTANT_BEYOND_RECORD.note(
+                order=best.form.order, time_constant_s=slowest, duration_s=data.duration
+            )
+        )
+        return best, notes
+    passed = [one for one in candidates if one.doubt == "time_constant" and one.held_back < best.held_back]
+    if passed:
+        notes.append(IdentificationCode.SLOW_MODELS_PASSED_OVER.note(count=len(passed), duration_s=data.duration))
+    simpler = [
+        one for one in candidates if not one.doubt and one is not best and one.form.n_values <= best.form.n_values
+    ]
+    near = [one for one in simpler if one.price <= (1.0 + NEARLY_AS_GOOD) * best.price]
+    if near and len(data.inputs) == 1 and _undetermined(best, data, by):
+        clean = [one for one in near if not _undetermined(one, data, by)]
+        if clean:
+            taken = min(clean, key=lambda one: one.price)
+            notes.append(IdentificationCode.SIMPLER_MODEL_TAKEN.note(order=best.form.order, taken=taken.form.order))
+            best = taken
+    return best, notes
+
+
+def _clearly_better(nonlinear: PolynomialCandidate, linear: Candidate) -> bool:
+    """Return whether a nonlinear model wins by a margin over all blocks, and in half of them at least."""
+    pairs = [
+        (one, other)
+        for one, other in zip(nonlinear.block_errors, linear.block_errors, strict=True)
+        if not (np.isnan(one) or np.isnan(other))
+    ]
+    won = sum(one < other for one, other in pairs)
+    return nonlinear.held_back < (1.0 - CLEAR_MARGIN) * linear.held_back and 2 * won >= len(pairs)
+
+
+def _undetermined(candidate: Candidate, data: Channels, by: Scaling) -> bool:
+    """Return whether a pole and a zero cancel, or the steady gain is less than its standard deviation."""
+    model = linear_model(candidate.fit, data, by)
+    return bool(model.cancellations) or not model.dc_gain_std < abs(model.dc_gain)
+
+
+def _refitted(found: PolynomialCandidate, whole: Channels) -> PolynomialBody:
+    """Return a polynomial body fitted to all data, or to as much as is practical."""
+    data, fit = section(whole, MOST_FITTED), found.fit
+    runs = Runs(fit.variables, fit.terms, data)
+    settled = runs.fit(np.concatenate([fit.coefficients, runs.start_values()]), FINAL_STEPS)
+    return PolynomialBody.of(settled or fit)
+
+
+def section(data: Channels, most: int) -> Channels:
+    """Return of each log the part in which the first input varies most, so that there are no more samples than wanted.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    """
+    total = sum(y.size for y in data.y)
+    if total <= most:
+        return data
+    parts: list[slice] = []
+    for u in data.u:
+        length = max(u.shape[0] * most // total, 1)
+        begins = np.linspace(0, u.shape[0] - length, 11).astype(int)
+        liveliest = max(begins, key=lambda k: float(np.var(u[k : k + length], axis=0).sum()))
+        parts.append(slice(int(liveliest), int(liveliest) + length))
+    return replace(
+        data,
+        u=tuple(np.ascontiguousarray(u[part]) for u, part in zip(data.u, parts, strict=True)),
+        y=tuple(y[part] for y, part in zip(data.y, parts, strict=True)),
+    )
+
+
+def _row(one: Candidate) -> dict[str, Any]:
+    form = one.form
+    return {
+        "structure": "output-error",
+        "order": form.order,
+        "numerator": list(form.sizes),
+        "delay": list(form.delays),
+        "held_back_percent": 100.0 * (1.0 - one.held_back),
+        "bic": one.bic,
+        "aic": one.aic,
+        "doubt": one.doubt or None,
+    }
+
+
+def _polynomial_row(one: PolynomialCandidate) -> dict[str, Any]:
+    terms = one.fit.terms
+    return {
+        "structure": "narx",
+        "order": one.fit.variables.n_start,
+        "terms": int(np.count_nonzero(terms[:, 1] >= 0)),
+        "held_back_percent": 100.0 * (1.0 - one.held_back),
+        "bic": one.bic,
+    }

@@ -1,0 +1,335 @@
+"""Output error of several inputs with one denominator, an offset, and a free initial state in every log."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.arrays import Array, BoolArray
+from estimation.identification.fit.output_error import minimise
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.linear_kernel import decay_rows
+from estimation.identification.search.criterion import Structure, polynomial, stabilised
+from estimation.identification.search.descent import stable
+from estimation.identification.search.experiments import Experiments
+from estimation.identification.search.levenberg import levenberg
+
+TOLERANCE, MOST_STEPS = 1e-9, 80
+"""Share of the cost that a further step may promise at the end, and evaluations at most."""
+
+MOST_SEARCHED = 100_000
+"""Samples of which the global minimum is searched; more begin at other starts alone."""
+
+PASSES = 12
+"""Of the iteration of Steiglitz and McBride."""
+
+SLOWER = (0.5, 0.9, 0.98)
+"""Poles that are added, each with its zeros, to the minimum of one order less."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """Size of a linear model.
+
+    Parameters
+    ----------
+    order : int
+        Coefficients of the denominator behind its 1.
+    sizes, delays : tuple of int
+        Coefficients of each input's numerator, and the samples before them.
+    """
+
+    order: int
+    sizes: tuple[int, ...]
+    delays: tuple[int, ...]
+
+    @property
+    def n_b(self) -> int:
+        """Coefficients of all numerators."""
+        return sum(self.sizes)
+
+    @property
+    def n_values(self) -> int:
+        """Coefficients of numerators and denominator, and the offset."""
+        return self.n_b + self.order + 1
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFit:
+    """Where a linear fit has ended, in the data's scale.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (p,)
+        Numerators, denominator behind its 1, offset, and the initial state of each log.
+    cost : float
+        Sum of squared residuals [dimensionless].
+    """
+
+    form: Form
+    theta: Array
+    cost: float
+
+    @property
+    def numerators(self) -> list[Array]:
+        """Free numerator of each input."""
+        return np.split(self.theta[: self.form.n_b], np.cumsum(self.form.sizes)[:-1])
+
+    @property
+    def f(self) -> Array:
+        """Denominator, monic."""
+        n_b = self.form.n_b
+        return np.concatenate([[1.0], self.theta[n_b : n_b + self.form.order]])
+
+
+class Problem:
+    """Sensitivities of one form on given data."""
+
+    def __init__(self, form: Form, data: Channels) -> None:
+        self.form, self.data = form, data
+        self.bounds = np.concatenate([[0], np.cumsum([y.size for y in data.y])])
+        self.y = np.concatenate(data.y)
+        self.used: BoolArray = np.isfinite(self.y)
+        self.n_parameters = form.n_values + form.order * len(data.y)
+
+    def linear_columns(self, f: Array) -> Array:
+        """Return the output's derivative by numerators, offset and initial states for a denominator.
+
+        Parameters
+        ----------
+        f : ndarray, shape (order + 1,)
+            Denominator, monic.
+
+        Returns
+        -------
+        ndarray, shape (n, n_b + 1 + order * logs)
+            Numerators, offset, initial states of each log.
+        """
+        form, n_b, n = self.form, self.form.n_b, self.form.order
+        out = np.zeros((self.y.size, n_b + 1 + n * len(self.data.y)), order="F")
+        out[:, n_b] = 1.0
+        for index, u in enumerate(self.data.u):
+            first, last = int(self.bounds[index]), int(self.bounds[index + 1])
+            # an input that stood at its first value before the log: lags are shifts, filtered or not
+            rows, levels = np.zeros((u.shape[1] + 1, last - first)), np.zeros(u.shape[1] + 1)
+            rows[:-1], levels[:-1], rows[-1, 0] = u.T, u[0], 1.0
+            decay_rows(f, rows, levels, np.zeros(n + 1))
+            place = 0
+            for answer, level, size, delay in zip(rows, levels / float(f.sum()), form.sizes, form.delays, strict=False):
+                for k in range(size):
+                    out[first:last, place + k] = _shifted(answer, delay + k, level)
+                place += size
+            for k in range(n):
+                out[first + k : last, n_b + 1 + index * n + k] = rows[-1, : last - first - k]
+        return out
+
+    def first_columns(self, index: int) -> Array:
+        """Return the lagged inputs before a log: every lag stands at the first value."""
+        return np.repeat(self.data.u[index][0], self.form.sizes)
+
+    def profiled(self, f: Array) -> tuple[float, Array]:
+        """Return the least cost that a denominator allows, and all values.
+
+        Parameters
+        ----------
+        f : ndarray, shape (order + 1,)
+            Denominator, monic.
+
+        Returns
+        -------
+        tuple of float and ndarray, shape (p,)
+            Sum of squared residuals, and values.
+        """
+        n_b, columns = self.form.n_b, self.linear_columns(f)
+        values, cost = least_squares(columns[self.used], self.y[self.used])
+        return cost, np.concatenate([values[:n_b], f[1:], values[n_b:]])
+
+    def jacobian(self, theta: Array) -> tuple[Array, Array]:
+        """Return the output and its derivative by every value.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (p,)
+            All values.
+
+        Returns
+        -------
+        tuple of ndarray, shapes (n,) and (n, p)
+            Output and derivatives, scaled.
+        """
+        n_b, n = self.form.n_b, self.form.order
+        f = np.concatenate([[1.0], theta[n_b : n_b + n]])
+        linear = self.linear_columns(f)
+        values = np.concatenate([theta[:n_b], theta[n_b + n :]])
+        output = linear @ values
+        jacobian = np.empty((self.y.size, theta.size), order="F")
+        jacobian[:, :n_b], jacobian[:, n_b + n :] = linear[:, :n_b], linear[:, n_b:]
+        for index, first in enumerate(self.bounds[:-1]):
+            part = slice(int(first), int(self.bounds[index + 1]))
+            # before the log the input stood at its first value, and so did what it drives
+            before = float(self.first_columns(index) @ theta[:n_b]) / float(f.sum())
+            moved = (output[part] - theta[n_b + n])[None, :]
+            decay_rows(f, moved, np.array([before]), np.zeros(n + 1))
+            for k in range(1, n + 1):
+                jacobian[part, n_b + k - 1] = -_shifted(moved[0], k, before / float(f.sum()))
+        return output, jacobian
+
+    def descend(self, theta: Array) -> LinearFit:
+        """Return the minimum that one start leads to.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (p,)
+            All values.
+        """
+        n_b, n = self.form.n_b, self.form.order
+        target = self.y[self.used]
+
+        def at(values: Array) -> tuple[float, Array, Array]:
+            output, jacobian = self.jacobian(values)
+            left = output[self.used] - target
+            kept = jacobian if self.used.all() else jacobian[self.used]
+            return float(left @ left), kept.T @ kept, kept.T @ left
+
+        cost, best = levenberg(
+            at, theta, lambda values: stable(values[n_b : n_b + n]), tolerance=TOLERANCE, most_steps=MOST_STEPS
+        )
+        return LinearFit(self.form, best, cost)
+
+
+def _shifted(series: Array, lag: int, before: float) -> Array:
+    """Return a series some samples later, a level in front of it."""
+    out = np.full(series.size, before)
+    out[lag:] = series[: max(series.size - lag, 0)]
+    return out
+
+
+def columns_of(form: Form, u: Array) -> Array:
+    """Return the lagged inputs of one log; before it every input stood at its first value.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n, m)
+        Inputs.
+
+    Returns
+    -------
+    ndarray, shape (n, n_b)
+        One column a numerator coefficient.
+    """
+    shifted: list[Array] = []
+    for index, (size, delay) in enumerate(zip(form.sizes, form.delays, strict=True)):
+        one = u[:, index]
+        for k in range(size):
+            lag = min(delay + k, one.size)
+            shifted.append(np.concatenate([np.full(lag, one[0]), one[: one.size - lag]]))
+    return np.column_stack(shifted) if shifted else np.zeros((u.shape[0], 0))
+
+
+def least_squares(columns: Array, target: Array) -> tuple[Array, float]:
+    """Return values of a least-squares fit by scaled normal equations, and its cost.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (n, p)
+        Regressors.
+    target : ndarray, shape (n,)
+        What they should give.
+
+    Returns
+    -------
+    tuple of ndarray, shape (p,), and float
+        Values, and the sum of squared residuals.
+    """
+    scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+    scale[scale == 0.0] = 1.0
+    unit = columns / scale
+    values = np.linalg.lstsq(unit.T @ unit, unit.T @ target, rcond=None)[0]
+    left = target - unit @ values
+    return values / scale, float(left @ left)
+
+
+def fit_linear(form: Form, data: Channels, starts: Sequence[Array] = ()) -> LinearFit:
+    """Return the best linear model of one form.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    starts : sequence of ndarray, shape (n + 1,)
+        Denominators to begin at beside those that are searched; where some are given, only they are.
+
+    Returns
+    -------
+    LinearFit
+        The lowest minimum found.
+    """
+    problem = Problem(form, data)
+    tried = list(starts) or [*_steiglitz_mcbride(problem), *_searched(problem)]
+    ranked = sorted((problem.profiled(_inside(f, data.longest)) for f in tried), key=lambda one: one[0])
+    kept: list[tuple[float, Array]] = []
+    for cost, theta in ranked:
+        if len(kept) < 3 and all(cost - other > 1e-7 * cost for other, _ in kept):
+            kept.append((cost, theta))
+    return min((problem.descend(theta) for _, theta in kept), key=lambda fit: fit.cost)
+
+
+def extended(fit: LinearFit) -> list[Array]:
+    """Return denominators of one order more that hold a minimum: a real pole is added, which zeros can cancel."""
+    return [np.convolve(fit.f, [1.0, -pole]) for pole in SLOWER]
+
+
+def _inside(f: Array, n_samples: int) -> Array:
+    f = stabilised(f, n_samples)
+    roots = np.roots(f).astype(np.complex128)
+    limit = 1.0 - 0.3 / n_samples
+    radius = np.abs(roots)
+    return f if (radius <= limit).all() else polynomial(roots * np.minimum(1.0, limit / np.maximum(radius, limit)))
+
+
+def _steiglitz_mcbride(problem: Problem) -> list[Array]:
+    """Return denominators of the iteration of Steiglitz and McBride (1965), begun at ARX; gaps end a run of rows."""
+    form, n = problem.form, problem.form.order
+    f, found = np.concatenate([[1.0], np.zeros(n)]), list[Array]()
+    for _ in range(PASSES):
+        rows, wanted = list[Array](), list[Array]()
+        for y, u in zip(problem.data.y, problem.data.u, strict=True):
+            columns = columns_of(form, u)
+            known = np.isfinite(y)
+            whole = np.where(known, y, np.interp(np.arange(y.size), np.flatnonzero(known), y[known]))
+            series = np.vstack([columns.T, np.ones(y.size), whole])
+            decay_rows(f, series, np.zeros(series.shape[0]), np.zeros(n + 1))
+            out = series[-1]
+            past = np.column_stack([np.concatenate([np.zeros(k), out[:-k]]) for k in range(1, n + 1)])
+            near = np.convolve(~known, np.ones(n + 1))[: y.size] == 0.0
+            near[: min(n + max(form.delays), y.size - 1)] = False
+            rows.append(np.column_stack([series[:-1].T, -past])[near])
+            wanted.append(out[near])
+        values = least_squares(np.concatenate(rows), np.concatenate(wanted))[0]
+        new = _inside(np.concatenate([[1.0], values[form.n_b + 1 :]]), problem.data.longest)
+        found.append(new)
+        if np.abs(new - f).max() < 1e-6:
+            break
+        f = new
+    return [found[0], found[len(found) // 2], found[-1]]
+
+
+def _searched(problem: Problem) -> list[Array]:
+    """Return the denominator of the search for the global minimum, of one input without its mean."""
+    form, data = problem.form, problem.data
+    if len(form.sizes) > 1 or data.longest * len(data.y) > MOST_SEARCHED:
+        return []
+    found: list[Array] = []
+    bounds = problem.bounds.astype(np.int64)
+    for index, (size, delay) in enumerate(zip(form.sizes, form.delays, strict=True)):
+        u = np.concatenate([one[:, index] for one in data.u])
+        pair = Experiments(u, np.where(problem.used, problem.y, 0.0), problem.used, bounds)
+        theta = minimise(Structure(size, form.order, delay), pair)
+        found.append(np.concatenate([[1.0], theta[size : size + form.order]]))
+    return found
+
+
+def quick_fit(form: Form, data: Channels) -> float:
+    """Return the cost of the best denominator that the iteration of Steiglitz and McBride passes, undescended."""
+    problem = Problem(form, data)
+    return min(problem.profiled(f)[0] for f in _steiglitz_mcbride(problem))

@@ -1,0 +1,237 @@
+"""`FreeRunModel`: an identified relation between any channels, simulated free, judged, saved and read again."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from estimation.arrays import Array
+from estimation.identification.free_run.bodies import BODIES, Body, LinearBody
+from estimation.identification.free_run.data import Scaling
+from plant.errors import HydrostateError
+
+if TYPE_CHECKING:
+    import control
+
+    from estimation.identification.model.linear_model import LinearModel
+
+FORMAT = "hydrostate-model"
+"""What a saved model calls itself."""
+
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class FreeRunQuality:
+    """How well a model follows an output.
+
+    Parameters
+    ----------
+    fit_percent, rmse : float
+        Of the free run: 100 is perfect, 0 as good as the mean; root-mean-square error [output unit].
+    one_step_percent, one_step_rmse : float
+        Of the prediction one step ahead from measured outputs [output unit].
+    """
+
+    fit_percent: float
+    rmse: float
+    one_step_percent: float
+    one_step_rmse: float
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRunModel:
+    """A model from one or more inputs to one output.
+
+    Parameters
+    ----------
+    inputs, output : tuple of str, str
+        Names of the channels.
+    sample_time : float
+        Seconds between samples [s].
+    structure : str
+        How it was fitted: ``"output-error"``, ``"narx"``, ...
+    linear : LinearModel, optional
+        The transfer function with its covariance, where there is one input and the model is linear.
+    """
+
+    inputs: tuple[str, ...]
+    output: str
+    sample_time: float
+    structure: str
+    scaling: Scaling
+    body: Body
+    linear: "LinearModel | None" = field(default=None)
+
+    @property
+    def n_values(self) -> int:
+        """Fitted coefficients."""
+        return self.body.n_values
+
+    def simulate(self, u: ArrayLike, y: ArrayLike | None = None) -> Array:
+        """Return the free run of the model.
+
+        Parameters
+        ----------
+        u : array_like, shape (n, m) or (n,)
+            Inputs in the model's order, no gaps.
+        y : array_like, shape (n,), optional
+            Measured output, NaN where missing: only the initial state is taken from it. Without it the run begins
+            where the first input would have brought a linear model, and a polynomial one at its mean.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output; NaN from where a polynomial model runs away.
+        """
+        inputs, outputs = self._scaled(u, y)
+        return self.scaling.y_mean + self.scaling.y_std * self.body.run(inputs, outputs)
+
+    def predict(self, u: ArrayLike, y: ArrayLike) -> Array:
+        """Return the prediction one step ahead from measured outputs, shape (n,); NaN where they are missing.
+
+        Parameters
+        ----------
+        u : array_like, shape (n, m) or (n,)
+            Inputs.
+        y : array_like, shape (n,)
+            Measured output.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output [output unit].
+        """
+        inputs, outputs = self._scaled(u, y)
+        if self.linear is not None and self.linear.noise_denominator.size > 1:
+            return self.linear.predict(self.scaling.u_mean[0] + self.scaling.u_std[0] * inputs[:, 0], np.asarray(y))
+        return self.scaling.y_mean + self.scaling.y_std * self.body.one_step(inputs, outputs)
+
+    def quality(self, u: Sequence[Array], y: Sequence[Array]) -> FreeRunQuality:
+        """Return how well the model follows logs.
+
+        Parameters
+        ----------
+        u : sequence of ndarray, shape (n, m)
+            Inputs of each log.
+        y : sequence of ndarray, shape (n,)
+            Output of each log; NaN where missing.
+        """
+        measured = np.concatenate(y)
+        free = np.concatenate([self.simulate(one_u, one_y) for one_u, one_y in zip(u, y, strict=True)])
+        ahead = np.concatenate([self.predict(one_u, one_y) for one_u, one_y in zip(u, y, strict=True)])
+        return FreeRunQuality(*_fit(measured, free, running=True), *_fit(measured, ahead, running=False))
+
+    def _scaled(self, u: ArrayLike, y: ArrayLike | None) -> tuple[Array, Array]:
+        inputs = np.asarray(u, dtype=np.float64)
+        inputs = inputs[:, None] if inputs.ndim == 1 else inputs
+        if inputs.ndim != 2 or inputs.shape[1] != len(self.inputs):
+            raise HydrostateError(
+                f"inputs {', '.join(self.inputs)} are wanted, shape (n, {len(self.inputs)}), got {inputs.shape}"
+            )
+        by = self.scaling
+        outputs = np.full(inputs.shape[0], np.nan) if y is None else np.asarray(y, dtype=np.float64)
+        if outputs.shape != inputs.shape[:1]:
+            raise HydrostateError(
+                f"input and output must be of one length, got {inputs.shape[0]} and {outputs.shape} samples"
+            )
+        return (inputs - by.u_mean) / by.u_std, (outputs - by.y_mean) / by.y_std
+
+    def transfer_functions(self) -> list[tuple[Array, Array]]:
+        """Return numerator and denominator from each input, in units of the channels.
+
+        Returns
+        -------
+        list of tuple of ndarray
+            In powers of the delay operator, dead time as leading zeros.
+
+        Raises
+        ------
+        HydrostateError
+            If the model is not linear.
+        """
+        body = self.body
+        if not isinstance(body, LinearBody):
+            raise HydrostateError(f"a {self.structure} model has no transfer function")
+        parts = np.split(body.theta[: body.form.n_b], np.cumsum(body.form.sizes)[:-1])
+        return [
+            (np.concatenate([np.zeros(delay), b * self.scaling.y_std / std]), body.f)
+            for b, delay, std in zip(parts, body.form.delays, self.scaling.u_std, strict=True)
+        ]
+
+    @property
+    def offset(self) -> float:
+        """Output at rest of a linear model whose inputs are zero [output unit]; NaN for others."""
+        if not isinstance(self.body, LinearBody):
+            return float("nan")
+        gains = [float(b.sum() / f.sum()) for b, f in self.transfer_functions()]
+        level = self.scaling.y_mean + self.scaling.y_std * float(self.body.theta[-1])
+        return level - float(np.dot(gains, self.scaling.u_mean))
+
+    def to_control(self) -> "control.TransferFunction":
+        """Return a linear model as a python-control object, one column an input; its offset is left out."""
+        import control
+
+        both = self.transfer_functions()
+        length = max(max(b.size, f.size) for b, f in both)
+        numerators, denominators = ([np.pad(x, (0, length - x.size)) for x in one] for one in zip(*both, strict=True))
+        return control.TransferFunction(
+            [numerators], [denominators], self.sample_time, inputs=list(self.inputs), outputs=[self.output]
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return JSON values that `from_dict` reads."""
+        by = self.scaling
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "inputs": list(self.inputs),
+            "output": self.output,
+            "sample_time_s": self.sample_time,
+            "structure": self.structure,
+            "kind": self.body.kind,
+            "scaling": {
+                "u_mean": by.u_mean.tolist(),
+                "u_std": by.u_std.tolist(),
+                "y_mean": by.y_mean,
+                "y_std": by.y_std,
+            },
+            "body": self.body.to_dict(),
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> "FreeRunModel":
+        """Return the model that `to_dict` wrote.
+
+        Raises
+        ------
+        HydrostateError
+            If it is no such model, or one of a later version.
+        """
+        if values.get("format") != FORMAT or int(values.get("version", 0)) > VERSION:
+            raise HydrostateError(
+                f"a saved model of format {FORMAT!r}, version {VERSION} at most, is wanted, got "
+                f"{values.get('format')!r}, version {values.get('version')}"
+            )
+        try:
+            by = values["scaling"]
+            scaling = Scaling(np.array(by["u_mean"]), np.array(by["u_std"]), float(by["y_mean"]), float(by["y_std"]))
+            body = BODIES[values["kind"]].from_dict(values["body"])
+            names = (tuple(values["inputs"]), str(values["output"]))
+            return cls(*names, float(values["sample_time_s"]), str(values["structure"]), scaling, body)
+        except (KeyError, TypeError, ValueError) as error:
+            raise HydrostateError(f"a saved model is not usable: {type(error).__name__} {error}") from error
+
+
+def _fit(measured: Array, found: Array, *, running: bool) -> tuple[float, float]:
+    """Return fit [%] and root-mean-square error; a free run that ran away has none."""
+    known = np.isfinite(measured) & (np.isfinite(found) | running)
+    left = (measured - found)[known]
+    spread = measured[known] - measured[known].mean()
+    if left.size == 0 or not np.isfinite(left).all():
+        return float("-inf"), float("inf")
+    power = float(spread @ spread)
+    fit = 100.0 * (1.0 - float(np.sqrt(left @ left / power))) if power > 0.0 else float("nan")
+    return fit, float(np.sqrt(np.mean(left**2)))

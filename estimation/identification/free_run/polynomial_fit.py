@@ -1,0 +1,288 @@
+"""Polynomial models: sums of products of lagged signals, fitted to their free run with exact sensitivities."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.arrays import Array, BoolArray, IntArray
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.linear_fit import LinearFit
+from estimation.identification.free_run.polynomial_kernel import carry, run_free
+from estimation.identification.search.levenberg import levenberg
+
+BEYOND = 0.1
+"""Share of its range by which a signal may leave it in a product before it is held [dimensionless]."""
+
+FARTHEST = 0.2
+"""Likewise, of the output itself, where there are products."""
+
+STEPS, FINAL_STEPS = 8, 40
+"""Evaluations after each added term, and at the end."""
+
+TOLERANCE = 1e-8
+"""Share of the cost that a further step may promise at the end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Variables:
+    """The lagged signals that terms multiply.
+
+    Parameters
+    ----------
+    source, lag : ndarray of int, shape (v,)
+        0 for the output, else the input's number from 1; and how many samples earlier.
+    limits : ndarray, shape (v, 2)
+        Ends at which each is held in products.
+    """
+
+    source: IntArray
+    lag: IntArray
+    limits: Array
+
+    @property
+    def ends(self) -> Array:
+        """Least and greatest output that was seen, shape (2,)."""
+        own = self.limits[self.source == 0][0]
+        inner = (own[1] - own[0]) / (1.0 + 2.0 * BEYOND)
+        return own + BEYOND * inner * np.array([1.0, -1.0])
+
+    def around(self, share: float) -> Array:
+        """Return ends that a share of the range beyond what was seen is added to, shape (2,).
+
+        Parameters
+        ----------
+        share : float
+            Of the range [dimensionless].
+
+        Returns
+        -------
+        ndarray, shape (2,)
+            Least and greatest output.
+        """
+        low, high = self.ends
+        return np.array([low, high]) + share * (high - low) * np.array([-1.0, 1.0])
+
+    @property
+    def n_start(self) -> int:
+        """First values of the output that a run needs."""
+        own = self.lag[self.source == 0]
+        return int(own.max()) if own.size else 0
+
+
+@dataclass(frozen=True, eq=False)
+class PolynomialFit:
+    """Terms and their coefficients, in the data's scale.
+
+    Parameters
+    ----------
+    terms : ndarray of int, shape (k, d)
+        Variables that each term multiplies; -1 stands for 1.
+    theta : ndarray, shape (k + n_start * logs,)
+        Coefficients, and the first outputs of each log.
+    cost : float
+        Sum of squared residuals of the free run [dimensionless].
+    """
+
+    variables: Variables
+    terms: IntArray
+    theta: Array
+    cost: float
+
+    @property
+    def coefficients(self) -> Array:
+        """One a term."""
+        return self.theta[: self.terms.shape[0]]
+
+
+def variables_of(linear: LinearFit, data: Channels) -> tuple[Variables, IntArray, Array]:
+    """Return the lagged signals of a linear model, its terms and coefficients.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+
+    Returns
+    -------
+    tuple of Variables, ndarray of int (k, 3) and ndarray (k,)
+        With the constant as the first term.
+    """
+    form = linear.form
+    source, lag = [0] * form.order, list(range(1, form.order + 1))
+    for index, (size, delay) in enumerate(zip(form.sizes, form.delays, strict=True)):
+        source += [index + 1] * size
+        lag += list(range(delay, delay + size))
+    outputs = np.concatenate(data.y)
+    ends = [(float(np.nanmin(outputs)), float(np.nanmax(outputs)))]
+    together = np.concatenate(data.u)
+    ends += [(float(one.min()), float(one.max())) for one in together.T]
+    limits = np.array([ends[k] for k in source])
+    span = limits[:, 1] - limits[:, 0]
+    limits = limits + BEYOND * np.column_stack([-span, span])
+    terms = np.full((1 + len(source), 3), -1, dtype=np.int64)
+    terms[1:, 0] = np.arange(len(source))
+    n_b = form.n_b
+    offset = linear.theta[n_b + form.order] * float(linear.f.sum())
+    values = np.concatenate([[offset], -linear.f[1:], linear.theta[:n_b]])
+    return Variables(np.array(source, dtype=np.int64), np.array(lag, dtype=np.int64), limits), terms, values
+
+
+class Runs:
+    """Free runs of one set of terms on given data.
+
+    Parameters
+    ----------
+    terms : ndarray of int, shape (k, d)
+        Variables that each term multiplies; -1 stands for 1.
+    data : Channels
+        Scaled.
+    """
+
+    def __init__(self, variables: Variables, terms: IntArray, data: Channels) -> None:
+        self.variables, self.terms, self.data = variables, terms, data
+        self.target = np.concatenate(data.y)
+        self.used: BoolArray = np.isfinite(self.target)
+
+    def start_values(self) -> Array:
+        """Return measured first outputs of each log, gaps filled by the first that is there."""
+        n = self.variables.n_start
+        return np.concatenate([first_values(y, n) for y in self.data.y]) if n else np.zeros(0)
+
+    def run(self, theta: Array) -> tuple[Array, list[Array]] | None:
+        """Return the outputs and their slopes by their own past, log by log; None where one runs away.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (p,)
+            All values.
+
+        Returns
+        -------
+        tuple of ndarray and list of ndarray, or None
+            Shapes (n,), and (n, lags) of each log.
+        """
+        k, n = self.terms.shape[0], self.variables.n_start
+        outs, slopes = list[Array](), list[Array]()
+        free = not (self.terms[:, 1] >= 0).any()
+        ends = np.array([-1e9, 1e9]) if free else self.variables.around(FARTHEST)
+        for index, u in enumerate(self.data.u):
+            out = np.zeros(u.shape[0])
+            out[:n] = theta[k + index * n : k + (index + 1) * n]
+            slope = np.zeros((u.shape[0], n))
+            one = self.variables
+            if run_free(theta[:k].copy(), self.terms, one.source, one.lag, one.limits, ends, u, out, slope) >= 0:
+                return None
+            outs.append(out)
+            slopes.append(slope)
+        return np.concatenate(outs), slopes
+
+    def sensitivities(self, output: Array, slopes: Sequence[Array], terms: IntArray, *, starts: bool) -> Array:
+        """Return the derivative of the free run by coefficients of terms, and by first values where wanted.
+
+        Parameters
+        ----------
+        output : ndarray, shape (n,)
+            As `run` returns it.
+        slopes : sequence of ndarray, shape (n, lags)
+            Likewise, one a log.
+        terms : ndarray of int, shape (k, d)
+            Variables that each term multiplies; -1 stands for 1.
+
+        Returns
+        -------
+        ndarray, shape (n, k) or (n, k + lags * logs)
+            One column a value.
+        """
+        n, rows = self.variables.n_start, list[Array]()
+        begin, count = 0, terms.shape[0]
+        for index, (u, slope) in enumerate(zip(self.data.u, slopes, strict=True)):
+            part = output[begin : begin + u.shape[0]]
+            begin += u.shape[0]
+            direct = np.zeros((part.size, count + (n * len(slopes) if starts else 0)))
+            direct[:, :count] = products(self.variables, terms, u, part)
+            direct[:n, :count] = 0.0
+            if starts:
+                direct[np.arange(n), count + index * n + np.arange(n)] = 1.0
+            carry(slope, direct)
+            rows.append(direct)
+        return np.concatenate(rows)
+
+    def fit(self, theta: Array, steps: int) -> PolynomialFit | None:
+        """Return the minimum of the squared free-run error that is reached from given values, if they run at all.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (p,)
+            All values.
+        """
+        target = self.target[self.used]
+        huge = (np.inf, np.eye(theta.size), np.zeros(theta.size))
+
+        def at(values: Array) -> tuple[float, Array, Array]:
+            ran = self.run(values)
+            if ran is None:
+                return huge
+            jacobian = self.sensitivities(*ran, self.terms, starts=True)[self.used]
+            left = ran[0][self.used] - target
+            gram = jacobian.T @ jacobian
+            # first values of a log whose outputs are held back have no effect
+            gram[np.diag_indices_from(gram)] += 1e-12 * max(float(np.diag(gram).max()), 1.0)
+            if not np.isfinite(gram).all():
+                return huge
+            return float(left @ left), gram, jacobian.T @ left
+
+        if not np.isfinite(at(theta)[0]):
+            return None
+        cost, best = levenberg(at, theta, lambda _: True, tolerance=TOLERANCE, most_steps=steps)
+        return PolynomialFit(self.variables, self.terms, best, cost)
+
+
+def first_values(y: Array, count: int) -> Array:
+    """Return the first outputs of a log, gaps filled by the first that is there.
+
+    Parameters
+    ----------
+    y : ndarray, shape (n,)
+        Output; NaN where missing.
+
+    Returns
+    -------
+    ndarray, shape (count,)
+        First outputs.
+    """
+    known = y[np.isfinite(y)]
+    first = y[:count]
+    return np.where(np.isfinite(first), first, known[0] if known.size else 0.0)
+
+
+def products(variables: Variables, terms: IntArray, u: Array, y: Array) -> Array:
+    """Return each term's product of lagged signals, shape (n, k).
+
+    Parameters
+    ----------
+    terms : ndarray of int, shape (k, d)
+        Variables that each term multiplies; -1 stands for 1.
+    u : ndarray, shape (n, m)
+        Inputs.
+    y : ndarray, shape (n,)
+        Output.
+
+    Returns
+    -------
+    ndarray, shape (n, k)
+        One column a term.
+    """
+    n = y.size
+    single, held = np.empty((variables.lag.size, n)), np.empty((variables.lag.size, n))
+    for v, (source, lag) in enumerate(zip(variables.source, variables.lag, strict=True)):
+        series = y if source == 0 else u[:, source - 1]
+        early = min(int(lag), n)
+        single[v, :early], single[v, early:] = series[0], series[: n - early]
+        np.clip(single[v], *variables.limits[v], out=held[v])
+    out = np.ones((terms.shape[0], n))
+    for row, term in zip(out, terms, strict=True):
+        chosen = term[term >= 0]
+        for v in chosen:
+            row *= single[v] if chosen.size == 1 else held[v]
+    return np.ascontiguousarray(out.T)

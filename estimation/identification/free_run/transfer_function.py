@@ -1,0 +1,72 @@
+"""A linear fit of one input as a `LinearModel`: units of the channels, both covariances, offset and initial state."""
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.identification.fit.covariances import covariances
+from estimation.identification.fit.fitted import COLOURED
+from estimation.identification.fit.residual_tests import ljung_box
+from estimation.identification.fit.validate import estimate_initial_state
+from estimation.identification.free_run.data import Channels, Scaling
+from estimation.identification.free_run.linear_fit import LinearFit, Problem
+from estimation.identification.model.linear_model import LinearModel
+from estimation.identification.search.experiments import Experiments, data_hash
+
+
+def linear_model(fit: LinearFit, data: Channels, by: Scaling, structure: str = "output-error") -> LinearModel:
+    """Return a fit of one input with its covariance, the robust one where the residual is not white.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    by : Scaling
+        What they were scaled by.
+    """
+    form, problem = fit.form, Problem(fit.form, data)
+    output, jacobian = problem.jacobian(fit.theta)
+    used = problem.used
+    residual = np.where(used, problem.y - output, 0.0)
+    jacobian[~used] = 0.0
+    n_main, gain = form.n_b + form.order, by.y_std / float(by.u_std[0])
+    experiments = _experiments(data, problem)
+    unscale = np.concatenate([np.full(form.n_b, gain), np.ones(form.order)])
+    *spreads, _ = covariances(jacobian, residual, experiments)
+    white, robust = (spread[:n_main, :n_main] * np.outer(unscale, unscale) for spread in spreads)
+    coloured = ljung_box(np.where(used, residual, np.nan)).p_value < COLOURED
+    b = fit.theta[: form.n_b] * gain
+    level = by.y_mean + by.y_std * float(fit.theta[n_main])
+    rss, n_used = float(residual @ residual) * by.y_std**2, data.n_samples
+    spread = np.concatenate(data.y)[used]
+    deviation = float(np.sum((spread - spread.mean()) ** 2)) * by.y_std**2
+    found = LinearModel(
+        numerator=np.concatenate([np.zeros(form.delays[0]), b]),
+        denominator=fit.f,
+        sample_time=data.sample_time,
+        input_name=data.inputs[0],
+        output_name=data.output,
+        delay=form.delays[0],
+        covariance=robust if coloured else white,
+        covariance_white=white,
+        covariance_robust=robust,
+        fit_percent=100.0 * (1.0 - float(np.sqrt(rss / deviation))),
+        rmse=float(np.sqrt(rss / n_used)),
+        residual_std=float(np.sqrt(rss / max(n_used - fit.theta.size, 1))),
+        n_samples=n_used,
+        data_hash=data_hash(experiments, data.sample_time),
+        structure=structure,
+        offset=level - float(b.sum() / fit.f.sum()) * float(by.u_mean[0]),
+    )
+    return _with_initial_state(found, output[: data.y[0].size] * by.y_std + by.y_mean, data.u[0][:, 0], by)
+
+
+def _with_initial_state(model: LinearModel, simulated: Array, u: Array, by: Scaling) -> LinearModel:
+    from dataclasses import replace
+
+    inputs = by.u_mean[0] + by.u_std[0] * u
+    return replace(model, initial_state=estimate_initial_state(model, inputs, simulated))
+
+
+def _experiments(data: Channels, problem: Problem) -> Experiments:
+    u = np.concatenate([one[:, 0] for one in data.u])
+    return Experiments(u, np.where(problem.used, problem.y, 0.0), problem.used, problem.bounds.astype(np.int64))

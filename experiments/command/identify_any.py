@@ -1,0 +1,268 @@
+"""`hydrostate identify LOG --input U --output Y`: a model between any columns, validated, saved and simulated again."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from experiments.command.json_output import Result, prepare_output
+from experiments.command.logs import Batch, finish, run_logs
+from experiments.command.options import figure_path, require_one_of, require_positive
+from experiments.command.terminal import clauses, table
+from plant.errors import HydrostateError
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from estimation.identification.free_run.data import Channels
+    from estimation.identification.free_run.identify import Identified
+    from estimation.identification.free_run.model import FreeRunModel
+    from plant.log.record import Record
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the command line asks of any columns.
+
+    Parameters
+    ----------
+    order, delay, numerator : int or None
+        Of every input; None lets the data choose.
+    sample_time, resampled : float or None
+        Between samples of logs without a column of time, and of the model [s].
+    """
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    structure: str = "output-error"
+    order: int | None = None
+    delay: int | None = None
+    numerator: int | None = None
+    sample_time: float | None = None
+    resampled: float | None = None
+    validate: tuple[Path, ...] = ()
+    figure: Path | None = None
+    simulated: Path | None = None
+
+
+BLANK: Result = {
+    **dict.fromkeys(("inputs", "input", "output", "structure", "order", "n_values", "sample_time_s")),
+    **dict.fromkeys(("fit_percent", "rmse", "one_step_percent", "one_step_rmse", "held_back_percent", "offset")),
+    **dict.fromkeys(("numerator", "denominator", "dc_gain", "poles", "delay", "test", "model")),
+    "candidates": [],
+}
+"""Entries of a log that could not be used."""
+
+
+def names(given: Sequence[str] | None) -> tuple[str, ...]:
+    """Return channel names, given one by one or with commas between.
+
+    Examples
+    --------
+    >>> names(["u1, u2", "u3"])
+    ('u1', 'u2', 'u3')
+    """
+    return tuple(part.strip() for text in given or () for part in text.split(",") if part.strip())
+
+
+def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path | None) -> None:
+    """Identify one model an output from all logs together, print what it is worth, and leave with the exit code.
+
+    Raises
+    ------
+    HydrostateError
+        If an option is not usable.
+    """
+    from estimation.identification.free_run.identify import FREE_STRUCTURES
+
+    if not asked.inputs or not asked.outputs:
+        raise HydrostateError("--input and --output are wanted together, a column each at least")
+    if twice := set(asked.inputs) & set(asked.outputs):
+        raise HydrostateError(f"--input and --output must be different channels, got {min(twice)!r} for both")
+    require_one_of("--structure", asked.structure, FREE_STRUCTURES)
+    require_positive("--sample-time", asked.sample_time, "s")
+    require_positive("--resample", asked.resampled, "s")
+    prepare_output(out)
+    read: list[list[Record]] = []
+
+    def work(name: Path) -> Result:
+        output = str(name)
+        if not read:
+            wanted = (*asked.inputs, *asked.outputs)
+            read.append([_record(log, wanted, asked.sample_time) for log in logs])
+            read.append([_record(log, wanted, asked.sample_time) for log in asked.validate])
+        return _identified(read[0], read[1], output, asked, logs)
+
+    batch = run_logs([Path(output) for output in asked.outputs], work, BLANK, "identifying")
+    named = ", ".join(str(log) for log in logs)
+    results = tuple({**result, "file": named} for result in batch.results)
+    finish(Batch(results, batch.total), _screen, as_json=as_json, out=out)
+
+
+def _record(log: Path, wanted: Sequence[str], sample_time: float | None) -> "Record":
+    from plant.log.any_columns import read_any
+
+    return read_any(log, wanted, sample_time=sample_time)
+
+
+def _identified(
+    records: "Sequence[Record]", tests: "Sequence[Record]", output: str, asked: Asked, logs: Sequence[Path]
+) -> Result:
+    from estimation.identification.free_run.from_records import channels_of
+    from estimation.identification.free_run.identify import identify_channels
+
+    data = channels_of(records, asked.inputs, output, asked.resampled)
+    found = identify_channels(
+        data, structure=asked.structure, order=asked.order, delay=asked.delay, n_numerator=asked.numerator
+    )
+    test = None
+    if tests:
+        held = channels_of(tests, asked.inputs, output, data.sample_time)
+        test = {"files": [str(one) for one in asked.validate], **_quality(found.model, held)}
+    figure = figure_path(asked.figure, Path(output), len(asked.outputs))
+    if figure is not None:
+        from experiments.log_pages.free_run_figure import write_free_run
+
+        write_free_run(found.model, data, logs[0].name, figure)
+    if asked.simulated is not None:
+        _write_simulated(found.model, data, figure_path(asked.simulated, Path(output), len(asked.outputs)))
+    return {**BLANK, **entries(found), "test": test}
+
+
+def entries(found: "Identified") -> dict[str, Any]:
+    """Return what was identified by the names of the JSON contract."""
+    from estimation.identification.free_run.identify import WARNED
+
+    model, linear = found.model, found.model.linear
+    result: dict[str, Any] = {
+        "outcome": "ok" if found.sound else "mismatch",
+        "inputs": list(model.inputs),
+        "input": model.inputs[0],
+        "output": model.output,
+        "structure": model.structure,
+        "n_values": model.n_values,
+        "sample_time_s": model.sample_time,
+        **vars(found.quality),
+        "held_back_percent": found.held_back_percent,
+        "candidates": list(found.candidates),
+        "model": model.to_dict(),
+        "notes": [note.to_dict() for note in found.notes if note.code not in WARNED],
+    }
+    if linear is not None:
+        from experiments.command.identify import linear_entries
+
+        result = {**linear_entries(linear), **result, "order": linear.denominator.size - 1, "offset": model.offset}
+        result["dc_gain"] = {"value": linear.dc_gain, "std": linear.dc_gain_std}
+    elif model.structure == "output-error":
+        transfer = model.transfer_functions()
+        result |= {"numerator": [b.tolist() for b, _ in transfer], "denominator": transfer[0][1].tolist()}
+        gains = [float(b.sum() / f.sum()) for b, f in transfer]
+        result |= {"order": transfer[0][1].size - 1, "offset": model.offset, "dc_gain": {"value": gains}}
+    quality = found.quality
+    result["message"] = clauses(
+        [
+            f"{model.structure} with {model.n_values} values: fit {quality.fit_percent:.1f} % running free, "
+            f"{found.held_back_percent:.1f} % on blocks held back, rms error {quality.rmse:.4g}",
+            *map(str, found.notes[:1] if not found.sound else ()),
+        ]
+    )
+    return result
+
+
+def _quality(model: "FreeRunModel", data: "Channels") -> dict[str, Any]:
+    return vars(model.quality(data.u, data.y))
+
+
+def simulate_any(logs: Sequence[Path], path: Path, asked: Asked, *, as_json: bool, out: Path | None) -> None:
+    """Simulate a saved model on every log, say how well it follows, and leave with the exit code.
+
+    Raises
+    ------
+    HydrostateError
+        If the model cannot be read, or has another number of channels than are named.
+    """
+    from estimation.identification.free_run.from_records import channels_of
+    from estimation.identification.free_run.saved import load_models
+
+    models = load_models(path)
+    if asked.outputs:
+        models = [one for one in models if one.output in asked.outputs] or models
+    prepare_output(out)
+    require_positive("--sample-time", asked.sample_time, "s")
+
+    def work(log: Path) -> Result:
+        results: list[Result] = []
+        for index, model in enumerate(models):
+            inputs = asked.inputs or model.inputs
+            outputs = asked.outputs or tuple(one.output for one in models)
+            if len(inputs) != len(model.inputs) or len(outputs) != len(models):
+                raise HydrostateError(
+                    f"the model goes from {len(model.inputs)} inputs to {len(models)} outputs, got columns for "
+                    f"{len(inputs)} and {len(outputs)}"
+                )
+            record = _record(log, (*inputs, outputs[index]), asked.sample_time)
+            data = channels_of([record], inputs, outputs[index], model.sample_time)
+            quality = _quality(model, data)
+            results.append({"inputs": list(inputs), "output": outputs[index], "structure": model.structure, **quality})
+            if asked.simulated is not None:
+                several = figure_path(asked.simulated, log, len(logs))
+                _write_simulated(model, data, figure_path(several, Path(outputs[index]), len(models)))
+        first = results[0]
+        message = clauses([f"{one['output']}: fit {one['fit_percent']:.1f} % running free" for one in results])
+        return {"outcome": "ok", **first, "outputs": results, "model_file": str(path), "message": message}
+
+    blank: Result = {**dict.fromkeys(("inputs", "output", "structure", "fit_percent", "rmse")), "outputs": []}
+    finish(run_logs(logs, work, blank, "simulating"), _simulated_screen, as_json=as_json, out=out)
+
+
+def _write_simulated(model: "FreeRunModel", data: "Channels", path: Path | None) -> None:
+    """Write time, inputs, measured and simulated output of the first log as CSV."""
+    if path is None:
+        return
+    import numpy as np
+    import pandas as pd
+
+    from experiments.command.json_output import write_whole
+
+    u, y = data.u[0], data.y[0]
+    columns: Mapping[str, Any] = {
+        "time_s": model.sample_time * np.arange(y.size),
+        **{name: u[:, k] for k, name in enumerate(data.inputs)},
+        data.output: y,
+        f"{data.output}_simulated": model.simulate(u, y),
+    }
+    write_whole(path, pd.DataFrame(columns).to_csv(index=False), "--simulated")
+
+
+def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
+    shown = table("output", "structure", "values [-]", "fit [%]", "held back [%]", "test [%]", "rms error", "gain")
+    for result in results:
+        test, gain = result["test"], result["dc_gain"]
+        value = None if gain is None else gain["value"]
+        said = (
+            "-" if value is None else " ".join(f"{one:.4g}" for one in ([value] if isinstance(value, float) else value))
+        )
+        shown.add_row(
+            str(result["output"]),
+            result["structure"] if result["order"] is None else f"{result['structure']}, order {result['order']}",
+            str(result["n_values"]),
+            f"{result['fit_percent']:.2f}",
+            f"{result['held_back_percent']:.2f}",
+            "-" if test is None else f"{test['fit_percent']:.2f}",
+            f"{result['rmse']:.4g}",
+            said,
+        )
+    yield shown
+    yield (
+        f"From {', '.join(results[0]['inputs'])}. Fits are of free runs: on the logs fitted, on blocks held back "
+        "from a fit to the others, and on --validate; one step ahead, models and candidates are in --json and --out."
+    )
+
+
+def _simulated_screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
+    shown = table("log", "output", "fit [%]", "rms error", "one step [%]")
+    for result in results:
+        for one in result["outputs"]:
+            numbers = (f"{one['fit_percent']:.2f}", f"{one['rmse']:.4g}", f"{one['one_step_percent']:.2f}")
+            shown.add_row(str(result["file"]), one["output"], *numbers)
+    yield shown

@@ -1,0 +1,183 @@
+"""A model between any channels in the hands of a Python user: it prints, draws, simulates, tests and saves itself."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from experiments.log_pages.answers import Shown
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    from control import TransferFunction
+    from matplotlib.axes import Axes
+
+    from estimation.identification.free_run.data import Channels
+    from estimation.identification.free_run.model import FreeRunModel
+    from plant.log.record import Record
+
+_FIVE = "{:.5g}".format
+
+
+class Relation(Shown):
+    """Models from the same inputs, one an output.
+
+    Parameters
+    ----------
+    models : sequence of FreeRunModel
+        One an output.
+    entries : sequence of Mapping
+        What is known of each by the names of the JSON contract; empty for models that were loaded.
+    """
+
+    def __init__(
+        self,
+        models: "Sequence[FreeRunModel]",
+        entries: "Sequence[Mapping[str, Any]]" = (),
+        data: "Sequence[Channels]" = (),
+    ) -> None:
+        self.models, self._entries, self._data = tuple(models), tuple(entries), tuple(data)
+
+    def __getattr__(self, name: str) -> Any:
+        if not name.startswith("_") and len(self.models) == 1:
+            if self._entries and name in self._entries[0]:
+                return self._entries[0][name]
+            if hasattr(self.models[0], name):
+                return getattr(self.models[0], name)
+        return super().__getattr__(name)
+
+    def __str__(self) -> str:
+        return f"From {', '.join(self.models[0].inputs)}\n{self.to_frame().to_string(float_format=_FIVE)}"
+
+    def _repr_html_(self) -> str:
+        return self.to_frame().to_html(float_format=_FIVE)
+
+    def simulate(self, log: Any) -> "np.ndarray[Any, Any]":
+        """Return the free run on a log, its initial state taken from the measured output where that is there.
+
+        Parameters
+        ----------
+        log : Log, or array_like of shape (n, m) or (n,)
+            A log with the model's channels, or inputs alone.
+
+        Returns
+        -------
+        ndarray, shape (n,), or (n, outputs)
+            Simulated output, on the model's sample time.
+        """
+        import numpy as np
+
+        if not hasattr(log, "record"):
+            runs = [one.simulate(log) for one in self.models]
+        else:
+            parts = [_channels(one, log.record) for one in self.models]
+            runs = [one.simulate(part.u[0], part.y[0]) for one, part in zip(self.models, parts, strict=True)]
+        return runs[0] if len(runs) == 1 else np.column_stack(runs)
+
+    def validate(self, log: Any) -> "pd.DataFrame":
+        """Return how well each output of another log is followed.
+
+        Parameters
+        ----------
+        log : Log
+            With the model's channels.
+
+        Returns
+        -------
+        pandas.DataFrame
+            By output: ``fit_percent`` and ``rmse`` of the free run, ``one_step_percent`` and ``one_step_rmse``.
+        """
+        import pandas as pd
+
+        parts = [_channels(one, log.record) for one in self.models]
+        rows = {one.output: vars(one.quality(part.u, part.y)) for one, part in zip(self.models, parts, strict=True)}
+        return pd.DataFrame.from_dict(rows, orient="index")
+
+    def to_control(self) -> "TransferFunction":
+        """Return linear models as one transfer function of python-control, a row an output.
+
+        Returns
+        -------
+        control.TransferFunction
+            Offsets are left out.
+        """
+        import control
+
+        if len(self.models) == 1:
+            return self.models[0].to_control()
+        parts = [one.to_control() for one in self.models]
+        numerators, denominators = ([part.num_list[0] for part in parts], [part.den_list[0] for part in parts])
+        return control.TransferFunction(numerators, denominators, self.models[0].sample_time)
+
+    def to_dict(self) -> list[dict[str, Any]]:
+        """Return the models as JSON values, one an output."""
+        return [one.to_dict() for one in self.models]
+
+    def save(self, path: str | Path) -> None:
+        """Write the models to a JSON file that `hydrostate.load_model` and ``identify --simulate`` read."""
+        from estimation.identification.free_run.saved import save_models
+
+        save_models(self.models, path)
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return what the models are worth as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            By output: structure, fitted values, and the fits of the free run.
+        """
+        import pandas as pd
+
+        kept = ("structure", "n_values", "fit_percent", "held_back_percent", "one_step_percent", "rmse")
+        if self._entries:
+            rows = {one["output"]: {name: one[name] for name in kept} for one in self._entries}
+        else:
+            rows = {one.output: {"structure": one.structure, "n_values": one.n_values} for one in self.models}
+        return pd.DataFrame.from_dict(rows, orient="index")
+
+    def plot(self) -> "list[Axes]":
+        """Draw measured and simulated output, and the difference, one figure an output.
+
+        Returns
+        -------
+        list of matplotlib.axes.Axes
+            Two an output.
+        """
+        from experiments.log_pages.free_run_figure import draw_free_run
+
+        pairs = zip(self.models, self._data, strict=False)
+        return [axis for model, data in pairs for axis in draw_free_run(model, data, "log").axes]
+
+
+def _channels(model: "FreeRunModel", record: "Record") -> "Channels":
+    from estimation.identification.free_run.from_records import channels_of
+
+    return channels_of([record], model.inputs, model.output, model.sample_time)
+
+
+def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: Mapping[str, Any]) -> Relation:
+    """Return the relation between channels of logs.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        One log or several.
+    inputs, outputs : str or sequence of str
+        Channels.
+    options : Mapping[str, Any]
+        As `identify_channels` takes them, and ``sample_time`` of the model [s].
+    """
+    from estimation.identification.free_run.from_records import channels_of
+    from estimation.identification.free_run.identify import identify_channels
+    from experiments.command.identify_any import entries
+
+    asked = dict(options)
+    sample_time = asked.pop("sample_time", None)
+    sources = [inputs] if isinstance(inputs, str) else list(inputs)
+    data = [
+        channels_of(records, sources, output, sample_time)
+        for output in ([outputs] if isinstance(outputs, str) else list(outputs))
+    ]
+    found = [identify_channels(one, **asked) for one in data]
+    return Relation([one.model for one in found], [entries(one) for one in found], data)

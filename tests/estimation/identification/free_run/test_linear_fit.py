@@ -1,0 +1,148 @@
+"""Output error of several inputs with offset and initial states, and how its order is chosen."""
+
+import numpy as np
+import pytest
+
+from estimation.arrays import Array
+from estimation.identification.free_run.choose_linear import chosen, linear_candidates
+from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
+from estimation.identification.free_run.identify import identify_channels
+from estimation.identification.free_run.linear_fit import Form, Problem, fit_linear
+from estimation.identification.model.recursion import filtered
+from estimation.identification.notes import IdentificationCode
+from plant.errors import HydrostateError, LogWarning
+
+F = [1.0, -1.5, 0.7]
+
+
+def steps(n: int, seed: int, hold: int = 8) -> Array:
+    return np.repeat(np.random.default_rng(seed).normal(size=n // hold + 1), hold)[:n]
+
+
+def plant(u: Array, seed: int, noise: float = 0.02, offset: float = 5.0) -> Array:
+    """Return the output of a second-order plant that answers after three samples, with offset and noise."""
+    y = filtered([0.0, 0.0, 0.0, 0.2, 0.1], F, u - u[0])
+    return offset + y + noise * np.random.default_rng(seed).normal(size=u.size)
+
+
+def one_log(n: int = 600, seed: int = 1) -> Channels:
+    u = 3.0 + steps(n, seed)
+    return channels_from([u[:, None]], [plant(u, seed + 100)], 0.1, ["valve"], "level")
+
+
+def test_sensitivities_are_the_derivatives_of_the_output() -> None:
+    data, _ = scaled(one_log(120))
+    problem = Problem(Form(2, (2,), (3,)), data)
+    theta = problem.profiled(np.array([1.0, -1.2, 0.5]))[1]
+    _, jacobian = problem.jacobian(theta)
+    for k in range(theta.size):
+        step = np.zeros(theta.size)
+        step[k] = 1e-6
+        moved = (problem.jacobian(theta + step)[0] - problem.jacobian(theta - step)[0]) / 2e-6
+        assert moved == pytest.approx(jacobian[:, k], abs=1e-6)
+
+
+def test_order_delay_and_offset_come_back_beside_a_mean_that_is_not_zero() -> None:
+    found = identify_channels(one_log())
+    linear = found.model.linear
+    assert linear is not None
+    assert (linear.denominator.size - 1, linear.delay) == (2, 3)
+    assert linear.dc_gain == pytest.approx(1.5, abs=4.0 * linear.dc_gain_std)
+    assert found.model.offset == pytest.approx(5.0 - 1.5 * (3.0 + steps(600, 1)[0]), abs=0.05)
+    assert found.sound
+    assert found.held_back_percent == pytest.approx(found.quality.fit_percent, abs=1.0)
+
+
+def test_the_transfer_function_simulates_what_the_model_does() -> None:
+    data = one_log()
+    model = identify_channels(data, order=2, delay=3).model
+    assert model.linear is not None
+    u = data.u[0][:, 0]
+    ours = model.simulate(u, data.y[0])
+    theirs = model.linear.simulate(u, initial=model.linear.initial_state)
+    assert theirs[20:] == pytest.approx(ours[20:], abs=1e-3)
+    (b, f) = model.transfer_functions()[0]
+    assert b.sum() / f.sum() == pytest.approx(model.linear.dc_gain)
+
+
+def test_several_inputs_and_several_logs_are_one_model() -> None:
+    u, y = [], []
+    for seed in (1, 2):
+        both = np.column_stack([steps(300, seed), 10.0 * steps(300, seed + 10)])
+        out = filtered([0.0, 0.5], [1.0, -0.8], both[:, 0]) + filtered([0.0, 0.0, 0.02], [1.0, -0.8], both[:, 1])
+        u.append(both)
+        y.append(7.0 * seed**0 + out + 0.01 * np.random.default_rng(seed).normal(size=300))
+    y[1][40:60] = np.nan
+    data = channels_from(u, y, 1.0, ["a", "b"], "y")
+    found = identify_channels(data, order=1)
+    gains = [b.sum() / f.sum() for b, f in found.model.transfer_functions()]
+    assert gains == pytest.approx([2.5, 0.1], rel=0.02)
+    assert found.model.offset == pytest.approx(7.0, abs=0.05)
+    assert found.model.to_control().ninputs == 2
+
+
+def test_a_block_that_is_held_back_does_not_move_the_fit() -> None:
+    data, _ = scaled(one_log(300))
+    masks = blocks(data, 4)[1]
+    spoilt = data.without([np.zeros(300, dtype=bool)])
+    wrong = np.where(masks[0], 1e3, spoilt.y[0])
+    clean = fit_linear(Form(2, (2,), (3,)), data.without(masks))
+    same = fit_linear(Form(2, (2,), (3,)), Channels(data.inputs, "y", 0.1, data.u, (wrong,)).without(masks))
+    assert same.theta == pytest.approx(clean.theta)
+
+
+def test_a_drift_is_not_taken_for_a_time_constant_beyond_the_record() -> None:
+    rng = np.random.default_rng(3)
+    u = steps(400, 3, hold=5)
+    y = filtered([0.0, 0.4], [1.0, -0.6], u) + 1e-2 * np.cumsum(rng.normal(size=400))
+    candidates = linear_candidates(scaled(channels_from([u[:, None]], [y], 1.0, ["u"], "y"))[0], [1, 2, 3], None)
+    best = chosen(candidates)
+    poles = np.abs(np.roots(best.fit.f))
+    assert not best.doubt
+    assert (-1.0 / np.log(poles) <= 400).all()
+
+
+def test_a_model_no_better_than_the_mean_is_not_sound() -> None:
+    rng = np.random.default_rng(5)
+    data = channels_from([rng.normal(size=(300, 1))], [rng.normal(size=300)], 1.0, ["u"], "y")
+    with pytest.warns(LogWarning) as said:
+        found = identify_channels(data)
+    assert not found.sound
+    assert IdentificationCode.NO_FIT in [one.message.note.code for one in said]  # type: ignore[union-attr]
+
+
+def test_an_integrating_plant_is_believed_and_said_to_be_one() -> None:
+    u = steps(400, 8, hold=20)
+    y = np.cumsum(0.1 * u) + 0.02 * np.random.default_rng(8).normal(size=400)
+    with pytest.warns(LogWarning, match="integrates its input"):
+        found = identify_channels(channels_from([u[:, None]], [y], 1.0, ["u"], "y"))
+    assert found.sound
+    assert found.quality.fit_percent > 90.0
+
+
+@pytest.mark.parametrize(
+    ("u", "y", "said"),
+    [
+        (np.ones((50, 1)), np.arange(50.0), "channel 'u' must vary, got 1 throughout"),
+        (np.arange(50.0)[:, None], np.ones(50), "channel 'y' must vary"),
+        (np.arange(5.0)[:, None], np.arange(5.0), "needs 20 samples or more, got 5"),
+        (np.full((50, 1), np.nan), np.arange(50.0), "must be finite"),
+        (np.ones((50, 2)), np.arange(50.0), "shape"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused_with_a_sentence(u: Array, y: Array, said: str) -> None:
+    with pytest.raises(HydrostateError, match=said):
+        channels_from([u], [y], 1.0, ["u"], "y")
+
+
+@pytest.mark.parametrize("structure", ["arx", "box-jenkins", "instrumental", "subspace", "continuous"])
+def test_other_structures_run_free_with_an_offset(structure: str) -> None:
+    data = one_log()
+    found = identify_channels(data, structure=structure, order=2, delay=3)
+    u, y = 3.0 + steps(400, 9), plant(3.0 + steps(400, 9), 9)
+    # ARX is biased by the sensor's noise
+    assert found.model.quality([u[:, None]], [y + 1.5 * (steps(400, 9)[0] - steps(600, 1)[0])]).rmse < 0.3 * np.std(y)
+    assert found.model.structure == structure
+    assert found.held_back_percent > 70.0
+    assert found.model.linear is not None
+    assert found.model.linear.offset == pytest.approx(found.model.offset, abs=0.05)

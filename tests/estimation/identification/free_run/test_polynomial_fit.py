@@ -1,0 +1,126 @@
+"""Polynomial models: their free run, its sensitivities, and which products they are given."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.arrays import Array
+from estimation.identification.free_run.data import Channels, channels_from, scaled
+from estimation.identification.free_run.identify import identify_channels
+from estimation.identification.free_run.linear_fit import Form, fit_linear
+from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.polynomial_fit import Runs, products
+from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, is_wild, one_more
+from estimation.identification.free_run.saved import load_models, save_models
+from plant.errors import HydrostateError
+
+
+def duffing(n: int, seed: int, noise: float = 0.01) -> tuple[Array, Array]:
+    """Return input and output of a resonance whose spring stiffens with the cube of the deflection."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.normal(size=n // 4 + 1), 4)[:n]
+    y = np.zeros(n)
+    for t in range(2, n):
+        y[t] = 1.5 * y[t - 1] - 0.7 * y[t - 2] + 0.2 * u[t - 1] - 0.05 * y[t - 1] ** 3
+    return u, y + noise * rng.normal(size=n)
+
+
+def log(n: int = 400, seed: int = 1) -> Channels:
+    u, y = duffing(n, seed)
+    return channels_from([u[:, None]], [y], 0.01, ["force"], "deflection")
+
+
+def test_the_free_run_begins_as_the_linear_model_that_it_grows_from() -> None:
+    data, _ = scaled(log())
+    linear = fit_linear(Form(2, (1,), (1,)), data)
+    start = begun(linear, data)
+    assert start is not None
+    assert start.cost == pytest.approx(linear.cost, rel=1e-2)
+
+
+def test_sensitivities_are_the_derivatives_of_the_free_run() -> None:
+    data, _ = scaled(log(150))
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    fit = one_more(start, candidate_terms(start.variables), data)
+    assert fit is not None
+    runs = Runs(fit.variables, fit.terms, data)
+    ran = runs.run(fit.theta)
+    assert ran is not None
+    jacobian = runs.sensitivities(*ran, fit.terms, starts=True)
+    for k in range(fit.theta.size):
+        step = np.zeros(fit.theta.size)
+        step[k] = 1e-6
+        ends = [runs.run(fit.theta + sign * step) for sign in (1.0, -1.0)]
+        moved = (ends[0][0] - ends[1][0]) / 2e-6  # type: ignore[index]
+        assert moved == pytest.approx(jacobian[:, k], abs=1e-5)
+
+
+def test_the_product_that_the_plant_has_is_the_first_one_added() -> None:
+    data, _ = scaled(log())
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    fit = one_more(start, candidate_terms(start.variables), data)
+    assert fit is not None
+    lags = [(int(fit.variables.source[v]), int(fit.variables.lag[v])) for v in fit.terms[-1]]
+    assert {source for source, _ in lags} == {0}  # the cube of the output, at the lags that noise leaves apart
+    assert fit.cost < 0.2 * start.cost
+
+
+def test_auto_takes_the_polynomial_model_of_a_stiffening_spring_and_not_of_a_linear_one() -> None:
+    stiff = identify_channels(log(), structure="auto")
+    assert stiff.model.structure == "narx"
+    u, y = duffing(400, 7)
+    assert stiff.model.quality([u[:, None]], [y]).fit_percent > 95.0
+    rng = np.random.default_rng(2)
+    u = rng.normal(size=300)
+    y = np.zeros(300)
+    for t in range(1, 300):
+        y[t] = 0.8 * y[t - 1] + 0.3 * u[t - 1]
+    linear = channels_from([u[:, None]], [y + 0.05 * rng.normal(size=300)], 1.0, ["u"], "y")
+    assert identify_channels(linear, structure="auto").model.structure == "output-error"
+
+
+def test_a_saved_model_simulates_as_before(tmp_path: object) -> None:
+    path = tmp_path / "model.json"  # type: ignore[operator]
+    u, y = duffing(300, 3)
+    for structure in ("narx", "output-error"):
+        model = identify_channels(log(300), structure=structure, order=2, delay=1).model
+        save_models([model], path)
+        (again,) = load_models(path)
+        assert again.simulate(u, y) == pytest.approx(model.simulate(u, y), abs=1e-12)
+        assert again.predict(u, y)[5:] == pytest.approx(model.predict(u, y)[5:], abs=1e-12)
+    path.write_text("[]")
+    with pytest.raises(HydrostateError, match="holds no saved model"):
+        load_models(path)
+    with pytest.raises(HydrostateError, match="of format 'hydrostate-model'"):
+        FreeRunModel.from_dict({"format": "other"})
+
+
+def test_a_model_that_leaves_the_range_when_the_inputs_come_in_another_order_is_wild() -> None:
+    data, _ = scaled(log())
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    fit = one_more(start, candidate_terms(start.variables), data)
+    assert fit is not None
+    assert not is_wild(fit, data)
+    theta = fit.theta.copy()
+    theta[fit.terms.shape[0] - 1] *= -3.0  # the spring softens
+    assert is_wild(replace(fit, theta=theta), data)
+
+
+def test_a_run_beyond_what_was_seen_does_not_run_away() -> None:
+    model = identify_channels(log(), structure="narx").model
+    assert np.isfinite(model.simulate(3.0 * duffing(400, 4)[0])).all()
+
+
+def test_products_are_held_at_the_ends_of_what_was_seen_and_single_terms_are_not() -> None:
+    data, _ = scaled(log())
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    far = 100.0 * np.ones((5, 1))
+    terms = np.array([[2, -1, -1], [2, 2, -1]])
+    single, square = products(start.variables, terms, far, np.zeros(5))[-1]
+    assert single == 100.0
+    assert square == pytest.approx(start.variables.limits[2, 1] ** 2)

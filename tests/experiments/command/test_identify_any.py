@@ -1,0 +1,92 @@
+"""The command line between any columns: fitted, validated, saved, simulated again."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner, Result
+
+from estimation.identification.model.linear_model import LinearModel
+from estimation.identification.model.recursion import filtered
+from experiments.cli import app
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Return three logs of a plant with two inputs and two outputs, in no unit that is known."""
+    folder = tmp_path_factory.mktemp("any")
+    paths: list[Path] = []
+    for seed in (1, 2, 3):
+        rng = np.random.default_rng(seed)
+        valve, load = (np.repeat(rng.normal(size=61), 5)[:300] for _ in range(2))
+        flow = 2.0 + filtered([0.0, 0.4], [1.0, -0.8], valve) - filtered([0.0, 0.1], [1.0, -0.8], load)
+        heat = 50.0 + filtered([0.0, 0.0, 1.0], [1.0, -0.5], load)
+        noise = rng.normal(size=(2, 300))
+        columns = {"Valve [%]": valve, "load": load, "flow": flow + 0.02 * noise[0], "heat": heat + 0.02 * noise[1]}
+        paths.append(folder / f"run{seed}.csv")
+        pd.DataFrame({"t_ms": 20.0 * np.arange(300), **columns}).to_csv(paths[-1], index=False)
+    return paths
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, ["identify", *map(str, arguments)])
+
+
+def test_several_logs_give_one_model_an_output_that_is_tested_and_simulated_again(
+    logs: list[Path], tmp_path: Path
+) -> None:
+    saved, table = tmp_path / "model.json", tmp_path / "sim.csv"
+    channels = ("--input", "Valve [%],load", "--output", "flow", "--output", "heat", "--order", 1)
+    ran = run(*logs[:2], *channels, "--validate", logs[2], "--out", saved, "--json", "--simulated", table)
+    assert ran.exit_code == 0, ran.output
+    flow, heat = json.loads(ran.stdout)
+    assert (flow["output"], heat["output"], flow["outcome"]) == ("flow", "heat", "ok")
+    assert flow["dc_gain"]["value"] == pytest.approx([2.0, -0.5], rel=0.05)
+    assert flow["sample_time_s"] == pytest.approx(0.02)
+    assert flow["offset"] == pytest.approx(2.0, abs=0.05)
+    assert flow["test"]["fit_percent"] > 90.0
+    assert set(pd.read_csv(tmp_path / "sim-flow.csv")) >= {"time_s", "flow", "flow_simulated"}
+
+    again = run(logs[2], "--simulate", saved, "--json")
+    (one,) = json.loads(again.stdout)
+    assert [part["output"] for part in one["outputs"]] == ["flow", "heat"]
+    assert one["outputs"][0]["fit_percent"] == pytest.approx(flow["test"]["fit_percent"], abs=1e-6)
+
+
+def test_one_input_gives_a_transfer_function_with_its_uncertainty(logs: list[Path], tmp_path: Path) -> None:
+    arguments = ("--input", "load", "--output", "heat", "--order", 1, "--delay", 2, "--figure", tmp_path / "fit.png")
+    ran = run(logs[0], *arguments, "--json")
+    (one,) = json.loads(ran.stdout)
+    model = LinearModel.from_dict(one)
+    assert model.dc_gain == pytest.approx(2.0, abs=4.0 * one["dc_gain"]["std"])
+    assert one["poles"][0]["real"] == pytest.approx(0.5, abs=0.02)
+    assert (one["structure"], one["order"], one["delay"]["samples"]) == ("output-error", 1, 2)
+    assert (tmp_path / "fit.png").read_bytes()[:4] == b"\x89PNG"
+    assert "running free" in one["message"]
+    assert "heat" in run(logs[0], "--input", "load", "--output", "heat", "--order", 1).stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--input", "load"), "--input and --output are wanted together"),
+        (("--input", "lod", "--output", "heat"), "did you mean 'load'?"),
+        (("--input", "load", "--output", "load"), "must be different channels"),
+        (("--input", "load", "--output", "heat", "--structure", "oe"), "--structure must be one of"),
+        (("--input", "load", "--output", "heat", "--resample", 0), "--resample must be positive"),
+        ((), "--input COLUMN --output COLUMN relates any others"),
+        (("--simulate", "none.json"), "none.json: the model cannot be read"),
+    ],
+)
+def test_a_slip_is_answered_with_a_sentence(arguments: tuple[object, ...], said: str, logs: list[Path]) -> None:
+    ran = run(logs[0], *arguments)
+    assert ran.exit_code == 2
+    assert said in " ".join(ran.output.split())
+
+
+def test_a_model_at_a_longer_sample_time(logs: list[Path]) -> None:
+    ran = run(logs[0], "--input", "load", "--output", "heat", "--order", 1, "--resample", 0.06, "--json")
+    (one,) = json.loads(ran.stdout)
+    assert one["sample_time_s"] == pytest.approx(0.06)
