@@ -53,6 +53,20 @@ class ChannelCode(Code):
     )
 
 
+class GuessCode(Code):
+    """Why a column of a strange log may be a channel; columns count from 1."""
+
+    CALLED_SO = "called_so", "it is called so"
+    DATES = "dates", "it holds dates or times of the day"
+    UNIT_FITS = "unit_fits", "{unit} is a unit of it"
+    UNIT_GUESSED = "unit_guessed", "no unit is given, and in {unit} it has the usual size: check it"
+    INCREASES = "increases", "it increases by {step:.6g} from row to row"
+    HAS_SLOPE = "has_slope", "its slope is column {column} (correlation {correlation:.3f})"
+    IS_SLOPE = "is_slope", "it is the slope of column {column} (correlation {correlation:.3f})"
+    FOLLOWS = "follows", "it goes with the motion of column {column} (correlation {correlation:.2f})"
+    IS_DIFFERENCE = "is_difference", "it is the difference of columns {one} and {other}"
+
+
 class EstimateCode(Code):
     """Notes on an estimate of bulk modulus: what speaks against it, or what it lacks."""
 
@@ -164,13 +178,28 @@ class RigCode(Code):
     )
     AIR_ENTRAINED = (
         "air_entrained",
-        "the oil holds {percent:.2g} +- {half_width:.2g} % of air at atmospheric pressure; without it its bulk modulus "
-        "is {liquid_pa:.3g} Pa",
+        "the oil holds {percent:.2g} +- {half_width:.2g} % of air at atmospheric pressure; bulk modulus is stated at "
+        "{stated_pa:.3g} Pa absolute, and is {liquid_pa:.3g} Pa without the air",
+    )
+    AIR_ENTERS = (
+        "air_enters",
+        "air gets into the oil after {percent_of_log:.0f} % of the log: {percent:.2g} +- {half_width:.2g} % at "
+        "atmospheric pressure",
+    )
+    RELIEF_LOW = (
+        "relief_low",
+        "the relief valve opens at {setting_pa:.3g} +- {half_width_pa:.2g} Pa, the rig file says {rig_pa:.3g} Pa: it "
+        "is set low, or leaks",
     )
     LEAKAGE_GROWS = (
         "leakage_grows",
-        "leakage changes over the log by a factor of {factor:.2f}, from {first:.3g} to {last:.3g} m^3/(s Pa): it "
-        "grows, or the oil warms",
+        "leakage grows over the log by a factor of {factor:.2f}, from {first:.3g} to {last:.3g} m^3/(s Pa): more than "
+        "warming oil explains",
+    )
+    LEAKAGE_DRIFTS = (
+        "leakage_drifts",
+        "leakage changes over the log by a factor of {factor:.2f}, from {first:.3g} to {last:.3g} m^3/(s Pa), as when "
+        "the oil warms or cools; the condition is that at the end",
     )
     MAKEUP_BLOCKED = "makeup_blocked", "the make-up valve of chamber {side} feeds next to nothing: it is stuck shut"
     PORT_DRAINS = (
@@ -180,6 +209,11 @@ class RigCode(Code):
     OIL_STIFFER = (
         "oil_stiffer",
         "bulk modulus is {ratio:.3g} times that of the rig file; the conditions are compared around the measured one",
+    )
+    OIL_SOFTER = (
+        "oil_softer",
+        "bulk modulus is {ratio:.2g} of that in the rig file: air in the oil, or a soft hose; the conditions are "
+        "compared around the measured one",
     )
     CHECKS_CRACK = (
         "checks_crack",

@@ -57,6 +57,11 @@ class ClassCode(Code):
     )
     NO_CIRCUIT = "no_circuit", "no circuit fits around this rig, so there are scores but no probabilities: {reason}"
     NO_PROBABILITIES = "no_probabilities", "no probabilities: {reason}"
+    LOAD_ON_ROD = (
+        "load_on_rod",
+        "a constant load of {force_n:.3g} N holds the rod back, or differential_pressure_pa reads {pressure_pa:.3g} Pa "
+        "too much: the force balance does not tell the two apart",
+    )
     PRESSURE_ABSENT_CLASS = (
         "pressure_absent_class",
         "without differential_pressure_pa friction shows in velocity alone: margins are smaller as a rule",

@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.fits.hypotheses import Explanation
+from estimation.finding import NORMAL_95
+from estimation.fits.explain import Explanation
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.sensor_check import PRESSURE
+from estimation.models.wide_flow import grown_leakage
 from estimation.notes import RigCode
 from plant.arrays import Array
 from plant.components.oil import ATMOSPHERE
@@ -15,12 +17,27 @@ from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
 
-Values = Mapping[str, tuple[float, float]]
-
 WORN = 0.9
 """Delivery over the pump's displacement below which the pump counts as worn, and not the rig file as rounded."""
 
-OUTSIDE = {RigCode.PUMP_WORN, RigCode.LEAKAGE_GROWS, RigCode.MAKEUP_BLOCKED, RigCode.PORT_DRAINS}
+WARMED = 3.0
+"""Factor up to which leakage follows the oil's viscosity and is no fault [dimensionless]: mineral oil thins to a third
+as it warms by some 25 K (ISO 3448 VG 46 between 40 and 65 degrees Celsius, about)."""
+
+LEAST_GROWN = 1e-3
+"""Least leakage over its value halfway [dimensionless]: a parabola may cross zero beyond what it was fitted to."""
+
+LEAKAGE_COURSE = "leakage_course"
+"""Channel of a log that was set right: leakage over what it is when the log ends [dimensionless]."""
+
+OUTSIDE = {
+    RigCode.PUMP_WORN,
+    RigCode.LEAKAGE_GROWS,
+    RigCode.MAKEUP_BLOCKED,
+    RigCode.PORT_DRAINS,
+    RigCode.AIR_ENTERS,
+    RigCode.RELIEF_LOW,
+}
 """Faults that are none of the nine conditions."""
 
 
@@ -46,7 +63,7 @@ def notes_of(found: Explanation, parameters: EhaParameters) -> tuple[Note, ...]:
 
 
 def _half_width(found: Explanation, name: str) -> float:
-    return 1.96 * found.values[name][1]
+    return NORMAL_95 * found.values[name][1]
 
 
 def _late(found: Explanation, _: EhaParameters) -> Note:
@@ -67,8 +84,9 @@ def _zero(found: Explanation, _: EhaParameters) -> Note:
 def _delivery(found: Explanation, p: EhaParameters) -> Note:
     value = found.values["pump_displacement"][0]
     share, half_width = value / p.pump_displacement, _half_width(found, "pump_displacement") / p.pump_displacement
-    code = RigCode.PUMP_WORN if share < WORN else RigCode.AREA_TO_DISPLACEMENT
-    return code.note(percent=100.0 * share, half_width=100.0 * half_width)
+    return (RigCode.PUMP_WORN if share < WORN else RigCode.AREA_TO_DISPLACEMENT).note(
+        percent=100.0 * share, half_width=100.0 * half_width
+    )
 
 
 def _volume(found: Explanation, p: EhaParameters) -> Note:
@@ -83,18 +101,32 @@ def _load(found: Explanation, p: EhaParameters) -> Note:
 
 
 def _air(found: Explanation, _: EhaParameters) -> Note:
-    softness, std = found.values["air_softness"]
-    return RigCode.AIR_ENTRAINED.note(
-        percent=100.0 * softness / ATMOSPHERE,
-        half_width=196.0 * std / ATMOSPHERE,
-        liquid_pa=found.values["bulk_modulus"][0],
-    )
+    (softness, std), stated = found.values["air_softness"], found.stated_pressure
+    liquid = 1.0 / (1.0 / found.values["bulk_modulus"][0] - softness / stated**2)
+    said = {"percent": 100.0 * softness / ATMOSPHERE, "half_width": 100.0 * NORMAL_95 * std / ATMOSPHERE}
+    if "air_onset" in found.values:
+        return RigCode.AIR_ENTERS.note(**said, percent_of_log=100.0 * found.values["air_onset"][0])
+    return RigCode.AIR_ENTRAINED.note(**said, stated_pa=stated, liquid_pa=liquid)
+
+
+def _relief(found: Explanation, p: EhaParameters) -> Note:
+    setting, std = found.values["relief_pressure"]
+    return RigCode.RELIEF_LOW.note(setting_pa=setting, half_width_pa=NORMAL_95 * std, rig_pa=p.relief_pressure)
 
 
 def _growth(found: Explanation, _: EhaParameters) -> Note:
-    first = found.values["leakage_coefficient"][0]
-    growth = found.values["leakage_growth"][0] + found.values["leakage_bend"][0]
-    return RigCode.LEAKAGE_GROWS.note(factor=1.0 + growth, first=first, last=first * (1.0 + growth))
+    begun, ended = _grown(found, np.array([0.0, 1.0]))
+    factor, last = float(ended / begun), found.values["leakage_coefficient"][0]
+    warmed = 1.0 / WARMED < factor < WARMED
+    return (RigCode.LEAKAGE_DRIFTS if warmed else RigCode.LEAKAGE_GROWS).note(
+        factor=factor, first=last / factor, last=last
+    )
+
+
+def _grown(found: Explanation, elapsed: Array) -> Array:
+    """Return leakage over its value halfway, at shares of the log."""
+    growth, bend = (found.values[name][0] for name in ("leakage_growth", "leakage_bend"))
+    return np.maximum(grown_leakage(elapsed, growth, bend), LEAST_GROWN)
 
 
 def _blocked(found: Explanation, _: EhaParameters) -> Note:
@@ -122,6 +154,8 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "volume": _volume,
     "start_load": _load,
     "air": _air,
+    "air_midway": _air,
+    "relief_low": _relief,
     "leakage_growth": _growth,
     "makeup_blocked": _blocked,
     "checks_crack": _crack,
@@ -143,13 +177,17 @@ def set_right(log: CleanLog, found: Explanation) -> CleanLog:
     Returns
     -------
     CleanLog
-        The log; pressures at its end that are not known any more are missing.
+        The log, with a `LEAKAGE_COURSE` where leakage drifts over it; pressures at its end that are not known any
+        more are missing.
     """
     value = {name: pair[0] for name, pair in found.values.items()}
     record, changed = log.record, dict[str, Array]()
     if zero := value.get("position_zero", 0.0):
         changed["position_m"] = record["position_m"] - zero
     late, offset = found.delay + value.get("pressure_lag", 0.0), value.get("pressure_offset", 0.0)
+    if "leakage_growth" in value:
+        grown = _grown(found, np.arange(len(record)) / len(record))
+        changed[LEAKAGE_COURSE] = grown / grown[-1]
     if late or offset:
         changed[PRESSURE] = _brought_forward(record, PRESSURE, late) - offset
     return replace(log, record=record.replace(**changed))

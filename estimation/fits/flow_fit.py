@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.fits.descent import descend
+from estimation.fits.explain import WORTH, explain, promised
 from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed
 from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, roughly
 from estimation.fits.greybox_problem import GreyBoxLog, Problem, greybox_log, search_bounds
-from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, START_LOAD, WORTH, explain, promised
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, START_LOAD
 from estimation.log_checks.bridging import bridged, gaps
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.outliers import without_outliers
-from estimation.models.flow import FLOW_FORM, MASS_FLOW_FORM, relieving
+from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, reaches_relief, relieving
 from estimation.notes import EstimateCode
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
@@ -52,9 +53,6 @@ make-up valves never open, no log tells a drain from leakage, and any drain woul
 SCREENED_SECONDS = 4.0
 """Starts are compared on the beginning of the log: it tells a wrong valley from a right one [s]."""
 
-NEAR_RELIEF = 0.97
-"""Share of the relief setting above which the valve is taken to open [fraction]."""
-
 LARGEST_CHI_SQUARE = 1.2
 """Mean squared normalised residual above which the model is said to leave something out [dimensionless]."""
 
@@ -86,9 +84,9 @@ def fit_flow(
     *,
     loaded: bool = False,
 ) -> FormFit:
-    """Fit the flow form to a log, balanced by volume and by mass, and weigh the two.
+    """Fit the flow form to a log, balanced by volume, by mass, and by volume in held chambers, and weigh the three.
 
-    A log that it does not explain is asked what is strange about rig, oil or logger (`estimation.fits.hypotheses`).
+    A log that it does not explain is asked what is strange about rig, oil or logger (`estimation.fits.explain`).
     Gross outliers are taken out, and what the pump delivered while its speed is missing is read off the pressure after.
 
     Parameters
@@ -123,8 +121,8 @@ def fit_flow(
     if variances is None:
         record, variances = _cleaned(record)
     pressure = record["differential_pressure_pa"]
-    relieved = float(np.nanmax(np.abs(pressure))) > NEAR_RELIEF * parameters.relief_pressure
-    forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM)]
+    relieved = reaches_relief(pressure, parameters.relief_pressure)
+    forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
     log = _log(record, parameters, uncertainties or {}, variances)
     starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
     search = Search(screened=ceil(SCREENED_SECONDS / record.sample_time))
@@ -138,11 +136,13 @@ def fit_flow(
     for form in forms:
         problem = Problem(form, log)
         near = roughly(problem, guesses, search, bounds)
-        if not fits or near.cost < fits[0].cost + 2.0 * UNLIKELY:  # which leaves room for the error of long model steps
+        if (
+            not fits or near.cost < min(fit.cost for fit in fits) + 2.0 * UNLIKELY
+        ):  # which leaves room for the error of long model steps
             fits.append(concluded(problem, descend(problem.at, near.theta, search.evaluations, bounds)))
         guesses = [fits[0].theta]
     best = min(fits, key=lambda fit: fit.cost)
-    found, rig_std = weighed(fits)
+    found = weighed(fits)
     value, std = found["bulk_modulus"]
     objections = _objections(best)
     asked = HYPOTHESES if objections else ()
@@ -155,12 +155,13 @@ def fit_flow(
         asked = (DELIVERY,) if gain > WORTH and size > LEAST_DELIVERY else ()
     if asked:
         usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
-        strange = explain(log, parameters, [best.values, *usual], _explains, asked=asked)
+        near = [best.values, *(usual if objections else ())]  # a fit that explains the log is in no wrong valley
+        strange = explain(log, parameters, near, _explains, asked=asked, paired=loaded or bool(objections))
         one = strange.fit
         if _explains(one) and one.cost < best.cost - WORTH:
             bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
-            return FormFit(strange.values, strange.rig_std, bound, one.chi_square[0], (), one.rig_slopes, strange)
-    return FormFit(found, rig_std, std / value, best.chi_square[0], objections, best.rig_slopes)
+            return FormFit(strange.values, bound, one.chi_square[0], (), one.rig_slopes, strange)
+    return FormFit(found, std / value, best.chi_square[0], objections, best.rig_slopes)
 
 
 def _explains(fit: GreyBoxFit) -> bool:

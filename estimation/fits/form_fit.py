@@ -11,7 +11,7 @@ from estimation.fits.greybox_fit import GreyBoxFit
 from plant.notes import Note
 
 if TYPE_CHECKING:
-    from estimation.fits.hypotheses import Explanation
+    from estimation.fits.explain import Explanation
 
 LONGEST_STEP = 2.5e-4
 """Longest step of a form [s]; slower logs are sub-stepped."""
@@ -32,8 +32,6 @@ class FormFit:
     ----------
     parameters : Mapping[str, tuple of float]
         Value and standard deviation in SI, by parameter name; the deviation is that of the log's noise.
-    rig_std : Mapping[str, float]
-        What the rig's uncertain parameters add to each deviation, in SI.
     bound : float
         Relative standard deviation of bulk modulus from the log's noise [fraction].
     chi_square : float
@@ -47,7 +45,6 @@ class FormFit:
     """
 
     parameters: Mapping[str, tuple[float, float]]
-    rig_std: Mapping[str, float]
     bound: float
     chi_square: float
     reasons: tuple[Note, ...]
@@ -55,7 +52,7 @@ class FormFit:
     explanation: "Explanation | None" = None
 
 
-def weighed(fits: Sequence[GreyBoxFit]) -> tuple[Mapping[str, tuple[float, float]], Mapping[str, float]]:
+def weighed(fits: Sequence[GreyBoxFit]) -> Mapping[str, tuple[float, float]]:
     """Return values and deviations over several models of one log, each weighed by its likelihood.
 
     A model that explains the log less well counts by a power of ``exp(-chi^2/2)``, see `TEMPER`; where two explain it
@@ -69,8 +66,8 @@ def weighed(fits: Sequence[GreyBoxFit]) -> tuple[Mapping[str, tuple[float, float
 
     Returns
     -------
-    tuple of Mapping
-        Value and deviation by parameter, and the rig's part of the deviation [SI].
+    Mapping[str, tuple of float]
+        Value and deviation by parameter [SI].
     """
     costs = np.array([fit.cost for fit in fits])
     weights = np.exp(-np.minimum((costs - np.min(costs)) / TEMPER, 700.0))
@@ -83,4 +80,4 @@ def weighed(fits: Sequence[GreyBoxFit]) -> tuple[Mapping[str, tuple[float, float
         mean = float(weights @ values)
         heavy = weights > np.finfo(np.float64).eps
         found[name] = mean, float(np.sqrt(weights[heavy] @ (stds[heavy] ** 2 + (values[heavy] - mean) ** 2)))
-    return found, best.rig_std
+    return found

@@ -4,7 +4,6 @@ The variance of an estimate has three parts, told apart: noise of the outputs, n
 well the rig's own parameters are known. The last two are read off the fit's linear response to them.
 """
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -56,8 +55,6 @@ class GreyBoxFit:
         The unknowns in SI.
     std : Mapping[str, float]
         Standard deviation of each from noise alone, in SI; infinite where the log does not determine it.
-    rig_std : Mapping[str, float]
-        The same from what is not known of the rig, in SI.
     cost : float
         Half the sum of squared normalised residuals, outliers counted linearly [dimensionless].
     chi_square : tuple of float
@@ -72,7 +69,6 @@ class GreyBoxFit:
     theta: Array
     values: Mapping[str, float]
     std: Mapping[str, float]
-    rig_std: Mapping[str, float]
     cost: float
     chi_square: tuple[float, ...]
     autocorrelation: tuple[float, ...]
@@ -229,10 +225,6 @@ def concluded(problem: Problem, point: Point) -> GreyBoxFit:
         theta=theta,
         values=values,
         std=dict(zip(model.unknowns, map(float, unit * noise), strict=True)),
-        rig_std={
-            one: math.hypot(*(problem.log.uncertainties[name] * slopes_si[name][one] for name in slopes_si))
-            for one in model.unknowns
-        },
         rig_slopes=slopes_si,
         cost=point.cost,
         chi_square=tuple(map(float, squares / seen)),

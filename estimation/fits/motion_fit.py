@@ -121,10 +121,10 @@ def fit_motion(
     first = _searched(MOTION_FORMS[0], log, starts)
     fits = [first, _compared(MOTION_FORMS[1], log, first, starts)]
     best = min(fits, key=lambda fit: fit.cost)
-    found, rig_std = weighed(fits)
+    found = weighed(fits)
     value, std = found["bulk_modulus"]
     believed = dict(found) | {"bulk_modulus": (value, float(np.hypot(std, STRUCTURE * value)))}
-    return FormFit(believed, rig_std, std / value, best.chi_square[0], _objections(fits, best), best.rig_slopes)
+    return FormFit(believed, std / value, best.chi_square[0], _objections(fits, best), best.rig_slopes)
 
 
 def _log(record: Record, p: EhaParameters, uncertainties: Mapping[str, float], speed_variance: float) -> GreyBoxLog:

@@ -9,12 +9,16 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from estimation.arrays import Array
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.functions import Scalar, absolute, maximum, sign, where
-from plant.components.check_valve import check_valve_flow
+from plant.components.check_valve import make_up_flow
 from plant.components.oil import ATMOSPHERE
 from plant.components.valves import pumped_flow
-from plant.eha.model import EhaParameters
+from plant.eha.circuit import chamber_volumes
+from plant.eha.model import EhaParameters, piston_areas
 
 
 class Delivery(NamedTuple):
@@ -67,8 +71,10 @@ def chamber_rates(
 ) -> tuple[Scalar, Scalar]:
     """Return how fast the chamber pressures change (equations 5.1 to 5.4 with errata E2, E8 and E17).
 
-    Each chamber holds ``2 V_0`` and the volume that the piston sweeps, so that the two together are the lumped plant's
-    ``V_0`` (errata E2). Balanced by mass, oil that leaves a chamber under pressure is denser than where it arrives by
+    Each chamber holds ``2 V_0``, on average of the two, and the volume that the piston sweeps, so that the two together
+    are the lumped plant's ``V_0`` (errata E2).
+
+    Balanced by mass, oil that leaves a chamber under pressure is denser than where it arrives by
     ``(p1 - p2) / beta``, and its tangent stiffness falls as it is compressed; equations 5.1 to 5.4 balance volumes,
     which loses nothing while pressures are a small part of bulk modulus.
 
@@ -91,24 +97,66 @@ def chamber_rates(
     """
     p1, p2 = pressures
     pumped, velocity, position = delivery
-    A, V, beta, supply = p.piston_area, 2.0 * p.chamber_volume, p.bulk_modulus, p.accumulator_pressure
+    beta, supply = p.bulk_modulus, p.accumulator_pressure
+    area_1, area_2 = piston_areas(p)
+    volume_1, volume_2 = chamber_volumes(position, p)
     dp = p1 - p2
-    relieved = sign(dp) * p.relief_conductance * maximum(absolute(dp) - p.relief_pressure, 0.0)
-    leaked = p.leakage_coefficient * dp + relieved
     into_1, into_2 = (
-        check_valve_flow(supply - chamber, p.makeup_conductance, p.makeup_opening) - p.case_leakage * (chamber - supply)
-        for chamber in pressures
+        make_up_flow(chamber, other, supply, p.makeup_conductance, p.makeup_opening, p.pilot_share)
+        - p.case_leakage * (chamber - supply)
+        for chamber, other in (pressures, pressures[::-1])
     )
-    swelling = dp / beta if by_mass else 0.0
-    # each flow is counted at its outlet for the pump, at its inlet for a leak: the denser side is chamber 1 if dp > 0
-    at_1 = pumped * where(pumped > 0.0, 1.0, 1.0 - swelling) - leaked * where(dp > 0.0, 1.0, 1.0 - swelling)
-    at_2 = pumped * where(pumped > 0.0, 1.0 + swelling, 1.0) - leaked * where(dp > 0.0, 1.0 + swelling, 1.0)
+    at_1, at_2 = port_flows(pumped, leaked_flow(dp, p.leakage_coefficient, p), dp, dp / beta if by_mass else 0.0)
     stiffness_1 = beta - (p1 - ATMOSPHERE) if by_mass else beta
     stiffness_2 = beta - (p2 - ATMOSPHERE) if by_mass else beta
     return (
-        stiffness_1 * (at_1 - A * velocity + into_1) / (V + A * position),
-        stiffness_2 * (A * velocity - at_2 + into_2) / (V - A * position),
+        stiffness_1 * (at_1 - area_1 * velocity + into_1) / volume_1,
+        stiffness_2 * (area_2 * velocity - at_2 + into_2) / volume_2,
     )
+
+
+def leaked_flow(dp: Scalar, leakage: Scalar, p: SimpleNamespace) -> Scalar:
+    """Return what goes from chamber to chamber past the piston and through the relief valve.
+
+    Parameters
+    ----------
+    dp : float or Expression
+        Differential pressure [Pa].
+    leakage : float or Expression
+        Leakage coefficient [m^3/(s Pa)].
+    p : namespace
+        `relief_conductance` [m^3/(s Pa)] and `relief_pressure` [Pa].
+
+    Returns
+    -------
+    float or Expression
+        Flow from chamber 1 to chamber 2 [m^3/s].
+    """
+    return leakage * dp + sign(dp) * p.relief_conductance * maximum(absolute(dp) - p.relief_pressure, 0.0)
+
+
+def port_flows(pumped: Scalar, leaked: Scalar, dp: Scalar, swelling: Scalar) -> tuple[Scalar, Scalar]:
+    """Return the flow into chamber 1 and that out of chamber 2, each as the volume that it has there.
+
+    A flow is counted at its outlet for the pump, at its inlet for a leak: the denser side is chamber 1 if ``dp > 0``.
+
+    Parameters
+    ----------
+    pumped, leaked : float or Expression
+        Flow of the pump, and of leakage and relief [m^3/s].
+    dp : float or Expression
+        Differential pressure [Pa].
+    swelling : float or Expression
+        Relative growth of oil that goes from chamber 1 to chamber 2; 0 where volumes are balanced [fraction].
+
+    Returns
+    -------
+    tuple of float or Expression
+        Flows [m^3/s].
+    """
+    at_1 = pumped * where(pumped > 0.0, 1.0, 1.0 - swelling) - leaked * where(dp > 0.0, 1.0, 1.0 - swelling)
+    at_2 = pumped * where(pumped > 0.0, 1.0 + swelling, 1.0) - leaked * where(dp > 0.0, 1.0 + swelling, 1.0)
+    return at_1, at_2
 
 
 def flow_rates(
@@ -143,6 +191,13 @@ def _by_mass(state: tuple[Scalar, Scalar], drives: Any, p: SimpleNamespace, shar
     return flow_rates(state, drives, p, share, by_mass=True)
 
 
+def _held(state: tuple[Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, Scalar]:
+    speeds, (x, next_x), step = drives
+    return chamber_rates(
+        state, Delivery(delivered_flow(speeds, p, step, share), (next_x - x) / step, 0.0), p, by_mass=False
+    )
+
+
 def _at_rest(p: SimpleNamespace) -> tuple[Scalar, Scalar]:
     return p.accumulator_pressure, p.accumulator_pressure
 
@@ -175,6 +230,37 @@ FLOW_FORM = GreyBoxModel(
 
 MASS_FLOW_FORM = replace(FLOW_FORM, name="flow_mass", rates=_by_mass)
 """The same, balanced by mass."""
+
+
+HELD_FLOW_FORM = replace(FLOW_FORM, name="flow_held", rates=_held)
+"""The same with the volumes that the chambers have in mid-stroke, as equation 5.8 holds them: of an actuator whose dead
+volume is far larger than what the piston sweeps, and of the lumped plant."""
+
+NEAR_RELIEF = 0.97
+"""Share of the relief setting above which the valve is taken to open [fraction]."""
+
+
+def reaches_relief(pressure: Array, setting: float) -> bool:
+    """Return whether the relief valve opens in a log.
+
+    Parameters
+    ----------
+    pressure : ndarray of any shape
+        Differential pressure [Pa]; NaN is missing.
+    setting : float
+        The valve's setting [Pa].
+
+    Returns
+    -------
+    bool
+        Whether pressure comes near the setting.
+
+    Examples
+    --------
+    >>> reaches_relief(np.array([0.0, np.nan, -3.4e6]), 3.4475e6)
+    True
+    """
+    return float(np.nanmax(np.abs(pressure))) > NEAR_RELIEF * setting
 
 
 def relieving(form: GreyBoxModel) -> GreyBoxModel:

@@ -13,7 +13,8 @@ from typing import Any
 from estimation.models.flow import Delivery, chamber_rates, delivered_flow
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.functions import Scalar, absolute, maximum
-from plant.eha.model import EhaParameters
+from plant.components.oil import ATMOSPHERE
+from plant.eha.model import EhaParameters, load_on_rod, piston_areas
 
 Friction = Callable[[Scalar, Scalar, SimpleNamespace], tuple[Scalar, Scalar]]
 """``friction(velocity [m/s], bristle [fraction of its deflection at a_3], parameters)``, which returns the bristle's
@@ -97,6 +98,11 @@ def parallel_friction(velocity: Scalar, bristle: Scalar, p: SimpleNamespace) -> 
     return rate, p.friction_coulomb * bristle + damping * rate + beside
 
 
+def _at_rest(p: SimpleNamespace) -> tuple[Scalar, ...]:
+    held, supply = p.load_force / p.piston_area, p.accumulator_pressure
+    return 0.0, 0.0, 0.0, supply + maximum(held, 0.0), supply + maximum(-held, 0.0)
+
+
 def _form(name: str, friction: Friction) -> GreyBoxModel:
     def rates(state: Any, drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
         _, velocity, bristle, p1, p2 = state
@@ -105,14 +111,16 @@ def _form(name: str, friction: Friction) -> GreyBoxModel:
         delivery = Delivery(delivered_flow(speeds, p, step, share), velocity, x + share * (next_x - x))
         circuit = SimpleNamespace(**vars(p), makeup_opening=SEATED)
         pushing = chamber_rates((p1, p2), delivery, circuit, by_mass=False)
-        return velocity, (p.piston_area * (p1 - p2) - force) / p.moving_mass, yielding, *pushing
+        area_1, area_2 = piston_areas(p)
+        push = area_1 * (p1 - ATMOSPHERE) - area_2 * (p2 - ATMOSPHERE) - load_on_rod(x + share * (next_x - x), p)
+        return velocity, (push - force) / p.moving_mass, yielding, *pushing
 
     return GreyBoxModel(
         name=name,
         drives=("motor_speed_rad_s", "position_m"),
         outputs=("position_m",),
         unknowns=UNKNOWNS,
-        initial=lambda p: (0.0, 0.0, 0.0, p.accumulator_pressure, p.accumulator_pressure),
+        initial=_at_rest,
         rates=rates,
         observe=lambda state: (state[0],),
         parameters=EhaParameters,

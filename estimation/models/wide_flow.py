@@ -8,16 +8,23 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Annotated, Any
 
-from estimation.models.flow import delivered_flow
+from estimation.models.flow import delivered_flow, leaked_flow, port_flows
 from estimation.models.greybox import GreyBoxModel
-from plant.compiled.functions import Scalar, absolute, maximum, sign, where
-from plant.components.check_valve import check_valve_flow
+from plant.compiled.functions import Scalar, maximum, minimum, where
+from plant.components.check_valve import make_up_flow
 from plant.components.oil import ATMOSPHERE
-from plant.eha.model import EhaParameters
+from plant.eha.circuit import chamber_volumes
+from plant.eha.model import EhaParameters, piston_areas
 from plant.units import SI
 
 VAPOUR = 2e4
 """Absolute pressure about which a chamber that is short of oil becomes soft [Pa]; pressures stay positive."""
+
+AIR_RISE = 0.02
+"""Time in which air that gets in midway is there, in lengths of the log: what is shorter stops a descent [fraction]."""
+
+STIFFEST = 0.01
+"""Least compliance of a chamber over that at the stated pressure: a search may try more air than there can be there."""
 
 SHORTEST_LAG = 1e-6
 """Lag of a pressure sensor that has none [s]."""
@@ -37,29 +44,34 @@ class WideFlowParameters(EhaParameters):
     start_level: Annotated[
         float, SI("Pa", "pressure of the lower side before the first sample, over the accumulator's", "fitted")
     ] = 0.0
-    air_softness: Annotated[float, SI("Pa", "a of 1/beta(p) = 1/beta + a/p^2", "fitted")] = 0.0
-    leakage_growth: Annotated[float, SI("1", "growth of leakage over the log, of its first value", "fitted")] = 0.0
+    air_softness: Annotated[float, SI("Pa", "a of 1/beta(p) = 1/beta_liquid + a/p^2", "fitted")] = 0.0
+    air_onset: Annotated[float, SI("1", "when that air gets in, in lengths of the log", "fitted")] = -1.0
+    stated_pressure: Annotated[float, SI("Pa", "absolute pressure that bulk modulus is stated at", "chosen")] = 1e6
+    leakage_growth: Annotated[float, SI("1", "growth of leakage over the log, of its value halfway", "fitted")] = 0.0
     leakage_bend: Annotated[float, SI("1", "part of that growth which goes with time squared", "fitted")] = 0.0
     crack_pressure: Annotated[float, SI("Pa", "drop at which the make-up valves crack", "fitted")] = 0.0
     makeup_share_b: Annotated[float, SI("1", "conductance of valve B over that of A", "fitted")] = 1.0
     drain_share_a: Annotated[float, SI("1", "drain of port A over the case leakage", "fitted")] = 1.0
     drain_share_b: Annotated[float, SI("1", "drain of port B over the case leakage", "fitted")] = 1.0
-    pilot_share: Annotated[float, SI("1", "piloted conductance of a make-up valve over its own", "fitted")] = 0.0
-    area_share_b: Annotated[float, SI("1", "piston area of side B over that of side A", "rig")] = 1.0
-    volume_share_b: Annotated[float, SI("1", "dead volume of side B over that of side A", "rig")] = 1.0
     by_mass: Annotated[float, SI("1", "1: balanced by mass, 0: by volume", "chosen")] = 0.0
 
     def __post_init__(self) -> None:
         """Take any finite number: a fit keeps to its own bounds."""
 
 
-def _stiffness(pressure: Scalar, p: SimpleNamespace) -> Scalar:
-    """Return the tangent bulk modulus of a chamber [Pa]: liquid, air that softens as 1/p^2, and vapour."""
+def _stiffness(pressure: Scalar, elapsed: Scalar, p: SimpleNamespace) -> Scalar:
+    """Return the tangent bulk modulus of a chamber [Pa]: liquid, air that softens as 1/p^2, and vapour.
+
+    `bulk_modulus` is that at `stated_pressure`, air included; the liquid's where air gets in midway.
+    """
     above = maximum(pressure, 0.05 * VAPOUR)
     ratio = VAPOUR / above
     short = ratio * ratio
-    liquid = p.bulk_modulus - p.by_mass * (pressure - ATMOSPHERE)
-    return 1.0 / ((1.0 + short * short) / liquid + p.air_softness / (above * above))
+    air = p.air_softness * minimum(maximum((elapsed - p.air_onset) / AIR_RISE, 0.0), 1.0)
+    stated = where(p.air_onset < 0.0, air / (p.stated_pressure * p.stated_pressure), 0.0)
+    softer = air / (above * above) - stated
+    oil = p.bulk_modulus - p.by_mass * (pressure - ATMOSPHERE)
+    return oil / maximum(1.0 + short * short + softer * oil, STIFFEST)
 
 
 def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
@@ -67,35 +79,44 @@ def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Sc
     p1, p2, behind = state
     velocity, position = (next_x - x) / step, x + share * (next_x - x) - p.position_zero
     pumped = delivered_flow(speeds, p, step, share)
-    A, V, supply = p.piston_area, 2.0 * p.chamber_volume, p.accumulator_pressure
+    supply = p.accumulator_pressure
+    area_1, area_2 = piston_areas(p)
+    volume_1, volume_2 = chamber_volumes(position, p)
     dp = p1 - p2
     elapsed = begun + share * (next_begun - begun)
-    grown = maximum(1.0 + (p.leakage_growth + p.leakage_bend * elapsed) * elapsed, 0.0)
-    relieved = sign(dp) * p.relief_conductance * maximum(absolute(dp) - p.relief_pressure, 0.0)
-    leaked = p.leakage_coefficient * grown * dp + relieved
-    into_1 = _fed(p1, p2, 1.0, p.drain_share_a, p, supply)
-    into_2 = _fed(p2, p1, p.makeup_share_b, p.drain_share_b, p, supply)
-    swelling = p.by_mass * dp / p.bulk_modulus
-    at_1 = pumped * where(pumped > 0.0, 1.0, 1.0 - swelling) - leaked * where(dp > 0.0, 1.0, 1.0 - swelling)
-    at_2 = pumped * where(pumped > 0.0, 1.0 + swelling, 1.0) - leaked * where(dp > 0.0, 1.0 + swelling, 1.0)
-    area_b = A * p.area_share_b
-    rise = _stiffness(p1, p) * (at_1 - A * velocity + into_1) / (V + A * position)
-    fall = _stiffness(p2, p) * (area_b * velocity - at_2 + into_2) / (V * p.volume_share_b - area_b * position)
+    grown = grown_leakage(elapsed, p.leakage_growth, p.leakage_bend)
+    leaked = leaked_flow(dp, p.leakage_coefficient * grown, p)
+    opening, pilot, conductance = p.makeup_opening, p.pilot_share, p.makeup_conductance
+    cracking = supply - p.crack_pressure
+    fed_1 = make_up_flow(p1, p2, cracking, conductance, opening, pilot)
+    fed_2 = make_up_flow(p2, p1, cracking, p.makeup_share_b * conductance, opening, pilot)
+    drain = p.case_leakage * grown
+    into_1 = fed_1 - p.drain_share_a * drain * (p1 - supply)
+    into_2 = fed_2 - p.drain_share_b * drain * (p2 - supply)
+    at_1, at_2 = port_flows(pumped, leaked, dp, p.by_mass * dp / p.bulk_modulus)
+    rise = _stiffness(p1, elapsed, p) * (at_1 - area_1 * velocity + into_1) / volume_1
+    fall = _stiffness(p2, elapsed, p) * (area_2 * velocity - at_2 + into_2) / volume_2
     # how far the sensor is behind stays small where its lag is short, which a stiff step resolves
     return rise, fall, rise - fall - (behind + p.pressure_offset) / (p.pressure_lag + SHORTEST_LAG)
 
 
-def _fed(
-    chamber: Scalar, other: Scalar, makeup_share: Scalar, drain_share: Scalar, p: SimpleNamespace, supply: Scalar
-) -> Scalar:
-    """Return what the inner circuit feeds into a chamber: through its check valve, a pilot, less the case drain."""
-    drop, makeup = supply - chamber, p.makeup_conductance * makeup_share
-    piloted = where(other > chamber, p.pilot_share * makeup * drop, 0.0)
-    return (
-        check_valve_flow(drop - p.crack_pressure, makeup, p.makeup_opening)
-        + piloted
-        + p.case_leakage * drain_share * drop
-    )
+def grown_leakage(elapsed: Scalar, growth: Scalar, bend: Scalar) -> Scalar:
+    """Return leakage over its value halfway through the log, which a fit tells best.
+
+    Parameters
+    ----------
+    elapsed : float, ndarray or Expression
+        Share of the log [fraction].
+    growth, bend : float or Expression
+        What goes with that share and with its square [dimensionless].
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Dimensionless; not negative.
+    """
+    since = elapsed - 0.5
+    return maximum(1.0 + (growth + bend * since) * since, 0.0)
 
 
 def _at_rest(p: SimpleNamespace) -> tuple[Scalar, ...]:
@@ -129,6 +150,7 @@ LINEAR = {
     "start_pressure": 1e5,
     "start_level": 1e4,
     "air_softness": 1e2,
+    "air_onset": 0.1,
     "leakage_growth": 1.0,
     "leakage_bend": 1.0,
     "crack_pressure": 1e4,

@@ -7,14 +7,17 @@ Eight circuits run side by side in one kernel, so a Gauss-Newton step with all i
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.eha.explained import LEAKAGE_COURSE
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from plant.components.oil import oil_pressure
+from plant.eha.circuit import chamber_volumes
 from plant.eha.circuit_parameters import CircuitParameters, longest_stroke
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT
@@ -73,6 +76,8 @@ class Blocks:
         Standard deviation of what the sensors add to velocity [m/s] and pressure [Pa].
     earlier : tuple of int and ndarray, shape (parameters,), or None
         Another circuit that ran up to a sample, as a row of parameters; None if one ran throughout.
+    course : ndarray, shape (samples,), or None
+        Leakage over what it is when the log ends [dimensionless]; None where it does not change.
     """
 
     speed: Array
@@ -82,6 +87,7 @@ class Blocks:
     pressure: Array | None
     noise: Array
     earlier: tuple[int, Array] | None = None
+    course: Array | None = None
 
     @property
     def outputs(self) -> Array:
@@ -143,7 +149,8 @@ def blocks_of(record: Record) -> Blocks:
     if pressure is not None:
         pressure = _mean(pressure, block)
     speed = bridged(whole["motor_speed_rad_s"])
-    return Blocks(speed, sample_time, block, velocity, pressure, _noise(whole, block, sample_time))
+    noise = _noise(whole, block, sample_time)
+    return Blocks(speed, sample_time, block, velocity, pressure, noise, course=whole.get(LEAKAGE_COURSE))
 
 
 def _noise(whole: Mapping[str, Array], block: int, sample_time: float) -> Array:
@@ -158,7 +165,7 @@ def _noise(whole: Mapping[str, Array], block: int, sample_time: float) -> Array:
     return np.array(noise)
 
 
-_NEEDED = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa")
+_NEEDED = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa", LEAKAGE_COURSE)
 
 
 def _pooled(values: Array, pooled: int) -> Array:
@@ -251,6 +258,8 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
     if blocks.earlier is not None:
         until, row = blocks.earlier
         rows = np.where(np.arange(len(blocks.speed))[:, None, None] < until, row, rows)
+    if blocks.course is not None:
+        rows = rows * _drift(blocks.course)[:, None, :]
     rows = _between_stops(blocks, rows)
     starts = np.array([CIRCUIT.start(row) for row in rows[0]])
     runs = controlled_run(
@@ -267,29 +276,42 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
     return np.array([_outputs(blocks, states, rows[:, i]) for i, states in enumerate(runs)])
 
 
+def _drift(course: Array) -> Array:
+    """Return the factors on a circuit's parameters, shape (samples, parameters): viscosity falls as leakage rises."""
+    factors = np.ones((len(course), len(_COLUMN)))
+    factors[:, [_COLUMN[name] for name in _LEAKAGES]] = course[:, None]
+    factors[:, _COLUMN["friction_linear"]] = 1.0 / course
+    return factors
+
+
+_LEAKAGES = ("leakage_coefficient", "pump_crossport_leakage", "pump_case_leakage", "cylinder_drain_leakage")
+
+
 def _between_stops(blocks: Blocks, rows: Array) -> Array:
     """Return circuits with the stops of the rig's stroke where the log may show one, without stops elsewhere.
 
     A piston that turned back before it came to a stop, or that went past it, shows none.
     """
-    stroke, area, volume = (_COLUMN[name] for name in ("stroke", "piston_area", "chamber_volume"))
-    half = 0.5 * rows[..., stroke]
+    half = 0.5 * rows[..., _COLUMN["stroke"]]
     shown = np.abs(blocks.reach - half) <= AT_STOP * half
     rows = rows.copy()
-    rows[..., stroke] = np.where(shown, 2.0 * half, longest_stroke(rows[..., volume], rows[..., area]))
+    rows[..., _COLUMN["stroke"]] = np.where(shown, 2.0 * half, longest_stroke(_values(rows)))
     return rows
+
+
+def _values(rows: Array) -> SimpleNamespace:
+    """Return the parameters in rows by name."""
+    return SimpleNamespace(**{name: rows[..., i] for name, i in _COLUMN.items()})
 
 
 def _outputs(blocks: Blocks, states: Array, row: Array) -> Array:
     velocity = np.diff(states[:: blocks.block, 2]) / (blocks.block * blocks.sample_time)
     if blocks.pressure is None:
         return velocity[:, None]
-    position, oil = states[:, 2], states[:, 4:6]
-    area, volume, modulus, air, vapour = (row[:, _COLUMN[n]] for n in _PRESSURE_OF)
-    swept = area * position
-    high = oil_pressure(oil[:, 0], 2 * volume + swept, modulus, air, vapour)
-    low = oil_pressure(oil[:, 1], 2 * volume - swept, modulus, air, vapour)
+    p = _values(row)
+    volumes = chamber_volumes(states[:, 2], p)
+    high, low = (
+        oil_pressure(oil, volume, p.bulk_modulus, p.air_fraction, p.vapour_pressure)
+        for oil, volume in zip(states[:, 4:6].T, volumes, strict=True)
+    )
     return np.column_stack([velocity, _mean(high - low, blocks.block)])
-
-
-_PRESSURE_OF = ("piston_area", "chamber_volume", "bulk_modulus", "air_fraction", "vapour_pressure")

@@ -95,7 +95,7 @@ class Actuator:
         points = [coordinates_of(parameters_for(condition, rig), rated) for condition in CONDITIONS.values()]
         circuit = circuit_of(rig)
         if rig.stroke is None:
-            circuit = replace(circuit, stroke=longest_stroke(circuit.chamber_volume, circuit.piston_area))
+            circuit = replace(circuit, stroke=float(longest_stroke(circuit)))
         return Actuator(circuit, rated, np.array(points))
 
 

@@ -24,6 +24,7 @@ from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import region_scores
 from faults.diagnosis.evidence import Scoreboard, weigh
+from faults.diagnosis.load import first_guesses, under_load
 from faults.diagnosis.models_verdict import models_verdict, ranked
 from faults.diagnosis.out_of_model import SOFT, reasons_against, sensors_disagree
 from faults.diagnosis.rmse import Scores, score_mathematical
@@ -124,10 +125,10 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
     if estimate.explanation is not None:
         log = set_right(log, estimate.explanation)
         rig = replace(rig, parameters=rig_set_right(rig.parameters, estimate.explanation))
-    if estimate.gate.passed and estimate.value is not None and estimate.value > rig.parameters.bulk_modulus / SOFT:
-        # oil stiffer than the rig's is no fault: the circuit is fitted around what was measured
-        strange = (*strange, RigCode.OIL_STIFFER.note(ratio=estimate.value / rig.parameters.bulk_modulus))
-        rig = replace(rig, parameters=replace(rig.parameters, bulk_modulus=estimate.value))
+    healthy = rig.parameters
+    if (other := _another_oil(estimate, healthy)) is not None:
+        strange = (*strange, other)
+        rig = replace(rig, parameters=replace(healthy, bulk_modulus=estimate.value))
     scores = score_mathematical(log.record, mathematical_bank(rig.parameters))
     verdict = models_verdict(scores, log.record)
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
@@ -139,13 +140,15 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
         return replace(found, evidence=EhaEvidence(estimate, scores, None))
     doubts = (*refused(estimate), *outside, *log.objections)
     try:
-        diagnosis = diagnose_clean(log, actuator_of(rig.parameters))
+        diagnosis, loaded = _diagnosed(log, rig.parameters, estimate)
     except RigError as error:
         said = ClassCode.NO_CIRCUIT.note(reason=str(error))
         return _without_circuit(found, log, scores, (*doubts, *verdict.against), said)
     except LogError as error:
         said = ClassCode.NO_PROBABILITIES.note(reason=error.message)
         return _without_circuit(found, log, scores, (*doubts, *verdict.against), said)
+    if loaded.load_force != rig.parameters.load_force:
+        found = replace(found, notes=(*found.notes, _load(loaded)))
     against = distinct((*doubts, *diagnosis.against))
     if against:  # nominal models alone are no judges of a circuit with another oil, but they say what is off
         against = distinct((*against, *verdict.against))
@@ -155,7 +158,7 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
         probabilities=diagnosis.probabilities,
         unknown=bool(against),
         against=against,
-        severities=_severities(diagnosis, estimate, rig, pressure=PRESSURE in scores.channels),
+        severities=_severities(diagnosis, estimate, healthy, rig, pressure=PRESSURE in scores.channels),
         healthy=diagnosis.healthy,
         not_told=diagnosis.not_told,
         since=diagnosis.scoreboard.onset,
@@ -164,13 +167,42 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
     )
 
 
+def _diagnosed(
+    log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate
+) -> tuple[Diagnosis, EhaParameters]:
+    """Return a diagnosis, under a load where the flow balance holds and the force balance wants one."""
+
+    def of(tried: EhaParameters) -> Diagnosis:
+        return diagnose_clean(log, actuator_of(tried))
+
+    if estimate.form != "flow" or not estimate.gate.passed:
+        return of(parameters), parameters
+    return under_load(of, first_guesses(log.record, parameters, estimate))
+
+
+def _load(p: EhaParameters) -> Note:
+    return ClassCode.LOAD_ON_ROD.note(force_n=p.load_force, pressure_pa=p.load_force / p.piston_area)
+
+
+def _another_oil(estimate: BulkModulusEstimate, healthy: EhaParameters) -> Note | None:
+    """Return a note where the oil is no kin of the rig's: the circuit is then fitted around what was measured.
+
+    Stiff oil is no fault, and soft oil is told by its severity, the air that would make it so soft.
+    """
+    if not estimate.gate.passed or estimate.value is None:
+        return None
+    ratio = estimate.value / healthy.bulk_modulus
+    if SOFT <= ratio <= 1.0 / SOFT:
+        return None
+    return (RigCode.OIL_SOFTER if ratio < 1.0 else RigCode.OIL_STIFFER).note(ratio=ratio)
+
+
 def _severities(
-    diagnosis: Diagnosis, estimate: BulkModulusEstimate, rig: Rig, *, pressure: bool
+    diagnosis: Diagnosis, estimate: BulkModulusEstimate, healthy: EhaParameters, rig: Rig, *, pressure: bool
 ) -> Mapping[str, Quantity]:
     """Return how bad it is, with the bulk modulus that was estimated, and what is not known of the rig."""
-    actuator = actuator_of(rig.parameters)
-    found = with_bulk_modulus(diagnosis.severity, estimate.quantity, actuator)
-    return with_totals(found, actuator, rig.spreads, pressure=pressure)
+    found = with_bulk_modulus(diagnosis.severity, estimate.quantity, actuator_of(healthy))
+    return with_totals(found, actuator_of(rig.parameters), rig.spreads, pressure=pressure)
 
 
 def _misread(found: Finding, log: CleanLog, scores: Scores) -> Finding:

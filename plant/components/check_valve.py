@@ -1,6 +1,6 @@
 """Check valves, which let oil through one way."""
 
-from plant.compiled.functions import Scalar, maximum
+from plant.compiled.functions import Scalar, maximum, where
 
 
 def check_valve_flow(drop: Scalar, conductance: Scalar, opening_pressure: Scalar) -> Scalar:
@@ -30,3 +30,40 @@ def check_valve_flow(drop: Scalar, conductance: Scalar, opening_pressure: Scalar
     """
     forward = maximum(drop, 0.0)
     return conductance * forward * forward / (forward + opening_pressure)
+
+
+def make_up_flow(
+    chamber: Scalar,
+    other: Scalar,
+    supply: Scalar,
+    conductance: Scalar,
+    opening_pressure: Scalar,
+    pilot_share: Scalar,
+) -> Scalar:
+    """Return what the inner circuit feeds into a chamber through its make-up valve, less what a pilot lets back.
+
+    A single rod displaces more oil on one side than on the other; what is over leaves through the low side's valve,
+    which the pressure of the other side holds open. Source: Rahmfeld and Ivantysynova, *Displacement controlled linear
+    actuator with differential cylinder*, International Journal of Fluid Power 2 (2001).
+
+    Parameters
+    ----------
+    chamber, other : float or Expression
+        Pressures of this chamber and of the other [Pa].
+    supply : float or Expression
+        Pressure of the inner circuit [Pa].
+    conductance : float or Expression
+        Flow of the valve a pascal when wide open [m^3/(s Pa)].
+    opening_pressure : float or Expression
+        Drop at which it is half open [Pa].
+    pilot_share : float or Expression
+        Conductance while it is held open, over its own; 0 for a plain check valve [dimensionless].
+
+    Returns
+    -------
+    float or Expression
+        Flow into the chamber [m^3/s].
+    """
+    drop = supply - chamber
+    piloted = where(other > chamber, pilot_share * conductance * drop, 0.0)
+    return check_valve_flow(drop, conductance, opening_pressure) + piloted

@@ -15,15 +15,16 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.compiled.functions import Scalar, minimum, where
+from plant.compiled.functions import Scalar, maximum, minimum, where
 from plant.components.accumulator import gas_pressure
-from plant.components.check_valve import check_valve_flow
+from plant.components.check_valve import make_up_flow
 from plant.components.end_stop import end_stop_force
-from plant.components.oil import oil_pressure, specific_volume
+from plant.components.oil import ATMOSPHERE, oil_pressure, specific_volume
 from plant.components.orifice import laminar_orifice_flow, orifice_constant
 from plant.components.presliding import bristle_rate, presliding_friction
 from plant.components.valves import pumped_flow, relief_flow
 from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.model import load_on_rod, piston_areas
 
 CircuitValues: TypeAlias = CircuitParameters | SimpleNamespace
 """What the model reads: the parameters, or a namespace of the same names holding expressions or arrays."""
@@ -75,7 +76,7 @@ class OilFlows(NamedTuple):
 
 
 def chamber_volumes(position: Scalar, p: CircuitValues) -> tuple[Scalar, Scalar]:
-    """Return the volumes of chambers A and B, each twice the lumped plant's in the middle (equation 5.3, errata E2).
+    """Return the volumes of chambers A and B, on average twice the lumped plant's in the middle (5.3, errata E2).
 
     Parameters
     ----------
@@ -89,8 +90,12 @@ def chamber_volumes(position: Scalar, p: CircuitValues) -> tuple[Scalar, Scalar]
     tuple of float, ndarray or Expression
         Volumes [m^3].
     """
-    swept = p.piston_area * position
-    return 2.0 * p.chamber_volume + swept, 2.0 * p.chamber_volume - swept
+    area_a, area_b = piston_areas(p)
+    volume = 2.0 * p.chamber_volume
+    return (
+        volume * (1.0 + p.volume_difference) + area_a * position,
+        volume * (1.0 - p.volume_difference) - area_b * position,
+    )
 
 
 def circuit_pressures(position: Scalar, oil: tuple[Scalar, Scalar, Scalar], p: CircuitValues) -> Pressures:
@@ -157,8 +162,10 @@ def circuit_flows(speed: Scalar, densities: tuple[Scalar, Scalar], pressures: Pr
     case = minimum(pressures.supply, 0.5 * (pressures.a + pressures.b))
     drained_a = drain * (pressures.a - case) * upstream
     drained_b = drain * (pressures.b - case) * upstream
-    made_up_a = check_valve_flow(pressures.supply - pressures.a, p.makeup_conductance, p.makeup_opening)
-    made_up_b = check_valve_flow(pressures.supply - pressures.b, p.makeup_conductance, p.makeup_opening)
+    made_up_a, made_up_b = (
+        make_up_flow(chamber, other, pressures.supply, p.makeup_conductance, p.makeup_opening, p.pilot_share)
+        for chamber, other in ((pressures.a, pressures.b), (pressures.b, pressures.a))
+    )
     into_a = pumped - crossed - drained_a + made_up_a
     into_b = crossed - pumped - drained_b + made_up_b
     return OilFlows(into_a, into_b, drained_a + drained_b - made_up_a - made_up_b)
@@ -195,12 +202,13 @@ def circuit_derivative(state: CircuitState, command: Scalar, p: CircuitValues) -
         v, bristle, yielding, coefficients, p.presliding_displacement, p.moving_mass, p.presliding_damping
     )
     stopped = end_stop_force(x, v, 0.5 * p.stroke, p.end_stop_stiffness, p.end_stop_damping)
-    push = p.piston_area * (pressures.a - pressures.b)
+    area_a, area_b = piston_areas(p)
+    push = area_a * (pressures.a - ATMOSPHERE) - area_b * (pressures.b - ATMOSPHERE) - load_on_rod(x, p)
     return turning, yielding, v, (push - friction + stopped) / p.moving_mass, *flows
 
 
 def at_rest(p: CircuitValues) -> CircuitState:
-    """Return the state at rest in mid-stroke, both chambers at the accumulator's pressure.
+    """Return the state at rest in mid-stroke: both chambers at the accumulator's pressure, or one above it for a load.
 
     Parameters
     ----------
@@ -212,12 +220,12 @@ def at_rest(p: CircuitValues) -> CircuitState:
     tuple of float
         As named in `STATES`.
     """
-    filled = (
-        2.0
-        * p.chamber_volume
-        / specific_volume(p.accumulator_pressure, p.bulk_modulus, p.air_fraction, p.vapour_pressure)
+    held = p.load_force / p.piston_area
+    filled_a, filled_b = (
+        volume / specific_volume(p.accumulator_pressure + more, p.bulk_modulus, p.air_fraction, p.vapour_pressure)
+        for volume, more in zip(chamber_volumes(0.0, p), (maximum(held, 0.0), maximum(-held, 0.0)), strict=True)
     )
-    return 0.0, 0.0, 0.0, 0.0, filled, filled, p.accumulator_oil
+    return 0.0, 0.0, 0.0, 0.0, filled_a, filled_b, p.accumulator_oil
 
 
 def circuit_channels(states: NDArray[np.float64], p: SimpleNamespace) -> Mapping[str, NDArray[np.float64]]:

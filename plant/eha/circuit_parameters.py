@@ -1,17 +1,15 @@
 """Parameters of the circuit-level plant: those of the actuator, and what the lumped plant leaves out."""
 
 from dataclasses import asdict, dataclass, fields
-from typing import Annotated, TypeVar
+from types import SimpleNamespace
+from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.components.oil import ATMOSPHERE, specific_volume
-from plant.eha.model import JUDGED_STROKE, EhaParameters
+from plant.eha.model import JUDGED_STROKE, EhaParameters, piston_areas
 from plant.errors import RigError
 from plant.units import SI, require_number
-
-Number = TypeVar("Number", float, NDArray[np.float64])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,11 +98,11 @@ class CircuitParameters(EhaParameters):
                 "leakage_coefficient must cover what pump and drain leak (errata E17), "
                 f"got {self.leakage_coefficient:g} and a rest of {self.cylinder_leakage:g} m^3/(s Pa)"
             )
-        swept, volume = 0.5 * self.piston_area * self.stroke, 2.0 * self.chamber_volume
-        if swept > _FULLEST * volume:
+        longest = longest_stroke(self)
+        if self.stroke > longest * (1.0 + _ROUNDING):
             raise RigError(
-                f"stroke must leave room in a chamber of {volume:g} m^3, got {self.stroke:g} m, half of which sweeps "
-                f"{swept:g} m^3"
+                f"stroke must leave room in a chamber of {2.0 * self.chamber_volume:g} m^3 on average, so be at most "
+                f"{longest:g} m, got {self.stroke:g} m"
             )
         if self.air_fraction > MOST_AIR:
             raise RigError(f"air_fraction must be at most {MOST_AIR:g}, got {self.air_fraction!r}")
@@ -172,20 +170,27 @@ def oil_demand(p: CircuitParameters) -> float:
     return 4.0 * p.chamber_volume * (1.0 / high - 1.0 / low) if high > 0.0 else float("inf")
 
 
-def longest_stroke(chamber_volume: Number, piston_area: Number) -> Number:
+def longest_stroke(p: EhaParameters | SimpleNamespace) -> Any:
     """Return the stroke that the chambers of an actuator have room for.
 
     Parameters
     ----------
-    chamber_volume, piston_area : float or ndarray of any shape
-        Half of a chamber in mid-stroke [m^3], and area [m^2].
+    p : EhaParameters or namespace of ndarray
+        Areas and volumes.
 
     Returns
     -------
-    float or ndarray of that shape
+    float or ndarray
         Full stroke [m].
+
+    Examples
+    --------
+    >>> round(float(longest_stroke(EhaParameters())), 3)
+    2.7
     """
-    return 4.0 * _FULLEST * chamber_volume / piston_area
+    area_a, area_b = piston_areas(p)
+    side_a, side_b = (1.0 + p.volume_difference) / area_a, (1.0 - p.volume_difference) / area_b
+    return 4.0 * _FULLEST * p.chamber_volume * np.minimum(side_a, side_b)
 
 
 def circuit_of(p: EhaParameters) -> CircuitParameters:

@@ -5,13 +5,15 @@ filter assumes. Level 2, *lumped*, keeps the flow balance 5.8 and the force bala
 pressure as a state, so that friction enters undifferentiated and the piston really sticks (errata E9).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Annotated, TypeAlias
 
 from plant.compiled.functions import Scalar, absolute, sign, where
 from plant.components.friction import quadratic_friction, velocity_under_friction
 from plant.components.valves import pumped_flow, relief_flow
+from plant.errors import RigError
 from plant.solvers.steps import GAMMA, parameter_names
 from plant.units import SI, require_numbers
 
@@ -60,15 +62,35 @@ class EhaParameters:
     stroke: Annotated[float | None, SI("m", "full stroke of the piston, where it is known", "the paper gives none")] = (
         None
     )
+    area_difference: Annotated[
+        float, SI("1", "areas of sides A and B: their difference over their sum", "0: a through rod")
+    ] = 0.0
+    volume_difference: Annotated[
+        float, SI("1", "chambers A and B in mid-stroke: their difference over their sum", "0: alike")
+    ] = 0.0
+    pilot_share: Annotated[
+        float, SI("1", "make-up valves opened by a pilot: their conductance over the valves' own", "0: plain checks")
+    ] = 0.0
+    load_force: Annotated[float, SI("N", "constant load on the rod, against extension", "none in the paper")] = 0.0
+    load_stiffness: Annotated[float, SI("N/m", "spring on the rod, free in mid-stroke", "none in the paper")] = 0.0
 
     def __post_init__(self) -> None:
-        require_numbers(self, signed=("friction_linear",), zero=MAY_BE_ZERO, unknown=("stroke",))
+        require_numbers(self, signed=SIGNED, zero=MAY_BE_ZERO, unknown=("stroke",))
+        for name in PAIRS.values():
+            if not -1.0 < getattr(self, name) < 1.0:
+                raise RigError(f"{name} must lie between -1 and 1, got {getattr(self, name)!r}")
 
     @property
     def rated_speed(self) -> float:
         """Motor speed at the paper's 4 V [rad/s]."""
         return 4.0 * self.motor_speed_per_volt
 
+
+PAIRS: Mapping[str, str] = MappingProxyType({"piston_area": "area_difference", "chamber_volume": "volume_difference"})
+"""Entries that a rig file may give as two numbers, of sides A and B: mean, and their difference over their sum."""
+
+SIGNED = frozenset({"friction_linear", "area_difference", "volume_difference", "load_force"})
+"""Parameters that may be negative."""
 
 JUDGED_STROKE = 0.25
 """Stroke [m] of a simulated actuator whose own is not known: the paper gives none."""
@@ -93,6 +115,45 @@ EhaValues: TypeAlias = EhaParameters | SimpleNamespace
 """What the models read: the parameters, or a namespace of the same names holding expressions."""
 
 
+def piston_areas(p: EhaValues) -> tuple[Scalar, Scalar]:
+    """Return the areas of the piston's sides A and B.
+
+    Parameters
+    ----------
+    p : EhaParameters or namespace of Expression
+        The actuator.
+
+    Returns
+    -------
+    tuple of float or Expression
+        Areas [m^2].
+
+    Examples
+    --------
+    >>> [round(1e4 * area, 2) for area in piston_areas(EhaParameters(piston_area=1.292e-3, area_difference=0.1765))]
+    [15.2, 10.64]
+    """
+    return p.piston_area * (1.0 + p.area_difference), p.piston_area * (1.0 - p.area_difference)
+
+
+def load_on_rod(position: Scalar, p: EhaValues) -> Scalar:
+    """Return the force that holds the rod back: a constant load and a spring.
+
+    Parameters
+    ----------
+    position : float or Expression
+        Piston position [m].
+    p : EhaParameters or namespace of Expression
+        The actuator.
+
+    Returns
+    -------
+    float or Expression
+        Force against extension [N].
+    """
+    return p.load_force + p.load_stiffness * position
+
+
 def reduced_derivative(
     state: tuple[Scalar, Scalar, Scalar], speed: Scalar, p: EhaValues
 ) -> tuple[Scalar, Scalar, Scalar]:
@@ -115,14 +176,14 @@ def reduced_derivative(
     tuple of float or Expression
         Velocity [m/s], acceleration [m/s^2], jerk [m/s^3].
     """
-    _, v, a = state
+    x, v, a = state
     A, V0, M, beta, L = p.piston_area, p.chamber_volume, p.moving_mass, p.bulk_modulus, p.leakage_coefficient
     a1, a2, a3 = p.friction_quadratic, p.friction_linear, p.friction_coulomb
     direction = sign(v)
     pumped = pumped_flow(speed, p.pump_displacement, p.flow_bias)
     swept = A * v
-    leaked = L / A * quadratic_friction(v, direction, a1, a2, a3) + L * M / A * a
-    damping = (a2 + 2.0 * a1 * v * direction) / M * a
+    leaked = L / A * (quadratic_friction(v, direction, a1, a2, a3) + load_on_rod(x, p)) + L * M / A * a
+    damping = (a2 + 2.0 * a1 * v * direction) / M * a + p.load_stiffness / M * v
     return v, a, A * beta / (M * V0) * (pumped - swept - leaked) - damping
 
 
@@ -147,10 +208,10 @@ def lumped_derivative(
     tuple of float or Expression
         Velocity [m/s], acceleration [m/s^2], rate of pressure [Pa/s].
     """
-    _, v, dp = state
+    x, v, dp = state
     A = p.piston_area
     friction = quadratic_friction(v, direction, p.friction_quadratic, p.friction_linear, p.friction_coulomb)
-    return v, (A * dp - friction) / p.moving_mass, pressure_rate(v, dp, speed, p)
+    return v, (A * dp - friction - load_on_rod(x, p)) / p.moving_mass, pressure_rate(v, dp, speed, p)
 
 
 def pressure_rate(velocity: Scalar, pressure: Scalar, speed: Scalar, p: EhaValues) -> Scalar:
@@ -245,7 +306,7 @@ def _stage_with_relief(
     held = 1.0 + stiffness * (p.leakage_coefficient + conductance)
     blocked_pressure = (dp + stiffness * (pumped + offset)) / held
     pressure_drop = stiffness * A / held
-    push = M / h * v + A * blocked_pressure
-    resistance = M / h + p.friction_linear + A * pressure_drop
+    push = M / h * v + A * blocked_pressure - load_on_rod(x, p)
+    resistance = M / h + p.friction_linear + A * pressure_drop + h * p.load_stiffness
     new_v = velocity_under_friction(push, resistance, p.friction_quadratic, p.friction_coulomb)
     return x + h * new_v, new_v, blocked_pressure - pressure_drop * new_v

@@ -16,9 +16,10 @@ from typing_extensions import TypeVar
 
 from plant.atomic import replacing
 from plant.eha.doubts import Spread, doubts_of, spreads_of
-from plant.eha.model import EhaParameters
+from plant.eha.model import PAIRS, EhaParameters
 from plant.errors import RigError
 from plant.log.columns import check_columns
+from plant.small_file import small_file
 from plant.units import notes
 
 _EXAMPLES: Mapping[str, str] = MappingProxyType(
@@ -177,7 +178,7 @@ def plant_of(path: str | Path) -> str | None:
 
 def _content(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        return tomllib.loads(small_file(path).decode("utf-8-sig"))
     except OSError as error:
         raise RigError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -190,8 +191,28 @@ def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> 
     if file.plant not in (None, plant):
         raise RigError(f"a rig of plant {plant!r} is wanted here, got one of {file.plant!r}")
     _known(file.parameters, _names(parameter_class), "parameters")
-    values = _values(file.parameters, parameter_class)
+    values = _values(
+        _unpaired(file.parameters, PAIRS if issubclass(parameter_class, EhaParameters) else {}), parameter_class
+    )
     return Rig(file.name, parameter_class(**values), file.uncertainty, file.columns, file.measured)
+
+
+def _unpaired(given: Mapping[str, Any], pairs: Mapping[str, str]) -> dict[str, Any]:
+    """Return what a file gives, with pairs of numbers, of sides A and B, as their mean and relative difference."""
+    values = dict(given)
+    for name, difference in pairs.items():
+        pair = given.get(name)
+        if not isinstance(pair, list):
+            continue
+        if difference in given:
+            raise RigError(f"parameters.{name} gives two numbers, so {difference} is not wanted beside it")
+        if len(pair) != 2 or not all(type(one) in (int, float) and 0.0 < one < float("inf") for one in pair):
+            raise RigError(f"parameters.{name} must be a positive number, or two for sides A and B, got {pair!r}")
+        side_a, side_b = pair
+        values |= {name: 0.5 * (side_a + side_b), difference: (side_a - side_b) / (side_a + side_b)}
+        if name == "piston_area" and side_a != side_b:
+            values.setdefault("pilot_share", 1.0)
+    return values
 
 
 def _values(given: Mapping[str, Any], parameter_class: type[Any]) -> dict[str, Any]:

@@ -101,15 +101,23 @@ def _lumped_channels(states: Array, rows: Array) -> Mapping[str, Array]:
 def _reduced_channels(states: Array, rows: Array) -> Mapping[str, Array]:
     """Differential pressure follows from the force balance 5.12; the reduced plant has no state for it."""
     position, velocity, acceleration = states.T
-    A, M, a1, a2, a3 = (rows[:, i] for i in _FORCE_COLUMNS)
+    A, M, a1, a2, a3, load, spring = (rows[:, i] for i in _FORCE_COLUMNS)
     friction = quadratic_friction(velocity, np.sign(velocity), a1, a2, a3)
-    pressure = (M * acceleration + friction) / A
+    pressure = (M * acceleration + friction + load + spring * position) / A
     return {"position_m": position, "velocity_m_s": velocity, "differential_pressure_pa": pressure}
 
 
 _FORCE_COLUMNS = tuple(
     list(EhaParameters.__dataclass_fields__).index(name)
-    for name in ("piston_area", "moving_mass", "friction_quadratic", "friction_linear", "friction_coulomb")
+    for name in (
+        "piston_area",
+        "moving_mass",
+        "friction_quadratic",
+        "friction_linear",
+        "friction_coulomb",
+        "load_force",
+        "load_stiffness",
+    )
 )
 
 REDUCED = Plant(

@@ -7,8 +7,8 @@ import pytest
 from scipy.signal import lfilter
 
 from estimation.eha.explained import notes_of, rig_set_right, set_right
+from estimation.fits.explain import Explanation
 from estimation.fits.flow_fit import fit_flow
-from estimation.fits.hypotheses import Explanation
 from estimation.log_checks.clean import clean_log
 from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters
 from estimation.notes import RigCode
@@ -118,7 +118,7 @@ def test_a_log_that_begins_under_load_says_so() -> None:
 def test_absent_additions_leave_the_plain_form() -> None:
     absent = WideFlowParameters()
     assert WIDE_FLOW_FORM.initial(absent)[0] == HEALTHY.accumulator_pressure
-    now, drives = (3e5, 2e5, 0.0), ((50.0, 50.0), (0.01, 0.0101), (0.5, 0.5), 1e-3)
+    now, drives = (3e5, 2e5, 0.0), ((50.0, 50.0), (0.01, 0.0101), (0.9, 0.9), 1e-3)
     grown = WIDE_FLOW_FORM.rates(now, drives, replace(absent, leakage_growth=1.0), 0.0)
     plain = WIDE_FLOW_FORM.rates(now, drives, absent, 0.0)
     assert grown[0] < plain[0]

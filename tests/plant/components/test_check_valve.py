@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from plant.components.check_valve import check_valve_flow
+from plant.components.check_valve import check_valve_flow, make_up_flow
 
 OPENING = 7e3
 
@@ -26,3 +26,9 @@ def test_at_a_large_drop_it_is_wide_open() -> None:
 
 def test_the_slope_at_the_seat_is_zero() -> None:
     assert float(check_valve_flow(1e-3 * OPENING, 1e-9, OPENING)) < 2e-3 * 1e-9 * 1e-3 * OPENING
+
+
+def test_a_piloted_valve_lets_oil_back_only_while_the_other_side_is_higher() -> None:
+    assert make_up_flow(5e5, 9e5, 3e5, 1e-9, OPENING, 1.0) == pytest.approx(-2e5 * 1e-9)
+    assert make_up_flow(5e5, 4e5, 3e5, 1e-9, OPENING, 1.0) == 0.0
+    assert make_up_flow(5e5, 9e5, 3e5, 1e-9, OPENING, 0.0) == 0.0

@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from plant.eha.circuit import chamber_volumes
+from plant.eha.circuit_parameters import circuit_of
 from plant.eha.doubts import DOUBTS, Spread
-from plant.eha.model import EhaParameters
+from plant.eha.model import EhaParameters, piston_areas
 from plant.eha.rig import Rig, read_rig, rig_template, write_rig_template
 from plant.errors import RigError
 from plant.units import notes
@@ -129,7 +131,7 @@ def test_what_a_rig_cannot_hold_is_refused_with_file_and_field(tmp_path: Path, t
 def test_a_rig_that_is_not_there_or_no_text_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RigError, match="cannot be read: No such file"):
         read_rig(tmp_path / "rig.toml")
-    with pytest.raises(RigError, match="cannot be read: Is a directory"):
+    with pytest.raises(RigError, match="cannot be read: a regular file is wanted"):
         read_rig(tmp_path)
     (tmp_path / "rig.toml").write_bytes(b"\xff\xfe\x00\x01")
     with pytest.raises(RigError, match="TOML"):
@@ -151,3 +153,27 @@ def test_the_template_is_written_once_and_never_over_a_file(tmp_path: Path) -> N
 def test_a_rig_survives_pickling() -> None:
     rig = Rig("bench 2", EhaParameters(stroke=0.1), {"bulk_modulus": 0.3}, {"position_m": "P:mm"}, ("moving_mass",))
     assert pickle.loads(pickle.dumps(rig)) == rig  # noqa: S301 (our own bytes)
+
+
+def test_two_areas_and_volumes_are_a_mean_and_a_difference_with_piloted_valves(tmp_path: Path) -> None:
+    text = "[parameters]\npiston_area = [15.2e-4, 10.64e-4]\nchamber_volume = [1.08e-3, 0.756e-3]\n"
+    p = rig_of(tmp_path, text).parameters
+    assert piston_areas(p) == pytest.approx((15.2e-4, 10.64e-4))
+    assert chamber_volumes(0.0, circuit_of(p)) == pytest.approx((2.16e-3, 1.512e-3))
+    assert p.pilot_share == 1.0
+    assert rig_of(tmp_path, text + "pilot_share = 0.0\n").parameters.pilot_share == 0.0
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ("piston_area = [1e-3]", r"piston_area must be a positive number, or two for sides A and B, got \[0.001\]"),
+        ("piston_area = [1e-3, -1e-3]", "piston_area must be a positive number, or two"),
+        ("piston_area = [1e-3, 2e-3]\narea_difference = 0.1", "area_difference is not wanted beside it"),
+        ("area_difference = 1.0", "area_difference must lie between -1 and 1, got 1.0"),
+        ("moving_mass = [1.0, 2.0]", "moving_mass must be"),
+    ],
+)
+def test_what_is_no_pair_is_refused(tmp_path: Path, entry: str, said: str) -> None:
+    with pytest.raises(RigError, match=said):
+        rig_of(tmp_path, f"[parameters]\n{entry}\n")

@@ -1,0 +1,293 @@
+"""`explain(log, parameters, ...) -> Explanation`: the hypotheses under which a log is explained, alone or two together.
+
+A log that the plain flow form does not explain is fitted under the hypotheses that the slopes of that fit promise most
+of, then under the others, then under pairs with the likeliest; what is freed without need only widens the interval.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import TypeAlias
+
+import numpy as np
+
+from estimation.fits.descent import descend
+from estimation.fits.form_fit import weighed
+from estimation.fits.greybox_fit import GreyBoxFit, concluded
+from estimation.fits.greybox_problem import GreyBoxLog
+from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
+from estimation.fits.wide_problem import delayed, freed, freed_bounds, own_starts, usual_pressure, widened
+from estimation.models.wide_flow import WideFlowParameters, grown_leakage
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+from plant.solvers.steps import parameter_names
+
+SCREENING, SETTLING, FINISHING = 7, 40, 12
+"""Evaluations of the model for a start, for one that is carried on, and for the last, with short model steps."""
+
+NEAR = 2.0
+"""First radius of a search [dimensionless]: it begins where the plain form ended, or a simpler hypothesis."""
+
+LIKELIEST = 4
+"""Hypotheses that are tried first, of which the slopes of the fit so far promise most."""
+
+FINALISTS, CARRIED, NEARLY = 3, 2, 3.0
+"""Hypotheses that are carried on, starts of each, and up to which share of the best start's cost the second is."""
+
+FINEST_DELAY = 1e-3
+"""Step in which a delay is sought [s]; what is left of it goes into the lag."""
+
+MAY_VANISH, VANISHED = ("leakage_coefficient", "flow_bias"), 1e-2
+"""What a search may take for nothing by mistake, and the share of the rig's value below which it has."""
+
+CLOSE = 60.0
+"""Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""
+
+WORTH = 10.0
+"""Gain in log-likelihood below which a hypothesis is not accepted [dimensionless]."""
+
+ALIKE = 15.0
+"""Difference of log-likelihood up to which two sets of hypotheses are said to explain a log alike [dimensionless]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """What explains a log that the plain flow form does not.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The hypotheses that were accepted together.
+    values : Mapping[str, tuple of float]
+        Value and standard deviation by parameter, in SI.
+    delay : float
+        Time by which pressure comes late beside its lag [s].
+    fit : GreyBoxFit
+        The fit under them.
+    rivals : int
+        How many other sets of hypotheses explain the log about as well.
+    stated_pressure : float
+        Absolute pressure that bulk modulus is stated at, where the oil holds air [Pa].
+    """
+
+    names: tuple[str, ...]
+    values: Mapping[str, tuple[float, float]]
+    delay: float
+    fit: GreyBoxFit
+    rivals: int
+    stated_pressure: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A set of hypotheses with the best that was found under it."""
+
+    together: tuple[Hypothesis, ...]
+    theta: Array
+    values: Mapping[str, float]
+    cost: float
+    delay: float
+    finished: GreyBoxFit | None = None
+
+    @property
+    def fit(self) -> GreyBoxFit:
+        if self.finished is None:
+            raise ValueError("only finished fits are compared")
+        return self.finished
+
+
+Accepted: TypeAlias = Callable[[GreyBoxFit], bool]
+
+
+def explain(
+    log: GreyBoxLog,
+    parameters: EhaParameters,
+    starts: Sequence[Mapping[str, float]],
+    accepted: Accepted,
+    *,
+    asked: Sequence[Hypothesis] = HYPOTHESES,
+    paired: bool = True,
+) -> Explanation:
+    """Return the hypotheses that explain a log best, alone or two together.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    starts : sequence of Mapping[str, float]
+        First guesses of the plain form's unknowns [SI].
+    accepted : callable
+        ``accepted(fit)``: whether a fit explains the log.
+    asked : sequence of Hypothesis
+        What is tried alone; pairs are with any other.
+    paired : bool
+        Whether pairs are tried where nothing explains the log alone.
+
+    Returns
+    -------
+    Explanation
+        The likeliest; whether it explains the log is for the gate to say.
+    """
+    wide = widened(log, parameters)
+    likely, others = _promising(wide, (), starts[0], asked)
+    finished = _likeliest(wide, [_screened(wide, (one,), starts) for one in likely])
+    if others and not accepted(finished[0].fit):
+        finished = _ranked([*finished, *_likeliest(wide, [_screened(wide, (one,), starts) for one in others])])
+    first = finished[0]
+    if paired and not accepted(first.fit):
+        late = delayed(wide, first.delay)
+        others = [one for one in HYPOTHESES if one not in first.together]
+        likely, others = _promising(late, first.together, first.values, others)
+        tried = [*likely, *(one for one in others if one.far)]
+        pairs = _likeliest(late, [_screened(late, (*first.together, one), [first.values]) for one in tried])
+        better = (one for one in pairs if one.cost < first.cost - WORTH)
+        finished = _ranked([first, *(replace(one, delay=first.delay + one.delay) for one in better)])
+    best = finished[0]
+    rivals = [one for one in finished[1:] if one.cost < best.cost + ALIKE]
+    found = weighed([best.fit, *(one.fit for one in rivals)])
+    values = {name: (value, best.fit.std[name]) for name, value in best.fit.values.items()} | dict(found)
+    if "leakage_growth" in values:  # what is told of a leakage is what it is at the end
+        ended = float(grown_leakage(1.0, values["leakage_growth"][0], values["leakage_bend"][0]))
+        value, std = values["leakage_coefficient"]
+        values["leakage_coefficient"] = ended * value, ended * std
+    names = tuple(one.name for one in best.together)
+    return Explanation(names, values, best.delay, best.fit, len(rivals), usual_pressure(log, parameters))
+
+
+def promised(
+    log: GreyBoxLog, parameters: EhaParameters, plain: Mapping[str, float], one: Hypothesis
+) -> tuple[float, float]:
+    """Return what a hypothesis promises beside the plain fit, to first order.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    plain : Mapping[str, float]
+        What the plain form found [SI].
+    one : Hypothesis
+        What is asked.
+
+    Returns
+    -------
+    tuple of float
+        Gain in log-likelihood, Rao's score statistic over two [dimensionless], and how far what is freed first would
+        move in its fitted coordinate: for a logarithm a relative change [dimensionless].
+    """
+    return _promises(widened(log, parameters), (), plain, (one,))[0]
+
+
+def _promising(
+    log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], asked: Sequence[Hypothesis]
+) -> tuple[list[Hypothesis], list[Hypothesis]]:
+    """Return the hypotheses that promise most beside those that are taken, best first; and the others."""
+    promises = _promises(log.coarsened(), together, found, asked)
+    order = sorted(range(len(asked)), key=lambda i: -promises[i][0])
+    likely = [asked[i] for i in order if not asked[i].far][:LIKELIEST]
+    return likely, [one for one in asked if one not in likely]
+
+
+def _promises(
+    log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], asked: Sequence[Hypothesis]
+) -> list[tuple[float, float]]:
+    """Return what each hypothesis promises beside those that are taken, as `promised` does, from one evaluation."""
+    problem = freed(log, (*together, *asked))
+    absent = dict(zip(parameter_names(WideFlowParameters), log.parameters, strict=True))
+    point = problem.at(problem.model.theta({**absent, **found}))
+    own = freed(log, together).model.unknowns
+
+    def step(names: Sequence[str]) -> tuple[float, Array]:
+        places = [problem.model.unknowns.index(name) for name in names]
+        gradient = point.gradient[places]
+        moved: Array = np.linalg.lstsq(point.gram[np.ix_(places, places)], gradient, rcond=None)[0].astype(np.float64)
+        return 0.5 * float(gradient @ moved), moved
+
+    before = step(own)[0]
+    promises: list[tuple[float, float]] = []
+    for one in asked:
+        names = list(dict.fromkeys((*own, *one.free)))
+        gain, moved = step(names)
+        promises.append((gain - before, float(abs(moved[names.index(one.free[0])]))))
+    return promises
+
+
+def _ranked(tried: Iterable[_Tried]) -> list[_Tried]:
+    return sorted(tried, key=lambda one: one.cost)
+
+
+def _screened(
+    log: GreyBoxLog, together: tuple[Hypothesis, ...], starts: Sequence[Mapping[str, float]]
+) -> Iterator[_Tried]:
+    """Yield the best from each start after a few steps, with one model step a sample."""
+    absent = dict(zip(parameter_names(WideFlowParameters), log.parameters, strict=True))
+    problems = [(delay, freed(delayed(log, delay).coarsened(), together)) for delay in together[-1].delays]
+    for start in starts:
+        tried: list[_Tried] = []
+        for (delay, problem), own in product(problems, own_starts(log, together[-1])):
+            guess = problem.model.theta({**absent, **start, **own})
+            point = descend(problem.at, guess, SCREENING, freed_bounds(problem, guess), radius=NEAR)
+            tried.append(_Tried(together, point.theta, problem.model.values(point.theta), point.cost, delay))
+        yield min(tried, key=lambda one: one.cost)
+
+
+def _settled(log: GreyBoxLog, tried: _Tried) -> _Tried:
+    """Return a set of hypotheses brought to its optimum, with one model step a sample."""
+    best = _descended(delayed(log, tried.delay).coarsened(), tried, SETTLING)
+    if revived := _revived(log, best):
+        again = _descended(delayed(log, tried.delay).coarsened(), revived, SETTLING)
+        best = min(best, again, key=lambda one: one.cost)
+    if len(tried.together[-1].delays) == 1:
+        return best
+    for step in (FINEST_DELAY, -FINEST_DELAY):
+        while best.delay + step >= 0.0:
+            moved = replace(best, delay=best.delay + step)
+            moved = _descended(delayed(log, moved.delay).coarsened(), moved, SETTLING)
+            if moved.cost >= best.cost:
+                break
+            best = moved
+    return best
+
+
+def _revived(log: GreyBoxLog, tried: _Tried) -> _Tried | None:
+    """Return a set with what has all but vanished put back to the rig's: from nothing a logarithm finds no way back."""
+    usual = dict(zip(parameter_names(WideFlowParameters), log.parameters, strict=True))
+    gone = {name: usual[name] for name in MAY_VANISH if tried.values[name] < VANISHED * usual[name]}
+    if not gone:
+        return None
+    return replace(tried, theta=freed(log, tried.together).model.theta({**tried.values, **gone}))
+
+
+def _descended(log: GreyBoxLog, tried: _Tried, evaluations: int) -> _Tried:
+    problem = freed(log, tried.together)
+    point = descend(problem.at, tried.theta, evaluations, freed_bounds(problem, tried.theta), radius=NEAR)
+    return replace(tried, theta=point.theta, values=problem.model.values(point.theta), cost=point.cost)
+
+
+def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
+    """Return a set of hypotheses fitted to the end, balanced by volume or by mass, whichever is likelier."""
+    row, by_mass = delayed(log, tried.delay), parameter_names(WideFlowParameters).index("by_mass")
+    done: list[tuple[_Tried, GreyBoxLog]] = []
+    for share in (0.0, 1.0):
+        parameters = row.parameters.copy()
+        parameters[by_mass] = share
+        own = replace(row, parameters=parameters)
+        done.append((_descended(own, done[-1][0] if done else tried, FINISHING), own))
+    best, own = min(done, key=lambda one: one[0].cost)
+    problem = freed(own, best.together)
+    return replace(best, finished=concluded(problem, problem.at(best.theta)))
+
+
+def _likeliest(log: GreyBoxLog, tried: Sequence[Iterable[_Tried]]) -> list[_Tried]:
+    """Return the likeliest of several sets of hypotheses, each tried from some starts, the best first.
+
+    The first set is carried on in any case: a few steps from a start are no measure of what promises most.
+    """
+    first, *others = [_ranked(one) for one in tried]
+    sets = [first, *sorted(others, key=lambda one: one[0].cost)[: FINALISTS - 1]]
+    carried = [[start for start in one[:CARRIED] if start.cost < NEARLY * one[0].cost] for one in sets]
+    settled = _ranked(_ranked(_settled(log, start) for start in one)[0] for one in carried)
+    return _ranked(_finished(log, one) for one in settled if one.cost < settled[0].cost + CLOSE)

@@ -1,0 +1,145 @@
+"""A log as the wide flow form sees it, and the least-squares problem of some hypotheses."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+
+import numpy as np
+
+from estimation.fits.freed_problem import FreedProblem
+from estimation.fits.greybox_problem import GreyBoxLog, search_bounds
+from estimation.fits.hypotheses import LIMITS, PRESUMED, Hypothesis
+from estimation.models.flow import FLOW_FORM, reaches_relief, relieving
+from estimation.models.wide_flow import LINEAR, WIDE_FLOW_FORM, WideFlowParameters
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+from plant.solvers.steps import parameter_names, parameter_row
+
+RELIEF_START = 1e-10
+"""Slope of a relief valve that opens early, first guess [m^3/(s Pa)]."""
+
+
+def widened(log: GreyBoxLog, parameters: EhaParameters) -> GreyBoxLog:
+    """Return a log as the wide flow form sees it: with the share of the log as a drive, and what is presumed.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    GreyBoxLog
+        The log.
+    """
+    samples = len(log.drives)
+    known = {one.name: getattr(parameters, one.name) for one in fields(parameters)}
+    return replace(
+        log,
+        drives=np.column_stack([log.drives, np.arange(samples) / samples]),
+        drive_std=(*log.drive_std, 0.0),
+        parameters=parameter_row(WideFlowParameters(**known, stated_pressure=usual_pressure(log, parameters))),
+        presumed={**log.presumed, **{name: (known[name], std) for name, std in PRESUMED.items()}},
+    )
+
+
+def usual_pressure(log: GreyBoxLog, parameters: EhaParameters) -> float:
+    """Return the pressure of the loaded side that a log has by root mean square.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log.
+    parameters : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    float
+        Absolute [Pa].
+    """
+    return parameters.accumulator_pressure + float(np.sqrt(np.nanmean(log.measured**2)))
+
+
+def freed(log: GreyBoxLog, together: Sequence[Hypothesis]) -> FreedProblem:
+    """Return the least-squares problem of a log under hypotheses.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    together : sequence of Hypothesis
+        What is freed beside the plain form's unknowns.
+
+    Returns
+    -------
+    FreedProblem
+        The problem; relief is free where the log reaches its setting.
+    """
+    extra = [name for one in together for name in one.free]
+    relief = log.parameters[parameter_names(WideFlowParameters).index("relief_pressure")]
+    plain = relieving(FLOW_FORM) if reaches_relief(log.measured, relief) else FLOW_FORM
+    return FreedProblem(WIDE_FLOW_FORM, log, tuple(dict.fromkeys((*plain.unknowns, *extra))), LINEAR)
+
+
+def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]]:
+    """Return where the search under a hypothesis begins.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log.
+    one : Hypothesis
+        The hypothesis.
+
+    Returns
+    -------
+    sequence of Mapping[str, float]
+        First guesses [SI].
+    """
+    if not one.shares_of_peak:
+        return one.starts
+    peak = float(np.nanmax(np.abs(log.measured)))
+    return [{"relief_pressure": share * peak, "relief_conductance": RELIEF_START} for share in one.shares_of_peak]
+
+
+def freed_bounds(problem: FreedProblem, guess: Array) -> tuple[Array, Array]:
+    """Return how far a search may go.
+
+    Parameters
+    ----------
+    problem : FreedProblem
+        The problem.
+    guess : ndarray, shape (unknowns,)
+        Where it begins [dimensionless].
+
+    Returns
+    -------
+    tuple of ndarray, shape (unknowns,)
+        Lower and upper bounds [dimensionless].
+    """
+    return search_bounds(problem.model, [guess], {**LIMITS, "speed_lead": (0.0, problem.log.sample_time)})
+
+
+def delayed(log: GreyBoxLog, delay: float) -> GreyBoxLog:
+    """Return a log whose outputs are brought forward by a time.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log.
+    delay : float
+        How late its outputs come [s].
+
+    Returns
+    -------
+    GreyBoxLog
+        The log, its last outputs missing.
+    """
+    samples = round(delay / log.sample_time)
+    if samples == 0:
+        return log
+    measured = np.full_like(log.measured, np.nan)
+    measured[:-samples] = log.measured[samples:]
+    return replace(log, measured=measured)
