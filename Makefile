@@ -36,11 +36,12 @@ benchmark: $(VENV)/.installed-dev
 
 # Each peer pins old versions of what the others need, so each has an environment of its own.
 .peers/.installed:
-	for peer in sippy pysib pysid jax-sysid jax; do $(PYTHON) -m venv .peers/$$peer || exit 1; done
+	for peer in sippy pysib pysid jax-sysid sysidentpy jax; do $(PYTHON) -m venv .peers/$$peer || exit 1; done
 	.peers/sippy/bin/python -m pip install --quiet sippy-unipi==1.0.1
 	.peers/pysib/bin/python -m pip install --quiet pysib==0.2.5
 	.peers/pysid/bin/python -m pip install --quiet pysid==0.1.1 "scipy<1.15" "numpy<2.3" ipython
 	.peers/jax-sysid/bin/python -m pip install --quiet jax-sysid==1.1.0
+	.peers/sysidentpy/bin/python -m pip install --quiet sysidentpy
 	.peers/jax/bin/python -m pip install --quiet jax
 	touch $@
 
@@ -49,6 +50,7 @@ peers: $(VENV)/.installed-dev .peers/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
 	status=0; \
 	$(BIN)/python -m benchmarks identification_peers || status=1; \
+	$(BIN)/python -m benchmarks identification_sets || status=1; \
 	$(BIN)/python -m benchmarks filter_speed --jax .peers/jax/bin/python || status=1; \
 	$(BIN)/python -m benchmarks circuit || status=1; \
 	exit $$status

@@ -9,7 +9,7 @@
 prints itself, and turns into pandas, matplotlib, python-control or plain dictionaries.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from estimation.finding import Finding as Finding
     from estimation.identification.model.linear_model import LinearModel as LinearModel
+    from experiments.log_pages.relation import Relation
     from experiments.published import load as published_table
     from faults.conditions import CONDITIONS as conditions  # noqa: N811 - a face has plain names
     from faults.conditions import Condition as Condition
@@ -61,6 +62,7 @@ __all__ = [
     "__version__",
     "actuators",
     "conditions",
+    "load_model",
     "published_table",
     "read",
     "read_rig",
@@ -135,20 +137,30 @@ def read(
     *,
     rig: "Rig[Any] | str | Path | None" = None,
     columns: Mapping[str, str] | None = None,
-    plant: str = "eha",
+    plant: str | None = None,
+    sample_time: float | None = None,
+    beside: "Sequence[str | Path] | str | Path" = (),
 ) -> "Log":
-    """Read a log.
+    """Read a log, of an actuator or of anything.
+
+    A log without the actuator's channels is read as it stands, every column of numbers under its own name, if neither
+    rig, columns nor kind are given: `Log.identify` relates them.
 
     Parameters
     ----------
     path : str or Path
-        CSV, Parquet or MAT, with ``time_s`` and the actuator's channels.
+        Text, Parquet, Feather or MAT; with the extra ``bench`` also XLSX, TDMS, MDF and HDF5. `hydrostate inspect`
+        shows what a strange one holds.
     rig : Rig, str or Path, optional
         The actuator, or its rig file; the paper's if not given.
     columns : Mapping[str, str], optional
         Columns under other names, with their units: ``{"position_m": "POS_MM:mm"}``.
-    plant : str
-        Kind of actuator, one of `actuators`.
+    plant : str, optional
+        Kind of actuator, one of `actuators`; the gear-pump actuator unless told.
+    sample_time : float, optional
+        Time between rows [s] of a log that has no time.
+    beside : str, Path or sequence of them
+        Files of other loggers of the same test; all are put on one clock.
 
     Returns
     -------
@@ -168,16 +180,50 @@ def read(
     Traceback (most recent call last):
     plant.errors.LogError: none.csv: there is no such file
     """
-    from experiments.actuators import actuator
+    from experiments.actuators import DEFAULT, actuator
     from experiments.command.logs import read_log
+    from experiments.log_pages.log import ANY
+    from plant.errors import NoChannelError
+    from plant.log.any_columns import read_any
 
-    kind = actuator(plant)
+    kind = actuator(plant or DEFAULT)
     bench = _rig(rig, kind)
     if not isinstance(path, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance] -- likewise
         refuse(f"the path of a log is wanted, got {path!r}")
     if columns is not None and not isinstance(columns, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         refuse(f"columns must be a mapping such as {{'position_m': 'POS_MM:mm'}}, got {columns!r}")
-    return Log(read_log(Path(path), bench.columns, dict(columns or {}), kind.required), bench, kind.name)
+    others = [Path(one) for one in ([beside] if isinstance(beside, str | Path) else beside)]
+    more: dict[str, Any] = {"sample_time": sample_time, "beside": others}
+    try:
+        return Log(read_log(Path(path), bench.columns, dict(columns or {}), kind.required, **more), bench, kind.name)
+    except NoChannelError:
+        if rig is not None or columns is not None or plant is not None or others:
+            raise
+    return Log(read_any(path, sample_time=sample_time), bench, ANY)
+
+
+def load_model(path: "str | Path") -> "Relation":
+    """Read a model between any channels that `Relation.save` or ``hydrostate identify --out`` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+        JSON.
+
+    Returns
+    -------
+    Relation
+        Ready to simulate and to be tested on logs.
+
+    Raises
+    ------
+    HydrostateError
+        If the file cannot be read or holds no such model.
+    """
+    from estimation.identification.free_run.saved import load_models
+    from experiments.log_pages.relation import Relation
+
+    return Relation(load_models(path))
 
 
 def simulate(

@@ -1,6 +1,6 @@
 """An archive of 1,000 CSV logs, three of them bad, diagnosed in one command; and how fast they are read.
 
-Reading is that of `plant.log.csv` beside pandas' `read_csv` as it comes, on the same files in turn.
+Reading is that of `plant.log.files`, checks included, beside pandas' `read_csv` as it comes, on the same files in turn.
 """
 
 import argparse
@@ -19,9 +19,7 @@ import pandas as pd
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.simulate import CIRCUIT, simulate
-from plant.log.columns import resolve_columns
-from plant.log.csv import read_csv
-from plant.log.files import write_record
+from plant.log.files import read_record, write_record
 from plant.sensors.sensors import BENCH
 
 SAMPLE_TIME = 1e-3
@@ -50,7 +48,7 @@ def reading(paths: list[Path]) -> tuple[float, float, float, float]:
     """Return megabytes a second of ours and of pandas, by wall time, then by CPU time."""
 
     def ours(path: Path) -> object:
-        return read_csv(path, lambda names: resolve_columns(names, None, str(path)))
+        return read_record(path)
 
     size = sum(path.stat().st_size for path in paths) / 1e6
     measured = {

@@ -103,7 +103,7 @@ def kernel_work(batch: list[FilterProblem]) -> Callable[[], None]:
         for work, (drives, measured) in zip(works, data, strict=True):
             work[: len(begin)] = begin[:, None]
             where = (drives.ctypes.data, measured.ctypes.data, 0, 0, count, first.substeps, first.every)
-            kernel.steps(work.ravel(), *where, (track, track, logs, nothing, nothing))
+            kernel.steps(work.ravel(), *where, (track, np.empty_like(track), logs, nothing, nothing))
 
     return run
 

@@ -19,6 +19,7 @@ from experiments.command import (
     estimate,
     identifiability,
     identify,
+    inspect,
     isolability,
     simulate,
     size_cylinder,
@@ -31,6 +32,10 @@ from experiments.motor_paper import command as motor_paper
 from experiments.nine_conditions import command as nine_conditions
 from experiments.open_benchmark import command as open_benchmark
 from experiments.piezo_stack import command as piezo_stack
+from plant.compiled.native.recipes import trust_sources
+
+LEFT_TO_END = 10.0
+"""How long a thread that still runs when a command is done is waited for [s]."""
 
 OBJECTS_AT_START = 500_000
 """More objects than imports and one log leave behind; garbage is looked for after so many [objects]."""
@@ -87,6 +92,7 @@ VERBS = (
     identify,
     library,
     diagnose,
+    inspect,
     watch,
     identifiability,
     isolability,
@@ -106,14 +112,22 @@ def main() -> None:
     """Run the command line and exit with its code.
 
     A short run is spent importing: no garbage is looked for meanwhile, and in the end nothing is freed piece by piece,
-    which by themselves take a third of it. What asked to be called at the exit is called.
+    which by themselves take a third of it. What asked to be called at the exit is called. Linear algebra has one
+    thread, as in all workers, unless the environment says otherwise: its matrices are small, its own threads would take
+    three times as long as they save, and results would depend on the count of cores.
     """
     gc.set_threshold(OBJECTS_AT_START)
+    trust_sources()
+    for name in ("OPENBLAS", "OMP", "MKL"):
+        os.environ.setdefault(f"{name}_NUM_THREADS", "1")
     try:
         app()
     except SystemExit as ended:
-        if threading.active_count() > 1 or not isinstance(ended.code, int):
+        if not isinstance(ended.code, int):
             raise
+        for thread in threading.enumerate():
+            if thread is not threading.current_thread() and not thread.daemon:
+                thread.join(LEFT_TO_END)  # libraries' own destructors would end the process while one runs
         atexit._run_exitfuncs()  # pyright: ignore[reportPrivateUsage]  as the interpreter would
         for stream in (sys.stdout, sys.stderr):
             with suppress(OSError, ValueError):

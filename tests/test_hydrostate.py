@@ -8,11 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import control
+import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.axes import Axes
 
 import hydrostate as hs
+from estimation.identification.model.recursion import filtered
 
 ROOT = Path(__file__).resolve().parents[1]
 HEAVY = ("numba", "numpy", "scipy", "pandas", "matplotlib", "typer")
@@ -133,3 +135,23 @@ def test_a_face_has_few_names_each_with_an_example(package: str) -> None:
 def test_importing_a_face_imports_nothing_heavy() -> None:
     done = run(f"import plant, estimation, faults, experiments; print([one for one in {HEAVY} if one in sys.modules])")
     assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_a_log_of_anything_is_read_related_and_simulated(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.normal(size=60), 5)
+    y = 3.0 + filtered([0.0, 0.5], [1.0, -0.5], u) + 0.01 * rng.normal(size=300)
+    pd.DataFrame({"t": 0.1 * np.arange(300), "coil (V)": u, "gap": y}).to_csv(tmp_path / "a.csv", index=False)
+    log = hs.read(tmp_path / "a.csv")
+    assert log.channels == ("coil (V)", "gap")
+    model = log.identify(input="coil (V)", output="gap", order=1)
+    assert model.fit_percent > 95.0
+    assert "output-error" in str(model)
+    assert model.simulate(log).shape == (300,)
+    model.save(tmp_path / "model.json")
+    assert hs.load_model(tmp_path / "model.json").validate(log).loc["gap", "fit_percent"] > 95.0
+    assert float(model.to_control().dcgain()) == pytest.approx(1.0, abs=0.05)
+    with pytest.raises(hs.HydrostateError, match="estimate needs the channels of an actuator"):
+        log.estimate()
+    with pytest.raises(hs.HydrostateError, match="channels among coil"):
+        log.identify(input="coil (V)")

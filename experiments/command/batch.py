@@ -30,6 +30,9 @@ QUIET_SECONDS = 30.0
 MOST_NAMED = 20
 """So many failed cases are named as they come; the store and the report name all."""
 
+ENDINGS = (signal.SIGINT, signal.SIGTERM)
+"""Signals that ask a batch to end: Ctrl-C, and that of a system that shuts down."""
+
 commands = typer.Typer()
 
 
@@ -162,20 +165,22 @@ def _say_differences(old: Any, new: Any) -> None:
 
 @contextmanager
 def _interruptible() -> Generator[Event]:
-    """Turn the first Ctrl-C into a wish to stop; a second one stops at once."""
+    """Turn the first Ctrl-C, or the system's request to end, into a wish to stop; a second one stops at once."""
     stop = Event()
 
     def wish(number: int, frame: object) -> None:
         del number, frame
         stop.set()
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        for one in ENDINGS:
+            signal.signal(one, signal.default_int_handler)
         note("interrupted: finishing what is in flight; press Ctrl-C again to stop at once")
 
-    before = signal.signal(signal.SIGINT, wish)
+    before = {one: signal.signal(one, wish) for one in ENDINGS}
     try:
         yield stop
     finally:
-        signal.signal(signal.SIGINT, before)
+        for one, was in before.items():
+            signal.signal(one, was)
 
 
 @contextmanager

@@ -8,6 +8,7 @@ import typer
 from experiments.command.log_verb import run_log_verb
 from experiments.command.options import (
     SEED,
+    Beside,
     BiasPressure,
     Columns,
     Healthy,
@@ -17,6 +18,7 @@ from experiments.command.options import (
     Out,
     Plant,
     RigFile,
+    SampleTime,
     Seed,
     option,
 )
@@ -33,6 +35,8 @@ def diagnose(
     ] = None,
     rig: RigFile = None,
     columns: Columns = None,
+    sample_time: SampleTime = None,
+    beside: Beside = None,
     transfer_functions: Annotated[
         bool,
         typer.Option(

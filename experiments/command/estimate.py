@@ -8,6 +8,7 @@ import typer
 from experiments.command.log_verb import run_log_verb
 from experiments.command.options import (
     SEED,
+    Beside,
     BiasPressure,
     Columns,
     ConditionName,
@@ -18,6 +19,7 @@ from experiments.command.options import (
     Out,
     Plant,
     RigFile,
+    SampleTime,
     Seed,
     option,
 )
@@ -85,6 +87,8 @@ def estimate(
     condition: ConditionName = None,
     rig: RigFile = None,
     columns: Columns = None,
+    sample_time: SampleTime = None,
+    beside: Beside = None,
     start: Annotated[float | None, option("PA", "First guess of bulk modulus [Pa]; the rig's if not given.")] = None,
     start_std: Annotated[
         float, option("PA", "Standard deviation of the first guess [Pa]; convergence needs 1e8.", show_default="3e8")

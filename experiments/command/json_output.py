@@ -85,13 +85,18 @@ def csv_text(results: Iterable[Result]) -> str:
     str
         The table; an entry that a log does not have is empty.
     """
-    rows = [flat(result) for result in results]
+    rows = [{name: _harmless(value) for name, value in flat(result).items()} for result in results]
     names = list(dict.fromkeys(name for row in rows for name in row))
     text = io.StringIO()
     writer = csv.DictWriter(text, names, lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
     return text.getvalue()
+
+
+def _harmless(value: Any) -> Any:
+    """Return a cell that no spreadsheet takes for a formula: text that begins like one gets an apostrophe."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
 
 
 def prepare_output(out: Path | None) -> None:

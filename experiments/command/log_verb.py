@@ -1,6 +1,6 @@
 """The body of `estimate` and `diagnose`, the same for every kind of actuator."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,13 +10,14 @@ from experiments.command.json_output import Result, prepare_output, write_whole
 from experiments.command.logs import finish, read_log, run_logs
 from experiments.command.options import figure_path, load_actuator, load_columns, require_one_of, understood
 from experiments.command.terminal import clauses, note
+from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
     from estimation.finding import Finding
     from experiments.actuator_kind import LogVerb
     from plant.log.record import Record
 
-COMMON = frozenset({"logs", "plant", "rig", "columns", "report", "out", "seed", "as_json"})
+COMMON = frozenset({"logs", "plant", "rig", "columns", "report", "out", "seed", "as_json", "sample_time", "beside"})
 """Options of every kind of actuator."""
 
 
@@ -45,8 +46,14 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     if expected is not None:
         require_one_of("--condition", expected, kind.conditions)
 
-    def read(path: Path) -> "Record":
-        return read_log(path, bench.columns, mapping, kind.required)
+    beside: list[Path] = asked.get("beside") or []
+    if beside and len(logs) > 1:
+        raise HydrostateError("--with goes with one log, got several")
+
+    def read(path: Path, beside: Sequence[Path] = ()) -> "Record":
+        return read_log(
+            path, bench.columns, mapping, kind.required, sample_time=asked.get("sample_time"), beside=beside
+        )
 
     if options.get("healthy") is not None:
         options["healthy"] = read(options["healthy"])
@@ -56,7 +63,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     about |= {"condition": options["condition"]} if "condition" in options else {}
 
     def work(log: Path) -> Result:
-        record = read(log)
+        record = read(log, beside)
         found = chosen.run(record, rig, prepared)
         result: dict[str, Any] = {**chosen.blank, **about, **chosen.entries(found)}
         result["message"] = clauses([result["message"], *_agreement(result, found)])

@@ -137,7 +137,13 @@ def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None) -> 
 
 
 def read_log(
-    path: Path, rig_columns: Mapping[str, str], columns: Mapping[str, str], required: Collection[str] | None = None
+    path: Path,
+    rig_columns: Mapping[str, str],
+    columns: Mapping[str, str],
+    required: Collection[str] | None = None,
+    *,
+    sample_time: float | None = None,
+    beside: Sequence[Path] = (),
 ) -> "Record":
     """Read a log by a rig's column names and the command line's, which go first.
 
@@ -150,6 +156,10 @@ def read_log(
         Foreign column by channel, from the rig file and from the command line.
     required : collection of str, optional
         Channels that must be there; those of the gear-pump actuator if not given.
+    sample_time : float, optional
+        Time between rows [s] of a log that has no time.
+    beside : sequence of Path
+        Files of other loggers of the same test.
 
     Raises
     ------
@@ -163,9 +173,17 @@ def read_log(
     """
     from plant.log.checks import REQUIRED
     from plant.log.files import read_record
+    from plant.log.plausibility import require_measurable
 
     wanted = REQUIRED if required is None else required
-    return with_rig_columns(lambda given: read_record(path, columns=given, required=wanted), rig_columns, columns)
+    more: dict[str, Any] = {"required": wanted}
+    if sample_time is not None:
+        more["sample_time"] = sample_time
+    if beside:
+        more["beside"] = beside
+    record = with_rig_columns(lambda given: read_record(path, columns=given, **more), rig_columns, columns)
+    require_measurable(record.channels, str(path))
+    return record
 
 
 def with_rig_columns(

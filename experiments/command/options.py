@@ -25,7 +25,8 @@ Logs: TypeAlias = Annotated[
     typer.Argument(
         metavar="LOG",
         help="Logs: CSV, Parquet or MAT, with time_s, motor_speed_rad_s, and position_m or velocity_m_s; "
-        "differential_pressure_pa is optional. Another unit stands in the name (position_mm, motor_speed_rpm).",
+        "differential_pressure_pa is optional. Another unit stands in the name (position_mm, motor_speed_rpm). "
+        "`hydrostate inspect` shows what any other file holds, and names its columns.",
         show_default=False,
     ),
 ]
@@ -59,6 +60,13 @@ Columns: TypeAlias = Annotated[
         "separate several by commas.",
         "--columns",
     ),
+]
+SampleTime: TypeAlias = Annotated[
+    float | None, option("S", "Time between rows [s] of a log that has no time.", "--sample-time")
+]
+Beside: TypeAlias = Annotated[
+    list[Path] | None,
+    option("FILE", "Another logger's file of the same test; both are put on one clock. Repeat it for more.", "--with"),
 ]
 ConditionName: TypeAlias = Annotated[
     str | None, option("NAME", "A condition by name, see `hydrostate conditions`.", "--condition")

@@ -7,6 +7,7 @@ import sys
 import traceback
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 import typer
@@ -23,6 +24,56 @@ PIPE_WIDTH = 200
 
 USAGE, SOME_FAILED, INTERRUPTED = 2, 1, 130
 """Exit codes beside 0."""
+
+
+_CONTROLS = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160))}
+_BLOCKS, _DIGITS = "\u2581\u2582\u2583\u2584\u2585\u2586\u2587\u2588", "_.-=+*%#"
+
+
+def visible(text: str) -> str:
+    """Return a text of a file's with its control characters spelt out, so that none reaches a terminal.
+
+    Parameters
+    ----------
+    text : str
+        Any text; lines stay lines.
+
+    Examples
+    --------
+    >>> len(visible("run" + chr(27) + "[2J.csv"))
+    14
+    """
+    return "\n".join(line.translate(_CONTROLS) for line in text.split("\n"))
+
+
+def sparkline(values: "Sequence[float]", width: int) -> str:
+    """Return a small plot in one line: the mean of each of so many parts, from low to high.
+
+    Parameters
+    ----------
+    values : sequence of float
+        Finite numbers [any unit].
+    width : int
+        Characters, at most.
+
+    Returns
+    -------
+    str
+        Blocks, or ASCII signs where the terminal has no others; empty where nothing varies.
+    """
+    count = len(values)
+    parts = min(width, count)
+    if parts < 2:
+        return ""
+    edges = [count * part // parts for part in range(parts + 1)]
+    largest = max(abs(float(max(values))), abs(float(min(values)))) or 1.0
+    chunks = [values[a : min(b, a + 200)] for a, b in pairwise(edges)]
+    means = [sum(float(one) / largest for one in chunk) / len(chunk) for chunk in chunks]
+    low, high = min(means), max(means)
+    if not high > low:
+        return ""
+    signs = _BLOCKS if "utf" in (getattr(sys.stdout, "encoding", None) or "").lower() else _DIGITS
+    return "".join(signs[min(7, int(8.0 * (one - low) / (high - low)))] for one in means)
 
 
 def emit(text: str, *, err: bool = False) -> None:
@@ -43,7 +94,7 @@ def emit(text: str, *, err: bool = False) -> None:
 
 def note(sentence: str) -> None:
     """Write a sentence to standard error."""
-    emit(" ".join(sentence.split()), err=True)
+    emit(visible(" ".join(sentence.split())), err=True)
 
 
 def clauses(parts: Iterable[str]) -> str:
@@ -105,7 +156,7 @@ def short_names(results: Sequence[Mapping[str, Any]]) -> list[str]:
     results : sequence of Mapping
         One object a log, with its ``file``.
     """
-    files = [str(result["file"]) for result in results]
+    files = [visible(str(result["file"])) for result in results]
     names = [file.replace(os.sep, "/").rsplit("/", 1)[-1] for file in files]
     return names if len(set(names)) == len(set(files)) else files
 
@@ -186,7 +237,7 @@ def _kernel_notices() -> Generator[None]:
         logger.propagate = propagate
 
 
-def unexpected(error: Exception) -> str:
+def unexpected(error: BaseException) -> str:
     """Return the sentence for an error that no check foresaw; ``HYDROSTATE_DEBUG=1`` prints where it arose."""
     if os.environ.get("HYDROSTATE_DEBUG", "") not in {"", "0"}:
         emit("".join(traceback.format_exception(error)).rstrip(), err=True)

@@ -1,19 +1,22 @@
 """`hydrostate watch -`: events of a stream as they come, one JSON object a line."""
 
+import io
 import json
+import signal
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TextIO, TypeVar
 
 import typer
 
 from experiments.command.json_output import plain
 from experiments.command.logs import caught, read_log, with_rig_columns
 from experiments.command.options import PRESSURE, Columns, RigFile, load_columns, load_rig, option
-from experiments.command.terminal import emit, note
+from experiments.command.terminal import SOME_FAILED, emit, note, unexpected
 from plant.errors import HydrostateError, LogError
 from plant.notes import distinct
 
@@ -29,6 +32,9 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 STANDARD_INPUT = "standard input"
+
+LONGEST_LINE = 1 << 20
+"""Characters of the longest line of a stream."""
 
 SAME_RATE = 0.01
 """By how much the rates of a healthy log and of what is watched may differ [fraction]."""
@@ -66,11 +72,13 @@ def watch(
     much lost flow and pressure changed; end. It learns what the actuator does while it is healthy and follows slow
     drift, as of the oil's temperature, so it tells sudden changes; use diagnose for what has always been wrong.
     """
-    asked = _Asked(load_rig(rig), load_columns(columns), false_alarms, learning, healthy, no_pressure)
     told = _Told()
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
+        asked = _Asked(load_rig(rig), load_columns(columns), false_alarms, learning, healthy, no_pressure)
         if log == "-":
-            _stream(told, sys.stdin, asked)
+            _stream(told, _lines(sys.stdin), asked)
         else:
             _file(told, Path(log), asked)
     except HydrostateError as error:
@@ -79,7 +87,24 @@ def watch(
     except KeyboardInterrupt:
         told.end("interrupted", "interrupted")
         raise
+    except BaseException as error:  # whatever ends it, the last line says so
+        said = unexpected(error)
+        told.end("failed", said)
+        note(said)
+        raise typer.Exit(SOME_FAILED) from error
     told.end("ok", "")
+
+
+def _lines(file: TextIO) -> Iterator[str]:
+    """Yield the lines of a stream; bytes that are no text, and a line without end, are refused later as no numbers."""
+    if not isinstance(file, io.TextIOWrapper):
+        yield from file
+        return
+    file.reconfigure(errors="replace")
+    while line := file.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE and not line.endswith("\n"):
+            raise LogError(f"a line must have fewer than {LONGEST_LINE} characters", STANDARD_INPUT)
+        yield line
 
 
 @dataclass(frozen=True)

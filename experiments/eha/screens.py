@@ -1,5 +1,6 @@
 """What a terminal shows of logs of the gear-pump actuator."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +46,7 @@ def estimates_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
 def _cells(result: Result) -> list[str]:
     modulus = result["bulk_modulus_pa"]
     verdict = result["outcome"].replace("_", " ")
-    bound = f"{result['bound_percent']:.2g}"
+    bound = f"{result['bound_percent']:.2g}" if math.isfinite(result["bound_percent"] or math.inf) else "-"
     if modulus["value"] is None:
         return ["-", "-", "-", bound, verdict]
     given, total = (

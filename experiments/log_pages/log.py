@@ -11,8 +11,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from estimation.finding import Finding
+    from experiments.log_pages.relation import Relation
     from plant.eha.rig import Rig
     from plant.log.record import Record
+
+
+ANY = "anything"
+"""Kind of a log whose columns are not those of an actuator: its channels can be related, and nothing be diagnosed."""
+
+
+FREE_OPTIONS = ("input", "output", "structure", "order", "delay", "n_numerator", "sample_time")
+"""Options of `Log.identify` between any channels."""
 
 
 def refuse(message: str) -> NoReturn:
@@ -84,7 +93,8 @@ class Log(Shown):
 
     def __str__(self) -> str:
         said = f"Log of {self.plant}: {self.duration:g} s at {1.0 / self.sample_time:g} Hz"
-        return f"{said}, {', '.join(self.channels)}; rig {self.rig.name!r}"
+        about = "" if self.plant == ANY else f"; rig {self.rig.name!r}"
+        return f"{said}, {', '.join(self.channels)}{about}"
 
     def between(self, begin: float, end: float) -> "Log":
         """Return a part of the log.
@@ -129,19 +139,23 @@ class Log(Shown):
         """
         return self._asked("diagnose", options)
 
-    def identify(self, **options: Any) -> "Model":
-        """Identify a discrete transfer function, from motor speed to velocity if nothing else is asked for.
+    def identify(self, *logs: "Log", **options: Any) -> "Model | Relation":
+        """Identify a transfer function from motor speed to velocity, or the relation between any channels.
 
         Parameters
         ----------
+        *logs : Log
+            Further experiments, where ``input`` and ``output`` are given.
         **options
-            As `estimation.identification.from_record.identify_record` takes them: ``input="motor_voltage_v"``,
+            With ``input`` and ``output``, names or lists of them: ``structure`` ("output-error", "narx", "auto"),
+            ``order``, ``delay``, ``n_numerator``, ``sample_time`` [s]; what is not given the data choose. Without, or
+            with an option that only it has: as `estimation.identification.from_record.identify_record` takes them,
             ``n_denominator=3``.
 
         Returns
         -------
-        Model
-            The transfer function with its uncertainty.
+        Model or Relation
+            The transfer function with its uncertainty, or one model an output.
         """
         import inspect
 
@@ -149,11 +163,28 @@ class Log(Shown):
 
         known = {name: one.default for name, one in inspect.signature(identify_record).parameters.items()}
         del known["record"]
+        free: dict[str, Any] = dict.fromkeys(FREE_OPTIONS)
+        if self.plant == ANY or logs or (options.keys() & {"input", "output"} and options.keys() <= free.keys()):
+            known_options(options, free, "identify")
+            return self._relation([self, *logs], dict(options))
         return Model(identify_record(self.record, **known_options(options, known, "identify")))
+
+    def _relation(self, logs: "list[Log]", options: dict[str, Any]) -> "Relation":
+        from experiments.log_pages.relation import identified
+
+        if not {"input", "output"} <= options.keys():
+            refuse(f"input and output are wanted, channels among {', '.join(self.channels)}")
+        inputs, outputs = options.pop("input"), options.pop("output")
+        return identified([one.record for one in logs], inputs, outputs, options)
 
     def _asked(self, verb: str, options: Mapping[str, Any]) -> "Answer":
         from experiments.actuators import actuator, offered
 
+        if self.plant == ANY:
+            refuse(
+                f"{verb} needs the channels of an actuator, the log has {', '.join(self.channels)}: name them by "
+                "read(..., columns={'motor_speed_rad_s': 'N:rpm'}), or relate them by identify(input=..., output=...)"
+            )
         chosen = offered(actuator(self.plant), verb)
         asked = {**chosen.options, **known_options(options, chosen.options, verb)}
         if isinstance(asked.get("healthy"), Log):

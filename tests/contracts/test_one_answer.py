@@ -17,8 +17,8 @@ from plant.eha.rig import Rig, read_rig
 from plant.errors import LogWarning
 from plant.log.columns import parse_columns
 
-FEW = ("bench/run002.csv", "strange/soft_oil/run000.csv", "strange/single_rod/run001.csv")
-"""A sound log, one of which the class alone is doubted, and one whose fit is refused."""
+FEW = ("bench/run002.csv", "strange/makeup_check_stuck_shut/run002.csv", "strange/speed_sign_reversed/run001.csv")
+"""A sound log, one of which the class alone is doubted, and one from which nothing follows."""
 
 
 def foreign(shared: Path) -> list[str]:

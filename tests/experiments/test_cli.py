@@ -106,7 +106,10 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
         (["estimate", "a.csv", "--start-std", "0"], "--start-std must be positive and finite, got 0 Pa"),
         (["estimate", "a.csv", "--rig", "none.toml"], "none.toml: cannot be read: No such file or directory"),
         (["estimate", "a.csv", "--columns", "position_m"], "columns are wanted as CHANNEL=NAME:UNIT"),
-        (["estimate", "a.csv", "--columns", "position_m=X:furlongs/h"], "position_m=X:furlongs/h"),
+        (
+            ["estimate", "a.csv", "--columns", "position_m=X:furlongs/h"],
+            "position_m='X:furlongs/h': unit 'furlongs/h' does not",
+        ),
         (["diagnose", "a.csv", "--columns", "depth=X"], "channel 'depth' is unknown"),
         (["identify", "a.csv", "--filter-hz", "0"], "--filter-hz must be positive and finite, got 0 Hz"),
         (["identify", "a.csv", "--order", "0"], "--order must be a whole number from 1 on, or auto, got '0'"),
