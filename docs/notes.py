@@ -133,7 +133,7 @@ def page() -> str:
         ]
         for name, member in enum.__members__.items():
             where = ", ".join(f"`{path}`" for path in sorted(raised.get(f"{enum.__name__}.{name}", ())))
-            parts.append(f"| `{member.value}` | {member.template.replace('|', chr(92) + '|')} | {where} |")
+            parts.append(f"| `{member}` | {member.template.replace('|', chr(92) + '|')} | {where} |")
         parts.append("")
     return "\n".join(parts)
 

@@ -6,29 +6,23 @@ from plant.notes import Code
 class AgainstCode(Code):
     """What speaks against a log being in any of the nine conditions."""
 
-    UNEXPLAINED = "unexplained", "the best circuit leaves {percent:.0f} % of the {channel} unexplained"
+    UNEXPLAINED = "the best circuit leaves {percent:.0f} % of the {channel} unexplained"
     NONE_FITS = (
-        "none_fits",
         "none of the nine fits: the best leaves {percent:.0f} % of the signal unexplained; check the rig file and the "
-        "columns' units",
+        "columns' units"
     )
     PUMP_OFF = (
-        "pump_off",
         "the pump's flow against the piston's is {percent:+.0f} % off the rig file: motor speed or position reads "
-        "wrong, or it is another actuator",
+        "wrong, or it is another actuator"
     )
-    SPEED_BIAS = "speed_bias", "motor speed reads {bias_rad_s:+.3g} rad/s off"
-    PRESSURE_BIAS = "pressure_bias", "differential pressure reads {bias_pa:+.3g} Pa off"
-    OIL_SOFT = "oil_soft", "the oil's bulk modulus is {share:.2f} of the rig's: air in it, or a soft hose"
-    OIL_STIFF = "oil_stiff", "the oil's bulk modulus is {share:.2f} of the rig's: another oil, or a wrong rig file"
-    OUTSIDE_CONDITIONS = (
-        "outside_conditions",
-        "the actuator that fits is in none of the nine conditions, nor between them",
-    )
+    SPEED_BIAS = "motor speed reads {bias_rad_s:+.3g} rad/s off"
+    PRESSURE_BIAS = "differential pressure reads {bias_pa:+.3g} Pa off"
+    OIL_SOFT = "the oil's bulk modulus is {share:.2f} of the rig's: air in it, or a soft hose"
+    OIL_STIFF = "the oil's bulk modulus is {share:.2f} of the rig's: another oil, or a wrong rig file"
+    OUTSIDE_CONDITIONS = "the actuator that fits is in none of the nine conditions, nor between them"
     BETWEEN_CONDITIONS = (
-        "between_conditions",
         "between the nine conditions: leakage {leakage:.2f} and friction {friction:.2f} where 1 is minor and 2 major; "
-        "a fault of another size, or a sensor with a wrong gain",
+        "a fault of another size, or a sensor with a wrong gain"
     )
 
 
@@ -36,60 +30,45 @@ class ClassCode(Code):
     """Notes on a diagnosis as a whole."""
 
     FRICTION_NOT_VISIBLE = (
-        "friction_not_visible",
-        "friction is not visible: the piston hardly moves, so any friction beyond what holds it fits alike",
+        "friction is not visible: the piston hardly moves, so any friction beyond what holds it fits alike"
     )
-    BULK_MODULUS_NOT_VISIBLE = "bulk_modulus_not_visible", "bulk modulus is not visible under this drive"
+    BULK_MODULUS_NOT_VISIBLE = "bulk modulus is not visible under this drive"
     ONE_SCALE = (
-        "one_scale",
         "without pressure leakage and friction share one scale, beyond which they are not told apart but by how alike "
-        "actuators of one kind are",
+        "actuators of one kind are"
     )
-    LEAKAGE_AND_BIAS_ALIKE = "leakage_and_bias_alike", "leakage coefficient and flow bias are not told apart"
-    VELOCITY_LOST_TOLD = (
-        "velocity_lost_told",
-        "the velocity lost, {percent:z.1f} % ({low:z.1f} to {high:z.1f}), is what the log determines",
-    )
-    MODELS_DIVERGED = "models_diverged", "no condition's model stayed finite; check units and rig"
-    MODELS_ALIKE = (
-        "models_alike",
-        "no class: under this drive the models move alike; drive the actuator, at best with steps",
-    )
-    NO_CIRCUIT = "no_circuit", "no circuit fits around this rig, so there are scores but no probabilities: {reason}"
-    NO_PROBABILITIES = "no_probabilities", "no probabilities: {reason}"
+    LEAKAGE_AND_BIAS_ALIKE = "leakage coefficient and flow bias are not told apart"
+    VELOCITY_LOST_TOLD = "the velocity lost, {percent:z.1f} % ({low:z.1f} to {high:z.1f}), is what the log determines"
+    MODELS_DIVERGED = "no condition's model stayed finite; check units and rig"
+    MODELS_ALIKE = "no class: under this drive the models move alike; drive the actuator, at best with steps"
+    NO_CIRCUIT = "no circuit fits around this rig, so there are scores but no probabilities: {reason}"
+    NO_PROBABILITIES = "no probabilities: {reason}"
     LOAD_ON_ROD = (
-        "load_on_rod",
         "a constant load of {force_n:.3g} N holds the rod back, or differential_pressure_pa reads {pressure_pa:.3g} Pa "
-        "too much: the force balance does not tell the two apart",
+        "too much: the force balance does not tell the two apart"
     )
     PRESSURE_ABSENT_CLASS = (
-        "pressure_absent_class",
-        "without differential_pressure_pa friction shows in velocity alone: margins are smaller as a rule",
+        "without differential_pressure_pa friction shows in velocity alone: margins are smaller as a rule"
     )
 
 
 class AdviceCode(Code):
     """What to do or to measure next."""
 
-    CHECK_SENSOR = "check_sensor", "check the sensor of {channels} and its wiring, then log again"
-    MEND_COLUMNS = (
-        "mend_columns",
-        "correct the sign, unit or name of {channels} with --columns, then read the same log again",
-    )
-    CHECK_RIG = "check_rig", "compare the rig file with the actuator (geometry, pump, relief setting), then log again"
-    FIT_DOUBTED = "fit_doubted", "the model does not follow this log: check units, signs and the rig file first"
-    LOG_PRESSURE = "log_pressure", "log differential pressure: it narrows leakage and friction several times"
-    MOVE_PISTON = "move_piston", "drive steps that move the piston: this log cannot show friction"
+    CHECK_SENSOR = "check the sensor of {channels} and its wiring, then log again"
+    MEND_COLUMNS = "correct the sign, unit or name of {channels} with --columns, then read the same log again"
+    CHECK_RIG = "compare the rig file with the actuator (geometry, pump, relief setting), then log again"
+    FIT_DOUBTED = "the model does not follow this log: check units, signs and the rig file first"
+    LOG_PRESSURE = "log differential pressure: it narrows leakage and friction several times"
+    MOVE_PISTON = "drive steps that move the piston: this log cannot show friction"
     MORE_SPEEDS = (
-        "more_speeds",
         "hold two or more motor speeds (hydrostate simulate --drive steps): this log holds {speeds}, which leaves two "
-        "causes",
+        "causes"
     )
     LOG_LONGER = (
-        "log_longer",
         "log steps of 10 s or more at several speeds: this log of {duration_s:.3g} s leaves more than one condition "
-        "open",
+        "open"
     )
-    CONDITIONS_OPEN = "conditions_open", "log again with larger steps: this log leaves more than one condition open"
-    CLOSER_SPEEDS = "closer_speeds", "log slower speeds too: at {speeds} speeds leakage and flow bias still look alike"
-    NOTHING = "nothing", "nothing: the log decides"
+    CONDITIONS_OPEN = "log again with larger steps: this log leaves more than one condition open"
+    CLOSER_SPEEDS = "log slower speeds too: at {speeds} speeds leakage and flow bias still look alike"
+    NOTHING = "nothing: the log decides"

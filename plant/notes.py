@@ -6,31 +6,37 @@ Programs decide by code and data alone; no sentence is read back.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
+from enum import Enum
 from typing import Any
 
 
-class Code(StrEnum):
+class Code(Enum):
     """A kind of note; each layer and each actuator has an enum of its own, without members in common.
 
-    A member is written ``NAME = "code", "sentence with {fields}"``; the fields are filled from a note's data.
+    A member is written ``NAME = "sentence with {fields}"``; a note's data fill the fields. Its name in small letters is
+    the code, and equals that text.
 
     Examples
     --------
     >>> class Colour(Code):
-    ...     FADED = "faded", "the colour is {share:.0f} % of what it was"
-    >>> str(Colour.FADED.note(share=40.0))
-    'the colour is 40 % of what it was'
+    ...     FADED = "the colour is {share:.0f} % of what it was"
+    >>> str(Colour.FADED), str(Colour.FADED.note(share=40.0))
+    ('faded', 'the colour is 40 % of what it was')
     """
 
     template: str
 
-    def __new__(cls, code: str, template: str) -> "Code":
-        """Keep the template beside the code."""
-        member = str.__new__(cls, code)
-        member._value_ = code
-        member.template = template
-        return member
+    def __init__(self, template: str) -> None:
+        self.template = template
+
+    def __str__(self) -> str:
+        return self.name.lower()
+
+    def __eq__(self, other: object) -> bool:
+        return str(self) == str(other) if isinstance(other, Code | str) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(str(self))
 
     def note(self, **data: Any) -> "Note":
         """Return a note of this kind.
@@ -67,7 +73,7 @@ class Note:
         dict[str, Any]
             ``code``, ``data`` and ``text``, the sentence.
         """
-        return {"code": self.code.value, "data": dict(self.data), "text": str(self)}
+        return {"code": str(self.code), "data": dict(self.data), "text": str(self)}
 
 
 def distinct(notes: Iterable[Note]) -> tuple[Note, ...]:

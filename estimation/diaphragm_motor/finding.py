@@ -30,24 +30,18 @@ class MotorCode(Code):
     """Notes on an estimate of the diaphragm motor."""
 
     PATTERN_BROKEN = (
-        "pattern_broken",
         "the electrodes' pattern is not a healthy pump's (chi-square {chi_square:.3g} a degree of freedom), so its "
-        "maps of flow and pressure do not hold: diagnose it first",
+        "maps of flow and pressure do not hold: diagnose it first"
     )
     FASTER_THAN_MAPS = (
-        "faster_than_maps",
-        "the rod moves faster than the pump's maps allow (leakage {leakage:.2g} m^3/(s Pa)): ports may be clogged",
+        "the rod moves faster than the pump's maps allow (leakage {leakage:.2g} m^3/(s Pa)): ports may be clogged"
     )
-    TOO_UNCERTAIN = (
-        "too_uncertain",
-        "too uncertain to give: {names}; a load of 10 N or more, or a healthy run (--healthy), would help",
-    )
-    LOAD_AND_FRICTION = "load_and_friction", "load counts any friction above the model's"
-    PISTON_LEAKS = "piston_leaks", "the piston leaks, certain since {since_s:.2f} s"
+    TOO_UNCERTAIN = "too uncertain to give: {names}; a load of 10 N or more, or a healthy run (--healthy), would help"
+    LOAD_AND_FRICTION = "load counts any friction above the model's"
+    PISTON_LEAKS = "the piston leaks, certain since {since_s:.2f} s"
     BULK_MODULUS_HIDDEN = (
-        "bulk_modulus_hidden",
         "bulk modulus is not observable here (bound {bound} of it): halved it changes the flow by {halved}, doubled by "
-        "{doubled}, for the diaphragms give 400 times as much",
+        "{doubled}, for the diaphragms give 400 times as much"
     )
 
 

@@ -7,61 +7,47 @@ class IdentificationCode(Code):
     """Notes on an identified model, or on the signals that it was identified from."""
 
     PISTON_RESTS = (
-        "piston_rests",
         "{output!r} rests in {measured:.0%} of the samples in which {input!r} drives it, a second-order model in "
         "{linear:.0%}: it sticks, and further poles imitate the wait, so order {order} is not the plant's. The fits by "
-        "order are {fits}: give the order, or drive the piston around a mean that keeps it moving",
+        "order are {fits}: give the order, or drive the piston around a mean that keeps it moving"
     )
     FEEDBACK = (
-        "feedback",
         "input {input!r} follows the noise of {output!r} (p = {p_value:.1g}): the data seem to come from a closed loop,"
-        " where output error is biased; fit ARMAX or Box-Jenkins",
+        " where output error is biased; fit ARMAX or Box-Jenkins"
     )
     VELOCITY_DIFFERENTIATED = (
-        "velocity_differentiated",
         "channel 'velocity_m_s' is absent: it is differentiated from 'position_m' by central differences, which "
-        "amplifies its noise",
+        "amplifies its noise"
     )
-    INPUT_BRIDGED = (
-        "input_bridged",
-        "input {channel!r} misses {count} of {total} samples: they are bridged by straight lines",
-    )
+    INPUT_BRIDGED = "input {channel!r} misses {count} of {total} samples: they are bridged by straight lines"
     OUTPUT_ALONE_FILTERED = (
-        "output_alone_filtered",
         "only the output is filtered: poles come out 20-30 % off and the gain does not roll off (errata E15); filter "
-        "input and output alike, or neither",
+        "input and output alike, or neither"
     )
     UNSTABLE = (
-        "unstable",
         "the identified {structure} model is unstable (a pole of modulus {modulus:.4f}): it predicts one step ahead, "
-        "and does not simulate",
+        "and does not simulate"
     )
     NEARLY_CANCEL = (
-        "nearly_cancel",
         "the pole {pole} and the zero {zero} nearly cancel ({deviations:.1f} standard deviations apart): intervals "
-        "from the covariance cover too little; use dc_gain_interval, or a lower order",
+        "from the covariance cover too little; use dc_gain_interval, or a lower order"
     )
     TIME_CONSTANT_BEYOND_RECORD = (
-        "time_constant_beyond_record",
         "the model of order {order} has a time constant of {time_constant_s:.3g} s and the longest record lasts "
-        "{duration_s:.3g} s: no simpler model was to be had, and its steady gain means nothing",
+        "{duration_s:.3g} s: no simpler model was to be had, and its steady gain means nothing"
     )
     SLOW_MODELS_PASSED_OVER = (
-        "slow_models_passed_over",
-        "{count} models with a time constant beyond the record of {duration_s:.3g} s are passed over for a simpler one",
+        "{count} models with a time constant beyond the record of {duration_s:.3g} s are passed over for a simpler one"
     )
     INTEGRATES = (
-        "integrates",
         "{output!r} integrates its input over the whole record: the model has a pole next to one, so its steady gain "
-        "means nothing",
+        "means nothing"
     )
     SIMPLER_MODEL_TAKEN = (
-        "simpler_model_taken",
         "in the model of order {order} a pole and a zero nearly cancel, or its gain is not determined; one of order "
-        "{taken} does nearly as well on what was held back, and is taken",
+        "{taken} does nearly as well on what was held back, and is taken"
     )
     NO_FIT = (
-        "no_fit",
         "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): nothing that it says "
-        "is to be believed",
+        "is to be believed"
     )

@@ -40,7 +40,7 @@ SINE = {"frequency": 480.0, "voltage": 200.0}
 class MotorRunCode(Code):
     """Notes on a simulated run."""
 
-    ROD_AT_END_STOP = "rod_at_end_stop", "the rod reaches its end stop within {duration_s:g} s"
+    ROD_AT_END_STOP = "the rod reaches its end stop within {duration_s:g} s"
 
 
 def _simulated(rig: Rig[Any], options: Options) -> Run:

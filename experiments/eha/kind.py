@@ -45,10 +45,7 @@ EXPERIMENT = {"sensors": ",".join(SENSORS), "noise": "bench", "drive": "steps", 
 class RunCode(Code):
     """Notes on a simulated run."""
 
-    PRESSURE_NOT_LOGGED = (
-        "pressure_not_logged",
-        "{channel} is not logged by these sensors: estimate and diagnose will be less certain",
-    )
+    PRESSURE_NOT_LOGGED = "{channel} is not logged by these sensors: estimate and diagnose will be less certain"
 
 
 def _simulated(rig: "Rig[Any]", options: Options) -> Run:

@@ -16,15 +16,14 @@ STANDING = 1e-4
 class MotorFaultCode(Code):
     """Notes on a diagnosis of the diaphragm motor."""
 
-    NO_FAULT_FITS = "no_fault_fits", "unknown: no fault of the catalogue looks like this"
+    NO_FAULT_FITS = "unknown: no fault of the catalogue looks like this"
     NEAREST_MISSES = (
-        "nearest_misses",
         "the nearest, {fault}, leaves a chi-square of {chi_square:.3g} for {freedom} degrees of freedom: another motor "
-        "or load, or several faults; calibrate on a healthy run",
+        "or load, or several faults; calibrate on a healthy run"
     )
-    ROD_STANDS = "rod_stands", "the rod moves at {velocity_mm_s:.2g} mm/s: stalled, or at its end"
-    LOOKS_LIKE = "looks_like", "by the electrodes' fundamentals alone it looks like {faults} too"
-    FAULT_FOUND = "fault_found", "{fault}: {meaning}: {severity:.3g}{unit}, 95 % interval {low:.3g} to {high:.3g}{unit}"
+    ROD_STANDS = "the rod moves at {velocity_mm_s:.2g} mm/s: stalled, or at its end"
+    LOOKS_LIKE = "by the electrodes' fundamentals alone it looks like {faults} too"
+    FAULT_FOUND = "{fault}: {meaning}: {severity:.3g}{unit}, 95 % interval {low:.3g} to {high:.3g}{unit}"
 
 
 def motor_fault_finding(

@@ -38,19 +38,15 @@ class StackFaultCode(Code):
     """Notes on a diagnosis of the piezo-stack actuator."""
 
     ANOTHER_ACTUATOR = (
-        "another_actuator",
-        "{channel} is missed by {ratio:.3g} times its noise: this is another actuator, calibrate on a healthy run",
+        "{channel} is missed by {ratio:.3g} times its noise: this is another actuator, calibrate on a healthy run"
     )
-    LEAKAGE_AND_FRICTION = (
-        "leakage_and_friction",
-        "the sensors hold too little to tell leakage from friction: log the stack's displacement",
-    )
-    AIR_IN_OIL = "air_in_oil", "air in the oil: {percent:.2f} %, {ratio:.3g} times the healthy share"
-    CHAMBER_LEAKS = "chamber_leaks", "the pump chamber leaks: {leakage:.2g} m^3/(s Pa)"
-    STACK_DEPOLARISED = "stack_depolarised", "the stack is depolarised: {percent:.0f} % of its stroke is lost"
-    REED_SOFT = "reed_soft", "{reed} reed soft: {ratio:.3g} times"
-    REED_STIFF = "reed_stiff", "{reed} reed stiff or jammed: {ratio:.3g} times"
-    REED_OPEN = "reed_open", "{reed} reed does not shut: a gap of {gap_um:.0f} um"
+    LEAKAGE_AND_FRICTION = "the sensors hold too little to tell leakage from friction: log the stack's displacement"
+    AIR_IN_OIL = "air in the oil: {percent:.2f} %, {ratio:.3g} times the healthy share"
+    CHAMBER_LEAKS = "the pump chamber leaks: {leakage:.2g} m^3/(s Pa)"
+    STACK_DEPOLARISED = "the stack is depolarised: {percent:.0f} % of its stroke is lost"
+    REED_SOFT = "{reed} reed soft: {ratio:.3g} times"
+    REED_STIFF = "{reed} reed stiff or jammed: {ratio:.3g} times"
+    REED_OPEN = "{reed} reed does not shut: a gap of {gap_um:.0f} um"
 
 
 def diagnose_stack(

@@ -52,7 +52,7 @@ def codes(entries: dict[str, object]) -> list[str]:
 
 def test_the_codes_that_entries_know_by_name_are_codes() -> None:
     known: set[Code] = {*EstimateCode, *ClassCode}
-    assert set(COSTS) | set(NO_CLASS) <= {str(code.value) for code in known}
+    assert set(COSTS) | set(NO_CLASS) <= {str(code) for code in known}
 
 
 def test_an_estimate_has_the_entries_that_it_promises() -> None:
