@@ -9,6 +9,7 @@ NAMES = (
     "foreign_logs",
     "filter_speed",
     "start_up",
+    "export_c",
     "many_filters",
     "robustness",
     "efficiency",

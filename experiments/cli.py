@@ -17,6 +17,7 @@ from experiments.command import (
     conditions,
     diagnose,
     estimate,
+    export,
     identifiability,
     identify,
     inspect,
@@ -105,6 +106,7 @@ VERBS = (
 for module in VERBS:
     app.add_typer(module.commands)
 app.add_typer(conditions.rig_commands, name="rig")
+app.add_typer(export.commands, name="export")
 app.add_typer(open_benchmark.commands, name="benchmark")
 
 

@@ -158,16 +158,36 @@ def filter_flow(
         If a channel is missing.
     """
     load = first_load(record, variances) if "differential_pressure_pa" in record else 0.0
-    anywhere = _prior(parameters, load, 1.0, 1.0, 1.0, MAKEUPS[0])
+    anywhere = flow_belief(parameters, load)
     first = filter_problem(FLOW_FILTER, anywhere, record, parameters, noise=noise, variances=variances)
     problems: list[FilterProblem] = []
     for guess in product(MODULI, LEAKAGES, BIASES, MAKEUPS):
-        prior = FLOW_FILTER.to_filter(_prior(parameters, load, *guess))
+        prior = FLOW_FILTER.to_filter(flow_belief(parameters, load, *guess))
         problems.append(replace(first, mean=prior.mean, covariance=prior.covariance))
     return in_si(first, mixture(list(filter_batch(problems))), record.start_time)
 
 
-def _prior(p: EhaParameters, load: float, modulus: float, leakage: float, bias: float, makeup: float) -> Gaussian:
+def flow_belief(
+    p: EhaParameters,
+    load: float = 0.0,
+    modulus: float = 1.0,
+    leakage: float = 1.0,
+    bias: float = 1.0,
+    makeup: float = MAKEUPS[0],
+) -> Gaussian:
+    """Return the belief of the flow form before the first sample.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+    load : float
+        Differential pressure that the log begins with [Pa].
+    modulus, leakage, bias : float
+        First guesses, as multiples of the actuator's [dimensionless].
+    makeup : float
+        First guess of the make-up conductance [m^3/(s Pa)].
+    """
     healthy = EhaParameters()
     means = {
         "pressure_a_pa": p.accumulator_pressure + max(load, 0.0),

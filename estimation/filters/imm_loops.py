@@ -23,6 +23,18 @@ Kind = tuple[Rule, ProcessModel]
 
 Room: TypeAlias = tuple[Array, Array, Array, Array]
 """What `mix` works in: states, terms and weights of the modes, and a belief."""
+
+Work: TypeAlias = tuple[Array, Array, Array, Array, Array, Room]
+"""What `step_bank` works in: predicted log probabilities (modes,), which before the first sample are the prior's;
+innovations and their variances (modes, 2, channels); terms, weights and shares (modes,); and what `mix` works in."""
+
+Chain: TypeAlias = tuple[Array, Array]
+"""Logarithms of transitions (modes, modes) and of each mode's probability (modes,)."""
+
+Judged: TypeAlias = tuple[Array, Array, Array]
+"""Sums of squared normalised innovations and counts of samples present (channels,), and the last sample's innovations
+with their variances (2, channels)."""
+
 PrepareMode: TypeAlias = Callable[[int, Array, Array], None]
 PredictMode: TypeAlias = Callable[[int, Array, Array, Array, Array, float], None]
 UpdateMode: TypeAlias = Callable[[int, Array, Array, Array, Array], None]
@@ -124,19 +136,67 @@ def unpack(belief: Array, mean: Array, covariance: Array, *, WIDTH: int) -> None
             place += 1
 
 
-def judge(k: int, sample: Array, seen: Array, predicted: Array, terms: Array, shares: Array, trace: Trace) -> None:
-    """Score the innovations of the mixture, a mode without probability left out, and keep them where wanted."""
+def judge(sample: Array, seen: Array, predicted: Array, terms: Array, shares: Array, judged: Judged) -> None:
+    """Score the innovations of the mixture, a mode without probability left out."""
+    nis, count, innovations = judged
     believed = 0.0
     for i in range(shares.shape[0]):
         shares[i] = math.exp(predicted[i]) if terms[i] > -np.inf else 0.0
         believed += shares[i]
     for c in range(sample.shape[0]):
         e, s = innovate(c, sample[c], seen, shares, believed)
+        innovations[0, c] = e
+        innovations[1, c] = s
         if e == e:
-            trace.nis[c] += e * e / s
-            trace.count[c] += 1.0
-        if trace.residuals.shape[0] > 0:
-            trace.residuals[k, c], trace.residual_variances[k, c] = e, s
+            nis[c] += e * e / s
+            count[c] += 1.0
+
+
+def step_bank(
+    begun: int,
+    states: Array,
+    constants: Array,
+    kinds: IntArray,
+    chain: Chain,
+    before: Array,
+    after: Array,
+    sample: Array,
+    substeps: int,
+    work: Work,
+    judged: Judged,
+    *,
+    WIDTH: int,
+    BELIEF: int,
+    predict: PredictMode,
+    update: UpdateMode,
+) -> float:
+    """Mix, step every mode, weigh and judge by one sample; return the logarithm of its density."""
+    transitions, log_probability = chain
+    predicted, seen, terms, weights, shares, room = work
+    modes = states.shape[0]
+    if begun > 0:
+        mix(states, transitions, log_probability, predicted, room, WIDTH=WIDTH, BELIEF=BELIEF)
+        for i in range(modes):
+            for j in range(substeps):
+                predict(kinds[i], states[i], constants[i], before, after, float(j))
+    for i in range(modes):
+        update(kinds[i], states[i], constants[i], sample, seen[i])
+        terms[i] = predicted[i] + log_density(sample, seen[i], states[i], BELIEF=BELIEF)
+    total = log_sum(terms, weights)
+    for i in range(modes):
+        log_probability[i] = terms[i] - total
+    judge(sample, seen, predicted, terms, shares, judged)
+    return total
+
+
+def combine(
+    density: float, states: Array, weights: Array, shift: Array, overall: Array, *, WIDTH: int, BELIEF: int
+) -> None:
+    """Set the moments of the bank after a sample; not numbers where no mode is finite any more."""
+    if density == -np.inf:
+        overall[:] = np.nan
+    else:
+        blend(states, weights, shift, overall, WIDTH=WIDTH, BELIEF=BELIEF)
 
 
 def run(
@@ -163,30 +223,36 @@ def run(
     (n, channels), modes = measured.shape, states.shape[0]
     constants, seen = np.empty((modes, CONSTANTS)), np.empty((modes, 2, channels))
     terms, weights, shares, shift = np.empty(modes), np.empty(modes), np.empty(modes), np.empty(BELIEF)
-    room = np.empty_like(states), terms, weights, shift
-    predicted, overall = log_probability.copy(), np.empty(BELIEF)
+    work = log_probability.copy(), seen, terms, weights, shares, (np.empty_like(states), terms, weights, shift)
+    overall, innovations = np.empty(BELIEF), np.empty((2, channels))
+    chain, judged = (transitions, log_probability), (trace.nis, trace.count, innovations)
     log_likelihood = 0.0
     for i in range(modes):
         prepare(kinds[i], rows[i], constants[i])
     for k in range(n):
-        if k > 0:
-            mix(states, transitions, log_probability, predicted, room, WIDTH=WIDTH, BELIEF=BELIEF)
-            for i in range(modes):
-                for j in range(substeps):
-                    predict(kinds[i], states[i], constants[i], drives[k - 1], drives[k], float(j))
-        for i in range(modes):
-            update(kinds[i], states[i], constants[i], measured[k], seen[i])
-            terms[i] = predicted[i] + log_density(measured[k], seen[i], states[i], BELIEF=BELIEF)
-        total = log_sum(terms, weights)
-        log_likelihood += total
-        for i in range(modes):
-            log_probability[i] = terms[i] - total
-        judge(k, measured[k], seen, predicted, terms, shares, trace)
+        before, after, sample = drives[max(k - 1, 0)], drives[k], measured[k]
+        density = step_bank(
+            k,
+            states,
+            constants,
+            kinds,
+            chain,
+            before,
+            after,
+            sample,
+            substeps,
+            work,
+            judged,
+            WIDTH=WIDTH,
+            BELIEF=BELIEF,
+            predict=predict,
+            update=update,
+        )
+        log_likelihood += density
+        if trace.residuals.shape[0] > 0:
+            trace.residuals[k], trace.residual_variances[k] = innovations[0], innovations[1]
         if k % every == 0 or k == n - 1:
-            if total == -np.inf:
-                overall[:] = np.nan
-            else:
-                blend(states, weights, shift, overall, WIDTH=WIDTH, BELIEF=BELIEF)
+            combine(density, states, weights, shift, overall, WIDTH=WIDTH, BELIEF=BELIEF)
             unpack(overall, trace.mean, trace.covariance, WIDTH=WIDTH)
         if k % every == 0:
             history[k // every] = log_probability
@@ -194,6 +260,10 @@ def run(
                 trace.track[k // every, a] = trace.mean[a]
                 trace.track_variance[k // every, a] = trace.covariance[a, a]
     return log_likelihood
+
+
+STEP = (log_sum, blend, mix, log_density, innovate, judge, step_bank, combine)
+"""All that a bank's step calls, and what combines its modes."""
 
 
 @dataclass(frozen=True)
@@ -238,7 +308,7 @@ def compile_imm(kinds: tuple[Kind, ...], channels: tuple[str, ...]) -> ImmKernel
         _dispatch("prepare", "rows, constants", len(kinds)),
         _dispatch("predict", "state, constants, before, after, j", len(kinds)),
         _dispatch("update", "state, constants, sample, seen", len(kinds)),
-        pasted(log_sum, blend, mix, log_density, innovate, judge, unpack, run, constants=sizes),
+        pasted(*STEP, unpack, run, constants=sizes),
     )
     names = "_".join(f"{rule.name}_{model.name}" for rule, model in kinds)
     kernel = load_kernel(f"imm_{names}", kernel_text(f"interacting models, {names}", *parts))

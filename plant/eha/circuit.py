@@ -228,31 +228,30 @@ def at_rest(p: CircuitValues) -> CircuitState:
     return 0.0, 0.0, 0.0, 0.0, filled_a, filled_b, p.accumulator_oil
 
 
-def circuit_channels(states: NDArray[np.float64], p: SimpleNamespace) -> Mapping[str, NDArray[np.float64]]:
-    """Return what a bench could measure.
+def observe_circuit(state: CircuitState, p: CircuitValues) -> Mapping[str, Scalar]:
+    """Return what a bench could measure, beside the motor's speed.
 
     Parameters
     ----------
-    states : ndarray, shape (n, 7)
-        As named in `STATES`.
-    p : namespace of ndarray
-        The circuit, each parameter of shape (1,) or (n,).
+    state : tuple of float, ndarray of shape (n,), or Expression
+        As named in `STATES` [SI].
+    p : CircuitParameters or namespace of float, ndarray or Expression
+        The circuit.
 
     Returns
     -------
-    Mapping[str, ndarray]
-        Motor speed (unless it follows its command at once), position, velocity, and the pressures, shape (n,).
+    Mapping[str, float, ndarray or Expression]
+        Position [m], velocity [m/s], and the pressures [Pa].
     """
-    motor, _, position, velocity, *oil = states.T
+    _, _, position, velocity, *oil = state
     pressures = circuit_pressures(position, (oil[0], oil[1], oil[2]), p)
-    channels = {
+    return {
         "position_m": position,
         "velocity_m_s": velocity,
         "differential_pressure_pa": pressures.a - pressures.b,
         "pressure_a_pa": pressures.a,
         "pressure_b_pa": pressures.b,
     }
-    return channels | ({"motor_speed_rad_s": motor} if np.all(p.motor_lag > 0.0) else {})
 
 
 def circuit_step_rate(p: SimpleNamespace) -> float:

@@ -4,19 +4,21 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from math import ceil
 from types import MappingProxyType, SimpleNamespace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.compiled.functions import Scalar, sign
 from plant.components.friction import quadratic_friction
 from plant.eha.circuit import (
     STATES,
     at_rest,
     circuit_breaches,
-    circuit_channels,
     circuit_derivative,
     circuit_scales,
     circuit_step_rate,
+    observe_circuit,
 )
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.model import EhaParameters, lumped_step, reduced_derivative
@@ -26,7 +28,7 @@ from plant.log.record import Record
 from plant.runs import checked_series, require_finite
 from plant.sensors.sensors import IDEAL, Sensors, measure
 from plant.solvers.adaptive import ErrorControl, controlled_run
-from plant.solvers.steps import StepFunction, parameter_row, ros2_step
+from plant.solvers.steps import StepFunction, parameter_names, parameter_row, ros2_step
 from plant.solvers.trajectory import compile_trajectory
 
 Array = NDArray[np.float64]
@@ -60,9 +62,9 @@ class Plant:
         State names with their unit.
     step : callable
         ``step(state, speeds, parameters, h)``, see `plant.solvers.steps.StepFunction`.
-    channels : callable
-        ``channels(states (n, width), parameter rows (1 or n, parameters))``, which returns position, velocity and
-        differential pressure, and more where the plant has more; a motor speed among them replaces the command.
+    observe : callable
+        ``observe(state, parameters)``, which returns position, velocity and differential pressure, and more where the
+        plant has more.
     substeps : int
         Steps of the integrator in 0.1 ms, enough for relative errors under 1e-4.
     parameter_class : type
@@ -82,7 +84,7 @@ class Plant:
     name: str
     states: tuple[str, ...]
     step: StepFunction
-    channels: Callable[[Array, Array], Mapping[str, Array]]
+    observe: Callable[[Any, Any], Mapping[str, Scalar]]
     substeps: int
     parameter_class: type[EhaParameters] = EhaParameters
     complete: Callable[[EhaParameters], EhaParameters] = _as_is
@@ -91,43 +93,48 @@ class Plant:
     breaches: Callable[[Array], Mapping[str, NDArray[np.bool_]]] = _never
     control: ErrorControl | None = None
 
+    def channels(self, states: Array, rows: Array) -> Mapping[str, Array]:
+        """Return what a bench could measure; a motor speed among it replaces the command.
 
-def _lumped_channels(states: Array, rows: Array) -> Mapping[str, Array]:
-    del rows
-    position, velocity, pressure = states.T
-    return {"position_m": position, "velocity_m_s": velocity, "differential_pressure_pa": pressure}
+        Parameters
+        ----------
+        states, rows : ndarray, shapes (n, width) and (1 or n, parameters)
+            As named in `states`, and parameter rows.
+
+        Returns
+        -------
+        Mapping[str, ndarray], each of shape (n,)
+            Channels by name.
+        """
+        values = dict(zip(parameter_names(self.parameter_class), rows.T, strict=True))
+        seen = dict(self.observe(tuple(states.T), SimpleNamespace(**values)))
+        if np.all(values.get("motor_lag", 0.0) > 0.0):
+            seen["motor_speed_rad_s"] = states[:, self.states.index("motor_speed_rad_s")]
+        return seen
 
 
-def _reduced_channels(states: Array, rows: Array) -> Mapping[str, Array]:
+def _observe_lumped(state: Any, p: Any) -> Mapping[str, Scalar]:
+    del p
+    return dict(zip(LOGGED[1:], state, strict=True))
+
+
+def _observe_reduced(state: Any, p: Any) -> Mapping[str, Scalar]:
     """Differential pressure follows from the force balance 5.12; the reduced plant has no state for it."""
-    position, velocity, acceleration = states.T
-    A, M, a1, a2, a3, load, spring = (rows[:, i] for i in _FORCE_COLUMNS)
-    friction = quadratic_friction(velocity, np.sign(velocity), a1, a2, a3)
-    pressure = (M * acceleration + friction + load + spring * position) / A
-    return {"position_m": position, "velocity_m_s": velocity, "differential_pressure_pa": pressure}
+    position, velocity, acceleration = state
+    coefficients = p.friction_quadratic, p.friction_linear, p.friction_coulomb
+    friction = quadratic_friction(velocity, sign(velocity), *coefficients)
+    pressure = (p.moving_mass * acceleration + friction + p.load_force + p.load_stiffness * position) / p.piston_area
+    return dict(zip(LOGGED[1:], (position, velocity, pressure), strict=True))
 
-
-_FORCE_COLUMNS = tuple(
-    list(EhaParameters.__dataclass_fields__).index(name)
-    for name in (
-        "piston_area",
-        "moving_mass",
-        "friction_quadratic",
-        "friction_linear",
-        "friction_coulomb",
-        "load_force",
-        "load_stiffness",
-    )
-)
 
 REDUCED = Plant(
     "reduced",
     ("position_m", "velocity_m_s", "acceleration_m_s2"),
     ros2_step(reduced_derivative),
-    _reduced_channels,
+    _observe_reduced,
     8,
 )
-LUMPED = Plant("lumped", ("position_m", "velocity_m_s", "differential_pressure_pa"), lumped_step, _lumped_channels, 4)
+LUMPED = Plant("lumped", ("position_m", "velocity_m_s", "differential_pressure_pa"), lumped_step, _observe_lumped, 4)
 
 
 def _circuit_values(rows: Array) -> SimpleNamespace:
@@ -139,7 +146,7 @@ CIRCUIT = Plant(
     "circuit",
     STATES,
     ros2_step(circuit_derivative),
-    lambda states, rows: circuit_channels(states, _circuit_values(rows)),
+    observe_circuit,
     3,
     CircuitParameters,
     circuit_of,
@@ -206,7 +213,7 @@ def simulate(
     0.0431
     """
     path = parameters if isinstance(parameters, ParameterPath) else ParameterPath.constant(parameters)
-    path = replace(path, parameters=tuple(plant.complete(given) for given in path.parameters))
+    path = replace(path, parameters=tuple(map(plant.complete, path.parameters)))
     speed = checked_series(drive)
     rows = np.ascontiguousarray(path.sample(sample_time * np.arange(len(speed))))
     (states,) = run_plant(plant, speed, sample_time, rows[:, None])
@@ -249,23 +256,13 @@ def simulate_each(
     DriveError, HydrostateError
         As `simulate`.
 
-    Examples
-    --------
-    >>> leaking = EhaParameters(flow_bias=5e-6)
-    >>> slower, faster = simulate_each(CIRCUIT, np.full(101, 100.0), 1e-3, [leaking, EhaParameters()])
-    >>> bool(slower["position_m"][-1] < faster["position_m"][-1])
-    True
     """
     speed = checked_series(drive)
     complete = [plant.complete(given) for given in parameters]
     rows = np.array([parameter_row(p) for p in complete])
     runs = run_plant(plant, speed, sample_time, rows[None])
-    return [
-        _record(
-            plant, speed, sample_time, states, p, rows[i : i + 1], sensors, None if rngs is None else rngs[i], False
-        )
-        for i, (states, p) in enumerate(zip(runs, complete, strict=True))
-    ]
+    each = zip(runs, complete, rows[:, None], rngs or [None] * len(rows), strict=True)
+    return [_record(plant, speed, sample_time, x, p, row, sensors, rng, False) for x, p, row, rng in each]
 
 
 def run_plant(plant: Plant, speed: Array, sample_time: float, rows: Array) -> Array:

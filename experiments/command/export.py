@@ -1,0 +1,185 @@
+"""`hydrostate export c`: filters and plants as C99 for a controller."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+import typer
+
+from experiments.command.json_output import json_text, prepare_output
+from experiments.command.logs import caught, read_log
+from experiments.command.options import Columns, Json, RigFile, load_columns, load_rig, option, require_positive
+from experiments.command.terminal import emit, note
+from plant.errors import HydrostateError
+from plant.notes import distinct
+
+if TYPE_CHECKING:
+    from plant.eha.rig import Rig
+    from plant.log.record import Record
+
+commands = typer.Typer(help="Take what works offline to a controller: C99.", no_args_is_help=True)
+
+Folder: TypeAlias = Annotated[Path, option("DIR", "Folder that the files are written to.", "--out", "-o")]
+Log: TypeAlias = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="LOG",
+        help="A log of the bench: the filter gets its rate, its channels and its sensors' noise. Without one, those of "
+        "a simulated healthy bench at 10 kHz.",
+        show_default=False,
+    ),
+]
+Form: TypeAlias = Annotated[
+    str, option("FORM", "What the filter believes: a form of `estimate` that is filtered, or flow.")
+]
+Method: TypeAlias = Annotated[
+    str, option("METHOD", "ekf, iekf, ukf, ckf, svsf, sif, or imm: nine interacting filters, of leakage and friction.")
+]
+PlantName: TypeAlias = Annotated[
+    str | None, option("PLANT", "Export the step of a plant instead of a filter: reduced, lumped or circuit.")
+]
+Tune: TypeAlias = Annotated[
+    bool, typer.Option("--tune", help="Tune the filter's noise levels to the log by likelihood.")
+]
+States: TypeAlias = Annotated[
+    str, option("NAMES", "What the filter estimates beside bulk modulus, comma-separated: parameters' names.")
+]
+
+
+@commands.command(
+    epilog="Example: hydrostate export c bench.csv --rig rig.toml --form pressure --tune --out controller"
+)
+def c(
+    log: Log = None,
+    out: Folder = Path("controller"),
+    form: Form = "pressure",
+    method: Method = "ekf",
+    plant: PlantName = None,
+    states: States = "",
+    tune: Tune = False,
+    precision: Annotated[str, option("TYPE", "double or float.")] = "double",
+    name: Annotated[
+        str | None, option("NAME", "What files, types and functions are called.", show_default="the form and method")
+    ] = None,
+    no_pressure: Annotated[
+        bool, typer.Option("--no-pressure", help="Use position and velocity alone, even if pressure is logged.")
+    ] = False,
+    sample_time: Annotated[
+        float | None, option("S", "Time between samples [s].", show_default="the log's, else 1e-4")
+    ] = None,
+    rig: RigFile = None,
+    columns: Columns = None,
+    as_json: Json = False,
+) -> None:
+    """Write a filter, or a plant's step, as C99: a header, a source, an example and a Makefile.
+
+    The arithmetic is that of the kernels that Python runs, line by line. Nothing is allocated, every loop is bounded,
+    and the header says how many operations a step takes at most.
+    """
+    prepare_output(out)
+    require_positive("--sample-time", sample_time, "s")
+    bench = load_rig(rig)
+    if plant is not None:
+        files, about = _plant(bench, plant, 1e-4 if sample_time is None else sample_time, name, precision)
+    else:
+        record = _bench_log(log, bench, load_columns(columns), sample_time, no_pressure=no_pressure)
+        files, about = _filter(bench, record, form, method, _listed(states), name, precision, tune=tune)
+    written = write_files(out, files)
+    found: dict[str, Any] = {"outcome": "ok", "folder": str(out), "files": written, **about}
+    emit(json_text([found]) if as_json else f"{out}: {', '.join(written)}")
+
+
+def _listed(text: str) -> tuple[str, ...]:
+    return tuple(one for one in text.split(",") if one)
+
+
+def _filter(
+    bench: "Rig",
+    record: "Record",
+    form: str,
+    method: str,
+    states: tuple[str, ...],
+    name: str | None,
+    precision: str,
+    *,
+    tune: bool,
+) -> tuple[Mapping[str, str], dict[str, Any]]:
+    from estimation.export.c_filter import filter_in_c
+    from estimation.export.task import filter_task
+
+    problem = filter_task(record, bench.parameters, form, states=states, tuned=tune)
+    called = name if name is not None else f"{form}_{method}"
+    about = {"form": form, "method": method, "channels": list(problem.channels), "sample_time_s": problem.sample_time}
+    return filter_in_c(problem, method, name=called, precision=precision), about
+
+
+def _plant(
+    bench: "Rig", plant: str, sample_time: float, name: str | None, precision: str
+) -> tuple[Mapping[str, str], dict[str, Any]]:
+    from plant.eha.simulate import PLANTS
+    from plant.errors import require_known
+    from plant.export.c_plant import plant_in_c
+
+    require_known("--plant", plant, PLANTS)
+    called = name if name is not None else f"{plant}_plant"
+    files = plant_in_c(PLANTS[plant], bench.parameters, sample_time, name=called, precision=precision)
+    return files, {"plant": plant, "sample_time_s": sample_time}
+
+
+def _bench_log(
+    log: Path | None, bench: "Rig", columns: Mapping[str, str], sample_time: float | None, *, no_pressure: bool
+) -> "Record":
+    """Return the log that a filter is made for, of a simulated bench where none is given."""
+    if log is None:
+        record = _simulated_bench(bench, 1e-4 if sample_time is None else sample_time)
+    else:
+        with caught() as said:
+            record = read_log(log, bench.columns, columns, sample_time=sample_time)
+        for one in distinct(warning.note for warning in said):
+            note(f"{log}: warning: {one}")
+    if not no_pressure:
+        return record
+    kept = {name: values for name, values in record.channels.items() if name != "differential_pressure_pa"}
+    return type(record)(record.sample_time, kept, record.metadata)
+
+
+def _simulated_bench(bench: "Rig", sample_time: float) -> "Record":
+    import numpy as np
+
+    from plant.eha.drives import sine
+    from plant.eha.simulate import LUMPED, simulate
+    from plant.sensors.sensors import BENCH
+
+    drive = sine(10_000 * sample_time, sample_time, bench.parameters.rated_speed, 5e-4 / sample_time)
+    return simulate(LUMPED, drive, sample_time, bench.parameters, sensors=BENCH, rng=np.random.default_rng(0))
+
+
+def write_files(folder: Path, files: Mapping[str, str]) -> list[str]:
+    """Write files into a folder, each whole or not at all.
+
+    Parameters
+    ----------
+    folder : Path
+        Which exists.
+    files : Mapping[str, str]
+        Texts by file name.
+
+    Returns
+    -------
+    list of str
+        The names.
+
+    Raises
+    ------
+    HydrostateError
+        If one cannot be written.
+    """
+    from plant.atomic import replacing
+
+    for name, text in files.items():
+        try:
+            with replacing(folder / name) as file:
+                file.write(text.encode())
+        except OSError as error:
+            raise HydrostateError(f"{folder / name}: it cannot be written: {error.strerror or error}") from error
+    return list(files)

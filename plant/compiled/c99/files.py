@@ -1,0 +1,77 @@
+"""Files of exported C: a header, a source, an example and a Makefile, from templates with names in their places."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from plant.errors import HydrostateError
+
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,30}")
+_KEYWORD = re.compile(
+    "auto|break|case|char|const|continue|default|do|double|else|enum|extern|float|for|goto|if|inline|int|long|main|"
+    "register|restrict|return|short|signed|sizeof|static|struct|switch|typedef|union|unsigned|void|volatile|while"
+)
+
+
+def checked_name(name: str) -> str:
+    """Return a name that C takes for types, functions and files.
+
+    Parameters
+    ----------
+    name : str
+        Lower-case letters, digits and underscores, a letter first, 31 characters at most.
+
+    Raises
+    ------
+    HydrostateError
+        If it is none.
+
+    Examples
+    --------
+    >>> checked_name("pressure_ekf")
+    'pressure_ekf'
+    """
+    if not _NAME.fullmatch(name) or _KEYWORD.fullmatch(name):
+        raise HydrostateError(
+            "a name in C must be lower-case letters, digits and _, begin with a letter, be no word of C and have at "
+            f"most 31 characters, got {name!r}"
+        )
+    return name
+
+
+def c_files(package: str, folder: str, kind: str, name: str, facts: Mapping[str, Any]) -> dict[str, str]:
+    """Fill in the templates of exported C.
+
+    Parameters
+    ----------
+    package, folder : str
+        Where the templates ``KIND.h``, ``KIND.c`` and ``KIND_example.c`` are.
+    kind : str
+        What is exported.
+    name : str
+        What its files are called.
+    facts : Mapping[str, Any]
+        What the templates ask for, by name.
+
+    Returns
+    -------
+    dict[str, str]
+        Texts by file name.
+    """
+    from jinja2 import Environment, PackageLoader, PrefixLoader, StrictUndefined
+
+    own, shared = PackageLoader(package, folder), PackageLoader("plant", "compiled/c99/templates")
+    environment = Environment(  # noqa: S701  C is no HTML
+        loader=PrefixLoader({"own": own, "shared": shared}),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    templates = {
+        f"{name}.h": f"own/{kind}.h",
+        f"{name}.c": f"own/{kind}.c",
+        "example.c": f"own/{kind}_example.c",
+        "Makefile": "shared/Makefile",
+    }
+    return {file: environment.get_template(template).render(**facts) for file, template in templates.items()}

@@ -1,0 +1,136 @@
+"""Loops as C: a kernel's typed Python functions, for arrays whose shapes are known when C is written.
+
+A function is translated for the shapes that it is called with, and all that it calls with it. Loops are ``for`` over
+``range`` or over an array, so each is bounded and the most operations that a call can take are counted on the way. What
+else Python has is refused by its line.
+"""
+
+import ast
+import inspect
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from plant.compiled.c99.body import Body
+from plant.compiled.c99.precision import Precision
+from plant.compiled.c99.shapes import Block, Scalar, Thing, kind_of, members, received
+from plant.compiled.paste import bare_text
+
+
+@dataclass(frozen=True)
+class Outside:
+    """A function that stands in C already.
+
+    Parameters
+    ----------
+    name : str
+        Its name there.
+    written : tuple of bool
+        Which of its arguments it writes to.
+    operations : Counter
+        What a call takes at most [operations].
+    """
+
+    name: str
+    written: tuple[bool, ...]
+    operations: Counter[str]
+
+
+@dataclass(frozen=True)
+class Translated:
+    """A function in C.
+
+    Parameters
+    ----------
+    name, text : str
+        Its name, and its definition.
+    written : tuple of bool
+        Which of its parameters, groups spelt out, it writes to.
+    operations : Counter
+        What a call takes at most [operations].
+    results : tuple of bool
+        For each result, whether it is whole; beyond the first they come through pointers.
+    """
+
+    name: str
+    text: str
+    written: tuple[bool, ...]
+    operations: Counter[str]
+    results: tuple[bool, ...]
+
+
+@dataclass
+class Translation:
+    """Functions of a kernel, translated as they are called.
+
+    Parameters
+    ----------
+    functions : Mapping[str, callable]
+        The Python functions, by name.
+    constants : Mapping[str, int]
+        Whole numbers that they read by name.
+    outside : Mapping[str, Outside]
+        What they call that stands in C already.
+    prefix : str
+        What the names of their translations begin with.
+    """
+
+    functions: Mapping[str, Callable[..., object]]
+    constants: Mapping[str, int]
+    outside: Mapping[str, Outside]
+    precision: Precision
+    prefix: str
+    _done: dict[tuple[str, object], Translated] = field(default_factory=dict[tuple[str, object], Translated])
+
+    def entered(self, name: str, given: Sequence[Thing], known: Mapping[str, int] | None = None) -> Translated:
+        """Translate a function for the shapes of what it is given.
+
+        Parameters
+        ----------
+        given : sequence of Scalar, Block or groups of them
+            Its arguments [any unit].
+        known : Mapping[str, int], optional
+            Whole parameters that always have one value.
+
+        Returns
+        -------
+        Translated
+            The function; whatever it calls is in `text` too.
+        """
+        key = name, tuple(kind_of(one) for one in given)
+        if key not in self._done:
+            self._done[key] = self._translated(name, given, known or {})
+        return self._done[key]
+
+    @property
+    def text(self) -> str:
+        """All functions, each below what it calls."""
+        return "\n\n".join(one.text for one in self._done.values())
+
+    def _translated(self, name: str, given: Sequence[Thing], known: Mapping[str, int]) -> Translated:
+        function = self.functions[name]
+        (node,) = ast.parse(bare_text(function)).body
+        assert isinstance(node, ast.FunctionDef)  # noqa: S101  bare_text sees to it
+        pairs = list(zip((argument.arg for argument in node.args.args), given, strict=True))
+        names = {called: received(called, thing) for called, thing in pairs}
+        names |= {called: Scalar(str(value), True) for called, value in known.items()}
+        body = Body(self, names, node)
+        lines = body.block(node.body)
+        flat = [one for called, thing in pairs if called not in known for one in members(called, thing)]
+        spelt = [self._parameter(called, thing, called in body.written) for called, thing in flat]
+        spelt += [f"{self._type(whole)} *result_{i}" for i, whole in enumerate(body.results) if i > 0]
+        variants = sum(known == name for known, _ in self._done)
+        in_c = f"{self.prefix}_{name}{f'_{variants + 1}' if variants else ''}"
+        head = f"static {self._type(body.results[0]) if body.results else 'void'} {in_c}({', '.join(spelt)})"
+        declared = [f"{self._type(whole)} {local} = 0;" for local, whole in body.locals.items()]
+        about = (inspect.getdoc(function) or name).splitlines()[0]
+        text = "\n".join([f"/* {about} */", head, "{", *(f"    {line}" for line in [*declared, *lines]), "}"])
+        return Translated(in_c, text, tuple(called in body.written for called, _ in flat), body.counted, body.results)
+
+    def _type(self, whole: bool) -> str:
+        return "int" if whole else self.precision.name
+
+    def _parameter(self, name: str, thing: Scalar | Block, written: bool) -> str:
+        if isinstance(thing, Scalar):
+            return f"{'' if written else 'const '}{self._type(thing.whole)} {name}"
+        return f"{'' if written else 'const '}{self._type(thing.whole)} *{name}"

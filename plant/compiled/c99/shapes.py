@@ -1,0 +1,129 @@
+"""What names of a translated loop stand for: numbers, and arrays whose shapes are known when C is written."""
+
+from dataclasses import dataclass
+from math import prod
+from typing import TypeAlias
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A number: a C expression that is ``int`` or ``real``.
+
+    Parameters
+    ----------
+    root : str
+        The array that it is an element of.
+    """
+
+    text: str
+    whole: bool = False
+    root: str = ""
+
+
+@dataclass(frozen=True)
+class Block:
+    """An array of known shape, row by row in memory.
+
+    Parameters
+    ----------
+    text : str
+        C expression that points at its first element.
+    root : str
+        The parameter that it is part of, which counts as written where one of its elements is.
+    """
+
+    text: str
+    shape: tuple[int, ...]
+    root: str
+    whole: bool = False
+
+    def at(self, places: list[str]) -> "Block | Scalar":
+        """Return an element, or what is left with fewer places given than dimensions.
+
+        Parameters
+        ----------
+        places : list of str
+            C expressions of the leading places.
+
+        Returns
+        -------
+        Block or Scalar
+            A row where places are left, else a number.
+
+        Examples
+        --------
+        >>> Block("seen", (9, 2, 3), "seen").at(["i", "0", "c"]).text
+        'seen[(i) * 6 + (0) * 3 + c]'
+        """
+        rest = self.shape[len(places) :]
+        strides = [prod(self.shape[i + 1 :]) for i in range(len(places))]
+        offset = " + ".join(
+            place if stride == 1 else f"({place}) * {stride}" for place, stride in zip(places, strides, strict=True)
+        )
+        if rest:
+            return Block(f"({self.text} + {offset})", rest, self.root, self.whole)
+        return Scalar(f"{self.text}[{offset}]", self.whole, self.root)
+
+
+Group: TypeAlias = "tuple[Thing, ...]"
+Thing: TypeAlias = "Scalar | Block | Group"
+"""What a name or an argument may be; a group is handed on as its members."""
+
+
+def kind_of(thing: Thing) -> object:
+    """Return what two things have in common that one translated function serves.
+
+    Parameters
+    ----------
+    thing : Scalar, Block or tuple of them
+        An argument [any unit].
+    """
+    match thing:
+        case Scalar():
+            return "int" if thing.whole else "real"
+        case Block():
+            return thing.shape, thing.whole
+        case _:
+            return tuple(kind_of(one) for one in thing)
+
+
+def members(name: str, thing: Thing) -> list[tuple[str, "Scalar | Block"]]:
+    """Return a thing as parameters of C, groups spelt out.
+
+    Parameters
+    ----------
+    name : str
+        The parameter's name.
+    thing : Scalar, Block or tuple of them
+        What it is [any unit].
+
+    Returns
+    -------
+    list of (str, Scalar or Block)
+        Each parameter's name, and what it is.
+    """
+    if isinstance(thing, tuple):
+        return [pair for i, one in enumerate(thing) for pair in members(f"{name}_{i}", one)]
+    return [(name, thing)]
+
+
+def received(name: str, thing: Thing) -> Thing:
+    """Return what a thing is called inside the function that receives it.
+
+    Parameters
+    ----------
+    thing : Scalar, Block or tuple of them
+        An argument [any unit].
+
+    Returns
+    -------
+    Scalar, Block or tuple of them
+        The same under its name there.
+    """
+    match thing:
+        case Scalar():
+            return Scalar(name, thing.whole)
+        case Block():
+            return Block(name, thing.shape, name, thing.whole)
+        case _:
+            return tuple(received(f"{name}_{i}", one) for i, one in enumerate(thing))

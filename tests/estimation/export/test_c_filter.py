@@ -1,0 +1,170 @@
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.export_c import task
+from estimation.engine.contract import FilterProblem
+from estimation.export.c_filter import EXPORTED, filter_in_c
+from estimation.export.task import EXPORTED_FORMS, filter_task
+from estimation.filters.run import METHODS, in_si
+from estimation.models.eha_forms import BULK_MODULUS
+from estimation.trust.consistency import LARGEST_NIS
+from faults.conditions import CONDITIONS
+from plant.eha.model import EhaParameters
+from plant.errors import HydrostateError, LogError
+from plant.log.record import Record
+from tests.c_compiler import SANITIZED, compiled, ran
+
+SHORT, LONG = 3_000, 100_000
+EXACT = "-DEXPORTED_EXACT"
+"""Products are fused by the library, so that no test depends on the processor."""
+EVERY_FORM = pytest.mark.parametrize("form", EXPORTED_FORMS)
+
+
+def rows_of(problem: FilterProblem) -> list[str]:
+    rows = np.column_stack([problem.drives, problem.measured])
+    return [",".join("" if np.isnan(one) else repr(float(one)) for one in row) for row in rows]
+
+
+def in_c(folder: Path, problem: FilterProblem, method: str = "ekf", *flags: str, **how: str) -> tuple[np.ndarray, str]:
+    """Values, then deviations, shape (2, samples, states); and what is said in the end."""
+    files = filter_in_c(problem, method, name="exported", precision=how.get("precision", "double"))
+    out, said = ran(compiled(folder, files, *(flags or (EXACT,)), using=how.get("using", "gcc")), rows_of(problem))
+    found = np.loadtxt(out.splitlines(), delimiter=",")
+    return np.stack([found[:, ::2], found[:, 1::2]]), said
+
+
+def in_python(problem: FilterProblem, method: str = "ekf") -> np.ndarray:
+    trace = METHODS[method](replace(problem, every=1))
+    mean, slope = problem.model.to_si(trace.track)
+    return np.stack([mean, np.sqrt(np.maximum(trace.track_variance, 0.0)) * slope])
+
+
+def apart(found: np.ndarray, wanted: np.ndarray) -> float:
+    return float(np.max(np.abs(found - wanted) / np.max(np.abs(wanted), axis=1, keepdims=True)))
+
+
+@EVERY_FORM
+@pytest.mark.parametrize("using", ["gcc", "clang"])
+def test_every_form_gives_in_c_what_it_gives_in_python(form: str, using: str, tmp_path: Path) -> None:
+    problem = task(form, "minor_friction", SHORT)
+    assert apart(in_c(tmp_path, problem, using=using)[0], in_python(problem)) < 1e-12
+
+
+@pytest.mark.parametrize("form", ["acceleration", "pressure"])
+def test_without_fused_products_it_differs_by_rounding_alone(form: str, tmp_path: Path) -> None:
+    problem = task(form, "minor_friction", SHORT)
+    assert 0.0 < apart(in_c(tmp_path, problem, "ekf", "-O2")[0], in_python(problem)) < 1e-12
+
+
+@pytest.mark.slow
+@EVERY_FORM
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_it_does_so_over_a_hundred_thousand_steps_of_every_condition(form: str, condition: str, tmp_path: Path) -> None:
+    problem = task(form, condition, LONG)
+    assert apart(in_c(tmp_path, problem)[0], in_python(problem)) < 1e-12
+
+
+@pytest.mark.parametrize("method", [name for name in EXPORTED if name not in ("ekf", "imm")])
+def test_every_rule_gives_in_c_what_it_gives_in_python(method: str, tmp_path: Path) -> None:
+    problem = task("pressure", "normal", 500)
+    assert apart(in_c(tmp_path, problem, method)[0], in_python(problem, method)) < 1e-12
+
+
+def test_nine_interacting_filters_give_in_c_what_they_give_in_python(tmp_path: Path) -> None:
+    problem = task("pressure", "minor_leakage", 1000)
+    found, said = in_c(tmp_path, problem, "imm", EXACT, *SANITIZED)
+    assert apart(found[0][None], in_python(problem, "imm")[0][None]) < 1e-12
+    assert "_MODES 9" in filter_in_c(problem, "imm", name="exported")["exported.h"]
+    likelihood = float(said.split("log likelihood: ")[1])
+    assert likelihood == pytest.approx(METHODS["imm"](problem).log_likelihood, rel=1e-12)
+
+
+@EVERY_FORM
+def test_it_runs_clean_under_sanitizers(form: str, tmp_path: Path) -> None:
+    assert np.all(np.isfinite(in_c(tmp_path, task(form, "normal", 500), "ekf", EXACT, *SANITIZED)[0]))
+
+
+def test_missing_samples_substeps_and_robust_updates_are_taken_as_in_python(tmp_path: Path) -> None:
+    problem = task("pressure", "normal", SHORT)
+    measured = problem.measured.copy()
+    measured[::3, 0] = np.nan
+    measured[100:200] = np.nan
+    measured[1000, 1] += 1.0
+    problem = replace(problem, measured=measured, substeps=3, robust="student-t")
+    assert apart(in_c(tmp_path, problem)[0], in_python(problem)) < 1e-12
+
+
+def test_likelihood_and_counters_of_the_gate_are_those_of_python(tmp_path: Path) -> None:
+    problem = task("pressure", "normal", SHORT)
+    trace = METHODS["ekf"](problem)
+    _, said = in_c(tmp_path, problem)
+    assert float(said.split("log likelihood: ")[1]) == pytest.approx(trace.log_likelihood, rel=1e-12)
+    shown = [float(one) for one in re.findall(r"innovation \d: (\S+)", said)]
+    assert shown == pytest.approx(list(in_si(problem, trace, 0.0).nis.values()), rel=1e-5)
+
+
+@pytest.mark.parametrize(("shrunk", "wanted"), [(1.0, 0), (1e-2, 1), (1e-6, 3)])
+def test_the_gate_says_how_far_innovations_are_from_what_is_predicted(
+    shrunk: float, wanted: int, tmp_path: Path
+) -> None:
+    problem = task("pressure", "normal", SHORT)
+    noise = np.random.default_rng(0).normal(size=problem.measured.shape) * np.sqrt(problem.variances)
+    problem = replace(problem, measured=problem.measured + noise, variances=problem.variances * 2.0 * shrunk)
+    _, said = in_c(tmp_path, problem)
+    worst = max(float(one) for one in re.findall(r"innovation \d: (\S+)", said))
+    assert (worst > LARGEST_NIS) == (wanted > 0)
+    assert f"gate: {wanted}\n" in said
+
+
+def test_in_float_its_bulk_modulus_stays_within_two_percent_of_pythons(tmp_path: Path) -> None:
+    problem = task("pressure", "normal", LONG // 4)
+    found, wanted = in_c(tmp_path, problem, precision="float")[0][0], in_python(problem)[0]
+    place = problem.model.index(BULK_MODULUS)
+    assert 0.0 < abs(found[-1, place] / wanted[-1, place] - 1.0) < 0.02
+
+
+def test_header_and_source_allocate_nothing_recurse_nowhere_and_jump_nowhere() -> None:
+    for method in ("ekf", "imm"):
+        files = filter_in_c(task("pressure", "normal", 500), method, name="exported")
+        text = files["exported.h"] + files["exported.c"]
+        assert re.findall(r"#include <(\S+)>", text) == ["math.h"]
+        assert not re.search(r"\b(malloc|calloc|goto|while|do)\b", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL))
+        assert all(re.search(r"; \w+ < \d+;|; \w+ < \w+;", loop) for loop in re.findall(r"for \(.*\)", text))
+
+
+def test_names_and_units_stand_in_the_header() -> None:
+    header = filter_in_c(task("pressure", "normal", 500), name="exported")["exported.h"]
+    assert "EXPORTED_ROW_PISTON_AREA = 1, /* m^2, effective piston area A */" in header
+    assert "EXPORTED_STATE_BULK_MODULUS_PA = 3 /* Pa; inside over 1e+08 */" in header
+    counts = [int(one) for one in re.findall(r"^ \* +(\d+) ", header, re.MULTILINE)]
+    assert f"#define EXPORTED_OPERATIONS {sum(counts)} " in header
+
+
+def test_what_cannot_be_exported_is_refused() -> None:
+    problem = task("pressure", "normal", 500)
+    with pytest.raises(HydrostateError, match=r"a method that can be exported must be one of ekf, .*, got 'particle'"):
+        filter_in_c(problem, "particle", name="exported")
+    with pytest.raises(HydrostateError, match="form must be one of acceleration, pressure, flow, got 'motion'"):
+        filter_task(Record(1e-3, {"position_m": np.zeros(9)}), EhaParameters(), "motion")
+    with pytest.raises(LogError, match="the flow form needs differential_pressure_pa"):
+        filter_task(
+            Record(1e-3, {"position_m": np.zeros(9), "motor_speed_rad_s": np.zeros(9)}), EhaParameters(), "flow"
+        )
+
+
+def test_a_tuned_filter_carries_the_noise_of_its_log() -> None:
+    problem = task("pressure", "normal", 2000)
+    record = Record(
+        1e-4,
+        {"motor_speed_rad_s": problem.drives[:, 0]}
+        | {name: problem.measured[:, c] for c, name in enumerate(problem.channels)},
+    )
+    plain = filter_task(record, EhaParameters(), "pressure")
+    tuned = filter_task(record, EhaParameters(), "pressure", tuned=True)
+    assert not np.allclose(plain.noise, tuned.noise) or not np.allclose(plain.variances, tuned.variances)
+    wide = filter_task(record, EhaParameters(), "pressure", states=("leakage_coefficient",))
+    assert [state.name for state in wide.model.states][-1] == "leakage_coefficient"

@@ -1,0 +1,61 @@
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from experiments.cli import app
+from tests.c_compiler import compiled
+
+
+def export(*arguments: object) -> Result:
+    return CliRunner().invoke(app, ["export", *(str(argument) for argument in arguments)])
+
+
+def read(folder: Path) -> dict[str, str]:
+    return {file.name: file.read_text() for file in folder.iterdir() if file.suffix in (".c", ".h")}
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("log") / "bench.csv"
+    done = CliRunner().invoke(
+        app, ["simulate", "--sample-time", "0.001", "--duration", "2", "--sensors", "bench", "--out", str(path)]
+    )
+    assert done.exit_code == 0, done.output
+    return path
+
+
+def test_a_filter_gets_the_rate_and_channels_of_a_log_and_compiles(log: Path, tmp_path: Path) -> None:
+    done = export("c", log, "--out", tmp_path, "--name", "mine", "--no-pressure", "--json")
+    assert done.exit_code == 0, done.output
+    (found,) = json.loads(done.stdout)
+    assert found["files"] == ["mine.h", "mine.c", "example.c", "Makefile"]
+    assert found["channels"] == ["position_m", "velocity_m_s"]
+    assert found["sample_time_s"] == pytest.approx(1e-3)
+    assert "MINE_SUBSTEPS 10" in (tmp_path / "mine.h").read_text()
+    compiled(tmp_path, read(tmp_path))
+
+
+def test_without_a_log_it_is_made_for_a_simulated_bench_and_a_plant_for_none(tmp_path: Path) -> None:
+    assert export("c", "--out", tmp_path / "filter", "--method", "imm", "--precision", "float").exit_code == 0
+    assert "float" in (tmp_path / "filter" / "pressure_imm.h").read_text()
+    assert export("c", "--plant", "circuit", "--sample-time", "2e-4", "--out", tmp_path / "plant").exit_code == 0
+    assert "every 0.0002 s" in (tmp_path / "plant" / "circuit_plant.h").read_text()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("--form", "motion"), "form must be one of"),
+        (("--method", "particle"), "a method that can be exported must be one of"),
+        (("--plant", "piezo"), "--plant must be one of reduced, lumped, circuit, got 'piezo'"),
+        (("--name", "no name"), "a name in C must be"),
+        (("--precision", "half"), "precision must be one of double, float"),
+        (("--sample-time", "0"), "--sample-time must be"),
+    ],
+)
+def test_what_cannot_be_exported_is_said_in_a_sentence(given: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    done = export("c", "--out", tmp_path, *given)
+    assert done.exit_code == 2
+    assert said in " ".join(done.stderr.split())

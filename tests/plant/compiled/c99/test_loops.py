@@ -1,0 +1,131 @@
+import math
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from plant.arrays import Array
+from plant.compiled.c99.loops import Outside, Translation
+from plant.compiled.c99.precision import DOUBLE
+from plant.compiled.c99.shapes import Block, Scalar, Thing
+from tests.c_compiler import compiled, ran
+
+
+def spread(values: Array) -> tuple[float, float]:
+    """Return the mean and the largest distance from it."""
+    total = farthest = 0.0
+    for value in values:
+        total += value
+    total /= values.shape[0]
+    for i in range(values.shape[0]):
+        away = values[i] - total if values[i] > total else total - values[i]
+        if away > farthest and math.isfinite(away):
+            farthest = away
+    return total, farthest
+
+
+def work(table: Array, room: tuple[Array, Array], *, SHIFT: int) -> float:
+    """Fill both rooms from a table."""
+    first, second = room
+    second[:] = 0.0
+    rows = table.shape[0]
+    for i in range(rows):
+        mean, most = spread(table[i])
+        first[i] = mean
+        for j in range(i, rows):
+            second[j] += SHIFT * most**2
+        doubled(table[i], first)
+    first[0] = first[1] = np.nan if first[0] == first[0] else 0.0
+    return math.sqrt(second[rows - 1]) - math.exp(-np.inf)
+
+
+def doubled(row: Array, first: Array) -> None:
+    """Double a row unless it is negative."""
+    if row[0] < 0.0 or not row[1] > 0.0:
+        first[2] = -1.0
+    else:
+        row[:] = first
+
+
+GIVEN: list[Thing] = [Block("table", (3, 3), "table"), (Block("first", (3,), "first"), Block("second", (3,), "second"))]
+
+
+def translation() -> Translation:
+    functions = {one.__name__: one for one in (spread, work, doubled)}
+    return Translation(functions, {"SHIFT": 2}, {}, DOUBLE, "mine")
+
+
+MAIN = """
+int main(void)
+{
+    double table[9] = { 0.5, 1.5, 4.0, 2.0, -3.0, 1.0, 8.0, 0.25, 0.125 };
+    double first[3] = { 0, 0, 0 };
+    double second[3];
+    printf("%.17g\\n", mine_work(table, first, second));
+    for (int i = 0; i < 9; ++i) {
+        printf("%.17g\\n", table[i]);
+    }
+    for (int i = 0; i < 3; ++i) {
+        printf("%.17g\\n%.17g\\n", first[i], second[i]);
+    }
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("using", ["gcc", "clang"])
+def test_a_loop_gives_in_c_what_it_gives_in_python(tmp_path: Path, using: str) -> None:
+    written = translation()
+    written.entered("work", GIVEN)
+    text = f"#include <math.h>\n#include <stdio.h>\n{written.text}\n{MAIN}"
+    out, _ = ran(compiled(tmp_path, {"loops.c": text}, using=using), [""])
+    table = np.array([[0.5, 1.5, 4.0], [2.0, -3.0, 1.0], [8.0, 0.25, 0.125]])
+    first, second = np.zeros(3), np.empty(3)
+    result = work(table, (first, second), SHIFT=2)
+    wanted = [result, *table.ravel(), *np.column_stack([first, second]).ravel()]
+    np.testing.assert_array_equal([float(one) for one in out.split()], wanted)
+
+
+def test_what_is_not_written_is_const() -> None:
+    found = translation().entered("spread", [Block("values", (4,), "values")])
+    assert "const double *values" in found.text
+    assert found.written == (False,)
+    assert found.results == (False, False)
+
+
+def test_the_most_that_a_call_can_take_is_counted_through_every_loop_and_call() -> None:
+    counted = translation().entered("spread", [Block("values", (4,), "values")]).operations
+    assert counted == Counter({"additions": 4 + 8, "divisions": 1, "choices and comparisons": 8})
+    assert translation().entered("work", GIVEN).operations["square roots"] == 1
+
+
+def test_a_function_that_stands_in_c_already_is_called_by_its_name() -> None:
+    outside = {"doubled": Outside("theirs", (True, False), Counter({"products": 5}))}
+    written = Translation({"spread": spread, "work": work}, {"SHIFT": 2}, outside, DOUBLE, "mine")
+    assert written.entered("work", GIVEN).operations["products"] >= 15
+    assert "theirs(" in written.text
+
+
+def endless(values: Array) -> float:
+    """Loop for as long as it takes."""
+    while values[0] > 0.0:
+        values[0] -= 1.0
+    return values[0]
+
+
+def swapped(a: float, b: float) -> float:
+    """Swap two numbers."""
+    c = a
+    d = b
+    c, d = d, c
+    return c - d
+
+
+def test_a_loop_without_bound_and_a_swap_are_refused() -> None:
+    functions = {one.__name__: one for one in (endless, swapped)}
+    written = Translation(functions, {}, {}, DOUBLE, "mine")
+    with pytest.raises(NotImplementedError, match="while"):
+        written.entered("endless", [Block("values", (2,), "values")])
+    with pytest.raises(NotImplementedError, match="none of what is translated"):
+        written.entered("swapped", [Scalar("a"), Scalar("b")])
