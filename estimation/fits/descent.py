@@ -97,14 +97,7 @@ def descend(
     best = at(np.clip(start, *bounds))
     for _ in range(evaluations - 1):
         curvature = best.gram + np.diag(np.abs(best.gradient) / REACH)
-        step = _step(best, curvature, radius, bounds)
-        promised = _promise(best, curvature, step)
-        for _ in range(SHORTENED):
-            if promised >= 0.0:
-                break
-            radius = POOR * float(np.linalg.norm(step))  # a step that a bound has bent uphill, where it is long
-            step = _step(best, curvature, radius, bounds)
-            promised = _promise(best, curvature, step)
+        step, promised, radius = _downhill(best, curvature, radius, bounds)
         if promised < least_gain:
             break
         tried = at(best.theta + step)
@@ -118,9 +111,18 @@ def descend(
     return best
 
 
-def _promise(point: Point, curvature: Array, step: Array) -> float:
-    """Return by how much a step lowers the quadratic model."""
-    return float(-point.gradient @ step - 0.5 * step @ curvature @ step)
+def _downhill(point: Point, curvature: Array, radius: float, bounds: tuple[Array, Array]) -> tuple[Array, float, float]:
+    """Return the best step, by how much it lowers the quadratic model, and the radius that it took.
+
+    A bound may bend a long step uphill; a shorter one then goes down.
+    """
+    for _ in range(SHORTENED):
+        step = _step(point, curvature, radius, bounds)
+        promised = float(-point.gradient @ step - 0.5 * step @ curvature @ step)
+        if promised >= 0.0:
+            return step, promised, radius
+        radius = POOR * float(np.linalg.norm(step))
+    return np.zeros_like(point.theta), 0.0, radius
 
 
 def _step(point: Point, curvature: Array, radius: float, bounds: tuple[Array, Array]) -> Array:

@@ -11,12 +11,20 @@ from typing import TypeAlias
 
 import numpy as np
 
-from estimation.fits.descent import descend
+from estimation.fits.descent import Point, descend
 from estimation.fits.form_fit import weighed
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_problem import GreyBoxLog
 from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
-from estimation.fits.wide_problem import delayed, freed, freed_bounds, own_starts, usual_pressure, widened
+from estimation.fits.wide_problem import (
+    delayed,
+    flow_bounds,
+    freed,
+    own_starts,
+    usual_pressure,
+    usual_values,
+    widened,
+)
 from estimation.models.wide_flow import WideFlowParameters, grown_leakage
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -83,11 +91,14 @@ class _Tried:
     """A set of hypotheses with the best that was found under it."""
 
     together: tuple[Hypothesis, ...]
-    theta: Array
+    point: Point
     values: Mapping[str, float]
-    cost: float
     delay: float
     finished: GreyBoxFit | None = None
+
+    @property
+    def cost(self) -> float:
+        return self.point.cost
 
     @property
     def fit(self) -> GreyBoxFit:
@@ -196,8 +207,7 @@ def _promises(
 ) -> list[tuple[float, float]]:
     """Return what each hypothesis promises beside those that are taken, as `promised` does, from one evaluation."""
     problem = freed(log, (*together, *asked))
-    absent = dict(zip(parameter_names(WideFlowParameters), log.parameters, strict=True))
-    point = problem.at(problem.model.theta({**absent, **found}))
+    point = problem.at(problem.model.theta({**usual_values(log), **found}))
     own = freed(log, together).model.unknowns
 
     def step(names: Sequence[str]) -> tuple[float, Array]:
@@ -223,48 +233,48 @@ def _screened(
     log: GreyBoxLog, together: tuple[Hypothesis, ...], starts: Sequence[Mapping[str, float]]
 ) -> Iterator[_Tried]:
     """Yield the best from each start after a few steps, with one model step a sample."""
-    absent = dict(zip(parameter_names(WideFlowParameters), log.parameters, strict=True))
+    absent = usual_values(log)
     problems = [(delay, freed(delayed(log, delay).coarsened(), together)) for delay in together[-1].delays]
     for start in starts:
         tried: list[_Tried] = []
         for (delay, problem), own in product(problems, own_starts(log, together[-1])):
             guess = problem.model.theta({**absent, **start, **own})
-            point = descend(problem.at, guess, SCREENING, freed_bounds(problem, guess), radius=NEAR)
-            tried.append(_Tried(together, point.theta, problem.model.values(point.theta), point.cost, delay))
+            point = descend(problem.at, guess, SCREENING, flow_bounds(problem, [guess]), radius=NEAR)
+            tried.append(_Tried(together, point, problem.model.values(point.theta), delay))
         yield min(tried, key=lambda one: one.cost)
 
 
 def _settled(log: GreyBoxLog, tried: _Tried) -> _Tried:
     """Return a set of hypotheses brought to its optimum, with one model step a sample."""
-    best = _descended(delayed(log, tried.delay).coarsened(), tried, SETTLING)
-    if revived := _revived(log, best):
-        again = _descended(delayed(log, tried.delay).coarsened(), revived, SETTLING)
-        best = min(best, again, key=lambda one: one.cost)
+    early = delayed(log, tried.delay).coarsened()
+    best = _descended(early, tried, tried.point.theta, SETTLING)
+    if (revived := _revived(log, best)) is not None:
+        best = min(best, _descended(early, best, revived, SETTLING), key=lambda one: one.cost)
     if len(tried.together[-1].delays) == 1:
         return best
     for step in (FINEST_DELAY, -FINEST_DELAY):
         while best.delay + step >= 0.0:
             moved = replace(best, delay=best.delay + step)
-            moved = _descended(delayed(log, moved.delay).coarsened(), moved, SETTLING)
+            moved = _descended(delayed(log, moved.delay).coarsened(), moved, best.point.theta, SETTLING)
             if moved.cost >= best.cost:
                 break
             best = moved
     return best
 
 
-def _revived(log: GreyBoxLog, tried: _Tried) -> _Tried | None:
-    """Return a set with what has all but vanished put back to the rig's: from nothing a logarithm finds no way back."""
-    usual = dict(zip(parameter_names(WideFlowParameters), log.parameters, strict=True))
+def _revived(log: GreyBoxLog, tried: _Tried) -> Array | None:
+    """Return a start with the rig's value of what has all but vanished, from where a logarithm finds no way back."""
+    usual = usual_values(log)
     gone = {name: usual[name] for name in MAY_VANISH if tried.values[name] < VANISHED * usual[name]}
     if not gone:
         return None
-    return replace(tried, theta=freed(log, tried.together).model.theta({**tried.values, **gone}))
+    return freed(log, tried.together).model.theta({**tried.values, **gone})
 
 
-def _descended(log: GreyBoxLog, tried: _Tried, evaluations: int) -> _Tried:
+def _descended(log: GreyBoxLog, tried: _Tried, start: Array, evaluations: int) -> _Tried:
     problem = freed(log, tried.together)
-    point = descend(problem.at, tried.theta, evaluations, freed_bounds(problem, tried.theta), radius=NEAR)
-    return replace(tried, theta=point.theta, values=problem.model.values(point.theta), cost=point.cost)
+    point = descend(problem.at, start, evaluations, flow_bounds(problem, [start]), radius=NEAR)
+    return replace(tried, point=point, values=problem.model.values(point.theta))
 
 
 def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
@@ -275,10 +285,10 @@ def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
         parameters = row.parameters.copy()
         parameters[by_mass] = share
         own = replace(row, parameters=parameters)
-        done.append((_descended(own, done[-1][0] if done else tried, FINISHING), own))
+        begun = done[-1][0] if done else tried
+        done.append((_descended(own, begun, begun.point.theta, FINISHING), own))
     best, own = min(done, key=lambda one: one[0].cost)
-    problem = freed(own, best.together)
-    return replace(best, finished=concluded(problem, problem.at(best.theta)))
+    return replace(best, finished=concluded(freed(own, best.together), best.point))
 
 
 def _likeliest(log: GreyBoxLog, tried: Sequence[Iterable[_Tried]]) -> list[_Tried]:

@@ -1,6 +1,6 @@
 """`fit_flow(record, parameters, ...) -> FormFit`: bulk modulus, leakage and flow bias of a log, by the flow form."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import ceil
 
@@ -11,8 +11,9 @@ from estimation.fits.descent import descend
 from estimation.fits.explain import WORTH, explain, promised
 from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed
 from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, roughly
-from estimation.fits.greybox_problem import GreyBoxLog, Problem, greybox_log, search_bounds
-from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, START_LOAD
+from estimation.fits.greybox_problem import GreyBoxLog, Problem, greybox_log
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, START_LOAD, Hypothesis
+from estimation.fits.wide_problem import flow_bounds
 from estimation.log_checks.bridging import bridged, gaps
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.outliers import without_outliers
@@ -39,9 +40,6 @@ LEAD_START = 1e-5
 
 OPENING_START = 1e3
 """First guess of the drop at which a make-up check valve is half open [Pa]."""
-
-LEAST_OPENING, LARGEST_OPENING = 1e2, 1e6
-"""Least and largest of that drop [Pa]; less is a corner that no step of the integrator and no sensor resolves."""
 
 DRAIN_START = 0.05
 """First guess of the pump's case drain, as a share of the healthy leakage [fraction]."""
@@ -120,48 +118,64 @@ def fit_flow(
         raise LogError(f"the flow form needs {' and '.join(FLOW_CHANNELS)}, the record lacks {', '.join(lacking)}")
     if variances is None:
         record, variances = _cleaned(record)
-    pressure = record["differential_pressure_pa"]
-    relieved = reaches_relief(pressure, parameters.relief_pressure)
-    forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
     log = _log(record, parameters, uncertainties or {}, variances)
     starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
-    search = Search(screened=ceil(SCREENED_SECONDS / record.sample_time))
-    limits = {
-        "speed_lead": (0.0, record.sample_time),
-        "makeup_opening": (LEAST_OPENING, LARGEST_OPENING),
-    }
-    guesses = [forms[0].theta(start) for start in starts]
-    bounds = search_bounds(forms[0], guesses, limits)
-    fits: list[GreyBoxFit] = []
-    for form in forms:
-        problem = Problem(form, log)
-        near = roughly(problem, guesses, search, bounds)
-        if (
-            not fits or near.cost < min(fit.cost for fit in fits) + 2.0 * UNLIKELY
-        ):  # which leaves room for the error of long model steps
-            fits.append(concluded(problem, descend(problem.at, near.theta, search.evaluations, bounds)))
-        guesses = [fits[0].theta]
-    best = min(fits, key=lambda fit: fit.cost)
-    found = weighed(fits)
-    value, std = found["bulk_modulus"]
-    objections = _objections(best)
-    asked = HYPOTHESES if objections else ()
-    if len(record) > MOST_ASKED:
-        asked = ()
-    elif loaded:
-        asked = (START_LOAD,)
-    elif not objections:
-        gain, size = promised(log, parameters, best.values, DELIVERY)
-        asked = (DELIVERY,) if gain > WORTH and size > LEAST_DELIVERY else ()
-    if asked:
-        usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
-        near = [best.values, *(usual if objections else ())]  # a fit that explains the log is in no wrong valley
-        strange = explain(log, parameters, near, _explains, asked=asked, paired=loaded or bool(objections))
+    fits = _balanced(log, parameters, starts)
+    best, found = min(fits, key=_cost), weighed(fits)
+    swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
+    if asked := _asked(log, parameters, swinging, loaded=loaded):
+        strange = explain(log, parameters, _near(swinging, starts), _explains, asked=asked, paired=asked != (DELIVERY,))
         one = strange.fit
         if _explains(one) and one.cost < best.cost - WORTH:
             bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
             return FormFit(strange.values, bound, one.chi_square[0], (), one.rig_slopes, strange)
-    return FormFit(found, std / value, best.chi_square[0], objections, best.rig_slopes)
+    value, std = found["bulk_modulus"]
+    return FormFit(found, std / value, best.chi_square[0], _objections(best), best.rig_slopes)
+
+
+def _balanced(
+    log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]
+) -> Sequence[GreyBoxFit]:
+    """Return the fits of the balances that count, the first by volume."""
+    relieved = reaches_relief(log.measured, parameters.relief_pressure)
+    forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
+    search = Search(screened=ceil(SCREENED_SECONDS / log.sample_time))
+    guesses = [forms[0].theta(start) for start in starts]
+    bounds = flow_bounds(Problem(forms[0], log), guesses)
+    fits: list[GreyBoxFit] = []
+    for form in forms:
+        problem = Problem(form, log)
+        near = roughly(problem, guesses, search, bounds)
+        # twice what counts leaves room for the error of long model steps
+        if not fits or near.cost < min(map(_cost, fits)) + 2.0 * UNLIKELY:
+            fits.append(concluded(problem, descend(problem.at, near.theta, search.evaluations, bounds)))
+        guesses = [fits[0].theta]
+    return fits
+
+
+def _asked(log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, loaded: bool) -> tuple[Hypothesis, ...]:
+    """Return what a log is asked beside the plain form, given its likelier fit with volumes that swing.
+
+    Held volumes may explain a log whose encoder was homed elsewhere: it is asked all the same.
+    """
+    if len(log.drives) > MOST_ASKED:
+        return ()
+    if loaded:
+        return (START_LOAD,)
+    if not _explains(swinging):
+        return HYPOTHESES
+    gain, size = promised(log, parameters, swinging.values, DELIVERY)
+    return (DELIVERY,) if gain > WORTH and size > LEAST_DELIVERY else ()
+
+
+def _near(fit: GreyBoxFit, starts: Sequence[Mapping[str, float]]) -> Sequence[Mapping[str, float]]:
+    """Return where the search for what is strange begins: a fit that explains the log is in no wrong valley."""
+    usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
+    return [fit.values, *(() if _explains(fit) else usual)]
+
+
+def _cost(fit: GreyBoxFit) -> float:
+    return fit.cost
 
 
 def _explains(fit: GreyBoxFit) -> bool:

@@ -81,7 +81,8 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "crack_pressure": (-1e5, 2e5),
     "leakage_bend": (-4.0, 4.0),
 }
-"""Least and largest values where physics gives them [SI]."""
+"""Least and largest values where physics gives them [SI]. A make-up valve that opens within a smaller drop has a corner
+that no step of the integrator and no sensor resolves."""
 
 PRESUMED = {"chamber_volume": 0.15, "pump_displacement": 0.15}
 """Standard deviation of the logarithm of what a rig file says, before the log is seen [dimensionless]: dead volume is

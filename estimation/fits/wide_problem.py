@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from estimation.fits.freed_problem import FreedProblem
-from estimation.fits.greybox_problem import GreyBoxLog, search_bounds
+from estimation.fits.greybox_problem import GreyBoxLog, Problem, search_bounds
 from estimation.fits.hypotheses import LIMITS, PRESUMED, Hypothesis
 from estimation.models.flow import FLOW_FORM, reaches_relief, relieving
 from estimation.models.wide_flow import LINEAR, WIDE_FLOW_FORM, WideFlowParameters
@@ -78,8 +78,8 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis]) -> FreedProblem:
         The problem; relief is free where the log reaches its setting.
     """
     extra = [name for one in together for name in one.free]
-    relief = log.parameters[parameter_names(WideFlowParameters).index("relief_pressure")]
-    plain = relieving(FLOW_FORM) if reaches_relief(log.measured, relief) else FLOW_FORM
+    relieved = reaches_relief(log.measured, usual_values(log)["relief_pressure"])
+    plain = relieving(FLOW_FORM) if relieved else FLOW_FORM
     return FreedProblem(WIDE_FLOW_FORM, log, tuple(dict.fromkeys((*plain.unknowns, *extra))), LINEAR)
 
 
@@ -104,14 +104,14 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
     return [{"relief_pressure": share * peak, "relief_conductance": RELIEF_START} for share in one.shares_of_peak]
 
 
-def freed_bounds(problem: FreedProblem, guess: Array) -> tuple[Array, Array]:
-    """Return how far a search may go.
+def flow_bounds(problem: Problem, guesses: Sequence[Array]) -> tuple[Array, Array]:
+    """Return how far a search for the flow form's unknowns may go, plain or wide.
 
     Parameters
     ----------
-    problem : FreedProblem
+    problem : Problem
         The problem.
-    guess : ndarray, shape (unknowns,)
+    guesses : sequence of ndarray, shape (unknowns,)
         Where it begins [dimensionless].
 
     Returns
@@ -119,7 +119,23 @@ def freed_bounds(problem: FreedProblem, guess: Array) -> tuple[Array, Array]:
     tuple of ndarray, shape (unknowns,)
         Lower and upper bounds [dimensionless].
     """
-    return search_bounds(problem.model, [guess], {**LIMITS, "speed_lead": (0.0, problem.log.sample_time)})
+    return search_bounds(problem.model, guesses, {**LIMITS, "speed_lead": (0.0, problem.log.sample_time)})
+
+
+def usual_values(log: GreyBoxLog) -> dict[str, float]:
+    """Return the parameters of a widened log by name.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+
+    Returns
+    -------
+    dict
+        What the rig file says, and what is strange absent [SI].
+    """
+    return dict(zip(parameter_names(WideFlowParameters), log.parameters.tolist(), strict=True))
 
 
 def delayed(log: GreyBoxLog, delay: float) -> GreyBoxLog:
