@@ -11,6 +11,7 @@ import numpy as np
 
 from estimation.fits.greybox_loops import compile_kernel
 from estimation.fits.greybox_problem import OUTLIER, GreyBoxLog, Problem
+from estimation.fits.side_by_side import LANES, compile_side_by_side
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
@@ -56,16 +57,15 @@ class FreedProblem(Problem):
         parameters: Array | None = None,
     ) -> tuple[float, Array, Array]:
         parameters = self.log.parameters if parameters is None else parameters
-        here = self._errors(theta, drives, parameters)
+        if not slopes.size and errors.size:
+            errors[...] = self._residuals(theta[None], drives, parameters)[..., 0]
+            return 0.0, np.zeros(0), np.zeros((0, 0))
+        nudged = theta + NUDGE * np.eye(len(theta))
+        found = self._residuals(np.vstack([theta, nudged]), drives, parameters)
+        here = found[..., 0]
+        columns = (found[..., 1:] - here[..., None]) / NUDGE
         if errors.size:
             errors[...] = here
-            if not slopes.size:
-                return 0.0, np.zeros(0), np.zeros((0, 0))
-        columns = np.empty((*here.shape, len(theta)))
-        for i in range(len(theta)):
-            nudged = theta.copy()
-            nudged[i] += NUDGE
-            columns[..., i] = (self._errors(nudged, drives, parameters) - here) / NUDGE
         if slopes.size:
             slopes[...] = columns
         weight = np.minimum(1.0, OUTLIER / np.maximum(np.abs(here), OUTLIER))
@@ -74,9 +74,21 @@ class FreedProblem(Problem):
         gradient = np.einsum("obi,ob->i", columns, weight * here)
         return cost, gradient, np.tril(np.tensordot(columns * bend[..., None], columns, axes=([0, 1], [0, 1])))
 
-    def _errors(self, theta: Array, drives: Array | None, parameters: Array) -> Array:
-        row = parameters.copy()
-        row[self._columns] = list(self.model.values(theta).values())
+    def _residuals(self, thetas: Array, drives: Array | None, parameters: Array) -> Array:
+        """Return the normalised residuals at some points, shape (outputs, blocks, points)."""
+        rows = np.repeat(parameters[None], len(thetas), axis=0)
+        rows[:, self._columns] = [list(self.model.values(theta).values()) for theta in thetas]
+        if self.log.gaps.size:  # what a gap leaves open is followed by the kernel of one run
+            return np.stack([self._alone(row, drives) for row in rows], axis=-1)
+        run, log = compile_side_by_side(self._bare), self.log
+        filled = np.concatenate([rows, np.repeat(rows[-1:], -len(rows) % LANES, axis=0)])
+        found = np.zeros((len(filled) // LANES, *self._room(LANES).shape))
+        with np.errstate(all="ignore"):  # a try that runs away is stepped back from
+            for errors, part in zip(found, filled.reshape(-1, LANES, rows.shape[1]), strict=True):
+                run(part, log.drives if drives is None else drives, log.measured, *self._course(), errors)
+        return np.moveaxis(found, 0, -2).reshape(*found.shape[1:3], -1)[..., : len(thetas)]
+
+    def _alone(self, row: Array, drives: Array | None) -> Array:
         errors = self._room()
         super()._run(np.empty(0), errors, np.empty((0, 0, 0)), drives, row)
         return errors

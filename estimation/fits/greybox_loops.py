@@ -25,13 +25,16 @@ Kernel: TypeAlias = Callable[..., tuple[float, Array, Array]]
 """``run(theta, drives, measured, parameters, sample_time, substeps, block, variance, walk, gaps, outlier, errors,
 slopes)``, see `compile_kernel`."""
 
+RUNAWAY = 1e6
+"""Largest normalised residual that counts [dimensionless]: a try that runs away keeps a finite cost."""
+
 _KERNEL = '''"""Generated: misfit of the {name} model, with its sensitivities."""
 
 import math
 
 import numpy as np
 
-RUNAWAY = 1e6
+RUNAWAY = {runaway!r}
 SETTLED = 1e-4
 STRAIGHT = 1e-3
 
@@ -142,10 +145,12 @@ def _source(model: GreyBoxModel) -> str:
     p = SimpleNamespace(**{**vars(parameter_symbols(model.parameters)), **fitted})
     start = [as_expression(value) for value in model.initial(p)]
     state = [symbol(f"x{i}") for i in range(len(start))]
-    moved = _step(model, state, p)
+    drives = [(symbol(f"a{i}"), symbol(f"b{i}")) for i in range(len(model.drives))]
+    moved = model_step(model, state, p, drives)
     outputs = [as_expression(value) for value in model.observe(tuple(state))]
     return _KERNEL.format(
         name=model.name,
+        runaway=RUNAWAY,
         outputs=len(outputs),
         unknowns=len(theta),
         columns=len(theta) + 1,
@@ -166,14 +171,36 @@ def _source(model: GreyBoxModel) -> str:
     )
 
 
-def _step(model: GreyBoxModel, state: Sequence[Expression], p: SimpleNamespace) -> list[Expression]:
-    """Return the state after one step, with the share of the step that has passed as the scheme's input."""
-    drives = (*((symbol(f"a{i}"), symbol(f"b{i}")) for i in range(len(model.drives))), symbol("h"))
+def model_step(
+    model: GreyBoxModel,
+    state: Sequence[Expression],
+    p: SimpleNamespace,
+    drives: Sequence[tuple[Expression, Expression]],
+) -> list[Expression]:
+    """Return the state after one step of length ``h``, with the share of it that has passed as the scheme's input.
+
+    Parameters
+    ----------
+    model : GreyBoxModel
+        The model.
+    state : sequence of Expression
+        The state before [SI].
+    p : SimpleNamespace
+        The parameters by name [SI].
+    drives : sequence of tuple
+        Each drive at the step's start and end [SI].
+
+    Returns
+    -------
+    list of Expression
+        In SI.
+    """
+    h = symbol("h")
 
     def rates(now: Any, share: Scalar, parameters: Any) -> tuple[Scalar, ...]:
-        return tuple(as_expression(rate) for rate in model.rates(now, drives, parameters, share))
+        return tuple(as_expression(rate) for rate in model.rates(now, (*drives, h), parameters, share))
 
-    return [as_expression(value) for value in ros2_step(rates)(tuple(state), (symbol("share"), ONE), p, symbol("h"))]
+    return [as_expression(value) for value in ros2_step(rates)(tuple(state), (symbol("share"), ONE), p, h)]
 
 
 def _named(values: Sequence[Expression]) -> dict[str, Expression]:

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimation.arrays import Array, IntArray
 from estimation.fits.descent import Point
 from estimation.fits.greybox_loops import Kernel, compile_kernel
 from estimation.log_checks.bridging import bridged
@@ -15,8 +15,6 @@ from estimation.models.greybox import GreyBoxModel
 from plant.log.record import Record
 from plant.runs import steps_a_sample
 from plant.solvers.steps import Parameters, parameter_row
-
-Array = NDArray[np.float64]
 
 OUTLIER = 3.0
 """Residuals beyond this many standard deviations count linearly (Huber 1964) [dimensionless]."""
@@ -82,7 +80,7 @@ class GreyBoxLog:
     measured: Array
     parameters: Array
     sample_time: float
-    steps: NDArray[np.int64]
+    steps: IntArray
     noise: tuple[OutputNoise, ...]
     drive_std: tuple[float, ...] = ()
     uncertainties: Mapping[str, float] = field(default_factory=_nothing)
@@ -230,7 +228,7 @@ class Problem:
         self._kernel = kernel or compile_kernel(model)
         self._block = max(1, round(BLOCK / log.sample_time))
         presumed = [log.presumed.get(name, (1.0, np.inf)) for name in model.unknowns]
-        self._presumed = np.array([np.log(value) for value, _ in presumed])
+        self.presumed = np.array([np.log(value) for value, _ in presumed])
         self.prior = np.array([deviation**-2.0 for _, deviation in presumed])
 
     def on(self, log: GreyBoxLog) -> "Problem":
@@ -262,7 +260,7 @@ class Problem:
             Cost and normal equations; nothing as long as the log is stored.
         """
         cost, gradient, gram = self._run(theta, np.empty((0, 0)), np.empty((0, 0, 0)))
-        away = theta - self._presumed
+        away = theta - self.presumed
         cost += 0.5 * float(self.prior @ away**2)
         return Point(theta, cost, gradient + self.prior * away, gram + np.tril(gram, -1).T + np.diag(self.prior))
 
@@ -322,13 +320,16 @@ class Problem:
                 log.drives if drives is None else drives,
                 log.measured,
                 log.parameters if parameters is None else parameters,
-                log.sample_time,
-                log.steps,
-                self._block,
-                np.array([noise.variance for noise in log.noise]),
-                np.array([noise.walk * self._block * log.sample_time for noise in log.noise]),
+                *self._course(),
                 log.gaps,
                 OUTLIER,
                 errors,
                 slopes,
             )
+
+    def _course(self) -> tuple[float, IntArray, int, Array, Array]:
+        """Return sample time, model steps up to each sample, samples a block, and both noises of each output."""
+        log = self.log
+        variance = np.array([noise.variance for noise in log.noise])
+        walk = np.array([noise.walk * self._block * log.sample_time for noise in log.noise])
+        return log.sample_time, log.steps, self._block, variance, walk

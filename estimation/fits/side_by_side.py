@@ -1,0 +1,91 @@
+"""Kernels that predict a log by a grey-box model under several parameter sets side by side.
+
+A search by finite differences asks for a dozen nearby predictions of one log: as many as fit into the processor's
+vectors take little longer than one.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import TypeAlias
+
+from estimation.arrays import Array, IntArray
+from estimation.fits.greybox_loops import RUNAWAY, model_step
+from estimation.fits.side_by_side_loops import residuals_side_by_side
+from estimation.models.greybox import GreyBoxModel
+from plant.compiled.expression import as_expression, symbol
+from plant.compiled.hoist import hoisted
+from plant.compiled.native.load import load_native
+from plant.compiled.native.machine import native_width
+from plant.compiled.native.signature import signature_of
+from plant.compiled.pack import packed_source
+from plant.compiled.paste import MERGED, kernel_text, pasted
+from plant.compiled.simplify import fused, simplified
+from plant.compiled.source import lines_source, operations_source
+from plant.solvers.fixed_step_loops import lay, share
+from plant.solvers.steps import parameter_names, parameter_symbols
+
+LANES = 8
+"""Parameter sets side by side."""
+
+ResidualsRun: TypeAlias = Callable[[Array, Array, Array, float, IntArray, int, Array, Array, Array], None]
+"""``run(parameters, drives, measured, sample_time, substeps, block, variance, walk, errors)``, which fills errors."""
+
+
+@cache
+def compile_side_by_side(model: GreyBoxModel) -> ResidualsRun:
+    """Generate the kernel that gives a model's normalised residuals under several parameter sets.
+
+    Parameters
+    ----------
+    model : GreyBoxModel
+        The model; it is stepped by ROS2, second order and L-stable.
+
+    Returns
+    -------
+    callable
+        Takes what `estimation.fits.side_by_side_loops.residuals_side_by_side` does, `LANES` parameter rows.
+    """
+    takes = signature_of(residuals_side_by_side, lanes=LANES, outputs=len(model.outputs), drives=len(model.drives))
+    entries = {residuals_side_by_side.__name__: takes}
+    kernel = load_native(f"residuals_{model.name}_{LANES}", lambda: _source(model), entries, (model, native_width()))
+    return kernel.residuals_side_by_side
+
+
+def _source(model: GreyBoxModel) -> str:
+    """Write the kernel."""
+    names, drives = parameter_names(model.parameters), range(len(model.drives))
+    p = parameter_symbols(model.parameters)
+    begun = {f"x{i}": as_expression(value) for i, value in enumerate(model.initial(p))}
+    states = [symbol(name) for name in begun]
+    starts = [symbol(f"base{i}") + symbol("j") * symbol(f"rise{i}") for i in drives]
+    ends = [start + symbol(f"rise{i}") for i, start in zip(drives, starts, strict=True)]
+    moved = model_step(model, states, p, list(zip(starts, ends, strict=True)))
+    shown = {f"y{i}": as_expression(value) for i, value in enumerate(model.observe(tuple(states)))}
+    moving = [*begun, *(f"base{i}" for i in drives), *(f"rise{i}" for i in drives)]
+    settled, stepped = hoisted(
+        simplified(dict(zip(begun, moved, strict=True)), {*names, "h", "share"}), {*moving, "j"}, "c"
+    )
+    every = [*moving, *shown, "h", *names, *settled, "share"]
+    vector = min(LANES, native_width())
+    lines = {
+        "begin": lines_source("begin", begun),
+        "settle": lines_source("settle", settled),
+        "step": packed_source("step", fused(stepped)),
+        "show": lines_source("show", shown),
+    }
+    sizes = {
+        "LANES": LANES,
+        "VECTOR": vector,
+        "WIDTH": len(begun),
+        "DRIVES": len(drives),
+        "OUTPUTS": len(shown),
+        "COLUMNS": len(names),
+        "NUMBERS": LANES * len(every),
+        "RUNAWAY": RUNAWAY,
+    }
+    return kernel_text(
+        f"residuals of the {model.name} model, {LANES} parameter sets side by side",
+        operations_source(lines, {each: LANES * i for i, each in enumerate(every)}, vector),
+        pasted(lay, share, constants=sizes, options=MERGED),
+        pasted(residuals_side_by_side),
+    )

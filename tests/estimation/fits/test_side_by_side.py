@@ -1,0 +1,81 @@
+"""Residuals under parameter sets side by side are those of one run after the other."""
+
+import numpy as np
+import pytest
+
+from estimation.fits.freed_problem import NUDGE, FreedProblem
+from estimation.fits.greybox_loops import RUNAWAY
+from estimation.fits.greybox_problem import OUTLIER, Problem, greybox_log
+from estimation.fits.hypotheses import HYPOTHESES
+from estimation.fits.side_by_side import LANES, compile_side_by_side
+from estimation.fits.wide_problem import freed, usual_values, widened
+from estimation.models.flow import FLOW_FORM
+from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.sensors.sensors import BENCH
+from plant.solvers.steps import parameter_names
+
+HEALTHY = EhaParameters()
+VARIANCES = {"motor_speed_rad_s": 1e-4, "position_m": 1e-12, "differential_pressure_pa": 1e7}
+
+
+@pytest.fixture(scope="module")
+def problem() -> FreedProblem:
+    rng = np.random.default_rng(3)
+    record = simulate(CIRCUIT, make_drive("steps", 1.0, 1e-3, HEALTHY, rng), 1e-3, HEALTHY, sensors=BENCH, rng=rng)
+    pressure = record["differential_pressure_pa"].copy()
+    pressure[[20, 21, 22, 23, 300]] = np.nan
+    record = record.replace(differential_pressure_pa=pressure)
+    log = greybox_log(FLOW_FORM, record, HEALTHY, longest_step=2.5e-4, variances=VARIANCES)
+    return freed(widened(log, HEALTHY), HYPOTHESES)
+
+
+def points(problem: FreedProblem, count: int) -> np.ndarray:
+    usual = problem.model.theta({**usual_values(problem.log), "case_leakage": 1e-13, "speed_lead": 1e-5})
+    return usual + 0.02 * np.random.default_rng(4).standard_normal((count, len(usual)))
+
+
+def alone(problem: FreedProblem, theta: np.ndarray) -> np.ndarray:
+    """One run by the kernel that also carries sensitivities and gaps."""
+    row = problem.log.parameters.copy()
+    for name, value in problem.model.values(theta).items():
+        row[parameter_names(WideFlowParameters).index(name)] = value
+    return Problem(WIDE_FLOW_FORM, problem.log).residuals(np.empty(0), parameters=row)
+
+
+def test_each_lane_gives_the_residuals_of_a_run_alone(problem: FreedProblem) -> None:
+    for theta in points(problem, 3):
+        together, one = problem.residuals(theta), alone(problem, theta)
+        assert np.max(np.abs(one)) > 1.0
+        np.testing.assert_allclose(together, one, rtol=1e-7, atol=1e-7)
+
+
+def test_the_normal_equations_are_those_of_residuals_one_by_one(problem: FreedProblem) -> None:
+    (theta,) = points(problem, 1)
+    assert len(theta) + 1 > LANES
+    point, here = problem.at(theta), alone(problem, theta).ravel()
+    small = np.abs(here) < OUTLIER
+    for i in (0, 1, len(theta) - 1):
+        nudged = theta.copy()
+        nudged[i] += NUDGE
+        slope = (alone(problem, nudged).ravel() - here) / NUDGE
+        weight = np.where(small, 1.0, OUTLIER / np.maximum(np.abs(here), OUTLIER))
+        expected = float(slope @ (weight * here)) + problem.prior[i] * (theta[i] - problem.presumed[i])
+        assert point.gradient[i] == pytest.approx(expected, rel=1e-3, abs=1e-3)
+
+
+def test_a_run_that_escapes_keeps_a_finite_residual_and_leaves_its_neighbours_alone(problem: FreedProblem) -> None:
+    mad = problem.log.parameters.copy()
+    mad[parameter_names(WideFlowParameters).index("chamber_volume")] = np.nan
+    run = compile_side_by_side(WIDE_FLOW_FORM)
+    log, rows = problem.log, np.repeat(problem.log.parameters[None], LANES, axis=0)
+    rows[3] = mad
+    errors = np.zeros((1, len(log.measured), LANES))
+    noise = log.noise[0]
+    run(rows, log.drives, log.measured, log.sample_time, log.steps, 1, np.array([noise.variance]), np.zeros(1), errors)
+    assert np.max(np.abs(errors[..., 3])) == RUNAWAY
+    others = np.delete(errors, 3, axis=-1)
+    assert np.all(others == others[..., :1])
+    assert np.max(np.abs(others)) < RUNAWAY
