@@ -38,7 +38,18 @@ def functions_of(text: str) -> SimpleNamespace:
             node.decorator_list = []
     names: dict[str, Any] = {}
     exec(compile(ast.Module(kept, []), "kernel", "exec"), names)  # noqa: S102  our own text
+    for node in tree.body:
+        match node:
+            case ast.Assign([ast.Name(made)], ast.Call(ast.Name("function_of"), [ast.Name(lines), _])):
+                names[made] = _of_a_tuple(names[lines])
+            case _:
+                pass
     return SimpleNamespace(**names)
+
+
+def _of_a_tuple(lines: FunctionType) -> Callable[[tuple[float, ...]], tuple[float, ...]]:
+    """Lines of a kernel, as a function from a tuple to a tuple."""
+    return lambda given: tuple(in_python(lines)(*given).values())
 
 
 def _is_made(node: ast.stmt) -> bool:

@@ -77,7 +77,8 @@ class FreedProblem(Problem):
     def _residuals(self, thetas: Array, drives: Array | None, parameters: Array) -> Array:
         """Return the normalised residuals at some points, shape (outputs, blocks, points)."""
         rows = np.repeat(parameters[None], len(thetas), axis=0)
-        rows[:, self._columns] = [list(self.model.values(theta).values()) for theta in thetas]
+        for i in range(len(rows)):
+            rows[i, self._columns] = list(self.model.values(thetas[i]).values())
         if self.log.gaps.size:  # what a gap leaves open is followed by the kernel of one run
             return np.stack([self._alone(row, drives) for row in rows], axis=-1)
         run, log = compile_side_by_side(self._bare), self.log

@@ -268,12 +268,12 @@ def without_saturated(record: Record, parameters: EhaParameters) -> tuple[Record
         levels = _clipping_levels(values, parameters, both=channel == PRESSURE)
         if not levels:
             continue
-        from scipy.ndimage import maximum_filter1d
-
         clipped = np.isin(values, levels)
         noise = measurement_variances(record.replace(**{channel: np.where(clipped, np.nan, values)}), (channel,))
         close = np.min([np.abs(values - level) for level in levels], axis=0) < BAND * noise[channel] ** 0.5
-        around = maximum_filter1d(clipped, 2 * round(AROUND / record.sample_time) + 1)
+        reach = round(AROUND / record.sample_time)
+        counts = np.cumsum(np.pad(clipped, (reach + 1, reach)))
+        around = counts[2 * reach + 1 :] > counts[: -2 * reach - 1]
         share = 100.0 * np.count_nonzero(clipped) / np.count_nonzero(np.isfinite(values))
         at = " and ".join(f"{level:.4g}" for level in levels)
         said.append(SensorCode.SENSOR_CLIPPED.note(channel=channel, levels=at, percent=share))

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
-from types import ModuleType
 from typing import TypeAlias
 
 import numpy as np
@@ -18,9 +17,9 @@ from estimation.models.eha_forms import BULK_MODULUS
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import ONE, ZERO, jacobian, symbol
-from plant.compiled.kernel_file import load_kernel
+from plant.compiled.native.load import NativeKernel, load_native
+from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import BORROWING, kernel_text, pasted
-from plant.compiled.source import INTRINSICS
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
 from plant.log.record import Record
@@ -158,7 +157,29 @@ def run(
     right: Times,
     look: Look,
 ) -> Array:
-    """Carry a covariance along the model's own run: through each step, then by what each channel tells."""
+    """Carry a covariance along the model's own run: through each step, then by what each channel tells.
+
+    Parameters
+    ----------
+    state : ndarray, shape (states,)
+        The model's start, in its scaled units.
+    P : ndarray, shape (states, states)
+        Its covariance, which is carried in place.
+    noise : ndarray, shape (states,)
+        Variance that process noise adds in a step.
+    variances : ndarray, shape (channels,)
+        Of the channels [SI squared].
+    drives : ndarray, shape (n, drives)
+        Drives at the samples [SI].
+    parameters : ndarray, shape (parameters,)
+        The actuator's row.
+    h : float
+        Length of a step [s].
+    substeps, every : int
+        Steps a sample, and samples a row of the track.
+    track, deviations : ndarray, shape (rows, states)
+        Filled with the states and their deviations.
+    """
     F, FP, H, PH = np.empty(SLOPES), np.empty((WIDTH, WIDTH)), np.zeros((len(variances), WIDTH)), np.empty(WIDTH)
     for k in range(drives.shape[0]):
         if k > 0:
@@ -197,7 +218,7 @@ def inform(P: Array, H: Array, variance: float, PH: Array, *, WIDTH: int) -> Non
 
 
 @cache
-def _compile(model: ProcessModel, channels: tuple[str, ...]) -> ModuleType:
+def _compile(model: ProcessModel, channels: tuple[str, ...]) -> NativeKernel:
     """Generate the recursion: the step and its Jacobian written out, the covariance in loops over what is not zero.
 
     Written out whole, as the filters are, thirteen states take a compiler a minute.
@@ -227,7 +248,6 @@ def _compile(model: ProcessModel, channels: tuple[str, ...]) -> ModuleType:
     seen = {f"H{c}_{k}": H[c][k] for c in range(len(channels)) for k in every if H[c][k] is not ZERO}
     shown = {name: f"H[{name[1:].replace('_', ', ')}]" for name in seen}
     parts = (
-        INTRINSICS,
         function_source("move", "state, parameters, before, after, j, h, share, F", reads, moved, kept | state),
         times("left", "F, P, FP, c", "P[{}, c]", "FP[{}, c]"),
         times("right", "F, FP, P, c", "FP[c, {}]", "P[c, {}]"),
@@ -236,7 +256,7 @@ def _compile(model: ProcessModel, channels: tuple[str, ...]) -> ModuleType:
         pasted(run, constants={"WIDTH": n, "SLOPES": max(1, len(slopes))}),
     )
     title = f"the posterior Cramér-Rao bound of the {model.name} form, in scaled units"
-    return load_kernel(f"bound_{model.name}", kernel_text(title, *parts))
+    return load_native(f"bound_{model.name}", kernel_text(title, *parts), {"run": signature_of(run)})
 
 
 def bulk_modulus_bound(

@@ -1,9 +1,6 @@
 """The Cramér-Rao bound says beforehand what a drive and its sensors can tell."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,6 +22,7 @@ from plant.eha.simulate import LUMPED, simulate
 from plant.errors import HydrostateError, LogError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, Sensors, noise_variances
+from tests.kernels import functions_of, text_of
 
 MOTION = ("position_m", "velocity_m_s")
 ALL = (*MOTION, "differential_pressure_pa")
@@ -173,15 +171,15 @@ def test_no_estimate_is_better_than_the_bound_without_process_noise(
 
 
 def test_the_recursion_run_as_python_gives_what_its_kernel_gives(
-    linear: ProcessModel, as_python: Callable[..., Callable[..., Any]], monkeypatch: pytest.MonkeyPatch
+    linear: ProcessModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drive = Record(1e-3, {"motor_speed_rad_s": np.linspace(0.0, 1.0, 6)})
     prior = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1e-4, 1e-3, 1.0]))
     given = (linear, prior, drive, EhaParameters())
     variances = {"position_m": 1e-4, "velocity_m_s": 1e-2}
     compiled = posterior_bound(*given, variances=variances)
-    run = as_python(bounds.run, bounds._compile(linear, tuple(variances)).run)
-    monkeypatch.setattr(bounds, "_compile", lambda *_: SimpleNamespace(run=run))
+    kernel = functions_of(text_of(monkeypatch, bounds, lambda: bounds._compile.__wrapped__(linear, tuple(variances))))
+    monkeypatch.setattr(bounds, "_compile", lambda *_: kernel)
     plain = posterior_bound(*given, variances=variances)
     np.testing.assert_array_equal(plain.std, compiled.std)
     np.testing.assert_array_equal(plain.mean, compiled.mean)
