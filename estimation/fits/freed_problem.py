@@ -80,7 +80,7 @@ class FreedProblem(Problem):
         for i in range(len(rows)):
             rows[i, self._columns] = list(self.model.values(thetas[i]).values())
         if self.log.gaps.size:  # what a gap leaves open is followed by the kernel of one run
-            return np.stack([self._alone(row, drives) for row in rows], axis=-1)
+            return np.stack([self._alone(rows[i], drives) for i in range(len(rows))], axis=-1)
         run, log = compile_side_by_side(self._bare), self.log
         filled = np.concatenate([rows, np.repeat(rows[-1:], -len(rows) % LANES, axis=0)])
         found = np.zeros((len(filled) // LANES, *self._room(LANES).shape))
