@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -23,11 +23,9 @@ from estimation.trust.bounds import bulk_modulus_bound
 from estimation.trust.consistency import MISMATCH_NIS
 from plant.eha.doubts import Spread
 from plant.eha.model import EhaParameters
-from plant.errors import HydrostateError, LogWarning
+from plant.errors import HydrostateError, LogWarning, require_known
 from plant.log.record import Record
 from plant.notes import Note
-
-T = TypeVar("T")
 
 SPEED = "motor_speed_rad_s"
 
@@ -220,9 +218,9 @@ def estimate_clean(
             f"got method {options.method!r}"
         )
     else:
-        model = _chosen(FORMS, form, "form")
+        require_known("form", form, FORMS)
         how = options.filter_options
-        found = estimate_by_filter(log, parameters, model, guess, options.start_std, how)
+        found = estimate_by_filter(log, parameters, FORMS[form], guess, options.start_std, how)
     return _doubting_sensors(_with_rig(found, parameters, spreads), log)
 
 
@@ -319,13 +317,5 @@ def _fitted(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEs
         channels=channels,
         nis={channels[-1]: fit.chi_square},
         others={name: found for name, found in fit.parameters.items() if known and name in REPORTED},
-        estimate=None,
-        first_pass=None,
         explanation=fit.explanation,
     )
-
-
-def _chosen(registry: Mapping[str, T], name: str, what: str) -> T:
-    if name not in registry:
-        raise HydrostateError(f"{what} must be one of {', '.join(registry)}, got {name!r}")
-    return registry[name]

@@ -66,8 +66,8 @@ class BulkModulusEstimate:
     channels: tuple[str, ...]
     nis: Mapping[str, float]
     others: Mapping[str, tuple[float, float]]
-    estimate: Estimate | None
-    first_pass: Estimate | None
+    estimate: Estimate | None = None
+    first_pass: Estimate | None = None
     responses: Mapping[str, Responses] = field(default_factory=lambda: MappingProxyType({}))
     spreads: Mapping[str, Spread] = field(default_factory=lambda: MappingProxyType({}))
     tuning: Tuning | None = None
@@ -158,6 +158,4 @@ def without_number(
         channels=channels,
         nis={},
         others={},
-        estimate=None,
-        first_pass=None,
     )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from experiments.command.json_output import json_text
-from experiments.command.options import Json, option
+from experiments.command.options import Json, argument, flag, option
 from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, emit, note
 from plant.errors import HydrostateError
 
@@ -38,24 +38,15 @@ commands = typer.Typer()
 
 @commands.command(epilog="Example: hydrostate batch fleet-archive --logs 'archive/**/*.csv' --out results/fleet")
 def batch(
-    study: Annotated[
-        str,
-        typer.Argument(
-            metavar="STUDY",
-            help="Study file (TOML), or one that comes along: eha-paper, fleet-archive.",
-            show_default=False,
-        ),
-    ],
+    study: Annotated[str, argument("STUDY", "Study file (TOML), or one that comes along: eha-paper, fleet-archive.")],
     out: Annotated[
         str | None, option("STORE", "Folder or URL (s3://...) of the store; results/<study> by default.", "--out", "-o")
     ] = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Say how many cases there are and what they cost.")
-    ] = False,
+    dry_run: Annotated[bool, flag("--dry-run", "Say how many cases there are and what they cost.")] = False,
     resume: Annotated[
-        bool, typer.Option("--resume/--no-resume", help="Keep the cases that the store has, or run all of them again.")
+        bool, flag("--resume/--no-resume", "Keep the cases that the store has, or run all of them again.")
     ] = True,
-    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run failed cases again.")] = False,
+    retry_failed: Annotated[bool, flag("--retry-failed", "Run failed cases again.")] = False,
     workers: Annotated[
         int | None, option("N", "Processes, one thread each; the machine's cores by default.", "--workers", min=1)
     ] = None,

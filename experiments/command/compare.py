@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from experiments.command.json_output import json_text, write_whole
-from experiments.command.options import SEED, Json, Seed, option
+from experiments.command.options import SEED, Json, Seed, argument, option
 from experiments.command.terminal import emit, note, rendered, table
 
 commands = typer.Typer()
@@ -14,8 +14,8 @@ commands = typer.Typer()
 
 @commands.command(epilog="Example: hydrostate compare results/before results/after --out comparison.html")
 def compare(
-    first: Annotated[str, typer.Argument(metavar="A", help="Store of the first study.", show_default=False)],
-    second: Annotated[str, typer.Argument(metavar="B", help="Store of the second study.", show_default=False)],
+    first: Annotated[str, argument("A", "Store of the first study.")],
+    second: Annotated[str, argument("B", "Store of the second study.")],
     out: Annotated[Path | None, option("HTML", "Also write a page with every condition.", "--out", "-o")] = None,
     seed: Seed = SEED,
     as_json: Json = False,
@@ -57,7 +57,7 @@ def compare(
 
 @commands.command(epilog="Example: hydrostate report results/eha-paper --out report")
 def report(
-    store: Annotated[str, typer.Argument(metavar="STORE", help="Store of a batch study.", show_default=False)],
+    store: Annotated[str, argument("STORE", "Store of a batch study.")],
     out: Annotated[str | None, option("DIR", "Another folder than the store's own.", "--out", "-o")] = None,
 ) -> None:
     """Write the report of a batch study from its store alone, also while the study runs.

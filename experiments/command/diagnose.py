@@ -20,6 +20,7 @@ from experiments.command.options import (
     RigFile,
     SampleTime,
     Seed,
+    flag,
     option,
 )
 
@@ -39,19 +40,19 @@ def diagnose(
     beside: Beside = None,
     transfer_functions: Annotated[
         bool,
-        typer.Option(
+        flag(
             "--transfer-functions/--no-transfer-functions",
-            help="Also score nine transfer functions, identified from simulated tests of the rig (some 20 s, once).",
+            "Also score nine transfer functions, identified from simulated tests of the rig (some 20 s, once).",
         ),
     ] = False,
     scores: Annotated[
-        bool, typer.Option("--scores/--no-scores", help="Also show every condition's model error in a table.")
+        bool, flag("--scores/--no-scores", "Also show every condition's model error in a table.")
     ] = False,
     report: Annotated[
         Path | None, option("FILE", "Write a page (HTML); of several logs, one each.", "--report")
     ] = None,
     no_pressure: Annotated[
-        bool, typer.Option("--no-pressure", help="Use velocity alone, even if differential pressure is logged.")
+        bool, flag("--no-pressure", "Use velocity alone, even if differential pressure is logged.")
     ] = False,
     plant: Plant = None,
     bias_pressure: BiasPressure = None,

@@ -21,6 +21,7 @@ from experiments.command.options import (
     RigFile,
     SampleTime,
     Seed,
+    flag,
     option,
 )
 
@@ -70,11 +71,9 @@ def estimate(
             "position, pressure. All by default.",
         ),
     ] = "",
-    tune: Annotated[
-        bool, typer.Option("--tune", help="Tune the filter's noise levels to the log by likelihood.")
-    ] = False,
+    tune: Annotated[bool, flag("--tune", "Tune the filter's noise levels to the log by likelihood.")] = False,
     smooth: Annotated[
-        bool, typer.Option("--smooth", help="Smooth: what the whole log says of every sample (method smoother).")
+        bool, flag("--smooth", "Smooth: what the whole log says of every sample (method smoother).")
     ] = False,
     robust: Annotated[str, option("HOW", "How gross outliers count in a filter: none, huber or student-t.")] = "none",
     figure: Annotated[
@@ -94,7 +93,7 @@ def estimate(
         float, option("PA", "Standard deviation of the first guess [Pa]; convergence needs 1e8.", show_default="3e8")
     ] = 3e8,
     no_pressure: Annotated[
-        bool, typer.Option("--no-pressure", help="Use position and velocity alone, even if pressure is logged.")
+        bool, flag("--no-pressure", "Use position and velocity alone, even if pressure is logged.")
     ] = False,
     out: Out = None,
     seed: Seed = SEED,

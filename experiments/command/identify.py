@@ -21,11 +21,10 @@ from experiments.command.options import (
     load_columns,
     load_rig,
     option,
-    require_one_of,
     require_positive,
 )
 from experiments.command.terminal import short_names, table
-from plant.errors import HydrostateError
+from plant.errors import HydrostateError, require_known
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -203,7 +202,7 @@ def identify(
 
 def _form(structure: str, order: str, delay: str, numerator: int | None) -> dict[str, Any]:
     """Return the form of the model as `identify_record` takes it."""
-    require_one_of("--structure", structure, list(STRUCTURES))
+    require_known("--structure", structure, list(STRUCTURES))
     wanted_order, wanted_delay = whole_or_auto("--order", order, 1), whole_or_auto("--delay", delay, 0)
     fixed = wanted_order or 2
     direct = wanted_order is None or not wanted_delay

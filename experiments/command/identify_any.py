@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish, run_logs
-from experiments.command.options import figure_path, require_one_of, require_positive
+from experiments.command.options import figure_path, require_positive
 from experiments.command.terminal import clauses, table
-from plant.errors import HydrostateError
+from plant.errors import HydrostateError, require_known
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -79,7 +79,7 @@ def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path
         raise HydrostateError("--input and --output are wanted together, a column each at least")
     if twice := set(asked.inputs) & set(asked.outputs):
         raise HydrostateError(f"--input and --output must be different channels, got {min(twice)!r} for both")
-    require_one_of("--structure", asked.structure, FREE_STRUCTURES)
+    require_known("--structure", asked.structure, FREE_STRUCTURES)
     require_positive("--sample-time", asked.sample_time, "s")
     require_positive("--resample", asked.resampled, "s")
     prepare_output(out)

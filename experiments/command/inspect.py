@@ -9,7 +9,7 @@ import typer
 
 from experiments.command.json_output import Result, plain, write_whole
 from experiments.command.logs import caught, finish, read_log, run_logs
-from experiments.command.options import Beside, Json, Out, Plant, SampleTime, load_actuator, option
+from experiments.command.options import Beside, Json, Out, Plant, SampleTime, argument, load_actuator, option
 from experiments.command.terminal import sparkline, table, visible
 from plant.errors import HydrostateError
 
@@ -33,11 +33,10 @@ commands = typer.Typer()
 def inspect(
     logs: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="FILE",
-            help="Logs in any format that is read: text with any delimiter, Parquet, Feather, MAT; with "
+        argument(
+            "FILE",
+            "Logs in any format that is read: text with any delimiter, Parquet, Feather, MAT; with "
             "hydrostate[bench] XLSX, TDMS, MDF, HDF5.",
-            show_default=False,
         ),
     ],
     html: Annotated[Path | None, option("HTML", "Also draw every column, on a page.")] = None,

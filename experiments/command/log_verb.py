@@ -8,9 +8,9 @@ import typer
 
 from experiments.command.json_output import Result, prepare_output, write_whole
 from experiments.command.logs import finish, read_log, run_logs
-from experiments.command.options import figure_path, load_actuator, load_columns, require_one_of, understood
+from experiments.command.options import figure_path, load_actuator, load_columns, understood
 from experiments.command.terminal import clauses, note
-from plant.errors import HydrostateError
+from plant.errors import HydrostateError, require_known
 
 if TYPE_CHECKING:
     from estimation.finding import Finding
@@ -44,7 +44,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     expected: str | None = asked["condition"] if diagnosing else None
     report: Path | None = asked["report"].with_suffix(".html") if asked.get("report") else None
     if expected is not None:
-        require_one_of("--condition", expected, kind.conditions)
+        require_known("--condition", expected, kind.conditions)
 
     beside: list[Path] = asked.get("beside") or []
     if beside and len(logs) > 1:

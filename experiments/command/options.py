@@ -20,18 +20,27 @@ def option(metavar: str, said: str, *names: str, **more: Any) -> Any:
     return typer.Option(*names, metavar=metavar, help=said, **more)
 
 
+def flag(names: str, said: str) -> Any:
+    """Return an option of the command line that is given or not, with what its help says."""
+    return typer.Option(names, help=said)
+
+
+def argument(metavar: str, said: str) -> Any:
+    """Return an argument of the command line, with what its help says."""
+    return typer.Argument(metavar=metavar, help=said, show_default=False)
+
+
 Logs: TypeAlias = Annotated[
     list[Path],
-    typer.Argument(
-        metavar="LOG",
-        help="Logs: CSV, Parquet or MAT, with time_s, motor_speed_rad_s, and position_m or velocity_m_s; "
+    argument(
+        "LOG",
+        "Logs: CSV, Parquet or MAT, with time_s, motor_speed_rad_s, and position_m or velocity_m_s; "
         "differential_pressure_pa is optional. Another unit stands in the name (position_mm, motor_speed_rpm). "
         "`hydrostate inspect` shows what any other file holds, and names its columns.",
-        show_default=False,
     ),
 ]
 Json: TypeAlias = Annotated[
-    bool, typer.Option("--json", help="Print one JSON document, a list with one object a log; notes go to stderr.")
+    bool, flag("--json", "Print one JSON document, a list with one object a log; notes go to stderr.")
 ]
 Out: TypeAlias = Annotated[
     Path | None,
@@ -119,7 +128,7 @@ Healthy: TypeAlias = Annotated[
 ]
 Noise: TypeAlias = Annotated[str, option("NOISE", "Noise of the sensors: bench, rig or paper.")]
 Drive: TypeAlias = Annotated[str, option("DRIVE", "Drive: sine, prbs, steps, chirp or multisine, at the paper's 4 V.")]
-Ranked: TypeAlias = Annotated[bool, typer.Option("--rank", help="Rank all drives, the one that tells most first.")]
+Ranked: TypeAlias = Annotated[bool, flag("--rank", "Rank all drives, the one that tells most first.")]
 
 PRESSURE = "differential_pressure_pa"
 """The channel that is optional everywhere."""
@@ -188,18 +197,6 @@ def require_positive(option: str, value: float | None, unit: str) -> None:
     """
     if value is not None and not (math.isfinite(value) and value > 0.0):
         raise HydrostateError(f"{option} must be positive and finite, got {value:g} {unit}")
-
-
-def require_one_of(option: str, value: str, known: Sequence[str]) -> None:
-    """Refuse an option that is none of the names known.
-
-    Raises
-    ------
-    HydrostateError
-        If it is none of them.
-    """
-    if value not in known:
-        raise HydrostateError(f"{option} must be one of {', '.join(known)}, got {value!r}")
 
 
 def figure_path(target: Path | None, log: Path, logs: int) -> Path | None:

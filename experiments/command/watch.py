@@ -15,7 +15,7 @@ import typer
 
 from experiments.command.json_output import plain
 from experiments.command.logs import caught, read_log, with_rig_columns
-from experiments.command.options import PRESSURE, Columns, RigFile, load_columns, load_rig, option
+from experiments.command.options import PRESSURE, Columns, RigFile, argument, flag, load_columns, load_rig, option
 from experiments.command.terminal import SOME_FAILED, emit, note, unexpected
 from plant.errors import HydrostateError, LogError
 from plant.notes import distinct
@@ -46,11 +46,10 @@ commands = typer.Typer()
 def watch(
     log: Annotated[
         str,
-        typer.Argument(
-            metavar="LOG",
-            help="A log, or - for rows of CSV on standard input: a header, then time_s, motor_speed_rad_s, and "
+        argument(
+            "LOG",
+            "A log, or - for rows of CSV on standard input: a header, then time_s, motor_speed_rad_s, and "
             "position_m or velocity_m_s; differential_pressure_pa is optional. Another unit stands in the name.",
-            show_default=False,
         ),
     ],
     false_alarms: Annotated[float, option("RATE", "False alarms an hour of healthy, moving operation [1/h].")] = 1.0,
@@ -63,7 +62,7 @@ def watch(
     rig: RigFile = None,
     columns: Columns = None,
     no_pressure: Annotated[
-        bool, typer.Option("--no-pressure", help="Use motion alone, even if differential pressure is logged.")
+        bool, flag("--no-pressure", "Use motion alone, even if differential pressure is logged.")
     ] = False,
 ) -> None:
     """Say when something changes inside the actuator: one JSON object a line, as it happens.

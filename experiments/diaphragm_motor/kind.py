@@ -12,7 +12,6 @@ from estimation.diaphragm_motor.signature import Signature, logged_signature
 from estimation.finding import Finding
 from experiments.actuator_kind import ActuatorKind, Experiment, LogVerb, Options, Run, Simulation
 from experiments.command.json_output import Result
-from experiments.command.options import require_one_of
 from experiments.command.terminal import short_names, table
 from experiments.log_pages.entries import BLANK, finding_entries, quantity_entry
 from faults.diaphragm_motor.diagnose import Match
@@ -21,7 +20,7 @@ from faults.diaphragm_motor.finding import motor_fault_finding, severity_of
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import ELECTRODES, MOTOR_SENSORS, NAME, SAMPLE_TIME, motor_drive, simulate_motor
 from plant.eha.rig import Rig
-from plant.errors import HydrostateError
+from plant.errors import HydrostateError, require_known
 from plant.log.columns import CHANNELS
 from plant.notes import Code
 
@@ -44,7 +43,7 @@ class MotorRunCode(Code):
 
 
 def _simulated(rig: Rig[Any], options: Options) -> Run:
-    require_one_of("--sensors", options["sensors"], list(MOTOR_SENSORS))
+    require_known("--sensors", options["sensors"], list(MOTOR_SENSORS))
     frequency, swing, between = (options[name] for name in ("frequency", "voltage", "sample_time"))
     healthy = _loaded(rig, options).parameters
     motor = _with_fault(healthy, options["fault"])

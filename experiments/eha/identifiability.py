@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from experiments.command.json_output import Result
-from experiments.command.options import PRESSURE, require_one_of, require_positive
+from experiments.command.options import PRESSURE, require_positive
 from experiments.command.terminal import note, table
-from plant.errors import DriveError, HydrostateError
+from plant.errors import DriveError, HydrostateError, require_known
 
 if TYPE_CHECKING:
     import numpy as np
@@ -109,8 +109,8 @@ def checked_experiment(options: Mapping[str, Any]) -> dict[str, str]:
 
     channels = sensed_channels(options["sensors"])
     seconds, rate = options["seconds"], options["rate"]
-    require_one_of("--noise", options["noise"], [name for name in SENSORS if name != "ideal"])
-    require_one_of("--drive", options["drive"], list(DRIVES))
+    require_known("--noise", options["noise"], [name for name in SENSORS if name != "ideal"])
+    require_known("--drive", options["drive"], list(DRIVES))
     require_positive("--seconds", seconds, "s")
     require_positive("--rate", rate, "Hz")
     if not 2.0 <= seconds * rate <= MOST_SAMPLES:
@@ -168,7 +168,7 @@ def sensed_channels(listed: str) -> dict[str, str]:
     """
     given = [name.strip() for name in listed.split(",")]
     for i, name in enumerate(given):
-        require_one_of("--sensors", name, list(CHANNELS))
+        require_known("--sensors", name, list(CHANNELS))
         if name in given[:i]:
             raise HydrostateError(f"--sensors names {name} twice")
     return {name: channel for name, channel in CHANNELS.items() if name in given}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.actuator_kind import ActuatorKind, Experiment, LogVerb, Options, Run, Simulation
 from experiments.command.json_output import Result
-from experiments.command.options import PRESSURE, require_one_of, require_positive
+from experiments.command.options import PRESSURE, require_positive
 from experiments.command.terminal import note
 from experiments.eha.entries import NO_DIAGNOSIS, NO_ESTIMATE, diagnosis_entries, estimate_entries
 from experiments.eha.identifiability import CHANNELS as SENSORS
@@ -16,7 +16,7 @@ from experiments.eha.identifiability import cards_of, experiment_entries, experi
 from experiments.eha.screens import diagnoses_shown, estimates_shown
 from faults.conditions import CONDITIONS, LEVELS, find_condition, parameters_for, severity
 from plant.eha.model import EhaParameters
-from plant.errors import HydrostateError
+from plant.errors import HydrostateError, require_known
 from plant.log.columns import CHANNELS
 from plant.notes import Code
 
@@ -57,8 +57,8 @@ def _simulated(rig: "Rig[Any]", options: Options) -> Run:
 
     plant = options["plant"] if options["plant"] in PLANTS else "lumped"
     drive, sensors, seed = options["drive"], options["sensors"], options["seed"]
-    require_one_of("--drive", drive, list(DRIVES))
-    require_one_of("--sensors", sensors, list(NOISE))
+    require_known("--drive", drive, list(DRIVES))
+    require_known("--sensors", sensors, list(NOISE))
     parameters, made_of = _faulty(rig.parameters, options)
     drive_rng, sensor_rng = np.random.default_rng(seed).spawn(2)
     speed = make_drive(drive, options["duration"], options["sample_time"], parameters, drive_rng)
@@ -101,14 +101,14 @@ def _how(options: Options) -> "EstimateOptions":
     from estimation.models.eha_forms import FORMS
 
     form, method, robust, start = (options[name] for name in ("form", "method", "robust", "start"))
-    require_one_of("--form", form, ["auto", *FITTED, *FORMS])
-    require_one_of("--method", method, ["auto", LEAST_SQUARES, *METHODS])
-    require_one_of("--robust", robust, list(ROBUST))
+    require_known("--form", form, ["auto", *FITTED, *FORMS])
+    require_known("--method", method, ["auto", LEAST_SQUARES, *METHODS])
+    require_known("--robust", robust, list(ROBUST))
     if options["smooth"] and method not in ("auto", "ekf", "smoother"):
         raise HydrostateError(f"--smooth smooths the ekf, got --method {method}")
     wanted = _listed(options["states"])
     for name in wanted:
-        require_one_of("--states", name, [*GROUPS, *AUGMENTABLE])
+        require_known("--states", name, [*GROUPS, *AUGMENTABLE])
     require_positive("--start-std", options["start_std"], "Pa")
     if start != 0.0:
         require_positive("--start", start, "Pa")
@@ -120,7 +120,7 @@ def _unused(sensors: str, no_pressure: bool) -> frozenset[str]:
     """Return the channels that are not to be used."""
     used = _listed(sensors)
     for name in used:
-        require_one_of("--sensors", name, list(SENSORS))
+        require_known("--sensors", name, list(SENSORS))
     left_out = {channel for name, channel in SENSORS.items() if used and name not in used}
     return frozenset(left_out | ({PRESSURE} if no_pressure else set()))
 

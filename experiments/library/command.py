@@ -8,7 +8,7 @@ import typer
 
 from experiments.command.json_output import Result
 from experiments.command.logs import Batch, finish
-from experiments.command.options import SEED, Json, Seed, option
+from experiments.command.options import SEED, Json, Seed, argument, option
 from experiments.command.studies import finish_study
 from experiments.command.terminal import table
 from plant.errors import HydrostateError
@@ -21,10 +21,7 @@ commands = typer.Typer()
 
 @commands.command(epilog="Example: hydrostate library --out results/library --seed 2024")
 def library(
-    file: Annotated[
-        Path | None,
-        typer.Argument(metavar="FILE", help="A library to show; the one that ships unless given.", show_default=False),
-    ] = None,
+    file: Annotated[Path | None, argument("FILE", "A library to show; the one that ships unless given.")] = None,
     out: Annotated[Path | None, option("DIR", "Build it anew, into this folder.", "--out", "-o")] = None,
     seed: Seed = SEED,
     as_json: Json = False,

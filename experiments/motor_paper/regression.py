@@ -13,7 +13,7 @@ from scipy.stats import norm
 
 from experiments.page.frames import Frames, stacked
 from experiments.published import load
-from plant.errors import HydrostateError
+from plant.errors import require_known
 
 FLOW, DEFORMATION, VELOCITY = "output_flow_qg", "deformation_delta_mm", "fluid_velocity_v"
 
@@ -44,8 +44,7 @@ def reading(name: str) -> pd.DataFrame:
     >>> reading("anova")["output_flow_qg"].tolist()[5], reading("physical")["output_flow_qg"].tolist()[5]
     (0.0868, 0.0568)
     """
-    if name not in READINGS:
-        raise HydrostateError(f"reading must be one of {', '.join(READINGS)}, got {name!r}")
+    require_known("reading", name, READINGS)
     table = load("table2")
     for (row, column), value in READINGS[name].items():
         table.loc[row, column] = value
@@ -133,23 +132,20 @@ def residual_table() -> Frames:
         found = fit(table)
         influence = found.get_influence()
         percentile = 100.0 * (np.arange(len(table)) + 0.5) / len(table)
-        part = pd.DataFrame(
-            {
-                "reading": name,
-                "row": np.arange(1, len(table) + 1),
-                "flow": table[FLOW],
-                "deformation": table[DEFORMATION],
-                "velocity": table[VELOCITY],
-                "predicted": found.fittedvalues,
-                "residual": found.resid,
-                "standardised_residual": influence.resid_studentized_internal,
-                "leverage": influence.hat_matrix_diag,
-                "percentile": percentile,
-                "sorted_flow": np.sort(table[FLOW].to_numpy()),
-                "normal_score": norm.ppf(percentile / 100.0),
-            }
-        )
-        yield part
+        yield {
+            "reading": name,
+            "row": np.arange(1, len(table) + 1),
+            "flow": table[FLOW],
+            "deformation": table[DEFORMATION],
+            "velocity": table[VELOCITY],
+            "predicted": found.fittedvalues,
+            "residual": found.resid,
+            "standardised_residual": influence.resid_studentized_internal,
+            "leverage": influence.hat_matrix_diag,
+            "percentile": percentile,
+            "sorted_flow": np.sort(table[FLOW].to_numpy()),
+            "normal_score": norm.ppf(percentile / 100.0),
+        }
 
 
 def inflations(found: Any) -> list[float]:

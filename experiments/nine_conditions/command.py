@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.command.options import SEED, Json, Seed
+from experiments.command.options import SEED, Json, Seed, flag
 from experiments.command.studies import Folder, finish_study
 
 commands = typer.Typer()
@@ -15,9 +15,7 @@ commands = typer.Typer()
 def study(
     out: Folder = Path("results/nine-conditions"),
     seed: Seed = SEED,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="A smaller study, in under 20 s once kernels are compiled.")
-    ] = False,
+    quick: Annotated[bool, flag("--quick", "A smaller study, in under 20 s once kernels are compiled.")] = False,
     as_json: Json = False,
 ) -> None:
     """Simulate, estimate, identify and diagnose the nine conditions; write a report beside the published results.

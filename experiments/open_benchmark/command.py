@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from experiments.command.json_output import json_text
-from experiments.command.options import Json, require_positive
+from experiments.command.options import Json, option, require_positive
 from experiments.command.studies import Folder, finish_study
 from experiments.command.terminal import emit
 
@@ -18,12 +18,9 @@ def make(
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="DIR", help="A folder of each kind goes below it.")
     ] = Path("open-benchmark"),
-    kind: Annotated[
-        list[str] | None,
-        typer.Option(metavar="KIND", help="A kind, may be given several times.", show_default="all"),
-    ] = None,
-    split: Annotated[str, typer.Option(metavar="SPLIT", help="training, validation or test.")] = "test",
-    count: Annotated[int, typer.Option(metavar="N", help="Logs of each kind.")] = 10,
+    kind: Annotated[list[str] | None, option("KIND", "A kind, may be given several times.", show_default="all")] = None,
+    split: Annotated[str, option("SPLIT", "training, validation or test.")] = "test",
+    count: Annotated[int, option("N", "Logs of each kind.")] = 10,
     as_json: Json = False,
 ) -> None:
     """Write logs with truth.csv, and a rig file where the actuator is not the paper's; same options, same bits.
@@ -54,8 +51,8 @@ def kinds(as_json: Json = False) -> None:
 @commands.command(epilog="Example: hydrostate benchmark baselines --out results/open-benchmark --training 90 --test 9")
 def baselines(
     out: Folder = Path("results/open-benchmark"),
-    training: Annotated[int, typer.Option(metavar="N", help="Plain logs to learn from.")] = 360,
-    test: Annotated[int, typer.Option(metavar="N", help="Logs of each kind to judge.")] = 18,
+    training: Annotated[int, option("N", "Plain logs to learn from.")] = 360,
+    test: Annotated[int, option("N", "Logs of each kind to judge.")] = 18,
     as_json: Json = False,
 ) -> None:
     """Judge ways to name a condition beside `diagnose`: RMSE as published, learners on features and random kernels.

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.command.options import SEED, Json, Seed, option, require_positive
+from experiments.command.options import SEED, Json, Seed, flag, option, require_positive
 from experiments.command.studies import Folder, finish_study
 
 commands = typer.Typer()
@@ -14,7 +14,7 @@ commands = typer.Typer()
 @commands.command("piezo-stack", epilog="Example: hydrostate piezo-stack --out results/piezo-stack --quick")
 def piezo_stack(
     out: Folder = Path("results/piezo-stack"),
-    quick: Annotated[bool, typer.Option("--quick", help="A small design map, in seconds.")] = False,
+    quick: Annotated[bool, flag("--quick", "A small design map, in seconds.")] = False,
     voltage_limit: Annotated[float, option("V", "Largest swing of the best operating points [V].")] = 140.0,
     power_limit: Annotated[float, option("W", "Largest power of the stack at the best operating points [W].")] = 30.0,
     seed: Seed = SEED,

@@ -10,14 +10,13 @@ from estimation.finding import Finding
 from estimation.piezo_stack.finding import stack_finding, stack_prospect
 from experiments.actuator_kind import ActuatorKind, Experiment, LogVerb, Options, Run, Simulation
 from experiments.command.json_output import Result
-from experiments.command.options import require_one_of
 from experiments.command.terminal import short_names, table
 from experiments.log_pages.entries import BLANK, finding_entries
 from faults.conditions import CONDITIONS
 from faults.piezo_stack.diagnose import calibrated_stack, diagnose_stack
 from faults.piezo_stack.faults import stack_with_fault
 from plant.eha.rig import Rig
-from plant.errors import HydrostateError
+from plant.errors import HydrostateError, require_known
 from plant.log.columns import CHANNELS
 from plant.notes import Code
 from plant.piezo_stack.flow import FLOW_TIME, mean_flow
@@ -56,7 +55,7 @@ class StackRunCode(Code):
 
 
 def _simulated(rig: Rig[Any], options: Options) -> Run:
-    require_one_of("--sensors", options["sensors"], list(STACK_SENSORS))
+    require_known("--sensors", options["sensors"], list(STACK_SENSORS))
     if options["condition"] is not None and options["fault"] is not None:
         raise HydrostateError("a --condition or a --fault is wanted, got both")
     fault = options["condition"] or options["fault"] or "normal"

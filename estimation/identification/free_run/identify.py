@@ -18,7 +18,7 @@ from estimation.identification.free_run.other_structures import ADOPTED, adopt
 from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, Runs
 from estimation.identification.free_run.transfer_function import linear_model
 from estimation.identification.notes import IdentificationCode
-from plant.errors import HydrostateError, LogWarning
+from plant.errors import HydrostateError, LogWarning, require_known
 from plant.notes import Note
 
 FREE_STRUCTURES = ("output-error", "narx", "auto", *ADOPTED)
@@ -109,8 +109,7 @@ def identify_channels(
     LogWarning
         If the model is not to be believed, or its steady gain means nothing.
     """
-    if structure not in FREE_STRUCTURES:
-        raise HydrostateError(f"structure must be one of {', '.join(FREE_STRUCTURES)}, got {structure!r}")
+    require_known("structure", structure, FREE_STRUCTURES)
     with threadpool_limits(limits=1, user_api="blas"):
         found = _identified(data, structure, order, delay, n_numerator)
     for note in found.notes:
