@@ -3,13 +3,13 @@
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.typing import RcKeyType
 from numpy.typing import NDArray
 
 from experiments.page.words import in_words
@@ -24,37 +24,14 @@ GREY = "#6b6b6b"
 WIDTH_INCHES = 10.0
 """Width of every figure; the report shows them at about the same size."""
 
-STYLE: Mapping[RcKeyType, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9.0,
-    "axes.titlesize": 9.5,
-    "axes.titleweight": "normal",
-    "axes.titlelocation": "left",
-    "axes.labelsize": 9.0,
-    "xtick.labelsize": 8.5,
-    "ytick.labelsize": 8.5,
-    "figure.titlesize": 11.5,
-    "figure.titleweight": "bold",
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "#e3e3e3",
-    "grid.linewidth": 0.6,
-    "lines.linewidth": 1.3,
-    "legend.frameon": False,
-    "hatch.linewidth": 0.6,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "hydrostate",
-}
+STYLE = Path(__file__).with_name("hydrostate.mplstyle")
+"""Type, lines and grid of every figure, as matplotlib reads them."""
 
 
 @contextmanager
 def styled() -> Generator[None]:
     """Draw and save figures in the project's look inside this block."""
-    with mpl.rc_context(dict(STYLE)):
+    with style.context(STYLE):
         yield
 
 
