@@ -11,10 +11,10 @@ from estimation.identification.choose import STRUCTURES, StructureName, choose_m
 from estimation.identification.design.sticking import rest_shares, rests
 from estimation.identification.fit.fitted import CovarianceKind
 from estimation.identification.fit.residual_tests import DEFAULT_LAGS, feedback_test
+from estimation.identification.free_run.from_records import without_gaps
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.notes import IdentificationCode
 from estimation.identification.signals.preprocess import resample, zero_phase_filter
-from estimation.log_checks.bridging import bridged
 from plant.errors import LogError, LogWarning
 from plant.log.record import Record
 
@@ -142,7 +142,7 @@ def record_signals(
         If the output is differentiated from position, or input samples are bridged.
     """
     measured = _output(record, output)
-    driven = _without_gaps(record[input], input)
+    driven = without_gaps(record[input], input)
     u = resample(driven, record.sample_time, sample_time)
     y = resample(measured, record.sample_time, sample_time)
     return (u, y) if filter_cutoff_hz is None else zero_phase_filter(u, y, sample_time, cutoff_hz=filter_cutoff_hz)
@@ -182,12 +182,3 @@ def _output(record: Record, name: str) -> Array:
         raise LogError(f"velocity by differentiation needs 3 samples of 'position_m' or more, got {len(record)}")
     warnings.warn(LogWarning(IdentificationCode.VELOCITY_DIFFERENTIATED.note()), stacklevel=3)
     return np.gradient(record["position_m"], record.sample_time)
-
-
-def _without_gaps(values: Array, name: str) -> Array:
-    n_missing = int(np.count_nonzero(np.isnan(values)))
-    if n_missing == 0:
-        return values
-    said = IdentificationCode.INPUT_BRIDGED.note(channel=name, count=n_missing, total=values.size)
-    warnings.warn(LogWarning(said), stacklevel=3)
-    return bridged(values)

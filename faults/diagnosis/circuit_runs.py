@@ -7,26 +7,23 @@ Eight circuits run side by side in one kernel, so a Gauss-Newton step with all i
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.eha.explained import LEAKAGE_COURSE
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
+from plant.arrays import Array
 from plant.components.oil import oil_pressure
 from plant.eha.circuit import chamber_volumes
-from plant.eha.circuit_parameters import CircuitParameters, longest_stroke
+from plant.eha.circuit_parameters import CircuitParameters, circuit_values, longest_stroke
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT
 from plant.errors import LogError
 from plant.log.record import Record
 from plant.solvers.adaptive import ErrorControl, controlled_run
 from plant.solvers.steps import parameter_row
-
-Array = NDArray[np.float64]
 
 COORDINATES = ("leakage", "bias", "friction_rest", "friction_quadratic", "friction_rated", "bulk_modulus", "pump")
 """What is fitted, as logarithms of: leakage coefficient, flow bias, friction force at rest, its quadratic part at rated
@@ -295,20 +292,15 @@ def _between_stops(blocks: Blocks, rows: Array) -> Array:
     half = 0.5 * rows[..., _COLUMN["stroke"]]
     shown = np.abs(blocks.reach - half) <= AT_STOP * half
     rows = rows.copy()
-    rows[..., _COLUMN["stroke"]] = np.where(shown, 2.0 * half, longest_stroke(_values(rows)))
+    rows[..., _COLUMN["stroke"]] = np.where(shown, 2.0 * half, longest_stroke(circuit_values(rows)))
     return rows
-
-
-def _values(rows: Array) -> SimpleNamespace:
-    """Return the parameters in rows by name."""
-    return SimpleNamespace(**{name: rows[..., i] for name, i in _COLUMN.items()})
 
 
 def _outputs(blocks: Blocks, states: Array, row: Array) -> Array:
     velocity = np.diff(states[:: blocks.block, 2]) / (blocks.block * blocks.sample_time)
     if blocks.pressure is None:
         return velocity[:, None]
-    p = _values(row)
+    p = circuit_values(row)
     volumes = chamber_volumes(states[:, 2], p)
     high, low = (
         oil_pressure(oil, volume, p.bulk_modulus, p.air_fraction, p.vapour_pressure)

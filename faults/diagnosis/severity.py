@@ -1,23 +1,20 @@
 """How bad is it? A fitted circuit in the units of a shop, each number with a 95 % interval."""
 
 from collections.abc import Mapping
-from types import SimpleNamespace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.finding import Quantity
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows
 from faults.diagnosis.class_fit import WEAK, Actuator
 from faults.diagnosis.class_regions import ClassFits
 from faults.notes import ClassCode
+from plant.arrays import Array
 from plant.components.friction import quadratic_friction
 from plant.components.oil import ATMOSPHERE
-from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.circuit_parameters import circuit_values
 from plant.eha.steady_state import steady_state
 from plant.notes import Note
-
-Array = NDArray[np.float64]
 
 DRAWS = 200
 """Circuits drawn from what a fit believes, for the intervals."""
@@ -62,7 +59,7 @@ def severities_at(point: Array, actuator: Actuator) -> Mapping[str, float]:
     """
     healthy = actuator.circuit
     (row,) = parameter_rows(point[None], healthy, actuator.rated)
-    p = SimpleNamespace(**dict(zip(CircuitParameters.__dataclass_fields__, row.tolist(), strict=True)))
+    p = circuit_values(row)
     velocity, pressure = steady_state(healthy.rated_speed, p)
     sound_velocity, sound_pressure = steady_state(healthy.rated_speed, healthy)
     rubbing, sound = (

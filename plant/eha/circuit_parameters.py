@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from plant.arrays import Array
 from plant.components.oil import ATMOSPHERE, specific_volume
 from plant.eha.model import JUDGED_STROKE, EhaParameters, piston_areas
 from plant.errors import RigError
@@ -231,3 +232,14 @@ def circuit_of(p: EhaParameters) -> CircuitParameters:
         accumulator_gas=size * paper.accumulator_gas,
         accumulator_oil=size * paper.accumulator_oil,
     )
+
+
+def circuit_values(rows: Array) -> SimpleNamespace:
+    """Return a circuit's parameters by name, from a row of them, or from rows of many circuits.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (..., parameters)
+        Parameters in the order of the fields [SI].
+    """
+    return SimpleNamespace(**{field.name: rows[..., i] for i, field in enumerate(fields(CircuitParameters))})

@@ -1,7 +1,7 @@
 """`simulate(plant, drive, ...) -> Record`: a run of a plant under a drive, seen through its sensors."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from math import ceil
 from types import MappingProxyType, SimpleNamespace
 from typing import Any
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.compiled.functions import Scalar, sign
 from plant.components.friction import quadratic_friction
 from plant.eha.circuit import (
@@ -20,7 +21,7 @@ from plant.eha.circuit import (
     circuit_step_rate,
     observe_circuit,
 )
-from plant.eha.circuit_parameters import CircuitParameters, circuit_of
+from plant.eha.circuit_parameters import CircuitParameters, circuit_of, circuit_values
 from plant.eha.model import EhaParameters, lumped_step, reduced_derivative
 from plant.eha.parameter_path import ParameterPath
 from plant.errors import HydrostateError
@@ -30,8 +31,6 @@ from plant.sensors.sensors import IDEAL, Sensors, measure
 from plant.solvers.adaptive import ErrorControl, controlled_run
 from plant.solvers.steps import StepFunction, parameter_names, parameter_row, ros2_step
 from plant.solvers.trajectory import compile_trajectory
-
-Array = NDArray[np.float64]
 
 
 def _as_is(parameters: EhaParameters) -> EhaParameters:
@@ -137,11 +136,6 @@ REDUCED = Plant(
 LUMPED = Plant("lumped", ("position_m", "velocity_m_s", "differential_pressure_pa"), lumped_step, _observe_lumped, 4)
 
 
-def _circuit_values(rows: Array) -> SimpleNamespace:
-    """Return the circuit's parameters by name, from one row or a column of them."""
-    return SimpleNamespace(**{field.name: rows[..., i] for i, field in enumerate(fields(CircuitParameters))})
-
-
 CIRCUIT = Plant(
     "circuit",
     STATES,
@@ -150,14 +144,14 @@ CIRCUIT = Plant(
     3,
     CircuitParameters,
     circuit_of,
-    lambda row: np.array(at_rest(_circuit_values(row)), dtype=np.float64),
-    lambda rows: circuit_step_rate(_circuit_values(rows)),
+    lambda row: np.array(at_rest(circuit_values(row)), dtype=np.float64),
+    lambda rows: circuit_step_rate(circuit_values(rows)),
     circuit_breaches,
     ErrorControl(
         circuit_derivative,
-        lambda row: circuit_scales(_circuit_values(row)),
-        lambda row: float(circuit_scales(_circuit_values(row))[0]),
-        lambda rows: 1.0 / (16.0 * max(3e4, circuit_step_rate(_circuit_values(rows)))),
+        lambda row: circuit_scales(circuit_values(row)),
+        lambda row: float(circuit_scales(circuit_values(row))[0]),
+        lambda rows: 1.0 / (16.0 * max(3e4, circuit_step_rate(circuit_values(rows)))),
     ),
 )
 

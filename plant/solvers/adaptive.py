@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from plant.arrays import Array
-from plant.runs import require_finite
 from plant.solvers.adaptive_kernel import compile_adaptive
-from plant.solvers.steps import Derivative, Parameters, parameter_row
+from plant.solvers.steps import Derivative, Parameters
 
 LANES = 8
 """Trajectories side by side in one kernel, as many as a vector register of 512 bits holds."""
@@ -106,61 +105,3 @@ def controlled_run(
             states[:, :, first : first + LANES],
         )
     return np.moveaxis(states, 2, 0)
-
-
-def controlled_trajectory(
-    name: str,
-    derivative: Derivative,
-    start: Array,
-    drive: Array,
-    parameters: Parameters,
-    sample_time: float,
-    *,
-    scales: Array,
-    drive_scale: float,
-) -> Array:
-    """Run any plant along a drive in steps of controlled error, L-stable: for what is stiff, or sticks and slips.
-
-    Parameters
-    ----------
-    derivative : callable
-        ``derivative(state, drive, parameters)``.
-    start : ndarray, shape (states,)
-        Initial state in SI.
-    drive : ndarray, shape (n,)
-        Drive at the samples [its SI unit], linear between.
-    sample_time : float
-        Seconds between samples [s].
-    scales : ndarray, shape (states,)
-        Size of each state that errors are relative to [its SI unit].
-    drive_scale : float
-        Size of the drive [its SI unit].
-
-    Returns
-    -------
-    ndarray, shape (n, states)
-        States at the samples.
-
-    Raises
-    ------
-    HydrostateError
-        If the state stops being finite.
-
-    Examples
-    --------
-    >>> from dataclasses import dataclass
-    >>> @dataclass(frozen=True)
-    ... class Lag:
-    ...     time_constant: float = 0.5
-    >>> def rates(state, drive, p):
-    ...     return ((drive - state[0]) / p.time_constant,)
-    >>> options = {"scales": np.ones(1), "drive_scale": 1.0}
-    >>> states = controlled_trajectory("lag", rates, np.zeros(1), np.ones(101), Lag(), 0.01, **options)
-    >>> states[[0, 50, 100], 0].round(4).tolist()
-    [0.0, 0.6321, 0.8647]
-    """
-    control = ErrorControl(derivative, lambda _: scales, lambda _: drive_scale, lambda _: 1e-3 * sample_time)
-    row = parameter_row(parameters)[None, None]
-    (states,) = controlled_run(name, control, start[None], drive, row, sample_time, type(parameters))
-    require_finite(states, sample_time, name)
-    return states

@@ -20,7 +20,7 @@ from estimation.models.model import ProcessModel, StateVariable
 from plant.compiled.functions import Scalar
 from plant.errors import HydrostateError
 from plant.log.record import Record
-from plant.solvers.adaptive import controlled_trajectory
+from plant.solvers.adaptive import ErrorControl, controlled_run
 from plant.solvers.steps import parameter_names, parameter_row, rk4_step, ros2_step
 from plant.solvers.trajectory import trajectory
 
@@ -74,11 +74,10 @@ def test_fixed_steps_follow_the_exact_run(scheme: Any) -> None:
 
 
 def test_steps_of_controlled_error_follow_the_exact_run() -> None:
-    stiff = replace(TRUTH, damping=4e3)
-    for p in (TRUTH, stiff):
-        found = controlled_trajectory(
-            "suspension", derivative, np.zeros(2), FORCE, p, T, scales=SCALES, drive_scale=40.0
-        )
+    control = ErrorControl(derivative, lambda _: SCALES, lambda _: 40.0, lambda _: 1e-3 * T)
+    for p in (TRUTH, replace(TRUTH, damping=4e3)):
+        row = parameter_row(p)[None, None]
+        (found,) = controlled_run("suspension", control, np.zeros((1, 2)), FORCE, row, T, type(p))
         assert np.max(np.abs(found - exact(p)) / SCALES) < 1e-4
 
 

@@ -51,7 +51,7 @@ def channels_of(
     wanted = max(one.sample_time for one in records) if sample_time is None else sample_time
     u, y = list[Array](), list[Array]()
     for record in records:
-        columns = [_on_clock(_whole(record[name], name), record.sample_time, wanted) for name in inputs]
+        columns = [_on_clock(without_gaps(record[name], name), record.sample_time, wanted) for name in inputs]
         u.append(np.column_stack(columns))
         y.append(_on_clock(record[output], record.sample_time, wanted))
     return channels_from(u, y, wanted, inputs, output)
@@ -63,7 +63,16 @@ def _on_clock(values: Array, sample_time: float, wanted: float) -> Array:
     return resample(values, sample_time, wanted)
 
 
-def _whole(values: Array, name: str) -> Array:
+def without_gaps(values: Array, name: str) -> Array:
+    """Return an input with its gaps bridged by straight lines, and warn of them.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        The input [any unit]; NaN where missing.
+    name : str
+        Its channel, for the warning.
+    """
     n_missing = int(np.count_nonzero(np.isnan(values)))
     if n_missing == 0:
         return values
