@@ -10,7 +10,6 @@ prints itself, and turns into pandas, matplotlib, python-control or plain dictio
 """
 
 from collections.abc import Mapping, Sequence
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,20 +31,6 @@ if TYPE_CHECKING:
     __version__: str
 
 PACKAGES = ("plant", "estimation", "faults", "experiments")
-
-LATE: Mapping[str, str] = {
-    "Condition": "faults.conditions",
-    "Finding": "estimation.finding",
-    "HydrostateError": "plant.errors",
-    "LinearModel": "estimation.identification.model.linear_model",
-    "LogError": "plant.errors",
-    "Record": "plant.log.record",
-    "Rig": "plant.eha.rig",
-    "RigError": "plant.errors",
-    "published_table": "experiments.published:load",
-    "read_rig": "plant.eha.rig",
-}
-"""Names that are imported when they are first asked for, and where they are."""
 
 __all__ = [
     "Answer",
@@ -90,6 +75,9 @@ _refuse_shadows()
 
 from experiments.log_pages.answers import Answer, Model, no_such  # noqa: E402 - after the check
 from experiments.log_pages.log import Log, known_options, refuse  # noqa: E402 - likewise
+from plant.lazy import lazily  # noqa: E402 - likewise
+
+_late = lazily("hydrostate", __file__)
 
 
 def __getattr__(name: str) -> Any:
@@ -98,13 +86,8 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("hydrostate")
-    if name == "conditions":
-        return import_module("faults.conditions").CONDITIONS
-    if name in LATE:
-        module, _, renamed = LATE[name].partition(":")
-        return getattr(import_module(module), renamed or name)
-    if name.startswith("_"):
-        raise AttributeError(name)
+    if name in __all__ or name.startswith("_"):
+        return _late(name)
     from plant.errors import NoSuchNameError
 
     raise NoSuchNameError(no_such("hydrostate", name, __all__))

@@ -54,28 +54,4 @@ if TYPE_CHECKING:
     from estimation.trust.consistency import consistency_gate as consistency_gate
     from estimation.trust.consistency import nees as nees
 
-__all__ = [
-    "FORMS",
-    "METHODS",
-    "Estimate",
-    "EstimateOptions",
-    "Finding",
-    "Gaussian",
-    "GreyBoxModel",
-    "LinearModel",
-    "Outcome",
-    "ProcessModel",
-    "Quantity",
-    "bulk_modulus_bound",
-    "clean_log",
-    "consistency_gate",
-    "estimate_log",
-    "estimate_motor",
-    "estimate_stack",
-    "identify_record",
-    "measurement_variances",
-    "nees",
-    "run_filter",
-]
-
 __getattr__ = lazily(__name__, __file__)

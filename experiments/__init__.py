@@ -26,6 +26,4 @@ if TYPE_CHECKING:
     from experiments.log_pages.log import Log as Log
     from experiments.published import load as load
 
-__all__ = ["ACTUATORS", "ActuatorKind", "Answer", "Log", "actuator", "load", "main"]
-
 __getattr__ = lazily(__name__, __file__)

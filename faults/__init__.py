@@ -40,21 +40,4 @@ if TYPE_CHECKING:
     from faults.piezo_stack.faults import STACK_FAULTS as STACK_FAULTS
     from faults.watch.watch import watch_record as watch_record
 
-__all__ = [
-    "CONDITIONS",
-    "MOTOR_FAULTS",
-    "STACK_FAULTS",
-    "Condition",
-    "diagnose_clean",
-    "diagnose_log",
-    "diagnose_motor",
-    "diagnose_stack",
-    "find_condition",
-    "mathematical_bank",
-    "parameters_for",
-    "score_mathematical",
-    "severity",
-    "watch_record",
-]
-
 __getattr__ = lazily(__name__, __file__)

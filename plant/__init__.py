@@ -56,29 +56,4 @@ if TYPE_CHECKING:
     from plant.units import SI as SI
     from plant.units import notes as notes
 
-__all__ = [
-    "DRIVES",
-    "PLANTS",
-    "SENSORS",
-    "SI",
-    "CircuitParameters",
-    "Code",
-    "DiaphragmMotorParameters",
-    "EhaParameters",
-    "HydrostateError",
-    "LogError",
-    "Note",
-    "PiezoStackParameters",
-    "Record",
-    "Rig",
-    "Sensors",
-    "make_drive",
-    "measure",
-    "notes",
-    "read_record",
-    "read_rig",
-    "simulate",
-    "write_record",
-]
-
 __getattr__ = lazily(__name__, __file__)
