@@ -12,7 +12,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.engine.contract import FilterProblem, Trace
 from estimation.filters.batch import filter_batch
@@ -27,8 +26,6 @@ from plant.compiled.functions import Scalar
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.solvers.steps import solve_linear
-
-Array = NDArray[np.float64]
 
 MODULI = (0.35, 0.6, 1.0, 1.6, 2.6)
 """First guesses of bulk modulus, as multiples of the rig's."""

@@ -6,12 +6,11 @@ scipy.signal drags in scipy.stats, and takes longer to import than a log to fit.
 from math import ceil, e, log
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from plant.arrays import Array
 
 
-def convolved(values: FloatArray, kernel: FloatArray) -> FloatArray:
+def convolved(values: Array, kernel: Array) -> Array:
     """Return the convolution with a kernel that is centred on each sample, by overlap and add.
 
     Parameters
@@ -46,7 +45,7 @@ def convolved(values: FloatArray, kernel: FloatArray) -> FloatArray:
     return sums.reshape(-1)[same]
 
 
-def _product(values: FloatArray, kernel: FloatArray, size: int) -> FloatArray:
+def _product(values: Array, kernel: Array, size: int) -> Array:
     """Return the convolution of each row by transforms of a length that holds it whole."""
     return np.fft.irfft(np.fft.rfft(values, size) * np.fft.rfft(kernel, size), size)
 

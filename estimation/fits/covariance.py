@@ -3,19 +3,17 @@
 import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.fits.convolution import convolved
 from estimation.notes import EstimateCode
+from plant.arrays import Array
 from plant.errors import LogWarning
-
-FloatArray = NDArray[np.float64]
 
 LARGEST_PART = 100_000
 """Rows of a Jacobian that are factored at a time."""
 
 
-def automatic_lags(residual: FloatArray) -> int:
+def automatic_lags(residual: Array) -> int:
     """Return the span of a residual's colour, read off its first-order correlation (Andrews 1991, equation 6.2).
 
     A span that is fixed in advance reads slow colour into white residuals, from which the fit has taken what is slow:
@@ -44,8 +42,8 @@ def automatic_lags(residual: FloatArray) -> int:
 
 
 def least_squares_covariance(
-    jacobian: FloatArray, residual: FloatArray, n_used: int, lags: int, prior: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+    jacobian: Array, residual: Array, n_used: int, lags: int, prior: Array
+) -> tuple[Array, Array]:
     """Return ``B = (J'J + P)^-1`` and the sandwich ``B (J'RJ + P) B`` of a residual with autocovariance R.
 
     R is estimated with a Bartlett window (Newey and West 1987).
@@ -88,18 +86,18 @@ def least_squares_covariance(
     return bread, bread @ (meat * (n_used / (n_used - n_parameters)) + np.diag(prior)) @ bread
 
 
-def _parts(jacobian: FloatArray) -> list[FloatArray]:
+def _parts(jacobian: Array) -> list[Array]:
     """Return a long Jacobian's rows in parts, so that working on one takes little memory."""
     return np.array_split(jacobian, max(1, len(jacobian) // LARGEST_PART))
 
 
-def _autocovariance(residual: FloatArray, n_used: int, lags: int) -> FloatArray:
+def _autocovariance(residual: Array, n_used: int, lags: int) -> Array:
     """Return the autocovariance at no lag and up to so many, under a Bartlett window."""
     shifted = [float(residual[lag:] @ residual[: residual.size - lag]) for lag in range(lags + 1)]
     return np.array(shifted) / n_used * (1.0 - np.arange(lags + 1) / (lags + 1.0))
 
 
-def _meat(columns: FloatArray, autocovariance: FloatArray) -> FloatArray:
+def _meat(columns: Array, autocovariance: Array) -> Array:
     """Return ``J'RJ``."""
     kernel = np.concatenate([autocovariance[:0:-1], autocovariance])
     return np.column_stack([columns.T @ convolved(column, kernel) for column in columns.T])

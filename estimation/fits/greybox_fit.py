@@ -15,9 +15,8 @@ from estimation.fits.covariance import automatic_lags, least_squares_covariance
 from estimation.fits.descent import Point, descend
 from estimation.fits.greybox_problem import GreyBoxLog, Problem, search_bounds
 from estimation.models.greybox import GreyBoxModel
+from plant.arrays import Array
 from plant.solvers.steps import parameter_names
-
-Array = NDArray[np.float64]
 
 LEAST_EFFECT = 1.0
 """An unknown whose unit change moves the prediction by less, in standard deviations of one sample, is not felt."""

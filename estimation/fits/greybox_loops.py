@@ -9,10 +9,8 @@ from functools import cache
 from types import SimpleNamespace
 from typing import Any, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
 from estimation.models.greybox import GreyBoxModel
+from plant.arrays import Array
 from plant.compiled.expression import ONE, ZERO, Expression, as_expression, jacobian, symbol, unary
 from plant.compiled.functions import Scalar
 from plant.compiled.native.load import load_native
@@ -20,7 +18,6 @@ from plant.compiled.native.signature import signature
 from plant.compiled.source import statements
 from plant.solvers.steps import parameter_names, parameter_symbols, ros2_step
 
-Array = NDArray[np.float64]
 Kernel: TypeAlias = Callable[..., tuple[float, Array, Array]]
 """``run(theta, drives, measured, parameters, sample_time, substeps, block, variance, walk, gaps, outlier, errors,
 slopes)``, see `compile_kernel`."""

@@ -15,14 +15,13 @@ from estimation.log_checks.measurement_noise import measurement_variances, posit
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.motion import MOTION_FORMS
 from estimation.notes import EstimateCode
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
 from plant.log.record import Record
 from plant.notes import Note
 from plant.runs import steps_a_sample
 from plant.solvers.steps import parameter_row
-
-Array = NDArray[np.float64]
 
 MOTION_CHANNELS = ("position_m",)
 """Channels that the motion form needs beside motor speed."""

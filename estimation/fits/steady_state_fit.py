@@ -11,13 +11,11 @@ from types import MappingProxyType
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
 from plant.log.record import Record
-
-Array: TypeAlias = NDArray[np.float64]
 
 Variance: TypeAlias = Callable[[Array], Array]
 """Variance of the points' residuals, given the coefficients."""

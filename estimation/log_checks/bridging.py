@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.models.model import OPENING, ProcessModel
+from plant.arrays import Array
 from plant.compiled.functions import Scalar
 from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.solvers.steps import Parameters
-
-Array = NDArray[np.float64]
 
 POSITION = "position_m"
 

@@ -4,14 +4,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.sensor_check import PRESSURE
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
-
-Array = NDArray[np.float64]
 
 FEWEST_SAMPLES, FEWEST_BLOCKS = 5, 20
 """Samples in a block, and blocks of which something is concluded, at least [count]."""

@@ -1,13 +1,11 @@
 """Does a still encoder miss a motion? Judged by what the log itself says that leakage takes, not by a healthy one's."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.log_checks.bridging import bridged
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
-
-Array = NDArray[np.float64]
 
 PRESSURE = "differential_pressure_pa"
 

@@ -3,11 +3,9 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.log.record import Record
-
-Array = NDArray[np.float64]
 
 SMALLEST_VARIANCE: Mapping[str, float] = {
     "position_m": 1e-12,

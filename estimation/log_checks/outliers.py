@@ -4,17 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.sensor_check import PRESSURES
 from estimation.notes import SensorCode
+from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
 from plant.sensors.sensors import differentiated
-
-Array = NDArray[np.float64]
 
 POSITION, VELOCITY = "position_m", "velocity_m_s"
 

@@ -12,11 +12,10 @@ from estimation.log_checks.bridging import bridged
 from estimation.log_checks.frozen_encoder import jumped, missed_motion
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.notes import SensorCode
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
-
-Array = NDArray[np.float64]
 
 PRESSURE = "differential_pressure_pa"
 

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.identification.fit.output_error import fit_output_error
 from estimation.identification.model.linear_model import LinearModel
@@ -21,11 +20,10 @@ from experiments.circuit.passes import CHANNELS, SAMPLE_TIME, Passes, in_conditi
 from experiments.nine_conditions.printed_transfer_functions import known, pair, pairs, printed_model
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS
+from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.simulate import CIRCUIT
 from plant.errors import HydrostateError, LogWarning
-
-Array = NDArray[np.float64]
 
 FORMAT = "hydrostate transfer-function library"
 """What the file says it is."""

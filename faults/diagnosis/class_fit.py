@@ -4,15 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuit_runs import COORDINATES, Blocks, coordinates_of, parameter_rows, predicted
+from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of, longest_stroke
 from plant.eha.model import EhaParameters
 from plant.eha.steady_state import steady_state
-
-Array = NDArray[np.float64]
 
 STEP = 0.02
 """Step of the finite differences in the logarithms [dimensionless]."""

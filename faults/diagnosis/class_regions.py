@@ -9,7 +9,6 @@ counts for none.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuit_runs import COORDINATES, Blocks
@@ -26,8 +25,7 @@ from faults.diagnosis.class_fit import (
     nominal_runs,
     scales_of,
 )
-
-Array = NDArray[np.float64]
+from plant.arrays import Array
 
 YIELDING = 5.0
 """Travel in presliding displacements below which a piston counts as stuck [dimensionless]."""

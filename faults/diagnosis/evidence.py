@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.finding import Change
 from estimation.identification.model.linear_model import LinearModel
@@ -16,9 +15,8 @@ from faults.diagnosis.class_regions import ClassFits, is_stuck
 from faults.diagnosis.innovation_bank import innovation_scores
 from faults.diagnosis.onset import last_part
 from faults.diagnosis.rmse import score_transfer_functions
+from plant.arrays import Array
 from plant.log.record import Record
-
-Array = NDArray[np.float64]
 
 EVIDENCES = ("transfer_functions", "models", "innovations", "parameters")
 """The evidences, in the order of the scoreboard's rows."""

@@ -3,17 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.filters.batch import filter_batch
 from estimation.filters.run import filter_problem
 from estimation.log_checks.first_belief import first_belief
 from estimation.models.eha_forms import PRESSURE_FORM
 from faults.conditions import CONDITIONS, parameters_for
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
-
-Array = NDArray[np.float64]
 
 STEP = 2e-3
 """Longest step of the filters [s]: their implicit step is stable at any, and what they tell apart is slower."""

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.finding import Change
 from faults.conditions import CONDITIONS
@@ -18,10 +17,9 @@ from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, least_
 from faults.diagnosis.class_regions import ClassFits, fit_classes, lasting_misfit
 from faults.watch.events import Alarm
 from faults.watch.watch import LEAST_LEARNING, SLOWEST, watch_record
+from plant.arrays import Array
 from plant.log.record import Record
 from plant.solvers.adaptive import LANES
-
-Array = NDArray[np.float64]
 
 EDGE = 1.0
 """What a log must hold before a change and after it [s]."""

@@ -8,7 +8,6 @@ it better. The limits leave room for rigs that no circuit describes to the last 
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.notes import SensorCode
 from faults.conditions import severity
@@ -18,8 +17,6 @@ from faults.diagnosis.class_regions import ClassFits, region_scores
 from faults.notes import AgainstCode
 from plant.log.record import Record
 from plant.notes import Note
-
-Array = NDArray[np.float64]
 
 UNEXPLAINED = (0.12, 0.08)
 """Share of velocity and of pressure, root mean square, that the best circuit may leave [dimensionless]."""

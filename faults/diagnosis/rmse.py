@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.signals.preprocess import resample
 from estimation.log_checks.bridging import bridged
 from faults.eha.bank import predict_run
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
 from plant.log.record import Record
@@ -22,7 +22,6 @@ from plant.sensors.sensors import differentiated
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
 POSITION_WINDOW = 0.01
 """Window over which position is differentiated where velocity was not logged [s]; two samples of a slower log."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.errors import LogError
 from plant.log.columns import TIME
 from plant.log.jitter import GAP, grid_of, resampled, rounded_clock, usual_step
@@ -22,8 +23,7 @@ WHOLE = 0.01
 
 ROUNDING = 1e-6
 
-Values = NDArray[np.float64]
-Channels = Mapping[str, Values]
+Channels = Mapping[str, Array]
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Checked:
     sample_time, start_time : float
         The clock [s].
     channels : Mapping[str, ndarray, shape (n,)]
-        Values in SI, NaN where a sample is missing.
+        Array in SI, NaN where a sample is missing.
     notes : tuple[Note, ...]
         What was resampled, masked, dropped, or looks wrong.
     """
@@ -105,7 +105,7 @@ def on_uniform_clock(columns: Channels, source: str, clock: Clock | None, notes:
     return Checked(sample_time, float(time[0]), _spread(channels, slots.astype(np.int64)))
 
 
-def _steps_of_a_clock(time: Values, source: str) -> None:
+def _steps_of_a_clock(time: Array, source: str) -> None:
     """Refuse stamps whose steps are too large for a number."""
     with np.errstate(over="ignore", invalid="ignore"):
         step = np.diff(time)
@@ -118,7 +118,7 @@ def _steps_of_a_clock(time: Values, source: str) -> None:
         )
 
 
-def _mended(time: Values, channels: Channels, source: str, notes: list[Note]) -> Checked:
+def _mended(time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
     """Put stamps that were rounded, repeat or jitter on a uniform clock; any other is no clock."""
     step = np.diff(time)
     again = np.flatnonzero(step == 0.0) + 1
@@ -141,7 +141,7 @@ def _mended(time: Values, channels: Channels, source: str, notes: list[Note]) ->
     return _without(again, time, channels, source, notes)
 
 
-def _without(again: NDArray[np.int64], time: Values, channels: Channels, source: str, notes: list[Note]) -> Checked:
+def _without(again: NDArray[np.int64], time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
     """Leave out rows whose stamp was there before; those that said something new leave a gap."""
     count, percent = len(again), 100.0 * len(again) / len(time)
     notes.append(LogCode.TIME_REPEATS.note(channel=TIME, count=count, total=len(time), percent=percent))
@@ -150,7 +150,7 @@ def _without(again: NDArray[np.int64], time: Values, channels: Channels, source:
     return on_uniform_clock(kept, source, None, notes)
 
 
-def _resampled(time: Values, channels: Channels, source: str, notes: list[Note]) -> Checked:
+def _resampled(time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
     shortest = GAP * usual_step(np.diff(time))
     if not shortest > 0.0:
         raise _not_increasing(time, source)
@@ -175,7 +175,7 @@ def _resampled(time: Values, channels: Channels, source: str, notes: list[Note])
     return Checked(grid.sample_time, float(time[0]), even)
 
 
-def _not_increasing(time: Values, source: str) -> LogError:
+def _not_increasing(time: Array, source: str) -> LogError:
     row = int(np.argmax(np.diff(time) <= 0.0))
     got = f"{time[row + 1]:.12g} in row {row + 2} after {time[row]:.12g}"
     return LogError(f"{TIME} must increase, got {got}", source)
@@ -190,7 +190,7 @@ def _own_times(channels: Channels) -> bool:
     return any(2 * np.count_nonzero(one & ~fastest) > np.count_nonzero(one) > 0 for one in there.values())
 
 
-def _merged(time: Values, channels: Channels, source: str, notes: list[Note]) -> Checked:
+def _merged(time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
     """Put channels that were logged at times of their own on the clock of the fastest.
 
     A slower channel's sample goes to the nearest tick, as interpolated there between the channel's own samples.
@@ -214,7 +214,7 @@ def _merged(time: Values, channels: Channels, source: str, notes: list[Note]) ->
     return Checked(on_clock.sample_time, on_clock.start_time, out)
 
 
-def _whole_ticks(time: Values) -> Values | None:
+def _whole_ticks(time: Array) -> Array | None:
     """Return how many sample times each step takes; None if one is no whole number of them, within 1 %."""
     step = np.diff(time)
     if step.min() <= 0.0:
@@ -231,12 +231,12 @@ def _few_left_out(there: int, total: float, source: str) -> None:
         raise LogError(f"{TIME} leaves out {said.format(total - there, total)} samples, wanted at most 5 %", source)
 
 
-def _agrees(time: Values, clock: Clock) -> bool:
+def _agrees(time: Array, clock: Clock) -> bool:
     error = np.abs(clock.start_time + clock.sample_time * np.arange(len(time)) - time).max()
     return bool(error <= (ROUNDING + _resolution(time, clock.sample_time)) * clock.sample_time)
 
 
-def _resolution(time: Values, sample_time: float) -> float:
+def _resolution(time: Array, sample_time: float) -> float:
     """Return what rounding of the times themselves to floats can look like, in sample times."""
     return 4.0 * float(np.spacing(np.abs(time[[0, -1]]).max())) / sample_time
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Values = NDArray[np.float64]
+from plant.arrays import Array
 
 GAP = 1.5
 """Steps longer than this many sample times, and than stamps jitter, leave samples out [dimensionless]."""
@@ -42,13 +42,13 @@ class Grid(NamedTuple):
         Root mean square and largest deviation of a step from the sample time, over it [fraction].
     """
 
-    times: Values
+    times: Array
     sample_time: float
     widest: float
     scatter: float
     most: float
 
-    def lacking(self, time: Values) -> NDArray[np.bool_]:
+    def lacking(self, time: Array) -> NDArray[np.bool_]:
         """Return at which times of the clock a gap between samples leaves nothing to go by.
 
         Parameters
@@ -67,7 +67,7 @@ class Grid(NamedTuple):
         return far & (before + behind > self.widest) | (np.minimum(before, behind) < -0.5 * self.sample_time)
 
 
-def usual_step(step: Values) -> float:
+def usual_step(step: Array) -> float:
     """Return the mean of the steps near their median, since the median of rounded steps is rounded.
 
     Parameters
@@ -84,7 +84,7 @@ def usual_step(step: Values) -> float:
     return float(np.mean(step[np.abs(step - middle) <= 0.5 * middle]))
 
 
-def grid_of(time: Values) -> Grid:
+def grid_of(time: Array) -> Grid:
     """Return the uniform clock for stamps that increase.
 
     Parameters
@@ -109,12 +109,12 @@ def grid_of(time: Values) -> Grid:
     return Grid(times, sample_time, widest, float(np.sqrt(np.mean(off**2))), float(np.max(np.abs(off))))
 
 
-def resampled(grid: Grid, time: Values, values: Values) -> Values:
+def resampled(grid: Grid, time: Array, values: Array) -> Array:
     """Return a channel on a uniform clock: each time has its nearest sample, moved along the local slope.
 
     The slope is that of a cubic fitted to five samples, so a sample that is moved by a tenth of the sample time keeps
     its noise: white, and larger by 1 % of its variance. Interpolation would average the noise of neighbours, and what
-    is read off the log afterwards would be too small. Values on a sensor's quanta stay on them.
+    is read off the log afterwards would be too small. Array on a sensor's quanta stay on them.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def resampled(grid: Grid, time: Values, values: Values) -> Values:
     Returns
     -------
     ndarray, shape (n,)
-        Values on the clock; NaN in gaps.
+        Array on the clock; NaN in gaps.
     """
     there = np.isfinite(values)
     t, y = time[there], values[there]
@@ -146,7 +146,7 @@ def resampled(grid: Grid, time: Values, values: Values) -> Values:
     return out
 
 
-def _slopes(t: Values, y: Values) -> tuple[Values, NDArray[np.bool_]]:
+def _slopes(t: Array, y: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return the slope of a cubic through five samples at each, and whether no gap lies between them."""
     half, usual = POINTS // 2, float(np.median(np.diff(t)))
     first = np.clip(np.arange(len(t)) - half, 0, len(t) - POINTS)
@@ -157,11 +157,11 @@ def _slopes(t: Values, y: Values) -> tuple[Values, NDArray[np.bool_]]:
     right = np.swapaxes(powers, 1, 2) @ (y[rows] - y[:, None])[:, :, None]
     whole = np.ptp(t[rows], axis=1) <= GAP * (POINTS - 1) * usual
     normal[~whole] = np.eye(4)
-    slopes: Values = np.linalg.solve(normal, right)[:, 1, 0].astype(np.float64) / usual
+    slopes: Array = np.linalg.solve(normal, right)[:, 1, 0].astype(np.float64) / usual
     return slopes, whole
 
 
-def _on_quanta(found: Values, measured: Values) -> Values:
+def _on_quanta(found: Array, measured: Array) -> Array:
     """Round to the quantum of a sensor where all that it measured is a whole number of them."""
     steps = np.abs(np.diff(measured))
     quantum = float(np.min(steps[steps > 0.0], initial=np.inf))
@@ -171,7 +171,7 @@ def _on_quanta(found: Values, measured: Values) -> Values:
     return measured[0] + quantum * np.rint((found - measured[0]) / quantum)
 
 
-def rounded_clock(time: Values, slots: Values) -> tuple[float, float, float] | None:
+def rounded_clock(time: Array, slots: Array) -> tuple[float, float, float] | None:
     """Return the uniform clock whose times, rounded, are a log's stamps; None if rounding does not explain them.
 
     Parameters
