@@ -12,7 +12,6 @@ from estimation.fits.greybox_loops import Kernel, compile_kernel
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.greybox import GreyBoxModel
-from plant.arrays import Array
 from plant.log.record import Record
 from plant.runs import steps_a_sample
 from plant.solvers.steps import Parameters, parameter_row
