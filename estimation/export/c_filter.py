@@ -31,6 +31,7 @@ from estimation.trust.consistency import LARGEST_NIS, MISMATCH_NIS
 from plant.compiled.c99.files import c_files, checked_name
 from plant.compiled.c99.precision import Precision, precision_of
 from plant.errors import require_known
+from plant.log.record import CHANNELS
 from plant.units import notes
 
 RULES: Mapping[str, Rule] = {rule.name: rule for rule in (EKF, IEKF, UKF, CKF, SVSF, SIF)}
@@ -91,14 +92,14 @@ def filter_in_c(problem: FilterProblem, method: str = "ekf", *, name: str, preci
     """
     require_known("a method that can be exported", method, EXPORTED)
     real, name = precision_of(precision), checked_name(name)
-    rule, settings, numbers = _chosen(problem, method)
+    rule, _, numbers = _chosen(problem, method)
     written = rule_in_c(rule, problem.model, problem.channels, real, name, scored=method != "imm")
     bank = None
     if method == "imm":
         bank = bank_in_c(written, problem.model, len(problem.channels), len(numbers.rows), problem.substeps, real, name)
     facts = {
         **_shapes(problem, written, bank, len(numbers.rows)),
-        **_names(problem, written, settings),
+        **_names(problem, method),
         **_tables(numbers, real),
         **_judging(problem, real),
         "method": method,
@@ -154,25 +155,57 @@ def _shapes(problem: FilterProblem, written: RuleInC, bank: BankInC | None, mode
     }
 
 
-def _names(problem: FilterProblem, written: RuleInC, settings: Sequence[Setting]) -> dict[str, object]:
+def numbers_of(problem: FilterProblem, method: str) -> Array:
+    """Return what a filter is told and never changes.
+
+    Parameters
+    ----------
+    method : str
+        One of `EXPORTED`.
+
+    Returns
+    -------
+    ndarray, shape (modes, rows)
+        Its values, named by `row_notes`.
+    """
+    return _chosen(problem, method)[2].rows
+
+
+def row_notes(problem: FilterProblem, method: str) -> list[tuple[str, str, str]]:
+    """Return name, unit and meaning of what a filter is told and never changes, in its order.
+
+    Parameters
+    ----------
+    method : str
+        One of `EXPORTED`.
+
+    Returns
+    -------
+    list of (str, str, str)
+        One a row of `numbers_of`.
+    """
+    model, settings = problem.model, _chosen(problem, method)[1]
+    told = [(name, note.unit, note.meaning) for name, note in notes(model.parameters).items()]
+    for state in model.states:
+        size = "" if state.logarithmic else f" over ({state.scale:g} {state.unit})^2"
+        kind = "the logarithm of " if state.logarithmic else ""
+        told.append((f"noise_{state.name}", "1/s", f"process-noise density of {kind}{state.name}{size}"))
+    told += [(f"variance_{one}", _squared(CHANNELS[one]), f"variance of {one}") for one in problem.channels]
+    told += [(setting.name, "1", "setting of the filter") for setting in settings]
+    return [*told, ("step", "s", "step of the model"), ("share", "1", "its share of a sample")]
+
+
+def _squared(unit: str) -> str:
+    return "/".join(f"{part}^2" for part in unit.split("/"))
+
+
+def _names(problem: FilterProblem, method: str) -> dict[str, object]:
     """Return every name with what stands beside it in a comment."""
-    model, known = problem.model, notes(problem.model.parameters)
-    about = {name: f"{note.unit}, {note.meaning}" for name, note in known.items()}
-    for i, state in enumerate(model.states):
-        unit = "1/s" if state.logarithmic else f"1/s, in units of ({state.scale:g} {state.unit})^2"
-        about[f"q{i}"] = f"{unit}, process-noise density of {state.name}"
-    for c, channel in enumerate(problem.channels):
-        about[f"r{c}"] = f"SI unit squared, variance of {channel}"
-    about |= {setting.name: "setting of the filter" for setting in settings}
-    about |= {"h": "s, step of the model", "share": "1, its share of a sample"}
-    spelt = {f"q{i}": f"noise_{state.name}" for i, state in enumerate(model.states)}
-    spelt |= {f"r{c}": f"variance_{channel}" for c, channel in enumerate(problem.channels)}
-    spelt |= {"h": "step", "share": "share"}
     return {
-        "row_names": [(spelt.get(row, row), about[row]) for row in written.rows],
-        "state_names": [(state.name, _state_note(problem, i)) for i, state in enumerate(model.states)],
+        "row_names": [(name, f"{unit}, {meaning}") for name, unit, meaning in row_notes(problem, method)],
+        "state_names": [(state.name, _state_note(problem, i)) for i, state in enumerate(problem.model.states)],
         "channel_names": problem.channels,
-        "drive_names": model.drives,
+        "drive_names": problem.model.drives,
     }
 
 

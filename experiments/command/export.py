@@ -1,4 +1,4 @@
-"""`hydrostate export c`: filters and plants as C99 for a controller."""
+"""`hydrostate export`: filters and plants as C99 for a controller, and as FMUs for co-simulation."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from plant.eha.rig import Rig
     from plant.log.record import Record
 
-commands = typer.Typer(help="Take what works offline to a controller: C99.", no_args_is_help=True)
+commands = typer.Typer(help="Take what works offline to a controller: C99, FMUs.", no_args_is_help=True)
 
 Folder: TypeAlias = Annotated[Path, option("DIR", "Folder that the files are written to.", "--out", "-o")]
 Log: TypeAlias = Annotated[
@@ -44,6 +44,10 @@ Tune: TypeAlias = Annotated[
 States: TypeAlias = Annotated[
     str, option("NAMES", "What the filter estimates beside bulk modulus, comma-separated: parameters' names.")
 ]
+NoPressure: TypeAlias = Annotated[
+    bool, typer.Option("--no-pressure", help="Use position and velocity alone, even if pressure is logged.")
+]
+Step: TypeAlias = Annotated[float | None, option("S", "Time between samples [s].", show_default="the log's, else 1e-4")]
 
 
 @commands.command(
@@ -61,12 +65,8 @@ def c(
     name: Annotated[
         str | None, option("NAME", "What files, types and functions are called.", show_default="the form and method")
     ] = None,
-    no_pressure: Annotated[
-        bool, typer.Option("--no-pressure", help="Use position and velocity alone, even if pressure is logged.")
-    ] = False,
-    sample_time: Annotated[
-        float | None, option("S", "Time between samples [s].", show_default="the log's, else 1e-4")
-    ] = None,
+    no_pressure: NoPressure = False,
+    sample_time: Step = None,
     rig: RigFile = None,
     columns: Columns = None,
     as_json: Json = False,
@@ -87,6 +87,56 @@ def c(
     written = write_files(out, files)
     found: dict[str, Any] = {"outcome": "ok", "folder": str(out), "files": written, **about}
     emit(json_text([found]) if as_json else f"{out}: {', '.join(written)}")
+
+
+@commands.command(epilog="Example: hydrostate export fmu --plant lumped --sample-time 1e-3 --fmi 3.0 --out plant.fmu")
+def fmu(
+    log: Log = None,
+    out: Annotated[Path, option("FILE", "The archive that is written.", "--out", "-o")] = Path("hydrostate.fmu"),
+    fmi: Annotated[str, option("VERSION", "Version of the interface: 2.0 or 3.0.")] = "2.0",
+    form: Form = "pressure",
+    method: Method = "ekf",
+    plant: PlantName = None,
+    states: States = "",
+    tune: Tune = False,
+    name: Annotated[
+        str | None, option("NAME", "The model's identifier, a name of C.", show_default="the form and method")
+    ] = None,
+    no_pressure: NoPressure = False,
+    sample_time: Step = None,
+    rig: RigFile = None,
+    columns: Columns = None,
+    as_json: Json = False,
+) -> None:
+    """Write a plant, or a filter, as an FMU for co-simulation: the binary for this Linux, the sources for all others.
+
+    Parameters and variables have the units and meanings of the parameter notes. A plant goes on by whole numbers of
+    samples, a filter by one sample a step.
+    """
+    require_positive("--sample-time", sample_time, "s")
+    bench = load_rig(rig)
+    if plant is not None:
+        content = _plant_fmu(bench, plant, 1e-4 if sample_time is None else sample_time, name, fmi)
+    else:
+        from estimation.export.fmu_filter import filter_fmu
+        from estimation.export.task import filter_task
+
+        record = _bench_log(log, bench, load_columns(columns), sample_time, no_pressure=no_pressure)
+        problem = filter_task(record, bench.parameters, form, states=_listed(states), tuned=tune)
+        content = filter_fmu(problem, method, fmi, name=name if name is not None else f"{form}_{method}")
+    write_files(out.parent, {out.name: content})
+    found = {"outcome": "ok", "file": str(out), "fmi": fmi}
+    emit(json_text([found]) if as_json else str(out))
+
+
+def _plant_fmu(bench: "Rig", plant: str, sample_time: float, name: str | None, fmi: str) -> bytes:
+    from plant.eha.simulate import PLANTS
+    from plant.errors import require_known
+    from plant.export.fmu import plant_fmu
+
+    require_known("--plant", plant, PLANTS)
+    called = name if name is not None else f"{plant}_plant"
+    return plant_fmu(PLANTS[plant], bench.parameters, sample_time, fmi, name=called)
 
 
 def _listed(text: str) -> tuple[str, ...]:
@@ -154,15 +204,15 @@ def _simulated_bench(bench: "Rig", sample_time: float) -> "Record":
     return simulate(LUMPED, drive, sample_time, bench.parameters, sensors=BENCH, rng=np.random.default_rng(0))
 
 
-def write_files(folder: Path, files: Mapping[str, str]) -> list[str]:
+def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[str]:
     """Write files into a folder, each whole or not at all.
 
     Parameters
     ----------
     folder : Path
         Which exists.
-    files : Mapping[str, str]
-        Texts by file name.
+    files : Mapping[str, str or bytes]
+        Contents by file name.
 
     Returns
     -------
@@ -176,10 +226,10 @@ def write_files(folder: Path, files: Mapping[str, str]) -> list[str]:
     """
     from plant.atomic import replacing
 
-    for name, text in files.items():
+    for name, content in files.items():
         try:
             with replacing(folder / name) as file:
-                file.write(text.encode())
+                file.write(content if isinstance(content, bytes) else content.encode())
         except OSError as error:
             raise HydrostateError(f"{folder / name}: it cannot be written: {error.strerror or error}") from error
     return list(files)

@@ -58,6 +58,29 @@ def c_files(package: str, folder: str, kind: str, name: str, facts: Mapping[str,
     dict[str, str]
         Texts by file name.
     """
+    templates = {
+        f"{name}.h": f"own/{kind}.h",
+        f"{name}.c": f"own/{kind}.c",
+        "example.c": f"own/{kind}_example.c",
+        "Makefile": "shared/Makefile",
+    }
+    return {file: _filled(package, folder, template, facts) for file, template in templates.items()}
+
+
+def filled(package: str, folder: str, template: str, facts: Mapping[str, Any]) -> str:
+    """Fill in one template.
+
+    Parameters
+    ----------
+    package, folder, template : str
+        Where it is.
+    facts : Mapping[str, Any]
+        What it asks for, by name.
+    """
+    return _filled(package, folder, f"own/{template}", facts)
+
+
+def _filled(package: str, folder: str, template: str, facts: Mapping[str, Any]) -> str:
     from jinja2 import Environment, PackageLoader, PrefixLoader, StrictUndefined
 
     own, shared = PackageLoader(package, folder), PackageLoader("plant", "compiled/c99/templates")
@@ -68,10 +91,4 @@ def c_files(package: str, folder: str, kind: str, name: str, facts: Mapping[str,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    templates = {
-        f"{name}.h": f"own/{kind}.h",
-        f"{name}.c": f"own/{kind}.c",
-        "example.c": f"own/{kind}_example.c",
-        "Makefile": "shared/Makefile",
-    }
-    return {file: environment.get_template(template).render(**facts) for file, template in templates.items()}
+    return environment.get_template(template).render(**facts)

@@ -1,4 +1,5 @@
 import json
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,15 @@ def test_without_a_log_it_is_made_for_a_simulated_bench_and_a_plant_for_none(tmp
     assert "float" in (tmp_path / "filter" / "pressure_imm.h").read_text()
     assert export("c", "--plant", "circuit", "--sample-time", "2e-4", "--out", tmp_path / "plant").exit_code == 0
     assert "every 0.0002 s" in (tmp_path / "plant" / "circuit_plant.h").read_text()
+
+
+def test_an_fmu_of_a_plant_and_of_a_filter_is_written(tmp_path: Path) -> None:
+    plant, kalman = tmp_path / "plant.fmu", tmp_path / "filter.fmu"
+    done = export("fmu", "--plant", "reduced", "--fmi", "3.0", "--out", plant, "--json")
+    assert json.loads(done.stdout) == [{"outcome": "ok", "file": str(plant), "fmi": "3.0"}]
+    assert export("fmu", "--out", kalman).exit_code == 0
+    assert zipfile.is_zipfile(plant)
+    assert "sources/pressure_ekf.c" in zipfile.ZipFile(kalman).namelist()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,41 @@
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.export_c import SAMPLE_TIME, task
+from estimation.export.fmu_filter import filter_fmu
+from estimation.filters.run import METHODS
+from tests.c_compiler import compiler
+
+
+@pytest.fixture(scope="module")
+def fmpy() -> Any:
+    compiler("gcc")
+    return pytest.importorskip("fmpy", reason="FMPy is an extra of developers")
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+@pytest.mark.parametrize(("form", "method"), [("pressure", "ekf"), ("pressure", "imm"), ("flow", "ekf")])
+def test_it_passes_validation_and_believes_what_the_native_filter_believes(
+    fmpy: Any, fmi: str, form: str, method: str, tmp_path: Path
+) -> None:
+    from fmpy.validation import validate_fmu
+
+    problem = task(form, "normal", 1500)
+    path = tmp_path / "filter.fmu"
+    path.write_bytes(filter_fmu(problem, method, fmi, name="believed"))
+    assert validate_fmu(str(path)) == []
+    names = [*problem.model.drives, *(f"measured_{one}" for one in problem.channels)]
+    time = SAMPLE_TIME * np.arange(len(problem.measured))
+    rows = np.column_stack([time, problem.drives, problem.measured])
+    signals = np.array([tuple(row) for row in rows], dtype=[(name, float) for name in ("time", *names)])
+    span = {"start_time": 0.0, "stop_time": time[-1], "step_size": SAMPLE_TIME, "output_interval": SAMPLE_TIME}
+    with np.errstate(all="ignore"):
+        found = fmpy.simulate_fmu(str(path), **span, input=signals)
+    mean, slope = problem.model.to_si(METHODS[method](problem).track)
+    assert slope.shape == mean.shape
+    for i, state in enumerate(problem.model.states):
+        wanted = mean[:-1, i]  # what the sample at a step's beginning says stands at its end
+        assert np.max(np.abs(found[f"estimated_{state.name}"][1:] - wanted)) < 1e-6 * np.max(np.abs(wanted))
