@@ -93,10 +93,13 @@ def mix(
         for j in range(modes):
             terms[j] = transitions[j, i] + log_probability[j]
         predicted[i] = log_sum(terms, weights)
-        mixed[i] = states[i]
+        for q in range(states.shape[1]):
+            mixed[i, q] = states[i, q]
         if predicted[i] > -np.inf:
             blend(states, weights, shift, mixed[i], WIDTH=WIDTH, BELIEF=BELIEF)
-    states[:] = mixed
+    for i in range(modes):
+        for q in range(states.shape[1]):
+            states[i, q] = mixed[i, q]
 
 
 def log_density(sample: Array, seen: Array, state: Array, *, BELIEF: int) -> float:
@@ -255,7 +258,8 @@ def run(
             combine(density, states, weights, shift, overall, WIDTH=WIDTH, BELIEF=BELIEF)
             unpack(overall, trace.mean, trace.covariance, WIDTH=WIDTH)
         if k % every == 0:
-            history[k // every] = log_probability
+            for i in range(modes):
+                history[k // every, i] = log_probability[i]
             for a in range(WIDTH):
                 trace.track[k // every, a] = trace.mean[a]
                 trace.track_variance[k // every, a] = trace.covariance[a, a]

@@ -146,9 +146,12 @@ def resample(rng: np.random.Generator, particles: Array, weights: Array, others:
         while place > reached and i < size - 1:
             i += 1
             reached += weights[i]
-        others[m] = particles[i]
+        for a in range(particles.shape[1]):
+            others[m, a] = particles[i, a]
         place += 1.0 / size
-    particles[:] = others
+    for m in range(size):
+        for a in range(particles.shape[1]):
+            particles[m, a] = others[m, a]
 
 
 PARTICLE_SETTINGS = (

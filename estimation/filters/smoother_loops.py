@@ -72,13 +72,16 @@ def forward(
         if k > 0:
             for j in range(substeps):
                 if keep:
-                    starts[k - first, j] = state[: starts.shape[2]]
+                    for i in range(starts.shape[2]):
+                        starts[k - first, j, i] = state[i]
                 predict(state, constants, drives[k - 1], drives[k], float(j))
         if keep:
-            priors[k - first] = state
+            for i in range(state.shape[0]):
+                priors[k - first, i] = state[i]
         update(state, constants, measured[k], seen)
         if keep:
-            posteriors[k - first] = state
+            for i in range(state.shape[0]):
+                posteriors[k - first, i] = state[i]
 
 
 def backward(

@@ -122,18 +122,22 @@ def forward(
     """Filter deviations from the trajectory; leave the filter's last covariance in P, and some on the way in kept."""
     rows, drives, measured, spread, substeps = log
     F, _, slope, residual, variance, kept = lines
-    m, state, before = prior - trajectory[0], np.empty(WIDTH), np.empty(WIDTH)
-    J, product = np.eye(WIDTH), np.empty((WIDTH, WIDTH))
+    m, state, before = np.empty(WIDTH), np.empty(WIDTH), np.empty(WIDTH)
+    J, product = np.zeros((WIDTH, WIDTH)), np.empty((WIDTH, WIDTH))
     seen, PH = np.empty(CHANNELS), np.empty(WIDTH)
+    for i in range(WIDTH):
+        m[i] = prior[i] - trajectory[0, i]
+        J[i, i] = 1.0
     for k in range(measured.shape[0]):
         if k > 0:
-            state[:] = trajectory[k - 1]
-            F[k] = np.eye(WIDTH)
+            for i in range(WIDTH):
+                state[i], before[i] = trajectory[k - 1, i], m[i]
+                for j in range(WIDTH):
+                    F[k, i, j] = 1.0 if i == j else 0.0
             for j in range(substeps):
                 differentiate(state, rows, drives[k - 1], drives[k], float(j), J)
                 multiply(J, F[k], product, WIDTH=WIDTH)
-                F[k] = product
-            before[:] = m
+                copy(product, F[k], WIDTH=WIDTH)
             for i in range(WIDTH):
                 m[i] = -opened[k, i] * adjoint[k, i]
                 for j in range(WIDTH):
@@ -146,7 +150,7 @@ def forward(
                         total += product[i, q] * F[k, j, q]
                     P[i, j] = P[j, i] = total
         if k % every == 0:
-            kept[k // every] = P
+            copy(P, kept[k // every], WIDTH=WIDTH)
         see(trajectory[k], rows, seen, slope[k])
         for c in range(CHANNELS):
             if math.isnan(measured[k, c]):
@@ -186,6 +190,13 @@ def multiply(a: Array, b: Array, product: Array, *, WIDTH: int) -> None:
             product[i, j] = total
 
 
+def copy(a: Array, b: Array, *, WIDTH: int) -> None:
+    """Copy a matrix, for which Numba takes several seconds to compile an assignment."""
+    for i in range(WIDTH):
+        for j in range(WIDTH):
+            b[i, j] = a[i, j]
+
+
 def backward(lines: Lines, wanted: Array, *, WIDTH: int, CHANNELS: int) -> None:
     """Carry the adjoint back over the log: what pushes the trajectory to where it fits best."""
     F, gain, slope, residual, variance, _ = lines
@@ -198,13 +209,13 @@ def backward(lines: Lines, wanted: Array, *, WIDTH: int, CHANNELS: int) -> None:
                     known -= gain[k, c, i] * u[i]
                 for i in range(WIDTH):
                     u[i] += slope[k, c, i] * known
-        wanted[k] = u
+        for i in range(WIDTH):
+            wanted[k, i] = earlier[i] = u[i]
         if k > 0:
             for i in range(WIDTH):
-                earlier[i] = 0.0
+                u[i] = 0.0
                 for j in range(WIDTH):
-                    earlier[i] += F[k, j, i] * u[j]
-            u[:] = earlier
+                    u[i] += F[k, j, i] * earlier[j]
 
 
 def spread_back(lines: Lines, every: int, *, WIDTH: int, CHANNELS: int) -> None:
@@ -229,10 +240,15 @@ def spread_back(lines: Lines, every: int, *, WIDTH: int, CHANNELS: int) -> None:
         if k % every == 0:
             multiply(kept[k // every], U, PU, WIDTH=WIDTH)
             multiply(PU, kept[k // every], half, WIDTH=WIDTH)
-            kept[k // every] -= half
+            for i in range(WIDTH):
+                for j in range(WIDTH):
+                    kept[k // every, i, j] -= half[i, j]
         if k > 0:
             multiply(U, F[k], half, WIDTH=WIDTH)
-            multiply(np.ascontiguousarray(F[k].T), half, U, WIDTH=WIDTH)
+            for i in range(WIDTH):
+                for j in range(WIDTH):
+                    PU[j, i] = F[k, i, j]
+            multiply(PU, half, U, WIDTH=WIDTH)
 
 
 def reweigh(
@@ -291,7 +307,7 @@ def compile_trajectory(model: ProcessModel, channels: tuple[str, ...], robust: s
         function_source("differentiate", "state, rows, before, after, j, jacobian", reads, linear, written),
         function_source("see", "state, rows, seen, slope", reads, {**shown, **H}, places),
         pasted(roll, forward, backward, spread_back, constants={"WIDTH": n, "CHANNELS": len(channels)}),
-        pasted(update, multiply, options=BORROWING),
+        pasted(update, multiply, copy, options=BORROWING),
     ]
     if robust != "none":
         doubted = {"factor": inflation(robust, symbol("x"))}

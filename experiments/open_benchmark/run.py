@@ -80,7 +80,8 @@ def trajectory(m: Machine, course: Array, y: Array, stretch: Array, substeps: in
         demand = now[0] if m.loop_gain == 0.0 else m.loop_gain * (now[0] - y[2])
         demand = clipped(demand, -m.speed_limit, m.speed_limit)
         for i in range(ticks):
-            out[k * ticks + i] = y
+            for j in range(len(y)):
+                out[k * ticks + i, j] = y[j]
             for _ in range(substeps):
                 advance(y, stretch, now, demand, m, step, work)
 
