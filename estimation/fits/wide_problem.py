@@ -17,6 +17,9 @@ from plant.solvers.steps import parameter_names, parameter_row
 RELIEF_START = 1e-10
 """Slope of a relief valve that opens early, first guess [m^3/(s Pa)]."""
 
+LEAST_PEAK = 1.0
+"""Highest differential pressure taken of a log whose sensor is dead: the logarithm of none is no start [Pa]."""
+
 
 def widened(log: GreyBoxLog, parameters: EhaParameters) -> GreyBoxLog:
     """Return a log as the wide flow form sees it: with the share of the log as a drive, and what is presumed.
@@ -100,7 +103,7 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
     """
     if not one.shares_of_peak:
         return one.starts
-    peak = float(np.nanmax(np.abs(log.measured)))
+    peak = max(float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)
     return [{"relief_pressure": share * peak, "relief_conductance": RELIEF_START} for share in one.shares_of_peak]
 
 
