@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
+from estimation.eha.named import NAMED
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide, without_number
 from estimation.eha.rig_share import fitted_responses, scaled_responses
 from estimation.filters.run import available_channels
@@ -50,8 +51,9 @@ class EstimateOptions:
         errata E9), or ``"auto"``: flow or motion where their channels are logged, else pressure.
     method : str
         ``"least-squares"`` for the forms that can be fitted, flow and motion; a filter of
-        `estimation.filters.run.METHODS`; or ``"auto"``: least squares where the form allows, the log begins at rest,
-        and nothing is asked for that only a filter does, else what `estimation.eha.by_filter.chosen_method` says.
+        `estimation.filters.run.METHODS`; a method of `estimation.eha.named.NAMED`, which has a form of its own; or
+        ``"auto"``: least squares where the form allows, the log begins at rest, and nothing is asked for that only a
+        filter does, else what `estimation.eha.by_filter.chosen_method` says.
     start : float, optional
         First guess [Pa]; the actuator's own if not given.
     start_std : float
@@ -199,7 +201,7 @@ def estimate_clean(
             f"the first guess must be 0 Pa or more, its deviation positive, got {guess}, {options.start_std}"
         )
     automatic, filtering = options.form == "auto", options.filtering
-    form = ("pressure" if filtering else _automatic(log.record)) if automatic else options.form
+    form = _form(options, log.record)
     if log.mistakes:
         return _misread(log, form)
     if automatic and form == "motion" and (bound := rigid_bound(log, parameters)) > LARGEST_BOUND:
@@ -211,7 +213,7 @@ def estimate_clean(
         if form == "flow":
             found = replace(found, responses=fitted_responses(fit))
     elif form == "flow":
-        found = estimate_by_flow_filter(log, parameters, options.filter_options)
+        found = estimate_by_flow_filter(log, parameters, options.filter_options, guess)
     elif options.method == LEAST_SQUARES or form == "motion":
         raise HydrostateError(
             f"the {form} form is {'filtered' if form in FORMS else 'fitted by least squares'}, "
@@ -248,6 +250,18 @@ def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusE
     if not said:
         return found
     return replace(found, gate=replace(found.gate, passed=False, reasons=(*said, *found.gate.reasons)))
+
+
+def _form(options: EstimateOptions, record: Record) -> str:
+    """Return what is believed of the actuator: what is asked for, what a named method believes, what the log allows."""
+    if options.method in NAMED:
+        own = NAMED[options.method].form
+        if options.form not in ("auto", own):
+            raise HydrostateError(f"{options.method} believes the {own} form, got form {options.form!r}")
+        return own
+    if options.form != "auto":
+        return options.form
+    return "pressure" if options.filtering else _automatic(record)
 
 
 def _automatic(record: Record) -> str:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.eha.by_flow_filter import filter_flow
+from estimation.eha.named import NAMED, NamedMethod
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide
 from estimation.filters.iterated_smoother import LONGEST
 from estimation.filters.run import METHODS, Estimate, available_channels, run_filter
@@ -42,7 +43,8 @@ class FilterOptions:
     Parameters
     ----------
     method : str
-        A filter of `estimation.filters.run.METHODS`, or ``"auto"``: see `chosen_method`.
+        A filter of `estimation.filters.run.METHODS`, a method of `estimation.eha.named.NAMED`, or ``"auto"``: see
+        `chosen_method`.
     states : tuple of str
         What is estimated beside bulk modulus: of `AUGMENTABLE`, or of `GROUPS`.
     tuned : bool
@@ -97,14 +99,15 @@ def estimate_by_filter(
     HydrostateError
         If a name in the options is unknown.
     """
-    require_known("method", options.method, ["auto", *METHODS])
+    require_known("method", options.method, ["auto", *METHODS, *NAMED])
     record = log.record
-    method = options.method if options.method != "auto" else chosen_method(record, model, options.tuned)
+    named = NAMED.get(options.method, NamedMethod(model.name, options.method))
+    method = named.method if named.method != "auto" else chosen_method(record, model, options.tuned)
     names = options.names
     wide = augmented(model, names, dict.fromkeys(names, WALK**2))
     channels = available_channels(model, record)
-    variances = log.variances
-    noise: Mapping[str, float] = {PRESSURE: PRESSURE_NOISE_LOGGED} if PRESSURE in channels else {}
+    variances = {**log.variances, **named.variances}
+    noise = {**({PRESSURE: PRESSURE_NOISE_LOGGED} if PRESSURE in channels else {}), **named.noise}
     found: Tuning | None = None
     if options.tuned:
         found = tune(
@@ -145,7 +148,7 @@ def estimate_by_filter(
     nominal = parameters.bulk_modulus
     bound = max(bound_at(nominal), bound_at(max(value, 1e-3 * nominal))) if np.isfinite(value) else float("inf")
     concluded = conclude(estimate, record, bound, model.name, names)
-    return replace(concluded, first_pass=first, tuning=found, method=method)
+    return replace(concluded, first_pass=first, tuning=found, method=options.method if named.noise else method)
 
 
 def chosen_method(record: Record, model: ProcessModel, tuned: bool) -> str:
@@ -171,8 +174,10 @@ def chosen_method(record: Record, model: ProcessModel, tuned: bool) -> str:
     return "iterated-smoother" if tuned and unseen and len(record) <= LONGEST else "ekf"
 
 
-def estimate_by_flow_filter(log: CleanLog, parameters: EhaParameters, options: FilterOptions) -> BulkModulusEstimate:
-    """Estimate bulk modulus, leakage and flow bias with a bank of flow-form filters.
+def estimate_by_flow_filter(
+    log: CleanLog, parameters: EhaParameters, options: FilterOptions, guess: float | None = None
+) -> BulkModulusEstimate:
+    """Estimate bulk modulus, leakage and flow bias with a bank of modelled-chamber filters.
 
     Parameters
     ----------
@@ -181,7 +186,9 @@ def estimate_by_flow_filter(log: CleanLog, parameters: EhaParameters, options: F
     parameters : EhaParameters
         Geometry and pump, and the size of the first guesses.
     options : FilterOptions
-        The method must be ``ekf`` or ``auto``; nothing else can be chosen.
+        The method must be ``chamber-ekf``, ``ekf`` or ``auto``; nothing else can be chosen.
+    guess : float, optional
+        First guess of bulk modulus [Pa]; the actuator's if not given.
 
     Returns
     -------
@@ -195,22 +202,30 @@ def estimate_by_flow_filter(log: CleanLog, parameters: EhaParameters, options: F
     """
     if (
         replace(options, states=(), method="auto") != FilterOptions()
-        or options.method not in ("auto", "ekf")
+        or options.method not in ("auto", "ekf", "chamber-ekf")
         or any(name != "leakage" for name in options.states)
     ):
         raise HydrostateError(
             "the flow form is filtered by a bank of ekf, which finds leakage along with bulk modulus; "
             f"it takes no other method, states, tuning or robust update, got {options}"
         )
-    estimate = filter_flow(log.record, parameters, variances=log.variances)
-    value, std = estimate.settled(BULK_MODULUS, 0.02)
+    estimate, again = filter_flow(log.record, parameters, variances=log.variances, guess=guess)
+    last = 0.5 / len(estimate.mean)
+    value, std = estimate.settled(BULK_MODULUS, last)
     bound = std / value if np.isfinite(value) and value > 0.0 else float("inf")
-    found = conclude(estimate, log.record, bound, "flow", ("leakage_coefficient", "flow_bias"), fraction=0.02)
-    return replace(found, method="ekf")
+    names = ("leakage_coefficient", "flow_bias")
+    found = conclude(estimate, log.record, bound, "flow", names, fraction=last, judged=again)
+    return replace(found, method="chamber-ekf")
 
 
 def conclude(
-    estimate: Estimate, record: Record, bound: float, form: str, names: tuple[str, ...], fraction: float = 0.2
+    estimate: Estimate,
+    record: Record,
+    bound: float,
+    form: str,
+    names: tuple[str, ...],
+    fraction: float = 0.2,
+    judged: Estimate | None = None,
 ) -> BulkModulusEstimate:
     """Judge a filtered log and put the result in words and numbers.
 
@@ -228,6 +243,8 @@ def conclude(
         Further states that are reported.
     fraction : float
         Share of the log, at its end, over which values are averaged [fraction].
+    judged : Estimate, optional
+        The reading of the log that passes the gate; the same if not given.
 
     Returns
     -------
@@ -235,7 +252,8 @@ def conclude(
         The result.
     """
     value, std = estimate.settled(BULK_MODULUS, fraction)
-    outcome, gate = _verdict(estimate, record, bool(np.isfinite(value) and np.isfinite(std)), bound)
+    finite = bool(np.isfinite(value) and np.isfinite(std))
+    outcome, gate = _verdict(estimate if judged is None else judged, record, finite, bound)
     known = outcome is Outcome.OK
     return BulkModulusEstimate(
         outcome=outcome,

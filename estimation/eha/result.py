@@ -54,7 +54,8 @@ class BulkModulusEstimate:
     explanation : Explanation or None
         What is strange about rig, oil or logger, where that explains the log.
     method : str
-        How it was estimated: ``least-squares``, or a filter of `estimation.filters.run.METHODS`.
+        How it was estimated: ``least-squares``, a filter of `estimation.filters.run.METHODS`, or a method of
+        `estimation.eha.named.NAMED`.
     """
 
     outcome: Outcome

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from estimation.eha.by_flow_filter import FLOW_FILTER, flow_belief
 from estimation.engine.contract import FilterProblem
+from estimation.export.flow import FLOW_FILTER, flow_belief
 from estimation.filters.run import available_channels, filter_problem
 from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, START_STD, first_belief, first_load
 from estimation.models.augment import augmented, augmented_prior

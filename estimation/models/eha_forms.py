@@ -6,13 +6,14 @@ as a state, so friction enters the force balance undifferentiated and the piston
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 
 from estimation.arrays import Array
 from estimation.models.model import ProcessModel, StateVariable
-from plant.compiled.functions import Scalar
+from plant.compiled.functions import Scalar, sign
 from plant.eha.model import PARAMETER_NAMES, EhaParameters, EhaValues, lumped_step, reduced_derivative
 
 BULK_MODULUS = "bulk_modulus_pa"
@@ -58,6 +59,40 @@ def acceleration_step(
     x, v, a, beta = state
     _, _, jerk = reduced_derivative((x, v, a), speeds[0], with_bulk_modulus(p, beta))
     return x + step * v, v + step * a, a + step * jerk, beta
+
+
+def printed_step(
+    state: tuple[Scalar, Scalar, Scalar, Scalar], speeds: tuple[Scalar, Scalar], p: EhaValues, step: Scalar
+) -> tuple[Scalar, Scalar, Scalar, Scalar]:
+    """Advance the published model as printed in equations 7.1 to 7.4, to show what that does.
+
+    The quadratic part of friction is divided by the volume too (errata E3), and the flow bias stands as in 5.8
+    (errata E8).
+
+    Parameters
+    ----------
+    state : tuple of float or Expression
+        Position [m], velocity [m/s], acceleration [m/s^2], effective bulk modulus [Pa].
+    speeds : tuple of float or Expression
+        Motor speed at the start and at the end of the step [rad/s]; the published step uses the first.
+    p : EhaParameters or namespace of Expression
+        The actuator; its own bulk modulus is not used.
+    step : float or Expression
+        Time step T [s].
+
+    Returns
+    -------
+    tuple of float or Expression
+        The state one step later.
+    """
+    x1, x2, x3, x4 = state
+    A, V0, M, L = p.piston_area, p.chamber_volume, p.moving_mass, p.leakage_coefficient
+    a1, a2, a3 = p.friction_quadratic, p.friction_linear, p.friction_coulomb
+    u = p.pump_displacement * speeds[0] - sign(speeds[0]) * p.flow_bias
+    decay = (a2 * V0 + M * L * x4) / (M * V0) * x3
+    swept = (A * A + a2 * L) / (M * V0) * x4 * x2
+    rubbed = (2.0 * a1 * x2 * x3 / (M * V0) + (a1 * x2 * x2 + a3) * L / (M * V0) * x4) * sign(x2)
+    return x1 + step * x2, x2 + step * x3, x3 + step * (A * u / (M * V0) * x4 - decay - swept - rubbed), x4
 
 
 def pressure_step(
@@ -141,6 +176,9 @@ ACCELERATION_FORM = ProcessModel(
     parameters=EhaParameters,
     opening=volume_left_open,
 )
+
+PRINTED_FORM = replace(ACCELERATION_FORM, name="acceleration_as_printed", step=printed_step)
+"""The published form as printed, with its misprint: it is no choice of `FORMS`."""
 
 PRESSURE_FORM = ProcessModel(
     "pressure",

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
+from estimation.eha.named import NAMED
 from estimation.filters.run import METHODS
 from estimation.log_checks.first_belief import START_STD
 from estimation.models.eha_forms import FORMS
@@ -86,7 +87,7 @@ class Method(_Table):
     def _names(cls, name: str, info: ValidationInfo) -> str:
         known = list(FORMS if info.field_name == "form" else METHODS)
         if info.data.get("verb") != "filter":
-            known = ["auto", *(("flow", "motion") if info.field_name == "form" else ("least-squares",)), *known]
+            known = ["auto", *(("flow", "motion") if info.field_name == "form" else ("least-squares", *NAMED)), *known]
         _known([name], known)
         return name
 

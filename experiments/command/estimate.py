@@ -38,7 +38,8 @@ Method: TypeAlias = Annotated[
     str,
     option(
         "METHOD",
-        "least-squares (flow, motion), or a filter: ekf, iekf, ukf, ckf, svsf, sif, imm (is not told leakage "
+        "least-squares (flow, motion); chamber-ekf (flow, sample by sample: two chambers, make-up and drain); "
+        "published-ekf (equations 7.1 to 7.7); or a filter: ekf, iekf, ukf, ckf, svsf, sif, imm (is not told leakage "
         "and friction), particle, smoother, iterated-smoother, filterpy-ekf; auto: least squares where the form "
         "allows.",
     ),

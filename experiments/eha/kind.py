@@ -96,13 +96,14 @@ def _how(options: Options) -> "EstimateOptions":
     """Return how a log is to be estimated, checked."""
     from estimation.eha.bulk_modulus import FITTED, LEAST_SQUARES, EstimateOptions
     from estimation.eha.by_filter import GROUPS
+    from estimation.eha.named import NAMED
     from estimation.filters.run import METHODS, ROBUST
     from estimation.models.augment import AUGMENTABLE
     from estimation.models.eha_forms import FORMS
 
     form, method, robust, start = (options[name] for name in ("form", "method", "robust", "start"))
     require_known("--form", form, ["auto", *FITTED, *FORMS])
-    require_known("--method", method, ["auto", LEAST_SQUARES, *METHODS])
+    require_known("--method", method, ["auto", LEAST_SQUARES, *NAMED, *METHODS])
     require_known("--robust", robust, list(ROBUST))
     if options["smooth"] and method not in ("auto", "ekf", "smoother"):
         raise HydrostateError(f"--smooth smooths the ekf, got --method {method}")

@@ -117,7 +117,7 @@ def test_five_drop_outs_of_a_channel_do_not_move_the_flow_filter(channel: str) -
     record = prbs()
     for first in (1100, 3000, 5200, 7100, 9000):
         record = without(record, channel, first, first + 100)
-    value, std = filter_flow(record, HEALTHY).settled("bulk_modulus_pa", 0.02)
+    value, std = filter_flow(record, HEALTHY).online.settled("bulk_modulus_pa", 0.02)
     assert value == pytest.approx(HEALTHY.bulk_modulus, rel=0.003)
     assert abs(value - HEALTHY.bulk_modulus) < 2.0 * std
 
@@ -126,7 +126,7 @@ def test_pressures_within_a_gap_of_position_are_not_compared() -> None:
     record = without(prbs(1.0), "position_m", 500, 600)
     spoilt = record[PRESSURE].copy()
     spoilt[500:600] += 1e6
-    kept, moved = (filter_flow(log, HEALTHY) for log in (record, record.replace(**{PRESSURE: spoilt})))
+    kept, moved = (filter_flow(log, HEALTHY).online for log in (record, record.replace(**{PRESSURE: spoilt})))
     assert moved.settled("bulk_modulus_pa") == kept.settled("bulk_modulus_pa")
 
 

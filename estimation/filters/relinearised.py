@@ -1,0 +1,69 @@
+"""The extended Kalman filter linearised anew: it reads again what it has read, from where that has led it.
+
+One pass linearises the first samples about a guess that may be far off, counts them as if that had been right, and
+ends too sure of a value beside the truth. The next pass begins at the constants that the last one ended with and is
+unsure of them by several of their deviations, correlated as they are, so that every linearisation is near its end.
+It is the Gauss-Newton iteration of a maximum-likelihood fit with the filter as its model (Bell and Cathey 1993, *The
+iterated Kalman filter update as a Gauss-Newton method*, for one update).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.engine.contract import FilterProblem, Trace
+from estimation.filters.ekf import ekf
+
+INFLATION = 3.0
+"""How much wider than a pass ended with its constants the next one begins [fraction]. The prior thus counts the log by
+a ninth too often, which the covariance that is returned makes up for."""
+
+MOST_PASSES = 10
+"""Most passes over the same samples."""
+
+SAME = 0.3
+"""Gain in log-likelihood below which another pass is not worth its time [dimensionless]."""
+
+
+def relinearised(problem: FilterProblem, mean: Array, covariance: Array, most: int = MOST_PASSES) -> Trace:
+    """Filter a log again until linearising it anew changes nothing.
+
+    Parameters
+    ----------
+    problem : FilterProblem
+        The task, with its prior.
+    mean, covariance : ndarray, shapes (n,) and (n, n)
+        What an earlier pass ended with, scaled; of it the constants count, which are states without process noise.
+    most : int
+        Most passes.
+
+    Returns
+    -------
+    Trace
+        The likeliest pass, surer of the constants by no more than the log allows; NaN where all diverged.
+    """
+    best = ekf(_begun_again(problem, mean, covariance))
+    found = best
+    for _ in range(most - 1):
+        if not np.isfinite(found.log_likelihood):
+            break
+        found = ekf(_begun_again(problem, found.mean, found.covariance))
+        gain = found.log_likelihood - best.log_likelihood
+        if gain > 0.0:
+            best = found
+        if abs(gain) < SAME:
+            break
+    wider = np.where(problem.noise == 0.0, np.sqrt(1.0 + INFLATION**-2), 1.0)
+    return best._replace(covariance=np.outer(wider, wider) * best.covariance)
+
+
+def _begun_again(problem: FilterProblem, mean: Array, covariance: Array) -> FilterProblem:
+    """Return the task with a prior about the constants of an earlier pass, no wider than the first one."""
+    constant = problem.noise == 0.0
+    block = np.ix_(constant, constant)
+    prior = problem.covariance.copy()
+    known = np.linalg.inv(prior[block]) + np.linalg.inv(INFLATION**2 * covariance[block])
+    spread = np.linalg.inv(known)
+    prior[block] = 0.5 * (spread + spread.T)
+    return replace(problem, mean=np.where(constant, mean, problem.mean), covariance=prior)
