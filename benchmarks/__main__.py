@@ -33,7 +33,7 @@ NAMES = (
 FITS = ("fit_diagnosis",)
 """Those that write numbers which ship with the package."""
 
-WITH_PEERS = ("identification_peers",)
+WITH_PEERS = ("identification_peers", "streaming")
 """Those that need environments of other tools, which `make peers` sets up."""
 
 OF_COMMITS = ("same_numbers",)

@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TextIO, TypeVar
@@ -18,6 +18,7 @@ from experiments.command.logs import caught, read_log, with_rig_columns
 from experiments.command.options import PRESSURE, Columns, RigFile, argument, flag, load_columns, load_rig, option
 from experiments.command.terminal import SOME_FAILED, emit, note, unexpected
 from plant.errors import HydrostateError, LogError
+from plant.log.stream_source import Received, is_stream, stream_lines
 from plant.notes import distinct
 
 if TYPE_CHECKING:
@@ -38,6 +39,9 @@ LONGEST_LINE = 1 << 20
 
 SAME_RATE = 0.01
 """By how much the rates of a healthy log and of what is watched may differ [fraction]."""
+
+SAVED_EVERY = 10.0
+"""Time of a stream between two looks at its state file [s]."""
 
 commands = typer.Typer()
 
@@ -64,6 +68,7 @@ def watch(
     no_pressure: Annotated[
         bool, flag("--no-pressure", "Use motion alone, even if differential pressure is logged.")
     ] = False,
+    state: Annotated[Path | None, option("FILE", "Continue a stream where this file says, and keep it there.")] = None,
 ) -> None:
     """Say when something changes inside the actuator: one JSON object a line, as it happens.
 
@@ -77,7 +82,9 @@ def watch(
     try:
         asked = _Asked(load_rig(rig), load_columns(columns), false_alarms, learning, healthy, no_pressure)
         if log == "-":
-            _stream(told, _lines(sys.stdin), asked)
+            _stream(told, _lines(sys.stdin), asked, STANDARD_INPUT, state)
+        elif is_stream(log):
+            _network(told, log, asked, state)
         else:
             _file(told, Path(log), asked)
     except HydrostateError as error:
@@ -231,35 +238,82 @@ def _file(told: _Told, path: Path, asked: _Asked) -> None:
     told.events(watch.take(samples))
 
 
-def _stream(told: _Told, lines: Iterable[str], asked: _Asked) -> None:
+def _network(told: _Told, address: str, asked: _Asked, state: Path | None) -> None:
+    received = Received()
+    try:
+        _stream(told, stream_lines(address, received), asked, address, state)
+    finally:
+        for count, said in (
+            (received.lost, "never came"),
+            (received.late, "came late or twice"),
+            (received.dropped, "found no room to wait"),
+        ):
+            if count:
+                note(f"{address}: warning: {count} batches {said} beside {received.batches} that were read")
+
+
+def _stream(told: _Told, lines: Iterable[str], asked: _Asked, source: str, state: Path | None) -> None:
     import numpy as np
 
+    from faults.watch.saved import save_watch
     from plant.log.csv_stream import CsvStream
 
     rest = iter(lines)
     header = next((line for line in rest if line.strip()), "")
 
     def opened(mapping: Mapping[str, str]) -> CsvStream:
-        return CsvStream(chain([header], rest), mapping, source=STANDARD_INPUT)
+        return CsvStream(chain([header], rest), mapping, source=source)
 
-    stream = _noted(STANDARD_INPUT, lambda: with_rig_columns(opened, asked.bench.columns, asked.columns))
-    T = stream.sample_time
-    _, pressure = _samples(dict.fromkeys(stream.channels, np.empty(0)), T, STANDARD_INPUT)
-    watch = asked.watch(T, pressure, stream.start_time)
-    told.start(STANDARD_INPUT, watch, asked)
-    travelled = 0.0
-    for last, rows, gap in stream.samples(watch.block):
-        channels = dict(zip(stream.channels, rows.T, strict=True))
-        samples, _ = _samples(channels, T, STANDARD_INPUT, travelled)
-        if "position_m" not in channels:
-            travelled += float(np.nansum(channels["velocity_m_s"])) * T
-        if gap:
-            watch.interrupt()
-            note(f"{STANDARD_INPUT}: warning: rows are missing before {last:g} s, so what is normal is learnt again")
-        watch.clock_reads(last - (len(rows) - 1) * T)
-        told.events(watch.take(samples))
+    stream = _noted(source, lambda: with_rig_columns(opened, asked.bench.columns, asked.columns))
+    _, pressure = _samples(dict.fromkeys(stream.channels, np.empty(0)), stream.sample_time, source)
+    watch, travelled = _begun(asked, stream.sample_time, pressure, stream.start_time, source, state)
+    T = watch.sample_time
+    told.start(source, watch, asked)
+    kept = watch.last
+    try:
+        for last, rows, gap in stream.samples(watch.block):
+            channels = dict(zip(stream.channels, rows.T, strict=True))
+            samples, _ = _samples(channels, T, source, travelled)
+            if "position_m" not in channels:
+                travelled += float(np.nansum(channels["velocity_m_s"])) * T
+            if gap:
+                watch.interrupt()
+                note(f"{source}: warning: rows are missing before {last:g} s, so what is normal is learnt again")
+            watch.clock_reads(last - (len(rows) - 1) * T)
+            told.events(watch.take(samples))
+            if state is not None and watch.last - kept > SAVED_EVERY:
+                kept = watch.last
+                save_watch(watch, state, travelled)
+    finally:
+        if state is not None:
+            save_watch(watch, state, travelled)
     if stream.cut:
-        note(f"{STANDARD_INPUT}: warning: the last row is cut short and left out")
+        note(f"{source}: warning: the last row is cut short and left out")
+
+
+def _begun(
+    asked: _Asked, sample_time: float, pressure: bool, start: float, source: str, state: Path | None
+) -> "tuple[Watch, float]":
+    """Return a watch, continued where there is a state of one, and how far the piston had come [m]."""
+    if state is None or not state.exists():
+        return asked.watch(sample_time, pressure, start), 0.0
+    import numpy as np
+
+    from faults.watch.saved import load_state
+    from plant.log.csv_stream import LONGEST_GAP
+
+    remembered, kept_time, travelled = load_state(state)
+    if abs(kept_time / sample_time - 1.0) > SAME_RATE:
+        raise LogError(f"{state} is of {1.0 / kept_time:g} Hz, the stream has {1.0 / sample_time:g} Hz", source)
+    watch = replace(asked, healthy=None).watch(kept_time, pressure, start)
+    watch.resume(remembered)
+    missing = round((start - watch.last) / kept_time)
+    if 0 <= missing * kept_time <= LONGEST_GAP:
+        watch.take(np.full((missing, 3), np.nan))
+    else:
+        watch.interrupt()
+        note(f"{source}: warning: the stream does not go on at {watch.last:g} s, so what is normal is learnt again")
+    return watch, travelled
 
 
 def _samples(

@@ -11,6 +11,7 @@ power of their number, and extrapolated. With scale and count uncertain, the exp
 of k peaks is ``k (1 + h / (k s))^-k`` (a Pareto predictive law), which is set to what the user asked for.
 """
 
+from collections.abc import Mapping
 from math import exp, isfinite
 
 import numpy as np
@@ -177,6 +178,51 @@ class Watch:
         self._partial[:] = 0.0
         self._partial[3] = np.nan
         watch_kernel().begin_again(self._memory)
+
+    def remembered(self) -> dict[str, Array]:
+        """Return all that the watch remembers, for `resume`.
+
+        Returns
+        -------
+        dict[str, ndarray]
+            Copies, by name.
+        """
+        kept = {f"memory_{i}": one.copy() for i, one in enumerate(self._memory)}
+        kept["asked"] = np.array([self.sample_time, len(self.balances), *self._setting, *self._sizes])
+        kept["start"] = np.array([self.start])
+        kept["open"] = np.empty(0)
+        if self._open is not None:
+            alarm, changed, due = self._open
+            told = alarm.time, self.balances.index(alarm.balance), alarm.since, *alarm.interval
+            kept["open"] = np.array([*told, alarm.score, alarm.threshold, changed, due])
+        return kept
+
+    def resume(self, kept: Mapping[str, Array]) -> None:
+        """Continue where another watch of the same settings was: to the last bit.
+
+        Parameters
+        ----------
+        kept : Mapping[str, ndarray], each of its own shape
+            What it remembered [any unit].
+
+        Raises
+        ------
+        HydrostateError
+            If that watch had other settings.
+        """
+        own = self.remembered()
+        alike = all(name in kept and (name == "open" or kept[name].shape == own[name].shape) for name in own)
+        if not alike or not np.array_equal(kept["asked"], own["asked"]):
+            raise HydrostateError(
+                "a watch can only continue one of the same rig, channels, rate, learning and false alarms"
+            )
+        for i, one in enumerate(self._memory):
+            one[:] = kept[f"memory_{i}"]
+        self.start = float(kept["start"][0])
+        if len(kept["open"]):
+            time, which, since, first, last, score, limit, changed, due = kept["open"].tolist()
+            alarm = Alarm(time, self.balances[int(which)], since, (first, last), score, limit)
+            self._open = alarm, int(changed), int(due)
 
     @property
     def _taken(self) -> int:

@@ -1,5 +1,7 @@
 import io
 import json
+import socket
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -127,3 +129,25 @@ def test_a_stream_on_standard_input_is_read_as_it_comes(log: Path, monkeypatch: 
     watch("-", learning=60.0)
     alarm = next(k for k, line in enumerate(printed) if '"alarm"' in line)
     assert alarm + 1 in seen
+
+
+def test_a_stream_over_tcp_that_is_restarted_goes_on_where_it_was(log: Path, tmp_path: Path) -> None:
+    header, *rows = log.read_text().splitlines(keepends=True)
+    _, wanted, _ = _run("-", "--learning", "60", given="".join([header, *rows]))
+    state, found = tmp_path / "state.npz", list[dict[str, Any]]()
+    for part in (rows[:7001], rows[7001:]):
+        with socket.create_server(("127.0.0.1", 0)) as server:
+
+            def serve(part: list[str] = part, server: socket.socket = server) -> None:
+                connection, _ = server.accept()
+                with connection:
+                    connection.sendall("".join([header, *part]).encode())
+
+            threading.Thread(target=serve, daemon=True).start()
+            address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+            code, events, said = _run(address, "--learning", "60", "--state", str(state))
+        assert (code, said) == (0, "")
+        found += events
+    told = [[one for one in events if one["event"] in ("ready", "alarm", "change")] for events in (found, wanted)]
+    assert told[0] == told[1]
+    assert [one["event"] for one in told[0]] == ["ready", "alarm", "change"]

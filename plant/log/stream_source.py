@@ -1,0 +1,184 @@
+"""Lines of a stream that comes over a network: from a TCP connection, or in numbered batches from an MQTT broker.
+
+Over TCP nothing is lost: rows that are not read yet wait at the sender. From a broker rows come in batches, since one
+row a message reaches some thousand a second. A batch is text: ``rows N`` with its number, the header, the rows; an
+empty message ends the stream. A batch whose number came already is late and left out; numbers that never come are lost.
+Up to `QUEUED` batches wait here; one that finds no room is dropped. All are counted, their rows are missing in time.
+"""
+
+import queue
+import socket
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+from urllib.parse import urlsplit
+
+from plant.errors import HydrostateError, LogError
+
+SCHEMES = ("tcp", "mqtt")
+"""What an address of a stream begins with."""
+
+QUEUED = 1000
+"""Batches that wait to be read [batches]."""
+
+PATIENCE = 10.0
+"""How long a connection may take [s]."""
+
+MQTT_PORT = 1883
+
+
+@dataclass
+class Received:
+    """What became of the batches of a stream.
+
+    Parameters
+    ----------
+    batches, late, lost, dropped : int
+        How many were read, came late or twice, never came, and found no room.
+    """
+
+    batches: int = 0
+    late: int = 0
+    lost: int = 0
+    dropped: int = 0
+    expected: int | None = field(default=None, repr=False)
+
+    def takes(self, number: int) -> bool:
+        """Return whether a batch is the next one to read, and count it.
+
+        Parameters
+        ----------
+        number : int
+            Its number.
+
+        Examples
+        --------
+        >>> received = Received()
+        >>> [received.takes(number) for number in (7, 8, 8, 11)], received.late, received.lost
+        ([True, True, False, True], 1, 2)
+        """
+        if self.expected is not None and number < self.expected:
+            self.late += 1
+            return False
+        self.lost += 0 if self.expected is None else number - self.expected
+        self.batches, self.expected = self.batches + 1, number + 1
+        return True
+
+
+def is_stream(address: str) -> bool:
+    """Return whether a text is an address of a stream."""
+    return urlsplit(address).scheme in SCHEMES
+
+
+def stream_lines(address: str, received: Received) -> Iterator[str]:
+    """Yield header and rows of a stream as they come.
+
+    Parameters
+    ----------
+    address : str
+        ``tcp://HOST:PORT`` or ``mqtt://HOST[:PORT]/TOPIC``.
+    received : Received
+        Receives what became of batches.
+
+    Raises
+    ------
+    HydrostateError
+        If it is no such address, or the package for MQTT is missing.
+    LogError
+        If nobody answers there, or a message is no batch.
+    """
+    parts = urlsplit(address)
+    try:
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        host, port = None, None
+    if parts.scheme == "tcp" and host and port:
+        return _tcp(host, port, address)
+    if parts.scheme == "mqtt" and host and parts.path.strip("/"):
+        return _mqtt(host, port or MQTT_PORT, parts.path.strip("/"), address, received)
+    raise HydrostateError(f"a stream must be tcp://HOST:PORT or mqtt://HOST[:PORT]/TOPIC, got {address!r}")
+
+
+def _tcp(host: str, port: int, address: str) -> Iterator[str]:
+    try:
+        connection = socket.create_connection((host, port), PATIENCE)
+    except OSError as error:
+        raise LogError(f"nobody answers: {error.strerror or error}", address) from error
+    connection.settimeout(None)
+    with connection, connection.makefile("r", encoding="utf-8", errors="replace", newline="\n") as lines:
+        try:
+            yield from lines
+        except OSError as error:
+            raise LogError(f"the connection broke: {error.strerror or error}", address) from error
+
+
+def batch(number: int, header: str, rows: Sequence[str]) -> str:
+    r"""Return rows as a message for a broker.
+
+    Parameters
+    ----------
+    number : int
+        Number of the batch: one more than that of the one before.
+    header : str
+        Names of the columns.
+    rows : sequence of str
+        The rows, without line ends.
+
+    Examples
+    --------
+    >>> batch(3, "time_s,position_m", ["0.0,0.1"])
+    'rows 3\ntime_s,position_m\n0.0,0.1\n'
+    """
+    return "\n".join([f"rows {number}", header, *rows]) + "\n"
+
+
+def _mqtt(host: str, port: int, topic: str, address: str, received: Received) -> Iterator[str]:
+    try:
+        from paho.mqtt import client as mqtt
+        from paho.mqtt.enums import CallbackAPIVersion
+    except ImportError as error:
+        raise HydrostateError(
+            f"{address}: streams from a broker need paho-mqtt: pip install 'hydrostate[stream]'"
+        ) from error
+    waiting: queue.Queue[str] = queue.Queue(QUEUED)
+
+    def subscribe(client: Any, *_: Any) -> None:
+        client.subscribe(topic, qos=1)
+
+    def take(_client: Any, _data: Any, message: Any) -> None:
+        try:
+            waiting.put_nowait(message.payload.decode("utf-8", errors="replace"))
+        except queue.Full:
+            received.dropped += 1
+
+    client = mqtt.Client(CallbackAPIVersion.VERSION2)
+    client.on_connect, client.on_message = subscribe, take
+    try:
+        client.connect(host, port)
+    except OSError as error:
+        raise LogError(f"no broker answers: {error.strerror or error}", address) from error
+    client.loop_start()
+    try:
+        header = ""
+        while text := waiting.get():
+            number, names, rows = _opened(text, address)
+            if header and names != header:
+                raise LogError(f"every batch must have the header {header.strip()!r}, got {names.strip()!r}", address)
+            if not received.takes(number):
+                continue
+            if not header:
+                header = names
+                yield header
+            yield from rows
+    finally:
+        client.loop_stop()
+        client.disconnect()
+
+
+def _opened(text: str, address: str) -> tuple[int, str, list[str]]:
+    """Return number, header and rows of a batch."""
+    first, *lines = text.splitlines(keepends=True)
+    word, _, number = first.strip().partition(" ")
+    if word != "rows" or not number.isdecimal() or not lines:
+        raise LogError(f"a batch must begin with 'rows NUMBER' and a header, got {first.strip()[:80]!r}", address)
+    return int(number), lines[0], [line if line.endswith("\n") else f"{line}\n" for line in lines[1:]]

@@ -1,0 +1,130 @@
+import shutil
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from plant.errors import HydrostateError, LogError
+from plant.log.stream_source import Received, batch, is_stream, stream_lines
+
+HEADER = "time_s,position_m"
+
+
+def free_port() -> int:
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+@pytest.fixture(scope="module")
+def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
+    pytest.importorskip("paho.mqtt.client", reason="paho-mqtt is an extra")
+    program = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
+    if program is None:
+        pytest.skip("mosquitto is not installed")
+    port = free_port()
+    settings: Path = tmp_path_factory.mktemp("broker") / "mosquitto.conf"
+    settings.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\nmax_queued_messages 0\n")
+    with subprocess.Popen([program, "-c", str(settings)], stderr=subprocess.DEVNULL) as running:  # noqa: S603
+        for _ in range(100):
+            with socket.socket() as one:
+                if one.connect_ex(("127.0.0.1", port)) == 0:
+                    break
+            time.sleep(0.05)
+        yield port
+        running.terminate()
+
+
+def publish(port: int, topic: str, messages: list[str]) -> None:
+    """Publish once the topic is subscribed to, which the broker's own count of subscriptions tells."""
+    from paho.mqtt import client as mqtt
+    from paho.mqtt.enums import CallbackAPIVersion
+
+    client: Any = mqtt.Client(CallbackAPIVersion.VERSION2)
+    client.connect("127.0.0.1", port)
+    client.loop_start()
+    time.sleep(0.5)
+    for message in messages:
+        client.publish(topic, message, qos=1).wait_for_publish(10.0)
+    client.loop_stop()
+    client.disconnect()
+
+
+def through_broker(port: int, topic: str, messages: list[str]) -> tuple[list[str], Received]:
+    received = Received()
+    lines: list[str] = []
+    reader = threading.Thread(
+        target=lambda: lines.extend(stream_lines(f"mqtt://127.0.0.1:{port}/{topic}", received)), daemon=True
+    )
+    reader.start()
+    publish(port, topic, messages)
+    reader.join(20.0)
+    assert not reader.is_alive()
+    return lines, received
+
+
+def test_rows_come_through_a_real_broker_in_batches_none_lost(broker: int) -> None:
+    rows = [f"{0.1 * i:.1f},{i}" for i in range(1000)]
+    messages = [batch(i // 100, HEADER, rows[i : i + 100]) for i in range(0, 1000, 100)]
+    lines, received = through_broker(broker, "bench/whole", [*messages, ""])
+    assert lines == [f"{line}\n" for line in [HEADER, *rows]]
+    assert (received.batches, received.late, received.lost, received.dropped) == (10, 0, 0, 0)
+
+
+def test_lost_and_late_batches_are_counted_and_left_out(broker: int) -> None:
+    messages = [batch(number, HEADER, [f"{number}.0,0"]) for number in (4, 5, 8, 5, 9)]
+    lines, received = through_broker(broker, "bench/broken", [*messages, ""])
+    assert [line.split(",")[0] for line in lines[1:]] == ["4.0", "5.0", "8.0", "9.0"]
+    assert (received.batches, received.late, received.lost) == (4, 1, 2)
+
+
+def test_rows_of_a_tcp_connection_wait_at_the_sender_until_they_are_read() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        sent = [f"{i},{i}" for i in range(2_000_000)]  # more than both ends of a connection hold
+
+        def serve() -> None:
+            connection, _ = server.accept()
+            with connection:
+                connection.sendall("".join(f"{line}\n" for line in [HEADER, *sent]).encode())
+
+        sender = threading.Thread(target=serve, daemon=True)
+        sender.start()
+        lines = stream_lines(f"tcp://127.0.0.1:{port}", Received())
+        assert next(lines) == f"{HEADER}\n"
+        sender.join(1.0)
+        assert sender.is_alive()
+        assert sum(1 for _ in lines) == len(sent)
+        sender.join(5.0)
+        assert not sender.is_alive()
+
+
+def test_what_is_no_stream_is_refused_in_a_sentence() -> None:
+    assert is_stream("tcp://here:1")
+    assert not is_stream("bench.csv")
+    for address in ("tcp://here", "tcp://:99", "mqtt://here", "tcp://here:99999999"):
+        with pytest.raises(HydrostateError, match="a stream must be tcp://HOST:PORT or mqtt://"):
+            stream_lines(address, Received())
+    with pytest.raises(LogError, match="nobody answers"):
+        next(stream_lines(f"tcp://127.0.0.1:{free_port()}", Received()))
+
+
+def test_a_message_that_is_no_batch_ends_the_stream_with_an_error(broker: int) -> None:
+    received, raised = Received(), list[LogError]()
+
+    def read() -> None:
+        try:
+            list(stream_lines(f"mqtt://127.0.0.1:{broker}/bench/other", received))
+        except LogError as error:
+            raised.append(error)
+
+    reader = threading.Thread(target=read, daemon=True)
+    reader.start()
+    publish(broker, "bench/other", ["hello"])
+    reader.join(10.0)
+    assert "a batch must begin with 'rows NUMBER' and a header, got 'hello'" in str(raised[0])
