@@ -85,8 +85,9 @@ class FreedProblem(Problem):
         filled = np.concatenate([rows, np.repeat(rows[-1:], -len(rows) % LANES, axis=0)])
         found = np.zeros((len(filled) // LANES, *self._room(LANES).shape))
         with np.errstate(all="ignore"):  # a try that runs away is stepped back from
-            for errors, part in zip(found, filled.reshape(-1, LANES, rows.shape[1]), strict=True):
-                run(part, log.drives if drives is None else drives, log.measured, *self._course(), errors)
+            for i in range(len(found)):
+                part = filled[LANES * i : LANES * (i + 1)]
+                run(part, log.drives if drives is None else drives, log.measured, *self._course(), found[i])
         return np.moveaxis(found, 0, -2).reshape(*found.shape[1:3], -1)[..., : len(thetas)]
 
     def _alone(self, row: Array, drives: Array | None) -> Array:
