@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,12 +21,11 @@ from estimation.identification.fit.subspace import fit_subspace
 from estimation.identification.fit.validate import fit_percent, validate
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.experiments import Signals, listed
+from estimation.identification.structure_names import StructureName
 from plant.errors import HydrostateError, LogWarning
 
 if TYPE_CHECKING:
     import pandas as pd
-
-StructureName: TypeAlias = Literal["ARX", "ARMAX", "output-error", "Box-Jenkins", "SRIV", "subspace", "continuous"]
 
 STRUCTURES: tuple[StructureName, ...] = ("ARX", "ARMAX", "output-error", "Box-Jenkins")
 """The four of section 4."""

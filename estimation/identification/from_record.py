@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.choose import STRUCTURES, StructureName, choose_model
+from estimation.identification.choose import STRUCTURES, choose_model
 from estimation.identification.design.sticking import rest_shares, rests
 from estimation.identification.fit.fitted import CovarianceKind
 from estimation.identification.fit.residual_tests import DEFAULT_LAGS, feedback_test
@@ -15,6 +15,7 @@ from estimation.identification.free_run.from_records import without_gaps
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.notes import IdentificationCode
 from estimation.identification.signals.preprocess import resample, zero_phase_filter
+from estimation.identification.structure_names import StructureName
 from plant.errors import LogError, LogWarning
 from plant.log.record import Record
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from estimation.identification.structure_names import STRUCTURE_NAMES
 from experiments.command.identify_any import Asked, identify_any, names, simulate_any
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, read_log, run_logs
@@ -30,8 +31,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from estimation.arrays import Array
-    from estimation.identification.choose import StructureName
     from estimation.identification.model.linear_model import LinearModel
+    from estimation.identification.structure_names import StructureName
 
 INPUT, OUTPUT = "motor_speed_rad_s", "velocity_m_s"
 """Channels that are related where none are named."""
@@ -42,16 +43,7 @@ TABLE_6_TIME = 1e-3
 FORMAT_VERSION = 1
 """Of a written library: later versions add entries and rename none."""
 
-STRUCTURES: "Mapping[str, StructureName | None]" = {
-    "output-error": "output-error",
-    "arx": "ARX",
-    "armax": "ARMAX",
-    "box-jenkins": "Box-Jenkins",
-    "instrumental": "SRIV",
-    "subspace": "subspace",
-    "continuous": "continuous",
-    "auto": None,
-}
+STRUCTURES: "Mapping[str, StructureName | None]" = {**STRUCTURE_NAMES, "auto": None}
 """What ``--structure`` takes; auto compares the first four on data held back."""
 
 HIGHEST_ORDER = 4

@@ -11,17 +11,11 @@ from estimation.identification.free_run.choose_linear import block_error
 from estimation.identification.free_run.data import Channels, Scaling, in_scale
 from estimation.identification.free_run.linear_fit import Form, Problem
 from estimation.identification.model.linear_model import LinearModel
+from estimation.identification.structure_names import STRUCTURE_NAMES
 from plant.errors import HydrostateError
 
-ADOPTED = {
-    "arx": "ARX",
-    "armax": "ARMAX",
-    "box-jenkins": "Box-Jenkins",
-    "instrumental": "SRIV",
-    "subspace": "subspace",
-    "continuous": "continuous",
-}
-"""Structures of one input by what the command line calls them."""
+ADOPTED = {name: structure for name, structure in STRUCTURE_NAMES.items() if name != "output-error"}
+"""Structures that are not fitted by their free run, by what the command line calls them."""
 
 HELD_BACK = 1.0 / 3.0
 """Last share of every log that is not fitted, to judge the structure by."""
