@@ -72,6 +72,16 @@ def without_gaps(values: Array, name: str) -> Array:
         The input [any unit]; NaN where missing.
     name : str
         Its channel, for the warning.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        The input without gaps, in its unit.
+
+    Warns
+    -----
+    LogWarning
+        If samples are bridged.
     """
     n_missing = int(np.count_nonzero(np.isnan(values)))
     if n_missing == 0:
