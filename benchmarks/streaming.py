@@ -1,7 +1,7 @@
 """Rows at 10 kHz through a real broker into a watch, for ten minutes: how many are lost, how late, at what cost.
 
-The publisher is a process of its own; it sends batches of a tenth of a second, on time, with a clock reading in the last
-row's time. The broker's queue is unlimited, so what is lost would be lost here.
+The publisher is a process of its own and sends batches of a tenth of a second, on time. The broker holds any number,
+so what is lost would be lost here.
 """
 
 import argparse

@@ -125,10 +125,10 @@ def filter_flow(
     random = {**dict.fromkeys(("pressure_a_pa", "pressure_b_pa"), density), **(noise or {})}
     members: list[Member] = []
     for model, makeup in FORMS:
-        anywhere = _prior(parameters, load, centre, 1.0, 1.0, makeup)
+        anywhere = chamber_belief(parameters, load, centre, 1.0, 1.0, makeup)
         task = filter_problem(model, anywhere, record, parameters, noise=random, variances=variances)
         for modulus, leakage, bias in product(moduli, LEAKAGES, BIASES):
-            prior = model.to_filter(_prior(parameters, load, modulus, leakage, bias, makeup))
+            prior = model.to_filter(chamber_belief(parameters, load, modulus, leakage, bias, makeup))
             score = -0.5 * (np.log(modulus / wanted) / GUESS_SPREAD) ** 2
             members.append(Member(task, prior.mean, prior.covariance, float(score)))
     told_apart = tuple(CHAMBERS.index(name) for name in (BULK_MODULUS, "leakage_coefficient"))
@@ -160,7 +160,24 @@ def drive_noise(record: Record, p: EhaParameters, variances: Mapping[str, float]
     return FLOOR_NOISE + rate**2 * known[speed] * record.sample_time
 
 
-def _prior(p: EhaParameters, load: float, modulus: float, leakage: float, bias: float, makeup: float) -> Gaussian:
+def chamber_belief(
+    p: EhaParameters, load: float, modulus: float, leakage: float, bias: float, makeup: float
+) -> Gaussian:
+    """Return what a chamber filter believes before the first sample.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+    load : float
+        Differential pressure that the log begins with [Pa].
+    modulus : float
+        First guess of bulk modulus [Pa].
+    leakage, bias : float
+        First guesses, as multiples of the actuator's [dimensionless].
+    makeup : float
+        First guess of the make-up conductance [m^3/(s Pa)].
+    """
     healthy = EhaParameters()
     means = {
         "pressure_a_pa": p.accumulator_pressure + max(load, 0.0),

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+from estimation.eha.by_flow_filter import FORMS as CHAMBERS
+from estimation.eha.by_flow_filter import chamber_belief, drive_noise
 from estimation.engine.contract import FilterProblem
 from estimation.export.flow import FLOW_FILTER, flow_belief
 from estimation.filters.run import available_channels, filter_problem
@@ -15,7 +17,14 @@ from plant.eha.model import EhaParameters
 from plant.errors import LogError, require_known
 from plant.log.record import Record
 
-EXPORTED_FORMS: Mapping[str, ProcessModel] = {**FORMS, "flow": FLOW_FILTER}
+CHAMBER_FORMS = {model.name: (model, makeup) for model, makeup in CHAMBERS}
+"""Forms of the modelled chambers, each with its first guess of the make-up conductance [m^3/(s Pa)]."""
+
+EXPORTED_FORMS: Mapping[str, ProcessModel] = {
+    **FORMS,
+    "flow": FLOW_FILTER,
+    **{name: model for name, (model, _) in CHAMBER_FORMS.items()},
+}
 """Process models that a filter can be exported with, by name."""
 
 PRESSURE = "differential_pressure_pa"
@@ -58,11 +67,8 @@ def filter_task(
     require_known("form", form, EXPORTED_FORMS)
     model = EXPORTED_FORMS[form]
     model.require_drives(record)
-    if model is FLOW_FILTER:
-        if PRESSURE not in record:
-            raise LogError(f"the flow form needs {PRESSURE}, the record has {', '.join(record)}")
-        prior = flow_belief(parameters, first_load(record))
-        return replace(filter_problem(model, prior, record, parameters), model=model)
+    if model is FLOW_FILTER or form in CHAMBER_FORMS:
+        return _by_flow(record, parameters, form, parameters.bulk_modulus if start is None else start)
     guess = parameters.bulk_modulus if start is None else start
     belief, channels = first_belief(model, record, guess, start_std), available_channels(model, record)
     noise: Mapping[str, float] = {PRESSURE: PRESSURE_NOISE_LOGGED} if PRESSURE in channels else {}
@@ -76,3 +82,15 @@ def filter_task(
         wide, prior, record, parameters, channels=channels or None, variances=variances, noise=noise
     )
     return replace(problem, model=wide)
+
+
+def _by_flow(record: Record, parameters: EhaParameters, form: str, guess: float) -> FilterProblem:
+    """Return the task of a filter that is driven by measured flows and sees differential pressure alone."""
+    if PRESSURE not in record:
+        raise LogError(f"the {form} form needs {PRESSURE}, the record has {', '.join(record)}")
+    load, model = first_load(record), EXPORTED_FORMS[form]
+    if form not in CHAMBER_FORMS:
+        return replace(filter_problem(model, flow_belief(parameters, load), record, parameters), model=model)
+    prior = chamber_belief(parameters, load, guess, 1.0, 1.0, CHAMBER_FORMS[form][1])
+    noise: Mapping[str, float] = dict.fromkeys(("pressure_a_pa", "pressure_b_pa"), drive_noise(record, parameters))
+    return replace(filter_problem(model, prior, record, parameters, noise=noise), model=model)

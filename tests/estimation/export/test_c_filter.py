@@ -148,7 +148,9 @@ def test_what_cannot_be_exported_is_refused() -> None:
     problem = task("pressure", "normal", 500)
     with pytest.raises(HydrostateError, match=r"a method that can be exported must be one of ekf, .*, got 'particle'"):
         filter_in_c(problem, "particle", name="exported")
-    with pytest.raises(HydrostateError, match="form must be one of acceleration, pressure, flow, got 'motion'"):
+    with pytest.raises(
+        HydrostateError, match=r"form must be one of acceleration, pressure, flow, chambers, .*got 'motion'"
+    ):
         filter_task(Record(1e-3, {"position_m": np.zeros(9)}), EhaParameters(), "motion")
     with pytest.raises(LogError, match="the flow form needs differential_pressure_pa"):
         filter_task(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.eha.by_flow_filter import _prior  # pyright: ignore[reportPrivateUsage]
+from estimation.eha.by_flow_filter import chamber_belief
 from estimation.engine.contract import FilterProblem
 from estimation.engine.linearised import compile_step
 from estimation.filters.ekf import ekf
@@ -27,7 +27,7 @@ RIG = EhaParameters()
 def task() -> FilterProblem:
     p, rng = CircuitParameters(), np.random.default_rng(3)
     record = simulate(CIRCUIT, make_drive("steps", 4.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
-    prior = _prior(RIG, 0.0, 0.6 * RIG.bulk_modulus, 4.0, 2.0, 1e-9)
+    prior = chamber_belief(RIG, 0.0, 0.6 * RIG.bulk_modulus, 4.0, 2.0, 1e-9)
     return filter_problem(CHAMBERS_BY_MASS, prior, record, RIG)
 
 
