@@ -189,7 +189,10 @@ def bulk_modulus_on_circuit(
         known = _believed(rig if experiment.form == "flow" else p)
         head = {**experiment._asdict(), "condition": name}
         finds = (
-            (start, estimate_bulk_modulus(record, known, form=experiment.form, start=start))
+            (
+                start,
+                estimate_bulk_modulus(record, known, form=experiment.form, method=experiment.method, start=start),
+            )
             for start in settings.starts
         )
         return [{**head, "start_pa": start, **estimate_entries(found, truth)} for start, found in finds]

@@ -30,6 +30,11 @@ class Experiment(NamedTuple):
     drive: str
     pressure_logged: bool
 
+    @property
+    def method(self) -> str:
+        """How the form is filtered: the published one with the published noise."""
+        return "published-ekf" if self.form == "acceleration" else "auto"
+
     def record(self, p: EhaParameters, settings: StudySettings, rng: np.random.Generator) -> Record:
         """Return a run of the experiment as the bench would log it."""
         drive = make_drive(self.drive, settings.duration, settings.sample_time, p, rng)
@@ -90,7 +95,9 @@ def bulk_modulus_study(
         flow = experiment.form == "flow"  # which tries starts of its own beside one, so the lowest guess is enough
         results: list[tuple[dict[str, object], pd.DataFrame]] = []
         for start in settings.starts[:1] if flow else settings.starts:
-            found = estimate_bulk_modulus(record, rig if flow else p, form=experiment.form, start=start)
+            found = estimate_bulk_modulus(
+                record, rig if flow else p, form=experiment.form, method=experiment.method, start=start
+            )
             head = {**experiment._asdict(), "condition": name, "start_pa": start}
             row = head | estimate_entries(found, p.bulk_modulus) | {"claim": EXPERIMENTS[experiment]}
             results.append((row, _curve(found.first_pass, head)))

@@ -1,7 +1,7 @@
 """How the report shows the study's tables: which columns a reader sees, in which units and words."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import partial
 from platform import python_version
@@ -118,6 +118,10 @@ def _recovered(row: Row) -> Cell:
     return Cell(text, "good" if row["recovered"] == row["conditions"] else "bad" if row["missed"] else "none")
 
 
+def _of_estimates(name: str) -> Callable[[Row], Cell]:
+    return lambda row: right(f"{row[name]} of {row['estimates']}")
+
+
 def _published(row: Row) -> Cell:
     return right(exact(float(f"{SCALAR_UNITS[row['unit']][1] * row['published']:.6g}")))
 
@@ -158,6 +162,8 @@ COLUMNS: Mapping[str, Columns] = {
         Column("key", "experiment", words=experiment_in_words),
         Column("claim", "what it shows"),
         Column("recovered", "conditions recovered", of_row=_recovered),
+        Column("passed", "gate passes", "estimates", of_row=_of_estimates("passed")),
+        Column("covered", "interval holds the truth", "estimates", of_row=_of_estimates("covered")),
         Column("mean_pa", "mean estimate", "1e8 Pa", TENTH_GIGA_PASCAL),
         Column("worst_error_percent", digits=2),
         Column("wanted_percent", "error allowed", digits=1),

@@ -40,6 +40,8 @@ class Recovery:
         Conditions in which bulk modulus is not observable, from any first guess.
     missed : tuple of str
         The other conditions, in words, with the error or the outcome.
+    passed, covered : int
+        Estimates that the filter's own gate passes, and whose 95 % interval holds the truth.
     wanted_percent : float or None
         The largest error that is wanted [percent].
     mean_pa, worst_error_percent : float or None
@@ -57,6 +59,8 @@ class Recovery:
     recovered: int
     unobservable: tuple[str, ...]
     missed: tuple[str, ...]
+    passed: int
+    covered: int
     wanted_percent: float | None
     mean_pa: float | None
     worst_error_percent: float | None
@@ -180,6 +184,8 @@ def _recovery(key: Experiment, rows: pd.DataFrame) -> Recovery:
         recovered=len(groups) - len(unobservable) - len(missed),
         unobservable=tuple(unobservable),
         missed=tuple(missed),
+        passed=int(rows["gate_passed"].sum()),
+        covered=_covered(rows),
         wanted_percent=wanted,
         mean_pa=float(values.mean()) if len(values) else None,
         worst_error_percent=float(rows["error_percent"].astype(float).abs().max()) if len(values) else None,
@@ -188,6 +194,14 @@ def _recovery(key: Experiment, rows: pd.DataFrame) -> Recovery:
         settled_low_pa=float(rows["filter_settled_at_pa"].min()),
         settled_high_pa=float(rows["filter_settled_at_pa"].max()),
     )
+
+
+def _covered(rows: pd.DataFrame) -> int:
+    """Return how many intervals hold the truth, which is what the errors are counted from."""
+    known = rows.dropna(subset=["value_pa", "error_percent"])
+    truth = known["value_pa"].astype(float) / (1.0 + known["error_percent"].astype(float) / 100.0)
+    low, high = known["ci95_low_pa"].astype(float), known["ci95_high_pa"].astype(float)
+    return int(((low <= truth) & (truth <= high)).sum())
 
 
 def class_accuracies(tables: Tables) -> tuple[ClassAccuracy, ...]:

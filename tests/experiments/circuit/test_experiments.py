@@ -148,11 +148,11 @@ def test_the_pressure_form_says_how_little_it_knows_of_chambers_that_change(esti
 
 def test_the_published_form_does_not_find_it_on_the_circuit(estimates: pd.DataFrame) -> None:
     found = estimates[estimates["form"] == "acceleration"]
-    leaking, stiff = (found[found["condition"] == name] for name in ("minor_leakage", "minor_friction"))
-    assert len(leaking) == len(stiff) == 2
-    assert (leaking["outcome"] == "not_observable").all()
-    assert leaking["value_pa"].isna().all()
-    assert (stiff["error_percent"] < -90.0).all()
+    assert len(found) == 4
+    assert (found["outcome"] == "not_observable").all()
+    assert found["value_pa"].isna().all()
+    assert (found["bound_percent"] > 20.0).all()
+    assert not found["gate_passed"].any()
 
 
 def test_the_truth_stands_beside_every_estimate(estimates: pd.DataFrame) -> None:

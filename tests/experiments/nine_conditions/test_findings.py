@@ -17,6 +17,9 @@ def _estimates(errors: dict[str, list[float | None]], outcome: str = "ok") -> pd
             "outcome": outcome if error is None else "ok",
             "error_percent": np.nan if error is None else error,
             "value_pa": np.nan if error is None else 2.07e8 * (1.0 + error / 100.0),
+            "ci95_low_pa": np.nan if error is None else 2.07e8 * (1.005 + error / 100.0 - 0.01),
+            "ci95_high_pa": np.nan if error is None else 2.07e8 * (1.005 + error / 100.0),
+            "gate_passed": error is not None and error > 0.0,
             "bound_percent": 0.1,
             "filter_settled_at_pa": 2e8,
             "claim": "",
@@ -33,6 +36,11 @@ def test_a_condition_is_recovered_if_every_first_guess_is() -> None:
     assert found.worst_error_percent is not None
     assert round(found.worst_error_percent, 6) == 1.1
     assert found.missed == ("minor leakage (1.1 % off)",)
+
+
+def test_gates_and_intervals_are_counted_beside() -> None:
+    found = recoveries(_estimates({"normal": [0.2, -0.9], "minor_leakage": [0.1, None]}))[PRESSURE_SINE]
+    assert (found.passed, found.covered, found.estimates) == (2, 2, 4)
 
 
 def test_not_observable_is_neither_recovered_nor_missed() -> None:
