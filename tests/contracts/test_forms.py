@@ -100,8 +100,8 @@ def test_the_covariance_stays_symmetric_and_positive(method: Method, model: Proc
 @WITHOUT_CHANCE
 def test_a_log_with_nothing_measured_leaves_bulk_modulus_as_believed(method: Method, model: ProcessModel) -> None:
     record = bench_log()
-    channels = {name: np.full(len(record), np.nan) for name in ("position_m", "velocity_m_s")}
-    estimate = filtered(method, model, record.replace(**channels, differential_pressure_pa=None))
+    missing = {name: np.full(len(record), np.nan) for name in record if name != "motor_speed_rad_s"}
+    estimate = filtered(method, model, record.replace(**missing))
     mean, std = estimate.track(BULK_MODULUS)
     assert mean[-1] == pytest.approx(2e8)
     assert std[-1] == pytest.approx(3e8)

@@ -19,10 +19,11 @@ from plant.sensors.sensors import BENCH, drop_samples
 HEALTHY = EhaParameters()
 
 
-def log(condition: str, seed: int, drive: str = "steps") -> Record:
+def log(condition: str, seed: int, drive: str = "steps", duration: float = 10.0, sample_time: float = 2e-3) -> Record:
     rng = np.random.default_rng(seed)
     p = parameters_for(CONDITIONS[condition])
-    return simulate(LUMPED, make_drive(drive, 10.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    drive_signal = make_drive(drive, duration, sample_time, p, rng)
+    return simulate(LUMPED, drive_signal, sample_time, p, sensors=BENCH, rng=rng)
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)
@@ -39,7 +40,7 @@ def test_bulk_modulus_and_leakage_come_back_without_knowing_the_condition(condit
 
 
 def test_a_drifting_pressure_sensor_is_objected_to() -> None:
-    record = log("normal", 12)
+    record = log("normal", 12, duration=4.0)
     drift = np.linspace(0.0, 2e5, len(record))
     fit = fit_flow(record.replace(differential_pressure_pa=record["differential_pressure_pa"] + drift), HEALTHY, 2e8)
     (ratio,) = (note.data["ratio"] for note in fit.reasons if note.code == EstimateCode.PRESSURE_RESIDUALS_LARGE)
@@ -70,7 +71,7 @@ def test_logs_of_a_foreign_bench_give_their_bulk_modulus_without_the_condition(s
 def test_a_draining_pump_and_oil_that_gives_way_do_not_bias_bulk_modulus(condition: str) -> None:
     rng = np.random.default_rng(3)
     p = circuit_of(parameters_for(CONDITIONS[condition]))
-    record = simulate(CIRCUIT, make_drive("steps", 10.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    record = simulate(CIRCUIT, make_drive("steps", 10.0, 2e-3, p, rng), 2e-3, p, sensors=BENCH, rng=rng)
     fit = fit_flow(record, HEALTHY, 2e8)
     assert fit.parameters["bulk_modulus"][0] == pytest.approx(p.bulk_modulus, rel=0.005)
     assert fit.parameters["case_leakage"][0] == pytest.approx(p.pump_case_leakage, rel=0.5)
@@ -95,7 +96,8 @@ def test_noise_of_speed_and_position_widens_the_interval() -> None:
 def test_fast_and_slow_logs_with_gaps_give_their_bulk_modulus(sample_time: float) -> None:
     rng = np.random.default_rng(16)
     p = HEALTHY
-    record = simulate(LUMPED, make_drive("steps", 5.0, sample_time, p, rng), sample_time, p, sensors=BENCH, rng=rng)
+    drive = make_drive("steps", 3.0, sample_time, p, rng)
+    record = simulate(LUMPED, drive, sample_time, p, sensors=BENCH, rng=rng)
     fit = fit_flow(drop_samples(record, 0.01, rng), HEALTHY, 3e8)
     assert fit.parameters["bulk_modulus"][0] == pytest.approx(p.bulk_modulus, rel=0.02)
 

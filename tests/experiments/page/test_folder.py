@@ -182,6 +182,7 @@ def test_a_place_that_cannot_be_written_is_said_before_the_study_runs(
         check_target(tmp_path / "out")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_path_that_no_file_system_takes_is_said_in_a_sentence(study: Found, tmp_path: Path) -> None:
     with pytest.raises(HydrostateError, match="result folder"):
         write_study(study, tmp_path / ("x" * 300))
