@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from estimation.arrays import Array, IntArray
 from estimation.fits.greybox_loops import RUNAWAY, model_step
-from estimation.fits.side_by_side_loops import residuals_side_by_side
+from estimation.fits.side_by_side_loops import absorb, residuals_side_by_side
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.expression import as_expression, symbol
 from plant.compiled.hoist import hoisted
@@ -86,6 +86,6 @@ def _source(model: GreyBoxModel) -> str:
     return kernel_text(
         f"residuals of the {model.name} model, {LANES} parameter sets side by side",
         operations_source(lines, {each: LANES * i for i, each in enumerate(every)}, vector),
-        pasted(lay, share, constants=sizes, options=MERGED),
+        pasted(lay, share, absorb, constants=sizes, options=MERGED),
         pasted(residuals_side_by_side),
     )

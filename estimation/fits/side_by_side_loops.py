@@ -109,13 +109,41 @@ def residuals_side_by_side(
                 if present[i] > 0.0:
                     total = spread[i] + variance[i] / present[i]
                     gain = spread[i] / total
-                    for lane in range(lanes):
-                        innovation = excess[i, lane] / present[i] - level[i, lane]
-                        level[i, lane] += gain * innovation
-                        value = innovation / math.sqrt(total)
-                        bounded = min(max(value, -kernel.RUNAWAY), kernel.RUNAWAY)
-                        errors[i, k // block, lane] = bounded if value == value else kernel.RUNAWAY
-                        excess[i, lane] = 0.0
+                    absorb(kernel, excess[i], level[i], present[i], gain, math.sqrt(total), errors[i, k // block])
                     spread[i] -= gain * spread[i]
                     present[i] = 0.0
                 spread[i] += walk[i]
+
+
+def absorb(
+    kernel: SideBySideKernel,
+    excess: Array,
+    level: Array,
+    samples: float,
+    gain: float,
+    deviation: float,
+    errors: Array,
+) -> None:
+    """Fill in the residuals of a block, less the random walk's level so far, and begin the next block.
+
+    Parameters
+    ----------
+    excess : ndarray, shape (lanes,)
+        Sums over the block, predicted less measured [SI].
+    level : ndarray, shape (lanes,)
+        The random walk's level [SI].
+    samples : float
+        How many samples the block has.
+    gain : float
+        Share of an innovation that goes into the level [fraction].
+    deviation : float
+        Standard deviation of an innovation [SI].
+    errors : ndarray, shape (lanes,)
+        Room for the normalised residuals.
+    """
+    for lane in range(kernel.LANES):
+        innovation = excess[lane] / samples - level[lane]
+        level[lane] += gain * innovation
+        value = innovation / deviation
+        errors[lane] = min(max(value, -kernel.RUNAWAY), kernel.RUNAWAY) if value == value else kernel.RUNAWAY
+        excess[lane] = 0.0
