@@ -55,7 +55,7 @@ def steps(folder: Path) -> dict[str, Path]:
     for path in paths.values():
         made = invoke(
             *("simulate", "--condition", "minor_friction", "--drive", "steps", "--duration", 6),
-            *("--sample-time", 2e-4, "--seed", 5, "--out", path),
+            *("--sample-time", 1e-3, "--seed", 5, "--out", path),
         )
         assert made.exit_code == 0, made.output
     return paths
