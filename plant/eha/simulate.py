@@ -105,7 +105,8 @@ class Plant:
         Mapping[str, ndarray], each of shape (n,)
             Channels by name.
         """
-        values = dict(zip(parameter_names(self.parameter_class), rows.T, strict=True))
+        # rows of a circuit begin with those of the lumped actuator, and go on
+        values = {name: rows[:, i] for i, name in enumerate(parameter_names(self.parameter_class))}
         seen = dict(self.observe(tuple(states.T), SimpleNamespace(**values)))
         if np.all(values.get("motor_lag", 0.0) > 0.0):
             seen["motor_speed_rad_s"] = states[:, self.states.index("motor_speed_rad_s")]
