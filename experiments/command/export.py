@@ -139,6 +139,42 @@ def _plant_fmu(bench: "Rig", plant: str, sample_time: float, name: str | None, f
     return plant_fmu(PLANTS[plant], bench.parameters, sample_time, fmi, name=called)
 
 
+Kind: TypeAlias = Annotated[str, option("KIND", "c, or mat for MATLAB.", "--to")]
+
+
+@commands.command(epilog="Example: hydrostate export model speed_to_pressure.json --to c --out controller")
+def model(
+    saved: Annotated[Path, typer.Argument(metavar="MODEL", help="A model that `hydrostate identify --out` saved.")],
+    out: Folder = Path("controller"),
+    to: Kind = "c",
+    precision: Annotated[str, option("TYPE", "double or float.")] = "double",
+    name: Annotated[
+        str | None, option("NAME", "What files, types and functions are called.", show_default="model")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Write an identified linear model as C99, a difference equation, or as a MAT file."""
+    from estimation.export.c_model import model_in_c
+    from estimation.export.mat_model import model_in_mat
+    from estimation.identification.free_run.saved import load_models
+    from plant.errors import require_known
+
+    require_known("--to", to, ("c", "mat"))
+    (found, *more) = load_models(saved)
+    if more:
+        raise HydrostateError(f"one model is wanted, got {1 + len(more)}", str(saved))
+    called = "model" if name is None else name
+    files: Mapping[str, str | bytes]
+    files = model_in_c(found, name=called, precision=precision) if to == "c" else model_in_mat(found, name=called)
+    prepare_output(out)
+    written = write_files(out, files)
+    emit(
+        json_text([{"outcome": "ok", "folder": str(out), "files": written}])
+        if as_json
+        else f"{out}: {', '.join(written)}"
+    )
+
+
 def _listed(text: str) -> tuple[str, ...]:
     return tuple(one for one in text.split(",") if one)
 

@@ -162,13 +162,19 @@ class FreeRunModel:
         ]
 
     @property
+    def level(self) -> float:
+        """Output of a linear model whose inputs have long stood at the data's means [output unit]; NaN for others."""
+        if not isinstance(self.body, LinearBody):
+            return float("nan")
+        return self.scaling.y_mean + self.scaling.y_std * float(self.body.theta[-1])
+
+    @property
     def offset(self) -> float:
         """Output at rest of a linear model whose inputs are zero [output unit]; NaN for others."""
         if not isinstance(self.body, LinearBody):
             return float("nan")
         gains = [float(b.sum() / f.sum()) for b, f in self.transfer_functions()]
-        level = self.scaling.y_mean + self.scaling.y_std * float(self.body.theta[-1])
-        return level - float(np.dot(gains, self.scaling.u_mean))
+        return self.level - float(np.dot(gains, self.scaling.u_mean))
 
     def to_control(self) -> "control.TransferFunction":
         """Return a linear model as a python-control object, one column an input; its offset is left out."""

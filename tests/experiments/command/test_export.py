@@ -69,3 +69,28 @@ def test_what_cannot_be_exported_is_said_in_a_sentence(given: tuple[str, ...], s
     done = export("c", "--out", tmp_path, *given)
     assert done.exit_code == 2
     assert said in " ".join(done.stderr.split())
+
+
+def test_an_identified_model_is_written_for_c_and_for_matlab(log: Path, tmp_path: Path) -> None:
+    saved = tmp_path / "model.json"
+    relation = ("--input", "motor_speed_rad_s", "--output", "differential_pressure_pa")
+    done = CliRunner().invoke(app, ["identify", str(log), *relation, "--out", str(saved)])
+    assert done.exit_code == 0, done.output
+    done = export("model", saved, "--name", "pressure", "--out", tmp_path / "c", "--json")
+    assert json.loads(done.stdout)[0]["files"] == ["pressure.h", "pressure.c", "example.c", "Makefile"]
+    compiled(tmp_path / "c", read(tmp_path / "c"))
+    assert export("model", saved, "--to", "mat", "--out", tmp_path / "mat").exit_code == 0
+    assert (tmp_path / "mat" / "model.mat").read_bytes().startswith(b"MATLAB 5.0")
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("nowhere.json",), "nowhere.json: the model cannot be read"),
+        (("nowhere.json", "--to", "ada"), "--to must be one of c, mat"),
+    ],
+)
+def test_a_model_that_is_not_there_and_an_unknown_kind_are_refused(given: tuple[str, ...], said: str) -> None:
+    done = export("model", *given)
+    assert done.exit_code == 2
+    assert said in done.stderr

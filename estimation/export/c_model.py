@@ -1,0 +1,68 @@
+"""An identified linear model as C99: a difference equation from its inputs to its output."""
+
+from importlib.metadata import version
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.identification.free_run.model import FreeRunModel
+from plant.compiled.c99.files import c_files, checked_name
+from plant.compiled.c99.precision import precision_of
+
+NO_LEVEL = 1e-9
+"""Sum of a denominator's coefficients, over that of their sizes, below which the model integrates [fraction]."""
+
+
+def model_in_c(model: FreeRunModel, *, name: str, precision: str = "double") -> dict[str, str]:
+    """Return the C99 files of a linear model.
+
+    Parameters
+    ----------
+    model : FreeRunModel
+        A linear one, of one input or several.
+    name : str
+        What its files, types and functions are called: a name of C.
+    precision : str
+        ``double`` or ``float``.
+
+    Returns
+    -------
+    dict[str, str]
+        Texts of ``NAME.h``, ``NAME.c``, ``example.c`` and ``Makefile``, by file name.
+
+    Raises
+    ------
+    HydrostateError
+        If the model is not linear, the name is none of C, or the precision is not known.
+    """
+    real, name = precision_of(precision), checked_name(name)
+    both = model.transfer_functions()
+    order = max(1, *(max(b.size, f.size) - 1 for b, f in both))
+    numerators = [np.pad(b, (0, order + 1 - b.size)) for b, _ in both]
+    denominator = np.pad(both[0][1], (0, order + 1 - both[0][1].size))
+    integrates = abs(denominator.sum()) < NO_LEVEL * np.abs(denominator).sum()
+    gains = [0.0 if integrates else float(b.sum() / denominator.sum()) for b in numerators]
+
+    def spelt(values: Array | list[float]) -> list[str]:
+        return [real.literal(float(value)) for value in values]
+
+    facts = {
+        "name": name,
+        "NAME": name.upper(),
+        "version": version("hydrostate"),
+        "real": real.name,
+        "f": real.function_suffix,
+        "lit": real.literal,
+        "digits": real.digits,
+        "sample_time": model.sample_time,
+        "inputs": model.inputs,
+        "output": model.output,
+        "order": order,
+        "operations": 3 * (order + 1) * len(numerators) + 3 * order + 2,
+        "numerators": [spelt(b) for b in numerators],
+        "denominator": spelt(denominator),
+        "gains": spelt(gains),
+        "means": spelt(model.scaling.u_mean),
+        "level": real.literal(model.level),
+    }
+    return c_files("estimation", "export/templates", "model", name, facts)

@@ -1,0 +1,53 @@
+"""An identified linear model as a MAT file."""
+
+from io import BytesIO
+from typing import Any, cast
+
+import numpy as np
+
+from estimation.identification.free_run.model import FreeRunModel
+from plant.compiled.c99.files import checked_name
+
+
+def model_in_mat(model: FreeRunModel, *, name: str) -> dict[str, bytes]:
+    """Return the MAT file of a linear model, whose variables are those of a transfer function of MATLAB.
+
+    ``numerator`` and ``denominator`` are in powers of the delay operator, an input a row; the output is that of the
+    transfer functions of the inputs less ``input_mean``, and ``output_level``.
+
+    Parameters
+    ----------
+    model : FreeRunModel
+        A linear one.
+    name : str
+        What the file is called.
+
+    Returns
+    -------
+    dict[str, bytes]
+        The file by its name.
+
+    Raises
+    ------
+    HydrostateError
+        If the model is not linear, or the name is no name.
+    """
+    from scipy.io import savemat
+
+    both = model.transfer_functions()
+    length = max(max(b.size, f.size) for b, f in both)
+    numerators, denominators = ([np.pad(x, (0, length - x.size)) for x in one] for one in zip(*both, strict=True))
+    held = BytesIO()
+    savemat(
+        cast(Any, held),
+        {
+            "numerator": np.array(numerators),
+            "denominator": np.array(denominators),
+            "sample_time_s": model.sample_time,
+            "inputs": np.array(model.inputs, dtype=object),
+            "output": model.output,
+            "input_mean": model.scaling.u_mean,
+            "output_level": model.level,
+        },
+    )
+    return {f"{checked_name(name)}.mat": held.getvalue()}
