@@ -158,7 +158,7 @@ def foreign_checks(actuator: Actuator) -> list[Check]:
         with_or_without = "with dp" if pressure else "without dp"
         share = 100.0 * float(np.mean(covered))
         checks.append(Check(f"foreign logs {with_or_without}: class right, of 18", right, 18, 18))
-        checks.append(Check(f"foreign logs {with_or_without}: flagged unknown, of 18", flagged, 0, 18))
+        checks.append(Check(f"foreign logs {with_or_without}: flagged unknown, of 18", flagged, 0, 0))
         checks.append(Check(f"foreign logs {with_or_without}: 95 % intervals that cover, %", share, 85.0, 100.0))
     return checks
 

@@ -9,8 +9,11 @@ samples averages away, and a bound of 0.001 % would be beaten by it.
 - `smoothed`: the iterated smoother in its place, which is what `hydrostate estimate --form pressure` takes where
   pressure is not logged;
 - `tuned`: noise levels found from the log, as `hydrostate estimate --form pressure --tune` does;
-- `unknown`: the flow form by least squares, which knows neither condition nor friction nor noise. Its bound is that of
-  a model that knows friction's structure and estimates leakage, flow bias and friction along with bulk modulus.
+- `unknown`, the default: what `hydrostate estimate` does with a log and no options, by the flow form or, without
+  pressure, by the motion form; it knows neither condition nor friction nor noise. Its bound is that of a model that
+  knows friction's structure and estimates leakage, flow bias and friction along with bulk modulus.
+
+A wish that chance alone may have met or missed counts as not met: more seeds decide it.
 """
 
 import argparse
@@ -122,7 +125,7 @@ def by_the_verb(case: Case, record: Record, p: EhaParameters) -> tuple[float, fl
     """Return bulk modulus and its standard deviation [Pa] as `hydrostate estimate` does; NaN where it gives none."""
     log = Record(record.sample_time, {name: record[name] for name in ("motor_speed_rad_s", *case.channels)})
     if case.estimator == "unknown":
-        found = estimate_bulk_modulus(log, EhaParameters(), form="flow", method="least-squares", start=FIRST_GUESS)
+        found = estimate_bulk_modulus(log, EhaParameters(), start=FIRST_GUESS)
     else:
         found = estimate_bulk_modulus(log, p, form="pressure", start=FIRST_GUESS, tuned=True)
     return found.value or float("nan"), found.std or float("nan")
@@ -199,17 +202,15 @@ def judged(met: bool) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """Print one line a cell and the pooled figures; return how many wishes are missed by more than chance explains."""
+    """Print one line a cell and the pooled figures; return how many wishes are not shown to be met."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--conditions", nargs="+", choices=list(CONDITIONS), default=list(CONDITIONS))
-    parser.add_argument("--estimator", choices=ESTIMATORS, default="stated")
+    parser.add_argument("--estimator", choices=ESTIMATORS, default="unknown")
     parser.add_argument("--without-pressure", action="store_true", help="position and velocity are all that is logged")
     parser.add_argument("--csv", help="write every estimate to this file")
     options = parser.parse_args(arguments)
     pressure = not options.without_pressure
-    if options.estimator == "unknown" and not pressure:
-        parser.error("the flow form needs pressure: --without-pressure goes with 'stated', 'smoothed' or 'tuned'")
     cases = [
         Case(drive, condition, seed, options.estimator, pressure)
         for drive in DRIVES
@@ -246,4 +247,4 @@ def main(arguments: list[str]) -> int:
     }
     print("\npooled")
     print("\n".join(f"  {line}: {verdict}" for line, verdict in verdicts.items()))
-    return list(verdicts.values()).count("missed")
+    return len(verdicts) - list(verdicts.values()).count("met")
