@@ -161,12 +161,19 @@ def _slopes(t: Array, y: Array) -> tuple[Array, NDArray[np.bool_]]:
     return slopes, whole
 
 
+FINEST_QUANTUM = 1e-12
+"""Quantum of a sensor over its range below which there is none: numbers end in fewer digits [fraction]."""
+
+
 def _on_quanta(found: Array, measured: Array) -> Array:
     """Round to the quantum of a sensor where all that it measured is a whole number of them."""
     steps = np.abs(np.diff(measured))
     quantum = float(np.min(steps[steps > 0.0], initial=np.inf))
-    counts = (measured - measured[0]) / quantum
-    if not np.isfinite(quantum) or np.max(np.abs(counts - np.rint(counts))) > 1e-3:
+    from_first = measured - measured[0]
+    if not np.isfinite(quantum) or np.max(np.abs(from_first)) * FINEST_QUANTUM > quantum:
+        return found
+    counts = from_first / quantum
+    if np.max(np.abs(counts - np.rint(counts))) > 1e-3:
         return found
     return measured[0] + quantum * np.rint((found - measured[0]) / quantum)
 
