@@ -8,6 +8,7 @@ import pandas as pd
 from estimation.identification.model.linear_model import LinearModel
 from experiments.circuit.passes import CHANNELS, SAMPLE_TIME
 from experiments.nine_conditions.printed_transfer_functions import printed_model
+from experiments.nine_conditions.transfer_functions import jump_ratio
 from experiments.page.frames import Frames, Rows, stacked, tabled
 
 FREQUENCIES = np.geomspace(0.5, 100.0, 60)
@@ -54,8 +55,8 @@ def library_table(models: Mapping[str, LinearModel]) -> Rows:
             "bandwidth_hz": model.bandwidth_hz,
             "bandwidth_std_hz": model.bandwidth_std_hz,
             "published_bandwidth_hz": published.bandwidth_hz,
-            "jump_ratio": model.numerator[0] / model.dc_gain,
-            "published_jump_ratio": published.numerator[0] / published.dc_gain,
+            "jump_ratio": jump_ratio(model),
+            "published_jump_ratio": jump_ratio(published),
             "fit_percent": model.fit_percent,
             "cancellations": len(model.cancellations),
         }

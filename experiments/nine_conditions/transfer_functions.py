@@ -82,11 +82,32 @@ def transfer_function_table(models: Mapping[str, LinearModel]) -> Rows:
             "dc_gain_std": model.dc_gain_std,
             "bandwidth_hz": model.bandwidth_hz,
             "fit_percent": model.fit_percent,
-            "jump_ratio": values[0] / model.dc_gain,
+            "jump_ratio": jump_ratio(model),
             **{f"published_{key}": value for key, value in printed.items()},
             "published_dc_gain_low": low,
             "published_dc_gain_high": high,
         }
+
+
+def jump_ratio(model: LinearModel) -> float:
+    """Return the share of a model's gain that acts within the sample of a step: 0 where output follows a mass (E15).
+
+    Parameters
+    ----------
+    model : LinearModel
+        A transfer function.
+
+    Returns
+    -------
+    float
+        ``b_0`` over the gain at zero frequency [dimensionless].
+
+    Examples
+    --------
+    >>> jump_ratio(LinearModel([0.5, 0.0, -0.4], [1.0, -0.9], 1e-3, "motor_speed_rad_s", "velocity_m_s"))
+    0.5
+    """
+    return float(model.numerator[0]) / model.dc_gain
 
 
 def printed_gain_interval(printed: list[str]) -> tuple[float, float]:
@@ -248,5 +269,5 @@ def _pole_row(variant: str, model: LinearModel) -> dict[str, object]:
         "pole_frequency_hz": abs(pole) / (2.0 * np.pi),
         "damping": -pole.real / abs(pole),
         "dc_gain": model.dc_gain,
-        "jump_ratio": model.numerator[0] / model.dc_gain,
+        "jump_ratio": jump_ratio(model),
     }

@@ -6,9 +6,19 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS
+from faults.diagnosis import class_regions
 from faults.diagnosis.circuit_runs import COORDINATES, Blocks
 from faults.diagnosis.class_fit import Actuator, PointFit
-from faults.diagnosis.class_regions import PRESSURE_SCALE, believed_information, is_stuck, region_scores, spread_of
+from faults.diagnosis.class_regions import (
+    ALIKE,
+    PRESSURE_SCALE,
+    believed_information,
+    fit_classes,
+    is_stuck,
+    lasting_misfit,
+    region_scores,
+    spread_of,
+)
 from plant.eha.model import EhaParameters
 
 ACTUATOR = Actuator.of(EhaParameters())
@@ -96,3 +106,44 @@ def test_without_pressure_an_actuator_unlike_its_kind_is_known_less_well() -> No
         for off in (np.zeros(7), np.array([0.2, -0.2, 0.2, 0.0, 0.0, 0.0, 0.0]))
     )
     assert 1.5 * near < far < 1.0
+
+
+def test_of_two_circuits_that_were_fitted_the_one_that_follows_the_log_decides(monkeypatch: pytest.MonkeyPatch) -> None:
+    log = blocks(pressure=True)
+    followed = {next(iter(CONDITIONS)): 1.0158, list(CONDITIONS)[4]: 1.0}
+    runs = np.array([log.outputs * followed.get(name, 2.0) for name in CONDITIONS])
+
+    def fitted_from(_: Blocks, __: Actuator, condition: str) -> PointFit:
+        place = list(CONDITIONS).index(condition)
+        scale = 1e-3 + 0.1 * (followed[condition] - 1.0)
+        return replace(fit(place, scale), fitted=runs[place], cost=float(scale))
+
+    monkeypatch.setattr(class_regions, "nominal_runs", lambda *_: runs)
+    monkeypatch.setattr(class_regions, "fit_freely", fitted_from)
+    found = fit_classes(log, ACTUATOR)
+    assert int(np.argmax(found.scores)) == 4
+    assert 2.0 < found.scores[4] - found.scores[0] < 4.0
+    assert found.best.cost == pytest.approx(1e-3)
+    assert int(np.argmin(found.nominal)) == 4
+
+
+def test_what_lasts_over_a_tenth_of_a_second_counts_as_often_as_white_noise_would_shrink() -> None:
+    log = blocks(pressure=True)
+    least = np.maximum(log.noise, 1e-3 * np.abs(log.outputs[0]))
+    lasting = np.ones((100, 2)) * least
+    assert lasting_misfit(log.outputs - lasting, log) == pytest.approx(np.sqrt(10.0), rel=1e-6)
+    alternating = np.where(np.arange(100) % 2, 1.0, -1.0)[:, None] * least
+    assert lasting_misfit(log.outputs - alternating, log) == pytest.approx(0.0, abs=1e-9)
+    gaps = log.outputs - lasting
+    gaps[50:60] = np.nan
+    assert lasting_misfit(gaps, log) == pytest.approx(np.sqrt(10.0), rel=1e-6)
+
+
+def test_without_pressure_the_scale_is_known_as_far_as_actuators_of_one_kind_are_alike() -> None:
+    found, log = residual(np.zeros(100), pressure=False)
+    spread = spread_of(found, np.zeros((7, 7)), log, ACTUATOR.conditions[0])
+    known = spread_of(found, INFORMATION, log, ACTUATOR.conditions[0])
+    along = PRESSURE_SCALE / np.linalg.norm(PRESSURE_SCALE)
+    assert float(along @ spread @ along) < float(along @ class_regions.WEAK @ along)
+    assert float(along @ known @ along) < float(along @ spread @ along)
+    assert 0.05**2 < ALIKE * class_regions.WITHIN[0, 0] < 0.1**2

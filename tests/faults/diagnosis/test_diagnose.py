@@ -11,7 +11,7 @@ from benchmarks.scores import calibration_error, share_interval
 from estimation.log_checks.clean import clean_log
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.calibration import shipped_calibration
+from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.diagnose import Diagnosis, diagnose_clean
@@ -117,6 +117,34 @@ def test_the_shipped_numbers_say_where_they_come_from() -> None:
     assert shipped.provenance["script"] == "python -m benchmarks fit_diagnosis"
     widths: Mapping[str, float] = shipped.widths(True)
     assert all(width > 0.0 for width in widths.values())
+
+
+def stretched(by: float, weight: float) -> Calibration:
+    """The shipped calibration with wider intervals and other weights."""
+    shipped = shipped_calibration()
+    parts = (
+        {
+            "weights": {name: weight * one for name, one in part["weights"].items()},
+            "widths": {name: by * one for name, one in part["widths"].items()},
+        }
+        for part in (shipped.with_pressure, shipped.without_pressure)
+    )
+    return Calibration(*parts, {})
+
+
+@PRESSURES
+def test_intervals_and_probabilities_are_those_of_the_calibration(*, pressure: bool) -> None:
+    speed = 90.0 * np.repeat([0.48, 1.0, -1.0, -0.56], 700)
+    record = simulate(CIRCUIT, speed, 1e-3, HEALTHY, sensors=BENCH, rng=np.random.default_rng(1))
+    log = clean_log(record if pressure else record.replace(**{PRESSURE: None}), HEALTHY)
+    once, twice = (diagnose_clean(log, ACTUATOR, calibration=stretched(by, 1.0)) for by in (1.0, 2.0))
+    for name in shipped_calibration().widths(pressure):
+        (low, high), (lower, higher) = once.severity[name].ci95 or (0.0, 0.0), twice.severity[name].ci95 or (0.0, 0.0)
+        assert higher - lower == pytest.approx(2.0 * (high - low)), name
+    assert once.probabilities == twice.probabilities
+    undecided = diagnose_clean(log, ACTUATOR, calibration=stretched(1.0, 0.0)).probabilities
+    assert list(undecided.values()) == pytest.approx([1.0 / len(CONDITIONS)] * len(CONDITIONS))
+    assert once.probabilities[once.condition] > 0.5
 
 
 def test_a_sure_classifier_that_is_always_right_has_no_calibration_error() -> None:

@@ -1,13 +1,25 @@
 """Severities in the units of a shop."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from estimation.finding import Quantity
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.circuit_runs import coordinates_of
-from faults.diagnosis.class_fit import Actuator
-from faults.diagnosis.severity import UNITS, severities_at
-from faults.eha.inject import with_bulk_modulus
+from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of
+from faults.diagnosis.class_fit import WEAK, Actuator, PointFit
+from faults.diagnosis.class_regions import ClassFits
+from faults.diagnosis.severity import (
+    OF_KIND,
+    UNITS,
+    severities,
+    severities_at,
+    what_is_not_told,
+    with_bulk_modulus,
+)
+from faults.eha import inject
+from faults.notes import ClassCode
 from plant.components.oil import effective_bulk_modulus
 from plant.eha.model import EhaParameters
 from plant.eha.steady_state import steady_state
@@ -42,7 +54,7 @@ def test_velocity_lost_and_pressure_rise_are_those_of_the_steady_state(name: str
 def test_air_is_what_would_make_the_oil_so_soft() -> None:
     share = 0.01
     soft = float(effective_bulk_modulus(RIG.accumulator_pressure, RIG.bulk_modulus, share, 0.0))
-    assert severities_of(with_bulk_modulus(RIG, soft))["entrained_air"] == pytest.approx(100.0 * share, rel=0.05)
+    assert severities_of(inject.with_bulk_modulus(RIG, soft))["entrained_air"] == pytest.approx(100.0 * share, rel=0.05)
 
 
 def test_severities_rise_with_their_fault() -> None:
@@ -56,3 +68,125 @@ def test_severities_rise_with_their_fault() -> None:
     ]
     assert np.all(np.diff(leaking) > 1.0)
     assert np.all(np.diff(rubbing) > 1000.0)
+
+
+def fits(spread: np.ndarray, place: int = 0) -> ClassFits:
+    """A circuit at a condition's centre, with what is believed of it."""
+    empty = np.zeros((10, 2))
+    best = PointFit(ACTUATOR.conditions[place], 0.0, np.eye(7), np.ones(2), empty, np.zeros((7, 10, 2)))
+    nine = np.zeros(len(CONDITIONS))
+    return ClassFits(best, np.linalg.inv(spread), nine, np.zeros((9, 2)), nine, spread)
+
+
+NARROW = np.diag(np.full(7, 0.01**2))
+
+
+def extent(one: Quantity) -> float:
+    assert one.ci95 is not None
+    return one.ci95[1] - one.ci95[0]
+
+
+def test_a_calibrated_width_stretches_its_own_interval_and_no_other() -> None:
+    plain = severities(fits(NARROW), ACTUATOR)
+    for name in ("leakage_flow", "velocity_lost", "added_friction", "pressure_rise", "bulk_modulus"):
+        wide = severities(fits(NARROW), ACTUATOR, {name: 2.5})
+        for other, one in plain.items():
+            if other != "entrained_air":
+                assert extent(wide[other]) == pytest.approx((2.5 if other == name else 1.0) * extent(one)), (
+                    name,
+                    other,
+                )
+
+
+def test_intervals_are_95_percent_of_what_is_believed() -> None:
+    found = severities(fits(NARROW), ACTUATOR)["bulk_modulus"]
+    assert found.ci95 is not None
+    assert extent(found) == pytest.approx(2.0 * 1.96 * 0.01 * 2.07e8, rel=0.15)
+    assert found.ci95[0] < found.value < found.ci95[1]  # type: ignore[operator]
+
+
+def test_twice_the_doubt_is_twice_the_interval() -> None:
+    once, twice = (severities(fits(factor * NARROW), ACTUATOR) for factor in (1.0, 4.0))
+    for name in ("leakage_flow", "added_friction", "bulk_modulus"):
+        assert extent(twice[name]) == pytest.approx(2.0 * extent(once[name]), rel=0.1)
+
+
+def soft(share: float, width: float) -> Quantity:
+    value = share * RIG.bulk_modulus
+    ends = value * (1.0 - width), value * (1.0 + width)
+    return Quantity(value, "Pa", ends, ci95_total=(0.9 * ends[0], 1.1 * ends[1]))
+
+
+def test_air_is_certain_only_where_no_sound_oil_of_the_kind_is_so_soft() -> None:
+    plain = severities(fits(NARROW), ACTUATOR)
+    sure, unsure = (with_bulk_modulus(plain, soft(share, 0.02), ACTUATOR) for share in (0.5, 0.95 - OF_KIND + 0.08))
+    assert sure["bulk_modulus"].value == 0.5 * RIG.bulk_modulus
+    assert sure["entrained_air"].ci95 is not None
+    assert sure["entrained_air"].ci95[0] > 0.0
+    assert unsure["entrained_air"].value is not None
+    assert unsure["entrained_air"].value > 0.0
+    assert unsure["entrained_air"].ci95 is not None
+    assert unsure["entrained_air"].ci95[0] == 0.0
+
+
+def test_a_softer_oil_holds_more_air_and_the_total_interval_is_the_wider() -> None:
+    plain = severities(fits(NARROW), ACTUATOR)
+    less, more = (with_bulk_modulus(plain, soft(share, 0.02), ACTUATOR)["entrained_air"] for share in (0.6, 0.4))
+    assert less.value is not None
+    assert more.value is not None
+    assert more.value > 1.5 * less.value > 0.0
+    assert more.ci95 is not None
+    assert more.ci95_total is not None
+    assert more.ci95_total[0] < more.ci95[0] < more.value < more.ci95[1] < more.ci95_total[1]
+
+
+def test_without_an_estimate_of_bulk_modulus_no_air_is_told() -> None:
+    found = with_bulk_modulus(severities(fits(NARROW), ACTUATOR), Quantity(None, "Pa"), ACTUATOR)
+    assert found["bulk_modulus"].value is None
+    assert found["entrained_air"].value is None
+
+
+def not_told(spread: np.ndarray, condition: str = "normal", *, pressure: bool = True) -> set[str]:
+    found = fits(spread, list(CONDITIONS).index(condition))
+    return {note.code.name for note in what_is_not_told(found, severities(found, ACTUATOR), pressure=pressure)}
+
+
+FRICTION = ("friction_rest", "friction_quadratic", "friction_rated")
+
+
+def blind(*names: str) -> np.ndarray:
+    """Return a covariance that is the prior's in some coordinates and narrow in the others."""
+    sizes = np.array([WEAK[i, i] * 50.0 if name in names else 1e-4 for i, name in enumerate(COORDINATES)])
+    return np.diag(sizes)
+
+
+def test_what_a_log_does_not_narrow_is_said_to_be_not_visible() -> None:
+    assert not_told(NARROW) == set()
+    assert not_told(blind("bulk_modulus")) == {ClassCode.BULK_MODULUS_NOT_VISIBLE.name}
+    assert ClassCode.FRICTION_NOT_VISIBLE.name in not_told(blind(*FRICTION))
+    assert ClassCode.FRICTION_NOT_VISIBLE.name not in not_told(blind("friction_rest"))
+
+
+def test_leakage_and_bias_that_trade_places_are_not_told_apart_but_the_velocity_lost_is() -> None:
+    one, two = (COORDINATES.index(name) for name in ("leakage", "bias"))
+    leaking = parameters_for(CONDITIONS["minor_leakage"])
+    assert ACTUATOR.conditions[list(CONDITIONS).index("minor_leakage")][one] == np.log(leaking.leakage_coefficient)
+    apart = np.zeros(7)
+    apart[one] = leaking.flow_bias
+    apart[two] = -leaking.leakage_coefficient * steady_state(RIG.rated_speed, leaking)[1]
+    traded = 1e-3 * NARROW + 0.6**2 * np.outer(apart, apart) / (apart @ apart)
+    assert not_told(traded, "minor_leakage") == {
+        ClassCode.LEAKAGE_AND_BIAS_ALIKE.name,
+        ClassCode.VELOCITY_LOST_TOLD.name,
+    }
+
+
+def test_without_pressure_one_scale_is_never_told() -> None:
+    assert not_told(NARROW, pressure=False) == {ClassCode.ONE_SCALE.name, ClassCode.VELOCITY_LOST_TOLD.name}
+
+
+def test_a_circuit_without_a_steady_state_has_no_number_and_no_interval() -> None:
+    nowhere = replace(fits(NARROW).best, coordinates=np.full(7, np.nan))
+    found = severities(replace(fits(NARROW), best=nowhere), ACTUATOR)
+    assert found["leakage_flow"].value is None
+    assert found["leakage_flow"].ci95 is None

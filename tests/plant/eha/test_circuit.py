@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from faults.eha.physical import throttled
 from plant.components.oil import effective_bulk_modulus
-from plant.eha.circuit import CircuitState, at_rest, circuit_derivative, circuit_pressures
+from plant.eha.circuit import CircuitState, Pressures, at_rest, circuit_derivative, circuit_flows, circuit_pressures
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.drives import make_drive
 from plant.eha.simulate import CIRCUIT, LUMPED, simulate
@@ -92,6 +92,27 @@ def test_pressure_falls_by_the_lumped_leakage_while_both_chambers_float(drain: f
     stiff = effective_bulk_modulus(pressures.supply, p.bulk_modulus, 0.0, p.vapour_pressure)
     falling = stiff * (rates[4] / start[4] - rates[5] / start[5])
     assert -falling * p.chamber_volume / stiff == pytest.approx(p.leakage_coefficient * dp, rel=1e-3)
+
+
+DRAINED = replace(PAPER, cylinder_drain_leakage=1e-12, pump_case_leakage=1e-12, makeup_conductance=0.0)
+
+
+@pytest.mark.parametrize(("a", "b"), [(4e5, 1e5), (1e5, 4e5)])
+def test_a_drain_that_floats_passes_on_all_that_it_takes(a: float, b: float) -> None:
+    flows = circuit_flows(0.0, (1.02, 0.98), Pressures(a, b, 5e5), DRAINED)
+    assert flows.supply == 0.0
+    assert flows.a * (a - b) < 0.0
+
+
+def test_a_drain_takes_oil_from_both_chambers_once_they_stand_above_the_accumulator() -> None:
+    level = circuit_flows(0.0, (1.02, 1.02), Pressures(9e5, 9e5, 5e5), DRAINED)
+    drain = DRAINED.cylinder_drain_leakage + DRAINED.pump_case_leakage
+    assert level.supply == pytest.approx(2.0 * drain * 4e5 * 1.02)
+    assert level.a == pytest.approx(-0.5 * level.supply)
+    assert level.b == pytest.approx(-0.5 * level.supply)
+    steep = circuit_flows(0.0, (1.02, 1.0), Pressures(9e5, 7e5, 5e5), DRAINED)
+    assert steep.supply == pytest.approx(drain * (4e5 + 2e5), rel=0.03)
+    assert steep.a + steep.b + steep.supply == pytest.approx(0.0, abs=1e-18)
 
 
 @pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)

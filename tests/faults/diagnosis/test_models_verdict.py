@@ -1,0 +1,62 @@
+"""What nine errors alone say: a class, none, or that no model fits."""
+
+import math
+
+import numpy as np
+import pytest
+
+from estimation.finding import Outcome
+from faults.conditions import CONDITIONS
+from faults.diagnosis.models_verdict import margin, models_verdict, ranked
+from faults.diagnosis.rmse import Scores
+from faults.notes import AgainstCode, ClassCode
+from plant.log.record import Record
+
+RECORD = Record(1e-3, {"motor_speed_rad_s": np.ones(100), "velocity_m_s": np.full(100, 0.1)})
+
+
+def scored(*least: float, channels: int = 1, rest: float = 0.09) -> Scores:
+    values = dict(zip(CONDITIONS, [*least, *[rest] * (len(CONDITIONS) - len(least))], strict=True))
+    names = ("velocity_m_s", "differential_pressure_pa")[:channels]
+    return Scores(values, dict.fromkeys(names, values))
+
+
+def test_the_least_error_comes_first_and_one_that_ran_away_last() -> None:
+    order = ranked(scored(0.02, math.inf, 0.01))
+    assert [name for name, _ in order[:2]] == [list(CONDITIONS)[2], next(iter(CONDITIONS))]
+    assert order[-1][0] == list(CONDITIONS)[1]
+
+
+@pytest.mark.parametrize(
+    ("least", "wanted"),
+    [((0.01, 0.02), 2.0), ((0.0, 0.02), math.inf), ((0.0, 0.0), 1.0), ((0.03, math.inf), 3.0)],
+)
+def test_the_margin_is_the_runner_up_over_the_best(least: tuple[float, float], wanted: float) -> None:
+    assert margin(scored(*least)) == pytest.approx(wanted)
+
+
+def test_where_every_model_ran_away_there_is_no_class_and_it_is_said() -> None:
+    found = models_verdict(scored(rest=math.inf), RECORD)
+    assert (found.outcome, [note.code for note in found.notes]) == (Outcome.DIVERGED, [ClassCode.MODELS_DIVERGED])
+
+
+@pytest.mark.parametrize(
+    ("runner_up", "outcome"), [(1.0005, Outcome.NOT_OBSERVABLE), (1.002, Outcome.OK), (2.0, Outcome.OK)]
+)
+def test_models_that_differ_by_less_than_a_thousandth_are_alike(runner_up: float, outcome: Outcome) -> None:
+    found = models_verdict(scored(0.01, 0.01 * runner_up), RECORD)
+    assert found.outcome is outcome
+    assert [note.code for note in found.notes] == ([] if outcome is Outcome.OK else [ClassCode.MODELS_ALIKE])
+    assert found.against == ()
+
+
+@pytest.mark.parametrize(("share", "said"), [(0.45, False), (0.55, True)])
+@pytest.mark.parametrize("channels", [1, 2])
+def test_a_best_model_that_leaves_more_than_half_of_the_signal_fits_none(
+    share: float, said: bool, channels: int
+) -> None:
+    least = share * (0.1 if channels == 1 else 1.0)  # one channel's error has its unit, two are shares already
+    found = models_verdict(scored(least, channels=channels, rest=2.0), RECORD)
+    assert [note.code for note in found.against] == ([AgainstCode.NONE_FITS] if said else [])
+    if said:
+        assert found.against[0].data["percent"] == pytest.approx(55.0)

@@ -1,0 +1,216 @@
+"""A log that no condition explains is "unknown", and each reason has its own limit: above it, not below."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS, severity
+from faults.diagnosis.circuit_runs import (
+    COORDINATES,
+    Blocks,
+    blocks_of,
+    coordinates_of,
+    parameter_rows,
+    predicted,
+)
+from faults.diagnosis.class_fit import Actuator, PointFit, scales_of
+from faults.diagnosis.class_regions import ClassFits, fit_classes, region_scores
+from faults.diagnosis.out_of_model import LEAST_BIAS, SOFT, UNEXPLAINED, reasons_against, sensors_disagree
+from faults.notes import AgainstCode
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from plant.notes import Note
+
+RIG = EhaParameters()
+ACTUATOR = Actuator.of(RIG)
+INFORMATION = 1e4 * np.eye(len(COORDINATES))
+LEVELS = [60.0, 120.0, 90.0, 120.0, -120.0, -70.0, -120.0, -100.0]
+NOISE = np.array([1e-4, 2e3])
+
+
+@cache
+def run_of(place: tuple[float, ...], dwell: int = 1000) -> Blocks:
+    """Return the log that a circuit leaves of eight speeds, each held for so many milliseconds, without noise."""
+    speed = np.repeat(LEVELS, dwell)
+    empty = np.zeros(len(speed) // 10)
+    blank = Blocks(np.append(speed, speed[-1]), 1e-3, 10, empty, empty, NOISE)
+    (found,) = predicted(blank, parameter_rows(np.array([place]), ACTUATOR.circuit, ACTUATOR.rated))
+    return replace(blank, velocity=found[:, 0], pressure=found[:, 1])
+
+
+@cache
+def slopes_of(place: tuple[float, ...]) -> np.ndarray:
+    """Return derivatives of what a circuit does with respect to its coordinates."""
+    point = np.array(place)
+    rows = parameter_rows(np.vstack([point, point + 0.02 * np.eye(len(point))]), ACTUATOR.circuit, ACTUATOR.rated)
+    runs = predicted(run_of(place), rows)
+    return (runs[1:] - runs[0]) / 0.02
+
+
+def fitted(blocks: Blocks, place: np.ndarray) -> ClassFits:
+    """Return fits whose best circuit is at a place."""
+    key = tuple(place.tolist())
+    scales, slopes = scales_of(blocks, run_of(key).outputs), slopes_of(key)
+    weighted = (slopes[:, blocks.first :] / scales).reshape(len(place), -1)
+    best = PointFit(place, 0.0, weighted @ weighted.T, scales, run_of(key).outputs, slopes)
+    nine = np.zeros(len(CONDITIONS))
+    return ClassFits(best, INFORMATION, nine, np.zeros((len(CONDITIONS), 2)), nine, np.linalg.inv(INFORMATION))
+
+
+def reasons(blocks: Blocks, place: np.ndarray | None = None) -> Mapping[AgainstCode, Note]:
+    """Return what speaks against a log, by code, where its best circuit is at a place, or is looked for."""
+    fits = fit_classes(blocks, ACTUATOR) if place is None else fitted(blocks, place)
+    region = float(np.max(region_scores(fits.best, fits.information, ACTUATOR)))
+    return {AgainstCode(note.code): note for note in reasons_against(blocks, fits, region, ACTUATOR)}
+
+
+def shifted(**by: float) -> np.ndarray:
+    """Return the healthy circuit's coordinates, some of them moved by a logarithm."""
+    return ACTUATOR.conditions[0] + np.array([by.get(name, 0.0) for name in COORDINATES])
+
+
+def at(leakage: float, friction: float) -> np.ndarray:
+    """Return the coordinates of a circuit with these severities."""
+    return coordinates_of(severity(leakage, friction, ACTUATOR.circuit), ACTUATOR.rated)
+
+
+def healthy() -> Blocks:
+    return run_of(tuple(ACTUATOR.conditions[0].tolist()))
+
+
+@pytest.mark.parametrize("place", range(len(CONDITIONS)), ids=list(CONDITIONS))
+def test_nothing_speaks_against_the_log_of_a_nominal_circuit(place: int) -> None:
+    point = ACTUATOR.conditions[place]
+    assert not reasons(run_of(tuple(point.tolist())), point)
+
+
+@pytest.mark.parametrize(("channel", "name"), [(0, "velocity"), (1, "differential pressure")])
+def test_a_log_is_unexplained_once_its_circuit_leaves_more_than_the_stated_share(channel: int, name: str) -> None:
+    log = healthy()
+    alternating = np.where(np.arange(len(log.velocity)) % 2, 1.0, -1.0)
+    size = float(np.sqrt(np.mean(log.outputs[log.first :, channel] ** 2)))
+
+    def with_left(share: float) -> Blocks:
+        changed = log.outputs + share * size * np.outer(alternating, np.eye(2)[channel])
+        return replace(log, velocity=changed[:, 0], pressure=changed[:, 1])
+
+    place, limit = ACTUATOR.conditions[0], UNEXPLAINED[channel]
+    assert AgainstCode.UNEXPLAINED not in reasons(with_left(0.9 * limit), place)
+    said = reasons(with_left(1.2 * limit), place)[AgainstCode.UNEXPLAINED]
+    assert said.data["channel"] == name
+    assert said.data["percent"] == pytest.approx(120.0 * limit, rel=0.02)
+    assert 0.02 < limit < 0.25
+
+
+def test_what_the_sensors_own_noise_leaves_speaks_against_nothing() -> None:
+    log = replace(healthy(), noise=np.array([1.0, 1e9]))
+    noisy = replace(log, velocity=log.velocity * np.where(np.arange(len(log.velocity)) % 2, 1.3, 0.7))
+    assert AgainstCode.UNEXPLAINED not in reasons(noisy, ACTUATOR.conditions[0])
+
+
+@pytest.mark.parametrize(("share", "code"), [(0.4, AgainstCode.OIL_SOFT), (2.5, AgainstCode.OIL_STIFF)])
+def test_an_oil_less_than_half_or_more_than_twice_as_stiff_is_another_oil(share: float, code: AgainstCode) -> None:
+    point = shifted(bulk_modulus=float(np.log(share)))
+    said = reasons(run_of(tuple(point.tolist())), point)
+    assert list(said) == [code]
+    assert said[code].data["share"] == pytest.approx(share)
+    near = shifted(bulk_modulus=float(np.log(0.75 if share < 1.0 else 1.3)))
+    assert not {AgainstCode.OIL_SOFT, AgainstCode.OIL_STIFF} & set(reasons(run_of(tuple(near.tolist())), near))
+    assert 0.4 < SOFT < 0.75
+
+
+def test_halfway_between_two_levels_of_leakage_lies_in_no_region_and_the_severity_is_told() -> None:
+    point = at(0.5, 0.0)
+    said = reasons(run_of(tuple(point.tolist())), point)
+    assert list(said) == [AgainstCode.BETWEEN_CONDITIONS]
+    assert said[AgainstCode.BETWEEN_CONDITIONS].data == {"leakage": 0.5, "friction": 0.0}
+
+
+def test_far_beyond_every_condition_lies_outside_of_all() -> None:
+    point = shifted(leakage=5.0, friction_rated=2.0)
+    found = reasons(run_of(tuple(point.tolist())), point)
+    assert AgainstCode.OUTSIDE_CONDITIONS in found
+    assert AgainstCode.BETWEEN_CONDITIONS not in found
+
+
+def test_an_actuator_that_differs_as_its_kind_does_stays_in_its_condition() -> None:
+    point = shifted(leakage=0.15, friction_rest=-0.1, bulk_modulus=0.1)
+    assert not reasons(run_of(tuple(point.tolist())), point)
+
+
+@pytest.mark.parametrize("share", [1.5, 3.0, -3.0])
+def test_a_pressure_sensor_that_is_biased_beyond_its_limit_is_named_with_its_bias(share: float) -> None:
+    log = healthy()
+    assert log.pressure is not None
+    limit = LEAST_BIAS["differential_pressure_pa"] * float(np.sqrt(np.mean(log.pressure**2)))
+    found = reasons(replace(log, pressure=log.pressure + share * limit))
+    assert found[AgainstCode.PRESSURE_BIAS].data["bias_pa"] == pytest.approx(share * limit, rel=0.02)
+    assert not reasons(replace(log, pressure=log.pressure + np.sign(share) * 0.5 * limit))
+
+
+def test_a_bias_is_not_believed_within_two_of_its_standard_errors() -> None:
+    short, long = (run_of(tuple(ACTUATOR.conditions[0].tolist()), dwell) for dwell in (100, 1000))
+    for log, said in ((short, False), (long, True)):
+        assert log.pressure is not None
+        limit = LEAST_BIAS["differential_pressure_pa"] * float(np.sqrt(np.mean(log.pressure**2)))
+        found = reasons(replace(log, pressure=log.pressure + 1.5 * limit))
+        assert (AgainstCode.PRESSURE_BIAS in found) == said
+
+
+@pytest.mark.parametrize("share", [1.5, 2.5, -2.5])
+def test_a_speed_sensor_that_is_biased_beyond_its_limit_is_named_with_its_bias(share: float) -> None:
+    log = healthy()
+    limit = LEAST_BIAS["motor_speed_rad_s"] * float(np.sqrt(np.mean(log.speed**2)))
+    found = reasons(replace(log, speed=log.speed + share * limit))
+    assert found[AgainstCode.SPEED_BIAS].data["bias_rad_s"] == pytest.approx(share * limit, rel=0.1)
+    assert not reasons(replace(log, speed=log.speed + np.sign(share) * 0.5 * limit))
+
+
+@pytest.mark.parametrize("gain", [1.2, 0.8])
+def test_a_pump_that_moves_more_or_less_than_the_rig_file_says_is_named(gain: float) -> None:
+    point = shifted(pump=float(np.log(gain)))
+    found = reasons(run_of(tuple(point.tolist())))
+    assert found[AgainstCode.PUMP_OFF].data["percent"] == pytest.approx(100.0 * (gain - 1.0), rel=0.35)
+    near = shifted(pump=float(np.log(1.0 + 0.15 * (gain - 1.0))))
+    assert AgainstCode.PUMP_OFF not in reasons(run_of(tuple(near.tolist())))
+
+
+def test_a_motor_that_never_turned_biases_nothing() -> None:
+    log = replace(healthy(), speed=np.zeros_like(healthy().speed))
+    assert not {AgainstCode.SPEED_BIAS, AgainstCode.PUMP_OFF} & set(reasons(log, ACTUATOR.conditions[0]))
+
+
+def with_two_sensors(gain: float, noise: float) -> Record:
+    """Return a log whose velocity sensor reads more than the encoder's slope says."""
+    time = 1e-3 * np.arange(3001)
+    rng = np.random.default_rng(3)
+    velocity = 0.05 * np.sin(2.0 * np.pi * time)
+    position = 0.05 / (2.0 * np.pi) * (1.0 - np.cos(2.0 * np.pi * time))
+    channels = {
+        "motor_speed_rad_s": 100.0 * np.sin(2.0 * np.pi * time),
+        "position_m": position,
+        "velocity_m_s": gain * velocity + rng.normal(0.0, noise, len(time)),
+    }
+    return Record(1e-3, channels)
+
+
+@pytest.mark.parametrize(("gain", "differs"), [(1.0, False), (1.03, False), (1.08, True), (0.9, True), (-1.0, True)])
+def test_velocity_and_the_encoders_slope_may_differ_by_five_percent(gain: float, differs: bool) -> None:
+    record = with_two_sensors(gain, 1e-6)
+    assert bool(sensors_disagree(record, blocks_of(record))) == differs
+
+
+@pytest.mark.parametrize(("gain", "noise", "differs"), [(1.0, 0.05, False), (1.2, 1e-3, True)])
+def test_noise_of_a_velocity_sensor_excuses_what_it_can_make_and_no_more(
+    gain: float, noise: float, differs: bool
+) -> None:
+    record = with_two_sensors(gain, noise)
+    assert bool(sensors_disagree(record, blocks_of(record))) == differs
+
+
+def test_one_sensor_alone_contradicts_none() -> None:
+    record = with_two_sensors(2.0, 1e-6).replace(position_m=None)
+    assert not sensors_disagree(record, blocks_of(record))
