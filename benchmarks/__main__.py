@@ -39,7 +39,10 @@ WITH_PEERS = ("identification_peers", "streaming")
 OF_COMMITS = ("same_numbers",)
 """Those that compare commits, named behind the script's name."""
 
-ALL = (*NAMES, *FITS, *WITH_PEERS, *OF_COMMITS)
+OF_TESTS = ("mutants",)
+"""Those that ask the tests themselves, and take minutes to hours."""
+
+ALL = (*NAMES, *FITS, *WITH_PEERS, *OF_COMMITS, *OF_TESTS)
 
 
 def main() -> int:
