@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 SEED ?= 2024
 WORKERS ?= 2
 
-.PHONY: study test test-slow lint benchmark peers clean
+.PHONY: study test test-slow lint benchmark peers release clean
 
 # One stamp a kind of install: re-made when the pins or the project's metadata change.
 $(VENV)/.installed: pyproject.toml constraints.txt
@@ -54,6 +54,19 @@ peers: $(VENV)/.installed-dev .peers/.installed
 	$(BIN)/python -m benchmarks filter_speed --jax .peers/jax/bin/python || status=1; \
 	$(BIN)/python -m benchmarks circuit || status=1; \
 	exit $$status
+
+# Built from what is committed, and tried where nothing else of the project is.
+release:
+	test -z "$$(git status --porcelain)" || { echo "make release: commit or remove what is not committed first" >&2; exit 1; }
+	rm -rf dist build/release
+	$(PYTHON) -m venv build/release/tools
+	build/release/tools/bin/python -m pip install --quiet --disable-pip-version-check build twine
+	build/release/tools/bin/python -m build --outdir dist
+	build/release/tools/bin/python -m twine check --strict dist/*
+	$(PYTHON) -m venv build/release/clean
+	build/release/clean/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt dist/*.whl
+	cd build/release && clean/bin/hydrostate study --quick --out study
+	build/release/clean/bin/hydrostate --version
 
 clean:
 	rm -rf $(VENV) .peers results build dist *.egg-info

@@ -1,0 +1,92 @@
+"""What a contributor and a user are promised: names that stay, versions that agree, an index, files that are valid."""
+
+import importlib.util
+import json
+import re
+import sys
+import tomllib
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+CITATION: dict[str, Any] = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
+FORMS = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
+
+
+def script(name: str) -> ModuleType:
+    """Import a script of the documents, which is in no package."""
+    spec = importlib.util.spec_from_file_location(f"_{name}_page", ROOT / "docs" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_no_name_is_missing_that_a_users_program_may_rest_on() -> None:
+    promised = json.loads((ROOT / "docs" / "interface.json").read_text("utf-8"))
+    found = script("interface").interface()
+    missing = [
+        f"{part} {key}: {name}"
+        for part, entries in promised.items()
+        for key, names in entries.items()
+        for name in names
+        if name not in found[part].get(key, ())
+    ]
+    assert not missing, "see 'Versions' in CONTRIBUTING.md"
+    assert len(promised["faces"]["plant"]) > 10
+    assert "bulk_modulus_pa" in promised["json"]["diagnose"]
+
+
+def test_every_decision_is_in_the_index() -> None:
+    index = script("decisions_index")
+    text = (ROOT / "docs" / "decisions.md").read_text("utf-8")
+    assert index.with_index(text) == text, "run: python docs/decisions_index.py"
+    numbers = [int(number) for number in re.findall(r"^## (\d+)\. ", text, re.MULTILINE)]
+    assert numbers == sorted(set(numbers))
+
+
+def test_an_anchor_is_what_a_page_of_markdown_gets() -> None:
+    anchor = script("decisions_index").anchor_of('5. "Not observable" is Cramér-Rao\'s, not 3 %')
+    assert anchor == "5-not-observable-is-cramér-raos-not-3-"
+
+
+def test_the_citation_has_what_its_schema_wants_and_the_projects_version() -> None:
+    assert {"cff-version", "message", "title", "authors"} <= set(CITATION)
+    assert CITATION["cff-version"] == "1.2.0"
+    assert CITATION["type"] == "software"
+    assert CITATION["license"] == PROJECT["license"]
+    assert str(CITATION["version"]) == PROJECT["version"]
+    assert [author["name"] for author in CITATION["authors"]] == [author["name"] for author in PROJECT["authors"]]
+
+
+def test_the_hooks_are_the_tools_of_make_lint() -> None:
+    hooks = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text("utf-8"))
+    (repo,) = hooks["repos"]
+    assert repo["repo"] == "local"
+    lint = re.findall(r"^\t\$\(BIN\)/(\w+)", (ROOT / "Makefile").read_text("utf-8").split("lint:")[1], re.MULTILINE)[:3]
+    assert [hook["entry"].split()[0].removeprefix(".venv/bin/") for hook in repo["hooks"]] == lint
+    assert all(hook["language"] == "system" for hook in repo["hooks"])
+
+
+@pytest.mark.parametrize("path", [path for path in FORMS if path.name != "config.yml"], ids=lambda path: path.stem)
+def test_every_form_for_an_issue_asks_for_something_that_is_required(path: Path) -> None:
+    form = yaml.safe_load(path.read_text("utf-8"))
+    assert {"name", "description", "body"} <= set(form)
+    ids = [field["id"] for field in form["body"]]
+    assert len(ids) == len(set(ids))
+    assert all({"type", "attributes"} <= set(field) and field["attributes"]["label"] for field in form["body"])
+    assert any(field.get("validations", {}).get("required") for field in form["body"])
+
+
+@pytest.mark.parametrize(
+    "target", re.findall(r"(?:^|`)make ([\w-]+)", (ROOT / "CONTRIBUTING.md").read_text("utf-8"), re.M)
+)
+def test_every_target_that_contributors_are_told_of_is_in_the_makefile(target: str) -> None:
+    assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)
