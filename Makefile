@@ -30,6 +30,7 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/pyright
+	$(BIN)/oxlint --deny-warnings experiments/page/scripts/*.js
 
 benchmark: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks

@@ -190,7 +190,7 @@ def _page(result: Result, found: "Finding", record: "Record") -> str:
     from experiments.eha.diagnosis_page import diagnosis_page
     from experiments.log_pages.finding_page import finding_page
 
-    return diagnosis_page(result, found) if found.probabilities else finding_page(result, found, record)
+    return diagnosis_page(result, found, record) if found.probabilities else finding_page(result, found, record)
 
 
 EHA = ActuatorKind(

@@ -1,31 +1,34 @@
-"""The page on one log, whatever the actuator: the verdict, quantities with intervals, notes, measured channels."""
+"""The page on one log, whatever the actuator: verdict, what to do, quantities with intervals, notes, the channels."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
-from matplotlib.figure import Figure
-from numpy import linspace
 
-from experiments.page.figure_files import svg_of
+from experiments.log_pages.channels import channel_charts
 from experiments.page.numbers import MISSING, number, pretty_unit
 from experiments.page.render import render_page
-from experiments.page.style import BLUE, Margins, panels, styled
 from experiments.page.tables import Column
-from plant.log.columns import UNITS
+from experiments.page.words import sentence
 
 if TYPE_CHECKING:
     from estimation.finding import Finding, Quantity
     from plant.log.record import Record
 
-MOST_CHANNELS = 10
-"""Up to so many channels are drawn."""
-
-MOST_POINTS = 4000
-"""About so many samples are drawn of each."""
-
 LEAST_SHARE = 0.001
-"""Probability below which a condition is not listed."""
+"""Probability below which a condition is not listed [probability]."""
+
+COLUMNS = {
+    "quantities": (
+        "quantity",
+        "value",
+        Column("interval", "95 % interval"),
+        Column("total", "with what is not known of the rig"),
+        "unit",
+    ),
+    "probabilities": ("condition", Column("percent", "probability", "%")),
+}
 
 
 def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") -> str:
@@ -36,53 +39,39 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
     result : Mapping
         Its entries: ``file``, ``rig``, ``message`` and others.
     """
-    with styled():
-        figure = _draw_channels(record, [*found.channels, *record])
-    title = " or ".join(found.named) if found.named and not found.unknown else found.outcome.value
     shown = {**found.quantities, **found.severities}
     shares = sorted(found.probabilities.items(), key=lambda item: -item[1])
+    file = Path(result["file"]).name
     facts = {
         "result": result,
-        "title": _capital(title.replace("_", " ")),
+        "file": file,
+        "title": _title(found),
         "actuator": found.actuator,
-        "message": _sentence(result["message"]),
-        "believed": _believed(found),
+        "message": sentence(result["message"]),
+        "to_do": [sentence(str(note)) for note in found.advice],
+        "doubts": [sentence(one) for one in dict.fromkeys(map(str, (*found.against, *found.gate.reasons)))],
         "duration": f"{record.duration:g}",
         "channels": ", ".join(found.channels),
-        "notes": [_sentence(str(note)) for note in found.all_notes],
+        "notes": [sentence(str(note)) for note in found.all_notes if note not in found.advice],
         "quantities": pd.DataFrame([_row(name, one) for name, one in shown.items()]),
         "probabilities": pd.DataFrame(
             [(name.replace("_", " "), f"{100.0 * share:.1f}") for name, share in shares if share >= LEAST_SHARE],
             columns=["condition", "percent"],
         ),
+        "charts": {"measured": channel_charts(record, found, Path(file).stem)},
     }
-    columns = {
-        "quantities": (
-            "quantity",
-            "value",
-            Column("interval", "95 % interval"),
-            Column("total", "with what is not known of the rig"),
-            "unit",
-        ),
-        "probabilities": ("condition", Column("percent", "probability", "%")),
-    }
-    return render_page("log_pages/finding.html", facts, columns, {"figures/measured.svg": svg_of(figure)})
+    return render_page("log_pages/finding.html", facts, COLUMNS, {})
 
 
-def _capital(said: str) -> str:
-    return said[:1].upper() + said[1:]
-
-
-def _sentence(said: str) -> str:
-    """Return a clause as a sentence."""
-    return f"{_capital(said).rstrip('.')}."
-
-
-def _believed(found: "Finding") -> str:
-    doubts = [*found.against, *found.gate.reasons]
-    if not doubts:
-        return "Yes: nothing speaks against it."
-    return _sentence("no: " + "; ".join(dict.fromkeys(map(str, doubts))))
+def _title(found: "Finding") -> str:
+    """Return the verdict in one sentence."""
+    if found.unknown:
+        return "No verdict: the log does not fit any known condition."
+    if found.named:
+        return f"Found: {' or '.join(found.named).replace('_', ' ')}."
+    if any(one.value is not None for one in found.quantities.values()):
+        return "The log was estimated." if found.gate.passed else "The log was estimated, but do not rely on it."
+    return "The log tells too little, or does not fit the model: there are no numbers."
 
 
 def _row(name: str, one: "Quantity") -> dict[str, str]:
@@ -97,15 +86,3 @@ def _row(name: str, one: "Quantity") -> dict[str, str]:
 
 def _ends(interval: tuple[float, float] | None) -> str:
     return MISSING if interval is None else f"{number(interval[0])} to {number(interval[1])}"
-
-
-def _draw_channels(record: "Record", names: Sequence[str]) -> Figure:
-    shown = [name for name in dict.fromkeys(names) if name in record and name in UNITS][:MOST_CHANNELS]
-    places = linspace(0, len(record) - 1, min(len(record), MOST_POINTS)).astype(int)
-    margins = Margins(left=0.9, down=0.35)
-    figure, axes = panels("Measured", len(shown), 1, 0.9 + 1.5 * len(shown), margins, sharex=True)
-    for axis, name in zip(axes, shown, strict=True):
-        axis.plot(record.time[places], record[name][places], color=BLUE, lw=0.8)
-        axis.set(title=name, ylabel=f"[{UNITS[name]}]")
-    axes[-1].set_xlabel("time [s]")
-    return figure

@@ -11,7 +11,7 @@ _LINES = files("experiments.page").joinpath("errata.txt").read_text(encoding="ut
 ERRATA: Mapping[str, str] = dict(line.split(": ", 1) for line in _LINES)
 """One sentence an erratum, by number."""
 
-_NUMBER_OR_TAG = re.compile(r"<[^>]*>|\b[EPM]\d{1,2}\b")
+_NUMBER_OR_TAG = re.compile(r"<script\b.*?</script>|<[^>]*>|\b[EPM]\d{1,2}\b", re.DOTALL)
 _LINK = re.compile(r'href="#([EPM]\d{1,2})"')
 
 

@@ -1,10 +1,12 @@
 """Figures that are drawn from named tables, as the files that they become."""
 
+from base64 import b64encode
 from collections.abc import Callable, Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import TypeAlias
 
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from experiments.page.frames import Tables
@@ -50,6 +52,21 @@ def svg_of(figure: Figure) -> bytes:
     with styled():
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     return buffer.getvalue()
+
+
+def image_of(figure: Figure | bytes, words: str) -> Markup:
+    """Return a figure as an image that is inside its page.
+
+    Parameters
+    ----------
+    figure : Figure or bytes
+        The figure, or its SVG file.
+    words : str
+        What it shows, for those who do not see it.
+    """
+    content = figure if isinstance(figure, bytes) else svg_of(figure)
+    data = b64encode(content).decode("ascii")
+    return Markup('<img alt="{}" src="data:image/svg+xml;base64,{}">').format(words, data)
 
 
 def write_png(draw: Callable[[], Figure], path: Path) -> None:

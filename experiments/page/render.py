@@ -1,7 +1,6 @@
 """A report as one HTML file that needs nothing beside it: the words of its template, with tables and figures inside."""
 
 import re
-from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,11 +8,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from experiments.page.errata import linked, linked_errata
+from experiments.page.figure_files import image_of
 from experiments.page.numbers import exact, number
+from experiments.page.scripting import with_scripts
 from experiments.page.tables import Columns, html_table
 
-_HEADING = re.compile(r'<section id="([^"]+)">\s*<h2>([^:<]*)')
-_BEFORE_UNIT = re.compile(r"(?<=\d) (?=%|(?:V|Hz|kHz|mm|ms|psi)\b)")
+_HEADING = re.compile(r'<section id="([^"]+)"[^>]*>\s*<h2>([^:<]*)')
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=%|(?:V|Hz|kHz|mm|ms|psi|MPa|bar|N|s|L/min)\b)")
 
 
 def render_page(
@@ -25,9 +26,10 @@ def render_page(
     ----------
     template : str
         The page's words, by their path below ``experiments``; it extends ``page/templates/page.html``. There
-        ``table(name, caption)`` and ``figure(name, caption)`` stand for what they name.
+        ``table(name, caption)``, ``figure(name, caption)`` and ``chart(name, caption)`` stand for what they name.
     facts : Mapping[str, Any]
-        What was found, by name: data frames that the page shows, and what else its words need.
+        What was found, by name: data frames that the page shows, `Charts` by name under ``charts``, and what else its
+        words need.
     columns : Mapping[str, Columns]
         How each data frame is shown.
     files : Mapping[str, bytes]
@@ -44,9 +46,11 @@ def render_page(
 
     def figure(name: str, caption: str) -> Markup:
         caption = " ".join(caption.split())
-        data = b64encode(files[f"figures/{name}.svg"]).decode("ascii")
-        image = Markup('<img alt="{}" src="data:image/svg+xml;base64,{}">').format(caption, data)
+        image = image_of(files[f"figures/{name}.svg"], caption)
         return Markup('<figure id="figure-{}">{}<figcaption>{}</figcaption></figure>').format(name, image, caption)
+
+    def chart(name: str, caption: str) -> Markup:
+        return facts["charts"][name].html(name, " ".join(caption.split()))
 
     environment = Environment(
         loader=PackageLoader("experiments", ""),
@@ -56,9 +60,9 @@ def render_page(
         lstrip_blocks=True,
     )
     environment.filters |= {"linked": linked, "number": number, "exact": exact}
-    made = {"table": table, "figure": figure, "headings_of": _headings_of, "errata_of": linked_errata}
+    made = {"table": table, "figure": figure, "chart": chart, "headings_of": _headings_of, "errata_of": linked_errata}
     page = environment.get_template(template).render({**facts, **made})
-    return _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", page)
+    return with_scripts(_BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", page))
 
 
 def _headings_of(body: str) -> Sequence[tuple[str, Markup]]:

@@ -157,9 +157,9 @@ def html_table(frame: pd.DataFrame, columns: Columns, caption: str) -> Markup:
     )
     rows = Markup("\n").join(Markup("<tr>{}</tr>").format(Markup("").join(cells)) for cells in body)
     return Markup(
-        '<div class="scroll"><table>\n<caption>{}</caption>\n'
+        '<div class="scroll" tabindex="0" role="region" aria-label="{}"><table>\n<caption>{}</caption>\n'
         "<thead><tr>{}</tr></thead>\n<tbody>\n{}\n</tbody></table></div>"
-    ).format(caption, head, rows)
+    ).format(caption, caption, head, rows)
 
 
 def _named(frame: pd.DataFrame, columns: Columns) -> Iterator[Column]:

@@ -33,4 +33,15 @@ def in_short(condition: str) -> str:
     return short
 
 
+def sentence(said: str) -> str:
+    """Return a clause as a sentence.
+
+    Examples
+    --------
+    >>> sentence("check the rig file")
+    'Check the rig file.'
+    """
+    return f"{said[:1].upper()}{said[1:].rstrip('.')}."
+
+
 CONDITION = Column("condition", words=lambda name: Cell(in_words(name), "name"))

@@ -28,7 +28,7 @@ from faults.diagnosis.load import first_guesses, under_load
 from faults.diagnosis.models_verdict import models_verdict, ranked
 from faults.diagnosis.out_of_model import SOFT, reasons_against, sensors_disagree
 from faults.diagnosis.rmse import Scores, score_mathematical
-from faults.diagnosis.severity import severities, severities_at, what_is_not_told, with_bulk_modulus
+from faults.diagnosis.severity import limits_of, severities, severities_at, what_is_not_told, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
 from faults.eha.bank import mathematical_bank
 from faults.notes import ClassCode
@@ -55,6 +55,8 @@ class Diagnosis:
         How bad, by the names of `faults.diagnosis.severity.UNITS` [each in the unit given there].
     healthy : Mapping[str, float]
         The same of the healthy actuator [each in the same unit].
+    limits : Mapping[str, float]
+        Where it stops being sound, from `faults.diagnosis.severity.limits_of` [each in the same unit].
     not_told : tuple of Note
         What the log does not determine.
     scoreboard : Scoreboard
@@ -66,6 +68,7 @@ class Diagnosis:
     against: tuple[Note, ...]
     severity: Mapping[str, Quantity]
     healthy: Mapping[str, float]
+    limits: Mapping[str, float]
     not_told: tuple[Note, ...]
     scoreboard: Scoreboard
 
@@ -279,6 +282,7 @@ def diagnose_clean(
         against,
         found,
         severities_at(actuator.conditions[0], actuator),
+        limits_of(actuator),
         tuple(what_is_not_told(board.fits, found, pressure=pressure)),
         board,
     )

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from estimation.finding import Quantity
+from faults.conditions import CONDITIONS
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows
 from faults.diagnosis.class_fit import WEAK, Actuator
 from faults.diagnosis.class_regions import ClassFits
@@ -110,6 +111,33 @@ def severities(
         ends = value - stretch * (value - low), value + stretch * (high - value)
         found[name] = Quantity(value, UNITS[name], ends)
     return found | {"entrained_air": _with_air(found["entrained_air"], found["bulk_modulus"], actuator)}
+
+
+def limits_of(actuator: Actuator) -> Mapping[str, float]:
+    """Return where an actuator stops being sound, until its owner says otherwise.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    Mapping[str, float]
+        Half-way from healthy to minor leakage or minor friction; the softest oil of a sound actuator of this kind. In
+        the units of `UNITS`; air has none, since bulk modulus has one.
+    """
+    names = list(CONDITIONS)
+    sound, leaking, rubbing = (
+        severities_at(actuator.conditions[names.index(name)], actuator)
+        for name in ("normal", "minor_leakage", "minor_friction")
+    )
+    faulty = {
+        **{name: leaking[name] for name in ("leakage_flow", "velocity_lost")},
+        **{name: rubbing[name] for name in ("added_friction", "pressure_rise")},
+    }
+    halfway = {name: float(0.5 * (sound[name] + value)) for name, value in faulty.items()}
+    return halfway | {"bulk_modulus": float((1.0 - OF_KIND) * sound["bulk_modulus"])}
 
 
 def with_bulk_modulus(found: Mapping[str, Quantity], estimated: Quantity, actuator: Actuator) -> Mapping[str, Quantity]:

@@ -1,0 +1,125 @@
+"""A diagnosis for a mechanic: the verdict in one sentence, and what to do about it."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from experiments.page.words import sentence
+from faults.conditions import CONDITIONS
+
+SURE, LIKELY = 0.99, 0.8
+"""Probabilities from which a verdict is called certain, and probable [probability]."""
+
+LEAKS: Mapping[str, str] = {
+    "minor": "leaks inside more than it should (minor leakage)",
+    "major": "leaks badly inside (major leakage)",
+}
+RUBS: Mapping[str, str] = {
+    "minor": "has more friction than it should (minor friction)",
+    "major": "has far too much friction (major friction)",
+}
+
+WORK_ON_LEAKAGE: Mapping[str, str] = {
+    "minor": "Plan a check of pump and piston seal. The log shows how much leaks, not which of the two.",
+    "major": "Check pump and piston seal now. The log shows how much leaks, not which of the two.",
+}
+WORK_ON_FRICTION: Mapping[str, str] = {
+    "minor": "Plan a check of seals, guides and alignment of the rod.",
+    "major": "Check seals, guides and alignment of the rod now.",
+}
+"""What follows from each level."""
+
+
+def verdict(result: Mapping[str, Any]) -> str:
+    """Return what is wrong in one sentence.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of a diagnosis with probabilities.
+
+    Returns
+    -------
+    str
+        For a mechanic.
+
+    Examples
+    --------
+    >>> verdict({"condition": "normal", "unknown": False, "probabilities": {"normal": 1.0}, "severity": {}})
+    'The actuator is healthy: leakage and friction are normal.'
+    """
+    if result["unknown"]:
+        return "No verdict: the log does not fit any known condition of this actuator."
+    condition = CONDITIONS[result["condition"]]
+    faults = [LEAKS.get(condition.leakage), RUBS.get(condition.friction)]
+    wrong = " and ".join(one for one in faults if one)
+    if not wrong:
+        said = "is healthy: leakage and friction are normal"
+    else:
+        absent = [name for name, one in zip(("leakage", "friction"), faults, strict=True) if not one]
+        said = f"{wrong}{''.join(f'; {name} is normal' for name in absent)}"
+    return f"The actuator {said}."
+
+
+def sureness(result: Mapping[str, Any]) -> str:
+    """Return how sure the verdict is, what the fault costs, and since when it is there.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of a diagnosis with probabilities.
+
+    Returns
+    -------
+    str
+        Sentences.
+    """
+    if result["unknown"]:
+        return f"Nothing on this page may be relied on: {'; '.join(result['reasons'])}."
+    return " ".join(one for one in (_how_sure(result), _cost(result), _since(result)) if one)
+
+
+def _how_sure(result: Mapping[str, Any]) -> str:
+    share = result["probabilities"][result["condition"]]
+    if share >= SURE:
+        return f"This is certain (over {100.0 * SURE:.0f} %)."
+    word = "probable" if share >= LIKELY else "the most likely of several explanations"
+    return f"This is {word} ({100.0 * share:.0f} %)."
+
+
+def _cost(result: Mapping[str, Any]) -> str:
+    lost = result["severity"].get("velocity_lost", {"value": None})["value"]
+    if result["condition"] == "normal" or lost is None or not math.isfinite(lost) or lost < 1.0:
+        return ""
+    return f"It is {lost:.0f} % slower than a healthy one at rated speed."
+
+
+def _since(result: Mapping[str, Any]) -> str:
+    if result["since_s"] is not None:
+        low, high = result["since_ci95_s"]
+        before = result["condition_before"].replace("_", " ")
+        return (
+            f"It has been so since {result['since_s']:.2f} s into the log ({low:.2f} to {high:.2f} s): {before} before."
+        )
+    return "" if result["condition"] == "normal" else "It was so before the log began."
+
+
+def what_to_do(result: Mapping[str, Any]) -> list[str]:
+    """Return what to do, the most important first.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of a diagnosis with probabilities.
+
+    Returns
+    -------
+    list[str]
+        Work on the actuator first, then how to log next.
+    """
+    found: list[str] = []
+    if not result["unknown"]:
+        condition = CONDITIONS[result["condition"]]
+        work = WORK_ON_LEAKAGE.get(condition.leakage), WORK_ON_FRICTION.get(condition.friction)
+        found += [one for one in work if one] or ["Nothing needs repair."]
+    return [*found, *(sentence(one) for one in result["advice"])]

@@ -1,0 +1,51 @@
+"""The channels of a log as charts."""
+
+from typing import TYPE_CHECKING
+
+from experiments.page.charts import Charts, Curve, Panel
+from plant.log.columns import UNITS
+
+if TYPE_CHECKING:
+    from estimation.finding import Finding
+    from plant.log.record import Record
+
+MOST_CHANNELS = 8
+"""Up to so many channels are drawn [count]."""
+
+SHOWN_IN = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "Pa": ("bar", 1e-5)}
+"""Units that a shop reads, and the factor from SI."""
+
+
+def channel_charts(record: "Record", found: "Finding", stem: str) -> Charts:
+    """Return the channels of a log, those that were used first.
+
+    Parameters
+    ----------
+    stem : str
+        What a download is named after.
+
+    Returns
+    -------
+    Charts
+        A panel a channel, `MOST_CHANNELS` at most.
+    """
+    names = [name for name in dict.fromkeys([*found.channels, *record]) if name in record and name in UNITS]
+    panels: list[Panel] = []
+    for name in names[:MOST_CHANNELS]:
+        unit, scale = SHOWN_IN.get(UNITS[name], (UNITS[name], 1.0))
+        panels.append(Panel(_plain(name), unit, (Curve("measured", scale * record[name], "blue"),)))
+    return Charts(record.time, "time [s]", panels, f"{stem}-measured")
+
+
+def _plain(name: str) -> str:
+    """Return a channel's name without its unit.
+
+    Examples
+    --------
+    >>> _plain("differential_pressure_pa"), _plain("velocity_m_s")
+    ('differential pressure', 'velocity')
+    """
+    for ending in ("_rad_s", "_m_s", "_pa", "_m", "_v", "_a", "_n", "_k"):
+        if name.endswith(ending):
+            return name.removesuffix(ending).replace("_", " ")
+    return name.replace("_", " ")

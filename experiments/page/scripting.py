@@ -1,0 +1,55 @@
+"""Scripts of a page, put inside it, and a policy that lets nothing else run and nothing be loaded."""
+
+import re
+from base64 import b64encode
+from collections.abc import Iterable
+from hashlib import sha256
+from importlib.resources import files
+
+_PLACES = files("experiments.page").joinpath("scripts")
+
+NEEDED = (
+    ('class="charts"', "uplot/uPlot.iife.min.js"),
+    ('class="charts"', "charts.js"),
+    ('class="limit"', "limits.js"),
+)
+"""A mark that a page may hold, and the script that then goes with it, in their order."""
+
+CHART_STYLE = "uplot/uPlot.min.css"
+
+POLICY_HERE, SCRIPTS_HERE = "<!-- policy -->", "<!-- scripts -->"
+"""Where the policy and the scripts go."""
+
+
+def with_scripts(page: str) -> str:
+    """Return a page with the scripts that it needs and a policy by which only they run.
+
+    Parameters
+    ----------
+    page : str
+        HTML with `POLICY_HERE` and `SCRIPTS_HERE`.
+
+    Returns
+    -------
+    str
+        The same; scripts and styles are allowed by their hashes, images from inside the page, and nothing else.
+    """
+    scripts = [_text(file) for mark, file in NEEDED if mark in page]
+    style = f"<style>{_text(CHART_STYLE)}</style>\n" if NEEDED[0][0] in page else ""
+    page = page.replace(SCRIPTS_HERE, "\n".join(f"<script>{one}</script>" for one in scripts))
+    page = page.replace("</head>", f"{style}</head>", 1)
+    styles = re.findall(r"<style>(.*?)</style>", page, re.DOTALL)
+    policy = (
+        f"default-src 'none'; img-src data:; style-src {_allowed(styles)}; script-src {_allowed(scripts)}; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    return page.replace(POLICY_HERE, f'<meta http-equiv="Content-Security-Policy" content="{policy}">', 1)
+
+
+def _text(file: str) -> str:
+    return _PLACES.joinpath(file).read_text(encoding="utf-8")
+
+
+def _allowed(texts: Iterable[str]) -> str:
+    hashes = [f"'sha256-{b64encode(sha256(one.encode()).digest()).decode()}'" for one in texts]
+    return " ".join(hashes) or "'none'"

@@ -1,0 +1,54 @@
+"""What a mechanic reads first."""
+
+from typing import Any
+
+import pytest
+
+from experiments.eha.plain_verdict import sureness, verdict, what_to_do
+from faults.conditions import CONDITIONS
+
+AMOUNT = {"velocity_lost": {"value": 28.4, "unit": "%", "ci95": [27.0, 30.0]}}
+
+
+def said_of(condition: str, share: float = 1.0, **more: Any) -> dict[str, Any]:
+    return {
+        "condition": condition,
+        "unknown": False,
+        "probabilities": {condition: share},
+        "severity": AMOUNT,
+        "since_s": None,
+        "advice": ["log again"],
+        "reasons": [],
+        **more,
+    }
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_every_condition_has_a_verdict_and_work_that_name_what_is_wrong(condition: str) -> None:
+    result = said_of(condition)
+    for fault in ("leakage", "friction"):
+        level = getattr(CONDITIONS[condition], fault)
+        assert (f"{level} {fault}" in verdict(result)) == (level != "none")
+    assert ("Nothing needs repair." in what_to_do(result)) == (condition == "normal")
+    assert what_to_do(result)[-1] == "Log again."
+
+
+def test_what_is_not_certain_is_not_called_certain() -> None:
+    assert sureness(said_of("minor_leakage", 0.999)).startswith("This is certain (over 99 %).")
+    assert sureness(said_of("minor_leakage", 0.9)).startswith("This is probable (90 %).")
+    assert "several explanations (45 %)" in sureness(said_of("minor_leakage", 0.45))
+
+
+def test_a_fault_says_what_it_costs_and_since_when() -> None:
+    assert "28 % slower" in sureness(said_of("minor_leakage"))
+    assert "It was so before the log began." in sureness(said_of("minor_leakage"))
+    changed = said_of("minor_leakage", since_s=2.5, since_ci95_s=[2.4, 2.6], condition_before="normal")
+    assert "since 2.50 s into the log (2.40 to 2.60 s): normal before." in sureness(changed)
+    assert "slower" not in sureness(said_of("normal"))
+
+
+def test_an_unknown_log_gets_no_verdict_no_work_and_its_reasons() -> None:
+    result = said_of("minor_leakage", unknown=True, reasons=["motor speed reads 3 rad/s off"])
+    assert verdict(result).startswith("No verdict")
+    assert what_to_do(result) == ["Log again."]
+    assert "motor speed reads 3 rad/s off" in sureness(result)

@@ -1,0 +1,57 @@
+"""Charts hold their numbers, a still picture, and a table."""
+
+import json
+import re
+
+import numpy as np
+
+from experiments.page.charts import MOST_DRAWN, Charts, Curve, Mark, Panel
+
+
+def numbers_of(charts: Charts) -> dict[str, object]:
+    (text,) = re.findall(r'class="numbers">(.*?)</script>', charts.html("one", "A caption."), re.DOTALL)
+    return json.loads(text)
+
+
+def two_curves(count: int) -> Charts:
+    time = 0.5 + 1e-3 * np.arange(count)
+    curves = Curve("measured", np.sin(time)), Curve("fitted <b>", np.cos(time), "orange")
+    return Charts(time, "time [s]", [Panel("velocity", "mm/s", curves, [Mark("x", 0.6, "change")])], "run")
+
+
+def test_a_figure_has_a_still_picture_its_numbers_and_a_table() -> None:
+    html = two_curves(50).html("one", "A caption.")
+    assert '<img alt="A caption." src="data:image/svg+xml;base64,' in html
+    assert '<th scope="row">velocity, measured</th>' in html
+    assert "<b>" not in html
+
+
+def test_a_uniform_axis_is_a_start_and_a_step() -> None:
+    x = numbers_of(two_curves(50))["x"]
+    assert isinstance(x, dict)
+    assert (x["start"], x["count"]) == (0.5, 50)
+    assert abs(x["step"] - 1e-3) < 1e-12
+
+
+def test_a_longer_log_is_carried_by_its_ends_on_a_coarser_axis() -> None:
+    x = numbers_of(two_curves(3 * MOST_DRAWN))["x"]
+    assert isinstance(x, dict)
+    assert x["count"] <= MOST_DRAWN
+    assert abs(x["start"] + x["step"] * x["count"] - (0.5 + 3e-3 * MOST_DRAWN)) < 0.01
+
+
+def test_an_uneven_axis_is_carried_as_values() -> None:
+    charts = Charts(np.array([0.0, 1.0, 5.0]), "log", [Panel("leakage", "L/min", [Curve("value", np.ones(3))])], "run")
+    x = numbers_of(charts)["x"]
+    assert isinstance(x, dict)
+    assert "data" in x
+
+
+def test_a_log_of_twenty_seconds_at_ten_kilohertz_stays_under_three_megabytes() -> None:
+    rng = np.random.default_rng(1)
+    time = 1e-4 * np.arange(200_000)
+    panels = [
+        Panel(name, "1", [Curve("measured", np.sin(time) + 0.02 * rng.standard_normal(len(time)))])
+        for name in ("speed", "position", "velocity", "pressure")
+    ]
+    assert len(Charts(time, "time [s]", panels, "run").html("one", "The log.")) < 2.4e6

@@ -1,0 +1,200 @@
+"""Pages in a real browser: they draw, zoom, fit the screen and the paper, load nothing and can be read by all."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.eha.bulk_modulus import EstimateOptions
+from estimation.eha.estimate import estimate_log
+from experiments.eha.diagnosis_page import diagnosis_page
+from experiments.eha.entries import diagnosis_entries, estimate_entries
+from experiments.log_pages.finding_page import finding_page
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.diagnose import diagnose_log
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.sensors.sensors import BENCH
+
+pytestmark = pytest.mark.slow
+
+WIDTHS = (390, 768, 1280)
+DARKEST_LIGHT, LIGHTEST_DARK = 200, 60
+"""Mean brightness of a light figure at the least, and of a dark one at the most [0 to 255]."""
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    rng = np.random.default_rng(3)
+    drive = make_drive("steps", 4.0, 1e-3, EhaParameters(), rng)
+    log = simulate(CIRCUIT, drive, 1e-3, parameters_for(CONDITIONS["minor_leakage"]), sensors=BENCH, rng=rng)
+    found, rig = diagnose_log(log, Rig()), {"file": "/private/place/run.csv", "rig": "paper"}
+    estimate = estimate_log(log, Rig(), EstimateOptions())
+    folder = tmp_path_factory.mktemp("pages")
+    texts = {
+        "diagnosis": diagnosis_page({**rig, **diagnosis_entries(found)}, found, log),
+        "unknown": diagnosis_page(
+            {**rig, **diagnosis_entries(found), "unknown": True, "reasons": ["motor speed reads off"]},
+            replace(found, unknown=True),
+            log,
+        ),
+        "estimate": finding_page({**rig, **estimate_entries(estimate)}, estimate, log),
+    }
+    for name, text in texts.items():
+        (folder / f"{name}.html").write_text(text, encoding="utf-8")
+    return {name: folder / f"{name}.html" for name in texts}
+
+
+PAGES = ("diagnosis", "unknown", "estimate")
+
+
+@pytest.fixture
+def opened(browser: Any, pages: dict[str, Path]) -> Iterator[Any]:
+    contexts: list[Any] = []
+
+    def visit(name: str, width: int = 1280, scheme: str = "light", script: bool = True) -> Any:
+        context = browser.new_context(
+            viewport={"width": width, "height": 900}, color_scheme=scheme, java_script_enabled=script
+        )
+        contexts.append(context)
+        page = context.new_page()
+        page.complaints, page.asked = [], []
+        page.on("console", lambda one: page.complaints.append(one.text))
+        page.on("pageerror", lambda one: page.complaints.append(str(one)))
+        page.on("request", lambda one: page.asked.append(one.url))
+        page.goto(pages[name].as_uri())
+        if script:
+            page.wait_for_selector("html.charts-drawn", state="attached")
+        return page
+
+    yield visit
+    for context in contexts:
+        context.close()
+
+
+def brightness(page: Any, selector: str) -> float:
+    """Return the mean brightness of the corners of an element, where nothing is drawn."""
+    from io import BytesIO
+
+    from matplotlib.image import imread
+
+    picture = imread(BytesIO(page.locator(selector).first.screenshot()), format="png")[..., :3]
+    return float(255.0 * np.median(picture.reshape(-1, 3).mean(axis=1)))
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_draws_its_charts_without_a_complaint_or_a_request(opened: Any, name: str) -> None:
+    page = opened(name)
+    assert page.locator(".live canvas").count() >= 3
+    assert page.complaints == []
+    assert [url for url in page.asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert len([url for url in page.asked if url.startswith("file:")]) == 1
+
+
+@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_serious(opened: Any, name: str, scheme: str) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
+    found = axe.Axe().run(opened(name, 390, scheme)).response["violations"]
+    assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
+
+
+@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("width", WIDTHS)
+def test_a_page_is_as_wide_as_its_screen(opened: Any, name: str, width: int) -> None:
+    page = opened(name, width)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.locator(".live canvas").first.bounding_box()["width"] <= width
+
+
+def test_zoom_by_button_key_and_drag_moves_every_chart_of_the_log(opened: Any) -> None:
+    page = opened("diagnosis")
+
+    def labels() -> list[bytes]:
+        return [page.locator(".live .panel").nth(i).screenshot() for i in (0, 3)]
+
+    whole = labels()
+    page.get_by_role("button", name="Zoom in").first.click()
+    by_button = labels()
+    assert all(one != other for one, other in zip(by_button, whole, strict=True))
+    page.get_by_role("button", name="Show all").last.click()
+    page.locator(".live .panel").first.focus()
+    page.keyboard.press("+")
+    by_key = labels()
+    assert by_key[1] != whole[1]
+    page.keyboard.press("0")
+    box = page.locator(".live .u-over").first.bounding_box()
+    page.mouse.move(box["x"] + 200, box["y"] + 50)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 500, box["y"] + 50)
+    page.mouse.up()
+    assert labels()[1] != whole[1]
+
+
+def test_the_cursor_is_moved_by_keys_and_its_values_are_told(opened: Any) -> None:
+    page = opened("diagnosis")
+    page.locator(".live .panel").first.focus()
+    page.keyboard.press("ArrowRight")
+    assert re.match(r"time \[s\]: \d", page.locator(".place").first.inner_text())
+    assert page.locator(".live .value").first.inner_text().strip()[-1:].isdigit()
+
+
+def test_a_curve_is_hidden_by_its_button(opened: Any) -> None:
+    page = opened("diagnosis")
+    before = page.locator(".live .panel").first.screenshot()
+    button = page.get_by_role("button", name="fitted").first
+    button.click()
+    assert button.get_attribute("aria-pressed") == "false"
+    page.mouse.move(0, 0)
+    assert page.locator(".live .panel").first.screenshot() != before
+
+
+def test_a_limit_that_the_reader_sets_changes_the_state_and_is_remembered(opened: Any) -> None:
+    page = opened("diagnosis")
+    limit, state = page.locator("input.limit[name=leakage_flow]"), page.locator(".state").first
+    assert state.inner_text() == "past the limit"
+    limit.fill("50")
+    assert state.inner_text() == "within the limit"
+    page.reload()
+    page.wait_for_selector("html.charts-drawn", state="attached")
+    assert page.locator(".state").first.inner_text() == "within the limit"
+    page.get_by_role("button", name="Limits as delivered").click()
+    assert page.locator(".state").first.inner_text() == "past the limit"
+
+
+def test_the_numbers_beneath_a_figure_are_downloaded_as_csv(opened: Any, tmp_path: Path) -> None:
+    page = opened("diagnosis")
+    with page.expect_download() as started:
+        page.get_by_role("button", name="Download the numbers").first.click()
+    started.value.save_as(tmp_path / "numbers.csv")
+    lines = (tmp_path / "numbers.csv").read_text("utf-8").splitlines()
+    assert started.value.suggested_filename == "run-fit.csv"
+    assert lines[0].split(",")[:2] == ['"time [s]"', '"velocity measured [mm/s]"']
+    assert len(lines) > 300
+
+
+@pytest.mark.parametrize(("scheme", "low", "high"), [("light", DARKEST_LIGHT, 256), ("dark", -1, LIGHTEST_DARK)])
+@pytest.mark.parametrize("script", [True, False])
+def test_figures_have_the_ground_of_their_page(opened: Any, scheme: str, low: int, high: int, script: bool) -> None:
+    page = opened("diagnosis", 900, scheme, script)
+    assert low < brightness(page, ".live .panel" if script else ".still img") < high
+
+
+def test_without_scripts_the_verdict_and_a_still_picture_are_there(opened: Any) -> None:
+    page = opened("diagnosis", script=False)
+    assert "leaks inside" in page.locator("h1").inner_text()
+    assert page.locator(".still img").first.is_visible()
+
+
+def test_a_page_prints_on_two_sheets_and_names_no_folder(opened: Any) -> None:
+    page = opened("diagnosis", scheme="dark")
+    edges = dict.fromkeys(("top", "bottom", "left", "right"), "12mm")
+    sheets = len(re.findall(rb"/Type\s*/Page\b", page.pdf(format="A4", margin=edges)))
+    assert sheets <= 2
+    assert "/private/place" not in page.content()
