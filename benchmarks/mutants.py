@@ -3,7 +3,7 @@
 `python -m benchmarks mutants --folder plant/eha --sample 40 --seed 0` draws faults at random from a folder's formulas
 (see `benchmarks.mutation`), runs the fast tests of the mirrored folder for each, stops at the first that fails, and
 lists the faults that none noticed. With ``--then-all`` those go to the rest of the fast suite. A fault that makes
-the tests hang counts as noticed.
+the tests hang counts as noticed. Kernels go to ``HYDROSTATE_CACHE`` if that is set, so that a second run finds them.
 """
 
 import argparse
@@ -37,7 +37,8 @@ def main(arguments: Sequence[str]) -> int:
     with tempfile.TemporaryDirectory(prefix="mutants-") as kept:
         copy = Path(kept) / "tree"
         shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(*LEFT_BEHIND), symlinks=True)
-        survivors = _tried(copy, Path(kept) / "kernels", chosen, then_all=given.then_all)
+        kernels = Path(os.environ.get("HYDROSTATE_CACHE", Path(kept) / "kernels"))
+        survivors = _tried(copy, kernels, chosen, then_all=given.then_all)
     score = 1.0 - len(survivors) / max(len(chosen), 1)
     print(f"\n{len(chosen) - len(survivors)} of {len(chosen)} planted faults noticed: {score:.1%}")
     for one in survivors:

@@ -1,38 +1,75 @@
+"""README and the page of verbs run as printed, print what they quote, and quote no number that is not measured."""
+
 import re
 import shlex
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
-README = Path(__file__).parent.parent / "README.md"
+ROOT = Path(__file__).parent.parent
+README, VERBS, MEASURED = ROOT / "README.md", ROOT / "docs" / "verbs.md", ROOT / "docs" / "benchmarks.md"
 COMMAND = Path(sys.executable).parent / "hydrostate"
+BLOCK = re.compile(r"```(sh|text)\n(.*?)```", re.DOTALL)
+
+Run = subprocess.CompletedProcess[str]
 
 
-def readme_commands() -> list[list[str]]:
-    blocks = re.findall(r"```sh\n(.*?)```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
+def commands(page: Path) -> list[list[str]]:
+    blocks = [text for kind, text in BLOCK.findall(page.read_text(encoding="utf-8")) if kind == "sh"]
     lines = [line.split("#")[0].strip() for block in blocks for line in block.splitlines()]
     return [shlex.split(line)[1:] for line in lines if line.startswith("hydrostate ")]
 
 
-def test_the_readme_shows_every_verb_that_works_on_logs() -> None:
-    assert {"simulate", "estimate", "identify", "diagnose"} <= {words[0] for words in readme_commands()}
+def quoted(page: Path) -> list[tuple[str, str]]:
+    """Return each command whose output is printed below it, and that output."""
+    blocks = BLOCK.findall(page.read_text(encoding="utf-8"))
+    pairs = pairwise(blocks)
+    return [(command.strip(), text) for (one, command), (two, text) in pairs if (one, two) == ("sh", "text")]
+
+
+def words(text: str) -> str:
+    """Return a text without its line breaks: the README wraps long lines."""
+    return " ".join(text.split())
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> list[subprocess.CompletedProcess[str]]:
-    """Run the README's commands in order, in one folder."""
-    folder = tmp_path_factory.mktemp("readme")
-    return [
-        subprocess.run([COMMAND, *words], cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603 - the README's own commands
-        for words in readme_commands()
+def done(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, list[Run]]:
+    """Run each page's commands in order, in a folder of its own."""
+    return {
+        page: [
+            subprocess.run([COMMAND, *line], cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603 - the page's own commands
+            for line in commands(page)
+        ]
+        for page in (README, VERBS)
+        for folder in [tmp_path_factory.mktemp(page.stem)]
+    }
+
+
+def test_the_pages_show_every_verb_that_works_on_logs() -> None:
+    assert {"simulate", "estimate", "identify", "diagnose"} <= {line[0] for line in commands(README)}
+    assert {"inspect", "watch", "isolability", "conditions"} <= {line[0] for line in commands(VERBS)}
+
+
+@pytest.mark.parametrize("page", [README, VERBS], ids=["readme", "verbs"])
+def test_every_command_runs_as_printed_and_in_order(page: Path, done: dict[Path, list[Run]]) -> None:
+    for line, one in zip(commands(page), done[page], strict=True):
+        assert one.returncode == 0, f"hydrostate {' '.join(line)}: {one.stderr}"
+
+
+def test_the_readme_quotes_what_its_five_commands_print(done: dict[Path, list[Run]]) -> None:
+    shown = quoted(README)
+    assert [command.split()[1] for command, _ in shown] == [
+        "simulate",
+        "estimate",
+        "diagnose",
+        "identify",
+        "identifiability",
     ]
-
-
-def test_every_command_of_the_readme_runs_as_printed_and_in_order(done: list[subprocess.CompletedProcess[str]]) -> None:
-    for words, one in zip(readme_commands(), done, strict=True):
-        assert one.returncode == 0, f"hydrostate {' '.join(words)}: {one.stderr}"
+    for (command, text), one in zip(shown, done[README], strict=True):
+        assert words(text) in words(one.stdout + one.stderr), command
 
 
 def test_the_readmes_script_runs_as_printed(tmp_path: Path) -> None:
@@ -47,15 +84,35 @@ def test_the_readmes_script_runs_as_printed(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "minor_leakage" in done.stdout
     assert "TransferFunction" in done.stdout or "z^2" in done.stdout
+    assert sum(bool(line) and not line.startswith("#") for line in script.splitlines()) <= 10
 
 
-def test_the_readme_quotes_what_estimate_prints(done: list[subprocess.CompletedProcess[str]]) -> None:
-    quoted = re.search(r"```text\n(.*?)\n```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
-    assert quoted is not None
-    assert readme_commands()[1][0] == "estimate"
-    assert quoted.group(1) in done[1].stdout + done[1].stderr
+def rows(page: Path, columns: int) -> list[list[str]]:
+    """Return the cells of a page's tables with so many columns, without headings."""
+    lines = [line for line in page.read_text(encoding="utf-8").splitlines() if line.startswith("| ")]
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    return [row for row in cells if len(row) == columns and row[0] != "what"]
 
 
-@pytest.mark.parametrize("link", sorted(set(re.findall(r"\]\(([\w/.-]+)\)", README.read_text(encoding="utf-8")))))
+def test_every_measured_row_of_the_readme_is_a_row_of_the_page_of_measurements() -> None:
+    measured = [row[:3] for row in rows(MEASURED, 7)]
+    shown = rows(README, 3)
+    assert 0 < len(shown) <= 10
+    for row in shown:
+        assert row in measured, row[0]
+
+
+@pytest.mark.parametrize("row", rows(MEASURED, 7), ids=lambda row: f"{row[3]} {row[0]}"[:60])
+def test_every_measurement_names_a_command_that_is_there_a_machine_and_a_date(row: list[str]) -> None:
+    name, *options = row[3].strip("`").split()
+    script = (ROOT / "benchmarks" / f"{name}.py").read_text(encoding="utf-8")
+    assert f'"{name}"' in (ROOT / "benchmarks" / "__main__.py").read_text(encoding="utf-8")
+    assert all(option in script for option in options if option.startswith("--"))
+    assert [row[4]] in [machine[:1] for machine in rows(MEASURED, 2)]
+    assert re.fullmatch(r"20\d\d-\d\d-\d\d", row[6])
+    assert re.search(r"\d", row[2])
+
+
+@pytest.mark.parametrize("link", sorted(set(re.findall(r"\]\(([\w/.-]+)", README.read_text(encoding="utf-8")))))
 def test_every_link_of_the_readme_leads_somewhere(link: str) -> None:
     assert (README.parent / link).exists()

@@ -54,3 +54,11 @@ def test_a_clamped_ceramic_holds_less_charge_but_not_none() -> None:
     clamped = np.diag([PZT.eps_11, PZT.eps_11, PZT.eps_33]) - d @ np.linalg.solve(s, d.T)
     assert 0.0 < clamped[2, 2] < PZT.eps_33
     assert np.linalg.eigvalsh(clamped).min() > 0.0
+
+
+def test_charging_a_free_ceramic_costs_energy_whatever_the_field() -> None:
+    for field in 1e5 * np.random.default_rng(4).standard_normal((5, 3)):
+        charge = electric_displacement(np.zeros(6), field, PZT)
+        assert charge @ field > 0.0
+        assert charge[2] / field[2] == pytest.approx(PZT.eps_33)
+        assert charge[:2] / field[:2] == pytest.approx([PZT.eps_11, PZT.eps_11])
