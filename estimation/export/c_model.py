@@ -58,7 +58,7 @@ def model_in_c(model: FreeRunModel, *, name: str, precision: str = "double") -> 
         "inputs": model.inputs,
         "output": model.output,
         "order": order,
-        "operations": 3 * (order + 1) * len(numerators) + 3 * order + 2,
+        "operations": (2 * order + 3) * len(numerators) + 3 * order + 2,
         "numerators": [spelt(b) for b in numerators],
         "denominator": spelt(denominator),
         "gains": spelt(gains),

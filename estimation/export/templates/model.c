@@ -12,34 +12,46 @@ static const {{ real }} gain[{{ NAME }}_INPUTS] = { {{ gains | join(", ") }} };
 static const {{ real }} mean[{{ NAME }}_INPUTS] = { {{ means | join(", ") }} }; /* inputs about which it was identified */
 static const {{ real }} level = {{ level }}; /* output that belongs to them */
 
-static {{ real }} {{ name }}_driven(const {{ real }} *inputs, int power)
+/* Inputs about their means. */
+static void {{ name }}_centre(const {{ real }} *inputs, {{ real }} *centred)
+{
+    for (int i = 0; i < {{ NAME }}_INPUTS; ++i) {
+        centred[i] = inputs[i] - mean[i];
+    }
+}
+
+static {{ real }} {{ name }}_driven(const {{ real }} *centred, int power)
 {
     {{ real }} sum = {{ lit(0.0) }};
     for (int i = 0; i < {{ NAME }}_INPUTS; ++i) {
-        sum += numerator[i][power] * (inputs[i] - mean[i]);
+        sum += numerator[i][power] * centred[i];
     }
     return sum;
 }
 
 void {{ name }}_start({{ name }}_model *model, const {{ real }} *inputs)
 {
+    {{ real }} centred[{{ NAME }}_INPUTS];
     {{ real }} output = {{ lit(0.0) }};
     {{ real }} behind = {{ lit(0.0) }};
+    {{ name }}_centre(inputs, centred);
     for (int i = 0; i < {{ NAME }}_INPUTS; ++i) {
-        output += gain[i] * (inputs[i] - mean[i]);
+        output += gain[i] * centred[i];
     }
     for (int i = {{ NAME }}_ORDER; i > 0; --i) {
-        behind += {{ name }}_driven(inputs, i) - denominator[i] * output;
+        behind += {{ name }}_driven(centred, i) - denominator[i] * output;
         model->state[i - 1] = behind;
     }
 }
 
 {{ real }} {{ name }}_step({{ name }}_model *model, const {{ real }} *inputs)
 {
-    const {{ real }} output = model->state[0] + {{ name }}_driven(inputs, 0);
+    {{ real }} centred[{{ NAME }}_INPUTS];
+    {{ name }}_centre(inputs, centred);
+    const {{ real }} output = model->state[0] + {{ name }}_driven(centred, 0);
     for (int i = 1; i <= {{ NAME }}_ORDER; ++i) {
         const {{ real }} behind = (i < {{ NAME }}_ORDER) ? model->state[i] : {{ lit(0.0) }};
-        model->state[i - 1] = behind + {{ name }}_driven(inputs, i) - denominator[i] * output;
+        model->state[i - 1] = behind + {{ name }}_driven(centred, i) - denominator[i] * output;
     }
     return output + level;
 }
