@@ -15,9 +15,8 @@ from estimation.eha.chamber_bank import Member, run_bank
 from estimation.filters.run import Estimate, filter_problem, in_si
 from estimation.log_checks.first_belief import first_load
 from estimation.log_checks.measurement_noise import measurement_variances
-from estimation.models.chambers import CHAMBERS, CHAMBERS_BY_MASS, CHAMBERS_HELD, FLOOR_NOISE, STATES
+from estimation.models.chambers import CHAMBERS, CHAMBERS_BY_MASS, CHAMBERS_HELD, FLOOR_NOISE, MAKEUP, chamber_belief
 from estimation.models.eha_forms import BULK_MODULUS
-from estimation.models.gaussian import Gaussian
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 
@@ -36,37 +35,9 @@ LEAKAGES = (1.0, 2.0, 4.0, 6.5, 9.5, 14.0, 20.0, 28.0)
 BIASES = (1.0, 2.0, 4.0, 6.5)
 """First guesses of flow bias, as multiples of a healthy actuator's; Table 3 goes to 6.1."""
 
-FORMS = ((CHAMBERS, 1e-9), (CHAMBERS_BY_MASS, 1e-9), (CHAMBERS_HELD, 1e-13))
+FORMS = ((CHAMBERS, MAKEUP), (CHAMBERS_BY_MASS, MAKEUP), (CHAMBERS_HELD, 1e-13))
 """What is believed of the chambers, each with a make-up conductance [m^3/(s Pa)]: a circuit with make-up valves,
 balanced by volume and by mass, and a lumped actuator without."""
-
-STDS: Mapping[str, float] = {
-    BULK_MODULUS: 0.3,
-    "leakage_coefficient": 0.3,
-    "flow_bias": 0.3,
-    "makeup_conductance": 0.5,
-    "makeup_opening": 1.0,
-    "case_leakage": 1.0,
-    "speed_lead": 2.0,
-    "relief_pressure": 0.02,
-    "relief_conductance": 0.7,
-}
-"""Relative standard deviation of each guess [fraction]; of bulk modulus, leakage and bias about half the distance to
-the next."""
-
-PRESSURE_STD = 1e4
-"""Standard deviation of the chamber pressures before the first sample, at rest [Pa]."""
-
-LOAD_STD = 0.3
-"""Standard deviation of the chamber pressures before the first sample of a log that begins under load, where the lower
-one need not be that of the inner circuit [fraction of the load]."""
-
-OPENING, DRAIN, LEAD = 1e3, 2.4e-13, 1e-5
-"""First guesses of the drop at which a make-up valve is half open [Pa], of the drain a port [m^3/(s Pa)], and of the
-motor's lead on the straight line between samples [s]."""
-
-LEAST = 1e-3
-"""A guess that is zero begins at this share of the default actuator's value [fraction]."""
 
 
 class FlowReading(NamedTuple):
@@ -158,40 +129,3 @@ def drive_noise(record: Record, p: EhaParameters, variances: Mapping[str, float]
     known = variances if variances is not None and speed in variances else measurement_variances(record, (speed,))
     rate = p.bulk_modulus / (2.0 * p.chamber_volume) * p.pump_displacement
     return FLOOR_NOISE + rate**2 * known[speed] * record.sample_time
-
-
-def chamber_belief(
-    p: EhaParameters, load: float, modulus: float, leakage: float, bias: float, makeup: float
-) -> Gaussian:
-    """Return what a chamber filter believes before the first sample.
-
-    Parameters
-    ----------
-    p : EhaParameters
-        The actuator.
-    load : float
-        Differential pressure that the log begins with [Pa].
-    modulus : float
-        First guess of bulk modulus [Pa].
-    leakage, bias : float
-        First guesses, as multiples of the actuator's [dimensionless].
-    makeup : float
-        First guess of the make-up conductance [m^3/(s Pa)].
-    """
-    healthy = EhaParameters()
-    means = {
-        "pressure_a_pa": p.accumulator_pressure + max(load, 0.0),
-        "pressure_b_pa": p.accumulator_pressure + max(-load, 0.0),
-        BULK_MODULUS: modulus,
-        "leakage_coefficient": leakage * max(p.leakage_coefficient, LEAST * healthy.leakage_coefficient),
-        "flow_bias": bias * max(p.flow_bias, LEAST * healthy.flow_bias),
-        "makeup_conductance": makeup,
-        "makeup_opening": OPENING,
-        "case_leakage": DRAIN,
-        "speed_lead": LEAD,
-        "relief_pressure": p.relief_pressure,
-        "relief_conductance": p.relief_conductance,
-    }
-    pressure = float(np.hypot(PRESSURE_STD, LOAD_STD * load))
-    stds = [STDS[state.name] * means[state.name] if state.name in STDS else pressure for state in STATES]
-    return Gaussian(np.array([means[state.name] for state in STATES]), np.diag(np.square(stds)))

@@ -5,56 +5,36 @@ make-up valves' opening are taken as known, and the filter is as good as its fir
 """
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import fields
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
-
+from estimation.models.chambers import OPENING, logarithm_of, observe_chambers
 from estimation.models.eha_forms import BULK_MODULUS, volume_left_open
 from estimation.models.flow import flow_rates
-from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel, StateVariable
 from plant.compiled.expression import ONE, as_expression, jacobian
 from plant.compiled.functions import Scalar
 from plant.eha.model import EhaParameters
 from plant.solvers.steps import solve_linear
 
-MAKEUP = 1e-9
-"""First guess of the make-up conductance [m^3/(s Pa)]."""
-
-GUESS_STD = 0.3
-"""Standard deviation of each guess's logarithm [dimensionless]."""
-
-PRESSURE_STD = 1e4
-"""Standard deviation of the chamber pressures before the first sample, at rest [Pa]."""
-
-LOAD_STD = 0.3
-"""Standard deviation of the chamber pressures before the first sample of a log that begins under load [fraction of the
-load]."""
-
-SECONDARY_STD: Mapping[str, float] = {"makeup_conductance": 0.1, "speed_lead": 1.0}
-"""Relative deviations of what is estimated along with them [fraction]."""
-
-OPENING = 1e3
-"""Drop at which a make-up check valve is taken to be half open [Pa]."""
-
-LEAST = 1e-3
-"""A guess that is zero begins at this share of the default actuator's value [fraction]."""
-
-
-def _state(name: str, unit: str, scale: float) -> StateVariable:
-    return StateVariable(name, unit, scale, 0.0, 1e-6 * scale, 1e6 * scale, logarithmic=True)
-
+STDS: Mapping[str, float] = {
+    BULK_MODULUS: 0.3,
+    "leakage_coefficient": 0.3,
+    "flow_bias": 0.3,
+    "makeup_conductance": 0.1,
+    "speed_lead": 1.0,
+}
+"""Relative standard deviation of each first guess [fraction]."""
 
 STATES = (
     StateVariable("pressure_a_pa", "Pa", 1e5, 1e6),
     StateVariable("pressure_b_pa", "Pa", 1e5, 1e6),
-    replace(_state(BULK_MODULUS, "Pa", 1e8), upper=2e10),
-    _state("leakage_coefficient", "m^3/(s Pa)", 5e-12),
-    _state("flow_bias", "m^3/s", 2.4e-6),
-    _state("makeup_conductance", "m^3/(s Pa)", 1e-9),
-    _state("speed_lead", "s", 1e-5),
+    logarithm_of(BULK_MODULUS, "Pa", 1e8, upper=200.0),
+    logarithm_of("leakage_coefficient", "m^3/(s Pa)", 5e-12),
+    logarithm_of("flow_bias", "m^3/s", 2.4e-6),
+    logarithm_of("makeup_conductance", "m^3/(s Pa)", 1e-9),
+    logarithm_of("speed_lead", "s", 1e-5),
 )
 """Chamber pressures with the process noise that measured speed brings, and constants."""
 
@@ -90,59 +70,14 @@ def flow_filter_step(state: tuple[Scalar, ...], drives: Any, p: Any, h: Scalar) 
     return (*(x + dx for x, dx in zip(pressures, moved, strict=True)), *state[2:])
 
 
-def _observe(state: tuple[Scalar, ...], p: Any) -> Mapping[str, Scalar]:
-    del p
-    return {"differential_pressure_pa": state[0] - state[1]}
-
-
 FLOW_FILTER = ProcessModel(
     "flow_filter",
     STATES,
     flow_filter_step,
-    _observe,
+    observe_chambers,
     longest_step=2.5e-4,
     drives=("motor_speed_rad_s", "position_m"),
     parameters=EhaParameters,
     opening=volume_left_open,
 )
 """The flow form as a process model: driven by what is measured, so friction plays no part."""
-
-
-def flow_belief(
-    p: EhaParameters,
-    load: float = 0.0,
-    modulus: float = 1.0,
-    leakage: float = 1.0,
-    bias: float = 1.0,
-    makeup: float = MAKEUP,
-) -> Gaussian:
-    """Return the belief of the flow form before the first sample.
-
-    Parameters
-    ----------
-    p : EhaParameters
-        The actuator.
-    load : float
-        Differential pressure that the log begins with [Pa].
-    modulus, leakage, bias : float
-        First guesses, as multiples of the actuator's [dimensionless].
-    makeup : float
-        First guess of the make-up conductance [m^3/(s Pa)].
-    """
-    healthy = EhaParameters()
-    means = {
-        "pressure_a_pa": p.accumulator_pressure + max(load, 0.0),
-        "pressure_b_pa": p.accumulator_pressure + max(-load, 0.0),
-        BULK_MODULUS: modulus * p.bulk_modulus,
-        "leakage_coefficient": leakage * max(p.leakage_coefficient, LEAST * healthy.leakage_coefficient),
-        "flow_bias": bias * max(p.flow_bias, LEAST * healthy.flow_bias),
-        "makeup_conductance": makeup,
-        "speed_lead": 1e-5,
-    }
-    stds = [
-        float(np.hypot(PRESSURE_STD, LOAD_STD * load))
-        if state.unit == "Pa" and not state.logarithmic
-        else SECONDARY_STD.get(state.name, GUESS_STD) * value
-        for state, value in zip(STATES, means.values(), strict=True)
-    ]
-    return Gaussian(np.array(list(means.values())), np.diag(np.square(stds)))

@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from estimation.eha.by_flow_filter import FORMS as CHAMBERS
-from estimation.eha.by_flow_filter import chamber_belief, drive_noise
+from estimation.eha.by_flow_filter import drive_noise
 from estimation.engine.contract import FilterProblem
-from estimation.export.flow import FLOW_FILTER, flow_belief
+from estimation.export.flow import FLOW_FILTER, STATES, STDS
 from estimation.filters.run import available_channels, filter_problem
 from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, START_STD, first_belief, first_load
 from estimation.models.augment import augmented, augmented_prior
+from estimation.models.chambers import chamber_belief
 from estimation.models.eha_forms import FORMS
 from estimation.models.model import ProcessModel
 from estimation.tuning.tuning import tune
@@ -90,7 +91,8 @@ def _by_flow(record: Record, parameters: EhaParameters, form: str, guess: float)
         raise LogError(f"the {form} form needs {PRESSURE}, the record has {', '.join(record)}")
     load, model = first_load(record), EXPORTED_FORMS[form]
     if form not in CHAMBER_FORMS:
-        return replace(filter_problem(model, flow_belief(parameters, load), record, parameters), model=model)
-    prior = chamber_belief(parameters, load, guess, 1.0, 1.0, CHAMBER_FORMS[form][1])
+        prior = chamber_belief(parameters, load, guess, states=STATES, stds=STDS)
+        return replace(filter_problem(model, prior, record, parameters), model=model)
+    prior = chamber_belief(parameters, load, guess, makeup=CHAMBER_FORMS[form][1])
     noise: Mapping[str, float] = dict.fromkeys(("pressure_a_pa", "pressure_b_pa"), drive_noise(record, parameters))
     return replace(filter_problem(model, prior, record, parameters, noise=noise), model=model)

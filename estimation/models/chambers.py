@@ -5,14 +5,17 @@ pressure form lacks stands here: chambers whose volume the piston changes, a low
 drain, and flows that are balanced by mass where pressure is not small beside bulk modulus.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+
 from estimation.models.eha_forms import BULK_MODULUS, volume_left_open
 from estimation.models.flow import Delivery, chamber_rates, delivered_flow
+from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel, StateVariable
 from plant.compiled.expression import ONE, as_expression, jacobian
 from plant.compiled.functions import Scalar
@@ -24,25 +27,64 @@ FLOOR_NOISE = 2e4
 of measured speed comes on top (`estimation.eha.by_flow_filter.drive_noise`)."""
 
 
-def _logarithm(name: str, unit: str, scale: float, lower: float = 1e-6, upper: float = 1e6) -> StateVariable:
+def logarithm_of(name: str, unit: str, scale: float, lower: float = 1e-6, upper: float = 1e6) -> StateVariable:
+    """Return a constant that the filter carries as its logarithm.
+
+    Parameters
+    ----------
+    name, unit : str
+        Its name and unit.
+    scale : float
+        Its typical size [unit].
+    lower, upper : float
+        Its bounds, as multiples of the typical size [dimensionless].
+    """
     return StateVariable(name, unit, scale, 0.0, lower * scale, upper * scale, logarithmic=True)
 
 
 STATES = (
     StateVariable("pressure_a_pa", "Pa", 1e5, FLOOR_NOISE),
     StateVariable("pressure_b_pa", "Pa", 1e5, FLOOR_NOISE),
-    _logarithm(BULK_MODULUS, "Pa", 1e8, upper=200.0),
-    _logarithm("leakage_coefficient", "m^3/(s Pa)", 5e-12),
-    _logarithm("flow_bias", "m^3/s", 2.4e-6),
-    _logarithm("makeup_conductance", "m^3/(s Pa)", 1e-9),
-    _logarithm("makeup_opening", "Pa", 1e3, 0.1, 100.0),
+    logarithm_of(BULK_MODULUS, "Pa", 1e8, upper=200.0),
+    logarithm_of("leakage_coefficient", "m^3/(s Pa)", 5e-12),
+    logarithm_of("flow_bias", "m^3/s", 2.4e-6),
+    logarithm_of("makeup_conductance", "m^3/(s Pa)", 1e-9),
+    logarithm_of("makeup_opening", "Pa", 1e3, 0.1, 100.0),
     StateVariable("case_leakage", "m^3/(s Pa)", 2.4e-13, 0.0, 0.0, 1e-10),
     StateVariable("speed_lead", "s", 1e-5, 0.0, 0.0, 1e-3),
-    _logarithm("relief_pressure", "Pa", 1e6),
-    _logarithm("relief_conductance", "m^3/(s Pa)", 1e-8),
+    logarithm_of("relief_pressure", "Pa", 1e6),
+    logarithm_of("relief_conductance", "m^3/(s Pa)", 1e-8),
 )
 """Chamber pressures, and constants: logarithms of what is positive and may be far from its first guess, as they are
 what may be nothing."""
+
+STDS: Mapping[str, float] = {
+    BULK_MODULUS: 0.3,
+    "leakage_coefficient": 0.3,
+    "flow_bias": 0.3,
+    "makeup_conductance": 0.5,
+    "makeup_opening": 1.0,
+    "case_leakage": 1.0,
+    "speed_lead": 2.0,
+    "relief_pressure": 0.02,
+    "relief_conductance": 0.7,
+}
+"""Relative standard deviation of each guess [fraction]; of bulk modulus, leakage and bias about half the distance to
+the next."""
+
+PRESSURE_STD = 1e4
+"""Standard deviation of the chamber pressures before the first sample, at rest [Pa]."""
+
+LOAD_STD = 0.3
+"""Standard deviation of the chamber pressures before the first sample of a log that begins under load, where the lower
+one need not be that of the inner circuit [fraction of the load]."""
+
+MAKEUP, OPENING, DRAIN, LEAD = 1e-9, 1e3, 2.4e-13, 1e-5
+"""First guesses of the make-up conductance [m^3/(s Pa)], of the drop at which a make-up valve is half open [Pa], of the
+drain a port [m^3/(s Pa)], and of the motor's lead on the straight line between samples [s]."""
+
+LEAST = 1e-3
+"""A guess that is zero begins at this share of the default actuator's value [fraction]."""
 
 CONSTANTS = ("bulk_modulus", *(state.name for state in STATES[3:]))
 """The constants, as `estimation.models.flow.chamber_rates` calls them."""
@@ -86,7 +128,8 @@ def chamber_step(
     return (*(old + new for old, new in zip(pressures, change, strict=True)), *state[2:])
 
 
-def _observe(state: tuple[Scalar, ...], p: Any) -> Mapping[str, Scalar]:
+def observe_chambers(state: tuple[Scalar, ...], p: Any) -> Mapping[str, Scalar]:
+    """Return the differential pressure of a state that begins with both chamber pressures [Pa]."""
     del p
     return {"differential_pressure_pa": state[0] - state[1]}
 
@@ -95,7 +138,7 @@ CHAMBERS = ProcessModel(
     "chambers",
     STATES,
     chamber_step,
-    _observe,
+    observe_chambers,
     longest_step=2.5e-4,
     drives=("motor_speed_rad_s", "position_m"),
     parameters=EhaParameters,
@@ -108,3 +151,56 @@ CHAMBERS_BY_MASS = replace(CHAMBERS, name="chambers_by_mass", step=partial(chamb
 
 CHAMBERS_HELD = replace(CHAMBERS, name="chambers_held", step=partial(chamber_step, held=True))
 """With the volumes of mid-stroke: of an actuator whose dead volume is far larger than what the piston sweeps."""
+
+
+def chamber_belief(
+    p: EhaParameters,
+    load: float,
+    modulus: float,
+    leakage: float = 1.0,
+    bias: float = 1.0,
+    makeup: float = MAKEUP,
+    *,
+    states: Sequence[StateVariable] = STATES,
+    stds: Mapping[str, float] = STDS,
+) -> Gaussian:
+    """Return what a chamber filter believes before the first sample.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+    load : float
+        Differential pressure that the log begins with [Pa].
+    modulus : float
+        First guess of bulk modulus [Pa].
+    leakage, bias : float
+        First guesses, as multiples of the actuator's [dimensionless].
+    makeup : float
+        First guess of the make-up conductance [m^3/(s Pa)].
+    states : sequence of StateVariable
+        The filter's states, some of `STATES` by name.
+    stds : Mapping[str, float]
+        Relative standard deviation of each first guess by state name [fraction].
+    """
+    healthy = EhaParameters()
+    means = {
+        "pressure_a_pa": p.accumulator_pressure + max(load, 0.0),
+        "pressure_b_pa": p.accumulator_pressure + max(-load, 0.0),
+        BULK_MODULUS: modulus,
+        "leakage_coefficient": leakage * max(p.leakage_coefficient, LEAST * healthy.leakage_coefficient),
+        "flow_bias": bias * max(p.flow_bias, LEAST * healthy.flow_bias),
+        "makeup_conductance": makeup,
+        "makeup_opening": OPENING,
+        "case_leakage": DRAIN,
+        "speed_lead": LEAD,
+        "relief_pressure": p.relief_pressure,
+        "relief_conductance": p.relief_conductance,
+    }
+    pressure = float(np.hypot(PRESSURE_STD, LOAD_STD * load))
+    guesses = np.array([means[state.name] for state in states])
+    spread = [
+        stds[state.name] * guess if state.name in stds else pressure
+        for state, guess in zip(states, guesses, strict=True)
+    ]
+    return Gaussian(guesses, np.diag(np.square(spread)))

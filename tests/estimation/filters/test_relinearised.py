@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from estimation.eha.by_flow_filter import chamber_belief
 from estimation.engine.contract import FilterProblem
 from estimation.engine.linearised import compile_step
 from estimation.filters.ekf import ekf
 from estimation.filters.relinearised import relinearised
 from estimation.filters.run import filter_problem
-from estimation.models.chambers import CHAMBERS, CHAMBERS_BY_MASS
+from estimation.models.chambers import CHAMBERS, CHAMBERS_BY_MASS, chamber_belief
 from estimation.models.eha_forms import BULK_MODULUS
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
