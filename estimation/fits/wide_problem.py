@@ -6,9 +6,10 @@ from dataclasses import fields, replace
 import numpy as np
 
 from estimation.fits.freed_problem import FreedProblem
-from estimation.fits.greybox_problem import GreyBoxLog, Problem, search_bounds
+from estimation.fits.greybox_problem import GreyBoxLog, search_bounds
 from estimation.fits.hypotheses import LIMITS, PRESUMED, Hypothesis
 from estimation.models.flow import FLOW_FORM, reaches_relief, relieving
+from estimation.models.greybox import GreyBoxModel
 from estimation.models.wide_flow import LINEAR, WIDE_FLOW_FORM, WideFlowParameters
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -107,22 +108,24 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
     return [{"relief_pressure": share * peak, "relief_conductance": RELIEF_START} for share in one.shares_of_peak]
 
 
-def flow_bounds(problem: Problem, guesses: Sequence[Array]) -> tuple[Array, Array]:
+def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], sample_time: float) -> tuple[Array, Array]:
     """Return how far a search for the flow form's unknowns may go, plain or wide.
 
     Parameters
     ----------
-    problem : Problem
-        The problem.
+    model : GreyBoxModel
+        The flow form with its unknowns.
     guesses : sequence of ndarray, shape (unknowns,)
         Where it begins [dimensionless].
+    sample_time : float
+        Time between samples [s].
 
     Returns
     -------
     tuple of ndarray, shape (unknowns,)
         Lower and upper bounds [dimensionless].
     """
-    return search_bounds(problem.model, guesses, {**LIMITS, "speed_lead": (0.0, problem.log.sample_time)})
+    return search_bounds(model, guesses, {**LIMITS, "speed_lead": (0.0, sample_time)})
 
 
 def usual_values(log: GreyBoxLog) -> dict[str, float]:
