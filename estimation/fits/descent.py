@@ -1,6 +1,6 @@
 """Gauss-Newton steps within a trust region and bounds, for least squares."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,13 +94,66 @@ def descend(
     >>> descend(valley, np.array([-1.2, 1.0]), 40, (-far, far)).theta.round(1).tolist()
     [1.0, 1.0]
     """
-    best = at(np.clip(start, *bounds))
+    return descend_together(
+        lambda thetas: [at(one) for one in thetas], [start], evaluations, bounds, least_gain, radius
+    )[0]
+
+
+def descend_together(
+    at_each: Callable[[Sequence[Array]], Sequence[Point]],
+    starts: Sequence[Array],
+    evaluations: int,
+    bounds: tuple[Array, Array],
+    least_gain: float = LEAST_GAIN,
+    radius: float = FIRST_RADIUS,
+) -> list[Point]:
+    """Return the least cost downhill from each of several starts, all a step at a time; see `descend`.
+
+    Parameters
+    ----------
+    at_each : callable
+        The cost at each of several coordinates.
+    starts : sequence of ndarray, shape (unknowns,)
+        Where to begin [dimensionless].
+    evaluations : int
+        How often the cost may be evaluated on the way down from each start [evaluations].
+    bounds : tuple of ndarray, shape (unknowns,)
+        Lowest and highest coordinates [dimensionless].
+    least_gain : float
+        Cost that a further step must promise [dimensionless].
+    radius : float
+        Length of the longest first step [dimensionless].
+
+    Returns
+    -------
+    list of Point
+        The best point from each start.
+    """
+    searches = [_search(start, evaluations, bounds, least_gain, radius) for start in starts]
+    asked = {i: next(search) for i, search in enumerate(searches)}
+    ended: dict[int, Point] = {}
+    while asked:
+        found = at_each(list(asked.values()))
+        for i, point in zip(tuple(asked), found, strict=True):
+            try:
+                asked[i] = searches[i].send(point)
+            except StopIteration as stop:
+                ended[i] = stop.value
+                del asked[i]
+    return [ended[i] for i in range(len(searches))]
+
+
+def _search(
+    start: Array, evaluations: int, bounds: tuple[Array, Array], least_gain: float, radius: float
+) -> Generator[Array, Point, Point]:
+    """Yield where the cost is to be evaluated, and return the best point."""
+    best = yield np.clip(start, *bounds)
     for _ in range(evaluations - 1):
         curvature = best.gram + np.diag(np.abs(best.gradient) / REACH)
         step, promised, radius = _downhill(best, curvature, radius, bounds)
         if promised < least_gain:
             break
-        tried = at(best.theta + step)
+        tried = yield best.theta + step
         gain, length = (best.cost - tried.cost) / promised, float(np.linalg.norm(step))
         if gain < POOR:
             radius = POOR * length

@@ -259,7 +259,10 @@ class Problem:
         Point
             Cost and normal equations; nothing as long as the log is stored.
         """
-        cost, gradient, gram = self._run(theta, np.empty((0, 0)), np.empty((0, 0, 0)))
+        return self._point(theta, *self._run(theta, np.empty((0, 0)), np.empty((0, 0, 0))))
+
+    def _point(self, theta: Array, cost: float, gradient: Array, gram: Array) -> Point:
+        """Return a point whose misfit is given, with what is known beforehand and a full matrix."""
         away = theta - self.presumed
         cost += 0.5 * float(self.prior @ away**2)
         return Point(theta, cost, gradient + self.prior * away, gram + np.tril(gram, -1).T + np.diag(self.prior))

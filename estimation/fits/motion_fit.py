@@ -1,19 +1,21 @@
 """`fit_motion(record, parameters, ...) -> FormFit`: bulk modulus, leakage and friction of a log without pressure."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.fits.descent import Point, descend
+from estimation.fits.descent import Point, descend, descend_together
 from estimation.fits.flow_fit import DRAIN_START, LEAD_START, LEAST_LEAKAGE
 from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed
+from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_problem import GreyBoxLog, OutputNoise, Problem, search_bounds
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from estimation.models.greybox import GreyBoxModel
-from estimation.models.motion import MOTION_FORMS
+from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS, MotionParameters
 from estimation.notes import EstimateCode
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -136,7 +138,7 @@ def _log(record: Record, p: EhaParameters, uncertainties: Mapping[str, float], s
     return GreyBoxLog(
         drives=drives,
         measured=(position - moved[0])[:, None],
-        parameters=parameter_row(p),
+        parameters=parameter_row(MotionParameters(**{one.name: getattr(p, one.name) for one in fields(p)})),
         sample_time=sample_time,
         steps=_steps(drives, sample_time),
         noise=(OutputNoise(position_variance(record["position_m"]) / block, drift),),
@@ -189,11 +191,10 @@ def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
 
 def _searched(form: GreyBoxModel, log: GreyBoxLog, starts: list[dict[str, float]]) -> GreyBoxFit:
     """Return the best of several starts; stop at one that explains the log."""
-    guesses = [form.theta(start) for start in starts]
-    bounds = search_bounds(form, guesses, {"speed_lead": (0.0, 0.5 * log.sample_time)})
-    whole = Problem(form, log)
+    whole = FreedProblem(form, log, UNKNOWNS, LINEAR)
+    guesses, bounds = _guesses(whole, starts)
     best: Point | None = None
-    for near in _brought_near(form, log, guesses, bounds):
+    for near in _brought_near(whole, guesses, bounds):
         found = descend(whole.at, near, FINISHING, bounds)
         best = found if best is None or found.cost < best.cost else best
         if 2.0 * best.cost < EXPLAINED * len(log.measured):
@@ -201,14 +202,18 @@ def _searched(form: GreyBoxModel, log: GreyBoxLog, starts: list[dict[str, float]
     return concluded(whole, best or whole.at(guesses[0]))
 
 
-def _brought_near(
-    form: GreyBoxModel, log: GreyBoxLog, guesses: list[Array], bounds: tuple[Array, Array]
-) -> Iterator[Array]:
+def _guesses(problem: Problem, starts: list[dict[str, float]]) -> tuple[list[Array], tuple[Array, Array]]:
+    """Return the starts in fitted coordinates, and how far a search from them may go."""
+    guesses = [problem.model.theta(start) for start in starts]
+    return guesses, search_bounds(problem.model, guesses, {"speed_lead": (0.0, 0.5 * problem.log.sample_time)})
+
+
+def _brought_near(whole: FreedProblem, guesses: list[Array], bounds: tuple[Array, Array]) -> Iterator[Array]:
     """Yield the likelier starts, brought nearer, one way after another."""
     for first, second in WAYS:
-        screen = Problem(form, log.softened(*first).beginning(SCREENED))
-        near = Problem(form, log.softened(*second))
-        screened = [descend(screen.at, guess, SCREENING, bounds) for guess in guesses]
+        screen = whole.on(whole.log.softened(*first).beginning(SCREENED))
+        near = whole.on(whole.log.softened(*second))
+        screened = descend_together(screen.at_each, guesses, SCREENING, bounds)
         for candidate in sorted(screened, key=lambda point: point.cost)[:FINALISTS]:
             yield descend(near.at, candidate.theta, NEARING, bounds).theta
 
@@ -217,8 +222,8 @@ def _compared(form: GreyBoxModel, log: GreyBoxLog, other: GreyBoxFit, starts: li
     """Return the fit of the other structure: from where the first ended, or by itself where that explains nothing."""
     if other.chi_square[0] > EXPLAINED:
         return _searched(form, log, starts)
-    bounds = search_bounds(form, [form.theta(start) for start in starts], {"speed_lead": (0.0, 0.5 * log.sample_time)})
-    whole = Problem(form, log)
+    whole = FreedProblem(form, log, UNKNOWNS, LINEAR)
+    _, bounds = _guesses(whole, starts)
     return concluded(whole, descend(whole.at, other.theta, NEARING, bounds))
 
 

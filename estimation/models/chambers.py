@@ -129,7 +129,20 @@ def chamber_step(
 
 
 def observe_chambers(state: tuple[Scalar, ...], p: Any) -> Mapping[str, Scalar]:
-    """Return the differential pressure of a state that begins with both chamber pressures [Pa]."""
+    """Return the differential pressure of two chambers.
+
+    Parameters
+    ----------
+    state : tuple of Expression
+        Both chamber pressures first [Pa].
+    p : namespace of Expression
+        The actuator, of which nothing is needed.
+
+    Returns
+    -------
+    Mapping[str, Expression]
+        Differential pressure by its channel [Pa].
+    """
     del p
     return {"differential_pressure_pa": state[0] - state[1]}
 

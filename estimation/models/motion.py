@@ -7,14 +7,27 @@ circuit's pressure, at which make-up begins.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
+from typing import Annotated, Any
 
 from estimation.models.flow import Delivery, chamber_rates, delivered_flow
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.functions import Scalar, absolute, maximum
 from plant.components.oil import ATMOSPHERE
 from plant.eha.model import EhaParameters, load_on_rod, piston_areas
+from plant.units import SI
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionParameters(EhaParameters):
+    """The actuator's parameters, and those that the motion form adds."""
+
+    case_leakage: Annotated[float, SI("m^3/(s Pa)", "drain of a port to the inner circuit", "fitted")] = 0.0
+    speed_lead: Annotated[float, SI("s", "lead of the motor on the line between samples", "fitted")] = 0.0
+    bristle_stiffness: Annotated[float, SI("N/m", "stiffness of the seals before they slide", "fitted")] = 1e8
+    bristle_damping: Annotated[float, SI("N s/m", "damping of the seals before they slide", "fitted")] = 1e2
+
 
 Friction = Callable[[Scalar, Scalar, SimpleNamespace], tuple[Scalar, Scalar]]
 """``friction(velocity [m/s], bristle [fraction of its deflection at a_3], parameters)``, which returns the bristle's
@@ -38,7 +51,7 @@ UNKNOWNS = (
 SEATED = 1.0
 """Drop at which a make-up valve is half open here, where nothing shows it [Pa]: it opens at once."""
 
-TYPICAL_LINEAR_FRICTION = 2e3
+LINEAR = {"friction_linear": 2e3}
 """Size in which the linear friction a_2 is fitted, which may be negative (errata E12) [N s/m]."""
 
 
@@ -119,12 +132,11 @@ def _form(name: str, friction: Friction) -> GreyBoxModel:
         name=name,
         drives=("motor_speed_rad_s", "position_m"),
         outputs=("position_m",),
-        unknowns=UNKNOWNS,
+        unknowns=(),
         initial=_at_rest,
         rates=rates,
         observe=lambda state: (state[0],),
-        parameters=EhaParameters,
-        linear=(("friction_linear", TYPICAL_LINEAR_FRICTION),),
+        parameters=MotionParameters,
     )
 
 

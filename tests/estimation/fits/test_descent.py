@@ -1,6 +1,6 @@
 import numpy as np
 
-from estimation.fits.descent import Point, descend
+from estimation.fits.descent import Point, descend, descend_together
 
 FAR = np.full(3, 10.0)
 
@@ -32,3 +32,18 @@ def test_the_cost_is_evaluated_no_more_often_than_allowed() -> None:
 
     descend(counted, np.array([-5.0, 6.0, 0.0]), 3, (-FAR, FAR), 0.0)
     assert len(tried) == 3
+
+
+def test_searches_together_end_where_each_ends_alone() -> None:
+    starts = [np.array([-5.0, 4.0, 1.5]), np.array([2.0, 3.0, 0.0]), np.array([9.0, -9.0, -3.0])]
+    evaluated: list[int] = []
+
+    def at_each(points) -> list[Point]:
+        evaluated.append(len(points))
+        return [bowl(one) for one in points]
+
+    together = descend_together(at_each, starts, 60, (-FAR, FAR), 1e-12)
+    for start, found in zip(starts, together, strict=True):
+        np.testing.assert_array_equal(found.theta, descend(bowl, start, 60, (-FAR, FAR), 1e-12).theta)
+    assert evaluated[0] == len(starts)  # the search that begins at the optimum leaves the others alone
+    assert evaluated[-1] < len(starts)

@@ -45,11 +45,20 @@ def alone(problem: FreedProblem, theta: np.ndarray) -> np.ndarray:
     return Problem(WIDE_FLOW_FORM, problem.log).residuals(np.empty(0), parameters=row)
 
 
-def test_each_lane_gives_the_residuals_of_a_run_alone(problem: FreedProblem) -> None:
-    for theta in points(problem, 3):
-        together, one = problem.residuals(theta), alone(problem, theta)
-        assert np.max(np.abs(one)) > 1.0
-        np.testing.assert_allclose(together, one, rtol=1e-7, atol=1e-7)
+def test_several_points_together_cost_what_each_costs_alone(problem: FreedProblem) -> None:
+    thetas = points(problem, 3)
+    for theta, point in zip(thetas, problem.at_each(thetas), strict=True):
+        here = alone(problem, theta).ravel()
+        assert np.max(np.abs(here)) > 1.0
+        weight = np.minimum(1.0, OUTLIER / np.maximum(np.abs(here), OUTLIER))
+        known = 0.5 * problem.prior @ (theta - problem.presumed) ** 2
+        assert point.cost == pytest.approx(float(np.sum((1.0 - 0.5 * weight) * weight * here**2) + known), rel=1e-7)
+        assert point.gradient == pytest.approx(problem.at(theta).gradient, rel=1e-12)
+
+
+def test_the_residuals_of_one_point_are_those_of_a_run_alone(problem: FreedProblem) -> None:
+    (theta,) = points(problem, 1)
+    np.testing.assert_allclose(problem.residuals(theta), alone(problem, theta), rtol=1e-7, atol=1e-7)
 
 
 def test_the_normal_equations_are_those_of_residuals_one_by_one(problem: FreedProblem) -> None:

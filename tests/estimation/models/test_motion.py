@@ -3,8 +3,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_problem import GreyBoxLog, OutputNoise, Problem
-from estimation.models.motion import MOTION_FORMS, lagging_friction, parallel_friction
+from estimation.models.motion import (
+    LINEAR,
+    MOTION_FORMS,
+    UNKNOWNS,
+    MotionParameters,
+    lagging_friction,
+    parallel_friction,
+)
 from plant.components.friction import quadratic_friction
 from plant.eha.model import EhaParameters
 from plant.solvers.steps import parameter_row
@@ -46,16 +54,15 @@ def test_at_rest_the_bristle_holds_without_yielding(friction) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", MOTION_FORMS, ids=lambda form: form.name)
-def test_sensitivities_are_the_derivatives_of_the_motion(form) -> None:
+def test_differences_side_by_side_are_the_exact_sensitivities_of_the_motion(form) -> None:
     n = 300
     drives = np.column_stack([np.full(n, 100.0), np.zeros(n)])
-    beside = {"speed_lead": 2e-5, "case_leakage": 1e-13, "bristle_stiffness": 2e7, "bristle_damping": 100.0}
-    theta = form.theta({name: beside[name] if name in beside else getattr(P, name) for name in form.unknowns})
-    log = GreyBoxLog(drives, np.zeros((n, 1)), parameter_row(P), 1e-3, np.full(n, 8), (OutputNoise(1.0),))
-    problem = Problem(form, log)
-    slopes = problem.slopes(theta)
-    for j in range(len(theta)):
-        nudge = np.eye(len(theta))[j] * 1e-5
-        ahead, behind = (problem.residuals(theta + side * nudge)[0] for side in (1.0, -1.0))
-        scale = np.abs(slopes[:, j]).max()
-        assert np.abs((ahead - behind) / 2e-5 - slopes[:, j]).max() <= 1e-2 * scale + 1e-12
+    log = GreyBoxLog(
+        drives, np.zeros((n, 1)), parameter_row(MotionParameters()), 1e-3, np.full(n, 8), (OutputNoise(1.0),)
+    )
+    freed = FreedProblem(form, log, UNKNOWNS, LINEAR)
+    beside = MotionParameters(speed_lead=2e-5, case_leakage=1e-13, bristle_stiffness=2e7)
+    theta = freed.model.theta({name: getattr(beside, name) for name in UNKNOWNS})
+    exact = Problem(freed.model, log).slopes(theta)
+    scale = np.abs(exact).max(axis=0)
+    assert np.all(np.abs(freed.slopes(theta) - exact).max(axis=0) <= 1e-2 * scale + 1e-12)
