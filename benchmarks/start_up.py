@@ -7,7 +7,6 @@ before, and whether the bits are the same.
 
 import argparse
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -22,6 +21,7 @@ from benchmarks.targets import misses, say
 from estimation.fits import greybox_loops
 from estimation.models.flow import FLOW_FORM, MASS_FLOW_FORM
 from estimation.models.greybox import GreyBoxModel
+from plant.compiled.source import INTRINSICS
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
@@ -82,9 +82,8 @@ def text_of(model: GreyBoxModel) -> str:
 
 def by_numba(text: str) -> Callable[..., Any]:
     """Return a kernel that Numba compiles from the same text, without fast-math."""
-    decorated = re.sub(r"^def ", '@numba.njit(nogil=True, error_model="numpy")\ndef ', text, flags=re.MULTILINE)
     names: dict[str, Any] = {}
-    exec("import numba\n" + decorated.split('"""', 2)[2], names)  # noqa: S102  our own text
+    exec(f"{INTRINSICS}\n{text.replace('cache=True, ', '')}", names)  # noqa: S102  our own text
     return names["run"]
 
 
@@ -110,9 +109,8 @@ def beside_numba(model: GreyBoxModel) -> None:
     with tempfile.TemporaryDirectory() as folder:
         os.environ["HYDROSTATE_CACHE"] = folder
         name = f"beside_numba_{model.name}"
-        takes = greybox_loops.signature(
-            greybox_loops._TAKES.format(unknowns=len(model.unknowns), outputs=1, channels=len(model.drives))
-        )
+        lengths = {"unknowns": len(model.unknowns), "outputs": 1, "channels": len(model.drives)}
+        takes = greybox_loops.signature_of(greybox_loops.run, **lengths)
         ours = lambda: greybox_loops.load_native(name, text + "\n# anew\n", {"run": takes}).run  # noqa: E731
         for compiled in (ours, lambda: by_numba(text)):
             begin = time.process_time()

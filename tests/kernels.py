@@ -4,7 +4,7 @@ import ast
 import ctypes
 import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 
 from plant.compiled import vector
+from plant.compiled.expression import Expression
+from plant.compiled.source import lines_source
 
 
 def text_of(monkeypatch: pytest.MonkeyPatch, module: ModuleType, compile_it: Callable[[], object]) -> str:
@@ -72,6 +74,14 @@ def in_python(lines: FunctionType) -> Callable[..., Any]:
         "ratios": lambda a, b: [x / y for x, y in zip(a, b, strict=True)],
     }
     return FunctionType(lines.__code__, {**vars(vector), **by_hand})
+
+
+def computed(outputs: Mapping[str, Expression], **inputs: float) -> dict[str, float]:
+    """What lines written for some outputs give, on floats."""
+    names: dict[str, Any] = {}
+    exec(lines_source("lines", outputs), names)  # noqa: S102  our own text
+    lines = names["lines"]
+    return in_python(lines)(*(inputs[name] for name in inspect.signature(lines).parameters))
 
 
 def on_memory(file: SimpleNamespace, *lines: FunctionType) -> Callable[[int, float], None]:

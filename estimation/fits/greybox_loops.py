@@ -1,42 +1,196 @@
 """Kernels that predict a log by a grey-box model and sum up the normal equations of its misfit, in one pass.
 
-The model's step is traced once; its derivatives by state and unknown parameters are written beside it. Nothing as long
-as the log is stored unless asked for: a log of ten million samples takes no more memory to fit than one of a thousand.
+The model's step is traced once; its derivatives by state and unknown parameters are written beside it, and the loop
+along the log is pasted to them. Nothing as long as the log is stored unless asked for: a log of ten million samples
+takes no more memory to fit than one of a thousand.
 """
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
+from itertools import chain
 from types import SimpleNamespace
-from typing import Any, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
+import numpy as np
+
+from estimation.arrays import Array, IntArray
+from estimation.engine.parts import function_source
 from estimation.models.greybox import GreyBoxModel
-from plant.arrays import Array
 from plant.compiled.expression import ONE, ZERO, Expression, as_expression, jacobian, symbol, unary
 from plant.compiled.functions import Scalar
+from plant.compiled.hoist import hoisted
 from plant.compiled.native.load import load_native
-from plant.compiled.native.signature import signature
-from plant.compiled.source import statements
+from plant.compiled.native.signature import signature_of
+from plant.compiled.paste import BORROWING, kernel_text, pasted
 from plant.solvers.steps import parameter_names, parameter_symbols, ros2_step
 
 Kernel: TypeAlias = Callable[..., tuple[float, Array, Array]]
 """``run(theta, drives, measured, parameters, sample_time, substeps, block, variance, walk, gaps, outlier, errors,
-slopes)``, see `compile_kernel`."""
+slopes)``, see `run`."""
 
 RUNAWAY = 1e6
 """Largest normalised residual that counts [dimensionless]: a try that runs away keeps a finite cost."""
 
-_KERNEL = '''"""Generated: misfit of the {name} model, with its sensitivities."""
-
-import math
-
-import numpy as np
-
-RUNAWAY = {runaway!r}
 SETTLED = 1e-4
+"""Variance that a gap has left open, below which it is closed [fraction of the sensor's]."""
+
 STRAIGHT = 1e-3
+"""Weight of a block in ``J'J`` that counts linearly [fraction]."""
 
 
-def absorb(row, level, gain, scale, outlier, gradient, gram):
+class MisfitKernel(Protocol):
+    """What the kernel of a model has.
+
+    A point is a tuple with a row for each state: the state, its derivatives by the unknowns, and in a model that bears
+    gaps those by the states that the last step began from. What is observed has such a row for each output.
+
+    Attributes
+    ----------
+    WIDTH, UNKNOWNS, OUTPUTS : int
+        Counts of states, unknowns and outputs.
+    JUMP, JUMPS : tuple of float, int
+        `GreyBoxModel.jump`, and its length.
+    settle, begin : callable
+        From fitted coordinates and parameters: what is the same at every step, and the point before the first sample.
+    step : callable
+        ``step(point, fixed, before, after, start, end, h)``: the point ``h`` [s] later, while the drives go from one
+        share of the way between samples to another [fraction].
+    observe : callable
+        ``observe(point, shown)``: fill in what is observed.
+    load, store : callable
+        ``load(address)`` and ``store(point, address)``: a point out of memory, and into it.
+    """
+
+    WIDTH: int
+    UNKNOWNS: int
+    OUTPUTS: int
+    JUMP: tuple[float, ...]
+    JUMPS: int
+    settle: Callable[[Array, Array], Any]
+    begin: Callable[[Array, Array], Any]
+    step: Callable[[Any, Any, Array, Array, float, float, float], Any]
+    observe: Callable[[Any, Array], None]
+    load: Callable[[int], Any]
+    store: Callable[[Any, int], None]
+
+
+def run(
+    kernel: MisfitKernel,
+    theta: Array,
+    drives: Array,
+    measured: Array,
+    parameters: Array,
+    sample_time: float,
+    substeps: IntArray,
+    block: int,
+    variance: Array,
+    walk: Array,
+    gaps: Array,
+    outlier: float,
+    errors: Array,
+    slopes: Array,
+) -> tuple[float, Array, Array]:
+    """Sum up the misfit of a model over a log.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (unknowns,)
+        Fitted coordinates, see `GreyBoxModel.theta`.
+    drives : ndarray, shape (n, channels)
+        Drives at the samples [their SI units], linear between.
+    measured : ndarray, shape (n, outputs)
+        Outputs [SI]; NaN is missing.
+    parameters : ndarray, shape (parameters,)
+        Parameter row.
+    sample_time : float
+        Seconds between samples [s].
+    substeps : ndarray of int, shape (n,)
+        Model steps up to each sample.
+    block : int
+        Samples a block.
+    variance, walk : ndarray, shape (outputs,)
+        White noise of each output [SI squared], and random walk [SI squared a block].
+    gaps : ndarray, shape (gaps, 3)
+        First and last sample that a gap in the drives acts on, and the variance of `GreyBoxModel.jump` over each.
+    outlier : float
+        Residual beyond which a block counts linearly [dimensionless].
+    errors : ndarray, shape (errors, blocks)
+        Room for the normalised residuals of each output, or empty.
+    slopes : ndarray, shape (slopes, slope blocks, slope unknowns)
+        Room for their derivatives, or empty.
+
+    Returns
+    -------
+    float
+        Half the sum of squares.
+    ndarray, shape (unknowns,)
+        Its gradient.
+    ndarray, shape (unknowns, unknowns)
+        ``J'J``, lower triangle, in which blocks that count linearly hardly count.
+    """
+    n, unknowns, outputs, jumps = drives.shape[0], kernel.UNKNOWNS, kernel.OUTPUTS, kernel.JUMPS
+    gradient, gram = np.zeros(unknowns), np.zeros((unknowns, unknowns))
+    rows, levels = np.zeros((outputs, 1 + unknowns)), np.zeros((outputs, 1 + unknowns))
+    present, spread = np.zeros(outputs), np.zeros(outputs)
+    moved, shown = np.zeros((kernel.WIDTH, 1 + unknowns + jumps)), np.zeros((outputs, 1 + unknowns + jumps))
+    jump, reach, covariance = np.zeros(jumps), np.zeros((jumps, jumps)), np.zeros((jumps, jumps))
+    cost, gap, loose = 0.0, 0, False
+    kernel.store(kernel.JUMP, jump.ctypes.data)
+    fixed, point = kernel.settle(theta, parameters), kernel.begin(theta, parameters)
+    for k in range(n):
+        if k > 0:
+            h = sample_time / substeps[k]
+            for j in range(substeps[k]):
+                start, end = j / substeps[k], (j + 1.0) / substeps[k]
+                point = kernel.step(point, fixed, drives[k - 1], drives[k], start, end, h)
+                if loose:
+                    kernel.store(point, moved.ctypes.data)
+                    carry(kernel, moved, covariance, reach)
+        if jumps > 0:
+            while gap < gaps.shape[0] and gaps[gap, 1] < k:
+                gap += 1
+            if gap < gaps.shape[0] and gaps[gap, 0] <= k:
+                loose = True
+                for i in range(jumps):
+                    for j in range(jumps):
+                        covariance[i, j] += jump[i] * jump[j] * gaps[gap, 2]
+        kernel.observe(point, shown)
+        for i in range(outputs):
+            if measured[k, i] == measured[k, i]:
+                excess, weight = shown[i, 0] - measured[k, i], 1.0
+                if loose:
+                    kernel.store(point, moved.ctypes.data)
+                    opened = correct(kernel, moved, covariance, reach[0], shown[i], excess, variance[i])
+                    point = kernel.load(moved.ctypes.data)
+                    weight = math.sqrt(variance[i] / (opened + variance[i]))
+                    loose = opened > SETTLED * variance[i]
+                    if not loose:
+                        covariance[:] = 0.0
+                present[i] += 1.0
+                rows[i, 0] += weight * excess
+                for j in range(1, 1 + unknowns):
+                    rows[i, j] += weight * shown[i, j]
+        if (k + 1) % block == 0 or k == n - 1:
+            for i in range(outputs):
+                if present[i] > 0.0:
+                    rows[i] /= present[i]
+                    total = spread[i] + variance[i] / present[i]
+                    gain = spread[i] / total
+                    cost += absorb(rows[i], levels[i], gain, 1.0 / math.sqrt(total), outlier, gradient, gram)
+                    spread[i] -= gain * spread[i]
+                    if errors.size > 0:
+                        errors[i, k // block] = rows[i, 0]
+                    if slopes.size > 0:
+                        slopes[i, k // block] = rows[i, 1:]
+                    rows[i] = 0.0
+                    present[i] = 0.0
+                spread[i] += walk[i]
+    return cost, gradient, gram
+
+
+def absorb(row: Array, level: Array, gain: float, scale: float, outlier: float, gradient: Array, gram: Array) -> float:
+    """Take a block's mean misfit and its slopes into the sums, less the random walk's level so far; return its cost."""
     for j in range(row.size):
         innovation = row[j] - level[j]
         level[j] += gain * innovation
@@ -52,119 +206,100 @@ def absorb(row, level, gain, scale, outlier, gradient, gram):
     return (1.0 - 0.5 * weight) * weight * error * error
 
 
-def run(
-    theta, drives, measured, parameters, sample_time, substeps, block, variance, walk, gaps, outlier, errors, slopes
-):
-    n = drives.shape[0]
-    gradient, gram = np.zeros({unknowns}), np.zeros(({unknowns}, {unknowns}))
-    rows, levels = np.zeros(({outputs}, {columns})), np.zeros(({outputs}, {columns}))
-    present, spread = np.zeros({outputs}), np.zeros({outputs})
-    cost, share, gap, loose = 0.0, 0.0, 0, False
-{load}
-{begin}
-    for k in range(n):
-        if k > 0:
-            h = sample_time / substeps[k]
-            for j in range(substeps[k]):
-                f_start = j / substeps[k]
-                f_end = (j + 1.0) / substeps[k]
-{between}
-{step}
-{carry}
-{observe}
-        if (k + 1) % block == 0 or k == n - 1:
-            for i in range({outputs}):
-                if present[i] > 0.0:
-                    rows[i] /= present[i]
-                    total = spread[i] + variance[i] / present[i]
-                    gain = spread[i] / total
-                    cost += absorb(rows[i], levels[i], gain, 1.0 / math.sqrt(total), outlier, gradient, gram)
-                    spread[i] -= gain * spread[i]
-                    if errors.size > 0:
-                        errors[i, k // block] = rows[i, 0]
-                    if slopes.size > 0:
-                        slopes[i, k // block] = rows[i, 1:]
-                    rows[i] = 0.0
-                    present[i] = 0.0
-                spread[i] += walk[i]
-    return cost, gradient, gram
-'''
+def carry(kernel: MisfitKernel, point: Array, covariance: Array, room: Array) -> None:
+    """Take the covariance of a state that a gap has left open over the last step: ``P' = F P F'``."""
+    size, first = kernel.JUMPS, 1 + kernel.UNKNOWNS
+    for i in range(size):
+        for j in range(i, size):
+            room[i, j] = 0.0
+            for m in range(size):
+                for n in range(size):
+                    room[i, j] += point[i, first + m] * covariance[m, n] * point[j, first + n]
+    for i in range(size):
+        for j in range(i, size):
+            covariance[i, j] = covariance[j, i] = room[i, j]
 
-_TAKES = """
-theta : ndarray, shape ({unknowns},)
-drives : ndarray, shape (n, {channels})
-measured : ndarray, shape (n, {outputs})
-parameters : ndarray, shape (parameters,)
-sample_time : float
-substeps : ndarray of int, shape (n,)
-block : int
-variance, walk : ndarray, shape ({outputs},)
-gaps : ndarray, shape (gaps, 3)
-outlier : float
-errors : ndarray, shape (errors, blocks)
-slopes : ndarray, shape (slopes, slope blocks, slope unknowns)
-"""
-"""What the kernel takes."""
+
+def correct(
+    kernel: MisfitKernel, point: Array, covariance: Array, reach: Array, shown: Array, excess: float, variance: float
+) -> float:
+    """Take a sample into a state that a gap has left open, by a Kalman update whose gain is taken as a constant.
+
+    With any gain that does not depend on the data the innovations are zero on average at the true parameters; with the
+    Kalman gain they are white, and hold all that the log says beside the state in the gap (Kalman 1960, equation 28).
+
+    Returns
+    -------
+    float
+        Variance of the output that was open [SI squared].
+    """
+    size, unknowns, opened = kernel.JUMPS, kernel.UNKNOWNS, 0.0
+    for m in range(size):
+        reach[m] = 0.0
+        for n in range(size):
+            reach[m] += covariance[m, n] * shown[1 + unknowns + n]
+        opened += shown[1 + unknowns + m] * reach[m]
+    for m in range(size):
+        gain = reach[m] / (opened + variance)
+        point[m, 0] -= gain * excess
+        for j in range(1, 1 + unknowns):
+            point[m, j] -= gain * shown[j]
+        for n in range(m, size):
+            covariance[m, n] -= gain * reach[n]
+            covariance[n, m] = covariance[m, n]
+    return opened
 
 
 @cache
 def compile_kernel(model: GreyBoxModel) -> Kernel:
     """Generate the kernel that sums up a model's misfit over a log.
 
-    Parameters
-    ----------
-    model : GreyBoxModel
-        The model; it is stepped by ROS2, second order and L-stable.
-
     Returns
     -------
     callable
-        Takes theta (unknowns,), drives (n, channels), measured (n, outputs), parameter row, sample time [s], model
-        steps up to each sample (n,), samples a block, each output's white noise [SI squared] and random walk [SI
-        squared a block], gaps (g, 3) with first and last sample that a gap in the drives acts on and the variance of
-        `GreyBoxModel.jump` over each, and the residual beyond which a block counts linearly.
-        Returns half the sum of squares, its gradient (unknowns,) and ``J'J`` (unknowns, unknowns), lower triangle, in
-        which blocks that count linearly hardly count.
-        Fills errors (outputs, blocks) and slopes (outputs, blocks, unknowns), each unless it is empty.
+        Takes what `run` does, and steps the model by ROS2, second order and L-stable.
     """
-    takes = _TAKES.format(unknowns=len(model.unknowns), outputs=len(model.outputs), channels=len(model.drives))
-    return load_native(f"fit_{model.name}", lambda: _source(model), {"run": signature(takes)}, model).run
+    takes = signature_of(run, unknowns=len(model.unknowns), outputs=len(model.outputs), channels=len(model.drives))
+    return load_native(f"fit_{model.name}", lambda: _source(model), {"run": takes}, model).run
 
 
 def _source(model: GreyBoxModel) -> str:
     """Write the kernel."""
-    theta = [symbol(f"theta{i}") for i in range(len(model.unknowns))]
-    sizes = dict(model.linear)
+    sizes, unknowns, jumps = dict(model.linear), range(len(model.unknowns)), range(len(model.jump))
+    theta = [symbol(f"theta{j}") for j in unknowns]
     fitted = {
         name: t * sizes[name] if name in sizes else unary("exp", t)
         for name, t in zip(model.unknowns, theta, strict=True)
     }
     p = SimpleNamespace(**{**vars(parameter_symbols(model.parameters)), **fitted})
-    start = [as_expression(value) for value in model.initial(p)]
-    state = [symbol(f"x{i}") for i in range(len(start))]
-    drives = [(symbol(f"a{i}"), symbol(f"b{i}")) for i in range(len(model.drives))]
-    moved = model_step(model, state, p, drives)
-    outputs = [as_expression(value) for value in model.observe(tuple(state))]
-    return _KERNEL.format(
-        name=model.name,
-        runaway=RUNAWAY,
-        outputs=len(outputs),
-        unknowns=len(theta),
-        columns=len(theta) + 1,
-        load="\n".join(
-            [f"    {name} = parameters[{i}]" for i, name in enumerate(parameter_names(model.parameters))]
-            + [f"    theta{i} = theta[{i}]" for i in range(len(theta))]
-            + [f"    {name} = 0.0" for name in _covariance(len(state)) if model.jump]
-        ),
-        begin=statements(_named(start) | _sensitivities(start, [], theta), "    "),
-        between="\n".join(
-            f"                {end}{i} = drives[k - 1, {i}] + f_{when} * (drives[k, {i}] - drives[k - 1, {i}])"
-            for i in range(len(model.drives))
-            for end, when in (("a", "start"), ("b", "end"))
-        ),
-        step=_stepping(model, moved, state, theta),
-        carry=_loosened(model) if model.jump else "",
-        observe=_observation(model, outputs, state, theta),
+    begun = [as_expression(value) for value in model.initial(p)]
+    states = range(len(begun))
+    state = [symbol(f"x{i}") for i in states]
+    names = [(f"x{i}", *(f"s{i}_{j}" for j in unknowns), *(f"f{i}_{m}" for m in jumps)) for i in states]
+    point = _places("point", chain.from_iterable(names))
+    data = {f"{when}{i}": f"{when}[{i}]" for when in ("before", "after") for i in range(len(model.drives))}
+    moved = _rows(
+        model_step(model, state, p, [_between(i) for i in range(len(model.drives))]), state, theta, len(jumps)
+    )
+    varying = {*point, *data, "start", "end", "h", "share"}
+    settled, stepped = hoisted(dict(zip(point, moved, strict=True)), varying, "c")
+    shown = _rows([as_expression(value) for value in model.observe(tuple(state))], state, theta, len(jumps))
+    columns = len(names[0])
+    seen = {f"shown[{k // columns}, {k % columns}]": value for k, value in enumerate(shown)}
+    rows = _places("parameters", parameter_names(model.parameters)) | _places("theta", [f"theta{j}" for j in unknowns])
+    reads = point | data | _places("fixed", settled) | {"share": "0.0"}
+    begin = dict(zip(point, _rows(begun, [], theta, len(jumps)), strict=True))
+    counts = {"WIDTH": len(states), "UNKNOWNS": len(unknowns), "OUTPUTS": len(model.outputs), "JUMPS": len(jumps)}
+    settings = {"JUMP": model.jump, "RUNAWAY": RUNAWAY, "SETTLED": SETTLED, "STRAIGHT": STRAIGHT}
+    return kernel_text(
+        f"misfit of the {model.name} model, with its sensitivities",
+        function_source("settle", "theta, parameters", rows, settled),
+        function_source("begin", "theta, parameters", rows, begin),
+        function_source("step", "point, fixed, before, after, start, end, h", reads, stepped),
+        function_source("observe", "point, shown", point, seen, {place: place for place in seen}),
+        f"load = loading({len(point)})",
+        pasted(absorb, constants=counts | settings, options=BORROWING),
+        pasted(carry, correct, run),
     )
 
 
@@ -174,23 +309,12 @@ def model_step(
     p: SimpleNamespace,
     drives: Sequence[tuple[Expression, Expression]],
 ) -> list[Expression]:
-    """Return the state after one step of length ``h``, with the share of it that has passed as the scheme's input.
+    """Return the state after one step of length ``h`` [SI], with the share of it that has passed as the scheme's input.
 
     Parameters
     ----------
-    model : GreyBoxModel
-        The model.
-    state : sequence of Expression
-        The state before [SI].
-    p : SimpleNamespace
-        The parameters by name [SI].
     drives : sequence of tuple
         Each drive at the step's start and end [SI].
-
-    Returns
-    -------
-    list of Expression
-        In SI.
     """
     h = symbol("h")
 
@@ -200,112 +324,27 @@ def model_step(
     return [as_expression(value) for value in ros2_step(rates)(tuple(state), (symbol("share"), ONE), p, h)]
 
 
-def _named(values: Sequence[Expression]) -> dict[str, Expression]:
-    return {f"x{i}": value for i, value in enumerate(values)}
+def _places(array: str, names: Iterable[str]) -> dict[str, str]:
+    """Return where each number stands in an array."""
+    return {name: f"{array}[{i}]" for i, name in enumerate(names)}
 
 
-def _sensitivities(
-    values: Sequence[Expression], state: Sequence[Expression], theta: Sequence[Expression]
-) -> dict[str, Expression]:
-    """Return the chain rule ``S' = F S + G`` for every value and unknown."""
+def _between(drive: int) -> tuple[Expression, Expression]:
+    """Return a drive at the start and the end of a step."""
+    before = symbol(f"before{drive}")
+    rise = symbol(f"after{drive}") - before
+    return before + symbol("start") * rise, before + symbol("end") * rise
+
+
+def _rows(
+    values: Sequence[Expression], state: Sequence[Expression], theta: Sequence[Expression], jumps: int
+) -> list[Expression]:
+    """Return each value, its derivatives by the unknowns (chain rule, ``S' = F S + G``), and those by the state."""
     by_state, by_theta = jacobian(values, state), jacobian(values, theta)
-    outputs: dict[str, Expression] = {}
-    for i in range(len(values)):
-        for j in range(len(theta)):
-            total = by_theta[i][j]
-            for m in range(len(state)):
-                total = total + by_state[i][m] * symbol(f"s{m}_{j}")
-            outputs[f"s{i}_{j}"] = total
+    outputs: list[Expression] = []
+    for value, through, slopes in zip(values, by_state, by_theta, strict=True):
+        outputs.append(value)
+        for j, slope in enumerate(slopes):
+            outputs.append(sum((by * symbol(f"s{m}_{j}") for m, by in enumerate(through)), start=slope))
+        outputs += (through or [ZERO] * jumps)[:jumps]
     return outputs
-
-
-def _covariance(size: int) -> list[str]:
-    """Return the names of the covariance's upper triangle."""
-    return [f"p{i}_{j}" for i in range(size) for j in range(i, size)]
-
-
-def _matrix(size: int) -> list[list[Expression]]:
-    return [[symbol(f"p{min(i, j)}_{max(i, j)}") for j in range(size)] for i in range(size)]
-
-
-def _sum(terms: Iterable[Expression]) -> Expression:
-    return sum(terms, start=ZERO)
-
-
-def _stepping(
-    model: GreyBoxModel, moved: Sequence[Expression], state: Sequence[Expression], theta: Sequence[Expression]
-) -> str:
-    """Return the lines of a step; where a gap has left the state open, its covariance goes along: ``P' = F P F'``."""
-    indent, size = " " * 16, len(state)
-    outputs = _named(moved) | _sensitivities(moved, state, theta)
-    if not model.jump:
-        return statements(outputs, indent)
-    by_state = jacobian(moved, state)
-    outputs |= {f"f{i}_{m}": by_state[i][m] for i in range(size) for m in range(size)}
-    F, P = [[symbol(f"f{i}_{m}") for m in range(size)] for i in range(size)], _matrix(size)
-    carried = {
-        f"p{i}_{j}": _sum(F[i][m] * P[m][n] * F[j][n] for m in range(size) for n in range(size))
-        for i in range(size)
-        for j in range(i, size)
-    }
-    return "\n".join([statements(outputs, indent), f"{indent}if loose:", statements(carried, indent + "    ", "c")])
-
-
-def _loosened(model: GreyBoxModel) -> str:
-    """Return the lines that add what a gap leaves open to the covariance of the state."""
-    jump, size = model.jump, len(model.jump)
-    lines = [
-        "            while gap < gaps.shape[0] and gaps[gap, 1] < k:",
-        "                gap += 1",
-        "            if gap < gaps.shape[0] and gaps[gap, 0] <= k:",
-        "                loose = True",
-    ]
-    for i in range(size):
-        lines += [f"                p{i}_{j} += {jump[i] * jump[j]!r} * gaps[gap, 2]" for j in range(i, size)]
-    return "\n".join(lines)
-
-
-def _observation(
-    model: GreyBoxModel, outputs: Sequence[Expression], state: Sequence[Expression], theta: Sequence[Expression]
-) -> str:
-    slopes = _sensitivities(outputs, state, theta)
-    named = {f"y{i}": output for i, output in enumerate(outputs)} | {f"d{name}": s for name, s in slopes.items()}
-    lines = [statements(named, " " * 8)]
-    for i in range(len(outputs)):
-        lines += [
-            f"        if measured[k, {i}] == measured[k, {i}]:",
-            f"            present[{i}] += 1.0",
-            f"            excess = y{i} - measured[k, {i}]",
-            "            weight = 1.0",
-            *(_corrected(outputs[i], i, state, len(theta)) if model.jump else []),
-            f"            rows[{i}, 0] += weight * excess",
-            *(f"            rows[{i}, {j + 1}] += weight * ds{i}_{j}" for j in range(len(theta))),
-        ]
-    return "\n".join(lines)
-
-
-def _corrected(output: Expression, i: int, state: Sequence[Expression], unknowns: int) -> list[str]:
-    """Return the lines of a Kalman update of a state that a gap has left open; its gain is taken as a constant.
-
-    With any gain that does not depend on the data the innovations are zero on average at the true parameters; with the
-    Kalman gain they are white, and hold all that the log says beside the state in the gap (Kalman 1960, equation 28).
-    """
-    size, excess, variance = len(state), symbol("excess"), symbol(f"variance[{i}]")
-    C, P = jacobian([output], state)[0], _matrix(size)
-    reach = [_sum(P[m][n] * C[n] for n in range(size)) for m in range(size)]
-    opened = _sum(C[m] * reach[m] for m in range(size))
-    total = opened + variance
-    gain = [r / total for r in reach]
-    outputs = {"opened": opened, "weight": unary("sqrt", variance / total)}
-    outputs |= {f"x{m}": state[m] - gain[m] * excess for m in range(size)}
-    outputs |= {
-        f"s{m}_{j}": symbol(f"s{m}_{j}") - gain[m] * symbol(f"ds{i}_{j}") for m in range(size) for j in range(unknowns)
-    }
-    outputs |= {f"p{m}_{n}": P[m][n] - gain[m] * reach[n] for m in range(size) for n in range(m, size)}
-    return [
-        "            if loose:",
-        statements(outputs, " " * 16, f"u{i}"),
-        f"                loose = opened > SETTLED * variance[{i}]",
-        "                if not loose:",
-        "                    " + " = ".join(_covariance(size)) + " = 0.0",
-    ]

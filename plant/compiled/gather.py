@@ -53,16 +53,17 @@ def gathered(outputs: Mapping[str, Expression], fixed: Collection[str]) -> dict[
     Examples
     --------
     >>> from plant.compiled.expression import symbol
-    >>> from plant.compiled.source import statements
+    >>> from plant.compiled.source import lines_source
     >>> x, y, k = symbol("x"), symbol("y"), symbol("k")
-    >>> print(statements(gathered({"a": 0.01 * x * k / 0.001, "b": k * (y - 0.1 * x) / 10.0}, {"k"}), ""))
-    t0_ = 10.0 * k
-    t1_ = t0_ * x
-    t2_ = 0.1 * k
-    t3_ = 0.1 * x
-    t4_ = y - t3_
-    t5_ = t2_ * t4_
-    a, b = t1_, t5_
+    >>> print(lines_source("lines", gathered({"a": 0.01 * x * k / 0.001, "b": k * (y - 0.1 * x) / 10.0}, {"k"})))
+    def lines(k, x, y):
+        t0_ = 10.0 * k
+        t1_ = t0_ * x
+        t2_ = 0.1 * k
+        t3_ = 0.1 * x
+        t4_ = y - t3_
+        t5_ = t2_ * t4_
+        return {"a": t1_, "b": t5_}
     """
     return _Gathering(outputs, fixed).outputs()
 

@@ -55,14 +55,15 @@ def share_reciprocals(outputs: Mapping[str, Expression], fixed: Collection[str])
     Examples
     --------
     >>> from plant.compiled.expression import symbol
-    >>> from plant.compiled.source import statements
+    >>> from plant.compiled.source import lines_source
     >>> x, y, z = symbol("x"), symbol("y"), symbol("z")
-    >>> print(statements(share_reciprocals({"a": x / z, "b": y / z, "c": z / x}, ()), ""))
-    t0_ = 1.0 / z
-    t1_ = x * t0_
-    t2_ = y * t0_
-    t3_ = z / x
-    a, b, c = t1_, t2_, t3_
+    >>> print(lines_source("lines", share_reciprocals({"a": x / z, "b": y / z, "c": z / x}, ())))
+    def lines(x, y, z):
+        t0_ = 1.0 / z
+        t1_ = x * t0_
+        t2_ = y * t0_
+        t3_ = z / x
+        return {"a": t1_, "b": t2_, "c": t3_}
     """
     order = ordered(outputs.values())
     settled = settled_nodes(order, fixed)
@@ -94,16 +95,17 @@ def share_ratios(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
     Examples
     --------
     >>> from plant.compiled.expression import symbol
-    >>> from plant.compiled.source import statements
+    >>> from plant.compiled.source import lines_source
     >>> x, y = symbol("x"), symbol("y")
-    >>> print(statements(share_ratios({"a": x / y, "b": y / x}), ""))
-    t0_ = x * y
-    t1_ = 1.0 / t0_
-    t2_ = x * t1_
-    t3_ = x * t2_
-    t4_ = y * t1_
-    t5_ = y * t4_
-    a, b = t3_, t5_
+    >>> print(lines_source("lines", share_ratios({"a": x / y, "b": y / x})))
+    def lines(x, y):
+        t0_ = x * y
+        t1_ = 1.0 / t0_
+        t2_ = x * t1_
+        t3_ = x * t2_
+        t4_ = y * t1_
+        t5_ = y * t4_
+        return {"a": t3_, "b": t5_}
     """
     order = ordered(outputs.values())
     places = {id(item): place for place, item in enumerate(order)}

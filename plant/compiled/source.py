@@ -5,85 +5,23 @@ from pathlib import Path
 
 from plant.compiled.expression import Expression, ordered
 
-_TEMPLATES: Mapping[str, str] = {
-    **{sign: f"{{0}} {sign} {{1}}" for sign in ("+", "-", "*", "/", "<", "<=", ">", ">=")},
-    **{name: f"math.{name}({{0}})" for name in ("sqrt", "exp", "log", "tanh")},
-    "present": "{0} == {0}",
-    "abs": "abs({0})",
-    "sign": "(1.0 if {0} > 0.0 else (-1.0 if {0} < 0.0 else 0.0))",
-    "where": "({1} if {0} else {2})",
-}
-"""How each operation is spelt; a new one needs a line here and one in `expression.local_derivatives`."""
-
 CALLED = ("present", "sign", "sqrt", "exp", "log", "tanh", "ratios", "roots", "where", "fma")
 """Functions of `plant.compiled.vector` that lines call: no symbol may have their names."""
 
 _CALLS: Mapping[str, str] = {
-    **_TEMPLATES,
-    **{name: f"{name}({{0}})" for name in CALLED[:-4]},
+    **{sign: f"{{0}} {sign} {{1}}" for sign in ("+", "-", "*", "/", "<", "<=", ">", ">=")},
+    **{name: f"{name}({{0}})" for name in ("abs", *CALLED[:-4])},
     "where": "where({0}, {1}, {2})",
     "fma": "fma({0}, {1}, {2})",
     "fnma": "fma(-{0}, {1}, {2})",
     "fms": "fma({0}, {1}, -{2})",
 }
-"""How each operation is spelt by them."""
+"""How each operation is spelt; a new one needs a line here and one in `expression.local_derivatives`."""
 
 _TEXTS = [Path(__file__).with_name(f"{name}.py").read_text("utf-8") for name in ("vector", "intrinsics")]
 
 INTRINSICS = "".join(_TEXTS).replace("from plant.compiled.vector", "# from")
 """What a kernel begins with that Numba compiles and that calls them: it contains all that it calls."""
-
-
-def statements(outputs: Mapping[str, Expression], indent: str, temporary: str = "t") -> str:
-    """Return assignments that compute the outputs from their symbols, one operation a line.
-
-    All outputs are assigned at the end, so an output may have the name of an input.
-
-    Parameters
-    ----------
-    outputs : Mapping[str, Expression]
-        What is computed, by the variable that receives it.
-    indent : str
-        White space in front of every line.
-    temporary : str
-        Beginning of the temporaries' names. Parts of one function need different ones: Numba takes a time that grows
-        with the square of the count of names assigned twice.
-
-    Examples
-    --------
-    >>> from plant.compiled.expression import symbol
-    >>> x = symbol("x")
-    >>> print(statements({"y": x * x + 1.0}, ""))
-    t0_ = x * x
-    t1_ = t0_ + 1.0
-    y = t1_
-    """
-    names: dict[int, str] = {}
-    lines = _operations(ordered(outputs.values()), names, temporary, indent, _TEMPLATES)
-    targets = [(target, names[id(value)]) for target, value in outputs.items()]
-    wanted = [(target, name) for target, name in targets if target != name]
-    if wanted:
-        left = ", ".join(target for target, _ in wanted)
-        right = ", ".join(name for _, name in wanted)
-        lines.append(f"{indent}{left} = {right}")
-    return "\n".join(lines)
-
-
-def _operations(
-    items: Sequence[Expression], names: dict[int, str], letter: str, indent: str, spelt: Mapping[str, str]
-) -> list[str]:
-    """Return one line an operation; note the variable of each in `names`."""
-    lines: list[str] = []
-    for item in items:
-        if not item.arguments:
-            names[id(item)] = leaf(item)
-        else:
-            operands = [names[id(argument)] for argument in item.arguments]
-            # the underscore: Numba names a load of t7 at 2854 as it names one of t72 at 854
-            name = f"{letter}{len(lines)}_"
-            names[id(item)] = name
-            lines.append(f"{indent}{name} = {spelt[item.operation].format(*operands)}")
-    return lines
 
 
 def lines_source(name: str, outputs: Mapping[str, Expression]) -> str:
@@ -110,7 +48,16 @@ def lines_source(name: str, outputs: Mapping[str, Expression]) -> str:
         return {"x": t1_}
     """
     names: dict[int, str] = {}
-    return function_source(name, outputs, _operations(ordered(outputs.values()), names, "t", "", _CALLS), names)
+    lines: list[str] = []
+    for item in ordered(outputs.values()):
+        if item.arguments:
+            # the underscore: Numba names a load of t7 at 2854 as it names one of t72 at 854
+            target = f"t{len(lines)}_"
+            lines.append(f"{target} = {spelt(item, names)}")
+            names[id(item)] = target
+        else:
+            names[id(item)] = leaf(item)
+    return function_source(name, outputs, lines, names)
 
 
 def function_source(
@@ -157,7 +104,7 @@ def leaf(item: Expression) -> str:
 
 
 def spelt(item: Expression, names: Mapping[int, str]) -> str:
-    """Return how `plant.compiled.vector` spells an operation.
+    """Return how an operation is spelt.
 
     Parameters
     ----------

@@ -1,5 +1,8 @@
 """The misfit's kernel is Python: its text, run as it stands, gives what the machine code gives, to the last bit."""
 
+import ctypes
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -10,6 +13,10 @@ from estimation.models.greybox import GreyBoxModel
 from plant.eha.model import EhaParameters
 from plant.solvers.steps import parameter_row
 from tests.kernels import functions_of, text_of
+
+
+def _numbers(address: int, count: int) -> "ctypes.Array[ctypes.c_double]":
+    return (ctypes.c_double * count).from_address(address)
 
 
 @pytest.mark.parametrize("model", [FLOW_FORM, MASS_FLOW_FORM], ids=lambda model: model.name)
@@ -26,8 +33,11 @@ def test_the_same_bits_as_python(model: GreyBoxModel, monkeypatch: pytest.Monkey
     blocks = -(-samples // block)
     found, wanted = ((np.zeros((1, blocks)), np.zeros((1, blocks, theta.size))) for _ in range(2))
     sums = compile_kernel(model)(*given, *found)
+    file: Any = functions_of(text)
+    file.load = lambda address: tuple(_numbers(address, file.WIDTH * (1 + file.UNKNOWNS + file.JUMPS)))
+    file.store = lambda point, address: _numbers(address, len(point)).__setitem__(slice(None), point)
     with np.errstate(all="ignore"):
-        expected = functions_of(text).run(*given, *wanted)
+        expected = greybox_loops.run(file, *given, *wanted)
     for one, other in zip((*sums, *found), (*expected, *wanted), strict=True):
         np.testing.assert_array_equal(one, other)
     assert np.isfinite(sums[0])

@@ -1,8 +1,5 @@
 """Elimination finds the Jacobian that differentiation forward finds, with fewer operations."""
 
-import math
-from collections.abc import Mapping
-
 import numpy as np
 import pytest
 
@@ -10,18 +7,13 @@ from plant.compiled.elimination import eliminated_jacobian
 from plant.compiled.expression import ZERO, Expression, jacobian, ordered, symbol
 from plant.compiled.functions import absolute, maximum, sqrt, where
 from plant.compiled.simplify import share_reciprocals
-from plant.compiled.source import statements
 from plant.eha.circuit import circuit_derivative
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.model import EhaParameters, reduced_derivative
 from plant.solvers.steps import parameter_symbols
+from tests.kernels import computed
 
 X, Y, U = symbol("x"), symbol("y"), symbol("u")
-
-
-def values(outputs: Mapping[str, Expression], **inputs: float) -> dict[str, float]:
-    exec(statements(outputs, ""), {"math": math}, inputs)  # noqa: S102  # the text is what is under test
-    return {name: inputs[name] for name in outputs}
 
 
 def both(outputs: list[Expression], inputs: list[Expression]) -> tuple[dict[str, Expression], dict[str, Expression]]:
@@ -37,7 +29,7 @@ def test_it_is_the_jacobian(x: float, y: float) -> None:
     shared = maximum(X * Y, -0.5) / (1.0 + absolute(X))
     outputs = [shared * shared - Y, where(X > Y, sqrt(1.0 + shared * shared), -shared), X, X * 0.0 + 1.0]
     found, wanted = both([o + ZERO for o in outputs], [X, Y, U])
-    assert values(found, x=x, y=y) == pytest.approx(values(wanted, x=x, y=y), rel=1e-13)
+    assert computed(found, x=x, y=y) == pytest.approx(computed(wanted, x=x, y=y), rel=1e-13)
 
 
 def test_what_does_not_depend_vanishes() -> None:
@@ -49,7 +41,7 @@ def test_what_was_not_chosen_is_never_multiplied_by_zero() -> None:
     ((slope,),) = eliminated_jacobian([where(X > 1.0, 1.0 / X, 0.0) * Y], [X])
     assert slope.operation == "where"
     assert slope.arguments[2] is ZERO
-    assert values({"s": slope}, x=2.0, y=3.0)["s"] == -0.75
+    assert computed({"s": slope}, x=2.0, y=3.0)["s"] == -0.75
 
 
 def test_it_needs_fewer_products_on_the_circuit() -> None:
@@ -68,13 +60,13 @@ def test_it_is_the_jacobian_of_the_reduced_plant() -> None:
         name: float(value)
         for name, value in zip([*vars(p), "x0", "x1", "x2", "u"], rng.uniform(0.5, 2.0, 60), strict=False)
     }
-    assert values(found, **inputs) == pytest.approx(values(wanted, **inputs), rel=1e-12)
+    assert computed(found, **inputs) == pytest.approx(computed(wanted, **inputs), rel=1e-12)
 
 
 def test_shared_reciprocals_change_the_last_digits_only() -> None:
     outputs = {"a": X / Y, "b": (X + 1.0) / Y, "c": X / (Y * Y), "d": Y / 3.0}
-    found = values(share_reciprocals(outputs, ()), x=0.7, y=1.3)
-    assert found == pytest.approx(values(outputs, x=0.7, y=1.3), rel=1e-15)
+    found = computed(share_reciprocals(outputs, ()), x=0.7, y=1.3)
+    assert found == pytest.approx(computed(outputs, x=0.7, y=1.3), rel=1e-15)
     counts = [
         sum(item.operation == "/" for item in ordered(one.values()))
         for one in (share_reciprocals(outputs, ()), outputs)

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.compiled.expression import constant, symbol
 from plant.compiled.functions import absolute, exp, maximum, minimum, sign, sqrt, tanh, where
-from plant.compiled.source import statements, symbols_in
+from plant.compiled.source import lines_source, symbols_in
 from plant.eha.model import EhaParameters, lumped_step, reduced_derivative
 from plant.solvers.steps import GAMMA, StepFunction, parameter_row, ros2_step
 from plant.solvers.trajectory import compile_trajectory
+from tests.kernels import computed
 
 STEP = 1e-4
 SPEEDS = (100.0, 104.0)
@@ -70,9 +71,8 @@ def test_every_function_is_spelt() -> None:
         "c": where(x >= y, where(x < 1.0, x, y), constant(-2.0)),
     }
     for values in ((0.7, -1.2), (-0.3, 0.4), (2.0, 2.0)):
-        scope = SimpleNamespace(x=values[0], y=values[1])
-        exec(statements(outputs, ""), {"math": math}, vars(scope))  # noqa: S102  # the text is what is under test
         u, v = values
+        scope = SimpleNamespace(**computed(outputs, x=u, y=v))
         assert scope.a == pytest.approx(math.sqrt(abs(u)) + math.exp(v) - math.tanh(u * v) / 3.0, rel=1e-15)
         assert scope.b == (max(u, 0.5) if u <= v else min(v, -0.5)) * math.copysign(1.0, u)
         assert scope.c == ((u if u < 1.0 else v) if u >= v else -2.0)
@@ -80,14 +80,12 @@ def test_every_function_is_spelt() -> None:
 
 def test_outputs_may_have_the_names_of_inputs() -> None:
     x, y = symbol("x"), symbol("y")
-    scope: dict[str, float] = {"x": 3.0, "y": 5.0}
-    exec(statements({"x": y, "y": x}, ""), {}, scope)  # noqa: S102  # the text is what is under test
-    assert (scope["x"], scope["y"]) == (5.0, 3.0)
+    assert computed({"x": y, "y": x}, x=3.0, y=5.0) == {"x": 5.0, "y": 3.0}
 
 
 def test_a_common_sub_expression_is_computed_once() -> None:
     x = symbol("x")
-    assert statements({"a": tanh(x) + 1.0, "b": tanh(x) * 2.0}, "").count("math.tanh") == 1
+    assert lines_source("lines", {"a": tanh(x) + 1.0, "b": tanh(x) * 2.0}).count("tanh") == 1
 
 
 def test_the_lumped_step_reads_only_the_parameters_that_it_uses() -> None:
