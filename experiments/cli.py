@@ -18,6 +18,7 @@ from experiments.command import (
     diagnose,
     estimate,
     export,
+    fleet,
     identifiability,
     identify,
     inspect,
@@ -100,6 +101,7 @@ VERBS = (
     conditions,
     batch,
     compare,
+    fleet,
     motor_paper,
     size_cylinder,
 )

@@ -1,10 +1,13 @@
 """The class of a log, as a batch asks for it: the one place that knows how a log is diagnosed."""
 
+import json
+import math
 import warnings
 from typing import Any
 
 from estimation.finding import Finding, Outcome
 from estimation.notes import ChannelCode, SensorCode
+from experiments.log_pages.entries import quantity_entry
 from faults.diagnosis.diagnose import diagnose_log
 from faults.notes import ClassCode
 from plant.eha.rig import Rig
@@ -29,8 +32,8 @@ def diagnosed(record: Record, rig: Rig) -> dict[str, Any]:
     Returns
     -------
     dict[str, Any]
-        Entries of a row: outcome, reason, and where there is a class, it, its runner-up and the ratio of their
-        probabilities. A log that is in none of the nine is a mismatch without a class.
+        Entries of a row: outcome, reason, severities, and where there is a class, it, its runner-up and the ratio of
+        their probabilities. A log that is in none of the nine is a mismatch without a class.
 
     Raises
     ------
@@ -49,14 +52,25 @@ def diagnosed(record: Record, rig: Rig) -> dict[str, Any]:
     if not found.probabilities:
         return _without_class(found)
     (best, first), (second, other) = sorted(found.probabilities.items(), key=lambda item: -item[1])[:2]
-    margin = first / max(other, 1e-300)
+    margin, severities = first / max(other, 1e-300), {"quantities": json.dumps(_severities(found))}
     if found.unknown:
         said = f"in none of the nine conditions, the nearest is {best}: {'; '.join(map(str, found.against))}"
-        return {"outcome": "mismatch", "reason": said, "trusted": False}
+        return {"outcome": "mismatch", "reason": said, "trusted": False, **severities}
     if margin < TOLD_APART:
         said = f"no class: under this drive {best} and {second} move alike; drive the actuator, at best with steps"
         return {"outcome": "not_observable", "reason": said, "margin": margin}
-    return {"outcome": "ok", "found_condition": best, "runner_up": second, "margin": margin, "trusted": True}
+    row = {"outcome": "ok", "found_condition": best, "runner_up": second, "margin": margin, "trusted": True}
+    return {**row, **severities}
+
+
+def _severities(found: Finding) -> dict[str, Any]:
+    """Return how bad it is, each severity with that of the healthy actuator and its limit."""
+    healthy, limits = found.healthy, found.evidence.diagnosis.limits
+    return {
+        name: {**quantity_entry(one), "healthy": float(healthy[name]), "limit": limits.get(name)}
+        for name, one in found.severities.items()
+        if one.value is None or math.isfinite(one.value)
+    }
 
 
 def _without_class(found: Finding) -> dict[str, Any]:

@@ -38,7 +38,9 @@ commands = typer.Typer()
 
 @commands.command(epilog="Example: hydrostate batch fleet-archive --logs 'archive/**/*.csv' --out results/fleet")
 def batch(
-    study: Annotated[str, argument("STUDY", "Study file (TOML), or one that comes along: eha-paper, fleet-archive.")],
+    study: Annotated[
+        str, argument("STUDY", "Study file (TOML), or the name of one that is installed: eha-paper, fleet-archive.")
+    ],
     out: Annotated[
         str | None, option("STORE", "Folder or URL (s3://...) of the store; results/<study> by default.", "--out", "-o")
     ] = None,
@@ -83,7 +85,7 @@ def batch(
     begin = time.perf_counter()
     source = f"{SHIPPED}/{study}.toml" if shipped else Path(study).name
     with store.writing():
-        tally, before = _run(plan, store, source, width, cluster, max_failures, resume, retry_failed)
+        tally, before = run_plan(plan, store, source, width, cluster, max_failures, resume, retry_failed)
         report = write_report(store, store.folder)
     _finish(plan, store, tally, before, report, as_json, time.perf_counter() - begin)
 
@@ -110,16 +112,28 @@ def _say_plan(plan: "Plan", store: "PartStore", workers: int, again: bool, as_js
     emit(f"about {duration(seconds)} with {width} (a rough guess from typical costs)")
 
 
-def _run(
+def run_plan(
     plan: "Plan",
     store: "PartStore",
     source: str,
     workers: int,
-    cluster: str | None,
-    max_failures: int | None,
-    resume: bool,
-    again: bool,
+    cluster: str | None = None,
+    max_failures: int | None = None,
+    resume: bool = True,
+    again: bool = False,
 ) -> "tuple[Tally, int]":
+    """Run what a store does not have yet, with progress on standard error.
+
+    Parameters
+    ----------
+    source : str
+        What the study is called in the manifest.
+
+    Returns
+    -------
+    tuple of Tally and int
+        What was run, and how many cases the store had before.
+    """
     from experiments.batch.runner import manifest_of, run_batch
     from experiments.running.executors import open_executor
 

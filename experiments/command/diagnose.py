@@ -64,9 +64,9 @@ def diagnose(
 ) -> None:
     """Say what is wrong: which of nine conditions, how probable, how bad, or that it is none of them.
 
-    A circuit is fitted to each log and laid beside the nine conditions of leakage and friction; nine models and
-    nine filters speak beside it. The probabilities were calibrated on simulated logs. Severities come with 95 %
-    intervals. In the table of scores a model's error is in velocity [m/s], or relative to the signals [dimensionless]
-    where differential pressure counts too. The seed draws the tests behind the transfer functions.
+    A hydraulic circuit is fitted to each log and compared with the nine conditions of leakage and friction; the
+    errors of nine models and nine filters count too. The probabilities were calibrated on simulated logs. Severities
+    come with 95 % intervals. In the table of scores a model's error is in velocity [m/s], or relative to the signals
+    [dimensionless] where differential pressure counts too. The seed draws the tests behind the transfer functions.
     """
     run_log_verb(context, "diagnose", "diagnosing", locals())

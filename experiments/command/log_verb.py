@@ -72,7 +72,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
             chosen.figure(found, log.name, figure)
         page = figure_path(report, log, len(logs))
         if page is not None:
-            write_whole(page, (chosen.page or _default_page)({"file": str(log), **result}, found, record), "--report")
+            write_whole(page, page_of(chosen, {"file": str(log), **result}, found, record), "--report")
         return result
 
     batch = run_logs(logs, work, {**chosen.blank, **about}, doing)
@@ -89,7 +89,14 @@ def _agreement(result: Result, found: "Finding") -> list[str]:
     return ["as expected" if result["expected"] in found.named else f"{result['expected']} was expected"]
 
 
-def _default_page(result: Result, found: "Finding", record: "Record") -> str:
+def page_of(chosen: "LogVerb", result: Result, found: "Finding", record: "Record") -> str:
+    """Return the page of a log: that of its kind of actuator, or the one that all have.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of the log, with ``file`` and ``rig``.
+    """
     from experiments.log_pages.finding_page import finding_page
 
-    return finding_page(result, found, record)
+    return (chosen.page or finding_page)(result, found, record)

@@ -12,6 +12,7 @@ NEEDED = (
     ('class="charts"', "uplot/uPlot.iife.min.js"),
     ('class="charts"', "charts.js"),
     ('class="limit"', "limits.js"),
+    ('class="fleet-table"', "fleet.js"),
 )
 """A mark that a page may hold, and the script that then goes with it, in their order."""
 

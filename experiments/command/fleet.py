@@ -1,0 +1,157 @@
+"""`hydrostate fleet FOLDER_OR_STORE`: one page with a row an actuator, the sick ones on top."""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from experiments.command.json_output import write_whole
+from experiments.command.options import Columns, Plant, RigFile, argument, load_actuator, load_columns, option
+from experiments.command.terminal import SOME_FAILED, USAGE, emit, note
+from plant.errors import HydrostateError, require_known
+
+if TYPE_CHECKING:
+    from experiments.batch.part_store import PartStore
+    from experiments.fleet.naming import Named
+
+PAGE = "index.html"
+
+SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".gz", ".zst", ".parquet", ".feather", ".arrow", ".mat", ".h5", ".hdf5")
+OTHERS = (".tdms", ".mf4", ".mdf", ".xlsx")
+"""Endings of files that are taken for logs; the second need a package for their format."""
+
+commands = typer.Typer()
+
+
+@commands.command(epilog="Example: hydrostate fleet archive --pattern '{actuator}_{date}.csv' --out fleet")
+def fleet(
+    place: Annotated[str, argument("FOLDER_OR_STORE", "Folder of logs, or the store of a batch that diagnosed some.")],
+    out: Annotated[Path, option("DIR", "Folder of the pages.", "--out", "-o")] = Path("fleet"),
+    pattern: Annotated[
+        str | None, option("PATTERN", "How files are named, such as '{actuator}_{date}.csv'.", "--pattern")
+    ] = None,
+    names: Annotated[
+        Path | None, option("CSV", "Table with the columns file, actuator, and date if known.", "--names")
+    ] = None,
+    limit: Annotated[
+        list[str] | None, option("NAME=VALUE", "Limit of a severity in its unit, such as leakage_flow=2.", "--limit")
+    ] = None,
+    pages: Annotated[int, option("N", "Write the log's own page for the N sickest.", "--pages", min=0)] = 20,
+    plant: Plant = None,
+    rig: RigFile = None,
+    columns: Columns = None,
+    workers: Annotated[
+        int | None, option("N", "Processes, one thread each; the machine's cores by default.", "--workers", min=1)
+    ] = None,
+) -> None:
+    """Write the page of a fleet: which actuators are sick, how badly, and where their logs' pages are.
+
+    The logs of a folder are diagnosed into a store beside the page; the same command goes on where it stopped. The last
+    line of standard output is the page's path.
+    """
+    from experiments.batch.part_store import open_store
+    from experiments.fleet.actuators import actuator_rows
+    from experiments.fleet.log_pages import write_pages
+    from experiments.fleet.page import fleet_page
+    from experiments.fleet.rows import log_rows
+
+    limits = _limits(limit or [])
+    store = open_store(place)
+    from_logs = store.manifest() is None
+    if from_logs:
+        store = _diagnosed(Path(place), out, plant, rig, load_columns(columns), workers or os.cpu_count() or 1)
+    table = store.rows(["file", "verb", "outcome", "found_condition", "reason", "quantities"]).to_pylist()
+    files = [row["file"] for row in table if row["file"]]
+    rows = actuator_rows(log_rows(table, _names(files, pattern, names), limits))
+    if not rows:
+        raise HydrostateError(f"{place}: must hold logs that were diagnosed (verb diagnose), there are none")
+    base = Path(place) if from_logs else Path()
+    links = write_pages(rows, out, pages, _page_writer(base, plant, rig, columns))
+    write_whole(out / PAGE, fleet_page(rows, links, Path(place).name), "--out", parents=True)
+    failed = sum(one.state == "failed" for row in rows for one in row.logs)
+    total = sum(len(row.logs) for row in rows)
+    if failed:
+        note(f"{failed} of {total} logs could not be read; the page says why")
+    emit(f"{out / PAGE}")
+    if failed:
+        raise typer.Exit(USAGE if failed == total else SOME_FAILED)
+
+
+def _limits(texts: Sequence[str]) -> dict[str, float]:
+    from faults.diagnosis.severity import UNITS
+
+    found: dict[str, float] = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        require_known("--limit", name, list(UNITS))
+        try:
+            found[name] = float(value)
+        except ValueError as error:
+            raise HydrostateError(f"--limit {name} must be a number in {UNITS[name]}, got {value!r}") from error
+    return found
+
+
+def _names(files: Sequence[str], pattern: str | None, names: Path | None) -> "Mapping[str, Named]":
+    from experiments.fleet.naming import by_pattern, by_table
+
+    if pattern is not None and names is not None:
+        raise HydrostateError("--pattern and --names say the same: give one of them")
+    if pattern is not None:
+        return by_pattern(files, pattern)
+    return {} if names is None else by_table(files, names)
+
+
+def _diagnosed(
+    folder: Path, out: Path, plant: str | None, rig: Path | None, columns: Mapping[str, str], workers: int
+) -> "PartStore":
+    """Diagnose the logs of a folder into a store beside the page."""
+    from experiments.batch.cases import plan_study
+    from experiments.batch.part_store import open_store
+    from experiments.batch.study_file import parse_study
+    from experiments.command.batch import run_plan
+
+    kind, _ = load_actuator(plant, rig)
+    found = sorted(
+        one for one in folder.rglob("*") if one.suffix.lower() in (*SUFFIXES, *OTHERS) and out not in one.parents
+    )
+    if not found:
+        raise HydrostateError(f"{folder}: must be a folder with logs or a store, no file in it ends like a log")
+    ends = sorted({one.suffix for one in found})
+    methods = [{"verb": "diagnose"}]
+    logs = [{"glob": f"**/*{end}", "columns": dict(columns), "methods": methods} for end in ends]
+    content: dict[str, Any] = {
+        "name": "fleet",
+        "plant": kind.name,
+        "rig": str(rig.resolve()) if rig else "",
+        "logs": logs,
+    }
+    plan = plan_study(parse_study(content, f"{folder}"), folder)
+    store = open_store(out / "store")
+    with store.writing():
+        run_plan(plan, store, "fleet", workers)
+    return store
+
+
+def _page_writer(base: Path, plant: str | None, rig: Path | None, columns: Any) -> Callable[[str, Path], bool]:
+    """Return what writes the page of a log, and says whether the log is still there."""
+    from experiments.actuators import offered
+    from experiments.command.log_verb import page_of
+    from experiments.command.logs import caught, read_log
+
+    kind, bench = load_actuator(plant, rig)
+    chosen, mapping = offered(kind, "diagnose"), load_columns(columns)
+    prepared = chosen.prepare(bench, {**chosen.options, "seed": 0})
+
+    def write(file: str, path: Path) -> bool:
+        if not (base / file).exists():
+            return False
+        with caught():
+            record = read_log(base / file, bench.columns, mapping, kind.required)
+            found = chosen.run(record, *prepared)
+        result = {**chosen.blank, "file": file, "rig": bench.name, **chosen.entries(found)}
+        write_whole(path, page_of(chosen, result, found, record), "--out", parents=True)
+        return True
+
+    return write

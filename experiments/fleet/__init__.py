@@ -1,0 +1,1 @@
+"""Many logs of many actuators: which are sick, and which are getting worse."""

@@ -1,0 +1,109 @@
+"""The page of a fleet: one row an actuator, the sick ones on top."""
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pandas as pd
+from markupsafe import Markup
+
+from experiments.fleet.actuators import ActuatorRow
+from experiments.fleet.rows import STATES, LogRow
+from experiments.page.numbers import number
+from experiments.page.render import render_page
+from experiments.page.tables import Cell, Column
+from experiments.page.words import in_words
+
+MOST_STILL = 100
+"""Rows of the table that stands where scripts do not run, and on paper [count]."""
+
+SICK = ("over", "likely")
+"""States of actuators that need work."""
+
+COLUMNS: Sequence[Mapping[str, Any]] = (
+    {"label": "actuator", "kind": "name"},
+    {"label": "state", "kind": "state", "words": STATES},
+    {"label": "found", "kind": "text"},
+    {"label": "worst", "kind": "text"},
+    {"label": "of the limit", "kind": "number", "unit": "%"},
+    {"label": "last log", "kind": "text"},
+    {"label": "logs", "kind": "number"},
+)
+
+SHOWN: Mapping[str, str] = {
+    "leakage_flow": "leakage",
+    "velocity_lost": "velocity lost",
+    "added_friction": "added friction",
+    "pressure_rise": "pressure rise",
+    "bulk_modulus": "bulk modulus",
+}
+"""Severities as a column has room for."""
+
+
+def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: str) -> str:
+    """Return the page of a fleet.
+
+    Parameters
+    ----------
+    rows : sequence of ActuatorRow
+        The sickest first.
+    links : Mapping[str, str]
+        Relative path of an actuator's own page, by its name.
+    source : str
+        What the page is of.
+    """
+    counts = Counter(row.last.state for row in rows)
+    cells = [row_cells(row) for row in rows]
+    data = {"columns": COLUMNS, "rows": cells, "links": [links.get(row.name) for row in rows]}
+    text = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
+    facts = {
+        "source": source,
+        "title": _title(counts, len(rows)),
+        "sickest": [row.name for row in rows if row.last.state in SICK][:5],
+        "counts": [(words, counts[name], name) for name, words in STATES.items() if counts[name]],
+        "logs": sum(len(row.logs) for row in rows),
+        "data": Markup(text),  # noqa: S704 - JSON in which no tag can begin
+        "most": MOST_STILL,
+        "still": pd.DataFrame(cells[:MOST_STILL], columns=[column["label"] for column in COLUMNS]),
+    }
+    columns = [
+        Column("state", words=lambda name: Cell(STATES[name], f"fleet-{name}")),
+        Column("of the limit", unit="%", digits=3),
+    ]
+    shown = [next((one for one in columns if one.source == each["label"]), each["label"]) for each in COLUMNS]
+    return render_page("fleet/fleet.html", facts, {"still": shown}, {})
+
+
+def _title(counts: Mapping[str, int], total: int) -> str:
+    sick = sum(counts[name] for name in SICK)
+    if not sick:
+        return f"None of {total} actuators is past a limit."
+    return f"{sick} of {total} actuators {'is' if sick == 1 else 'are'} past a limit."
+
+
+def row_cells(row: ActuatorRow) -> list[Any]:
+    """Return the cells of an actuator, as `COLUMNS` lists them.
+
+    Returns
+    -------
+    list
+        Text, numbers, or None where nothing is known.
+    """
+    last = row.last
+    share = None if last.worst is None else round(100.0 * last.worst.share, 1)
+    return [row.name, last.state, found_in(last), worst_in(last), share, last.named.date, len(row.logs)]
+
+
+def found_in(log: LogRow) -> str:
+    """Return what was found in a log, or why nothing was, without the folder that the log was in."""
+    return in_words(log.condition) if log.condition else log.reason.split(f"{log.file}: ", 1)[-1]
+
+
+def worst_in(log: LogRow) -> str:
+    """Return the severity that is nearest to its limit, or farthest beyond."""
+    one = log.worst
+    if one is None:
+        return ""
+    scale, unit = (1e-6, "MPa") if one.unit == "Pa" else (1.0, one.unit)
+    return f"{SHOWN.get(one.name, one.name.replace('_', ' '))} {number(scale * one.value, 3)} {unit}"

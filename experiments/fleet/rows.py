@@ -1,0 +1,147 @@
+"""One row a log, from the rows of a batch store: state, worst severity, and how near to its limit that is."""
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from experiments.fleet.naming import UNNAMED, Named
+
+STATES: Mapping[str, str] = {
+    "over": "past a limit",
+    "likely": "probably past a limit",
+    "unknown": "no verdict",
+    "open": "may be past a limit",
+    "within": "within limits",
+    "failed": "not read",
+}
+"""States of a log, the most urgent first, and what a reader is told."""
+
+RANKS: Mapping[str, int] = {name: place for place, name in enumerate(STATES)}
+
+
+@dataclass(frozen=True)
+class Amount:
+    """A severity of a log.
+
+    Parameters
+    ----------
+    value, low, high : float
+        Estimate and 95 % interval [unit].
+    healthy, limit : float
+        Of the healthy actuator, and where it stops being sound [unit].
+    """
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    healthy: float
+    limit: float
+
+    @property
+    def share(self) -> float:
+        """How far it is from healthy to the limit [fraction]: 1 at the limit, more beyond."""
+        return (self.value - self.healthy) / (self.limit - self.healthy)
+
+    @property
+    def std(self) -> float:
+        """Standard deviation, half the interval's width over 1.96 [unit]."""
+        return 0.5 * (self.high - self.low) / 1.96
+
+    @property
+    def state(self) -> str:
+        """Where value and interval lie to the limit, one of `STATES`."""
+        sign = math.copysign(1.0, self.limit - self.healthy)
+        limit, value = sign * self.limit, sign * self.value
+        low, high = sorted((sign * self.low, sign * self.high))
+        if low > limit:
+            return "over"
+        if value > limit:
+            return "likely"
+        return "open" if high > limit else "within"
+
+
+@dataclass(frozen=True)
+class LogRow:
+    """One log of a fleet.
+
+    Parameters
+    ----------
+    state : str
+        One of `STATES`.
+    condition : str
+        That was found; empty where none was.
+    reason : str
+        Why there is none.
+    """
+
+    file: str
+    named: Named
+    state: str
+    condition: str
+    reason: str
+    amounts: Mapping[str, Amount]
+
+    @property
+    def worst(self) -> Amount | None:
+        """The severity that is farthest towards its limit."""
+        return max(self.amounts.values(), key=lambda one: one.share, default=None)
+
+    @property
+    def order(self) -> tuple[int, float]:
+        """The sickest first."""
+        return RANKS[self.state], -(self.worst.share if self.worst else 0.0)
+
+
+def log_rows(
+    rows: Iterable[Mapping[str, Any]], names: Mapping[str, Named], limits: Mapping[str, float]
+) -> list[LogRow]:
+    """Return one row a log that was diagnosed.
+
+    Parameters
+    ----------
+    rows : iterable of Mapping
+        Of a batch store, with ``file``, ``verb``, ``outcome``, ``found_condition``, ``reason`` and ``quantities``.
+    names : Mapping[str, Named]
+        By file.
+    limits : Mapping[str, float]
+        That replace those of the store, by severity [its unit].
+
+    Returns
+    -------
+    list of LogRow
+        In the order of the store.
+    """
+    return [
+        _row(row, names.get(row["file"], UNNAMED), limits) for row in rows if row["file"] and row["verb"] == "diagnose"
+    ]
+
+
+def _row(row: Mapping[str, Any], named: Named, limits: Mapping[str, float]) -> LogRow:
+    amounts = _amounts(row["quantities"], limits)
+    return LogRow(row["file"], named, _state(row, amounts), row["found_condition"] or "", row["reason"] or "", amounts)
+
+
+def _amounts(text: str | None, limits: Mapping[str, float]) -> dict[str, Amount]:
+    """Return the severities that have a value, an interval and a limit."""
+    found: dict[str, Amount] = {}
+    for name, one in json.loads(text or "{}").items():
+        limit = limits.get(name, one.get("limit"))
+        told = [one["value"], *(one["ci95"] or ()), one.get("healthy"), limit]
+        numbers = [float(number) for number in told if number is not None and math.isfinite(number)]
+        if len(numbers) == len(fields(Amount)) - 2 and limit != one["healthy"]:
+            found[name] = Amount(name, one["unit"], *numbers)
+    return found
+
+
+def _state(row: Mapping[str, Any], amounts: Mapping[str, Amount]) -> str:
+    if row["outcome"] == "failed":
+        return "failed"
+    if row["outcome"] != "ok":
+        return "unknown"
+    if amounts:
+        return min((one.state for one in amounts.values()), key=RANKS.__getitem__)
+    return "within" if row["found_condition"] in ("normal", "healthy") else "over"

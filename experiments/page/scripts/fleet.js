@@ -1,0 +1,113 @@
+// A table of many rows: only those in sight are in the page. Headings sort, words and a state filter.
+"use strict";
+
+(() => {
+  const ROW = 36; // height of a row [px], as in the style
+  const SPARE = 12; // rows above and below those in sight
+
+  function element(tag, attributes = {}, ...children) {
+    const made = document.createElement(tag);
+    for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+    made.append(...children);
+    return made;
+  }
+
+  const numberText = new Intl.NumberFormat("en", { maximumSignificantDigits: 3, useGrouping: false });
+
+  function cell(column, value, link) {
+    if (column.kind === "number") {
+      const words = value === null ? "–" : `${numberText.format(value)}${column.unit ? ` ${column.unit}` : ""}`;
+      return element("td", { class: "number" }, words);
+    }
+    if (column.kind === "state") return element("td", { class: `fleet-${value}` }, column.words[value]);
+    if (column.kind === "name") {
+      return element("th", { scope: "row" }, link ? element("a", { href: link }, value) : value);
+    }
+    return element("td", { title: value }, value);
+  }
+
+  function start(holder) {
+    const { columns, rows, links } = JSON.parse(holder.querySelector("script.rows").textContent);
+    const states = columns.findIndex((column) => column.kind === "state");
+    const ranks = Object.keys(columns[states].words);
+    let order = rows.map((_, i) => i);
+    let sorted = { column: -1, down: false };
+
+    const words = element("input", { type: "search", id: "fleet-words", placeholder: "name, condition, ..." });
+    const state = element("select", { id: "fleet-state" }, element("option", { value: "" }, "all"));
+    for (const name of ranks) state.append(element("option", { value: name }, columns[states].words[name]));
+    const count = element("p", { class: "place", role: "status" });
+    const head = element("tr");
+    const body = element("tbody");
+    const table = element("table", { class: "fleet" }, element("caption", {}, holder.dataset.caption), element("thead", {}, head), body);
+    const view = element("div", { class: "window", tabindex: "0", role: "region", "aria-label": holder.dataset.caption }, table);
+
+    function key(row, column) {
+      const value = rows[row][column];
+      return columns[column].kind === "state" ? ranks.indexOf(value) : value;
+    }
+
+    function compare(one, other) {
+      const [a, b] = [key(one, sorted.column), key(other, sorted.column)];
+      if (a === b) return one - other;
+      if (a === null || a === "") return 1; // what is not known stands last, either way
+      if (b === null || b === "") return -1;
+      const less = typeof a === "string" ? a.localeCompare(b, "en", { numeric: true }) : a - b;
+      return sorted.down ? -less : less;
+    }
+
+    function arrange() {
+      const asked = words.value.trim().toLowerCase().split(/\s+/).filter(Boolean);
+      const fits = (row) => (!state.value || rows[row][states] === state.value)
+        && asked.every((word) => rows[row].some((value) => typeof value === "string" && value.toLowerCase().includes(word)));
+      order = rows.map((_, i) => i).filter(fits);
+      if (sorted.column >= 0) order.sort(compare);
+      count.textContent = `${order.length} of ${rows.length} rows`;
+      table.setAttribute("aria-rowcount", String(order.length + 1));
+      view.scrollTop = 0;
+      draw();
+    }
+
+    function spacer(rowsAway) {
+      const gap = element("tr", { "aria-hidden": "true" }, element("td", { colspan: String(columns.length), class: "gap" }));
+      gap.style.height = `${rowsAway * ROW}px`;
+      return gap;
+    }
+
+    function draw() {
+      const first = Math.max(0, Math.floor(view.scrollTop / ROW) - SPARE);
+      const last = Math.min(order.length, first + Math.ceil(view.clientHeight / ROW) + 2 * SPARE);
+      const shown = order.slice(first, last).map((row, i) => {
+        const cells = columns.map((column, place) => cell(column, rows[row][place], links[row]));
+        return element("tr", { "aria-rowindex": String(first + i + 2) }, ...cells);
+      });
+      body.replaceChildren(...(first > 0 ? [spacer(first)] : []), ...shown, ...(last < order.length ? [spacer(order.length - last)] : []));
+    }
+
+    columns.forEach((column, place) => {
+      const heading = element("th", { scope: "col", "aria-sort": "none", class: column.kind === "number" ? "number" : "" });
+      const sort = element("button", { type: "button" }, column.label);
+      sort.addEventListener("click", () => {
+        sorted = { column: place, down: sorted.column === place ? !sorted.down : column.kind === "number" };
+        for (const other of head.children) other.setAttribute("aria-sort", "none");
+        heading.setAttribute("aria-sort", sorted.down ? "descending" : "ascending");
+        arrange();
+      });
+      heading.append(sort);
+      head.append(heading);
+    });
+    words.addEventListener("input", arrange);
+    state.addEventListener("change", arrange);
+    view.addEventListener("scroll", () => requestAnimationFrame(draw), { passive: true });
+    const filters = element("div", { class: "tools" },
+      element("label", { for: "fleet-words" }, "Show rows with"), words,
+      element("label", { for: "fleet-state" }, "in state"), state);
+    holder.querySelector(".still").before(element("div", { class: "live" }, filters, count, view));
+    holder.classList.add("is-live");
+    new ResizeObserver(draw).observe(view);
+    arrange();
+    document.documentElement.classList.add("table-drawn");
+  }
+
+  document.querySelectorAll(".fleet-table").forEach(start);
+})();

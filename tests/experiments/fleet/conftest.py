@@ -1,0 +1,14 @@
+"""Rows of a store, as a batch would have written them."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+
+def store_row(file: str, leakage: float, spread: float = 0.2, **more: Any) -> Mapping[str, Any]:
+    """Return the row of a log that leaks so much: healthy is 1, the limit 3."""
+    ends = [leakage - spread, leakage + spread]
+    amount = {"value": leakage, "unit": "L/min", "ci95": ends, "healthy": 1.0, "limit": 3.0}
+    stiff = {"value": 2.0e8, "unit": "Pa", "ci95": [1.9e8, 2.1e8], "healthy": 2.07e8, "limit": 1.656e8}
+    row = {"file": file, "verb": "diagnose", "outcome": "ok", "found_condition": "normal", "reason": None}
+    return {**row, "quantities": json.dumps({"leakage_flow": amount, "bulk_modulus": stiff}), **more}

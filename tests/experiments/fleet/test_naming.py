@@ -1,0 +1,63 @@
+"""Which actuator, and when: from file names or from a table."""
+
+from pathlib import Path
+
+import pytest
+
+from experiments.fleet.naming import UNNAMED, by_pattern, by_table, place_of
+from plant.errors import HydrostateError
+
+
+@pytest.mark.parametrize(
+    ("pattern", "file", "actuator", "date"),
+    [
+        ("{actuator}_{date}.csv", "hall/P-12_2026-11-22.csv", "P-12", "2026-11-22"),
+        ("{actuator}/{date}.csv", "hall/P-12/20261122.csv", "P-12", "20261122"),
+        ("{actuator}_{date}*", "P_1_812.5_steps.csv", "P_1", "812.5"),
+        ("run-{date}-{actuator}.csv", "run-7-B3.csv", "B3", "7"),
+        ("{actuator}.csv", "hall\\P-12.csv", "P-12", ""),
+    ],
+)
+def test_a_pattern_reads_file_names(pattern: str, file: str, actuator: str, date: str) -> None:
+    found = by_pattern([file], pattern)[file]
+    assert (found.actuator, found.date) == (actuator, date)
+
+
+def test_a_file_that_does_not_match_has_no_name() -> None:
+    assert by_pattern(["notes.txt"], "{actuator}_{date}.csv") == {"notes.txt": UNNAMED}
+
+
+@pytest.mark.parametrize("pattern", ["{date}.csv", "{actuator}{actuator}.csv", "{actuator}_{serial}.csv", "x.csv"])
+def test_a_pattern_that_cannot_be_used_is_refused(pattern: str) -> None:
+    with pytest.raises(HydrostateError, match=r"--pattern must hold \{actuator\} once"):
+        by_pattern(["a.csv"], pattern)
+
+
+def test_a_later_date_is_a_larger_number_whatever_its_form() -> None:
+    places = [
+        place_of(date, "log") for date in ("20261121", "2026-11-22", "2026-11-22T12:00", "2026-11-22T14:00+01:00")
+    ]
+    assert places == sorted(places)
+    assert place_of("2026-11-23", "log") - place_of("20261122", "log") == 1.0
+
+
+def test_a_date_that_is_none_is_refused_with_the_file() -> None:
+    with pytest.raises(HydrostateError, match=r"P_2026-13-45.csv: date must be ISO 8601"):
+        by_pattern(["P_2026-13-45.csv"], "{actuator}_{date}.csv")
+
+
+def test_a_table_names_files_by_path_or_by_name(tmp_path: Path) -> None:
+    table = tmp_path / "names.csv"
+    table.write_text("\ufefffile,actuator,date\na.csv,P-1,2026-11-22\nhall/b.csv,P-2,\n", encoding="utf-8")
+    found = by_table(["x/a.csv", "hall/b.csv", "c.csv"], table)
+    assert [found[one].actuator for one in found] == ["P-1", "P-2", ""]
+    assert found["hall/b.csv"].place is None
+
+
+def test_a_table_without_its_columns_is_refused_with_those_it_has(tmp_path: Path) -> None:
+    table = tmp_path / "names.csv"
+    table.write_text("log,actuator\n", encoding="utf-8")
+    with pytest.raises(HydrostateError, match="must have a column 'file', it has log, actuator"):
+        by_table([], table)
+    with pytest.raises(HydrostateError, match="must be a CSV table"):
+        by_table([], tmp_path / "absent.csv")

@@ -1,0 +1,121 @@
+"""The page of a fleet, and that it works in a browser."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.fleet.actuators import actuator_rows
+from experiments.fleet.log_pages import file_name, write_pages
+from experiments.fleet.naming import by_pattern
+from experiments.fleet.page import fleet_page
+from experiments.fleet.rows import log_rows
+from tests.experiments.fleet.conftest import store_row
+
+ROWS = 10_000
+
+
+def page_of(count: int, links: bool = False) -> str:
+    files = [f"/private/hall/P-{i}_{i % 9}.csv" for i in range(count)]
+    rows = [store_row(file, 1.0 + (7 * i % count) / count * 3.0) for i, file in enumerate(files)]
+    found = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {}))
+    return fleet_page(found, {found[0].name: "pages/first.html"} if links else {}, "hall")
+
+
+def test_the_page_says_how_many_are_sick_and_with_which_to_begin() -> None:
+    page = page_of(9)
+    assert "<h1>2 of 9 actuators are past a limit.</h1>" in page
+    assert "Begin with P-5, P-1." in page
+
+
+def test_a_page_has_relative_links_and_no_folder() -> None:
+    page = page_of(30, links=True)
+    assert "pages/first.html" in page
+    assert "/private" not in page
+    assert "file:" not in page
+
+
+def test_why_a_log_was_not_read_is_told_without_its_folder() -> None:
+    row = store_row(
+        "a.csv", 1.0, outcome="failed", quantities=None, found_condition=None, reason="/private/a.csv: no time"
+    )
+    page = fleet_page(actuator_rows(log_rows([row], {}, {})), {}, "hall")
+    assert "no time" in page
+    assert "/private" not in page
+
+
+def test_a_name_cannot_end_the_script_that_holds_it() -> None:
+    row = store_row("a</script><b>.csv", 1.0)
+    page = fleet_page(actuator_rows(log_rows([row], {}, {})), {}, "hall")
+    assert "</script><b>" not in page
+
+
+def test_pages_are_written_for_the_sickest_that_can_be_read(tmp_path: Path) -> None:
+    rows = [store_row("A_1.csv", 4.0), store_row("B_1.csv", 5.0, outcome="failed"), store_row("C_1.csv", 3.6)]
+    found = actuator_rows(log_rows(rows, by_pattern(["A_1.csv", "B_1.csv", "C_1.csv"], "{actuator}_{date}.csv"), {}))
+    written: list[str] = []
+
+    def write(file: str, path: Path) -> bool:
+        written.append(f"{file} {path.parent.name}")
+        return file != "C_1.csv"
+
+    assert list(write_pages(found, tmp_path, 5, write)) == ["A"]
+    assert written == ["A_1.csv pages", "C_1.csv pages"]
+
+
+def test_names_of_pages_are_safe_and_differ() -> None:
+    names = {file_name(one) for one in ("a b/../c.csv", "c.csv", "", "x" * 300, "ü/é.csv")}
+    assert len(names) == 5
+    assert all(one.isascii() and "/" not in one and len(one) < 80 for one in names)
+
+
+@pytest.fixture(scope="module")
+def big(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("fleet") / "index.html"
+    path.write_text(page_of(ROWS, links=True), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def page(browser: Any, big: Path) -> Any:
+    context = browser.new_context(viewport={"width": 390, "height": 800}, color_scheme="dark")
+    one = context.new_page()
+    one.complaints = []
+    one.on("console", lambda said: one.complaints.append(said.text))
+    one.on("pageerror", lambda said: one.complaints.append(str(said)))
+    one.on("request", lambda asked: asked.url.startswith("file:") or one.complaints.append(asked.url))
+    one.goto(big.as_uri())
+    one.wait_for_selector("html.table-drawn", state="attached")
+    yield one
+    context.close()
+
+
+@pytest.mark.slow
+def test_ten_thousand_rows_sort_and_filter_with_few_in_the_page(page: Any) -> None:
+    first = page.locator(".window tbody th").first
+    begin = first.inner_text()
+    assert page.locator(".window tbody tr").count() < 100
+    page.get_by_role("button", name="actuator").click()
+    assert first.inner_text() == "P-0"
+    assert page.locator(".window th[aria-sort=ascending]").inner_text().startswith("actuator")
+    page.get_by_role("button", name="of the limit").click()
+    assert first.inner_text() == begin
+    page.get_by_label("Show rows with").fill("p-99")
+    assert page.get_by_role("status").inner_text() == "111 of 10000 rows"
+    page.get_by_label("in state").select_option("over")
+    assert all(words == "past a limit" for words in page.locator(".window td.fleet-over").all_inner_texts())
+    assert page.complaints == []
+
+
+@pytest.mark.slow
+def test_the_last_row_is_reached_by_scrolling(page: Any) -> None:
+    page.evaluate("document.querySelector('.window').scrollTop = 1e9")
+    page.wait_for_selector(f'.window tr[aria-rowindex="{ROWS + 1}"]')
+
+
+@pytest.mark.slow
+def test_axe_finds_nothing_serious_and_the_page_fits_a_phone(page: Any) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
+    found = axe.Axe().run(page).response["violations"]
+    assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390

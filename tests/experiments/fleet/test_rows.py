@@ -1,0 +1,65 @@
+"""A log's state follows from its severities and their limits."""
+
+import pytest
+
+from experiments.fleet.actuators import actuator_rows
+from experiments.fleet.naming import by_pattern
+from experiments.fleet.rows import STATES, log_rows
+from tests.experiments.fleet.conftest import store_row
+
+
+@pytest.mark.parametrize(
+    ("leakage", "spread", "state"),
+    [(1.2, 0.2, "within"), (2.9, 0.2, "open"), (3.1, 0.2, "likely"), (3.5, 0.2, "over")],
+)
+def test_the_state_says_where_value_and_interval_lie(leakage: float, spread: float, state: str) -> None:
+    (row,) = log_rows([store_row("a.csv", leakage, spread)], {}, {})
+    assert row.state == state
+    assert row.worst is not None
+    assert row.worst.name == ("leakage_flow" if leakage > 2.0 else "bulk_modulus")
+
+
+def test_bulk_modulus_is_bad_below_its_limit() -> None:
+    (row,) = log_rows([store_row("a.csv", 1.0)], {}, {"bulk_modulus": 2.05e8})
+    assert row.state == "likely"
+    assert row.amounts["bulk_modulus"].share > 1.0
+
+
+def test_a_limit_of_the_reader_replaces_that_of_the_store() -> None:
+    assert log_rows([store_row("a.csv", 2.0)], {}, {"leakage_flow": 1.5})[0].state == "over"
+
+
+def test_what_has_no_verdict_is_not_called_sound() -> None:
+    unknown, failed = log_rows(
+        [store_row("a.csv", 1.0, outcome="mismatch"), store_row("b.csv", 1.0, outcome="failed", quantities=None)],
+        {},
+        {},
+    )
+    assert (unknown.state, failed.state) == ("unknown", "failed")
+
+
+def test_of_another_kind_of_actuator_the_condition_decides() -> None:
+    rows = [store_row("a.csv", 1.0, quantities=None, found_condition=name) for name in ("healthy", "cracked_flap")]
+    assert [one.state for one in log_rows(rows, {}, {})] == ["within", "over"]
+
+
+def test_estimates_and_simulated_runs_are_no_logs_of_a_fleet() -> None:
+    assert log_rows([store_row("a.csv", 1.0, verb="estimate"), store_row("", 1.0)], {}, {}) == []
+
+
+def test_the_sickest_actuators_come_first_by_their_last_log() -> None:
+    files = {"A_3.csv": 3.4, "A_1.csv": 1.0, "B_1.csv": 9.0, "B_2.csv": 1.1, "C_1.csv": 4.4, "D_1.csv": 3.1}
+    rows = [store_row(file, leakage) for file, leakage in files.items()]
+    found = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {}))
+    assert [one.name for one in found] == ["C", "A", "D", "B"]
+    assert [len(one.logs) for one in found] == [1, 2, 1, 2]
+
+
+def test_a_log_that_could_not_be_read_does_not_hide_the_one_before() -> None:
+    rows = [store_row("A_1.csv", 3.6), store_row("A_2.csv", 1.0, outcome="failed", quantities=None)]
+    (row,) = actuator_rows(log_rows(rows, by_pattern(["A_1.csv", "A_2.csv"], "{actuator}_{date}.csv"), {}))
+    assert row.last.state == "over"
+
+
+def test_every_state_has_words() -> None:
+    assert all(words for words in STATES.values())
