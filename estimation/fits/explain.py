@@ -239,9 +239,7 @@ def _screened(
         tried: list[_Tried] = []
         for (delay, problem), own in product(problems, own_starts(log, together[-1])):
             guess = problem.model.theta({**absent, **start, **own})
-            point = descend(
-                problem.at, guess, SCREENING, flow_bounds(problem.model, [guess], log.sample_time), radius=NEAR
-            )
+            point = descend(problem.at, guess, SCREENING, flow_bounds(problem.model, [guess], log), radius=NEAR)
             tried.append(_Tried(together, point, problem.model.values(point.theta), delay))
         yield min(tried, key=lambda one: one.cost)
 
@@ -275,7 +273,7 @@ def _revived(log: GreyBoxLog, tried: _Tried) -> Array | None:
 
 def _descended(log: GreyBoxLog, tried: _Tried, start: Array, evaluations: int) -> _Tried:
     problem = freed(log, tried.together)
-    bounds = flow_bounds(problem.model, [start], log.sample_time)
+    bounds = flow_bounds(problem.model, [start], log)
     point = descend(problem.at, start, evaluations, bounds, radius=NEAR)
     return replace(tried, point=point, values=problem.model.values(point.theta))
 

@@ -141,7 +141,7 @@ def _balanced(
     forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
     search = Search(screened=ceil(SCREENED_SECONDS / log.sample_time))
     guesses = [forms[0].theta(start) for start in starts]
-    bounds = flow_bounds(forms[0], guesses, log.sample_time)
+    bounds = flow_bounds(forms[0], guesses, log)
     fits: list[GreyBoxFit] = []
     for form in forms:
         problem = Problem(form, log)

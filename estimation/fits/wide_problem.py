@@ -18,6 +18,11 @@ from plant.solvers.steps import parameter_names, parameter_row
 RELIEF_START = 1e-10
 """Slope of a relief valve that opens early, first guess [m^3/(s Pa)]."""
 
+SHARPEST_RELIEF = 3e-3
+"""Least rise of pressure over its setting within which a relief valve passes the largest flow of the log [fraction].
+Valves need 0.05 to 0.2. At a sharper corner, which no sensor resolves, the model chatters from open to closed: slopes
+are then so steep that the deviation of bulk modulus comes out twenty times too small."""
+
 LEAST_PEAK = 1.0
 """Highest differential pressure taken of a log whose sensor is dead: the logarithm of none is no start [Pa]."""
 
@@ -108,7 +113,7 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
     return [{"relief_pressure": share * peak, "relief_conductance": RELIEF_START} for share in one.shares_of_peak]
 
 
-def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], sample_time: float) -> tuple[Array, Array]:
+def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) -> tuple[Array, Array]:
     """Return how far a search for the flow form's unknowns may go, plain or wide.
 
     Parameters
@@ -117,15 +122,18 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], sample_time: floa
         The flow form with its unknowns.
     guesses : sequence of ndarray, shape (unknowns,)
         Where it begins [dimensionless].
-    sample_time : float
-        Time between samples [s].
+    log : GreyBoxLog
+        The log, as the model sees it.
 
     Returns
     -------
     tuple of ndarray, shape (unknowns,)
         Lower and upper bounds [dimensionless].
     """
-    return search_bounds(model, guesses, {**LIMITS, "speed_lead": (0.0, sample_time)})
+    rig = dict(zip(parameter_names(model.parameters), map(float, log.parameters), strict=True))
+    most = rig["pump_displacement"] * float(np.max(np.abs(log.drives[:, 0])))
+    relief = (0.0, max(most / (SHARPEST_RELIEF * rig["relief_pressure"]), rig["relief_conductance"]))
+    return search_bounds(model, guesses, {**LIMITS, "speed_lead": (0.0, log.sample_time), "relief_conductance": relief})
 
 
 def usual_values(log: GreyBoxLog) -> dict[str, float]:

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -147,3 +148,15 @@ def test_gross_outliers_in_every_channel_do_not_bias_bulk_modulus() -> None:
     fit = fit_flow(record, HEALTHY, 3e8)
     assert fit.parameters["bulk_modulus"][0] == pytest.approx(HEALTHY.bulk_modulus, rel=0.005)
     assert fit.reasons == ()
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_a_relief_valve_with_a_sharp_corner_does_not_feign_certainty(seed: int) -> None:
+    rng, rig = np.random.default_rng(seed), EhaParameters(relief_pressure=1.7e6)
+    p = replace(parameters_for(CONDITIONS["major_friction"], rig), relief_conductance=1e-7)
+    record = simulate(CIRCUIT, make_drive("prbs", 6.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    bit = 12207.0  # of a 12-bit converter
+    coarse = record.replace(differential_pressure_pa=bit * np.round(record["differential_pressure_pa"] / bit))
+    fit = fit_flow(coarse, rig, 2.07e8)
+    assert 1e-3 < fit.bound < 5e-3
+    assert abs(fit.parameters["bulk_modulus"][0] / p.bulk_modulus - 1.0) < 3.0 * fit.bound
