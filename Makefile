@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 SEED ?= 2024
 WORKERS ?= 2
 
-.PHONY: study test test-slow lint benchmark peers release clean
+.PHONY: study test test-slow lint benchmark peers release docs clean
 
 # One stamp a kind of install: re-made when the pins or the project's metadata change.
 $(VENV)/.installed: pyproject.toml constraints.txt
@@ -55,6 +55,14 @@ peers: $(VENV)/.installed-dev .peers/.installed
 	$(BIN)/python -m benchmarks filter_speed --jax .peers/jax/bin/python || status=1; \
 	$(BIN)/python -m benchmarks circuit || status=1; \
 	exit $$status
+
+$(VENV)/.installed-docs: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
+	touch $@
+
+docs: $(VENV)/.installed-docs
+	$(BIN)/python -m sphinx -W --keep-going -b html docs build/site
+	@echo build/site/index.html
 
 # Built from what is committed, and tried where nothing else of the project is.
 release:

@@ -1,5 +1,7 @@
-"""Every block of a tutorial runs, in turn, in one folder."""
+"""Every block of every tutorial runs, in turn, in one folder; the site names each of them once."""
 
+import ast
+import json
 import os
 import re
 import shutil
@@ -12,7 +14,16 @@ import pytest
 from tests.c_compiler import compiler
 
 ROOT = Path(__file__).resolve().parents[1]
+TUTORIALS = ROOT / "docs" / "tutorials"
+PAGES = sorted(path.stem for path in TUTORIALS.glob("*.md"))
+FAST = ("leaking", "your-log")
+"""Those that ask the two questions most users have; the others take the minutes of the slow tests."""
+
 BLOCK = re.compile(r"```(sh|python)\n(.*?)```", re.DOTALL)
+
+
+def blocks(name: str) -> list[tuple[str, str]]:
+    return BLOCK.findall((TUTORIALS / f"{name}.md").read_text("utf-8"))
 
 
 def ran(kind: str, text: str, folder: Path) -> str:
@@ -23,17 +34,53 @@ def ran(kind: str, text: str, folder: Path) -> str:
     return done.stdout
 
 
+def worked_through(name: str, folder: Path) -> str:
+    """Run a tutorial and return what it printed."""
+    command = folder / "hydrostate"
+    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m experiments.cli "$@"\n')
+    command.chmod(0o755)
+    return "".join(ran(kind, text, folder) for kind, text in blocks(name))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name in FAST else pytest.mark.slow)
+        for name in PAGES
+        if name != "log-to-controller"
+    ],
+)
+def test_every_block_runs_in_turn_and_what_it_claims_holds(name: str, tmp_path: Path) -> None:
+    assert worked_through(name, tmp_path)
+
+
 def test_from_a_log_to_a_controller_with_the_same_numbers(tmp_path: Path) -> None:
     compiler("gcc")
     if shutil.which("make") is None:
         pytest.skip("make is not installed")
-    command = tmp_path / "hydrostate"
-    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m experiments.cli "$@"\n')
-    command.chmod(0o755)
-    page = (ROOT / "docs/tutorials/log-to-controller.md").read_text("utf-8")
-    said = "".join(ran(kind, text, tmp_path) for kind, text in BLOCK.findall(page))
+    said = worked_through("log-to-controller", tmp_path)
     found = re.search(r"bulk modulus (\S+) Pa, C and Python differ by (\S+)", said)
     assert found is not None
     assert 1.8e8 < float(found[1]) < 2.3e8
     assert float(found[2]) < 1e-12
     assert (tmp_path / "plant.fmu").is_file()
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_tutorial_uses_verbs_and_options_that_there_are_and_python_that_parses(name: str) -> None:
+    options = json.loads((ROOT / "docs" / "interface.json").read_text("utf-8"))["options"]
+    for kind, text in blocks(name):
+        if kind == "python":
+            ast.parse(text)
+            continue
+        for line in text.splitlines():
+            if not line.startswith("hydrostate "):
+                continue
+            words = line.split("#")[0].split()[1:]
+            verb = next(verb for verb in (" ".join(words[:2]), words[0]) if verb in options)
+            assert {word for word in words if word.startswith("--")} <= set(options[verb]), line
+
+
+def test_the_site_names_every_tutorial_once() -> None:
+    index = (ROOT / "docs" / "index.md").read_text("utf-8")
+    assert [index.count(f"\ntutorials/{name}\n") for name in PAGES] == [1] * len(PAGES)

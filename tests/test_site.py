@@ -1,0 +1,80 @@
+"""The site: links lead somewhere, every name of a face is documented, the drawing is of the code, and it builds."""
+
+import importlib
+import re
+import subprocess
+import sys
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+sys.path.insert(0, str(DOCS))
+site_pages = importlib.import_module("site_pages")
+anchor_of = importlib.import_module("decisions_index").anchor_of
+sys.path.remove(str(DOCS))
+
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.glob("*.md")), *sorted(DOCS.glob("tutorials/*.md"))]
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+
+
+def prose(page: Path) -> str:
+    """Return a page without its blocks of code and its code in line."""
+    return re.sub(r"```.*?```|`[^`\n]*`", "`", page.read_text("utf-8"), flags=re.DOTALL)
+
+
+def anchors(page: Path) -> set[str]:
+    headings = re.findall(r"^#+ (.+)$", page.read_text("utf-8"), re.MULTILINE)
+    return {anchor_of(heading) for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_link_leads_to_a_page_and_a_heading_that_are_there(page: Path) -> None:
+    for link in LINK.findall(prose(page)):
+        parts = urlsplit(link)
+        if parts.scheme:
+            assert parts.scheme == "https"
+            assert "." in parts.netloc
+            continue
+        if parts.path.startswith("generated/"):
+            assert parts.path.removeprefix("generated/") in {"house.md", "house.svg"}
+            continue
+        target = (page.parent / parts.path).resolve() if parts.path else page
+        assert target.is_file(), link
+        assert not parts.fragment or parts.fragment in anchors(target), link
+
+
+def test_the_site_holds_every_page_once() -> None:
+    text = (DOCS / "index.md").read_text("utf-8")
+    held = [
+        line.strip() for block in re.findall(r"```{toctree}\n(.*?)```", text, re.DOTALL) for line in block.splitlines()
+    ]
+    wanted = {str(page.relative_to(DOCS).with_suffix("")) for page in PAGES if DOCS in page.parents} - {"index"}
+    assert sorted(line for line in held if line and not line.startswith(":")) == sorted(wanted)
+
+
+def test_every_name_of_every_face_has_an_entry() -> None:
+    pages = site_pages.api_pages()
+    for face in site_pages.FACES:
+        names = {name for name in importlib.import_module(face).__all__ if not name.startswith("_")}
+        headings = set(re.findall(r"^(\w+)\n-+$", pages[f"api_{face}.rst"], re.MULTILINE))
+        assert headings == names
+
+
+def test_the_drawing_has_every_room_and_only_arrows_that_point_left() -> None:
+    found = site_pages.house()
+    drawing = site_pages.house_drawing()
+    assert all(f">{room.partition('.')[2]}<" in drawing for room in found.rooms if "." in room)
+    layers = [(user.split(".")[0], used.split(".")[0]) for user, used in found.imports]
+    assert all(site_pages.LAYERS.index(used) <= site_pages.LAYERS.index(user) for user, used in layers)
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+    pytest.importorskip("sphinx")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", str(DOCS), str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)  # noqa: S603  our own pages
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "generated" / "api_plant.html").is_file()
