@@ -54,7 +54,7 @@ def house_drawing() -> str:
     place = {layer: 20 + i * (WIDE + GAP) for i, layer in enumerate(LAYERS)}
     height = TOP + ROW * max(len(rooms) for rooms in columns.values()) + 20
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {place["experiments"] + WIDE + 20} {height + 90}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {place["experiments"] + WIDE + 20} {height + 120}" '
         'font-family="sans-serif" font-size="12" role="img" aria-label="Packages, their rooms, and who imports whom">',
         '<rect width="100%" height="100%" fill="white"/>',
     ]
@@ -87,7 +87,7 @@ def _arrows(found: House, place: Mapping[str, int], height: int) -> list[str]:
         if user == used:
             continue
         start, end = place[user] + WIDE / 2, place[used] + WIDE / 2
-        depth = height + 18 + 20 * abs(LAYERS.index(user) - LAYERS.index(used))
+        depth = height + 6 + 42 * abs(LAYERS.index(user) - LAYERS.index(used))
         parts.append(
             f'<path d="M{start} {height} C{start} {depth} {end} {depth} {end} {height}" fill="none" stroke="#c60"/>'
             f'<path d="M{end} {height} l-4 9 h8 z" fill="#c60"/>'
