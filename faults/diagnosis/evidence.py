@@ -123,13 +123,28 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
         table = score_transfer_functions(record, library).by_condition
         found["transfer_functions"] = -SAMPLES * np.log([table[name] for name in CONDITIONS])
     if is_stuck(blocks, actuator):
-        found = {name: _friction_left_open(scores, blocks, actuator) for name, scores in found.items()}
+        found = {name: friction_left_open(scores, blocks, actuator) for name, scores in found.items()}
     odds = {name: bounded(found[name]) for name in EVIDENCES if name in found}
     return Scoreboard(odds, blocks, fits, part.window, part.onset)
 
 
-def _friction_left_open(scores: Array, blocks: Blocks, actuator: Actuator) -> Array:
-    """Score the friction levels that would hold the piston alike: a stuck piston tells none from the other."""
+def friction_left_open(scores: Array, blocks: Blocks, actuator: Actuator) -> Array:
+    """Score the friction levels that would hold the piston alike: a stuck piston tells none from the other.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (9,)
+        Log-likelihoods of the conditions [dimensionless].
+    blocks : Blocks
+        The log; without pressure every level may hold.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (9,)
+        For a level that holds against the largest pressure, the best score among those of the same leakage.
+    """
     reached = (
         0.0 if blocks.pressure is None else actuator.circuit.piston_area * float(np.nanmax(np.abs(blocks.pressure)))
     )

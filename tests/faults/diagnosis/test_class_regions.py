@@ -7,7 +7,7 @@ import pytest
 
 from faults.conditions import CONDITIONS
 from faults.diagnosis import class_regions
-from faults.diagnosis.circuit_runs import COORDINATES, Blocks
+from faults.diagnosis.circuit_runs import COORDINATES, Blocks, parameter_rows, predicted
 from faults.diagnosis.class_fit import Actuator, PointFit
 from faults.diagnosis.class_regions import (
     ALIKE,
@@ -147,3 +147,33 @@ def test_without_pressure_the_scale_is_known_as_far_as_actuators_of_one_kind_are
     assert float(along @ spread @ along) < float(along @ class_regions.WEAK @ along)
     assert float(along @ known @ along) < float(along @ spread @ along)
     assert 0.05**2 < ALIKE * class_regions.WITHIN[0, 0] < 0.1**2
+
+
+@pytest.mark.parametrize("name", [name for name in COORDINATES if name != "pump"])
+def test_an_actuator_of_its_kind_is_in_its_region_and_one_twice_off_in_anything_is_not(name: str) -> None:
+    at = COORDINATES.index(name)
+    near, far = (
+        region_scores(
+            replace(fit(0), coordinates=ACTUATOR.conditions[0] + off * np.eye(7)[at]), 1e6 * INFORMATION, ACTUATOR
+        )
+        for off in (0.1, 0.8)
+    )
+    assert near[0] > -1.0
+    assert far[0] < -7.0
+
+
+def test_the_pump_is_known_to_a_thousandth() -> None:
+    at = COORDINATES.index("pump")
+    moved = replace(fit(0), coordinates=ACTUATOR.conditions[0] + 0.01 * np.eye(7)[at])
+    assert region_scores(moved, 1e6 * INFORMATION, ACTUATOR)[0] < -30.0
+
+
+def test_along_the_scale_of_pressure_motion_stays_and_pressure_grows_alike() -> None:
+    speed = np.repeat([60.0, 120.0, -120.0, -70.0], 150)
+    log = Blocks(np.append(speed, speed[-1]), 1e-3, 10, np.zeros(60), np.zeros(60), np.ones(2))
+    points = ACTUATOR.conditions[0] + np.vstack([np.zeros(7), 0.2 * PRESSURE_SCALE, 0.2 * np.eye(7)[:6]])
+    runs = predicted(log, parameter_rows(points, ACTUATOR.circuit, ACTUATOR.rated))[:, log.first :]
+    size = np.sqrt(np.mean(runs[0] ** 2, axis=0))
+    moved = np.sqrt(np.mean((runs - runs[0]) ** 2, axis=1)) / size
+    assert moved[1, 0] < 0.3 * np.sort(moved[2:, 0])[-3]
+    assert np.sqrt(np.mean(runs[1, :, 1] ** 2)) / size[1] == pytest.approx(np.exp(0.2), rel=0.05)

@@ -214,3 +214,10 @@ def test_noise_of_a_velocity_sensor_excuses_what_it_can_make_and_no_more(
 def test_one_sensor_alone_contradicts_none() -> None:
     record = with_two_sensors(2.0, 1e-6).replace(position_m=None)
     assert not sensors_disagree(record, blocks_of(record))
+
+
+def test_sensors_that_never_spoke_at_once_do_not_disagree() -> None:
+    record = with_two_sensors(2.0, 1e-6)
+    early = np.where(np.arange(len(record)) < 60, record["velocity_m_s"], np.nan)
+    apart = record.replace(velocity_m_s=early)
+    assert not sensors_disagree(apart, blocks_of(apart))

@@ -1,0 +1,104 @@
+"""Evidences on one scoreboard: what each says, how they add up, and what a stuck piston leaves open."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS
+from faults.diagnosis.calibration import Calibration
+from faults.diagnosis.circuit_runs import COORDINATES, Blocks
+from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.evidence import FARTHEST, YIELDS, Scoreboard, bounded, friction_left_open
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+ACTUATOR = Actuator.of(EhaParameters())
+NAMES = list(CONDITIONS)
+WEIGHTS = {"transfer_functions": 0.0, "models": 0.5, "innovations": 0.0, "parameters": 1.0}
+
+
+def blocks(pressure: float | None) -> Blocks:
+    """Return a log of a stuck piston, pushed with a pressure."""
+    still = np.zeros(50)
+    pushed = None if pressure is None else np.linspace(-pressure, pressure, 50)
+    return Blocks(np.zeros(501), 1e-3, 10, still, pushed, np.ones(1 if pushed is None else 2))
+
+
+def board(log: Blocks, **odds: np.ndarray) -> Scoreboard:
+    fits: Any = None
+    return Scoreboard(odds, log, fits, Record(1e-3, {"motor_speed_rad_s": np.zeros(2)}), None)
+
+
+def calibration(*, without: float = 1.0) -> Calibration:
+    return Calibration({"weights": WEIGHTS}, {"weights": {name: without * one for name, one in WEIGHTS.items()}}, {})
+
+
+def odds_for(**by_name: float) -> np.ndarray:
+    return np.array([by_name.get(name, -10.0) for name in NAMES])
+
+
+def test_probabilities_are_weighted_log_odds_and_sum_to_one() -> None:
+    one = board(
+        blocks(1e5),
+        models=odds_for(normal=0.0, minor_leakage=-2.0),
+        parameters=odds_for(normal=0.0, minor_leakage=-1.0),
+    )
+    found = one.probabilities(calibration())
+    assert sum(found.values()) == pytest.approx(1.0)
+    assert found["normal"] / found["minor_leakage"] == pytest.approx(np.exp(0.5 * 2.0 + 1.0))
+
+
+def test_a_log_without_pressure_has_weights_of_its_own() -> None:
+    odds = odds_for(normal=0.0, minor_leakage=-1.0)
+    with_it, without = (
+        board(blocks(at), parameters=odds).probabilities(calibration(without=3.0)) for at in (1e5, None)
+    )
+    assert with_it["normal"] / with_it["minor_leakage"] == pytest.approx(np.exp(1.0))
+    assert without["normal"] / without["minor_leakage"] == pytest.approx(np.exp(3.0))
+
+
+def test_an_evidence_alone_names_its_best() -> None:
+    assert board(blocks(None), models=odds_for(major_friction=0.0)).choice("models") == "major_friction"
+
+
+def test_no_evidence_is_surer_than_its_bound_and_the_order_stays() -> None:
+    scores = np.array([0.0, -1.0, -50.0, -1e6, np.nan])
+    found = bounded(scores)
+    assert found[0] == 0.0
+    assert found[1] == pytest.approx(-1.0, abs=0.05)
+    assert np.all(np.diff(found[:4]) < 0.0)
+    assert np.all(found >= -FARTHEST)
+    assert found[4] == -FARTHEST
+    assert bounded(np.full(3, -np.inf)).tolist() == [0.0, 0.0, 0.0]
+
+
+def holding(place: int) -> float:
+    """Return the force that a condition's friction holds at most [N]."""
+    return float(np.exp(ACTUATOR.conditions[place, COORDINATES.index("friction_rest")])) * YIELDS
+
+
+def test_frictions_that_would_hold_the_piston_alike_score_alike_and_leakage_still_counts() -> None:
+    scores = -np.arange(len(NAMES), dtype=np.float64)
+    found = friction_left_open(scores, blocks(1e4), ACTUATOR)
+    for level in ("none", "minor", "major"):
+        alike = [i for i, one in enumerate(CONDITIONS.values()) if one.leakage == level]
+        assert found[alike].tolist() == [max(scores[alike])] * 3
+
+
+def test_a_friction_that_would_have_given_way_keeps_its_own_score() -> None:
+    weakest = min(range(len(NAMES)), key=holding)
+    strongest = max(range(len(NAMES)), key=holding)
+    between = 0.5 * (holding(weakest) + holding(strongest)) / ACTUATOR.circuit.piston_area
+    scores = np.where(np.arange(len(NAMES)) == weakest, 5.0, 0.0)
+    found = friction_left_open(scores, blocks(between), ACTUATOR)
+    assert found[weakest] == 5.0
+    assert found[strongest] == 0.0
+    assert np.all(np.isfinite(found))
+
+
+def test_without_pressure_every_friction_may_hold() -> None:
+    scores = np.random.default_rng(0).normal(size=len(NAMES))
+    found = friction_left_open(scores, blocks(None), ACTUATOR)
+    assert len(set(found.tolist())) == 3
+    assert np.all(found >= scores)
