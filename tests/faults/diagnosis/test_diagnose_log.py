@@ -1,0 +1,122 @@
+"""When a log's class is unknown, and what stands in its place: every way that leads there, on short logs."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from estimation.finding import Finding, Outcome
+from estimation.notes import ChannelCode, EstimateCode, RigCode
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis import diagnose
+from faults.diagnosis.diagnose import diagnose_log
+from faults.notes import AdviceCode, AgainstCode, ClassCode
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.eha.simulate import LUMPED, simulate
+from plant.errors import RigError
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+HEALTHY = EhaParameters()
+RIG = Rig("paper", HEALTHY)
+
+
+@cache
+def log(condition: str = "minor_leakage", duration: float = 4.0) -> Record:
+    p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(8)
+    return simulate(LUMPED, make_drive("steps", duration, 2e-3, p, rng), 2e-3, p, sensors=BENCH, rng=rng)
+
+
+def codes(found: Finding) -> set[object]:
+    return {note.code for note in found.notes}
+
+
+@cache
+def plain() -> Finding:
+    return diagnose_log(log(), RIG)
+
+
+def test_a_plain_log_has_its_class_and_nothing_against_it() -> None:
+    found = plain()
+    assert (found.outcome, found.condition, found.unknown) == (Outcome.OK, "minor_leakage", False)
+    assert found.against == ()
+    assert found.probabilities is not None
+    assert found.severities["bulk_modulus"] == found.quantities["bulk_modulus"]
+
+
+def test_a_channel_with_a_wrong_sign_gives_no_probabilities_and_says_which_to_mend() -> None:
+    record = log().replace(differential_pressure_pa=-log()["differential_pressure_pa"])
+    found = diagnose_log(record, RIG)
+    assert (found.outcome, found.unknown) == (Outcome.MISMATCH, True)
+    assert {type(note.code) for note in found.against} == {ChannelCode}
+    assert not found.probabilities
+    assert AdviceCode.MEND_COLUMNS in {note.code for note in found.advice}
+
+
+def test_a_refused_fit_makes_the_class_unknown_for_the_same_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    why = EstimateCode.BOUND_TOO_WIDE.note()
+    monkeypatch.setattr(diagnose, "refused", lambda _: (why,))
+    found = diagnose_log(log(), RIG)
+    assert found.unknown
+    assert found.against[0] == why
+    assert found.condition == "minor_leakage"
+
+
+def test_what_nominal_models_object_to_counts_only_beside_another_objection(monkeypatch: pytest.MonkeyPatch) -> None:
+    poor = AgainstCode.NONE_FITS.note(percent=70.0)
+    verdict = diagnose.models_verdict
+
+    def objecting(*given: object) -> object:
+        return verdict(*given)._replace(against=(poor,))  # type: ignore[arg-type]
+
+    monkeypatch.setattr(diagnose, "models_verdict", objecting)
+    assert not diagnose_log(log(), RIG).unknown
+    monkeypatch.setattr(diagnose, "refused", lambda _: (EstimateCode.BOUND_TOO_WIDE.note(),))
+    assert poor in diagnose_log(log(), RIG).against
+
+
+def test_a_log_too_short_for_a_circuit_has_a_condition_without_probabilities() -> None:
+    short = log("major_leakage").slice(0, 90)
+    found = diagnose_log(short, RIG)
+    assert found.condition is not None
+    assert not found.probabilities
+    assert ClassCode.NO_PROBABILITIES in codes(found)
+
+
+def test_a_rig_around_which_no_circuit_fits_has_a_condition_without_probabilities(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+
+    def refusing(_: EhaParameters) -> object:
+        raise RigError("accumulator_oil must fill both chambers")
+
+    monkeypatch.setattr(diagnose, "actuator_of", refusing)
+    found = diagnose_log(log(), RIG)
+    assert found.condition == "minor_leakage"
+    assert not found.probabilities
+    (said,) = [note for note in found.notes if note.code == ClassCode.NO_CIRCUIT]
+    assert "accumulator_oil" in str(said)
+
+
+@pytest.mark.parametrize(("share", "code"), [(0.45, RigCode.OIL_STIFFER), (2.2, RigCode.OIL_SOFTER)])
+def test_an_oil_that_is_no_kin_of_the_rigs_is_named_and_the_class_is_still_found(share: float, code: RigCode) -> None:
+    found = diagnose_log(log(), replace(RIG, parameters=replace(HEALTHY, bulk_modulus=share * HEALTHY.bulk_modulus)))
+    assert code in codes(found)
+    assert found.condition == "minor_leakage"
+
+
+def test_an_oil_within_a_third_of_the_rigs_is_no_other_oil() -> None:
+    found = diagnose_log(log(), replace(RIG, parameters=replace(HEALTHY, bulk_modulus=1.3 * HEALTHY.bulk_modulus)))
+    assert not {RigCode.OIL_STIFFER, RigCode.OIL_SOFTER} & codes(found)
+
+
+def test_a_drive_that_is_nothing_tells_no_class() -> None:
+    record = log()
+    still = Record(record.sample_time, {name: np.zeros(len(record)) for name in ("motor_speed_rad_s", "position_m")})
+    found = diagnose_log(still, RIG)
+    assert found.outcome is Outcome.NOT_OBSERVABLE
+    assert found.condition is None
+    assert ClassCode.MODELS_ALIKE in codes(found)
