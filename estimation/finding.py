@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from plant.notes import Note, distinct
@@ -160,10 +159,6 @@ class Change:
     before: str
 
 
-def _nothing() -> Mapping[str, Any]:
-    return MappingProxyType({})
-
-
 @dataclass(frozen=True, eq=False)
 class Finding:
     """What a log says of its actuator, when the log ends.
@@ -216,12 +211,12 @@ class Finding:
     notes: tuple[Note, ...] = ()
     condition: str | None = None
     alike: tuple[str, ...] = ()
-    probabilities: Mapping[str, float] = field(default_factory=_nothing)
+    probabilities: Mapping[str, float] = field(default_factory=dict[str, float])
     unknown: bool = False
     against: tuple[Note, ...] = ()
     faults: tuple[Note, ...] = ()
-    severities: Mapping[str, Quantity] = field(default_factory=_nothing)
-    healthy: Mapping[str, float] = field(default_factory=_nothing)
+    severities: Mapping[str, Quantity] = field(default_factory=dict[str, Quantity])
+    healthy: Mapping[str, float] = field(default_factory=dict[str, float])
     not_told: tuple[Note, ...] = ()
     since: Change | None = None
     advice: tuple[Note, ...] = ()

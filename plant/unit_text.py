@@ -6,7 +6,6 @@ A unit comes from a file that anybody may have written, and the library that con
 
 import re
 from collections.abc import Mapping
-from types import MappingProxyType
 
 LONGEST = 40
 """Characters of the longest unit that is read."""
@@ -23,25 +22,23 @@ _SIGNS = str.maketrans(
     {"²": "^2", "³": "^3", "⁻": "-", "¹": "1", "μ": "µ", "·": "*", "⋅": "*", "\u2212": "-", "\u00d7": "*"}
 )
 
-SPELLINGS: Mapping[str, str] = MappingProxyType(
-    {
-        "°": "degree",
-        "°/s": "degree/s",
-        "°C": "degC",
-        "deg": "degree",
-        "sec": "s",
-        "secs": "s",
-        "seconds": "s",
-        "Sekunden": "s",
-        "msec": "ms",
-        "usec": "us",
-        "Volt": "V",
-        "Volts": "V",
-        "MPa": "MPa",
-        "barg": "bar",
-        "bar(g)": "bar",
-    }
-)
+SPELLINGS: Mapping[str, str] = {
+    "°": "degree",
+    "°/s": "degree/s",
+    "°C": "degC",
+    "deg": "degree",
+    "sec": "s",
+    "secs": "s",
+    "seconds": "s",
+    "Sekunden": "s",
+    "msec": "ms",
+    "usec": "us",
+    "Volt": "V",
+    "Volts": "V",
+    "MPa": "MPa",
+    "barg": "bar",
+    "bar(g)": "bar",
+}
 """What benches write, and what it means."""
 
 _TURNS = {"1/min", "min^-1", "u/min", "umdr/min", "tr/min", "r/min", "rev/min", "rpm", "upm"}

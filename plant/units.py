@@ -7,7 +7,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
 from math import isfinite
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 
 from plant.errors import RigError
@@ -154,9 +153,16 @@ def unit_registry() -> "pint.UnitRegistry[Any]":
     return registry
 
 
-LOWER_CASE: Mapping[str, str] = MappingProxyType(
-    {"pa": "Pa", "kpa": "kPa", "mpa": "MPa", "gpa": "GPa", "v": "V", "mv": "mV", "kv": "kV", "hz": "Hz"}
-)
+LOWER_CASE: Mapping[str, str] = {
+    "pa": "Pa",
+    "kpa": "kPa",
+    "mpa": "MPa",
+    "gpa": "GPa",
+    "v": "V",
+    "mv": "mV",
+    "kv": "kV",
+    "hz": "Hz",
+}
 """Units that column names write in lower case, where pint reads another unit or none (``pa``: pico-year)."""
 
 

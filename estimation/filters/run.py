@@ -28,21 +28,19 @@ from plant.errors import LogError, require_known
 from plant.log.record import Record
 from plant.solvers.steps import Parameters, parameter_row, parameter_symbols
 
-METHODS: Mapping[str, Method] = MappingProxyType(
-    {
-        "ekf": ekf,
-        "iekf": iekf,
-        "ukf": ukf,
-        "ckf": ckf,
-        "svsf": svsf,
-        "sif": sif,
-        "imm": imm,
-        "particle": particle,
-        "smoother": smoother,
-        "iterated-smoother": iterated_smoother,
-        "filterpy-ekf": filterpy_ekf,
-    }
-)
+METHODS: Mapping[str, Method] = {
+    "ekf": ekf,
+    "iekf": iekf,
+    "ukf": ukf,
+    "ckf": ckf,
+    "svsf": svsf,
+    "sif": sif,
+    "imm": imm,
+    "particle": particle,
+    "smoother": smoother,
+    "iterated-smoother": iterated_smoother,
+    "filterpy-ekf": filterpy_ekf,
+}
 """The filters, by name."""
 
 ROBUST = ("none", "huber", "student-t")

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,7 +47,7 @@ class FormFit:
     bound: float
     chi_square: float
     reasons: tuple[Note, ...]
-    rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=lambda: MappingProxyType({}))
+    rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
     explanation: "Explanation | None" = None
 
 

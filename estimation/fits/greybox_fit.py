@@ -6,7 +6,6 @@ well the rig's own parameters are known. The last two are read off the fit's lin
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +70,7 @@ class GreyBoxFit:
     cost: float
     chi_square: tuple[float, ...]
     autocorrelation: tuple[float, ...]
-    rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=lambda: MappingProxyType({}))
+    rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 
 import numpy as np
 
@@ -24,10 +23,6 @@ BLOCK = 1e-3
 
 UPWARD, DOWNWARD = np.log(1e3), 70.0
 """How far the logarithm of an unknown may leave its starts: three decades up; down until it is as good as absent."""
-
-
-def _nothing() -> Mapping[str, float]:
-    return MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -83,9 +78,9 @@ class GreyBoxLog:
     steps: IntArray
     noise: tuple[OutputNoise, ...]
     drive_std: tuple[float, ...] = ()
-    uncertainties: Mapping[str, float] = field(default_factory=_nothing)
+    uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
     gaps: Array = field(default_factory=lambda: np.empty((0, 3)))
-    presumed: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
+    presumed: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
 
     def beginning(self, samples: int) -> "GreyBoxLog":
         """Return the log's first part.

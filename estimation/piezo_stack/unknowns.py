@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import exp, log
-from types import MappingProxyType, SimpleNamespace
+from types import SimpleNamespace
 
 from plant.piezo_stack.parameters import PiezoStackParameters
 
@@ -23,22 +23,20 @@ class Unknown:
     unit: str = "1"
 
 
-UNKNOWNS: Mapping[str, Unknown] = MappingProxyType(
-    {
-        "air_fraction": Unknown(("air_fraction",)),
-        "chamber_leakage": Unknown(("chamber_leakage",), 1e-11, unit="m^3/(s Pa)"),
-        "crossport_leakage": Unknown(("crossport_leakage",), 1e-11, unit="m^3/(s Pa)"),
-        "coulomb_friction": Unknown(("coulomb_friction",), 100.0, unit="N"),
-        "polarisation": Unknown(("free_stroke_a_volt", "hysteresis")),
-        "outlet_reed_stiffness": Unknown(("outlet_reed_stiffness",), unit="N/m"),
-        "inlet_reed_stiffness": Unknown(("inlet_reed_stiffness",), unit="N/m"),
-        "outlet_reed_gap": Unknown(("outlet_reed_gap",), 1e-4, unit="m"),
-        "inlet_reed_gap": Unknown(("inlet_reed_gap",), 1e-4, unit="m"),
-        "viscous_friction": Unknown(("viscous_friction",), unit="N s/m"),
-        "delivery_length": Unknown(("delivery_length", "return_length", "intake_length")),
-        "discharge_coefficient": Unknown(("discharge_coefficient",)),
-    }
-)
+UNKNOWNS: Mapping[str, Unknown] = {
+    "air_fraction": Unknown(("air_fraction",)),
+    "chamber_leakage": Unknown(("chamber_leakage",), 1e-11, unit="m^3/(s Pa)"),
+    "crossport_leakage": Unknown(("crossport_leakage",), 1e-11, unit="m^3/(s Pa)"),
+    "coulomb_friction": Unknown(("coulomb_friction",), 100.0, unit="N"),
+    "polarisation": Unknown(("free_stroke_a_volt", "hysteresis")),
+    "outlet_reed_stiffness": Unknown(("outlet_reed_stiffness",), unit="N/m"),
+    "inlet_reed_stiffness": Unknown(("inlet_reed_stiffness",), unit="N/m"),
+    "outlet_reed_gap": Unknown(("outlet_reed_gap",), 1e-4, unit="m"),
+    "inlet_reed_gap": Unknown(("inlet_reed_gap",), 1e-4, unit="m"),
+    "viscous_friction": Unknown(("viscous_friction",), unit="N s/m"),
+    "delivery_length": Unknown(("delivery_length", "return_length", "intake_length")),
+    "discharge_coefficient": Unknown(("discharge_coefficient",)),
+}
 """What can be estimated, by name; the last three calibrate a healthy actuator."""
 
 DEFAULT_UNKNOWNS = tuple(UNKNOWNS)[:7]

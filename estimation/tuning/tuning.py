@@ -33,17 +33,15 @@ LEAST_SHARE = 0.25
 PUBLISHED_STEP = 1e-4
 """Step for which equation 7.6 gives covariances [s]."""
 
-PUBLISHED_NOISE: Mapping[str, float] = MappingProxyType(
-    {
-        "position_m": 1e-12 / PUBLISHED_STEP,
-        "velocity_m_s": 1e-8 / PUBLISHED_STEP,
-        "acceleration_m_s2": 1e-6 / PUBLISHED_STEP,
-        "bulk_modulus_pa": 1e-12 / PUBLISHED_STEP,
-    }
-)
+PUBLISHED_NOISE: Mapping[str, float] = {
+    "position_m": 1e-12 / PUBLISHED_STEP,
+    "velocity_m_s": 1e-8 / PUBLISHED_STEP,
+    "acceleration_m_s2": 1e-6 / PUBLISHED_STEP,
+    "bulk_modulus_pa": 1e-12 / PUBLISHED_STEP,
+}
 """Q of equation 7.6 as densities, by state name [SI squared a second]; far too small on bulk modulus (errata E10)."""
 
-PUBLISHED_VARIANCES: Mapping[str, float] = MappingProxyType({"position_m": 1e-12, "velocity_m_s": 1e-4})
+PUBLISHED_VARIANCES: Mapping[str, float] = {"position_m": 1e-12, "velocity_m_s": 1e-4}
 """R of equation 7.7, by channel [SI squared] (errata E11)."""
 
 SCREENED = ((1e3, 1.0), (1.0, 1.0), (1e-1, 1.0), (1e-2, 1.0), (1e-3, 1.0), (1.0, 1e-2), (1e-3, 1e-2))

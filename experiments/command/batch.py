@@ -50,15 +50,11 @@ def batch(
     ] = True,
     retry_failed: Annotated[bool, flag("--retry-failed", "Run failed cases again.")] = False,
     workers: Annotated[
-        int | None, option("N", "Processes, one thread each; the machine's cores by default.", "--workers", min=1)
+        int | None, option("N", "Processes, one thread each; the machine's cores by default.", min=1)
     ] = None,
-    cluster: Annotated[
-        str | None, option("ADDRESS", "Use a Dask cluster: its scheduler, as tcp://host:8786.", "--cluster")
-    ] = None,
-    max_failures: Annotated[
-        int | None, option("N", "Stop once more than N cases have failed.", "--max-failures", min=0)
-    ] = None,
-    logs: Annotated[str | None, option("GLOB", "Replaces the glob of the study's logs.", "--logs")] = None,
+    cluster: Annotated[str | None, option("ADDRESS", "Use a Dask cluster: its scheduler, as tcp://host:8786.")] = None,
+    max_failures: Annotated[int | None, option("N", "Stop once more than N cases have failed.", min=0)] = None,
+    logs: Annotated[str | None, option("GLOB", "Replaces the glob of the study's logs.")] = None,
     as_json: Json = False,
 ) -> None:
     """Run a study of many cases into a store that survives whatever stops it, and write its report.

@@ -32,7 +32,7 @@ def diagnose(
     context: typer.Context,
     logs: Logs,
     condition: Annotated[
-        str | None, option("NAME", "The condition that you expect; the result says if it agrees.", "--condition")
+        str | None, option("NAME", "The condition that you expect; the result says if it agrees.")
     ] = None,
     rig: RigFile = None,
     columns: Columns = None,
@@ -48,9 +48,7 @@ def diagnose(
     scores: Annotated[
         bool, flag("--scores/--no-scores", "Also show every condition's model error in a table.")
     ] = False,
-    report: Annotated[
-        Path | None, option("FILE", "Write a page (HTML); of several logs, one each.", "--report")
-    ] = None,
+    report: Annotated[Path | None, option("FILE", "Write a page (HTML); of several logs, one each.")] = None,
     no_pressure: Annotated[
         bool, flag("--no-pressure", "Use velocity alone, even if differential pressure is logged.")
     ] = False,

@@ -80,9 +80,7 @@ def estimate(
     figure: Annotated[
         Path | None, option("PNG", "Draw the filtered estimate with its 95 % band, innovations and NIS.")
     ] = None,
-    report: Annotated[
-        Path | None, option("FILE", "Write a page (HTML); of several logs, one each.", "--report")
-    ] = None,
+    report: Annotated[Path | None, option("FILE", "Write a page (HTML); of several logs, one each.")] = None,
     plant: Plant = None,
     bias_pressure: BiasPressure = None,
     load: Load = None,

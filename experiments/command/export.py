@@ -8,7 +8,17 @@ import typer
 
 from experiments.command.json_output import json_text, prepare_output
 from experiments.command.logs import caught, read_log
-from experiments.command.options import Columns, Json, RigFile, load_columns, load_rig, option, require_positive
+from experiments.command.options import (
+    Columns,
+    Json,
+    RigFile,
+    argument,
+    flag,
+    load_columns,
+    load_rig,
+    option,
+    require_positive,
+)
 from experiments.command.terminal import emit, note
 from plant.errors import HydrostateError
 from plant.notes import distinct
@@ -22,11 +32,10 @@ commands = typer.Typer(help="Take what works offline to a controller: C99, FMUs.
 Folder: TypeAlias = Annotated[Path, option("DIR", "Folder that the files are written to.", "--out", "-o")]
 Log: TypeAlias = Annotated[
     Path | None,
-    typer.Argument(
-        metavar="LOG",
-        help="A log of the bench: the filter gets its rate, its channels and its sensors' noise. Without one, those of "
-        "a simulated healthy bench at 10 kHz.",
-        show_default=False,
+    argument(
+        "LOG",
+        "A log of the bench: the filter gets its rate, its channels and its sensors' noise. Without one, those of a "
+        "simulated healthy bench at 10 kHz.",
     ),
 ]
 Form: TypeAlias = Annotated[
@@ -38,14 +47,12 @@ Method: TypeAlias = Annotated[
 PlantName: TypeAlias = Annotated[
     str | None, option("PLANT", "Export the step of a plant instead of a filter: reduced, lumped or circuit.")
 ]
-Tune: TypeAlias = Annotated[
-    bool, typer.Option("--tune", help="Tune the filter's noise levels to the log by likelihood.")
-]
+Tune: TypeAlias = Annotated[bool, flag("--tune", "Tune the filter's noise levels to the log by likelihood.")]
 States: TypeAlias = Annotated[
     str, option("NAMES", "What the filter estimates beside bulk modulus, comma-separated: parameters' names.")
 ]
 NoPressure: TypeAlias = Annotated[
-    bool, typer.Option("--no-pressure", help="Use position and velocity alone, even if pressure is logged.")
+    bool, flag("--no-pressure", "Use position and velocity alone, even if pressure is logged.")
 ]
 Step: TypeAlias = Annotated[float | None, option("S", "Time between samples [s].", show_default="the log's, else 1e-4")]
 

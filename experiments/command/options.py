@@ -51,14 +51,13 @@ Out: TypeAlias = Annotated[
         "-o",
     ),
 ]
-Seed: TypeAlias = Annotated[int, option("INT", "Seed of all that is random; kept in the results.", "--seed", min=0)]
+Seed: TypeAlias = Annotated[int, option("INT", "Seed of all that is random; kept in the results.", min=0)]
 RigFile: TypeAlias = Annotated[
     Path | None,
     option(
         "FILE",
         "Rig file (TOML): parameters in SI, and what the logs call their columns; see `hydrostate rig init`. "
         "Without it, the paper's actuator.",
-        "--rig",
     ),
 ]
 Columns: TypeAlias = Annotated[
@@ -67,19 +66,14 @@ Columns: TypeAlias = Annotated[
         "CHANNEL=NAME:UNIT",
         "A column under another name, with its unit if it is not SI: position_m=POS_MM:mm. Repeat it, or "
         "separate several by commas.",
-        "--columns",
     ),
 ]
-SampleTime: TypeAlias = Annotated[
-    float | None, option("S", "Time between rows [s] of a log that has no time.", "--sample-time")
-]
+SampleTime: TypeAlias = Annotated[float | None, option("S", "Time between rows [s] of a log that has no time.")]
 Beside: TypeAlias = Annotated[
     list[Path] | None,
     option("FILE", "Another logger's file of the same test; both are put on one clock. Repeat it for more.", "--with"),
 ]
-ConditionName: TypeAlias = Annotated[
-    str | None, option("NAME", "A condition by name, see `hydrostate conditions`.", "--condition")
-]
+ConditionName: TypeAlias = Annotated[str | None, option("NAME", "A condition by name, see `hydrostate conditions`.")]
 
 Plant: TypeAlias = Annotated[
     str | None,
@@ -89,20 +83,17 @@ Plant: TypeAlias = Annotated[
         "of stack_displacement_m, stack_force_n, position_m, chamber_pressure_pa, from rest on; diaphragm-motor, with "
         "drive_voltage_v, a steady sine, electrode_1_v to electrode_7_v and position_m. Options that name a plant "
         "apply to it alone.",
-        "--plant",
         show_default="that of the rig file, else eha",
     ),
 ]
 BiasPressure: TypeAlias = Annotated[
-    float | None,
-    option("PA", "piezo-stack: absolute bias pressure of the runs.", "--bias-pressure", show_default="1e6"),
+    float | None, option("PA", "piezo-stack: absolute bias pressure of the runs.", show_default="1e6")
 ]
 Load: TypeAlias = Annotated[
     float | None,
     option(
         "KG|N",
         "piezo-stack: mass lifted in the runs [kg]; diaphragm-motor: known force against extension [N].",
-        "--load",
         show_default="0",
     ),
 ]
@@ -123,8 +114,7 @@ Voltage: TypeAlias = Annotated[
     ),
 ]
 Healthy: TypeAlias = Annotated[
-    Path | None,
-    option("LOG", "piezo-stack, diaphragm-motor: a run of the healthy actuator to calibrate on.", "--healthy"),
+    Path | None, option("LOG", "piezo-stack, diaphragm-motor: a run of the healthy actuator to calibrate on.")
 ]
 Noise: TypeAlias = Annotated[str, option("NOISE", "Noise of the sensors: bench, rig or paper.")]
 Drive: TypeAlias = Annotated[str, option("DRIVE", "Drive: sine, prbs, steps, chirp or multisine, at the paper's 4 V.")]

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
@@ -122,11 +121,11 @@ def tracking(room: Room, rng: np.random.Generator) -> Array:
 
 Draw = Callable[[Room, np.random.Generator], Array]
 
-OPEN: Mapping[str, Draw] = MappingProxyType({"steps": steps, "multisine": multisine, "prbs": prbs, "sines": sines})
+OPEN: Mapping[str, Draw] = {"steps": steps, "multisine": multisine, "prbs": prbs, "sines": sines}
 """Drives that ask for a motor speed."""
 
-CLOSED: Mapping[str, Draw] = MappingProxyType({"posn": position_steps, "track": tracking})
+CLOSED: Mapping[str, Draw] = {"posn": position_steps, "track": tracking}
 """Drives that ask for a position."""
 
-DRIVES: Mapping[str, Draw] = MappingProxyType({**OPEN, **CLOSED})
+DRIVES: Mapping[str, Draw] = {**OPEN, **CLOSED}
 """Every drive by the name that the truth has for it."""

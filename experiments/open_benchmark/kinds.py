@@ -3,7 +3,6 @@
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -26,7 +25,7 @@ VERSION = "1.0"
 SPLITS = ("training", "validation", "test")
 """What may be looked at, what choices may be made on, and what is scored."""
 
-KINDS: Mapping[str, Kind] = MappingProxyType({kind.name: kind for kind in (*LOGGERS, *RIGS, *FAULTY)})
+KINDS: Mapping[str, Kind] = {kind.name: kind for kind in (*LOGGERS, *RIGS, *FAULTY)}
 """Every kind by name."""
 
 STRIDE = 4

@@ -7,7 +7,6 @@ import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
-from types import MappingProxyType
 from typing import Literal, TypeAlias, get_args
 
 import pandas as pd
@@ -52,14 +51,12 @@ def _scalars() -> Mapping[str, PublishedScalar]:
         }
 
 
-SCALARS: Mapping[str, PublishedScalar] = MappingProxyType(_scalars())
+SCALARS: Mapping[str, PublishedScalar] = _scalars()
 
-_FILES: Mapping[TableName | MotorTableName, str] = MappingProxyType(
-    {
-        **{name: f"eha_table{number}_{name}.csv" for number, name in enumerate(get_args(TableName), start=1)},
-        **{name: f"motor_{name}.csv" for name in get_args(MotorTableName)},
-    }
-)
+_FILES: Mapping[TableName | MotorTableName, str] = {
+    **{name: f"eha_table{number}_{name}.csv" for number, name in enumerate(get_args(TableName), start=1)},
+    **{name: f"motor_{name}.csv" for name in get_args(MotorTableName)},
+}
 
 
 def load(name: TableName | MotorTableName) -> pd.DataFrame:

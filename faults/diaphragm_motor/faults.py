@@ -7,7 +7,6 @@ each. Friction and load, and other pairs, look alike from outside: `faults.diaph
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from operator import add
-from types import MappingProxyType
 from typing import Any, TypeAlias
 
 from plant.diaphragm_motor.parameters import ROWS, DiaphragmMotorParameters, changed
@@ -179,7 +178,7 @@ _ALL = (
     ),
 )
 
-MOTOR_FAULTS: Mapping[str, MotorFault] = MappingProxyType({fault.name: fault for fault in _ALL})
+MOTOR_FAULTS: Mapping[str, MotorFault] = {fault.name: fault for fault in _ALL}
 """Every fault by name; places count from the inlet."""
 
 

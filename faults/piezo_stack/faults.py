@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from types import MappingProxyType
 from typing import TypeAlias
 
 from faults.conditions import CONDITIONS, find_condition
@@ -12,10 +11,10 @@ from plant.piezo_stack.parameters import PiezoStackParameters
 StackFault: TypeAlias = Callable[[PiezoStackParameters], PiezoStackParameters]
 """From a healthy actuator to a faulty one."""
 
-CROSSPORT_LEAKAGE: Mapping[str, float] = MappingProxyType({"none": 0.0, "minor": 5e-12, "major": 2e-11})
+CROSSPORT_LEAKAGE: Mapping[str, float] = {"none": 0.0, "minor": 5e-12, "major": 2e-11}
 """Leakage across the cylinder of each level [m^3/(s Pa)]: about 10 and 33 % of the flow at 275 Hz and 10 kg, judged."""
 
-ADDED_FRICTION: Mapping[str, float] = MappingProxyType({"none": 0.0, "minor": 100.0, "major": 250.0})
+ADDED_FRICTION: Mapping[str, float] = {"none": 0.0, "minor": 100.0, "major": 250.0}
 """Coulomb friction of each level above the healthy one [N]: about 23 and 56 % of that flow, judged."""
 
 
@@ -29,23 +28,21 @@ def _depolarised(share: float) -> StackFault:
     )
 
 
-STACK_FAULTS: Mapping[str, StackFault] = MappingProxyType(
-    {
-        "air_doubled": _air(2.0),
-        "air_fourfold": _air(4.0),
-        "chamber_leakage_minor": lambda p: replace(p, chamber_leakage=5e-12),
-        "chamber_leakage_major": lambda p: replace(p, chamber_leakage=2e-11),
-        "outlet_reed_soft": lambda p: replace(p, outlet_reed_stiffness=0.5 * p.outlet_reed_stiffness),
-        "inlet_reed_soft": lambda p: replace(p, inlet_reed_stiffness=0.5 * p.inlet_reed_stiffness),
-        "outlet_reed_gap": lambda p: replace(p, outlet_reed_gap=3e-5),
-        "inlet_reed_gap": lambda p: replace(p, inlet_reed_gap=3e-5),
-        "outlet_reed_stuck_open": lambda p: replace(p, outlet_reed_gap=1.5e-4),
-        "inlet_reed_jammed": lambda p: replace(p, inlet_reed_stiffness=100.0 * p.inlet_reed_stiffness),
-        "depolarised_10_percent": _depolarised(0.10),
-        "depolarised_25_percent": _depolarised(0.25),
-        "bias_lost": lambda p: replace(p, bias_pressure=0.6 * p.bias_pressure),
-    }
-)
+STACK_FAULTS: Mapping[str, StackFault] = {
+    "air_doubled": _air(2.0),
+    "air_fourfold": _air(4.0),
+    "chamber_leakage_minor": lambda p: replace(p, chamber_leakage=5e-12),
+    "chamber_leakage_major": lambda p: replace(p, chamber_leakage=2e-11),
+    "outlet_reed_soft": lambda p: replace(p, outlet_reed_stiffness=0.5 * p.outlet_reed_stiffness),
+    "inlet_reed_soft": lambda p: replace(p, inlet_reed_stiffness=0.5 * p.inlet_reed_stiffness),
+    "outlet_reed_gap": lambda p: replace(p, outlet_reed_gap=3e-5),
+    "inlet_reed_gap": lambda p: replace(p, inlet_reed_gap=3e-5),
+    "outlet_reed_stuck_open": lambda p: replace(p, outlet_reed_gap=1.5e-4),
+    "inlet_reed_jammed": lambda p: replace(p, inlet_reed_stiffness=100.0 * p.inlet_reed_stiffness),
+    "depolarised_10_percent": _depolarised(0.10),
+    "depolarised_25_percent": _depolarised(0.25),
+    "bias_lost": lambda p: replace(p, bias_pressure=0.6 * p.bias_pressure),
+}
 """Faults beside the nine conditions, by name."""
 
 

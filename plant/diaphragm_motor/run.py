@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from math import pi
-from types import MappingProxyType
 from typing import Annotated, TypeAlias
 
 import numpy as np
@@ -78,7 +77,7 @@ BENCH_SENSORS = MotorSensors()
 IDEAL_SENSORS = MotorSensors(electrode_v=0.0, position_m=0.0)
 """Sensors that change nothing."""
 
-MOTOR_SENSORS: Mapping[str, MotorSensors] = MappingProxyType({"bench": BENCH_SENSORS, "ideal": IDEAL_SENSORS})
+MOTOR_SENSORS: Mapping[str, MotorSensors] = {"bench": BENCH_SENSORS, "ideal": IDEAL_SENSORS}
 """The sensor sets by name."""
 
 

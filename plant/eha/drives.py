@@ -6,7 +6,6 @@ motor speeds [rad/s]; the paper's 4 V are ``parameters.rated_speed``.
 
 from collections.abc import Callable, Mapping
 from math import ceil
-from types import MappingProxyType
 from typing import TypeAlias
 
 import numpy as np
@@ -247,15 +246,13 @@ def multisine(
     return amplitude * total / np.max(np.abs(total))
 
 
-DRIVES: Mapping[str, Drive] = MappingProxyType(
-    {
-        "sine": lambda duration, sample_time, p, _: sine(duration, sample_time, p.rated_speed),
-        "prbs": lambda duration, sample_time, p, rng: prbs(duration, sample_time, p.rated_speed, HOLD_TIME, rng),
-        "steps": nine_steps,
-        "chirp": lambda duration, sample_time, p, _: chirp(duration, sample_time, p.rated_speed),
-        "multisine": lambda duration, sample_time, p, rng: multisine(duration, sample_time, p.rated_speed, rng),
-    }
-)
+DRIVES: Mapping[str, Drive] = {
+    "sine": lambda duration, sample_time, p, _: sine(duration, sample_time, p.rated_speed),
+    "prbs": lambda duration, sample_time, p, rng: prbs(duration, sample_time, p.rated_speed, HOLD_TIME, rng),
+    "steps": nine_steps,
+    "chirp": lambda duration, sample_time, p, _: chirp(duration, sample_time, p.rated_speed),
+    "multisine": lambda duration, sample_time, p, rng: multisine(duration, sample_time, p.rated_speed, rng),
+}
 """The drives by name, at the paper's 4 V."""
 
 

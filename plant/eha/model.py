@@ -7,7 +7,7 @@ pressure as a state, so that friction enters undifferentiated and the piston rea
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Annotated, TypeAlias
 
 from plant.compiled.functions import Scalar, absolute, sign, where
@@ -86,7 +86,7 @@ class EhaParameters:
         return 4.0 * self.motor_speed_per_volt
 
 
-PAIRS: Mapping[str, str] = MappingProxyType({"piston_area": "area_difference", "chamber_volume": "volume_difference"})
+PAIRS: Mapping[str, str] = {"piston_area": "area_difference", "chamber_volume": "volume_difference"}
 """Entries that a rig file may give as two numbers, of sides A and B: mean, and their difference over their sum."""
 
 SIGNED = frozenset({"friction_linear", "area_difference", "volume_difference", "load_force"})

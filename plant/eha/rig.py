@@ -22,28 +22,22 @@ from plant.log.columns import check_columns
 from plant.small_file import small_file
 from plant.units import notes
 
-_EXAMPLES: Mapping[str, str] = MappingProxyType(
-    {
-        "time_s": "T_MS:ms",
-        "motor_speed_rad_s": "RPM:rpm",
-        "position_m": "POS_MM:mm",
-        "velocity_m_s": "VEL_MM_S:mm/s",
-        "differential_pressure_pa": "DP_BAR:bar",
-        "pressure_a_pa": "PA_BAR:bar",
-        "pressure_b_pa": "PB_BAR:bar",
-        "motor_voltage_v": "U_MOTOR:V",
-    }
-)
+_EXAMPLES: Mapping[str, str] = {
+    "time_s": "T_MS:ms",
+    "motor_speed_rad_s": "RPM:rpm",
+    "position_m": "POS_MM:mm",
+    "velocity_m_s": "VEL_MM_S:mm/s",
+    "differential_pressure_pa": "DP_BAR:bar",
+    "pressure_a_pa": "PA_BAR:bar",
+    "pressure_b_pa": "PB_BAR:bar",
+    "motor_voltage_v": "U_MOTOR:V",
+}
 
 
 EHA = "eha"
 """What a rig file calls the gear-pump actuator; one that names no plant is taken for what is wanted."""
 
 P = TypeVar("P", default=EhaParameters)
-
-
-def _nothing() -> Mapping[str, Any]:
-    return MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -78,8 +72,8 @@ class Rig(Generic[P]):
 
     name: str = "paper"
     parameters: P = field(default_factory=EhaParameters)  # pyright: ignore[reportAssignmentType] -- P's own default
-    uncertainties: Mapping[str, float] = field(default_factory=_nothing)
-    columns: Mapping[str, str] = field(default_factory=_nothing)
+    uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
+    columns: Mapping[str, str] = field(default_factory=dict[str, str])
     measured: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import ceil
-from types import MappingProxyType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -156,7 +156,7 @@ CIRCUIT = Plant(
     ),
 )
 
-PLANTS: Mapping[str, Plant] = MappingProxyType({plant.name: plant for plant in (REDUCED, LUMPED, CIRCUIT)})
+PLANTS: Mapping[str, Plant] = {plant.name: plant for plant in (REDUCED, LUMPED, CIRCUIT)}
 """The plants, by name."""
 
 

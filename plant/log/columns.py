@@ -13,22 +13,20 @@ from plant.errors import HydrostateError, LogError, MissingColumnError, RigError
 from plant.log.headings import Heading, cleaned
 from plant.units import conversion_to
 
-CHANNELS: Mapping[str, str] = MappingProxyType(
-    {
-        "motor_speed_rad_s": "rad/s",
-        "position_m": "m",
-        "velocity_m_s": "m/s",
-        "differential_pressure_pa": "Pa",
-        "pressure_a_pa": "Pa",
-        "pressure_b_pa": "Pa",
-        "motor_voltage_v": "V",
-        "drive_voltage_v": "V",
-        "stack_displacement_m": "m",
-        "stack_force_n": "N",
-        "chamber_pressure_pa": "Pa",
-        **{f"electrode_{i}_v": "V" for i in range(1, 8)},
-    }
-)
+CHANNELS: Mapping[str, str] = {
+    "motor_speed_rad_s": "rad/s",
+    "position_m": "m",
+    "velocity_m_s": "m/s",
+    "differential_pressure_pa": "Pa",
+    "pressure_a_pa": "Pa",
+    "pressure_b_pa": "Pa",
+    "motor_voltage_v": "V",
+    "drive_voltage_v": "V",
+    "stack_displacement_m": "m",
+    "stack_force_n": "N",
+    "chamber_pressure_pa": "Pa",
+    **{f"electrode_{i}_v": "V" for i in range(1, 8)},
+}
 """Every channel that the project reads, with its unit. `time_s` is implied by `Record.sample_time`."""
 
 TIME = "time_s"

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from types import MappingProxyType
 from typing import Annotated
 
 import numpy as np
@@ -63,7 +62,7 @@ BENCH_SENSORS = StackSensors()
 IDEAL_SENSORS = StackSensors(stack_displacement_m=0.0, stack_force_n=0.0, position_m=0.0, chamber_pressure_pa=0.0)
 """Sensors that change nothing."""
 
-STACK_SENSORS: Mapping[str, StackSensors] = MappingProxyType({"bench": BENCH_SENSORS, "ideal": IDEAL_SENSORS})
+STACK_SENSORS: Mapping[str, StackSensors] = {"bench": BENCH_SENSORS, "ideal": IDEAL_SENSORS}
 """The sensor sets by name."""
 
 

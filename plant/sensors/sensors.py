@@ -96,7 +96,7 @@ RIG = Sensors(velocity_from_position=True)
 """The paper's rig, section 2: an optical encoder, its position differentiated, and pressure transducers; noise as on
 the reference bench, since the paper gives none."""
 
-SENSORS: Mapping[str, Sensors] = MappingProxyType({"bench": BENCH, "rig": RIG, "paper": PAPER, "ideal": IDEAL})
+SENSORS: Mapping[str, Sensors] = {"bench": BENCH, "rig": RIG, "paper": PAPER, "ideal": IDEAL}
 """The sensor sets by name."""
 
 
