@@ -6,7 +6,7 @@ A mass on a spring, a damper and a Bouc-Wen force (equations 1 and 2).
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from math import isfinite
-from typing import Annotated, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from plant.components.bouc_wen import bouc_wen_rate
 from plant.errors import RigError
 from plant.solvers.steps import rk4_step
 from plant.solvers.trajectory import compile_trajectory
-from plant.units import SI
+from plant.units import si
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -40,12 +40,12 @@ class OscillatorParameters:
         If a value is not finite, or mass, stiffness or alpha are not positive.
     """
 
-    mass: Annotated[float, SI("kg", "mass m", BENCHMARK)] = 2.0
-    damping: Annotated[float, SI("N s/m", "damping c", BENCHMARK)] = 10.0
-    stiffness: Annotated[float, SI("N/m", "stiffness k", BENCHMARK)] = 5e4
-    alpha: Annotated[float, SI("N/m", "small-signal stiffness of the Bouc-Wen force", BENCHMARK)] = 5e4
-    beta_gamma: Annotated[float, SI("1/m", "beta times gamma", BENCHMARK)] = 800.0
-    beta_delta: Annotated[float, SI("1/m", "beta times delta", BENCHMARK)] = -1100.0
+    mass: float = si(2.0, "kg", "mass m", BENCHMARK)
+    damping: float = si(10.0, "N s/m", "damping c", BENCHMARK)
+    stiffness: float = si(5e4, "N/m", "stiffness k", BENCHMARK)
+    alpha: float = si(5e4, "N/m", "small-signal stiffness of the Bouc-Wen force", BENCHMARK)
+    beta_gamma: float = si(800.0, "1/m", "beta times gamma", BENCHMARK)
+    beta_delta: float = si(-1100.0, "1/m", "beta times delta", BENCHMARK)
 
     def __post_init__(self) -> None:
         for field in fields(self):

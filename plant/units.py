@@ -3,8 +3,8 @@
 Inside the project everything is SI; a unit stands only in a name's suffix (``speed_rpm``) or in an `SI` note.
 """
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from functools import cache
 from math import isfinite
 from typing import TYPE_CHECKING, Any, get_args, get_type_hints
@@ -38,11 +38,34 @@ class SI:
         What the quantity is, in a few words.
     source : str
         Table, equation or section of the source, with the erratum where one applies.
+    signed, zero : bool
+        Whether it may have either sign, or be zero; otherwise it is positive.
     """
 
     unit: str
     meaning: str
     source: str
+    signed: bool = False
+    zero: bool = False
+
+
+def si(default: Any, unit: str, meaning: str, source: str, *, signed: bool = False, zero: bool = False) -> Any:
+    """Return a field of a parameter dataclass, with its note, which takes the same but the default.
+
+    Parameters
+    ----------
+    default : float, bool, tuple of float or None
+        Its value unless another is given [its unit]; a parameter may be what it is by default.
+
+    Examples
+    --------
+    >>> @dataclass(frozen=True)
+    ... class Rod:
+    ...     area: float = si(3e-4, "m^2", "area of the rod", "drawing 7")
+    >>> Rod().area, notes(Rod)["area"].unit
+    (0.0003, 'm^2')
+    """
+    return field(default=default, metadata={"si": SI(unit, meaning, source, signed, zero or default == 0.0)})
 
 
 @cache
@@ -52,7 +75,7 @@ def notes(parameter_class: type) -> Mapping[str, SI]:
     Parameters
     ----------
     parameter_class : type
-        A dataclass whose fields are ``Annotated[float, SI(...)]``.
+        A dataclass whose fields are ``si(...)``, or ``Annotated[float, SI(...)]`` where they have no default.
 
     Returns
     -------
@@ -72,12 +95,12 @@ def notes(parameter_class: type) -> Mapping[str, SI]:
     """
     hints = get_type_hints(parameter_class, include_extras=True)
     found: dict[str, SI] = {}
-    for field in fields(parameter_class):
-        hint = hints[field.name]
-        note = next((extra for extra in get_args(hint) if isinstance(extra, SI)), None)
+    for one in fields(parameter_class):
+        hint = hints[one.name]
+        note = one.metadata.get("si") or next((extra for extra in get_args(hint) if isinstance(extra, SI)), None)
         if note is None:
-            raise TypeError(f"{parameter_class.__name__}.{field.name} must carry an SI note, got {hint}")
-        found[field.name] = note
+            raise TypeError(f"{parameter_class.__name__}.{one.name} must carry an SI note, got {hint}")
+        found[one.name] = note
     return found
 
 
@@ -109,37 +132,29 @@ def require_number(name: str, value: object, *, signed: bool = False, zero: bool
         raise RigError(f"{name} must be from {SMALLEST:g} to {LARGEST:g} in size, got {value!r}")
 
 
-def require_numbers(
-    parameters: Any, *, signed: Collection[str] = (), zero: Collection[str] = (), unknown: Collection[str] = ()
-) -> None:
+def require_numbers(parameters: Any) -> None:
     """Refuse a set of parameters with a number, or a row of them, that is not finite or not of its sign.
 
     Parameters
     ----------
     parameters : dataclass instance
-        The parameters, each in its own unit.
-    signed : collection of str
-        Those that may be negative.
-    zero : collection of str
-        Those that may be zero, beside those that are zero by default.
-    unknown : collection of str
-        Those that may be None.
+        The parameters, each in its own unit; one that is None by default may be None.
 
     Raises
     ------
     RigError
         If one is not what it must be, with its name.
     """
-    for field in fields(parameters):
-        value = getattr(parameters, field.name)
-        rule = {"signed": field.name in signed, "zero": field.name in zero or field.default == 0.0}
-        if value is None and field.name in unknown:
+    noted = notes(type(parameters))
+    for one in fields(parameters):
+        value, note = getattr(parameters, one.name), noted[one.name]
+        if value is None and one.default is None:
             continue
         if not isinstance(value, tuple | list):
-            require_number(field.name, value, **rule)
+            require_number(one.name, value, signed=note.signed, zero=note.zero)
             continue
-        for i, one in enumerate(value, start=1):
-            require_number(f"{field.name} [{i}]", one, **rule)
+        for i, each in enumerate(value, start=1):
+            require_number(f"{one.name} [{i}]", each, signed=note.signed, zero=note.zero)
 
 
 @cache

@@ -184,7 +184,7 @@ def _fields(node: ast.ClassDef) -> dict[str, ast.expr | None]:
             for item in node.body
             if isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name)
             if not item.target.id.startswith("_") and "init=False" not in ast.unparse(item)
-            if not re.match(r"(typing\.)?ClassVar\b|.*\bSI\(", ast.unparse(item.annotation))
+            if not re.match(r"(typing\.)?ClassVar\b|.*\bSI\(|.* = si\(", ast.unparse(item).partition(": ")[2])
         }
     found = [item for item in node.body if isinstance(item, Function) and item.name == "__init__"]
     return _arguments(found[0], method=True) if found else {}

@@ -92,7 +92,7 @@ def is_parameters(found: object) -> bool:
     if not (isinstance(found, type) and is_dataclass(found)):
         return False
     hints = inspect.get_annotations(found)
-    return any("SI(" in str(hints.get(field.name)) for field in fields(found))
+    return any("si" in one.metadata or "SI(" in str(hints.get(one.name)) for one in fields(found))
 
 
 def bad_notes(parameter_class: type) -> list[str]:

@@ -9,24 +9,24 @@ circuit's pressure, at which make-up begins.
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Annotated, Any
+from typing import Any
 
 from estimation.models.flow import Delivery, chamber_rates, delivered_flow
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.functions import Scalar, absolute, maximum
 from plant.components.oil import ATMOSPHERE
 from plant.eha.model import EhaParameters, load_on_rod, piston_areas
-from plant.units import SI
+from plant.units import si
 
 
 @dataclass(frozen=True, kw_only=True)
 class MotionParameters(EhaParameters):
     """The actuator's parameters, and those that the motion form adds."""
 
-    case_leakage: Annotated[float, SI("m^3/(s Pa)", "drain of a port to the inner circuit", "fitted")] = 0.0
-    speed_lead: Annotated[float, SI("s", "lead of the motor on the line between samples", "fitted")] = 0.0
-    bristle_stiffness: Annotated[float, SI("N/m", "stiffness of the seals before they slide", "fitted")] = 1e8
-    bristle_damping: Annotated[float, SI("N s/m", "damping of the seals before they slide", "fitted")] = 1e2
+    case_leakage: float = si(0.0, "m^3/(s Pa)", "drain of a port to the inner circuit", "fitted")
+    speed_lead: float = si(0.0, "s", "lead of the motor on the line between samples", "fitted")
+    bristle_stiffness: float = si(1e8, "N/m", "stiffness of the seals before they slide", "fitted")
+    bristle_damping: float = si(1e2, "N s/m", "damping of the seals before they slide", "fitted")
 
 
 Friction = Callable[[Scalar, Scalar, SimpleNamespace], tuple[Scalar, Scalar]]

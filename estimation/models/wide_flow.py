@@ -6,7 +6,7 @@ held there.
 
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Annotated, Any
+from typing import Any
 
 from estimation.models.flow import delivered_flow, leaked_flow, port_flows
 from estimation.models.greybox import GreyBoxModel
@@ -15,7 +15,7 @@ from plant.components.check_valve import make_up_flow
 from plant.components.oil import ATMOSPHERE
 from plant.eha.circuit import chamber_volumes
 from plant.eha.model import EhaParameters, piston_areas
-from plant.units import SI
+from plant.units import si
 
 VAPOUR = 2e4
 """Absolute pressure about which a chamber that is short of oil becomes soft [Pa]; pressures stay positive."""
@@ -34,26 +34,26 @@ SHORTEST_LAG = 1e-6
 class WideFlowParameters(EhaParameters):
     """The actuator's parameters, and those of what a strange rig, oil or logger may add; absent by default."""
 
-    makeup_opening: Annotated[float, SI("Pa", "drop at which a make-up valve is half open", "fitted")] = 1e3
-    case_leakage: Annotated[float, SI("m^3/(s Pa)", "drain of a port to the inner circuit", "fitted")] = 0.0
-    speed_lead: Annotated[float, SI("s", "lead of the motor on the line between samples", "fitted")] = 0.0
-    pressure_lag: Annotated[float, SI("s", "first-order lag of the pressure sensor", "fitted")] = 0.0
-    pressure_offset: Annotated[float, SI("Pa", "offset of the differential pressure", "fitted")] = 0.0
-    position_zero: Annotated[float, SI("m", "encoder's reading in the middle position", "fitted")] = 0.0
-    start_pressure: Annotated[float, SI("Pa", "differential pressure before the first sample", "fitted")] = 0.0
-    start_level: Annotated[
-        float, SI("Pa", "pressure of the lower side before the first sample, over the accumulator's", "fitted")
-    ] = 0.0
-    air_softness: Annotated[float, SI("Pa", "a of 1/beta(p) = 1/beta_liquid + a/p^2", "fitted")] = 0.0
-    air_onset: Annotated[float, SI("1", "when that air gets in, in lengths of the log", "fitted")] = -1.0
-    stated_pressure: Annotated[float, SI("Pa", "absolute pressure that bulk modulus is stated at", "chosen")] = 1e6
-    leakage_growth: Annotated[float, SI("1", "growth of leakage over the log, of its value halfway", "fitted")] = 0.0
-    leakage_bend: Annotated[float, SI("1", "part of that growth which goes with time squared", "fitted")] = 0.0
-    crack_pressure: Annotated[float, SI("Pa", "drop at which the make-up valves crack", "fitted")] = 0.0
-    makeup_share_b: Annotated[float, SI("1", "conductance of valve B over that of A", "fitted")] = 1.0
-    drain_share_a: Annotated[float, SI("1", "drain of port A over the case leakage", "fitted")] = 1.0
-    drain_share_b: Annotated[float, SI("1", "drain of port B over the case leakage", "fitted")] = 1.0
-    by_mass: Annotated[float, SI("1", "1: balanced by mass, 0: by volume", "chosen")] = 0.0
+    makeup_opening: float = si(1e3, "Pa", "drop at which a make-up valve is half open", "fitted")
+    case_leakage: float = si(0.0, "m^3/(s Pa)", "drain of a port to the inner circuit", "fitted")
+    speed_lead: float = si(0.0, "s", "lead of the motor on the line between samples", "fitted")
+    pressure_lag: float = si(0.0, "s", "first-order lag of the pressure sensor", "fitted")
+    pressure_offset: float = si(0.0, "Pa", "offset of the differential pressure", "fitted")
+    position_zero: float = si(0.0, "m", "encoder's reading in the middle position", "fitted")
+    start_pressure: float = si(0.0, "Pa", "differential pressure before the first sample", "fitted")
+    start_level: float = si(
+        0.0, "Pa", "pressure of the lower side before the first sample, over the accumulator's", "fitted"
+    )
+    air_softness: float = si(0.0, "Pa", "a of 1/beta(p) = 1/beta_liquid + a/p^2", "fitted")
+    air_onset: float = si(-1.0, "1", "when that air gets in, in lengths of the log", "fitted")
+    stated_pressure: float = si(1e6, "Pa", "absolute pressure that bulk modulus is stated at", "chosen")
+    leakage_growth: float = si(0.0, "1", "growth of leakage over the log, of its value halfway", "fitted")
+    leakage_bend: float = si(0.0, "1", "part of that growth which goes with time squared", "fitted")
+    crack_pressure: float = si(0.0, "Pa", "drop at which the make-up valves crack", "fitted")
+    makeup_share_b: float = si(1.0, "1", "conductance of valve B over that of A", "fitted")
+    drain_share_a: float = si(1.0, "1", "drain of port A over the case leakage", "fitted")
+    drain_share_b: float = si(1.0, "1", "drain of port B over the case leakage", "fitted")
+    by_mass: float = si(0.0, "1", "1: balanced by mass, 0: by volume", "chosen")
 
     def __post_init__(self) -> None:
         """Take any finite number: a fit keeps to its own bounds."""

@@ -6,12 +6,11 @@ eps_11 = eps_22, which the printed matrices leave open (errata M10, M11 and M12)
 """
 
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
 
 from plant.arrays import Array
-from plant.units import SI
+from plant.units import si
 
 PZT_5H = "PZT-5H; Erturk and Inman, Piezoelectric Energy Harvesting (2011), appendix E"
 
@@ -29,16 +28,16 @@ class PoledCeramic:
     -2.74e-10
     """
 
-    s_11: Annotated[float, SI("1/Pa", "compliance at constant field", PZT_5H)] = 16.5e-12
-    s_12: Annotated[float, SI("1/Pa", "compliance at constant field", PZT_5H)] = -4.78e-12
-    s_13: Annotated[float, SI("1/Pa", "compliance at constant field", PZT_5H)] = -8.45e-12
-    s_33: Annotated[float, SI("1/Pa", "compliance at constant field", PZT_5H)] = 20.7e-12
-    s_44: Annotated[float, SI("1/Pa", "shear compliance at constant field", PZT_5H)] = 43.5e-12
-    d_31: Annotated[float, SI("m/V", "strain across the field", PZT_5H)] = -274e-12
-    d_33: Annotated[float, SI("m/V", "strain along the field", PZT_5H)] = 593e-12
-    d_15: Annotated[float, SI("m/V", "shear", PZT_5H)] = 741e-12
-    eps_11: Annotated[float, SI("F/m", "permittivity at constant stress", PZT_5H)] = 3130.0 * VACUUM
-    eps_33: Annotated[float, SI("F/m", "permittivity at constant stress", PZT_5H)] = 3400.0 * VACUUM
+    s_11: float = si(16.5e-12, "1/Pa", "compliance at constant field", PZT_5H)
+    s_12: float = si(-4.78e-12, "1/Pa", "compliance at constant field", PZT_5H)
+    s_13: float = si(-8.45e-12, "1/Pa", "compliance at constant field", PZT_5H)
+    s_33: float = si(20.7e-12, "1/Pa", "compliance at constant field", PZT_5H)
+    s_44: float = si(43.5e-12, "1/Pa", "shear compliance at constant field", PZT_5H)
+    d_31: float = si(-274e-12, "m/V", "strain across the field", PZT_5H)
+    d_33: float = si(593e-12, "m/V", "strain along the field", PZT_5H)
+    d_15: float = si(741e-12, "m/V", "shear", PZT_5H)
+    eps_11: float = si(3130.0 * VACUUM, "F/m", "permittivity at constant stress", PZT_5H)
+    eps_33: float = si(3400.0 * VACUUM, "F/m", "permittivity at constant stress", PZT_5H)
 
 
 def compliance_matrix(c: PoledCeramic) -> Array:

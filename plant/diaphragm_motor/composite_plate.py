@@ -9,7 +9,7 @@ Mechanics of Laminated Composite Plates and Shells, 2nd edition, section 3.3.
 
 from dataclasses import dataclass
 from math import pi, sqrt
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
@@ -17,7 +17,7 @@ from scipy.special import iv, jv
 
 from plant.arrays import Array
 from plant.errors import RigError
-from plant.units import SI, require_numbers
+from plant.units import require_numbers, si
 
 TABLE_1 = "Table 1"
 PZT_5H = "PZT-5H; Erturk and Inman, Piezoelectric Energy Harvesting (2011), appendix E"
@@ -39,19 +39,19 @@ class PlateParameters:
     0.6
     """
 
-    clamp_radius: Annotated[float, SI("m", "radius a at which the brass is held", "calibrated, errata M22")] = 14e-3
-    ceramic_radius: Annotated[float, SI("m", "radius of the ceramic", TABLE_1)] = 12.5e-3
-    brass_thickness: Annotated[float, SI("m", "thickness of the brass", TABLE_1)] = 0.4e-3
-    ceramic_thickness: Annotated[float, SI("m", "thickness of the ceramic", TABLE_1)] = 0.2e-3
-    brass_modulus: Annotated[float, SI("Pa", "Young's modulus of brass", HANDBOOK)] = 100e9
-    ceramic_compliance: Annotated[float, SI("1/Pa", "compliance s_11 at constant field", PZT_5H)] = 16.5e-12
-    poisson_ratio: Annotated[float, SI("1", "Poisson's ratio of both", HANDBOOK)] = 0.35
-    brass_density: Annotated[float, SI("kg/m^3", "density of brass", HANDBOOK)] = 8500.0
-    ceramic_density: Annotated[float, SI("kg/m^3", "density of the ceramic", PZT_5H)] = 7500.0
-    charge_constant: Annotated[float, SI("m/V", "size of the piezoelectric constant d_31", PZT_5H)] = 274e-12
+    clamp_radius: float = si(14e-3, "m", "radius a at which the brass is held", "calibrated, errata M22")
+    ceramic_radius: float = si(12.5e-3, "m", "radius of the ceramic", TABLE_1)
+    brass_thickness: float = si(0.4e-3, "m", "thickness of the brass", TABLE_1)
+    ceramic_thickness: float = si(0.2e-3, "m", "thickness of the ceramic", TABLE_1, zero=True)
+    brass_modulus: float = si(100e9, "Pa", "Young's modulus of brass", HANDBOOK)
+    ceramic_compliance: float = si(16.5e-12, "1/Pa", "compliance s_11 at constant field", PZT_5H)
+    poisson_ratio: float = si(0.35, "1", "Poisson's ratio of both", HANDBOOK)
+    brass_density: float = si(8500.0, "kg/m^3", "density of brass", HANDBOOK)
+    ceramic_density: float = si(7500.0, "kg/m^3", "density of the ceramic", PZT_5H)
+    charge_constant: float = si(274e-12, "m/V", "size of the piezoelectric constant d_31", PZT_5H)
 
     def __post_init__(self) -> None:
-        require_numbers(self, zero=("ceramic_thickness",))
+        require_numbers(self)
         if self.ceramic_radius >= self.clamp_radius:
             raise RigError(
                 f"ceramic_radius must be below {self.clamp_radius:g} m, the clamp, got {self.ceramic_radius:g}"

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from math import pi
-from typing import Annotated, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from scipy.signal import lfilter
@@ -17,7 +17,7 @@ from plant.log.record import Record
 from plant.runs import checked_series, require_drivable, require_finite, sample_count, steps_a_sample, with_noise
 from plant.sensors.sensors import require_not_negative
 from plant.solvers.trajectory import compile_trajectory
-from plant.units import SI
+from plant.units import si
 
 Schedule: TypeAlias = Sequence[tuple[float, DiaphragmMotorParameters]]
 """From when on [s] which motor: a load that steps, a valve that is switched, a fault that comes. The first is at 0."""
@@ -64,8 +64,8 @@ class MotorSensors:
     0.02
     """
 
-    electrode_v: Annotated[float, SI("V", "each sensing electrode", JUDGED)] = 0.02
-    position_m: Annotated[float, SI("m", "encoder on the rod", JUDGED)] = 2e-6
+    electrode_v: float = si(0.02, "V", "each sensing electrode", JUDGED)
+    position_m: float = si(2e-6, "m", "encoder on the rod", JUDGED)
 
     def __post_init__(self) -> None:
         require_not_negative(self)

@@ -2,7 +2,7 @@
 
 from dataclasses import asdict, dataclass, fields
 from types import SimpleNamespace
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from plant.arrays import Array
 from plant.components.oil import ATMOSPHERE, specific_volume
 from plant.eha.model import JUDGED_STROKE, EhaParameters, piston_areas
 from plant.errors import RigError
-from plant.units import SI, require_number
+from plant.units import si
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,47 +33,49 @@ class CircuitParameters(EhaParameters):
     2.2724e-12
     """
 
-    stroke: Annotated[float, SI("m", "full stroke of the piston", "judged: the paper gives none")] = JUDGED_STROKE
-    pump_crossport_leakage: Annotated[
-        float, SI("m^3/(s Pa)", "cross-port leakage xi of the pump", "judged: half of Table 3's L_t when normal")
-    ] = 2.392e-12
-    pump_case_leakage: Annotated[
-        float, SI("m^3/(s Pa)", "case leakage C_ep a port", "judged: a twentieth of Table 3's L_t when normal")
-    ] = 2.392e-13
-    cylinder_drain_leakage: Annotated[
-        float, SI("m^3/(s Pa)", "external leakage L_out a chamber, drained", "judged: equation 5.3 gives no value")
-    ] = 0.0
-    bypass_conductance: Annotated[
-        float, SI("m^3/(s Pa)", "bypass valve, port to port; shut at 0", "section 2: the pump's fail-safe")
-    ] = 0.0
-    air_fraction: Annotated[
-        float, SI("1", "entrained air at atmospheric pressure", "piezo-stack paper, equation 6")
-    ] = 0.0
-    vapour_pressure: Annotated[float, SI("Pa", "absolute pressure of the vapour", "judged, errata P5")] = 2e3
-    makeup_opening: Annotated[float, SI("Pa", "drop at which a make-up check valve is half open", "judged: 1 psi")] = (
-        7e3
+    stroke: float = si(JUDGED_STROKE, "m", "full stroke of the piston", "judged: the paper gives none")
+    pump_crossport_leakage: float = si(
+        2.392e-12,
+        "m^3/(s Pa)",
+        "cross-port leakage xi of the pump",
+        "judged: half of Table 3's L_t when normal",
+        zero=True,
     )
-    accumulator_gas: Annotated[
-        float, SI("m^3", "gas volume of the accumulator at its pressure", "judged: the paper gives none")
-    ] = 1e-3
-    accumulator_oil: Annotated[
-        float, SI("m^3", "oil in the accumulator at its pressure", "judged: the paper gives none")
-    ] = 1e-3
-    throttle_rated_flow: Annotated[float, SI("m^3/s", "rated flow of a throttle, fully open", "section 3")] = 2.57e-3
-    throttle_rated_pressure: Annotated[
-        float, SI("Pa", "pressure drop at the rated flow", "judged: 50 psi, the paper gives none")
-    ] = 3.4475e5
-    motor_lag: Annotated[float, SI("s", "time constant of the motor's speed", "judged: the paper gives none")] = 2e-3
-    presliding_displacement: Annotated[
-        float, SI("m", "deflection at which the seals break loose", "judged: the paper gives none")
-    ] = 2e-5
-    presliding_damping: Annotated[
-        float, SI("1", "damping ratio of the mass on the seals' stiffness", "judged: the paper gives none")
-    ] = 0.2
-    end_stop_stiffness: Annotated[float, SI("N/m", "stiffness of the cylinder's ends", "judged")] = 1e8
-    end_stop_damping: Annotated[
-        float, SI("s/m", "damping over spring force at the ends, a unit of velocity", "judged")
-    ] = 20.0
+    pump_case_leakage: float = si(
+        2.392e-13,
+        "m^3/(s Pa)",
+        "case leakage C_ep a port",
+        "judged: a twentieth of Table 3's L_t when normal",
+        zero=True,
+    )
+    cylinder_drain_leakage: float = si(
+        0.0, "m^3/(s Pa)", "external leakage L_out a chamber, drained", "judged: equation 5.3 gives no value"
+    )
+    bypass_conductance: float = si(
+        0.0, "m^3/(s Pa)", "bypass valve, port to port; shut at 0", "section 2: the pump's fail-safe"
+    )
+    air_fraction: float = si(0.0, "1", "entrained air at atmospheric pressure", "piezo-stack paper, equation 6")
+    vapour_pressure: float = si(2e3, "Pa", "absolute pressure of the vapour", "judged, errata P5")
+    makeup_opening: float = si(7e3, "Pa", "drop at which a make-up check valve is half open", "judged: 1 psi")
+    accumulator_gas: float = si(
+        1e-3, "m^3", "gas volume of the accumulator at its pressure", "judged: the paper gives none"
+    )
+    accumulator_oil: float = si(1e-3, "m^3", "oil in the accumulator at its pressure", "judged: the paper gives none")
+    throttle_rated_flow: float = si(2.57e-3, "m^3/s", "rated flow of a throttle, fully open", "section 3")
+    throttle_rated_pressure: float = si(
+        3.4475e5, "Pa", "pressure drop at the rated flow", "judged: 50 psi, the paper gives none"
+    )
+    motor_lag: float = si(2e-3, "s", "time constant of the motor's speed", "judged: the paper gives none", zero=True)
+    presliding_displacement: float = si(
+        2e-5, "m", "deflection at which the seals break loose", "judged: the paper gives none"
+    )
+    presliding_damping: float = si(
+        0.2, "1", "damping ratio of the mass on the seals' stiffness", "judged: the paper gives none", zero=True
+    )
+    end_stop_stiffness: float = si(1e8, "N/m", "stiffness of the cylinder's ends", "judged")
+    end_stop_damping: float = si(
+        20.0, "s/m", "damping over spring force at the ends, a unit of velocity", "judged", zero=True
+    )
 
     @property
     def cylinder_leakage(self) -> float:
@@ -91,9 +93,7 @@ class CircuitParameters(EhaParameters):
         return self.leakage_coefficient + 0.5 * (self.pump_case_leakage + self.cylinder_drain_leakage)
 
     def __post_init__(self) -> None:
-        EhaParameters(**{field.name: getattr(self, field.name) for field in fields(EhaParameters)})
-        for name in _OWN:
-            require_number(name, getattr(self, name), zero=name not in _POSITIVE)
+        super().__post_init__()
         if self.cylinder_leakage < -_ROUNDING * self.leakage_coefficient:
             raise RigError(
                 "leakage_coefficient must cover what pump and drain leak (errata E17), "
@@ -134,21 +134,6 @@ _FULLEST = 0.95
 
 _ROUNDING = 1e-9
 """Share of L_t by which rounding may leave the cylinder's part below zero."""
-
-_OWN = tuple(field.name for field in fields(CircuitParameters) if field.name not in EhaParameters.__dataclass_fields__)
-
-_POSITIVE = frozenset(
-    {
-        "vapour_pressure",
-        "makeup_opening",
-        "accumulator_gas",
-        "accumulator_oil",
-        "throttle_rated_flow",
-        "throttle_rated_pressure",
-        "presliding_displacement",
-        "end_stop_stiffness",
-    }
-)
 
 
 def oil_demand(p: CircuitParameters) -> float:

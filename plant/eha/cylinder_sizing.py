@@ -9,7 +9,7 @@ from math import inf, isfinite, pi, sqrt
 from typing import Annotated
 
 from plant.errors import HydrostateError
-from plant.units import SI, require_numbers
+from plant.units import SI, require_numbers, si
 
 BORES_MM = (8, 10, 12, 16, 20, 25, 32, 40, 50, 63, 80, 100, 125, 160, 200, 250, 320)
 RODS_MM = (
@@ -40,24 +40,22 @@ class Duty:
     0.0042
     """
 
-    extend_force: Annotated[float, SI("N", "force against the load while the rod goes out", "asked for")]
+    extend_force: Annotated[float, SI("N", "force against the load while the rod goes out", "asked for", zero=True)]
     extend_speed: Annotated[float, SI("m/s", "speed of the rod going out", "asked for")]
     stroke: Annotated[float, SI("m", "stroke", "asked for")]
     supply_pressure: Annotated[float, SI("Pa", "pressure at the valve's supply port, above tank", "asked for")]
-    retract_force: Annotated[float, SI("N", "force while the rod goes in", "asked for")] = 0.0
-    retract_speed: Annotated[float, SI("m/s", "speed going in; that of going out unless given", "asked for")] = 0.0
-    return_pressure: Annotated[float, SI("Pa", "pressure in the return line, above tank", "judged")] = 0.0
-    efficiency: Annotated[float, SI("1", "force at the rod over pressure times area", "judged: seals")] = 0.9
-    valve_drop: Annotated[float, SI("1", "drop at each edge of the valve, over supply", "judged")] = 0.05
-    relief_margin: Annotated[float, SI("1", "relief setting above supply, over supply", "judged")] = 0.1
-    line_speed: Annotated[float, SI("m/s", "largest mean speed in a pipe", "judged: pressure lines")] = 3.0
-    density: Annotated[float, SI("kg/m^3", "density of the liquid", "water")] = 998.0
-    discharge_coefficient: Annotated[float, SI("1", "discharge coefficient of check valves", "judged")] = 0.65
+    retract_force: float = si(0.0, "N", "force while the rod goes in", "asked for")
+    retract_speed: float = si(0.0, "m/s", "speed going in; that of going out unless given", "asked for")
+    return_pressure: float = si(0.0, "Pa", "pressure in the return line, above tank", "judged")
+    efficiency: float = si(0.9, "1", "force at the rod over pressure times area", "judged: seals")
+    valve_drop: float = si(0.05, "1", "drop at each edge of the valve, over supply", "judged")
+    relief_margin: float = si(0.1, "1", "relief setting above supply, over supply", "judged", zero=True)
+    line_speed: float = si(3.0, "m/s", "largest mean speed in a pipe", "judged: pressure lines")
+    density: float = si(998.0, "kg/m^3", "density of the liquid", "water")
+    discharge_coefficient: float = si(0.65, "1", "discharge coefficient of check valves", "judged")
 
     def __post_init__(self) -> None:
-        require_numbers(
-            self, zero=("extend_force", "retract_force", "retract_speed", "return_pressure", "relief_margin")
-        )
+        require_numbers(self)
         if self.efficiency > 1.0 or self.valve_drop >= 0.5:
             raise HydrostateError(
                 f"efficiency must be at most 1 and valve_drop below 0.5, got {self.efficiency} and {self.valve_drop}"

@@ -8,14 +8,14 @@ pressure as a state, so that friction enters undifferentiated and the piston rea
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Annotated, TypeAlias
+from typing import TypeAlias
 
 from plant.compiled.functions import Scalar, absolute, sign, where
 from plant.components.friction import quadratic_friction, velocity_under_friction
 from plant.components.valves import pumped_flow, relief_flow
 from plant.errors import RigError
 from plant.solvers.steps import GAMMA, parameter_names
-from plant.units import SI, require_numbers
+from plant.units import require_numbers, si
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,46 +36,43 @@ class EhaParameters:
     0.00152
     """
 
-    pump_displacement: Annotated[float, SI("m^3/rad", "pump displacement D_p", "Table 2, errata E1")] = 5.57e-7
-    piston_area: Annotated[float, SI("m^2", "effective piston area A", "Table 2")] = 1.52e-3
-    chamber_volume: Annotated[float, SI("m^3", "mean chamber volume V_0", "Table 2, errata E2")] = 1.08e-3
-    moving_mass: Annotated[float, SI("kg", "moving mass M", "section 5")] = 7.376
-    bulk_modulus: Annotated[float, SI("Pa", "effective bulk modulus beta", "section 7, errata E2, E20")] = 2.07e8
-    leakage_coefficient: Annotated[float, SI("m^3/(s Pa)", "lumped leakage L_t", "Table 3, errata E5")] = 4.784e-12
-    flow_bias: Annotated[float, SI("m^3/s", "flow bias Q_b", "Table 3, errata E8")] = 2.413e-6
-    friction_quadratic: Annotated[float, SI("N s^2/m^2", "quadratic friction a_1", "Table 4")] = 6.589e4
-    friction_linear: Annotated[float, SI("N s/m", "linear friction a_2", "Table 4, errata E12")] = 2.144e3
-    friction_coulomb: Annotated[float, SI("N", "Coulomb friction a_3", "Table 4")] = 436.0
-    relief_pressure: Annotated[float, SI("Pa", "relief setting, either direction", "sections 2, 3: 500 psi")] = 3.4475e6
-    relief_conductance: Annotated[
-        float,
-        SI("m^3/(s Pa)", "relief flow a pascal above the setting", "judged: rated pump flow within 7 kPa"),
-    ] = 1e-8
-    accumulator_pressure: Annotated[float, SI("Pa", "inner circuit, absolute", "section 2: 40 psi")] = 2.758e5
-    makeup_conductance: Annotated[
-        float, SI("m^3/(s Pa)", "make-up flow a pascal below the inner circuit", "judged: the paper gives none")
-    ] = 1e-9
-    motor_speed_per_volt: Annotated[
-        float, SI("rad/(s V)", "motor speed a volt of command", "section 7: 4 V is 1200 rpm, errata E1")
-    ] = 31.41592653589793
-    motor_speed_limit: Annotated[float, SI("rad/s", "highest motor speed", "section 4: 8 V input mean")] = 251.4
-    stroke: Annotated[float | None, SI("m", "full stroke of the piston, where it is known", "the paper gives none")] = (
-        None
+    pump_displacement: float = si(5.57e-7, "m^3/rad", "pump displacement D_p", "Table 2, errata E1")
+    piston_area: float = si(1.52e-3, "m^2", "effective piston area A", "Table 2")
+    chamber_volume: float = si(1.08e-3, "m^3", "mean chamber volume V_0", "Table 2, errata E2")
+    moving_mass: float = si(7.376, "kg", "moving mass M", "section 5")
+    bulk_modulus: float = si(2.07e8, "Pa", "effective bulk modulus beta", "section 7, errata E2, E20")
+    leakage_coefficient: float = si(4.784e-12, "m^3/(s Pa)", "lumped leakage L_t", "Table 3, errata E5", zero=True)
+    flow_bias: float = si(2.413e-6, "m^3/s", "flow bias Q_b", "Table 3, errata E8", zero=True)
+    friction_quadratic: float = si(6.589e4, "N s^2/m^2", "quadratic friction a_1", "Table 4", zero=True)
+    friction_linear: float = si(2.144e3, "N s/m", "linear friction a_2", "Table 4, errata E12", signed=True)
+    friction_coulomb: float = si(436.0, "N", "Coulomb friction a_3", "Table 4", zero=True)
+    relief_pressure: float = si(3.4475e6, "Pa", "relief setting, either direction", "sections 2, 3: 500 psi")
+    relief_conductance: float = si(
+        1e-8, "m^3/(s Pa)", "relief flow a pascal above the setting", "judged: rated pump flow within 7 kPa", zero=True
     )
-    area_difference: Annotated[
-        float, SI("1", "areas of sides A and B: their difference over their sum", "0: a through rod")
-    ] = 0.0
-    volume_difference: Annotated[
-        float, SI("1", "chambers A and B in mid-stroke: their difference over their sum", "0: alike")
-    ] = 0.0
-    pilot_share: Annotated[
-        float, SI("1", "make-up valves opened by a pilot: their conductance over the valves' own", "0: plain checks")
-    ] = 0.0
-    load_force: Annotated[float, SI("N", "constant load on the rod, against extension", "none in the paper")] = 0.0
-    load_stiffness: Annotated[float, SI("N/m", "spring on the rod, free in mid-stroke", "none in the paper")] = 0.0
+    accumulator_pressure: float = si(2.758e5, "Pa", "inner circuit, absolute", "section 2: 40 psi")
+    makeup_conductance: float = si(
+        1e-9, "m^3/(s Pa)", "make-up flow a pascal below the inner circuit", "judged: the paper gives none", zero=True
+    )
+    motor_speed_per_volt: float = si(
+        31.41592653589793, "rad/(s V)", "motor speed a volt of command", "section 7: 4 V is 1200 rpm, errata E1"
+    )
+    motor_speed_limit: float = si(251.4, "rad/s", "highest motor speed", "section 4: 8 V input mean")
+    stroke: float | None = si(None, "m", "full stroke of the piston, where it is known", "the paper gives none")
+    area_difference: float = si(
+        0.0, "1", "areas of sides A and B: their difference over their sum", "0: a through rod", signed=True
+    )
+    volume_difference: float = si(
+        0.0, "1", "chambers A and B in mid-stroke: their difference over their sum", "0: alike", signed=True
+    )
+    pilot_share: float = si(
+        0.0, "1", "make-up valves opened by a pilot: their conductance over the valves' own", "0: plain checks"
+    )
+    load_force: float = si(0.0, "N", "constant load on the rod, against extension", "none in the paper", signed=True)
+    load_stiffness: float = si(0.0, "N/m", "spring on the rod, free in mid-stroke", "none in the paper")
 
     def __post_init__(self) -> None:
-        require_numbers(self, signed=SIGNED, zero=MAY_BE_ZERO, unknown=("stroke",))
+        require_numbers(self)
         for name in PAIRS.values():
             if not -1.0 < getattr(self, name) < 1.0:
                 raise RigError(f"{name} must lie between -1 and 1, got {getattr(self, name)!r}")
@@ -89,23 +86,8 @@ class EhaParameters:
 PAIRS: Mapping[str, str] = {"piston_area": "area_difference", "chamber_volume": "volume_difference"}
 """Entries that a rig file may give as two numbers, of sides A and B: mean, and their difference over their sum."""
 
-SIGNED = frozenset({"friction_linear", "area_difference", "volume_difference", "load_force"})
-"""Parameters that may be negative."""
-
 JUDGED_STROKE = 0.25
 """Stroke [m] of a simulated actuator whose own is not known: the paper gives none."""
-
-MAY_BE_ZERO = frozenset(
-    {
-        "leakage_coefficient",
-        "flow_bias",
-        "friction_quadratic",
-        "friction_coulomb",
-        "relief_conductance",
-        "makeup_conductance",
-    }
-)
-"""Parameters that a healthy or idealised actuator may have at exactly zero."""
 
 
 PARAMETER_NAMES = parameter_names(EhaParameters)

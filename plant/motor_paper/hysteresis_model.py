@@ -6,7 +6,7 @@ of u; at an amplitude its first harmonic is one too, with a phase that no freque
 
 from dataclasses import dataclass
 from math import pi, sqrt
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from plant.compiled.functions import Scalar
 from plant.components.bouc_wen import power_bouc_wen_rate
 from plant.errors import RigError
 from plant.solvers.steps import rk4_step
-from plant.units import SI, require_numbers
+from plant.units import require_numbers, si
 
 if TYPE_CHECKING:
     import control
@@ -37,19 +37,21 @@ class HysteresisParameters:
     3985
     """
 
-    mass: Annotated[float, SI("kg", "mass m", "judged: a fifth of the diaphragm inside the clamp")] = 5.2e-4
-    damping: Annotated[float, SI("N s/m", "damping b", "judged: two percent of critical")] = 0.52
-    stiffness: Annotated[float, SI("N/m", "stiffness k", "first mode of Table 1's composite plate, dry")] = 3.26e5
-    stroke_a_volt: Annotated[float, SI("m/V", "d: displacement a volt without hysteresis", "composite plate")] = 8.38e-8
-    alpha: Annotated[float, SI("1", "alpha of equation 21: share of hysteresis at small voltage", "judged")] = 0.30
-    beta: Annotated[float, SI("1/V", "beta of equation 21, for exponent 1", "judged: a loop 11 % wide at 100 V")] = (
-        0.006
+    mass: float = si(5.2e-4, "kg", "mass m", "judged: a fifth of the diaphragm inside the clamp")
+    damping: float = si(0.52, "N s/m", "damping b", "judged: two percent of critical")
+    stiffness: float = si(3.26e5, "N/m", "stiffness k", "first mode of Table 1's composite plate, dry")
+    stroke_a_volt: float = si(
+        8.38e-8, "m/V", "d: displacement a volt without hysteresis", "composite plate", signed=True
     )
-    gamma: Annotated[float, SI("1/V", "gamma of equation 21, for exponent 1", "judged")] = 0.002
-    exponent: Annotated[float, SI("1", "exponent n of equation 21", "judged")] = 1.0
+    alpha: float = si(0.30, "1", "alpha of equation 21: share of hysteresis at small voltage", "judged", signed=True)
+    beta: float = si(
+        0.006, "1/V", "beta of equation 21, for exponent 1", "judged: a loop 11 % wide at 100 V", signed=True
+    )
+    gamma: float = si(0.002, "1/V", "gamma of equation 21, for exponent 1", "judged", signed=True)
+    exponent: float = si(1.0, "1", "exponent n of equation 21", "judged", signed=True)
 
     def __post_init__(self) -> None:
-        require_numbers(self, signed=("stroke_a_volt", "alpha", "beta", "gamma", "exponent"))
+        require_numbers(self)
         if self.exponent < 1.0:
             raise RigError(f"exponent must be at least 1, got {self.exponent!r}")
 

@@ -7,7 +7,7 @@ diaphragm-motor plant's.
 
 from dataclasses import dataclass
 from math import pi, sqrt
-from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from plant.arrays import Array
 from plant.errors import RigError
 from plant.motor_paper.fractional import oustaloup_states
-from plant.units import SI, require_numbers
+from plant.units import require_numbers, si
 
 if TYPE_CHECKING:
     import control
@@ -41,24 +41,22 @@ class VibrationParameters:
         If a value is not finite or of the wrong sign, or the order is not from 0 to below 2.
     """
 
-    diaphragm_mass: Annotated[float, SI("kg", "mass M_1 of the diaphragms", CALIBRATED)] = 1.96e-3
-    cylinder_mass: Annotated[float, SI("kg", "mass M_2 of piston and liquid", CALIBRATED)] = 3.22e-2
-    diaphragm_stiffness: Annotated[
-        float, SI("N/m", "stiffness k_1 of the diaphragms", "A_c^2/C_d, composite plate of Table 1")
-    ] = 1.226e6
-    fluid_stiffness: Annotated[
-        float, SI("N/m", "stiffness k_2 of fluid and line", "A_c^2/(C_line + V_A/beta), judged")
-    ] = 3.51e5
-    load_stiffness: Annotated[float, SI("N/m", "stiffness k_3 at the cylinder", "judged")] = 2e4
-    cubic_stiffness: Annotated[float, SI("N/m^3", "cubic spring k_4 at the cylinder, errata M2", "judged")] = 0.0
-    damping: Annotated[float, SI("N s/m", "viscous damping c", "judged: a tenth of critical")] = 19.4
-    fractional_damping: Annotated[
-        float, SI("N/m", "fractional damping c_f, times s to the power of the order, errata M5", "judged")
-    ] = 0.0
-    fractional_order: Annotated[float, SI("1", "order a of the fractional damping, errata M5", "judged")] = 1.0
+    diaphragm_mass: float = si(1.96e-3, "kg", "mass M_1 of the diaphragms", CALIBRATED)
+    cylinder_mass: float = si(3.22e-2, "kg", "mass M_2 of piston and liquid", CALIBRATED)
+    diaphragm_stiffness: float = si(
+        1.226e6, "N/m", "stiffness k_1 of the diaphragms", "A_c^2/C_d, composite plate of Table 1"
+    )
+    fluid_stiffness: float = si(3.51e5, "N/m", "stiffness k_2 of fluid and line", "A_c^2/(C_line + V_A/beta), judged")
+    load_stiffness: float = si(2e4, "N/m", "stiffness k_3 at the cylinder", "judged", zero=True)
+    cubic_stiffness: float = si(0.0, "N/m^3", "cubic spring k_4 at the cylinder, errata M2", "judged")
+    damping: float = si(19.4, "N s/m", "viscous damping c", "judged: a tenth of critical", zero=True)
+    fractional_damping: float = si(
+        0.0, "N/m", "fractional damping c_f, times s to the power of the order, errata M5", "judged"
+    )
+    fractional_order: float = si(1.0, "1", "order a of the fractional damping, errata M5", "judged", zero=True)
 
     def __post_init__(self) -> None:
-        require_numbers(self, zero=("load_stiffness", "damping", "fractional_order"))
+        require_numbers(self)
         if self.fractional_order >= 2.0:
             raise RigError(f"fractional_order must be below 2, which is a mass, got {self.fractional_order!r}")
 

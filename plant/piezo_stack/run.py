@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Annotated
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.trajectory import NAME, run_stack
 from plant.runs import checked_series, require_drivable, require_frequency, sample_count, with_noise
 from plant.sensors.sensors import require_not_negative
-from plant.units import SI
+from plant.units import si
 
 HIGHEST_VOLTAGE = 150.0
 """Rated voltage of the stack [V]; it cannot withstand reverse voltage either (output performance section)."""
@@ -47,10 +46,10 @@ class StackSensors:
     5e-08
     """
 
-    stack_displacement_m: Annotated[float, SI("m", "eddy current sensor on the stack", OBSERVED)] = 5e-8
-    stack_force_n: Annotated[float, SI("N", "force sensor below the stack", OBSERVED)] = 10.0
-    position_m: Annotated[float, SI("m", "laser on the cylinder's rod", OBSERVED)] = 2e-5
-    chamber_pressure_pa: Annotated[float, SI("Pa", "pressure sensor in the pump chamber", OBSERVED)] = 1e4
+    stack_displacement_m: float = si(5e-8, "m", "eddy current sensor on the stack", OBSERVED)
+    stack_force_n: float = si(10.0, "N", "force sensor below the stack", OBSERVED)
+    position_m: float = si(2e-5, "m", "laser on the cylinder's rod", OBSERVED)
+    chamber_pressure_pa: float = si(1e4, "Pa", "pressure sensor in the pump chamber", OBSERVED)
 
     def __post_init__(self) -> None:
         require_not_negative(self)

@@ -4,14 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from math import isfinite
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from plant.errors import RigError
 from plant.log.record import Record
-from plant.units import SI
+from plant.units import si
 
 BENCH_NOTES = "reference bench logs"
 
@@ -56,19 +56,19 @@ class Sensors:
     0.01
     """
 
-    speed_noise: Annotated[float, SI("rad/s", "motor speed noise", BENCH_NOTES)] = 0.05
-    velocity_noise: Annotated[float, SI("m/s", "noise of a velocity sensor", BENCH_NOTES)] = 1e-3
-    pressure_noise: Annotated[float, SI("Pa", "differential pressure noise", BENCH_NOTES)] = 5e3
-    pressure_quantum: Annotated[float, SI("Pa", "differential pressure quantum", BENCH_NOTES)] = 500.0
-    position_noise: Annotated[float, SI("m", "position noise", BENCH_NOTES)] = 0.0
-    position_quantum: Annotated[float, SI("m", "position quantum", BENCH_NOTES)] = 1e-6
-    velocity_window: Annotated[
-        float, SI("s", "span over which position is differentiated", "judged: 0.08 mm/s of noise from a 1 um encoder")
-    ] = 5e-3
-    velocity_from_position: Annotated[
-        bool, SI("1", "velocity is differentiated position, not a sensor of its own", "section 2")
-    ] = False
-    pressure: Annotated[bool, SI("1", "differential pressure is logged", "section 2")] = True
+    speed_noise: float = si(0.05, "rad/s", "motor speed noise", BENCH_NOTES)
+    velocity_noise: float = si(1e-3, "m/s", "noise of a velocity sensor", BENCH_NOTES)
+    pressure_noise: float = si(5e3, "Pa", "differential pressure noise", BENCH_NOTES)
+    pressure_quantum: float = si(500.0, "Pa", "differential pressure quantum", BENCH_NOTES)
+    position_noise: float = si(0.0, "m", "position noise", BENCH_NOTES)
+    position_quantum: float = si(1e-6, "m", "position quantum", BENCH_NOTES)
+    velocity_window: float = si(
+        5e-3, "s", "span over which position is differentiated", "judged: 0.08 mm/s of noise from a 1 um encoder"
+    )
+    velocity_from_position: bool = si(
+        False, "1", "velocity is differentiated position, not a sensor of its own", "section 2"
+    )
+    pressure: bool = si(True, "1", "differential pressure is logged", "section 2")
 
     def __post_init__(self) -> None:
         require_not_negative(self)
