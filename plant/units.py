@@ -181,6 +181,16 @@ LOWER_CASE: Mapping[str, str] = {
 """Units that column names write in lower case, where pint reads another unit or none (``pa``: pico-year)."""
 
 
+@cache
+def converts(unit: str, wanted: str) -> bool:
+    """Return whether a unit is known, and measures what another does."""
+    try:
+        conversion_to(unit, wanted)
+    except ValueError:
+        return False
+    return True
+
+
 def conversion_to(unit: str, wanted: str) -> tuple[float, float]:
     """Return ``(factor, offset)`` such that ``value * factor + offset`` is in the wanted unit.
 

@@ -180,19 +180,17 @@ ACCELERATION_FORM = ProcessModel(
 PRINTED_FORM = replace(ACCELERATION_FORM, name="acceleration_as_printed", step=printed_step)
 """The published form as printed, with its misprint: it is no choice of `FORMS`."""
 
-PRESSURE_FORM = ProcessModel(
-    "pressure",
-    (
+PRESSURE_FORM = replace(
+    ACCELERATION_FORM,
+    name="pressure",
+    states=(
         StateVariable("position_m", "m", 1e-3, 1e-13),
         StateVariable("velocity_m_s", "m/s", 1e-2, 1e-2),
         StateVariable("differential_pressure_pa", "Pa", 1e5, 1e6),
         BULK_MODULUS_STATE,
     ),
-    pressure_step,
-    _observe_motion_and_pressure,
-    longest_step=1e-4,
-    parameters=EhaParameters,
-    opening=volume_left_open,
+    step=pressure_step,
+    observe=_observe_motion_and_pressure,
 )
 
 FORMS: Mapping[str, ProcessModel] = {model.name: model for model in (ACCELERATION_FORM, PRESSURE_FORM)}

@@ -138,18 +138,16 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
     notes = (*log.left_out, *strange, *verdict.notes, *absent, *estimate.rig_notes)
     found = replace(found, outcome=verdict.outcome, notes=notes, channels=scores.channels)
     if log.mistakes:
-        return _misread(found, log, scores)
+        return replace(_without_class(found, log, scores, log.mistakes), outcome=Outcome.MISMATCH)
     if verdict.outcome is not Outcome.OK:
         return replace(found, evidence=EhaEvidence(estimate, scores, None))
     doubts = (*refused(estimate), *outside, *log.objections)
     try:
         diagnosis, loaded = _diagnosed(log, rig.parameters, estimate)
-    except RigError as error:
-        said = ClassCode.NO_CIRCUIT.note(reason=str(error))
-        return _without_circuit(found, log, scores, (*doubts, *verdict.against), said)
-    except LogError as error:
-        said = ClassCode.NO_PROBABILITIES.note(reason=error.message)
-        return _without_circuit(found, log, scores, (*doubts, *verdict.against), said)
+    except (RigError, LogError) as error:
+        without = _without_class(found, log, scores, distinct((*doubts, *verdict.against)))
+        said = ClassCode.NO_CIRCUIT if isinstance(error, RigError) else ClassCode.NO_PROBABILITIES
+        return replace(without, notes=(*found.notes, said.note(reason=error.message)))
     if loaded.load_force != rig.parameters.load_force:
         found = replace(found, notes=(*found.notes, _load(loaded)))
     against = distinct((*doubts, *diagnosis.against))
@@ -208,31 +206,15 @@ def _severities(
     return with_totals(found, actuator_of(rig.parameters), rig.spreads, pressure=pressure)
 
 
-def _misread(found: Finding, log: CleanLog, scores: Scores) -> Finding:
-    """Return a finding of a log whose channels are not what they are called: unknown, and what to mend."""
-    return replace(
-        found,
-        outcome=Outcome.MISMATCH,
-        condition=ranked(scores)[0][0],
-        unknown=True,
-        against=log.mistakes,
-        advice=advice_for(log.record, {}, log.mistakes, (), scores.channels),
-        evidence=EhaEvidence(found.evidence, scores, None),
-    )
-
-
-def _without_circuit(found: Finding, log: CleanLog, scores: Scores, doubts: tuple[Note, ...], why: Note) -> Finding:
-    """Return a finding whose condition is that of the nearest nominal model."""
-    estimate: BulkModulusEstimate = found.evidence
-    against = distinct(doubts)
+def _without_class(found: Finding, log: CleanLog, scores: Scores, against: tuple[Note, ...]) -> Finding:
+    """Return what is said where no circuit was fitted: the nearest model's name, and what speaks against it."""
     return replace(
         found,
         condition=ranked(scores)[0][0],
         unknown=bool(against),
         against=against,
         advice=advice_for(log.record, {}, against, (), scores.channels),
-        notes=(*found.notes, why),
-        evidence=EhaEvidence(estimate, scores, None),
+        evidence=EhaEvidence(found.evidence, scores, None),
     )
 
 

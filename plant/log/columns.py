@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from plant.errors import HydrostateError, LogError, MissingColumnError, RigError
 from plant.log.headings import Heading, cleaned
-from plant.units import conversion_to
+from plant.units import conversion_to, converts
 
 CHANNELS: Mapping[str, str] = {
     "motor_speed_rad_s": "rad/s",
@@ -150,7 +150,7 @@ def _channel_of(heading: Heading) -> str | None:
         return name
     if heading.unit is not None and (known := STEMS.get(heading.stem + "_")):
         return known
-    if heading.stem in TIMES and heading.unit is not None and is_time(heading.unit):
+    if heading.stem in TIMES and heading.unit is not None and converts(heading.unit, "s"):
         return TIME
     stems = [stem for stem in STEMS if name.startswith(stem)]
     return STEMS[max(stems, key=len)] if stems and heading.name == heading.bare else None
@@ -204,15 +204,6 @@ def _foreign(headings: Sequence[Heading], channel: str, spec: str, source: str) 
 def _name_and_unit(spec: str) -> tuple[str, str | None]:
     name, colon, unit = spec.rpartition(":")
     return (name.strip(), unit.strip()) if colon else (spec.strip(), None)
-
-
-def is_time(unit: str) -> bool:
-    """Return whether a unit is one of time."""
-    try:
-        conversion_to(unit, "s")
-    except ValueError:
-        return False
-    return True
 
 
 def _conversion(unit: str, channel: str, name: str, source: str) -> tuple[float, float]:

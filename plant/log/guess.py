@@ -3,14 +3,13 @@
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
 from plant.errors import NoChannelError
 from plant.log.columns import CHANNELS, TIME, UNITS, listed
 from plant.log.headings import Heading
-from plant.units import conversion_to
+from plant.units import converts
 
 NAMES: Mapping[str, tuple[tuple[str, float], ...]] = {
     TIME: (
@@ -120,7 +119,7 @@ def points_by_name(heading: Heading, channel: str) -> float | None:
     if heading.stamped:
         return 8.0 if channel == TIME else None
     unit = unit_of(heading)
-    fits = unit is not None and _fits(unit, UNITS[channel])
+    fits = unit is not None and converts(unit, UNITS[channel])
     if unit is not None and not fits:
         return None
     name = heading.stem
@@ -154,15 +153,6 @@ def unit_of(heading: Heading) -> str | None:
         return heading.unit
     found = _SUFFIX.search(heading.stem)
     return None if found is None else found[1].replace("_", "/")
-
-
-@cache
-def _fits(unit: str, wanted: str) -> bool:
-    try:
-        conversion_to(unit, wanted)
-    except ValueError:
-        return False
-    return True
 
 
 def guessed(points: Mapping[str, Mapping[int, float]], headings: Sequence[Heading]) -> tuple[Guess, ...]:
