@@ -67,6 +67,23 @@ def test_leakage_and_velocity_answer_the_ratio_of_displacement_and_area_as_much_
         assert moved == pytest.approx(law[name], rel=0.4)
 
 
+@pytest.mark.parametrize("entry", ["pump_displacement", "piston_area"])
+@pytest.mark.parametrize("lost", [5.0, 28.0, 60.0])
+def test_leakage_answers_an_entry_as_what_is_pumped_less_what_the_piston_sweeps(lost: float, entry: str) -> None:
+    actuator, doubt = actuator_of(HEALTHY), 1e-3
+    pumped = HEALTHY.pump_displacement * HEALTHY.rated_speed
+    swept = HEALTHY.piston_area * actuator.rated * (1.0 - lost / 100.0)
+    changed = pumped * (1.0 + doubt) - swept if entry == "pump_displacement" else pumped - swept * (1.0 + doubt)
+    exact = {"velocity_lost": lost, "leakage_flow": 5.0, "added_friction": 20.0, "pressure_rise": 3.0}
+    found = {name: Quantity(value, "1", (value, value)) for name, value in exact.items()}
+    for pressure in (True, False):
+        total = with_totals(found, actuator, {entry: Spread.of(doubt)}, pressure=pressure)["leakage_flow"].ci95_total
+        assert total is not None
+        assert (total[1] - total[0]) / 2.0 == pytest.approx(
+            1.96 * 5.0 * abs(changed / (pumped - swept) - 1.0), rel=0.02
+        )
+
+
 def test_a_diagnosis_has_both_intervals_of_every_severity_and_the_totals_hold_the_others() -> None:
     found = diagnose_log(log(), Rig())
     for name, one in found.severities.items():
