@@ -8,7 +8,7 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.components.oil import ATMOSPHERE, specific_volume
-from plant.eha.model import JUDGED_STROKE, EhaParameters, piston_areas
+from plant.eha.model import JUDGED, JUDGED_STROKE, EhaParameters, piston_areas
 from plant.errors import RigError
 from plant.units import si
 
@@ -33,7 +33,7 @@ class CircuitParameters(EhaParameters):
     2.2724e-12
     """
 
-    stroke: float = si(JUDGED_STROKE, "m", "full stroke of the piston", "judged: the paper gives none")
+    stroke: float = si(JUDGED_STROKE, "m", "full stroke of the piston", JUDGED)
     pump_crossport_leakage: float = si(
         2.392e-12,
         "m^3/(s Pa)",
@@ -57,21 +57,15 @@ class CircuitParameters(EhaParameters):
     air_fraction: float = si(0.0, "1", "entrained air at atmospheric pressure", "piezo-stack paper, equation 6")
     vapour_pressure: float = si(2e3, "Pa", "absolute pressure of the vapour", "judged, errata P5")
     makeup_opening: float = si(7e3, "Pa", "drop at which a make-up check valve is half open", "judged: 1 psi")
-    accumulator_gas: float = si(
-        1e-3, "m^3", "gas volume of the accumulator at its pressure", "judged: the paper gives none"
-    )
-    accumulator_oil: float = si(1e-3, "m^3", "oil in the accumulator at its pressure", "judged: the paper gives none")
+    accumulator_gas: float = si(1e-3, "m^3", "gas volume of the accumulator at its pressure", JUDGED)
+    accumulator_oil: float = si(1e-3, "m^3", "oil in the accumulator at its pressure", JUDGED)
     throttle_rated_flow: float = si(2.57e-3, "m^3/s", "rated flow of a throttle, fully open", "section 3")
     throttle_rated_pressure: float = si(
         3.4475e5, "Pa", "pressure drop at the rated flow", "judged: 50 psi, the paper gives none"
     )
-    motor_lag: float = si(2e-3, "s", "time constant of the motor's speed", "judged: the paper gives none", zero=True)
-    presliding_displacement: float = si(
-        2e-5, "m", "deflection at which the seals break loose", "judged: the paper gives none"
-    )
-    presliding_damping: float = si(
-        0.2, "1", "damping ratio of the mass on the seals' stiffness", "judged: the paper gives none", zero=True
-    )
+    motor_lag: float = si(2e-3, "s", "time constant of the motor's speed", JUDGED, zero=True)
+    presliding_displacement: float = si(2e-5, "m", "deflection at which the seals break loose", JUDGED)
+    presliding_damping: float = si(0.2, "1", "damping ratio of the mass on the seals' stiffness", JUDGED, zero=True)
     end_stop_stiffness: float = si(1e8, "N/m", "stiffness of the cylinder's ends", "judged")
     end_stop_damping: float = si(
         20.0, "s/m", "damping over spring force at the ends, a unit of velocity", "judged", zero=True

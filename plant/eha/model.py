@@ -17,6 +17,8 @@ from plant.errors import RigError
 from plant.solvers.steps import GAMMA, parameter_names
 from plant.units import require_numbers, si
 
+JUDGED = "judged: the paper gives none"
+
 
 @dataclass(frozen=True, kw_only=True)
 class EhaParameters:
@@ -52,7 +54,7 @@ class EhaParameters:
     )
     accumulator_pressure: float = si(2.758e5, "Pa", "inner circuit, absolute", "section 2: 40 psi")
     makeup_conductance: float = si(
-        1e-9, "m^3/(s Pa)", "make-up flow a pascal below the inner circuit", "judged: the paper gives none", zero=True
+        1e-9, "m^3/(s Pa)", "make-up flow a pascal below the inner circuit", JUDGED, zero=True
     )
     motor_speed_per_volt: float = si(
         31.41592653589793, "rad/(s V)", "motor speed a volt of command", "section 7: 4 V is 1200 rpm, errata E1"
