@@ -7,7 +7,6 @@ same operations whatever the data, or at most as many as the header says.
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from importlib.metadata import version
 from math import log, pi
 
 import numpy as np
@@ -107,18 +106,11 @@ def filter_in_c(problem: FilterProblem, method: str = "ekf", *, name: str, preci
         "functions": written.text,
         "bank": bank,
         "operations": _operations(problem, written, bank),
-        "real": real.name,
-        "f": real.function_suffix,
-        "lit": real.literal,
-        "name": name,
-        "NAME": name.upper(),
-        "version": version("hydrostate"),
         "form": problem.model.name,
         "sample_time": problem.sample_time,
         "scanned": "%f" if real.name == "float" else "%lf",
-        "digits": real.digits,
     }
-    return c_files("estimation", "export/templates", "filter", name, facts)
+    return c_files("estimation", "filter", name, real, facts)
 
 
 def _chosen(problem: FilterProblem, method: str) -> tuple[Rule, Sequence[Setting], Numbers]:

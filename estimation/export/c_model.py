@@ -1,7 +1,5 @@
 """An identified linear model as C99: a difference equation from its inputs to its output."""
 
-from importlib.metadata import version
-
 import numpy as np
 
 from estimation.arrays import Array
@@ -47,13 +45,6 @@ def model_in_c(model: FreeRunModel, *, name: str, precision: str = "double") -> 
         return [real.literal(float(value)) for value in values]
 
     facts = {
-        "name": name,
-        "NAME": name.upper(),
-        "version": version("hydrostate"),
-        "real": real.name,
-        "f": real.function_suffix,
-        "lit": real.literal,
-        "digits": real.digits,
         "sample_time": model.sample_time,
         "inputs": model.inputs,
         "output": model.output,
@@ -65,4 +56,4 @@ def model_in_c(model: FreeRunModel, *, name: str, precision: str = "double") -> 
         "means": spelt(model.scaling.u_mean),
         "level": real.literal(model.level),
     }
-    return c_files("estimation", "export/templates", "model", name, facts)
+    return c_files("estimation", "model", name, real, facts)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
 from math import ceil
 
 import numpy as np
@@ -122,14 +121,7 @@ def plant_in_c(
     known = notes(plant.parameter_class)
     about = [(one, f"{known[one].unit}, {known[one].meaning}") for one in names] + [("step", "s, step of the scheme")]
     facts = {
-        "name": name,
-        "NAME": name.upper(),
         "plant": plant.name,
-        "version": version("hydrostate"),
-        "real": real.name,
-        "f": real.function_suffix,
-        "lit": real.literal,
-        "digits": real.digits,
         "sample_time": sample_time,
         "substeps": substeps,
         "operations": sorted((kind, substeps * count) for kind, count in each.items()),
@@ -141,7 +133,7 @@ def plant_in_c(
         "constants": len(kept),
         "functions": "\n\n".join(_function(name, part, lines, real.name) for part, lines in bodies.items()),
     }
-    return c_files("plant", "export/templates", "plant", name, facts)
+    return c_files("plant", "plant", name, real, facts)
 
 
 def _function(name: str, part: str, lines: list[str], real: str) -> str:

@@ -2,8 +2,10 @@
 
 import re
 from collections.abc import Mapping
+from importlib.metadata import version
 from typing import Any
 
+from plant.compiled.c99.precision import Precision
 from plant.errors import HydrostateError
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,30}")
@@ -39,19 +41,19 @@ def checked_name(name: str) -> str:
     return name
 
 
-def c_files(package: str, folder: str, kind: str, name: str, facts: Mapping[str, Any]) -> dict[str, str]:
+def c_files(package: str, kind: str, name: str, real: Precision, facts: Mapping[str, Any]) -> dict[str, str]:
     """Fill in the templates of exported C.
 
     Parameters
     ----------
-    package, folder : str
-        Where the templates ``KIND.h``, ``KIND.c`` and ``KIND_example.c`` are.
+    package : str
+        In whose ``export/templates`` the templates ``KIND.h``, ``KIND.c`` and ``KIND_example.c`` are.
     kind : str
         What is exported.
     name : str
-        What its files are called.
+        What its files, types and functions are called.
     facts : Mapping[str, Any]
-        What the templates ask for, by name.
+        What the templates ask for, by name, beside name, version, and what spells numbers.
 
     Returns
     -------
@@ -64,7 +66,10 @@ def c_files(package: str, folder: str, kind: str, name: str, facts: Mapping[str,
         "example.c": f"own/{kind}_example.c",
         "Makefile": "shared/Makefile",
     }
-    return {file: _filled(package, folder, template, facts) for file, template in templates.items()}
+    called = {"name": name, "NAME": name.upper(), "version": version("hydrostate")}
+    spelt = {"real": real.name, "f": real.function_suffix, "lit": real.literal, "digits": real.digits}
+    whole = {**called, **spelt, **facts}
+    return {file: _filled(package, "export/templates", template, whole) for file, template in templates.items()}
 
 
 def filled(package: str, folder: str, template: str, facts: Mapping[str, Any]) -> str:
