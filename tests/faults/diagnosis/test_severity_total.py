@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -82,6 +83,31 @@ def test_leakage_answers_an_entry_as_what_is_pumped_less_what_the_piston_sweeps(
         assert (total[1] - total[0]) / 2.0 == pytest.approx(
             1.96 * 5.0 * abs(changed / (pumped - swept) - 1.0), rel=0.02
         )
+
+
+@pytest.mark.parametrize(
+    ("name", "entry"),
+    [
+        ("leakage_flow", PRESSURE_GAIN),
+        *product(
+            ("velocity_lost", "added_friction", "pressure_rise"), ("pump_displacement", "piston_area", PRESSURE_GAIN)
+        ),
+    ],
+)
+def test_with_pressure_friction_is_area_times_gauge_and_leakage_is_flow_over_gauge(name: str, entry: str) -> None:
+    actuator, doubt = actuator_of(HEALTHY), 1e-3
+    exact = {"velocity_lost": 20.0, "leakage_flow": 5.0, "added_friction": 30.0, "pressure_rise": 4.0}
+    p, v = HEALTHY, actuator.rated
+    sound = p.friction_quadratic * v**2 + p.friction_linear * v + p.friction_coulomb
+    gauge = sound + exact["added_friction"] if name == "added_friction" else 100.0 + exact["pressure_rise"]
+    wanted = {
+        "leakage_flow": {PRESSURE_GAIN: exact["leakage_flow"]},
+        "velocity_lost": {"pump_displacement": 80.0, "piston_area": 80.0, PRESSURE_GAIN: 0.0},
+    }.get(name, dict.fromkeys(("pump_displacement", "piston_area", PRESSURE_GAIN), gauge))
+    found = {one: Quantity(value, "1", (value, value)) for one, value in exact.items()}
+    total = with_totals(found, actuator, {entry: Spread.of(doubt)}, pressure=True)[name].ci95_total
+    assert total is not None
+    assert (total[1] - total[0]) / 2.0 == pytest.approx(1.96 * doubt * wanted[entry], rel=0.02, abs=1e-9)
 
 
 def test_a_diagnosis_has_both_intervals_of_every_severity_and_the_totals_hold_the_others() -> None:
