@@ -2,8 +2,9 @@
 
 `python -m benchmarks mutants --folder plant/eha --sample 40 --seed 0` draws faults at random from a folder's formulas
 (see `benchmarks.mutation`), runs the fast tests of the mirrored folder for each, stops at the first that fails, and
-lists the faults that none noticed. With ``--then-all`` those go to the rest of the fast suite. A fault that makes
-the tests hang counts as noticed. Kernels go to ``HYDROSTATE_CACHE`` if that is set, so that a second run finds them.
+lists the faults that none noticed. ``--own`` asks each file's own test alone. With ``--then-all`` survivors go to the
+rest of the fast suite. A fault that makes the tests hang counts as noticed. Kernels go to ``HYDROSTATE_CACHE`` if that
+is set, so that a second run finds them.
 """
 
 import argparse
@@ -38,7 +39,7 @@ def main(arguments: Sequence[str]) -> int:
         copy = Path(kept) / "tree"
         shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(*LEFT_BEHIND), symlinks=True)
         kernels = Path(os.environ.get("HYDROSTATE_CACHE", Path(kept) / "kernels"))
-        survivors = _tried(copy, kernels, chosen, then_all=given.then_all)
+        survivors = _tried(copy, kernels, chosen, own=given.own, then_all=given.then_all)
     score = 1.0 - len(survivors) / max(len(chosen), 1)
     print(f"\n{len(chosen) - len(survivors)} of {len(chosen)} planted faults noticed: {score:.1%}")
     for one in survivors:
@@ -51,6 +52,9 @@ def _options() -> argparse.ArgumentParser:
     parser.add_argument("--folder", action="append", help="folder or file of plant, estimation or faults; repeatable")
     parser.add_argument("--sample", type=int, default=40, help="how many faults are drawn")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--own", action="store_true", help="run a file's own test alone, where it has one: seconds a fault"
+    )
     parser.add_argument("--then-all", action="store_true", help="give survivors to the whole fast suite")
     return parser
 
@@ -91,12 +95,13 @@ def _sources(place: Path) -> list[Path]:
     return [place] if place.is_file() else [path for path in place.rglob("*.py") if path.name != "__init__.py"]
 
 
-def _tried(copy: Path, kernels: Path, chosen: Sequence[Mutant], *, then_all: bool) -> list[Mutant]:
+def _tried(copy: Path, kernels: Path, chosen: Sequence[Mutant], *, own: bool, then_all: bool) -> list[Mutant]:
     """Return the faults that no test noticed."""
     waits: dict[tuple[str, ...], float] = {}
     survivors: list[Mutant] = []
     for number, mutant in enumerate(chosen, start=1):
         tests = tuple(mirrored(copy, mutant.path))
+        tests = tests[:-1] if own and len(tests) > 2 else tests
         if tests not in waits:
             begin = time.perf_counter()
             if not _passes(copy, kernels, tests, None):

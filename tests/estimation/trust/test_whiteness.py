@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from statsmodels.stats.diagnostic import acorr_ljungbox
 
 from estimation.filters.run import Estimate
 from estimation.models.model import ProcessModel
-from estimation.trust.whiteness import Whiteness, quantum, whiteness
+from estimation.trust.whiteness import LAGS, Whiteness, _autocorrelations, _ljung_box, quantum, whiteness
 from plant.log.record import Record
 
 Array = NDArray[np.float64]
@@ -118,3 +119,12 @@ def test_noise_has_no_quantum() -> None:
 def test_a_log_of_a_few_samples_or_none_kept_says_nothing(linear: ProcessModel) -> None:
     assert judged(linear, np.empty((0, 2))) == []
     assert judged(linear, white(0)[:200]) == []
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.05, 0.1])
+def test_the_test_for_remaining_structure_is_ljungs_and_boxs(memory: float) -> None:
+    values = np.random.default_rng(7).standard_normal(2000)
+    values[1:] += memory * values[:-1]
+    values -= values.mean()
+    wanted = acorr_ljungbox(values, lags=[LAGS])["lb_pvalue"].iloc[0]
+    assert _ljung_box(_autocorrelations(values), len(values)) == pytest.approx(wanted, rel=1e-6)

@@ -171,9 +171,38 @@ def test_the_pump_is_known_to_a_thousandth() -> None:
 def test_along_the_scale_of_pressure_motion_stays_and_pressure_grows_alike() -> None:
     speed = np.repeat([60.0, 120.0, -120.0, -70.0], 150)
     log = Blocks(np.append(speed, speed[-1]), 1e-3, 10, np.zeros(60), np.zeros(60), np.ones(2))
-    points = ACTUATOR.conditions[0] + np.vstack([np.zeros(7), 0.2 * PRESSURE_SCALE, 0.2 * np.eye(7)[:6]])
+    doubled = [
+        np.where(np.arange(7) == i, np.where(PRESSURE_SCALE == 0.0, 1.0, 2.0 * PRESSURE_SCALE), PRESSURE_SCALE)
+        for i in range(6)
+    ]
+    points = ACTUATOR.conditions[0] + 0.2 * np.vstack([np.zeros(7), PRESSURE_SCALE, doubled])
     runs = predicted(log, parameter_rows(points, ACTUATOR.circuit, ACTUATOR.rated))[:, log.first :]
     size = np.sqrt(np.mean(runs[0] ** 2, axis=0))
-    moved = np.sqrt(np.mean((runs - runs[0]) ** 2, axis=1)) / size
-    assert moved[1, 0] < 0.3 * np.sort(moved[2:, 0])[-3]
-    assert np.sqrt(np.mean(runs[1, :, 1] ** 2)) / size[1] == pytest.approx(np.exp(0.2), rel=0.05)
+    moved = np.sqrt(np.mean((runs - runs[0])[:, :, 0] ** 2, axis=1)) / size[0]
+    assert moved[1] < 0.01
+    assert moved[1] < np.min(moved[2:])
+    assert np.sqrt(np.mean(runs[1, :, 1] ** 2)) / size[1] == pytest.approx(np.exp(0.2), rel=0.01)
+
+
+def test_a_log_that_says_nothing_leaves_the_weak_belief_and_one_that_says_all_leaves_none() -> None:
+    nine = np.zeros(len(CONDITIONS))
+    said = (
+        class_regions.ClassFits(fit(0), scale * np.eye(7), nine, np.zeros((9, 2)), nine, np.eye(7)).covariance
+        for scale in (0.0, 1e9)
+    )
+    nothing, everything = said
+    np.testing.assert_allclose(nothing, class_regions.WEAK, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(everything, 1e-9 * np.eye(7), rtol=2e-3, atol=1e-12)
+
+
+@pytest.mark.parametrize("off", [0.4, -0.4])
+def test_without_pressure_a_fit_is_moved_along_the_scale_to_its_condition(
+    off: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = blocks(pressure=False)
+    runs = np.array([log.outputs * (1.0 if i == 0 else 2.0) for i in range(len(CONDITIONS))])
+    away = ACTUATOR.conditions[0] + off * PRESSURE_SCALE
+    found = replace(fit(0, outputs=1), coordinates=away, fitted=log.outputs)
+    monkeypatch.setattr(class_regions, "nominal_runs", lambda *_: runs)
+    monkeypatch.setattr(class_regions, "fit_freely", lambda *_: found)
+    np.testing.assert_allclose(fit_classes(log, ACTUATOR).best.coordinates, ACTUATOR.conditions[0], atol=1e-9)

@@ -177,3 +177,12 @@ def test_all_18_foreign_logs_are_put_in_their_class(shared: Path) -> None:
     logs = [read_record(shared / "bench" / str(file)) for file in truth["file"]]
     assert len(logs) == 18
     assert [score_mathematical(log, BANK).condition for log in logs] == true
+
+
+def test_one_channel_is_scored_in_its_own_unit_and_two_as_shares() -> None:
+    log = bench_log("normal", 0)
+    alone, both = (score_mathematical(log, {"normal": BANK["normal"]}, pressure=pressure) for pressure in (False, True))
+    assert alone.by_condition == alone.rmse["velocity_m_s"]
+    sizes = {channel: float(np.sqrt(np.nanmean(log[channel] ** 2))) for channel in both.channels}
+    shares = [both.rmse[channel]["normal"] / sizes[channel] for channel in both.channels]
+    assert both.by_condition["normal"] == pytest.approx(float(np.sqrt(np.mean(np.square(shares)))))

@@ -13,6 +13,7 @@ from faults.diagnosis.class_regions import ClassFits
 from faults.diagnosis.severity import (
     OF_KIND,
     UNITS,
+    limits_of,
     severities,
     severities_at,
     what_is_not_told,
@@ -190,3 +191,16 @@ def test_a_circuit_without_a_steady_state_has_no_number_and_no_interval() -> Non
     found = severities(replace(fits(NARROW), best=nowhere), ACTUATOR)
     assert found["leakage_flow"].value is None
     assert found["leakage_flow"].ci95 is None
+
+
+def test_a_limit_lies_halfway_from_a_healthy_actuator_to_a_minor_fault() -> None:
+    limits, healthy = limits_of(ACTUATOR), severities_of(RIG)
+    leaking, rubbing = (severities_of(parameters_for(CONDITIONS[name])) for name in ("minor_leakage", "minor_friction"))
+    for name, faulty in (
+        ("leakage_flow", leaking),
+        ("velocity_lost", leaking),
+        ("added_friction", rubbing),
+        ("pressure_rise", rubbing),
+    ):
+        assert limits[name] - healthy[name] == pytest.approx(faulty[name] - limits[name], rel=1e-9), name
+    assert limits["bulk_modulus"] == pytest.approx(0.8 * RIG.bulk_modulus)
