@@ -171,11 +171,13 @@ def test_the_pump_is_known_to_a_thousandth() -> None:
 def test_along_the_scale_of_pressure_motion_stays_and_pressure_grows_alike() -> None:
     speed = np.repeat([60.0, 120.0, -120.0, -70.0], 150)
     log = Blocks(np.append(speed, speed[-1]), 1e-3, 10, np.zeros(60), np.zeros(60), np.ones(2))
-    doubled = [
-        np.where(np.arange(7) == i, np.where(PRESSURE_SCALE == 0.0, 1.0, 2.0 * PRESSURE_SCALE), PRESSURE_SCALE)
-        for i in range(6)
+    places = np.eye(7)[:6]
+    others = [
+        PRESSURE_SCALE + by * place * (PRESSURE_SCALE + (PRESSURE_SCALE == 0.0))
+        for place in places
+        for by in (1.0, -0.5)
     ]
-    points = ACTUATOR.conditions[0] + 0.2 * np.vstack([np.zeros(7), PRESSURE_SCALE, doubled])
+    points = ACTUATOR.conditions[0] + 0.2 * np.vstack([np.zeros(7), PRESSURE_SCALE, others])
     runs = predicted(log, parameter_rows(points, ACTUATOR.circuit, ACTUATOR.rated))[:, log.first :]
     size = np.sqrt(np.mean(runs[0] ** 2, axis=0))
     moved = np.sqrt(np.mean((runs - runs[0])[:, :, 0] ** 2, axis=1)) / size[0]

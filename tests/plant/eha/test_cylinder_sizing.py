@@ -1,6 +1,7 @@
 """A sized cylinder does its duty, with standard diameters and a rod that does not buckle."""
 
 from dataclasses import replace
+from itertools import pairwise
 from math import pi
 
 import pytest
@@ -88,3 +89,10 @@ def test_a_duty_beyond_all_standard_cylinders_is_refused() -> None:
 def test_a_rod_as_thick_as_its_bore_is_refused() -> None:
     with pytest.raises(HydrostateError, match="rod must be thinner than the bore"):
         cylinder_circuit(PRESS, 0.02, 0.02)
+
+
+@pytest.mark.parametrize("sizes", [BORES_MM, RODS_MM], ids=["bores", "rods"])
+def test_standard_diameters_climb_in_the_steps_of_preferred_numbers(sizes: tuple[int, ...]) -> None:
+    steps = [after / before for before, after in pairwise(sizes)]
+    assert min(steps) > 10.0 ** (1.0 / 40.0)
+    assert max(steps) < 10.0 ** (1.0 / 7.0)
