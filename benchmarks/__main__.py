@@ -19,6 +19,7 @@ NAMES = (
     "identification_sets",
     "circuit",
     "detection",
+    "forecast",
     "real_rig",
     "piezo_stack",
     "diaphragm_motor",

@@ -38,7 +38,10 @@ def fleet(
     limit: Annotated[
         list[str] | None, option("NAME=VALUE", "Limit of a severity in its unit, such as leakage_flow=2.", "--limit")
     ] = None,
-    pages: Annotated[int, option("N", "Write the log's own page for the N sickest.", "--pages", min=0)] = 20,
+    maintenance: Annotated[
+        Path | None, option("CSV", "Repairs, with the columns actuator and date: trends begin anew.", "--maintenance")
+    ] = None,
+    pages: Annotated[int, option("N", "Write pages of their own for the N sickest.", "--pages", min=0)] = 20,
     plant: Plant = None,
     rig: RigFile = None,
     columns: Columns = None,
@@ -54,6 +57,7 @@ def fleet(
     from experiments.batch.part_store import open_store
     from experiments.fleet.actuators import actuator_rows
     from experiments.fleet.log_pages import write_pages
+    from experiments.fleet.outlook import read_maintenance
     from experiments.fleet.page import fleet_page
     from experiments.fleet.rows import log_rows
 
@@ -64,7 +68,7 @@ def fleet(
         store = _diagnosed(Path(place), out, plant, rig, load_columns(columns), workers or os.cpu_count() or 1)
     table = store.rows(["file", "verb", "outcome", "found_condition", "reason", "quantities"]).to_pylist()
     files = [row["file"] for row in table if row["file"]]
-    rows = actuator_rows(log_rows(table, _names(files, pattern, names), limits))
+    rows = actuator_rows(log_rows(table, _names(files, pattern, names), limits), read_maintenance(maintenance))
     if not rows:
         raise HydrostateError(f"{place}: must hold logs that were diagnosed (verb diagnose), there are none")
     base = Path(place) if from_logs else Path()

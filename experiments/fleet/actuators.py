@@ -1,10 +1,13 @@
-"""One row an actuator: its last log, and how many there are."""
+"""One row an actuator: its last log, and how its worst severity develops."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 
-from experiments.fleet.rows import LogRow
+from experiments.fleet.outlook import Outlook, outlook_of
+from experiments.fleet.rows import RANKS, LogRow
+from faults.trend.trend import FEWEST
 
 
 @dataclass(frozen=True)
@@ -17,10 +20,13 @@ class ActuatorRow:
         Of the actuator, or of the log's file.
     logs : tuple of LogRow
         By date, the last one last.
+    maintained : tuple of float
+        When it was repaired, as `experiments.fleet.naming.place_of` gives dates [day].
     """
 
     name: str
     logs: tuple[LogRow, ...]
+    maintained: tuple[float, ...] = ()
 
     @cached_property
     def last(self) -> LogRow:
@@ -28,14 +34,36 @@ class ActuatorRow:
         read = [one for one in self.logs if one.state != "failed"]
         return (read or self.logs)[-1]
 
+    @cached_property
+    def outlook(self) -> Outlook | None:
+        """How the worst severity of the last log develops; None for a few logs."""
+        if self.last.worst is None or len(self.logs) < FEWEST:
+            return None
+        return outlook_of(self.logs, self.last.worst.name, self.maintained)
 
-def actuator_rows(logs: Sequence[LogRow]) -> list[ActuatorRow]:
+    @cached_property
+    def state(self) -> str:
+        """That of the last log, or an alarm where it is within its limits and will not stay so."""
+        growing = self.outlook is not None and self.outlook.alarm
+        return "alarm" if growing and self.last.state in ("open", "within") else self.last.state
+
+    @property
+    def order(self) -> tuple[int, float]:
+        """The sickest first."""
+        return RANKS[self.state], self.last.order[1]
+
+
+def actuator_rows(
+    logs: Sequence[LogRow], maintained: Mapping[str, Sequence[float]] = MappingProxyType({})
+) -> list[ActuatorRow]:
     """Return the actuators of a fleet, the sickest first.
 
     Parameters
     ----------
     logs : sequence of LogRow
         In any order; logs of one actuator without a date stay in their order.
+    maintained : Mapping[str, sequence of float]
+        When actuators were repaired, by name [day].
 
     Returns
     -------
@@ -47,7 +75,7 @@ def actuator_rows(logs: Sequence[LogRow]) -> list[ActuatorRow]:
         known = one.named.actuator
         groups.setdefault(("actuator", known) if known else ("file", one.file), []).append(one)
     rows = [
-        ActuatorRow(name, tuple(sorted(group, key=lambda one: one.named.place or 0.0)))
+        ActuatorRow(name, tuple(sorted(group, key=lambda one: one.named.place or 0.0)), tuple(maintained.get(name, ())))
         for (_, name), group in groups.items()
     ]
-    return sorted(rows, key=lambda row: row.last.order)
+    return sorted(rows, key=lambda row: row.order)

@@ -1,10 +1,12 @@
-"""Pages of the sickest logs of a fleet, under names that hold no folder."""
+"""Pages of the sickest actuators of a fleet and of their logs, under names that hold no folder."""
 
 import re
 from collections.abc import Callable, Iterable
 from hashlib import sha256
 from pathlib import Path
 
+from experiments.command.json_output import write_whole
+from experiments.fleet.actuator_page import actuator_page
 from experiments.fleet.actuators import ActuatorRow
 
 
@@ -33,7 +35,7 @@ def file_name(name: str) -> str:
 def write_pages(
     rows: Iterable[ActuatorRow], out: Path, most: int, write: Callable[[str, Path], bool]
 ) -> dict[str, str]:
-    """Write the page of the last log of the sickest actuators.
+    """Write the page of the last log of the sickest actuators, and the course of those with several logs.
 
     Parameters
     ----------
@@ -53,9 +55,13 @@ def write_pages(
     """
     links: dict[str, str] = {}
     for row in list(rows)[:most]:
-        if row.last.state == "failed":
-            continue
         place = Path("pages") / file_name(row.last.file)
-        if write(row.last.file, out / place):
+        written = row.last.state != "failed" and write(row.last.file, out / place)
+        if written:
             links[row.name] = place.as_posix()
+        if row.outlook is not None:
+            course = Path("actuators") / file_name(row.name)
+            page = actuator_page(row, f"../{place.as_posix()}" if written else None)
+            write_whole(out / course, page, "--out", parents=True)
+            links[row.name] = course.as_posix()
     return links

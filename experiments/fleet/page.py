@@ -22,14 +22,17 @@ SICK = ("over", "likely")
 """States of actuators that need work."""
 
 COLUMNS: Sequence[Mapping[str, Any]] = (
-    {"label": "actuator", "kind": "name"},
-    {"label": "state", "kind": "state", "words": STATES},
-    {"label": "found", "kind": "text"},
-    {"label": "worst", "kind": "text"},
-    {"label": "of the limit", "kind": "number", "unit": "%"},
-    {"label": "last log", "kind": "text"},
-    {"label": "logs", "kind": "number"},
+    {"label": "actuator", "kind": "name", "width": 10},
+    {"label": "state", "kind": "state", "width": 13, "words": STATES},
+    {"label": "found", "kind": "text", "width": 11},
+    {"label": "worst", "kind": "text", "width": 12},
+    {"label": "of the limit", "kind": "number", "width": 7.5, "unit": "%"},
+    {"label": "outlook", "kind": "text", "width": 17},
+    {"label": "logs left", "kind": "number", "width": 6},
+    {"label": "last log", "kind": "text", "width": 7},
+    {"label": "logs", "kind": "number", "width": 5},
 )
+"""Columns of the table, their widths in widths of a letter of the page [rem]."""
 
 SHOWN: Mapping[str, str] = {
     "leakage_flow": "leakage",
@@ -53,14 +56,14 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     source : str
         What the page is of.
     """
-    counts = Counter(row.last.state for row in rows)
+    counts = Counter(row.state for row in rows)
     cells = [row_cells(row) for row in rows]
     data = {"columns": COLUMNS, "rows": cells, "links": [links.get(row.name) for row in rows]}
     text = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
     facts = {
         "source": source,
         "title": _title(counts, len(rows)),
-        "sickest": [row.name for row in rows if row.last.state in SICK][:5],
+        "sickest": [row.name for row in rows if row.state in SICK][:5],
         "counts": [(words, counts[name], name) for name, words in STATES.items() if counts[name]],
         "logs": sum(len(row.logs) for row in rows),
         "data": Markup(text),  # noqa: S704 - JSON in which no tag can begin
@@ -70,6 +73,7 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     columns = [
         Column("state", words=lambda name: Cell(STATES[name], f"fleet-{name}")),
         Column("of the limit", unit="%", digits=3),
+        Column("logs left", digits=3),
     ]
     shown = [next((one for one in columns if one.source == each["label"]), each["label"]) for each in COLUMNS]
     return render_page("fleet/fleet.html", facts, {"still": shown}, {})
@@ -92,7 +96,10 @@ def row_cells(row: ActuatorRow) -> list[Any]:
     """
     last = row.last
     share = None if last.worst is None else round(100.0 * last.worst.share, 1)
-    return [row.name, last.state, found_in(last), worst_in(last), share, last.named.date, len(row.logs)]
+    outlook = row.outlook
+    left = None if outlook is None or outlook.left is None else round(outlook.left[1], 1)
+    words = "" if outlook is None else outlook.words
+    return [row.name, row.state, found_in(last), worst_in(last), share, words, left, last.named.date, len(row.logs)]
 
 
 def found_in(log: LogRow) -> str:

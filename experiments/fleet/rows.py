@@ -11,12 +11,13 @@ from experiments.fleet.naming import UNNAMED, Named
 STATES: Mapping[str, str] = {
     "over": "past a limit",
     "likely": "probably past a limit",
+    "alarm": "growing towards a limit",
     "unknown": "no verdict",
     "open": "may be past a limit",
     "within": "within limits",
     "failed": "not read",
 }
-"""States of a log, the most urgent first, and what a reader is told."""
+"""States of a log or an actuator, the most urgent first, and what a reader is told."""
 
 RANKS: Mapping[str, int] = {name: place for place, name in enumerate(STATES)}
 

@@ -84,6 +84,7 @@
       body.replaceChildren(...(first > 0 ? [spacer(first)] : []), ...shown, ...(last < order.length ? [spacer(order.length - last)] : []));
     }
 
+    table.style.minWidth = `${columns.reduce((sum, column) => sum + column.width, 0)}rem`;
     columns.forEach((column, place) => {
       const heading = element("th", { scope: "col", "aria-sort": "none", class: column.kind === "number" ? "number" : "" });
       const sort = element("button", { type: "button" }, column.label);
@@ -93,6 +94,7 @@
         heading.setAttribute("aria-sort", sorted.down ? "descending" : "ascending");
         arrange();
       });
+      heading.style.width = `${column.width}rem`;
       heading.append(sort);
       head.append(heading);
     });

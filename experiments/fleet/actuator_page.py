@@ -1,0 +1,127 @@
+"""The page of one actuator: how every severity develops over its logs, and when a limit is reached."""
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from experiments.fleet.actuators import ActuatorRow
+from experiments.fleet.outlook import Outlook, outlook_of
+from experiments.fleet.page import SHOWN, found_in
+from experiments.fleet.rows import STATES
+from experiments.page.charts import Charts, Curve, Mark, Panel
+from experiments.page.numbers import MISSING, number
+from experiments.page.render import render_page
+from experiments.page.tables import Column
+from faults.trend.kalman import moments, moved, settings
+from plant.arrays import Array
+
+AHEAD = 30
+"""Logs for which the course is drawn on [count]."""
+
+NORMAL_90 = 1.645
+"""Half-width of a 90 % normal interval, in standard deviations."""
+
+ROUNDING = 0.05
+"""Growth below this share of its standard deviation is shown as none [fraction]."""
+
+MOST_LOGS = 30
+"""Last logs that are listed [count]."""
+
+FORECASTS = (
+    "severity",
+    Column("level", "level now, 95 % interval"),
+    Column("growth", "growth a log"),
+    Column("half", "50 % interval to the limit", "logs"),
+    Column("most", "90 % interval to the limit", "logs"),
+    Column("outlook", "outlook"),
+)
+LOGS = ("log", "date", "state", "found")
+
+
+def actuator_page(row: ActuatorRow, log: str | None) -> str:
+    """Return the page of an actuator.
+
+    Parameters
+    ----------
+    log : str or None
+        Path of the page of its last log from this one, where there is one.
+    """
+    every = (outlook_of(row.logs, name, row.maintained) for name in SHOWN)
+    outlooks = [one for one in every if one is not None]
+    worst = row.outlook
+    last = [*row.logs][-MOST_LOGS:][::-1]
+    facts = {
+        "name": row.name,
+        "title": f"{row.name}: {STATES[row.state]}.",
+        "outlook": "" if worst is None else f"{SHOWN.get(worst.name, worst.name)}: {worst.words}".capitalize(),
+        "log": log,
+        "forecasts": pd.DataFrame([_forecast(one) for one in outlooks]),
+        "logs": pd.DataFrame(
+            [(one.file.rsplit("/", 1)[-1], one.named.date, STATES[one.state], found_in(one)) for one in last],
+            columns=list(LOGS),
+        ),
+        "charts": {one.name: _chart(one, row.name) for one in outlooks},
+        "names": [(one.name, SHOWN[one.name]) for one in outlooks],
+        "began": [_changed(one) for one in outlooks if one.trend.begin > 0],
+    }
+    return render_page("fleet/actuator.html", facts, {"forecasts": FORECASTS, "logs": LOGS}, {})
+
+
+def _scale(one: Outlook) -> tuple[float, str]:
+    return (1e-6, "MPa") if one.unit == "Pa" else (1.0, one.unit)
+
+
+def _changed(one: Outlook) -> str:
+    return f"{SHOWN[one.name].capitalize()} begins anew with the log of {one.logs[one.trend.begin].named.date}."
+
+
+def _forecast(one: Outlook) -> dict[str, str]:
+    scale, unit = _scale(one)
+    (level, std), (growth, growth_std) = one.trend.level, one.trend.growth
+    low, high = (number(scale * (level + sign * 1.96 * std), 3) for sign in (-1.0, 1.0))
+    growth = growth if abs(growth) > ROUNDING * growth_std else 0.0
+    crossing = one.trend.crossing
+    ends = None if crossing is None else [float(end) for end in crossing.quantiles]
+    return {
+        "severity": SHOWN[one.name],
+        "level": f"{number(scale * level, 3)} {unit} ({low} to {high})",
+        "growth": f"{number(scale * growth, 2)} ± {number(scale * growth_std, 2)} {unit}",
+        "half": MISSING if ends is None else _to(ends[1], ends[3]),
+        "most": MISSING if ends is None else _to(ends[0], ends[4]),
+        "outlook": one.words,
+    }
+
+
+def _to(low: float, high: float) -> str:
+    if math.isinf(low):
+        return "more than 300"
+    return f"{low:.0f} to {f'{high:.0f}' if math.isfinite(high) else 'more than 300'}"
+
+
+def _chart(one: Outlook, name: str) -> Charts:
+    """Return the logs of a severity, its level with a 90 % band, and the same for `AHEAD` logs to come."""
+    scale, unit = _scale(one)
+    count = len(one.logs)
+    x = np.arange(1, count + AHEAD + 1, dtype=np.float64)
+    measured = np.full(len(x), np.nan)
+    measured[:count] = scale * one.series.values
+    level, std = _course(one)
+    curves = (
+        Curve("logs", measured, "black", "dots"),
+        Curve("level", scale * level, "blue"),
+        Curve("90 % upper", scale * (level + NORMAL_90 * std), "blue", "edge"),
+        Curve("90 % lower", scale * (level - NORMAL_90 * std), "blue", "edge"),
+    )
+    marks = (Mark("y", scale * one.series.limit, "limit"), Mark("x", float(count), "last log"))
+    return Charts(x, "log", [Panel(SHOWN[one.name], unit, curves, marks, [(2, 3)])], f"{name}-{one.name}", "logs")
+
+
+def _course(one: Outlook) -> tuple[Array, Array]:
+    """Return level and standard deviation after every log, and as forecast, shape (logs + AHEAD,) each."""
+    grid, series = settings(), one.series
+    past = [trend.level for trend in one.course]
+    ahead = [moments(moved(one.trend.belief, float(step), grid), grid) for step in range(1, AHEAD + 1)]
+    future = [(series.healthy + series.size * mean, abs(series.size) * std) for mean, std in ahead]
+    level, std = np.array([*past, *future]).T
+    return level, std

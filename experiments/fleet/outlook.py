@@ -1,0 +1,131 @@
+"""How an actuator's severities develop over its logs: level, growth, and when a limit is reached."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from experiments.fleet.naming import place_of, table_rows
+from experiments.fleet.rows import LogRow
+from faults.trend.trend import FEWEST, Series, Trend, trends
+
+LEAST_STD = 1e-3
+"""Least standard deviation of a log, as a share of the way from healthy to the limit [fraction]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outlook:
+    """One severity of an actuator over its logs.
+
+    Parameters
+    ----------
+    name : str
+        The severity.
+    logs : tuple of LogRow
+        Those that tell it.
+    """
+
+    name: str
+    unit: str
+    logs: tuple[LogRow, ...]
+    series: Series
+
+    @cached_property
+    def course(self) -> list[Trend]:
+        """What was known after each log."""
+        return list(trends(self.series))
+
+    @property
+    def trend(self) -> Trend:
+        """What is known after the last log."""
+        return self.course[-1]
+
+    @cached_property
+    def left(self) -> tuple[float, float, float] | None:
+        """Logs to the limit: 5 %, median and 95 % [step]; None where the median is not within sight."""
+        crossing = self.trend.crossing
+        if crossing is None or not self.trend.certain:
+            return None
+        low, _, middle, _, high = crossing.quantiles
+        return (float(low), float(middle), float(high)) if math.isfinite(middle) else None
+
+    @property
+    def alarm(self) -> bool:
+        """Whether there is an alarm after the last log."""
+        return self.trend.alarm
+
+    @property
+    def words(self) -> str:
+        """The forecast in one clause."""
+        if len(self.logs) - self.trend.begin < FEWEST:
+            return "too few logs"
+        if self.left is None:
+            return "growing" if self.trend.certain else "no certain growth"
+        low, middle, high = self.left
+        if middle <= 0.0:
+            return "past the limit"
+        end = f"{high:.0f}" if math.isfinite(high) else "more than 300"
+        return f"limit in {middle:.0f} logs ({low:.0f} to {end})"
+
+
+def outlook_of(logs: Sequence[LogRow], name: str, maintained: Sequence[float] = ()) -> Outlook | None:
+    """Return how a severity develops.
+
+    Parameters
+    ----------
+    logs : sequence of LogRow
+        Of one actuator, by date; without dates they count as evenly spaced.
+    maintained : sequence of float
+        When it was repaired, as `experiments.fleet.naming.place_of` gives dates [day].
+
+    Returns
+    -------
+    Outlook or None
+        None where no log tells the severity with a verdict.
+    """
+    told = tuple(one for one in logs if name in one.amounts and one.state not in ("unknown", "failed"))
+    if not told:
+        return None
+    amounts = [one.amounts[name] for one in told]
+    last = amounts[-1]
+    places = [one.named.place for one in told]
+    dated = all(place is not None for place in places)
+    times = np.array(places if dated else range(len(told)), dtype=np.float64)
+    least = LEAST_STD * abs(last.limit - last.healthy)
+    series = Series(
+        times,
+        np.array([one.value for one in amounts]),
+        np.maximum([one.std for one in amounts], least),
+        last.healthy,
+        last.limit,
+        tuple(maintained) if dated else (),
+    )
+    return Outlook(name, last.unit, told, series)
+
+
+def read_maintenance(table: Path | None) -> Mapping[str, list[float]]:
+    """Return when actuators were repaired.
+
+    Parameters
+    ----------
+    table : Path or None
+        CSV with columns ``actuator`` and ``date``.
+
+    Returns
+    -------
+    Mapping[str, list of float]
+        Dates as numbers, by actuator.
+
+    Raises
+    ------
+    HydrostateError
+        If it cannot be read, or a date is none.
+    """
+    found: dict[str, list[float]] = {}
+    rows: Iterable[Mapping[str, str]] = [] if table is None else table_rows(table, ("actuator", "date"))
+    for row in rows:
+        found.setdefault(row["actuator"], []).append(place_of(row["date"], str(table)))
+    return found

@@ -1,0 +1,1 @@
+"""How severities of one actuator develop from log to log, and when a limit is crossed."""

@@ -1,0 +1,99 @@
+"""When a limit is crossed: by Monte Carlo from what is believed now, settings drawn by their weight."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from faults.trend.kalman import Belief, Settings
+from plant.arrays import Array
+
+DRAWS = 1000
+"""Futures that are drawn [count]."""
+
+STRIDES = np.concatenate([np.ones(60), np.full(30, 8.0)])
+"""Times in which a future is followed, fine at first [count]."""
+
+HORIZON = float(np.sum(STRIDES))
+"""How far is looked ahead [count]."""
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Of the crossing time: ends of the 90 % interval, of the 50 % interval, and the median [probability]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """When the level first reaches the limit.
+
+    Parameters
+    ----------
+    steps : ndarray, shape (draws,)
+        From now, sorted; infinite where it is not within `HORIZON` [count].
+    """
+
+    steps: Array
+
+    @property
+    def quantiles(self) -> Array:
+        """At `QUANTILES`, shape (5,); infinite where it is not within `HORIZON` [count]."""
+        places = np.minimum((np.array(QUANTILES) * len(self.steps)).astype(int), len(self.steps) - 1)
+        return self.steps[places]
+
+    def within(self, steps: float) -> float:
+        """Return the probability of a crossing within a time.
+
+        Parameters
+        ----------
+        steps : float
+            From now [count].
+
+        Returns
+        -------
+        float
+            The probability [probability].
+        """
+        return float(np.mean(self.steps <= steps))
+
+
+def crossing(belief: Belief, grid: Settings, rng: np.random.Generator, limit: float = 1.0) -> Crossing:
+    """Return when the level first reaches the limit.
+
+    Parameters
+    ----------
+    belief : Belief
+        After the last log.
+    grid : Settings
+        Of the belief.
+    rng : numpy.random.Generator
+        What draws the futures.
+    limit : float
+        Where [dimensionless].
+
+    Returns
+    -------
+    Crossing
+        From `DRAWS` futures; between two steps the crossing is placed on a straight line.
+    """
+    chosen = rng.choice(len(grid.slope), DRAWS, p=belief.weights(grid))
+    level, slope, curvature = _drawn(belief, chosen, rng)
+    gone = np.where(level >= limit, 0.0, np.inf)
+    bend, wander, jerk = grid.bend[chosen], grid.wander[chosen], grid.jerk[chosen]
+    begin = 0.0
+    for stride in STRIDES:
+        turn, half, drift, jolt = np.sqrt(stride) * rng.standard_normal((4, DRAWS))
+        before, bowing = level, curvature
+        curvature = curvature + jerk * jolt
+        bowed = stride * bend * (0.5 * turn + half / np.sqrt(12.0))
+        level = level + stride * slope + stride**2 * (2.0 * bowing + curvature) / 6.0 + bowed + wander * drift
+        slope = slope + 0.5 * stride * (bowing + curvature) + bend * turn
+        share = np.clip((limit - before) / np.where(level > before, level - before, 1.0), 0.0, 1.0)
+        gone = np.where(np.isinf(gone) & (level >= limit), begin + stride * share, gone)
+        begin += stride
+    return Crossing(np.sort(gone))
+
+
+def _drawn(belief: Belief, chosen: "np.ndarray[tuple[int], np.dtype[np.int64]]", rng: np.random.Generator) -> Array:
+    """Return levels, slopes and curvatures, shape (3, draws), under the settings that were chosen."""
+    sizes, axes = np.linalg.eigh(belief.covariance)
+    roots = axes * np.sqrt(np.maximum(sizes, 0.0))[:, None, :]
+    normal = rng.standard_normal((len(chosen), 3))
+    return (belief.mean[chosen] + np.einsum("nij,nj->ni", roots[chosen], normal)).T

@@ -1,0 +1,175 @@
+"""`trend_of(series) -> Trend`: whether a severity grows over an actuator's logs, and when it reaches its limit."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from faults.trend.changes import stretches
+from faults.trend.crossing import Crossing, crossing
+from faults.trend.kalman import Belief, growth_evidence, moments, settings
+from plant.arrays import Array
+
+FALSE_ALARMS = 0.01
+"""Probability that a stretch without growth ever raises an alarm, however long it is [probability]."""
+
+AHEAD = 25.0
+"""An alarm is raised when a crossing within so many steps is more probable than not [count]."""
+
+SURE = 0.95
+"""Probability that the level is past the limit, from which that is an alarm by itself [probability]."""
+
+FEWEST = 4
+"""Logs of a stretch before which nothing is forecast [count]."""
+
+_grid = lru_cache(maxsize=1)(settings)
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One severity over an actuator's logs.
+
+    Parameters
+    ----------
+    times : ndarray, shape (n,)
+        Rising [any unit].
+    values, stds : ndarray, shape (n,)
+        Estimate and standard deviation of each log [the severity's unit].
+    healthy, limit : float
+        Of the healthy actuator, and the limit [the severity's unit].
+    maintained : tuple of float
+        When the actuator was repaired [unit of the times].
+
+    Raises
+    ------
+    ValueError
+        If the series is empty, its times fall, or its limit is its healthy value.
+    """
+
+    times: Array
+    values: Array
+    stds: Array
+    healthy: float
+    limit: float
+    maintained: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not len(self.values) or np.any(np.diff(self.times) < 0.0) or self.limit == self.healthy:
+            raise ValueError("a series needs logs in the order of time, and a limit other than the healthy value")
+
+    @cached_property
+    def step(self) -> float:
+        """Usual time between logs [unit of the times]."""
+        apart = np.diff(self.times)
+        apart = apart[apart > 0.0]
+        return float(np.median(apart)) if len(apart) else 1.0
+
+    @property
+    def size(self) -> float:
+        """From healthy to the limit, negative where a severity falls to it [the severity's unit]."""
+        return self.limit - self.healthy
+
+
+@dataclass(frozen=True, eq=False)
+class Trend:
+    """What a series says after a log.
+
+    Parameters
+    ----------
+    series : Series
+        The whole series.
+    place : int
+        Of the log.
+    begin : int
+        Of the first log of its stretch: the last jump or repair.
+    belief : Belief
+        After the log, on the scale of `faults.trend.kalman`.
+    """
+
+    series: Series
+    place: int
+    begin: int
+    belief: Belief
+
+    @property
+    def level(self) -> tuple[float, float]:
+        """The severity without the scatter from log to log, and its standard deviation [the severity's unit]."""
+        mean, std = moments(self.belief, _grid())
+        return self.series.healthy + self.series.size * mean, abs(self.series.size) * std
+
+    @property
+    def growth(self) -> tuple[float, float]:
+        """Growth a step and its standard deviation [the severity's unit/log]."""
+        mean, std = moments(self.belief, _grid(), 1)
+        return self.series.size * mean, abs(self.series.size) * std
+
+    @cached_property
+    def growing(self) -> float:
+        """Logarithm of how much more probable the logs are with growth than without [dimensionless]."""
+        return growth_evidence(self.belief, _grid())
+
+    @cached_property
+    def crossing(self) -> Crossing | None:
+        """When the limit is reached; None before `FEWEST` logs of the stretch."""
+        if self.place - self.begin + 1 < FEWEST:
+            return None
+        return crossing(self.belief, _grid(), np.random.default_rng(self.place))
+
+    @property
+    def certain(self) -> bool:
+        """Whether it grows, with a probability of `FALSE_ALARMS` at most of ever saying so wrongly."""
+        return self.growing >= -float(np.log(FALSE_ALARMS)) and moments(self.belief, _grid(), 1)[0] > 0.0
+
+    @property
+    def alarm(self) -> bool:
+        """Whether it grows for certain and probably reaches its limit within `AHEAD`, or is past it with `SURE`."""
+        mean, std = moments(self.belief, _grid())
+        if self.crossing is None or (not self.certain and mean + 3.0 * std < 1.0):
+            return False
+        return self.crossing.within(0.0) >= SURE or (self.certain and self.crossing.within(AHEAD) >= 0.5)
+
+
+def trends(series: Series) -> Iterator[Trend]:
+    """Yield what a series says after each log; later logs play no part.
+
+    Yields
+    ------
+    Trend
+        One a log.
+    """
+    scaled = (series.values - series.healthy) / series.size
+    known = first_logs_after(series.times, series.maintained)
+    parts = stretches(series.times / series.step, scaled, series.stds / abs(series.size), known, _grid())
+    for place, (begin, belief) in enumerate(parts):
+        yield Trend(series, place, begin, belief)
+
+
+def trend_of(series: Series) -> Trend:
+    """Return what a series says after its last log.
+
+    Returns
+    -------
+    Trend
+        Level, growth, forecast and alarm.
+    """
+    return list(trends(series))[-1]
+
+
+def first_logs_after(times: Array, events: Iterable[float]) -> set[int]:
+    """Return the first log at or after each event, of those that have one.
+
+    Parameters
+    ----------
+    times : ndarray, shape (n,)
+        Rising [any unit].
+    events : iterable of float
+        When something was done [the same unit].
+
+    Examples
+    --------
+    >>> first_logs_after(np.array([1.0, 2.0, 3.0]), [1.5, 9.0])
+    {1}
+    """
+    places = np.searchsorted(times, sorted(events))
+    return {int(place) for place in places if place < len(times)}

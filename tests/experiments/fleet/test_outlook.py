@@ -1,0 +1,105 @@
+"""How an actuator develops: its outlook, its alarm and its page."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.fleet.actuator_page import actuator_page
+from experiments.fleet.actuators import ActuatorRow, actuator_rows
+from experiments.fleet.naming import by_pattern
+from experiments.fleet.outlook import outlook_of, read_maintenance
+from experiments.fleet.rows import log_rows
+from plant.errors import HydrostateError
+from tests.experiments.fleet.conftest import store_row
+
+
+def actuator(leakages: Any, maintained: tuple[float, ...] = (), **more: Any) -> ActuatorRow:
+    noise = 0.05 * np.random.default_rng(4).standard_normal(len(leakages))
+    files = [f"P-1_{place}.csv" for place in range(len(leakages))]
+    rows = [
+        store_row(file, float(one + more_noise), **more)
+        for file, one, more_noise in zip(files, leakages, noise, strict=True)
+    ]
+    logs = log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {})
+    (row,) = actuator_rows(logs, {"P-1": maintained})
+    return row
+
+
+GROWING = 1.0 + 0.05 * np.arange(30)
+
+
+def test_an_actuator_that_grows_towards_its_limit_is_in_alarm_before_it_is_past() -> None:
+    row = actuator(GROWING)
+    assert (row.last.state, row.state) == ("within", "alarm")
+    assert row.outlook is not None
+    assert row.outlook.left is not None
+    assert row.outlook.left[0] < 11.0 < row.outlook.left[2]
+    assert re.fullmatch(r"limit in \d+ logs \(\d+ to (\d+|more than 300)\)", row.outlook.words)
+
+
+def test_an_actuator_that_rests_is_in_no_alarm() -> None:
+    row = actuator(np.full(30, 1.5))
+    assert row.state == "within"
+    assert row.outlook is not None
+    assert row.outlook.words == "no certain growth"
+
+
+def test_few_logs_have_no_outlook_and_a_repair_makes_them_few() -> None:
+    assert actuator(GROWING[:3]).outlook is None
+    repaired = actuator(GROWING, maintained=(27.0,)).outlook
+    assert repaired is not None
+    assert repaired.words == "too few logs"
+
+
+def test_what_is_past_its_limit_says_so() -> None:
+    outlook = actuator(1.0 + 0.1 * np.arange(30)).outlook
+    assert outlook is not None
+    assert outlook.words == "past the limit"
+
+
+def test_logs_without_a_verdict_play_no_part() -> None:
+    assert outlook_of(actuator(GROWING, outcome="mismatch").logs, "leakage_flow") is None
+
+
+def test_the_page_of_an_actuator_shows_every_severity_with_its_forecast() -> None:
+    page = actuator_page(actuator(GROWING), "../pages/last.html").replace("\N{NO-BREAK SPACE}", " ")
+    assert "<h1>P-1: growing towards a limit.</h1>" in page
+    assert page.count('class="charts"') == 2
+    assert 'href="../pages/last.html"' in page
+    assert "Leakage: limit in" in page
+    assert "more than 300" in page
+
+
+def test_a_repair_is_named_on_the_page() -> None:
+    assert "Leakage begins anew with the log of 10." in actuator_page(actuator(GROWING, maintained=(9.5,)), None)
+
+
+def test_repairs_are_read_from_a_table(tmp_path: Path) -> None:
+    table = tmp_path / "repairs.csv"
+    table.write_text("actuator,date,what\nP-1,1970-01-03,seal\nP-1,1970-01-05,pump\n", encoding="utf-8")
+    assert read_maintenance(table) == {"P-1": [2.0, 4.0]}
+    assert read_maintenance(None) == {}
+    table.write_text("actuator,date\nP-1,soon\n", encoding="utf-8")
+    with pytest.raises(HydrostateError, match=r"repairs.csv: date must be ISO 8601"):
+        read_maintenance(table)
+
+
+@pytest.mark.slow
+def test_the_page_of_an_actuator_works_in_a_browser(browser: Any, tmp_path: Path) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
+    (tmp_path / "page.html").write_text(actuator_page(actuator(GROWING), None), encoding="utf-8")
+    page = browser.new_page(viewport={"width": 390, "height": 800}, color_scheme="dark")
+    complaints: list[str] = []
+    page.on("console", lambda said: complaints.append(said.text))
+    page.on("pageerror", lambda said: complaints.append(str(said)))
+    page.goto((tmp_path / "page.html").as_uri())
+    page.wait_for_selector("html.charts-drawn", state="attached")
+    assert page.locator(".live canvas").count() == 2
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    found = axe.Axe().run(page).response["violations"]
+    assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
+    assert complaints == []
+    page.close()

@@ -1,0 +1,76 @@
+"""The trend's filter, against what is known in closed form and against its own claims."""
+
+import numpy as np
+import pytest
+
+from faults.trend.kalman import LEVEL, Settings, after, beliefs, first_belief, growth_evidence, moments, moved, settings
+
+
+def one_setting(**values: float) -> Settings:
+    names = ("slope", "curvature", "jerk", "bend", "wander", "scatter")
+    return Settings(*(np.array([values.get(name, 0.0)]) for name in names))
+
+
+def test_without_process_noise_the_filter_is_bayesian_regression_on_a_line() -> None:
+    rng = np.random.default_rng(1)
+    times, stds = np.sort(rng.uniform(0.0, 20.0, 12)), rng.uniform(0.05, 0.3, 12)
+    values = 0.2 + 0.03 * times + stds * rng.standard_normal(12)
+    grid = one_setting(slope=0.05)
+    *_, last = beliefs(times, values, stds, grid)
+    design = np.column_stack([np.ones(12), times - times[0]])
+    precision = design.T @ (design / stds[:, None] ** 2) + np.diag([1.0 / LEVEL**2, 1.0 / 0.05**2])
+    line = np.linalg.solve(precision, design.T @ (values / stds**2))
+    end = np.array([1.0, times[-1] - times[0]])
+    assert last.mean[0, :2] == pytest.approx([end @ line, line[1]])
+    assert last.covariance[0, 0, 0] == pytest.approx(end @ np.linalg.solve(precision, end))
+    marginal = np.diag(stds**2) + design @ np.diag([LEVEL**2, 0.05**2]) @ design.T
+    said = -0.5 * (values @ np.linalg.solve(marginal, values) + np.linalg.slogdet(2.0 * np.pi * marginal)[1])
+    assert last.evidence[0] == pytest.approx(said)
+
+
+def test_two_steps_are_one_step_of_twice_the_time() -> None:
+    grid = settings()
+    now = after(first_belief(grid), 0.0, 0.1, 0.05, grid)
+    once, twice = moved(now, 3.0, grid), moved(moved(now, 1.2, grid), 1.8, grid)
+    assert np.allclose(once.mean, twice.mean)
+    assert np.allclose(once.covariance, twice.covariance, rtol=1e-9, atol=1e-18)
+
+
+def test_covariances_stay_symmetric_and_positive() -> None:
+    rng = np.random.default_rng(2)
+    *_, last = beliefs(np.arange(80.0), rng.standard_normal(80), np.full(80, 0.01), settings())
+    assert np.allclose(last.covariance, np.swapaxes(last.covariance, 1, 2), atol=1e-12)
+    assert np.linalg.eigvalsh(last.covariance).min() > -1e-12
+
+
+def test_one_grossly_wrong_log_moves_the_level_by_less_than_its_own_standard_deviation() -> None:
+    values = np.zeros(30)
+    values[-1] = 5.0
+    grid = settings()
+    *_, before, last = beliefs(np.arange(30.0), values, np.full(30, 0.05), grid)
+    assert abs(moments(last, grid)[0] - moments(before, grid)[0]) < 0.05
+
+
+def test_a_log_with_a_larger_deviation_counts_less() -> None:
+    grid = settings()
+    moves = []
+    for std in (0.02, 0.2):
+        *_, last = beliefs(np.arange(9.0), np.array([0.0] * 8 + [0.1]), np.array([0.02] * 8 + [std]), grid)
+        moves.append(moments(last, grid)[0])
+    assert moves[0] > 2.0 * moves[1] > 0.0
+
+
+def test_growth_is_more_probable_with_a_slope_and_rest_is_not() -> None:
+    grid, times, stds = settings(), np.arange(40.0), np.full(40, 0.03)
+    noise = 0.03 * np.random.default_rng(3).standard_normal(40)
+    *_, growing = beliefs(times, 0.02 * times + noise, stds, grid)
+    *_, resting = beliefs(times, noise, stds, grid)
+    assert growth_evidence(growing, grid) > 10.0
+    assert growth_evidence(resting, grid) < 0.0
+
+
+def test_weights_sum_to_one_and_half_of_the_prior_is_rest() -> None:
+    grid = settings()
+    weights = first_belief(grid).weights(grid)
+    assert weights.sum() == pytest.approx(1.0)
+    assert weights[grid.growing].sum() == pytest.approx(0.5)

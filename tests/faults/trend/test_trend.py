@@ -1,0 +1,138 @@
+"""Levels, forecasts, alarms and stretches of simulated actuators."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faults.trend.crossing import HORIZON, crossing
+from faults.trend.kalman import Settings, first_belief
+from faults.trend.trend import Series, Trend, trend_of, trends
+from plant.arrays import Array
+
+
+def series_of(truth: Array, std: float = 0.04, seed: int = 0) -> Series:
+    noise = std * np.random.default_rng(seed).standard_normal(len(truth))
+    return Series(np.arange(len(truth), dtype=np.float64), truth + noise, np.full(len(truth), std), 0.0, 1.0)
+
+
+def growth(count: int = 40, rate: float = 0.02) -> Array:
+    return rate * np.arange(count, dtype=np.float64)
+
+
+def scaled_by(series: Series, size: float, healthy: float, stretch: float) -> Series:
+    return Series(
+        stretch * series.times, healthy + size * series.values, abs(size) * series.stds, healthy, healthy + size
+    )
+
+
+def test_level_and_growth_of_a_steady_actuator_come_back() -> None:
+    found = trend_of(series_of(growth()))
+    (level, level_std), (rate, rate_std) = found.level, found.growth
+    assert abs(level - 0.78) < 3.0 * level_std < 0.15
+    assert abs(rate - 0.02) < 3.0 * rate_std < 0.03
+
+
+def test_the_forecast_holds_the_crossing_and_its_intervals_are_nested() -> None:
+    found = trend_of(series_of(growth()))
+    assert found.crossing is not None
+    least, low, middle, high, most = found.crossing.quantiles
+    assert least <= low <= middle <= high <= most
+    assert least < 11.0 < most
+    assert abs(middle - 11.0) < 5.0
+
+
+@pytest.mark.parametrize(("size", "healthy", "stretch"), [(-4.1e7, 2.07e8, 7.0), (2.5, 1.1, 0.1)])
+def test_units_and_falling_severities_change_nothing(size: float, healthy: float, stretch: float) -> None:
+    plain = series_of(growth())
+    one, other = trend_of(plain), trend_of(scaled_by(plain, size, healthy, stretch))
+    assert one.crossing is not None
+    assert other.crossing is not None
+    assert other.crossing.quantiles == pytest.approx(one.crossing.quantiles)
+    assert other.level[0] == pytest.approx(healthy + size * one.level[0])
+    assert other.growth[1] == pytest.approx(abs(size) * one.growth[1])
+
+
+def first_alarm(series: Series) -> int | None:
+    return next((trend.place for trend in trends(series) if trend.alarm), None)
+
+
+def test_a_growing_actuator_raises_an_alarm_well_before_its_limit() -> None:
+    places = [first_alarm(series_of(growth(50), seed=seed)) for seed in range(5)]
+    assert all(place is not None and place <= 40 for place in places)
+
+
+def test_a_resting_actuator_raises_none_though_one_log_is_grossly_wrong() -> None:
+    for seed in range(5):
+        series = series_of(np.zeros(60), seed=seed)
+        series.values[30] += 1.5
+        assert first_alarm(series) is None
+
+
+def test_an_actuator_that_began_past_its_limit_is_in_alarm_from_the_first_forecast() -> None:
+    assert first_alarm(series_of(np.full(10, 1.5))) == 3
+
+
+def test_a_jump_begins_a_new_stretch_and_is_no_growth() -> None:
+    truth = np.where(np.arange(40) < 25, 0.1, 0.6)
+    found = trend_of(series_of(truth, std=0.02))
+    assert 24 <= found.begin <= 26
+    assert found.level[0] == pytest.approx(0.6, abs=0.05)
+    assert not found.certain
+
+
+def test_steady_growth_is_one_stretch() -> None:
+    assert [trend_of(series_of(growth(60), seed=seed)).begin for seed in range(5)] == [0] * 5
+
+
+def test_a_repair_resets_the_trend_even_where_it_makes_no_jump() -> None:
+    truth = np.concatenate([growth(30, 0.01), np.full(15, 0.29)])
+    series = series_of(truth)
+    found = trend_of(replace(series, maintained=(29.5, 99.0)))
+    assert found.begin == 30
+    assert not found.alarm
+
+
+def test_before_a_few_logs_nothing_is_forecast() -> None:
+    found = [*trends(series_of(growth(6)))]
+    assert [one.crossing is None for one in found] == [True] * 3 + [False] * 3
+
+
+def test_what_is_said_after_a_log_does_not_depend_on_later_logs() -> None:
+    series = series_of(growth(30))
+    early = Series(series.times[:20], series.values[:20], series.stds[:20], 0.0, 1.0)
+
+    def numbers(found: Trend) -> tuple[float, float]:
+        return found.level[0], found.growing
+
+    assert numbers(trend_of(early)) == numbers([*trends(series)][19])
+
+
+def test_a_known_slope_without_noise_crosses_at_a_known_time() -> None:
+    grid = Settings(*(np.array([value]) for value in (1e-9, 0.0, 0.0, 0.0, 0.0, 0.0)))
+    start = first_belief(grid)
+    belief = replace(start, mean=np.array([[0.2, 0.05, 0.0]]), covariance=np.zeros((1, 3, 3)))
+    found = crossing(belief, grid, np.random.default_rng(0))
+    assert found.quantiles == pytest.approx([16.0] * 5)
+    assert (found.within(15.9), found.within(16.1)) == (0.0, 1.0)
+    resting = replace(belief, mean=np.array([[0.2, 0.0, 0.0]]))
+    assert np.all(np.isinf(crossing(resting, grid, np.random.default_rng(0)).quantiles))
+    late = replace(belief, mean=np.array([[0.2, 0.7 / HORIZON, 0.0]]))
+    assert crossing(late, grid, np.random.default_rng(0)).within(HORIZON) == 0.0
+
+
+def test_a_constant_curvature_crosses_where_the_parabola_does() -> None:
+    grid = Settings(*(np.array([value]) for value in (1e-9, 0.0, 0.0, 0.0, 0.0, 0.0)))
+    belief = replace(first_belief(grid), mean=np.array([[0.0, 0.0, 0.02]]), covariance=np.zeros((1, 3, 3)))
+    assert crossing(belief, grid, np.random.default_rng(0)).quantiles[2] == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"times": np.array([1.0, 0.0])}, {"limit": 0.0}, {"values": np.empty(0)}],
+    ids=["order", "limit", "empty"],
+)
+def test_a_series_that_cannot_be_followed_is_refused(changes: dict[str, object]) -> None:
+    good = Series(np.arange(2.0), np.zeros(2), np.ones(2), 0.0, 1.0)
+    with pytest.raises(ValueError, match="a series needs logs in the order of time"):
+        replace(good, **changes)  # pyright: ignore[reportArgumentType]
