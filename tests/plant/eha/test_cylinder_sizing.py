@@ -96,3 +96,19 @@ def test_standard_diameters_climb_in_the_steps_of_preferred_numbers(sizes: tuple
     steps = [after / before for before, after in pairwise(sizes)]
     assert min(steps) > 10.0 ** (1.0 / 40.0)
     assert max(steps) < 10.0 ** (1.0 / 7.0)
+
+
+def test_a_free_rod_buckles_at_eulers_load_of_twice_its_length() -> None:
+    rod, stiffness = 0.028, 2.1e11
+    second_moment = pi * rod**4 / 64.0
+    wanted = pi**2 * stiffness * second_moment / (2.0 * 0.8) ** 2
+    assert cylinder_circuit(replace(PRESS, stroke=0.8), 0.05, rod).buckling_force == pytest.approx(wanted)
+
+
+def test_the_pressures_that_a_duty_needs_balance_its_forces() -> None:
+    found = cylinder_circuit(PRESS, 0.05, 0.028)
+    cap, ring = pi / 4.0 * 0.05**2, pi / 4.0 * (0.05**2 - 0.028**2)
+    pressed = (found.extend_force - PRESS.extend_force) / (PRESS.efficiency * cap) + found.extend_pressure
+    again = (found.retract_force - PRESS.retract_force) / (PRESS.efficiency * ring) + found.retract_pressure
+    assert pressed == pytest.approx(again)
+    assert pressed <= PRESS.supply_pressure
