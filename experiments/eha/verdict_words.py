@@ -49,7 +49,11 @@ def headline(result: Mapping[str, Any]) -> str:
     """
     ranked = sorted(result["probabilities"].items(), key=lambda item: -item[1])
     (best, first), (second, other) = ranked[:2]
-    parts = [f"{_said(best)}, probability {_percent(first)}", since(result), f"next {_said(second)}, {_percent(other)}"]
+    parts = [
+        f"{_said(best)}, probability {_percent(first)}",
+        since(result),
+        f"second most likely {_said(second)}, {_percent(other)}",
+    ]
     named = "; ".join(part for part in parts if part)
     return f"{NEAREST}{named}" if result["unknown"] else named
 

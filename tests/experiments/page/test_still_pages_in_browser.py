@@ -1,0 +1,39 @@
+"""Pages with still figures alone, of a log's columns and of a study, in a real browser."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from experiments.cli import app
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def pages(written: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("still")
+    for arguments in (
+        ("simulate", "--duration", "1", "--sample-time", "1e-3", "--out", folder / "run.csv"),
+        ("inspect", folder / "run.csv", "--html", folder / "inspect.html"),
+    ):
+        assert CliRunner().invoke(app, [str(one) for one in arguments]).exit_code == 0
+    return {"inspect": folder / "inspect.html", "study": written / "report.html"}
+
+
+@pytest.mark.parametrize("name", ["inspect", "study"])
+def test_a_still_page_is_quiet_dark_and_as_wide_as_a_phone(browser: Any, pages: dict[str, Path], name: str) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
+    page = browser.new_page(viewport={"width": 390, "height": 800}, color_scheme="dark")
+    complaints: list[str] = []
+    page.on("console", lambda said: complaints.append(said.text))
+    page.on("pageerror", lambda said: complaints.append(str(said)))
+    page.on("request", lambda asked: asked.url.startswith(("file:", "data:")) or complaints.append(asked.url))
+    page.goto(pages[name].as_uri())
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert page.locator("figure img").first.evaluate("one => getComputedStyle(one).filter").startswith("invert")
+    found = axe.Axe().run(page).response["violations"]
+    assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
+    assert complaints == []
+    page.close()
