@@ -25,6 +25,7 @@ from estimation.fits.wide_problem import (
     usual_values,
     widened,
 )
+from estimation.models.flow import STIFFNESS
 from estimation.models.wide_flow import WideFlowParameters, grown_leakage
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -141,7 +142,7 @@ def explain(
     Explanation
         The likeliest; whether it explains the log is for the gate to say.
     """
-    wide = widened(log, parameters)
+    wide = widened(log, parameters, starts[0].get(STIFFNESS, 0.0))
     likely, others = _promising(wide, (), starts[0], asked)
     finished = _likeliest(wide, [_screened(wide, (one,), starts) for one in likely])
     if others and not accepted(finished[0].fit):
@@ -189,7 +190,7 @@ def promised(
         Gain in log-likelihood, Rao's score statistic over two [dimensionless], and how far what is freed first would
         move in its fitted coordinate: for a logarithm a relative change [dimensionless].
     """
-    return _promises(widened(log, parameters), (), plain, (one,))[0]
+    return _promises(widened(log, parameters, plain.get(STIFFNESS, 0.0)), (), plain, (one,))[0]
 
 
 def _promising(

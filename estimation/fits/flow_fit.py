@@ -17,7 +17,7 @@ from estimation.fits.wide_problem import flow_bounds
 from estimation.log_checks.bridging import bridged, gaps
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.outliers import without_outliers
-from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, reaches_relief, relieving
+from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.notes import EstimateCode
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
@@ -140,16 +140,15 @@ def _balanced(
     relieved = reaches_relief(log.measured, parameters.relief_pressure)
     forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
     search = Search(screened=ceil(SCREENED_SECONDS / log.sample_time))
-    guesses = [forms[0].theta(start) for start in starts]
-    bounds = flow_bounds(forms[0], guesses, log)
     fits: list[GreyBoxFit] = []
     for form in forms:
         problem = Problem(form, log)
-        near = roughly(problem, guesses, search, bounds)
+        guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in starts]
+        bounds = flow_bounds(form, guesses, log)
+        near = roughly(problem, [form.theta({STIFFNESS: 0.0, **fits[0].values})] if fits else guesses, search, bounds)
         # twice what counts leaves room for the error of long model steps
         if not fits or near.cost < min(map(_cost, fits)) + 2.0 * UNLIKELY:
             fits.append(concluded(problem, descend(problem.at, near.theta, search.evaluations, bounds)))
-        guesses = [fits[0].theta]
     return fits
 
 
@@ -170,8 +169,10 @@ def _asked(log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, 
 
 def _near(fit: GreyBoxFit, starts: Sequence[Mapping[str, float]]) -> Sequence[Mapping[str, float]]:
     """Return where the search for what is strange begins: a fit that explains the log is in no wrong valley."""
+    if _explains(fit):
+        return [fit.values]
     usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
-    return [fit.values, *(() if _explains(fit) else usual)]
+    return [{name: value for name, value in fit.values.items() if name != STIFFNESS}, *usual]
 
 
 def _cost(fit: GreyBoxFit) -> float:

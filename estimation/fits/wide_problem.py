@@ -8,7 +8,7 @@ import numpy as np
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_problem import GreyBoxLog, search_bounds
 from estimation.fits.hypotheses import LIMITS, PRESUMED, Hypothesis
-from estimation.models.flow import FLOW_FORM, reaches_relief, relieving
+from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.wide_flow import LINEAR, WIDE_FLOW_FORM, WideFlowParameters
 from plant.arrays import Array
@@ -23,11 +23,18 @@ SHARPEST_RELIEF = 3e-3
 Valves need 0.05 to 0.2. At a sharper corner, which no sensor resolves, the model chatters from open to closed: slopes
 are then so steep that the deviation of bulk modulus comes out twenty times too small."""
 
+ADIABATIC = 1.4
+"""Exponent of nitrogen that is compressed quickly [dimensionless]."""
+
+LEAST_GAS = 1.0
+"""Least gas of the inner circuit's accumulator, in chamber volumes; judged. With less its pressure would follow every
+stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
+
 LEAST_PEAK = 1.0
 """Highest differential pressure taken of a log whose sensor is dead: the logarithm of none is no start [Pa]."""
 
 
-def widened(log: GreyBoxLog, parameters: EhaParameters) -> GreyBoxLog:
+def widened(log: GreyBoxLog, parameters: EhaParameters, stiffness: float = 0.0) -> GreyBoxLog:
     """Return a log as the wide flow form sees it: with the share of the log as a drive, and what is presumed.
 
     Parameters
@@ -36,6 +43,8 @@ def widened(log: GreyBoxLog, parameters: EhaParameters) -> GreyBoxLog:
         The log, as the plain flow form sees it.
     parameters : EhaParameters
         The actuator.
+    stiffness : float
+        `STIFFNESS` of the inner circuit [Pa/m^3]; held, as it would take up what is strange.
 
     Returns
     -------
@@ -48,7 +57,11 @@ def widened(log: GreyBoxLog, parameters: EhaParameters) -> GreyBoxLog:
         log,
         drives=np.column_stack([log.drives, np.arange(samples) / samples]),
         drive_std=(*log.drive_std, 0.0),
-        parameters=parameter_row(WideFlowParameters(**known, stated_pressure=usual_pressure(log, parameters))),
+        parameters=parameter_row(
+            WideFlowParameters(
+                **known, stated_pressure=usual_pressure(log, parameters), accumulator_stiffness=stiffness
+            )
+        ),
         presumed={**log.presumed, **{name: (known[name], std) for name, std in PRESUMED.items()}},
     )
 
@@ -133,7 +146,9 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     rig = dict(zip(parameter_names(model.parameters), map(float, log.parameters), strict=True))
     most = rig["pump_displacement"] * float(np.max(np.abs(log.drives[:, 0])))
     relief = (0.0, max(most / (SHARPEST_RELIEF * rig["relief_pressure"]), rig["relief_conductance"]))
-    return search_bounds(model, guesses, {**LIMITS, "speed_lead": (0.0, log.sample_time), "relief_conductance": relief})
+    stiffest = ADIABATIC * rig["accumulator_pressure"] / (LEAST_GAS * rig["chamber_volume"])
+    limits = {"speed_lead": (0.0, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
+    return search_bounds(model, guesses, {**LIMITS, **limits})
 
 
 def usual_values(log: GreyBoxLog) -> dict[str, float]:

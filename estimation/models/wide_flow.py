@@ -53,6 +53,9 @@ class WideFlowParameters(EhaParameters):
     makeup_share_b: float = si(1.0, "1", "conductance of valve B over that of A", "fitted")
     drain_share_a: float = si(1.0, "1", "drain of port A over the case leakage", "fitted")
     drain_share_b: float = si(1.0, "1", "drain of port B over the case leakage", "fitted")
+    accumulator_stiffness: float = si(
+        0.0, "Pa/m^3", "rise of the inner circuit's pressure per volume pushed back into it", "fitted"
+    )
     by_mass: float = si(0.0, "1", "1: balanced by mass, 0: by volume", "chosen")
 
     def __post_init__(self) -> None:
@@ -76,10 +79,9 @@ def _stiffness(pressure: Scalar, elapsed: Scalar, p: SimpleNamespace) -> Scalar:
 
 def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
     speeds, (x, next_x), (begun, next_begun), step = drives
-    p1, p2, behind = state
+    p1, p2, behind, supply = state
     velocity, position = (next_x - x) / step, x + share * (next_x - x) - p.position_zero
     pumped = delivered_flow(speeds, p, step, share)
-    supply = p.accumulator_pressure
     area_1, area_2 = piston_areas(p)
     volume_1, volume_2 = chamber_volumes(position, p)
     dp = p1 - p2
@@ -97,7 +99,8 @@ def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Sc
     rise = _stiffness(p1, elapsed, p) * (at_1 - area_1 * velocity + into_1) / volume_1
     fall = _stiffness(p2, elapsed, p) * (area_2 * velocity - at_2 + into_2) / volume_2
     # how far the sensor is behind stays small where its lag is short, which a stiff step resolves
-    return rise, fall, rise - fall - (behind + p.pressure_offset) / (p.pressure_lag + SHORTEST_LAG)
+    lagging = rise - fall - (behind + p.pressure_offset) / (p.pressure_lag + SHORTEST_LAG)
+    return rise, fall, lagging, -p.accumulator_stiffness * (into_1 + into_2)
 
 
 def grown_leakage(elapsed: Scalar, growth: Scalar, bend: Scalar) -> Scalar:
@@ -121,11 +124,11 @@ def grown_leakage(elapsed: Scalar, growth: Scalar, bend: Scalar) -> Scalar:
 
 def _at_rest(p: SimpleNamespace) -> tuple[Scalar, ...]:
     held, supply = p.start_pressure, p.accumulator_pressure + p.start_level
-    return supply + maximum(held, 0.0), supply + maximum(-held, 0.0), -p.pressure_offset
+    return supply + maximum(held, 0.0), supply + maximum(-held, 0.0), -p.pressure_offset, p.accumulator_pressure
 
 
 def _shown(state: tuple[Scalar, ...]) -> tuple[Scalar]:
-    p1, p2, behind = state
+    p1, p2, behind, _ = state
     return (p1 - p2 - behind,)
 
 
@@ -138,7 +141,7 @@ WIDE_FLOW_FORM = GreyBoxModel(
     rates=_rates,
     observe=_shown,
     parameters=WideFlowParameters,
-    jump=(0.5, -0.5, 0.0),
+    jump=(0.5, -0.5, 0.0, 0.0),
 )
 """Without unknowns of its own: which of its parameters are free is a hypothesis, see `estimation.fits.hypotheses`."""
 

@@ -160,3 +160,13 @@ def test_a_relief_valve_with_a_sharp_corner_does_not_feign_certainty(seed: int) 
     fit = fit_flow(coarse, rig, 2.07e8)
     assert 1e-3 < fit.bound < 5e-3
     assert abs(fit.parameters["bulk_modulus"][0] / p.bulk_modulus - 1.0) < 3.0 * fit.bound
+
+
+@pytest.mark.parametrize("seed", [100, 101])
+def test_an_inner_circuit_with_little_gas_does_not_bias_bulk_modulus(seed: int) -> None:
+    rng, p = np.random.default_rng(seed), circuit_of(parameters_for(CONDITIONS["major_friction"]))
+    drive = make_drive("prbs", 10.0, 1e-3, p, rng)
+    record = simulate(CIRCUIT, drive, 1e-3, p, sensors=BENCH, rng=rng)
+    value, std = fit_flow(record, HEALTHY, 2.07e8).parameters["bulk_modulus"]
+    assert abs(value - p.bulk_modulus) < 2.5 * std
+    assert std < 0.003 * value

@@ -26,7 +26,7 @@ def test_the_same_bits_as_python(model: GreyBoxModel, monkeypatch: pytest.Monkey
     drives = np.stack([120.0 * np.sign(np.sin(0.3 * np.arange(samples))), 0.01 * np.sin(0.1 * np.arange(samples))], 1)
     measured = 1e6 * rng.normal(size=(samples, 1))
     measured[rng.random(samples) < 0.2] = np.nan
-    theta = np.array([*np.log([2e8, 1e-12, 1e-6, 1e-9, 1e4, 1e-13]), 0.3])
+    theta = np.array([*np.log([2e8, 1e-12, 1e-6, 1e-9, 1e4, 1e-13]), 0.3, *[2.0] * (len(model.unknowns) - 7)])
     gaps = np.array([[10.0, 14.0, 1e9], [30.0, 31.0, 1e8]])
     given = (theta, drives, measured, parameter_row(EhaParameters()), 1e-3, rng.integers(1, 3, samples), block)
     given = (*given, np.array([2.5e7]), np.array([1e3]), gaps, 3.0)
