@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from math import isfinite
+from types import MappingProxyType
 from typing import Annotated, Literal, TypeAlias, get_args
 
 from plant.eha.model import EhaParameters
@@ -89,7 +90,7 @@ _NINE = (
     Condition("major_leakage_major_friction", "major", "major"),
 )
 
-CONDITIONS: Mapping[str, Condition] = {condition.name: condition for condition in _NINE}
+CONDITIONS: Mapping[str, Condition] = MappingProxyType({condition.name: condition for condition in _NINE})
 """The nine conditions by name, in the order of Table 1."""
 
 

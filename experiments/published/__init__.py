@@ -7,6 +7,7 @@ import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
+from types import MappingProxyType
 from typing import Literal, TypeAlias, get_args
 
 import pandas as pd
@@ -51,7 +52,7 @@ def _scalars() -> Mapping[str, PublishedScalar]:
         }
 
 
-SCALARS: Mapping[str, PublishedScalar] = _scalars()
+SCALARS: Mapping[str, PublishedScalar] = MappingProxyType(_scalars())
 
 _FILES: Mapping[TableName | MotorTableName, str] = {
     **{name: f"eha_table{number}_{name}.csv" for number, name in enumerate(get_args(TableName), start=1)},

@@ -36,6 +36,11 @@ OTHER_RIG = EhaParameters(
 )
 
 
+def test_the_nine_conditions_cannot_be_changed() -> None:
+    with pytest.raises(TypeError):
+        CONDITIONS["normal"] = CONDITIONS["major_leakage"]  # pyright: ignore[reportIndexIssue] - read-only is the claim
+
+
 def rated_flow(p: EhaParameters) -> float:
     return p.pump_displacement * p.rated_speed
 
