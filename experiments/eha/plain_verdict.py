@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from estimation.notes import RigCode
 from experiments.page.words import sentence
 from faults.conditions import CONDITIONS
 
@@ -29,6 +30,16 @@ WORK_ON_FRICTION: Mapping[str, str] = {
 }
 """What follows from each level."""
 
+OUTSIDE: Mapping[str, str] = {
+    str(RigCode.LEAKAGE_GROWS): "Leakage grows while the actuator runs.",
+    str(RigCode.PUMP_WORN): "The pump delivers less than it should: it is worn, or the rig file is wrong.",
+    str(RigCode.MAKEUP_BLOCKED): "A make-up valve is stuck shut.",
+    str(RigCode.PORT_DRAINS): "A make-up valve leaks or is stuck open.",
+    str(RigCode.RELIEF_LOW): "The relief valve opens too early, or leaks.",
+    str(RigCode.AIR_ENTERS): "Air gets into the oil.",
+}
+"""Faults that are none of the nine conditions, by the code of their note."""
+
 
 def verdict(result: Mapping[str, Any]) -> str:
     """Return what is wrong in one sentence.
@@ -49,7 +60,8 @@ def verdict(result: Mapping[str, Any]) -> str:
     'The actuator is healthy: leakage and friction are normal.'
     """
     if result["unknown"]:
-        return "No verdict: the log does not fit any known condition of this actuator."
+        named = [OUTSIDE[one["code"]] for one in result["notes"] if one["code"] in OUTSIDE]
+        return " ".join(named) or "No verdict: the log does not fit any known condition of this actuator."
     condition = CONDITIONS[result["condition"]]
     faults = [LEAKS.get(condition.leakage), RUBS.get(condition.friction)]
     wrong = " and ".join(one for one in faults if one)
@@ -75,7 +87,10 @@ def sureness(result: Mapping[str, Any]) -> str:
         Sentences.
     """
     if result["unknown"]:
-        return f"Nothing on this page may be relied on: {'; '.join(result['reasons'])}."
+        reasons = "; ".join(result["reasons"])
+        if any(one["code"] in OUTSIDE for one in result["notes"]):
+            return f"This is none of the nine conditions, so do not rely on the numbers below: {reasons}."
+        return f"Nothing on this page may be relied on: {reasons}."
     return " ".join(one for one in (_how_sure(result), _cost(result), _since(result)) if one)
 
 

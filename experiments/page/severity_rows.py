@@ -12,6 +12,9 @@ MEGAPASCAL = 1e-6
 ROOM = 1.05
 """A bar's scale ends so far beyond the largest number on it [dimensionless]."""
 
+LEAST_RANGE = 1e-3
+"""A scale that is shorter is taken to be so long [any row's unit]."""
+
 ROUNDING = 1e-6
 """Share of a bar's scale below which a number is zero [fraction]."""
 
@@ -64,7 +67,7 @@ class SeverityRow:
     @property
     def sound_shown(self) -> float:
         """The healthy value, zero where it is no more than rounding [the row's unit]."""
-        return self.sound if abs(self.sound) > ROUNDING * (self.last - self.first) else 0.0
+        return self.sound if abs(self.sound) > ROUNDING * max(self.last - self.first, LEAST_RANGE) else 0.0
 
     @property
     def limit_text(self) -> str:

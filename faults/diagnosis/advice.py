@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from estimation.log_checks.sensor_check import PRESSURE
-from estimation.notes import ChannelCode, EstimateCode, SensorCode
+from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
 from faults.notes import AdviceCode, AgainstCode, ClassCode
 from plant.log.record import Record
 from plant.notes import Note
@@ -123,9 +123,28 @@ def _mended(doubts: list[Note]) -> tuple[Note, ...]:
         accused |= {"position_m": None, "velocity_m_s": None}
     if accused:
         return (AdviceCode.CHECK_SENSOR.note(channels=" and ".join(accused)),)
+    if work := tuple(one for one in map(_work_on, doubts) if one is not None):
+        return work
     if any(isinstance(note.code, EstimateCode) or note.code == AgainstCode.NONE_FITS for note in doubts):
         return (AdviceCode.FIT_DOUBTED.note(),)
     return (AdviceCode.CHECK_RIG.note(),)
+
+
+def _work_on(fault: Note) -> Note | None:
+    """Return the work on an actuator that has a fault which is none of the nine conditions."""
+    match fault.code:
+        case RigCode.LEAKAGE_GROWS:
+            return AdviceCode.STOP_LEAKAGE.note()
+        case RigCode.PUMP_WORN:
+            return AdviceCode.CHECK_PUMP.note()
+        case RigCode.MAKEUP_BLOCKED | RigCode.PORT_DRAINS:
+            return AdviceCode.CHECK_MAKEUP.note(side=fault.data["side"])
+        case RigCode.RELIEF_LOW:
+            return AdviceCode.CHECK_RELIEF.note()
+        case RigCode.AIR_ENTERS:
+            return AdviceCode.FIND_AIR.note()
+        case _:
+            return None
 
 
 def _of_sensor(note: Note) -> bool:

@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from estimation.notes import RigCode
 from experiments.eha.plain_verdict import sureness, verdict, what_to_do
 from faults.conditions import CONDITIONS
 
@@ -19,6 +20,7 @@ def said_of(condition: str, share: float = 1.0, **more: Any) -> dict[str, Any]:
         "since_s": None,
         "advice": ["log again"],
         "reasons": [],
+        "notes": [],
         **more,
     }
 
@@ -52,3 +54,10 @@ def test_an_unknown_log_gets_no_verdict_no_work_and_its_reasons() -> None:
     assert verdict(result).startswith("No verdict")
     assert what_to_do(result) == ["Log again."]
     assert "motor speed reads 3 rad/s off" in sureness(result)
+
+
+def test_a_fault_that_is_none_of_the_nine_is_the_verdict_and_its_numbers_are_doubted() -> None:
+    note = RigCode.MAKEUP_BLOCKED.note(side="B").to_dict()
+    result = said_of("major_friction", unknown=True, reasons=[note["text"]], notes=[note])
+    assert verdict(result) == "A make-up valve is stuck shut."
+    assert "do not rely on the numbers below: the make-up valve of chamber B" in sureness(result)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.notes import EstimateCode, SensorCode
+from estimation.notes import EstimateCode, RigCode, SensorCode
 from faults.conditions import CONDITIONS
 from faults.diagnosis.advice import advice_for, speeds_held
 from faults.notes import AdviceCode, AgainstCode, ClassCode
@@ -142,3 +142,11 @@ def test_without_probabilities_nothing_is_said_to_be_decided() -> None:
     assert advice_for(staircase([100.0]), {}, (), (), ALL) == ()
     (mend,) = advice_for(staircase([100.0]), {}, (AgainstCode.NONE_FITS.note(percent=90.0),), (), ALL)
     assert mend.code == AdviceCode.FIT_DOUBTED
+
+
+def test_a_fault_outside_the_nine_is_worked_on_before_the_rig_file() -> None:
+    grows = RigCode.LEAKAGE_GROWS.note(factor=12.0, first=5e-12, last=6e-11)
+    blocked = RigCode.MAKEUP_BLOCKED.note(side="B")
+    outside = AgainstCode.OUTSIDE_CONDITIONS.note()
+    assert advice_for(staircase([100.0]), SURE, (grows, outside), (), ALL) == (AdviceCode.STOP_LEAKAGE.note(),)
+    assert advice_for(staircase([100.0]), SURE, (blocked,), (), ALL) == (AdviceCode.CHECK_MAKEUP.note(side="B"),)
