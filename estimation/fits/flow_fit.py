@@ -69,6 +69,10 @@ FELT_GAP = 0.1
 MOST_ASKED = 50_000
 """A longer log is not asked what is strange about it: the answer takes minutes [samples]."""
 
+STRUCTURE = 5e-4
+"""Relative standard deviation of bulk modulus from what the balance leaves out. Judged on 18 plain logs of the open
+benchmark's validation split, where z is 1.14 rms without it and 0.95 with it [fraction]."""
+
 UNLIKELY = 36.0
 """Difference of log-likelihood from which a form of the balance counts for nothing beside the other [dimensionless]."""
 
@@ -128,9 +132,15 @@ def fit_flow(
         one = strange.fit
         if _explains(one) and one.cost < best.cost - WORTH:
             bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
-            return FormFit(strange.values, bound, one.chi_square[0], (), one.rig_slopes, strange)
+            return FormFit(_believed(strange.values), bound, one.chi_square[0], (), one.rig_slopes, strange)
     value, std = found["bulk_modulus"]
-    return FormFit(found, std / value, best.chi_square[0], _objections(best), best.rig_slopes)
+    return FormFit(_believed(found), std / value, best.chi_square[0], _objections(best), best.rig_slopes)
+
+
+def _believed(found: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    """Return what was found, with what the balance itself may be wrong by."""
+    value, std = found["bulk_modulus"]
+    return {**found, "bulk_modulus": (value, float(np.hypot(std, STRUCTURE * value)))}
 
 
 def _balanced(
