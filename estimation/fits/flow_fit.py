@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from estimation.fits.descent import descend
 from estimation.fits.explain import WORTH, explain, promised
-from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed
+from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
 from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, roughly
 from estimation.fits.greybox_problem import GreyBoxLog, Problem, greybox_log
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, START_LOAD, Hypothesis
@@ -132,15 +132,11 @@ def fit_flow(
         one = strange.fit
         if _explains(one) and one.cost < best.cost - WORTH:
             bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
-            return FormFit(_believed(strange.values), bound, one.chi_square[0], (), one.rig_slopes, strange)
+            believed = with_structure(strange.values, STRUCTURE)
+            return FormFit(believed, bound, one.chi_square[0], (), one.rig_slopes, strange)
     value, std = found["bulk_modulus"]
-    return FormFit(_believed(found), std / value, best.chi_square[0], _objections(best), best.rig_slopes)
-
-
-def _believed(found: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-    """Return what was found, with what the balance itself may be wrong by."""
-    value, std = found["bulk_modulus"]
-    return {**found, "bulk_modulus": (value, float(np.hypot(std, STRUCTURE * value)))}
+    believed = with_structure(found, STRUCTURE)
+    return FormFit(believed, std / value, best.chi_square[0], _objections(best), best.rig_slopes)
 
 
 def _balanced(

@@ -51,6 +51,25 @@ class FormFit:
     explanation: "Explanation | None" = None
 
 
+def with_structure(found: Mapping[str, tuple[float, float]], structure: float) -> dict[str, tuple[float, float]]:
+    """Return what was found, its bulk modulus with what the form itself may be wrong by.
+
+    Parameters
+    ----------
+    found : Mapping[str, tuple of float]
+        Value and deviation by parameter [SI].
+    structure : float
+        Relative standard deviation of bulk modulus from what the form leaves out [fraction].
+
+    Returns
+    -------
+    dict[str, tuple of float]
+        The same, the deviation of bulk modulus wider [SI].
+    """
+    value, std = found["bulk_modulus"]
+    return {**found, "bulk_modulus": (value, float(np.hypot(std, structure * value)))}
+
+
 def weighed(fits: Sequence[GreyBoxFit]) -> Mapping[str, tuple[float, float]]:
     """Return values and deviations over several models of one log, each weighed by its likelihood.
 

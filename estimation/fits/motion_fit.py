@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from estimation.fits.descent import Point, descend, descend_together
 from estimation.fits.flow_fit import DRAIN_START, LEAD_START, LEAST_LEAKAGE
-from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed
+from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_problem import GreyBoxLog, OutputNoise, Problem, search_bounds
@@ -124,7 +124,7 @@ def fit_motion(
     best = min(fits, key=lambda fit: fit.cost)
     found = weighed(fits)
     value, std = found["bulk_modulus"]
-    believed = dict(found) | {"bulk_modulus": (value, float(np.hypot(std, STRUCTURE * value)))}
+    believed = with_structure(found, STRUCTURE)
     return FormFit(believed, std / value, best.chi_square[0], _objections(fits, best), best.rig_slopes)
 
 

@@ -60,8 +60,7 @@ def verdict(result: Mapping[str, Any]) -> str:
     'The actuator is healthy: leakage and friction are normal.'
     """
     if result["unknown"]:
-        named = [OUTSIDE[one["code"]] for one in result["notes"] if one["code"] in OUTSIDE]
-        return " ".join(named) or "No verdict: the log does not fit any known condition of this actuator."
+        return " ".join(_outside(result)) or "No verdict: the log does not fit any known condition of this actuator."
     condition = CONDITIONS[result["condition"]]
     faults = [LEAKS.get(condition.leakage), RUBS.get(condition.friction)]
     wrong = " and ".join(one for one in faults if one)
@@ -71,6 +70,11 @@ def verdict(result: Mapping[str, Any]) -> str:
         absent = [name for name, one in zip(("leakage", "friction"), faults, strict=True) if not one]
         said = f"{wrong}{''.join(f'; {name} is normal' for name in absent)}"
     return f"The actuator {said}."
+
+
+def _outside(result: Mapping[str, Any]) -> list[str]:
+    """Return the faults that are named though they are none of the nine conditions."""
+    return [OUTSIDE[one["code"]] for one in result["notes"] if one["code"] in OUTSIDE]
 
 
 def sureness(result: Mapping[str, Any]) -> str:
@@ -88,7 +92,7 @@ def sureness(result: Mapping[str, Any]) -> str:
     """
     if result["unknown"]:
         reasons = "; ".join(result["reasons"])
-        if any(one["code"] in OUTSIDE for one in result["notes"]):
+        if _outside(result):
             return f"This is none of the nine conditions, so do not rely on the numbers below: {reasons}."
         return f"Nothing on this page may be relied on: {reasons}."
     return " ".join(one for one in (_how_sure(result), _cost(result), _since(result)) if one)

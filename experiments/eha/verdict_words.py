@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from experiments.page.numbers import shop_unit
+
 SHOWN = {
     "leakage_flow": "leakage at rated pressure",
     "velocity_lost": "velocity lost",
@@ -106,7 +108,7 @@ def amount(one: Mapping[str, Any]) -> str:
     """
     if any(number is None or not math.isfinite(number) for number in (one["value"], *one["ci95"])):
         return "not determined"
-    scale, unit = (1e-6, "MPa") if one["unit"] == "Pa" else (1.0, one["unit"])
+    scale, unit = shop_unit(one["unit"])
     value, low, high = (scale * float(number) for number in (one["value"], *one["ci95"]))
     decimals = min(max(1 - math.floor(math.log10(high - low)), 0), 4) if high > low else 2
     said = f"{low:.{decimals}f} to {high:.{decimals}f}"

@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pandas as pd
 
+from estimation.finding import NORMAL_95
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.outlook import Outlook, outlook_of
 from experiments.fleet.page import SHOWN, found_in
 from experiments.fleet.rows import STATES
 from experiments.page.charts import Charts, Curve, Mark, Panel
-from experiments.page.numbers import MISSING, number
+from experiments.page.numbers import MISSING, number, shop_unit
 from experiments.page.render import render_page
 from experiments.page.tables import Column
 from faults.trend.kalman import moments, moved, settings
@@ -68,18 +69,14 @@ def actuator_page(row: ActuatorRow, log: str | None) -> str:
     return render_page("fleet/actuator.html", facts, {"forecasts": FORECASTS, "logs": LOGS}, {})
 
 
-def _scale(one: Outlook) -> tuple[float, str]:
-    return (1e-6, "MPa") if one.unit == "Pa" else (1.0, one.unit)
-
-
 def _changed(one: Outlook) -> str:
     return f"{SHOWN[one.name].capitalize()} begins anew with the log of {one.logs[one.trend.begin].named.date}."
 
 
 def _forecast(one: Outlook) -> dict[str, str]:
-    scale, unit = _scale(one)
+    scale, unit = shop_unit(one.unit)
     (level, std), (growth, growth_std) = one.trend.level, one.trend.growth
-    low, high = (number(scale * (level + sign * 1.96 * std), 3) for sign in (-1.0, 1.0))
+    low, high = (number(scale * (level + sign * NORMAL_95 * std), 3) for sign in (-1.0, 1.0))
     growth = growth if abs(growth) > ROUNDING * growth_std else 0.0
     crossing = one.trend.crossing
     ends = None if crossing is None else [float(end) for end in crossing.quantiles]
@@ -101,7 +98,7 @@ def _to(low: float, high: float) -> str:
 
 def _chart(one: Outlook, name: str) -> Charts:
     """Return the logs of a severity, its level with a 90 % band, and the same for `AHEAD` logs to come."""
-    scale, unit = _scale(one)
+    scale, unit = shop_unit(one.unit)
     count = len(one.logs)
     x = np.arange(1, count + AHEAD + 1, dtype=np.float64)
     measured = np.full(len(x), np.nan)

@@ -1,17 +1,16 @@
 """The page of a fleet: one row an actuator, the sick ones on top."""
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
-from markupsafe import Markup
 
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.rows import STATES, LogRow
-from experiments.page.numbers import number
+from experiments.page.numbers import number, shop_unit
 from experiments.page.render import render_page
+from experiments.page.scripting import data_block
 from experiments.page.tables import Cell, Column
 from experiments.page.words import in_words
 
@@ -59,14 +58,13 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     counts = Counter(row.state for row in rows)
     cells = [row_cells(row) for row in rows]
     data = {"columns": COLUMNS, "rows": cells, "links": [links.get(row.name) for row in rows]}
-    text = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
     facts = {
         "source": source,
         "title": _title(counts, len(rows)),
         "sickest": [row.name for row in rows if row.state in SICK][:5],
         "counts": [(words, counts[name], name) for name, words in STATES.items() if counts[name]],
         "logs": sum(len(row.logs) for row in rows),
-        "data": Markup(text),  # noqa: S704 - JSON in which no tag can begin
+        "data": data_block(data),
         "most": MOST_STILL,
         "still": pd.DataFrame(cells[:MOST_STILL], columns=[column["label"] for column in COLUMNS]),
     }
@@ -112,5 +110,5 @@ def worst_in(log: LogRow) -> str:
     one = log.worst
     if one is None:
         return ""
-    scale, unit = (1e-6, "MPa") if one.unit == "Pa" else (1.0, one.unit)
+    scale, unit = shop_unit(one.unit)
     return f"{SHOWN.get(one.name, one.name.replace('_', ' '))} {number(scale * one.value, 3)} {unit}"

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
+from estimation.finding import NORMAL_95
 from experiments.fleet.naming import UNNAMED, Named
 
 STATES: Mapping[str, str] = {
@@ -49,8 +50,8 @@ class Amount:
 
     @property
     def std(self) -> float:
-        """Standard deviation, half the interval's width over 1.96 [unit]."""
-        return 0.5 * (self.high - self.low) / 1.96
+        """Standard deviation, from a normal interval [unit]."""
+        return 0.5 * (self.high - self.low) / NORMAL_95
 
     @property
     def state(self) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 
 import pandas as pd
 
+from estimation.finding import NORMAL_95
 from estimation.identification.design.input_design import Limits
 from experiments.library.figures import LIBRARY_FIGURES
 from experiments.library.library import build_library, library_models, library_text
@@ -66,7 +67,7 @@ def _root(root: Row) -> str:
 
 
 def _gain(row: Row) -> Cell:
-    return right(f"{fixed(1e3 * row['dc_gain'], 4)} ± {fixed(1.96e3 * row['dc_gain_std'], 4)}")
+    return right(f"{fixed(1e3 * row['dc_gain'], 4)} ± {fixed(1e3 * NORMAL_95 * row['dc_gain_std'], 4)}")
 
 
 def _printed_gain(row: Row) -> Cell:

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from experiments.page.charts import Charts, Curve, Panel
-from plant.log.columns import UNITS
+from plant.log.columns import UNITS, unit_ending
 
 if TYPE_CHECKING:
     from estimation.finding import Finding
@@ -45,7 +45,4 @@ def _plain(name: str) -> str:
     >>> _plain("differential_pressure_pa"), _plain("velocity_m_s")
     ('differential pressure', 'velocity')
     """
-    for ending in ("_rad_s", "_m_s", "_pa", "_m", "_v", "_a", "_n", "_k"):
-        if name.endswith(ending):
-            return name.removesuffix(ending).replace("_", " ")
-    return name.replace("_", " ")
+    return name.removesuffix(unit_ending(UNITS[name])).replace("_", " ")

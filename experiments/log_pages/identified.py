@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from estimation.arrays import Array
+from estimation.finding import NORMAL_95
 from estimation.identification.fit.residual_tests import DEFAULT_LAGS, correlations
 from estimation.identification.fit.validate import Validation
 from estimation.identification.model.linear_model import LinearModel
@@ -60,7 +61,7 @@ def _over_time(axis: Axes, model: LinearModel, curves: dict[str, tuple[str, Arra
 
 def _correlations(axis: Axes, residual: Array, other: Array, lags: np.ndarray) -> None:
     axis.bar(lags, correlations(residual, other, lags), width=0.7, color=BLUE)
-    reach = 1.96 / np.sqrt(np.count_nonzero(np.isfinite(residual)))
+    reach = NORMAL_95 / np.sqrt(np.count_nonzero(np.isfinite(residual)))
     axis.axhspan(-reach, reach, color=GREY, alpha=0.25, lw=0)
     axis.set(xlabel="lag [samples]; grey, 95 % of white residuals", ylabel="correlation [ratio]")
 

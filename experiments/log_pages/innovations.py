@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from estimation.eha.bulk_modulus import BulkModulusEstimate
 from estimation.filters.run import Estimate
+from estimation.finding import NORMAL_95
 from estimation.models.eha_forms import BULK_MODULUS
 from estimation.trust.consistency import mean_chi_square_bounds
 from experiments.page.figure_files import write_png
@@ -58,7 +59,7 @@ def draw_innovations(found: BulkModulusEstimate, log: str) -> Figure:
 def _track(axis: Axes, found: BulkModulusEstimate, estimate: Estimate) -> None:
     mean, std = estimate.track(BULK_MODULUS)
     std = std * found.gate.inflation
-    low, high = (mean - 1.96 * std) / 1e6, (mean + 1.96 * std) / 1e6
+    low, high = (mean - NORMAL_95 * std) / 1e6, (mean + NORMAL_95 * std) / 1e6
     axis.fill_between(estimate.time, low, high, color=BLUE, alpha=0.25, lw=0, label="95 % band")
     axis.plot(estimate.time, mean / 1e6, color=BLUE, label="estimate")
     late = mean[len(mean) // 10 :]
@@ -74,7 +75,7 @@ def _innovations(axis: Axes, time: np.ndarray, normalised: np.ndarray, estimate:
     for i, channel in enumerate(estimate.channels):
         look: Any = {"ms": 1.5, "color": COLOURS[i % 3], "label": NAMES.get(channel, channel)}
         axis.plot(time[::every], normalised[::every, i], ".", **look)
-    axis.axhspan(-1.96, 1.96, color=GREY, alpha=0.15, lw=0)
+    axis.axhspan(-NORMAL_95, NORMAL_95, color=GREY, alpha=0.15, lw=0)
     axis.set(ylim=(-6.0, 6.0), ylabel="innovation over its\nexpected deviation")
     axis.legend(loc="upper right", ncols=3, markerscale=5)
 

@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 from markupsafe import Markup
 
+from estimation.finding import NORMAL_95
 from experiments.nine_conditions.bulk_modulus import Experiment
 from experiments.nine_conditions.findings import (
     bank_in_words,
@@ -88,7 +89,7 @@ def _estimate(rows: pd.DataFrame, key: Experiment) -> Cell:
 def _models(frame: pd.DataFrame) -> Rows:
     """Return two rows a condition: ours, and as Table 6 prints it."""
     for row in frame.to_dict("records"):
-        gain, std = 1e3 * row["dc_gain"], 1.96e3 * row["dc_gain_std"]
+        gain, std = 1e3 * row["dc_gain"], 1e3 * NORMAL_95 * row["dc_gain_std"]
         low, high = 1e3 * row["published_dc_gain_low"], 1e3 * row["published_dc_gain_high"]
         ours: dict[str, object] = {"condition": in_words(str(row["condition"])), "source": "ours"}
         ours |= {name: number(row[name]) for name in COEFFICIENTS}

@@ -1,6 +1,5 @@
 """Charts that a reader zooms: panels over one x axis, their numbers inside the page, and a still picture of them."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +12,7 @@ from matplotlib.figure import Figure
 from experiments.page.figure_files import image_of
 from experiments.page.numbers import number
 from experiments.page.packed import ends_of_stretches, packed, stretch_length
+from experiments.page.scripting import data_block
 from experiments.page.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILION, Margins, panels, styled
 from plant.arrays import Array
 
@@ -147,8 +147,7 @@ class Charts:
                 for panel in self.panels
             ],
         }
-        text = json.dumps(found, allow_nan=False).replace("<", "\\u003c")
-        return Markup(text)  # noqa: S704 - JSON in which no tag can begin
+        return data_block(found)
 
     def _table(self) -> Markup:
         rows = [

@@ -89,6 +89,22 @@ def exact(value: float) -> str:
     return (shown.rstrip("0").rstrip(".") if "." in shown else shown) + times + power
 
 
+def shop_unit(unit: str) -> tuple[float, str]:
+    """Return the unit in which a severity is shown to a shop, and how.
+
+    Returns
+    -------
+    tuple of float and str
+        Factor from SI, and the unit.
+
+    Examples
+    --------
+    >>> shop_unit("Pa"), shop_unit("L/min")
+    ((1e-06, 'MPa'), (1.0, 'L/min'))
+    """
+    return (1e-6, "MPa") if unit == "Pa" else (1.0, unit)
+
+
 def pretty_unit(unit: str) -> str:
     """Return a unit with raised exponents.
 

@@ -1,10 +1,14 @@
 """Scripts of a page, put inside it, and a policy that lets nothing else run and nothing be loaded."""
 
+import json
 import re
 from base64 import b64encode
 from collections.abc import Iterable
 from hashlib import sha256
 from importlib.resources import files
+from typing import Any
+
+from markupsafe import Markup
 
 _PLACES = files("experiments.page").joinpath("scripts")
 
@@ -45,6 +49,28 @@ def with_scripts(page: str) -> str:
         "base-uri 'none'; form-action 'none'"
     )
     return page.replace(POLICY_HERE, f'<meta http-equiv="Content-Security-Policy" content="{policy}">', 1)
+
+
+def data_block(data: Any) -> Markup:
+    r"""Return data as JSON that may stand inside a script element: no tag can begin in it.
+
+    Parameters
+    ----------
+    data : object
+        Of what JSON knows; infinities are refused.
+
+    Returns
+    -------
+    Markup
+        That a template does not escape.
+
+    Examples
+    --------
+    >>> data_block({"name": "</script>"})
+    Markup('{"name": "\\u003c/script>"}')
+    """
+    text = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
+    return Markup(text)  # noqa: S704 - no tag can begin in it
 
 
 def _text(file: str) -> str:

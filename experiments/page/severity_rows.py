@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from estimation.finding import Quantity
+from experiments.page.numbers import shop_unit
 
-MEGAPASCAL = 1e-6
 """Shown are MPa, not Pa [MPa/Pa]."""
 
 ROOM = 1.05
@@ -94,7 +94,7 @@ def severity_row(name: str, words: str, one: Quantity, sound: float, limit: floa
     """
     if one.value is None or one.ci95 is None or not all(map(math.isfinite, (one.value, *one.ci95))):
         return None
-    scale, unit = (MEGAPASCAL, "MPa") if one.unit == "Pa" else (1.0, one.unit)
+    scale, unit = shop_unit(one.unit)
     value, low, high, healthy = (scale * float(each) for each in (one.value, *one.ci95, sound))
     most = None if limit is None else scale * limit
     shown = [0.0, value, low, high, healthy, *([] if most is None else [most])]

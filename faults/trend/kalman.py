@@ -10,7 +10,7 @@ limit 1; the unit of time is the usual time between two logs, a count of logs.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import product
 
 import numpy as np
@@ -68,6 +68,7 @@ class Settings:
         return -np.log(2.0 * counts)
 
 
+@cache
 def settings() -> Settings:
     """Return the grid: every combination with a slope, and those without one."""
     growth = [(slope, *curvature, bend) for slope, curvature, bend in product(SLOPES, CURVATURES, BENDS)]

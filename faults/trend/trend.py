@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -22,8 +22,6 @@ SURE = 0.95
 
 FEWEST = 4
 """Logs of a stretch before which nothing is forecast [count]."""
-
-_grid = lru_cache(maxsize=1)(settings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,36 +93,36 @@ class Trend:
     @property
     def level(self) -> tuple[float, float]:
         """The severity without the scatter from log to log, and its standard deviation [the severity's unit]."""
-        mean, std = moments(self.belief, _grid())
+        mean, std = moments(self.belief, settings())
         return self.series.healthy + self.series.size * mean, abs(self.series.size) * std
 
     @property
     def growth(self) -> tuple[float, float]:
         """Growth a step and its standard deviation [the severity's unit/log]."""
-        mean, std = moments(self.belief, _grid(), 1)
+        mean, std = moments(self.belief, settings(), 1)
         return self.series.size * mean, abs(self.series.size) * std
 
     @cached_property
     def growing(self) -> float:
         """Logarithm of how much more probable the logs are with growth than without [dimensionless]."""
-        return growth_evidence(self.belief, _grid())
+        return growth_evidence(self.belief, settings())
 
     @cached_property
     def crossing(self) -> Crossing | None:
         """When the limit is reached; None before `FEWEST` logs of the stretch."""
         if self.place - self.begin + 1 < FEWEST:
             return None
-        return crossing(self.belief, _grid(), np.random.default_rng(self.place))
+        return crossing(self.belief, settings(), np.random.default_rng(self.place))
 
     @property
     def certain(self) -> bool:
         """Whether it grows, with a probability of `FALSE_ALARMS` at most of ever saying so wrongly."""
-        return self.growing >= -float(np.log(FALSE_ALARMS)) and moments(self.belief, _grid(), 1)[0] > 0.0
+        return self.growing >= -float(np.log(FALSE_ALARMS)) and moments(self.belief, settings(), 1)[0] > 0.0
 
     @property
     def alarm(self) -> bool:
         """Whether it grows for certain and probably reaches its limit within `AHEAD`, or is past it with `SURE`."""
-        mean, std = moments(self.belief, _grid())
+        mean, std = moments(self.belief, settings())
         if self.crossing is None or (not self.certain and mean + 3.0 * std < 1.0):
             return False
         return self.crossing.within(0.0) >= SURE or (self.certain and self.crossing.within(AHEAD) >= 0.5)
@@ -140,7 +138,7 @@ def trends(series: Series) -> Iterator[Trend]:
     """
     scaled = (series.values - series.healthy) / series.size
     known = first_logs_after(series.times, series.maintained)
-    parts = stretches(series.times / series.step, scaled, series.stds / abs(series.size), known, _grid())
+    parts = stretches(series.times / series.step, scaled, series.stds / abs(series.size), known, settings())
     for place, (begin, belief) in enumerate(parts):
         yield Trend(series, place, begin, belief)
 

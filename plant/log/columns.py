@@ -62,11 +62,22 @@ def know_channels(units: Mapping[str, str]) -> None:
         If a channel is known in another unit, or its name does not end in it.
     """
     for name, unit in units.items():
-        ending = "_" + unit.replace("/", "_").replace("^", "").lower()
+        ending = unit_ending(unit)
         if UNITS.get(name, unit) != unit or not name.endswith(ending):
             raise HydrostateError(f"channel {name!r} in {unit!r} must end in {ending!r} and be known in no other unit")
         _units[name] = unit
         _stems[name.removesuffix(ending) + "_"] = name
+
+
+def unit_ending(unit: str) -> str:
+    """Return how the name of a channel in a unit ends.
+
+    Returns
+    -------
+    str
+        ``"_m_s"`` of ``"m/s"``.
+    """
+    return "_" + unit.replace("/", "_").replace("^", "").lower()
 
 
 know_channels({TIME: "s", **CHANNELS})

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from plant.errors import NoChannelError
-from plant.log.columns import CHANNELS, TIME, UNITS, listed
+from plant.log.columns import CHANNELS, TIME, UNITS, listed, unit_ending
 from plant.log.headings import Heading
 from plant.units import converts
 
@@ -123,7 +123,7 @@ def points_by_name(heading: Heading, channel: str) -> float | None:
     if unit is not None and not fits:
         return None
     name = heading.stem
-    own = channel.removesuffix("_" + UNITS[channel].replace("/", "_").replace("^", "").lower())
+    own = channel.removesuffix(unit_ending(UNITS[channel]))
     if name == own or heading.name == channel:
         said = 6.0
     elif channel in NAMES:
