@@ -129,7 +129,7 @@ def uncommitted() -> bool:
 
 def environment() -> dict[str, str]:
     """Return what numbers hang on beside the code: processor and versions."""
-    versions = {name: version(name) for name in ("numpy", "scipy", "numba", "llvmlite", "pandas")}
+    versions = {name: version(name) for name in ("numpy", "scipy", "llvmlite", "pandas")}
     return {"processor": get_host_cpu_name(), "python": platform.python_version(), **versions}
 
 

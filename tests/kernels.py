@@ -9,10 +9,14 @@ from fractions import Fraction
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from plant.compiled import vector
 from plant.compiled.expression import Expression
+from plant.compiled.native.load import load_native
+from plant.compiled.native.signature import signature_of
+from plant.compiled.paste import kernel_text, pasted
 from plant.compiled.source import lines_source
 
 
@@ -34,7 +38,7 @@ def text_of(monkeypatch: pytest.MonkeyPatch, module: ModuleType, compile_it: Cal
 def functions_of(text: str) -> SimpleNamespace:
     """A kernel's constants and functions, as Python."""
     tree = ast.parse(text)
-    kept = [node for node in tree.body if not _is_made(node) and not _is_numba(node)]
+    kept = [node for node in tree.body if not _is_made(node)]
     for node in kept:
         if isinstance(node, ast.FunctionDef):
             node.decorator_list = []
@@ -66,14 +70,26 @@ def fma(a: float, b: float, c: float) -> float:
     return float(exact) if exact else a * b + c
 
 
+def where(condition: bool, a: float, b: float) -> float:
+    """Chosen after both are computed."""
+    return a if condition else b
+
+
+OPERATIONS: Mapping[str, Callable[..., Any]] = {
+    **{name: getattr(math, name) for name in ("sqrt", "exp", "log", "tanh")},
+    "fma": fma,
+    "where": where,
+    "sign": lambda x: where(x > 0.0, 1.0, where(x < 0.0, -1.0, 0.0)),
+    "present": lambda x: x == x,
+    "ratios": lambda a, b: [x / y for x, y in zip(a, b, strict=True)],
+    "roots": lambda values: [math.sqrt(x) for x in values],
+}
+"""What lines call (`plant.compiled.source.CALLED`), on floats."""
+
+
 def in_python(lines: FunctionType) -> Callable[..., Any]:
     """Lines of a kernel, on floats."""
-    by_hand = {
-        "fma": fma,
-        "present": lambda x: x == x,
-        "ratios": lambda a, b: [x / y for x, y in zip(a, b, strict=True)],
-    }
-    return FunctionType(lines.__code__, {**vars(vector), **by_hand})
+    return FunctionType(lines.__code__, dict(OPERATIONS))
 
 
 def computed(outputs: Mapping[str, Expression], **inputs: float) -> dict[str, float]:
@@ -82,6 +98,32 @@ def computed(outputs: Mapping[str, Expression], **inputs: float) -> dict[str, fl
     exec(lines_source("lines", outputs), names)  # noqa: S102  our own text
     lines = names["lines"]
     return in_python(lines)(*(inputs[name] for name in inspect.signature(lines).parameters))
+
+
+def every_lane(work: NDArray[np.float64], *, step: Callable[[int, float], None], WIDTH: int) -> None:
+    """Step on slots of 8 numbers in memory.
+
+    Parameters
+    ----------
+    work : ndarray, shape (numbers,)
+        The slots.
+    """
+    for lane in range(0, 8, WIDTH):
+        step(work.ctypes.data + 8 * lane, 0.0)
+
+
+def stepped(
+    text: str, name: str, given: Mapping[str, NDArray[np.float64]], results: str, width: int
+) -> dict[str, NDArray[np.float64]]:
+    """What lines of a name give of 8 numbers each, so many at a time; only what they give is returned."""
+    slots = {one: 8 * i for i, one in enumerate((*given, *results))}
+    step = f"SLOTS = {slots}\n\nstep = stepping(SLOTS, {width}, {name})"
+    whole = kernel_text(f"{name}, {width} at a time", text, step, pasted(every_lane, constants={"WIDTH": width}))
+    kernel = load_native(f"stepped_{name}", whole, {"every_lane": signature_of(every_lane)})
+    work = np.concatenate([*given.values(), np.full(8 * len(results), np.nan)])
+    kernel.every_lane(work)
+    found = {one: work[slots[one] : slots[one] + 8] for one in results}
+    return {one: values for one, values in found.items() if not np.all(np.isnan(values))}
 
 
 def on_memory(file: SimpleNamespace, *lines: FunctionType) -> Callable[[int, float], None]:
@@ -102,7 +144,3 @@ def on_memory(file: SimpleNamespace, *lines: FunctionType) -> Callable[[int, flo
                 at(name).value = value
 
     return operation
-
-
-def _is_numba(node: ast.stmt) -> bool:
-    return isinstance(node, ast.Import) and node.names[0].name == "numba"

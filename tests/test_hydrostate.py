@@ -17,7 +17,7 @@ import hydrostate as hs
 from estimation.identification.model.recursion import filtered
 
 ROOT = Path(__file__).resolve().parents[1]
-HEAVY = ("numba", "numpy", "scipy", "pandas", "matplotlib", "typer")
+HEAVY = ("numpy", "scipy", "pandas", "matplotlib", "typer")
 
 
 @pytest.fixture(scope="module")

@@ -6,21 +6,18 @@ the drive's corners or takes no step longer than ten samples, lest it miss one.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cached_property
 from importlib import import_module
 from itertools import pairwise
-from types import ModuleType
-from typing import Any, Literal, Protocol, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.compiled.expression import as_expression, jacobian, symbol
-from plant.compiled.kernel_file import load_kernel
-from plant.compiled.paste import kernel_text, pasted
-from plant.compiled.source import INTRINSICS, lines_source
+from benchmarks.peers.compiled_model import compiled_model
+from plant.compiled.native.load import NativeKernel
 from plant.errors import HydrostateError
-from plant.solvers.steps import Derivative, Parameters, parameter_names, parameter_row, parameter_symbols
+from plant.solvers.steps import Derivative, Parameters, parameter_row
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -30,132 +27,12 @@ Method: TypeAlias = Literal["LSODA", "Radau", "BDF", "odeint", "CVODE"]
 CORNER = 1e-2
 """Bend of the drive, relative to its largest value, at which a solver may be told to stop."""
 
-Held: TypeAlias = tuple[Array, NDArray[np.int64], float, Array]
-"""What a solver hands to the rates: drive at the samples, first and last sample of a piece, sample time, parameters."""
-
-
-class ModelKernel(Protocol):
-    """What the kernel of a model has: its rates and slopes from ``(*state, drive)`` and the parameters in memory."""
-
-    WIDTH: int
-    load: Callable[[int], Any]
-    store: Callable[[Any, int], None]
-    rates_of: Callable[[Any, int], Any]
-    slopes_of: Callable[[Any, int], Any]
-
-
-def rates(kernel: ModelKernel, state: Array, u: float, parameters: Array) -> Array:
-    """Return the rates of a state."""
-    result = np.empty(kernel.WIDTH)
-    numbers = (*kernel.load(state.ctypes.data), u)
-    kernel.store(kernel.rates_of(numbers, parameters.ctypes.data), result.ctypes.data)
-    return result
-
-
-def slopes(kernel: ModelKernel, state: Array, u: float, parameters: Array) -> Array:
-    """Return the Jacobian of the rates by the state."""
-    matrix = np.empty((kernel.WIDTH, kernel.WIDTH))
-    numbers = (*kernel.load(state.ctypes.data), u)
-    kernel.store(kernel.slopes_of(numbers, parameters.ctypes.data), matrix.ctypes.data)
-    return matrix
-
-
-def drive_at(t: float, speed: Array, piece: NDArray[np.int64], sample_time: float) -> float:
-    """Return the drive at a time, the piece's line going on beyond its ends."""
-    place = t / sample_time
-    k = min(max(int(place), piece[0]), piece[1] - 1)
-    return speed[k] + (place - k) * (speed[k + 1] - speed[k])
-
-
-def rates_at(
-    kernel: ModelKernel,
-    t: float,
-    state: Array,
-    speed: Array,
-    piece: NDArray[np.int64],
-    sample_time: float,
-    parameters: Array,
-) -> Array:
-    """Return the rates at a time."""
-    return rates(kernel, state, drive_at(t, speed, piece, sample_time), parameters)
-
-
-def slopes_at(
-    kernel: ModelKernel,
-    t: float,
-    state: Array,
-    speed: Array,
-    piece: NDArray[np.int64],
-    sample_time: float,
-    parameters: Array,
-) -> Array:
-    """Return the Jacobian at a time."""
-    return slopes(kernel, state, drive_at(t, speed, piece, sample_time), parameters)
-
-
-def fill_rates(kernel: ModelKernel, t: float, state: Array, result: Array, held: Held) -> None:
-    """Fill in the rates, as CVODE asks for them."""
-    result[:] = rates_at(kernel, t, state, held[0], held[1], held[2], held[3])
-
-
-def fill_slopes(kernel: ModelKernel, t: float, state: Array, known: Array, result: Array, held: Held) -> None:  # noqa: ARG001  CVODE passes them
-    """Fill in the Jacobian, as CVODE asks for it; the rates are known."""
-    result[:] = slopes_at(kernel, t, state, held[0], held[1], held[2], held[3])
-
-
-FUNCTIONS = (rates, slopes, drive_at, rates_at, slopes_at, fill_rates, fill_slopes)
-
-
-def compile_model(
-    derivative: Derivative, width: int, parameter_class: type[Parameters]
-) -> tuple[Callable[[Array, float, Array], Array], Callable[[Array, float, Array], Array]]:
-    """Generate a derivative and its analytic Jacobian by the state.
-
-    Parameters
-    ----------
-    derivative : callable
-        ``derivative(state, speed, parameters)``.
-    width : int
-        Count of states.
-    parameter_class : type
-        What a parameter row holds, field by field.
-
-    Returns
-    -------
-    tuple of callable
-        ``rates(state (states,), speed [rad/s], parameter row)``, shape (states,), and ``slopes`` of the same, shape
-        (states, states).
-    """
-    module = _compiled(derivative, width, parameter_class)
-    return module.rates, module.slopes
-
-
-@cache
-def _compiled(derivative: Derivative, width: int, parameter_class: type[Parameters]) -> ModuleType:
-    names = [f"x{i}" for i in range(width)]
-    state = tuple(map(symbol, names))
-    found = [as_expression(rate) for rate in derivative(state, symbol("u"), parameter_symbols(parameter_class))]
-    by_state = jacobian(found, state)
-    slots = {name: i for i, name in enumerate(parameter_names(parameter_class))}
-    given = [*names, "u"]
-    parts = (
-        INTRINSICS,
-        lines_source("rate_lines", {f"r{i}": rate for i, rate in enumerate(found)}),
-        lines_source("slope_lines", {f"j{i}_{j}": by_state[i][j] for i in range(width) for j in range(width)}),
-        f"load = loading({width})",
-        f"rates_of = advancing({given}, {slots}, rate_lines, {width})",
-        f"slopes_of = advancing({given}, {slots}, slope_lines, {width**2})",
-        pasted(*FUNCTIONS, constants={"WIDTH": width}),
-    )
-    title = f"rates of {derivative.__name__} and their Jacobian"
-    return load_kernel(f"model_{derivative.__name__}", kernel_text(title, *parts))
-
 
 @dataclass(frozen=True)
 class _Problem:
     """A run for a stiff solver; while it works on one piece of the drive it sees that piece's line go on forever."""
 
-    model: ModuleType
+    kernel: NativeKernel
     initial: Array
     speed: Array
     row: Array
@@ -166,9 +43,29 @@ class _Problem:
     corners: tuple[int, ...]
     piece: NDArray[np.int64]
 
-    @property
-    def held(self) -> tuple[Array, NDArray[np.int64], float, Array]:
-        return self.speed, self.piece, self.sample_time, self.row
+    @cached_property
+    def rates(self) -> "OfTime":
+        return self._of_time(self.kernel.rates_at, len(self.initial))
+
+    @cached_property
+    def slopes(self) -> "OfTime":
+        return self._of_time(self.kernel.slopes_at, len(self.initial), len(self.initial))
+
+    def _of_time(self, entry: Any, *shape: int) -> "OfTime":
+        """Return rates or slopes as a function of time and state, at the cost of a call and two small copies."""
+        at, state, result = np.empty(1), np.empty(len(self.initial)), np.empty(shape)
+        call = entry.again(at, state, self.speed, self.piece, self.sample_time, self.row, result)
+
+        def of_time(t: float, x: Array) -> Array:
+            at[0] = t
+            state[:] = x
+            call()
+            return result.copy()
+
+        return of_time
+
+
+OfTime: TypeAlias = Callable[[float, Array], Array]
 
 
 def reference_trajectory(
@@ -220,7 +117,7 @@ def reference_trajectory(
     """
     bends = np.abs(np.diff(speed, 2)) > CORNER * np.max(np.abs(speed))
     problem = _Problem(
-        _compiled(derivative, len(initial), type(parameters)),
+        compiled_model(derivative, len(initial), type(parameters)),
         initial,
         np.ascontiguousarray(speed, dtype=np.float64),
         parameter_row(parameters),
@@ -253,16 +150,14 @@ def _by_pieces(problem: _Problem, solve: Pieces) -> Array:
 def _ivp_pieces(problem: _Problem, method: Literal["LSODA", "Radau", "BDF"]) -> Pieces:
     from scipy.integrate import solve_ivp
 
-    rates, slopes, held = problem.model.rates_at, problem.model.slopes_at, problem.held
-
     def solve(times: Array, state: Array) -> Array:
         solution = solve_ivp(
-            lambda t, x: rates(t, x, *held),
+            problem.rates,
             (float(times[0]), float(times[-1])),
             state,
             method=method,
             t_eval=times,
-            jac=lambda t, x: slopes(t, x, *held),
+            jac=problem.slopes,
             rtol=problem.relative,
             atol=problem.absolute,
             max_step=problem.longest,
@@ -280,11 +175,10 @@ def _by_odeint(problem: _Problem) -> Array:
     odeint: Any = integrate.odeint  # the stubs take no array of tolerances
     times = problem.sample_time * np.arange(len(problem.speed))
     states, notes = odeint(
-        problem.model.rates_at,
+        problem.rates,
         problem.initial,
         times,
-        args=problem.held,
-        Dfun=problem.model.slopes_at,
+        Dfun=problem.slopes,
         rtol=problem.relative,
         atol=problem.absolute,
         tcrit=times[list(problem.corners)],
@@ -303,10 +197,16 @@ def _cvode_pieces(problem: _Problem) -> Pieces:
         cvode = import_module("sksundae.cvode")
     except ModuleNotFoundError as error:
         raise HydrostateError("CVODE needs the package scikit-sundae, which is not installed") from error
+
+    def fill_rates(t: float, state: Array, result: Array) -> None:
+        result[:] = problem.rates(t, state)
+
+    def fill_slopes(t: float, state: Array, known: Array, result: Array) -> None:  # noqa: ARG001  CVODE passes them
+        result[:] = problem.slopes(t, state)
+
     solver = cvode.CVODE(
-        problem.model.fill_rates,
-        jacfn=problem.model.fill_slopes,
-        userdata=problem.held,
+        fill_rates,
+        jacfn=fill_slopes,
         rtol=problem.relative,
         atol=problem.absolute,
         max_num_steps=_MOST_STEPS,

@@ -17,7 +17,7 @@ from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.machine import native_width
 from plant.compiled.native.operations import ROWS
 from plant.compiled.native.signature import signature
-from plant.compiled.paste import BORROWING, INLINED, kernel_text, pasted
+from plant.compiled.paste import kernel_text, pasted
 from plant.compiled.source import lines_source, operations_source
 
 LANES = 32
@@ -61,9 +61,9 @@ def kernel_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...], la
     parts = (
         operations_source(lines, slots, width),
         f"both_at = stepping(SLOTS, {width}, predict, update)\nmove = moving({width})",
-        pasted(take, keep, flush, constants={**sizes, **settings}, options=BORROWING),
+        pasted(take, keep, flush, constants={**sizes, **settings}, inlined=True),
         pasted(steps),
-        *([pasted(lay_side_by_side, options=INLINED), pasted(run)] if lanes > 1 else []),
+        *([pasted(lay_side_by_side, inlined=True), pasted(run)] if lanes > 1 else []),
     )
     return kernel_text(f"{rule.name} on the {model.name} form, {lanes} side by side", *parts)
 

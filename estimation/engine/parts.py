@@ -14,7 +14,7 @@ from estimation.engine.layout import halves_of, layout
 from estimation.engine.rule import Rule
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import Expression
-from plant.compiled.paste import BORROWING
+from plant.compiled.paste import INLINED
 from plant.compiled.source import lines_source, symbols_in
 
 Prepare: TypeAlias = Callable[[Array, Array], None]
@@ -57,12 +57,12 @@ def function_source(
     _twice = function_of(twice_lines, 1)
     <BLANKLINE>
     <BLANKLINE>
-    @numba.njit(forceinline=True, error_model="numpy", _nrt=False)
+    @inlined
     def twice(x):
         (x[1],) = _twice((x[0],))
     """
     wanted = {key: value for key, value in outputs.items() if writes is None or key in writes}
-    begin = f"@numba.njit({BORROWING})\ndef {name}({arguments}):\n"
+    begin = f"{INLINED}def {name}({arguments}):\n"
     if not wanted:
         return begin + "    return (0.0,)"
     places = [reads.get(symbol, symbol) for symbol in sorted(symbols_in(list(wanted.values())))]

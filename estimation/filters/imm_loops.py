@@ -13,9 +13,9 @@ from estimation.engine.contract import Trace
 from estimation.engine.parts import rule_functions
 from estimation.engine.rule import Rule
 from estimation.models.model import ProcessModel
-from plant.compiled.kernel_file import load_kernel
-from plant.compiled.paste import COMPILED, kernel_text, pasted
-from plant.compiled.source import INTRINSICS
+from plant.compiled.native.load import load_native
+from plant.compiled.native.signature import signature_of
+from plant.compiled.paste import kernel_text, pasted
 
 Kind = tuple[Rule, ProcessModel]
 """What modes share: a filter on a model; they differ in parameters."""
@@ -222,7 +222,27 @@ def run(
     predict: PredictMode,
     update: UpdateMode,
 ) -> float:
-    """Mix, step every mode, weigh and combine, at every sample; return the log-likelihood."""
+    """Mix, step every mode, weigh and combine, at every sample; return the log-likelihood.
+
+    Parameters
+    ----------
+    states : ndarray, shape (modes, carried)
+        What each mode carries.
+    rows : ndarray, shape (modes, constants)
+        Constants of each mode's filter.
+    kinds : ndarray of int, shape (modes,)
+        Which filter and model each mode is.
+    transitions : ndarray, shape (modes, modes)
+        Logarithms of the transitions.
+    log_probability : ndarray, shape (modes,)
+        Of the modes, before and after.
+    drives, measured : ndarray, shapes (samples, drives) and (samples, channels)
+        The log [SI].
+    substeps, every : int
+        Steps a sample, and samples a row of the track.
+    history : ndarray, shape (rows, modes)
+        Logarithms of the probabilities along the track.
+    """
     (n, channels), modes = measured.shape, states.shape[0]
     constants, seen = np.empty((modes, CONSTANTS)), np.empty((modes, 2, channels))
     terms, weights, shares, shift = np.empty(modes), np.empty(modes), np.empty(modes), np.empty(BELIEF)
@@ -289,7 +309,7 @@ class ImmKernel:
 def _dispatch(name: str, arguments: str, kinds: int) -> str:
     """Write the choice among the functions of the modes' kinds."""
     choices = [(f"    if kind == {kind}:", f"        {name}_{kind}({arguments})") for kind in range(kinds)]
-    head = f"@numba.njit({COMPILED}, _nrt=False)\ndef {name}(kind, {arguments}):"
+    head = f"def {name}(kind, {arguments}):"
     return "\n".join([head, *(line for choice in choices for line in choice)])
 
 
@@ -307,7 +327,6 @@ def compile_imm(kinds: tuple[Kind, ...], channels: tuple[str, ...]) -> ImmKernel
     sizes = {"WIDTH": width, "BELIEF": width + width * (width + 1) // 2}
     sizes["CONSTANTS"] = max(rule.constants for rule in rules)
     parts = (
-        INTRINSICS,
         *(rule.source for rule in rules),
         _dispatch("prepare", "rows, constants", len(kinds)),
         _dispatch("predict", "state, constants, before, after, j", len(kinds)),
@@ -315,5 +334,6 @@ def compile_imm(kinds: tuple[Kind, ...], channels: tuple[str, ...]) -> ImmKernel
         pasted(*STEP, unpack, run, constants=sizes),
     )
     names = "_".join(f"{rule.name}_{model.name}" for rule, model in kinds)
-    kernel = load_kernel(f"imm_{names}", kernel_text(f"interacting models, {names}", *parts))
+    text = kernel_text(f"interacting models, {names}", *parts)
+    kernel = load_native(f"imm_{names}", text, {"run": signature_of(run)})
     return ImmKernel(kernel.run, max(len(rule.carried) for rule in rules))

@@ -13,7 +13,6 @@ linear about it. Outliers are weighed by their residuals from the trajectory, ag
 """
 
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 
@@ -21,7 +20,8 @@ from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem, Trace, empty_trace
 from estimation.engine.rule import chosen_settings
 from estimation.engine.runner import constant_row
-from estimation.filters.trajectory_loops import Lines, Log, compile_trajectory
+from estimation.filters.linearised_log import Lines, Log
+from estimation.filters.trajectory_loops import compile_trajectory
 from plant.errors import HydrostateError
 
 ITERATIONS = 50
@@ -58,11 +58,11 @@ class _Search:
     def __init__(self, problem: FilterProblem) -> None:
         n, (samples, channels) = problem.model.width, problem.measured.shape
         self.problem = problem
-        self.kernel: ModuleType = compile_trajectory(problem.model, problem.channels, problem.robust)
+        self.kernel = compile_trajectory(problem.model, problem.channels, problem.robust)
         self.opened = problem.opened + problem.noise * problem.sample_time
         self.bounds = np.array([state.scaled_bounds for state in problem.model.states])
         drives, measured = (np.ascontiguousarray(one, np.float64) for one in (problem.drives, problem.measured))
-        self.log: Log = (
+        self.log = Log(
             constant_row(problem, {}),
             drives,
             measured,

@@ -28,9 +28,9 @@ from estimation.engine.runner import constant_row
 from estimation.filters.ekf import EKF
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import unary
-from plant.compiled.kernel_file import load_kernel
-from plant.compiled.paste import MERGED, kernel_text, pasted
-from plant.compiled.source import INTRINSICS
+from plant.compiled.native.load import load_native
+from plant.compiled.native.signature import signature_of
+from plant.compiled.paste import kernel_text, pasted
 from plant.errors import HydrostateError
 
 Move: TypeAlias = Callable[[Array, Array, Array, Array, float], None]
@@ -43,8 +43,14 @@ Spread: TypeAlias = Callable[[Array, Array, Array], None]
 """``spread(rows, after, deviations)``: standard deviation that the noise of a sub-step gives each state."""
 
 
+DRAWN = 1_000_000
+"""Random numbers that are drawn at a time, at most but for those of one sample [count]."""
+
+
 def run(
-    rng: np.random.Generator,
+    first: int,
+    normal: Array,
+    places: Array,
     particles: Array,
     rows: Array,
     limits: Array,
@@ -60,13 +66,40 @@ def run(
     observe: Observe,
     spread: Spread,
 ) -> float:
-    """Run the filter; return its log-likelihood."""
-    n, channels = measured.shape
+    """Run the filter over some samples; return their log-likelihood.
+
+    Parameters
+    ----------
+    first : int
+        Of the samples.
+    normal : ndarray, shape (taken, particles, substeps, n)
+        Standard normal numbers [dimensionless].
+    places : ndarray, shape (taken,)
+        Numbers from 0 to 1 [dimensionless].
+    particles : ndarray, shape (particles, n)
+        States [scaled].
+    rows : ndarray, shape (constants,)
+        The filter's constants.
+    limits : ndarray, shape (2, n)
+        Bounds of the states [scaled].
+    drives, measured : ndarray, shapes (samples, drives) and (samples, channels)
+        The log [SI].
+    variances : ndarray, shape (channels,)
+        Of the sensors [SI squared].
+    substeps, every : int
+        Steps a sample, and samples a row of the track.
+
+    Returns
+    -------
+    float
+        Log-likelihood [dimensionless].
+    """
+    channels = measured.shape[1]
     size = particles.shape[0]
     others, weights, seen = np.empty_like(particles), np.empty(size), np.empty((size, channels))
     deviations = np.empty(WIDTH)
     log_likelihood = 0.0
-    for k in range(n):
+    for k in range(first, first + places.shape[0]):
         if k > 0:
             spread(rows, drives[k], deviations)
             for i in range(size):
@@ -74,7 +107,7 @@ def run(
                     move(particles[i], rows, drives[k - 1], drives[k], float(j))
                     for a in range(WIDTH):
                         if deviations[a] > 0.0:
-                            value = particles[i, a] + deviations[a] * rng.standard_normal()
+                            value = particles[i, a] + deviations[a] * normal[k - first, i, j, a]
                             particles[i, a] = min(max(value, limits[0, a]), limits[1, a])
         weights[:] = 1.0 / size
         for i in range(size):
@@ -94,9 +127,17 @@ def run(
             for a in range(WIDTH):
                 trace.track[k // every, a] = trace.mean[a]
                 trace.track_variance[k // every, a] = trace.covariance[a, a]
-        if np.any(measured[k] == measured[k]):
-            resample(rng, particles, weights, others)
+        if is_logged(measured[k]):
+            resample(places[k - first], particles, weights, others)
     return log_likelihood
+
+
+def is_logged(sample: Array) -> bool:
+    """Return whether any channel of a sample was measured."""
+    logged = False
+    for c in range(sample.shape[0]):
+        logged = logged or sample[c] == sample[c]
+    return logged
 
 
 def predicted(weights: Array, seen: Array, r: float) -> tuple[float, float]:
@@ -137,10 +178,10 @@ def gather(particles: Array, weights: Array, mean: Array, covariance: Array, *, 
             covariance[b, a] = covariance[a, b]
 
 
-def resample(rng: np.random.Generator, particles: Array, weights: Array, others: Array) -> None:
+def resample(place: float, particles: Array, weights: Array, others: Array) -> None:
     """Draw particles anew by their weights, at even distances from one random place (Kitagawa 1996)."""
     size = weights.shape[0]
-    place = rng.random() / size
+    place /= size
     reached, i = weights[0], 0
     for m in range(size):
         while place > reached and i < size - 1:
@@ -180,14 +221,14 @@ def compile_particles(model: ProcessModel, channels: tuple[str, ...]) -> Callabl
     shown = {f"p{c}": value for c, value in enumerate(observed(model, mean, channels))}
     noise = {f"d{i}": unary("sqrt", process_noise(model, i)) for i in range(model.width)}
     parts = (
-        INTRINSICS,
         function_source("move", "state, rows, before, after, j", reads, stepped, state),
         function_source("observe", "state, rows, seen", reads, shown, {n: f"seen[{n[1:]}]" for n in shown}),
         function_source("spread", "rows, after, deviations", reads, noise, {n: f"deviations[{n[1:]}]" for n in noise}),
-        pasted(predicted, weigh, gather, resample, options=MERGED),
+        pasted(is_logged, predicted, weigh, gather, resample, inlined=True),
         pasted(run, constants={"WIDTH": model.width}),
     )
-    return load_kernel(f"particles_{model.name}", kernel_text(f"particles on the {model.name} form", *parts)).run
+    text = kernel_text(f"particles on the {model.name} form", *parts)
+    return load_native(f"particles_{model.name}", text, {"run": signature_of(run)}).run
 
 
 def particle(problem: FilterProblem) -> Trace:
@@ -237,5 +278,11 @@ def particle_filter(problem: FilterProblem, particles: int, rng: np.random.Gener
     log = (problem.drives, problem.measured, problem.variances, problem.substeps, problem.every)
     run_kernel = compile_particles(problem.model, problem.channels)
     cloud = np.clip(cloud, *limits)
-    log_likelihood = run_kernel(rng, cloud, constant_row(problem, {}), limits, *log, trace)
+    rows, log_likelihood = constant_row(problem, {}), 0.0
+    each = (particles, problem.substeps, problem.model.width)
+    taken = max(1, DRAWN // math.prod(each))
+    for first in range(0, len(problem.measured), taken):
+        count = min(taken, len(problem.measured) - first)
+        drawn = rng.standard_normal((count, *each)), rng.random(count)
+        log_likelihood += run_kernel(first, *drawn, cloud, rows, limits, *log, trace)
     return trace._replace(log_likelihood=log_likelihood)

@@ -28,7 +28,7 @@ from estimation.engine.kalman import belief_names
 from estimation.engine.rule import chosen_settings
 from estimation.engine.runner import constant_row
 from estimation.filters.ekf import ekf
-from estimation.filters.smoother_loops import compile_smoother
+from estimation.filters.smoother_loops import Beliefs, Log, compile_smoother
 
 
 def smoother(problem: FilterProblem) -> Trace:
@@ -58,7 +58,7 @@ def _chunks(problem: FilterProblem) -> Iterator[tuple[int, Array, Array]]:
     """Yield first sample, filtered and smoothed beliefs of each chunk, the last chunk first; the arrays are reused."""
     n, samples = problem.model.width, len(problem.measured)
     kernel = compile_smoother(problem.model, problem.channels, problem.robust)
-    log = (constant_row(problem, {}), problem.drives, problem.measured, problem.substeps)
+    log = Log(constant_row(problem, {}), problem.drives, problem.measured, problem.substeps)
     state = np.concatenate([problem.mean, problem.covariance[np.triu_indices(n)]])
     length = isqrt(samples - 1) + 1
     firsts = range(0, samples, length)
@@ -66,10 +66,10 @@ def _chunks(problem: FilterProblem) -> Iterator[tuple[int, Array, Array]]:
     nothing, blank = np.empty((0, 0, n)), np.empty((0, len(state)))
     for i, first in enumerate(firsts):
         checkpoints[i] = state
-        kernel.forward(state, log, first, min(first + length, samples), (nothing, blank, blank))
+        kernel.forward(state, log, first, min(first + length, samples), Beliefs(nothing, blank, blank))
     starts = np.empty((length, problem.substeps, n))
     priors, posteriors, smoothed = (np.empty((length, len(state))) for _ in range(3))
-    beliefs = (starts, priors, posteriors)
+    beliefs = Beliefs(starts, priors, posteriors)
     adjoint = np.zeros(len(state))
     for i, first in reversed(list(enumerate(firsts))):
         stop = min(first + length, samples)

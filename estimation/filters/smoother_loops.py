@@ -2,8 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import cache
-from types import ModuleType
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -26,9 +25,9 @@ from estimation.filters.ekf import EKF, Update, linearised_update, noise_symbols
 from estimation.filters.sigma_points import root
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import ONE, ZERO, Expression, select, symbol
-from plant.compiled.kernel_file import load_kernel
+from plant.compiled.native.load import NativeKernel, load_native
+from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import kernel_text, pasted
-from plant.compiled.source import INTRINSICS
 
 BackPredict: TypeAlias = Callable[[Array, Array, Array, Array, Array, float], None]
 """``back_predict(state, adjoint, rows, before, after, j)``: take the adjoint back over a sub-step from a state."""
@@ -43,10 +42,39 @@ OnBelief: TypeAlias = Callable[[Array, Array, Array], None]
 """``smooth(state, adjoint, smoothed)`` smooths a belief; ``lift(state, shift, adjoint)`` adds what a shift means."""
 
 
-Log: TypeAlias = tuple[Array, Array, Array, int]
-"""What a kernel reads and never changes, drives, measurements, and sub-steps a sample."""
-Beliefs: TypeAlias = tuple[Array, Array, Array]
-"""States before sub-steps, and beliefs before and after each sample's update."""
+class Log(NamedTuple):
+    """What a kernel reads and never changes.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (constants,)
+        The filter's constants.
+    drives, measured : ndarray, shapes (samples, drives) and (samples, channels)
+        The log [SI].
+    substeps : int
+        Steps a sample.
+    """
+
+    rows: Array
+    drives: Array
+    measured: Array
+    substeps: int
+
+
+class Beliefs(NamedTuple):
+    """Room for a chunk of the log, or none.
+
+    Parameters
+    ----------
+    starts : ndarray, shape (length, substeps, n)
+        States before sub-steps [scaled].
+    priors, posteriors : ndarray, shape (length, belief)
+        Beliefs before and after each sample's update [scaled].
+    """
+
+    starts: Array
+    priors: Array
+    posteriors: Array
 
 
 def forward(
@@ -61,7 +89,13 @@ def forward(
     predict: Predict,
     update: RuleUpdate,
 ) -> None:
-    """Filter a chunk; keep the states before sub-steps and the beliefs about each sample, unless there is no room."""
+    """Filter a chunk; keep the states before sub-steps and the beliefs about each sample, unless there is no room.
+
+    Parameters
+    ----------
+    state : ndarray, shape (belief,)
+        Belief before the chunk, and after it afterwards [scaled].
+    """
     rows, drives, measured, substeps = log
     starts, priors, posteriors = beliefs
     keep = starts.shape[0] > 0
@@ -98,19 +132,35 @@ def backward(
     back_update: BackUpdate,
     back_predict: BackPredict,
 ) -> None:
-    """Smooth a chunk from its end, and carry the adjoint back to its beginning."""
+    """Smooth a chunk from its end, and carry the adjoint back to its beginning.
+
+    Parameters
+    ----------
+    adjoint : ndarray, shape (belief,)
+        After the chunk, and before it afterwards [1/scaled].
+    smoothed : ndarray, shape (length, belief)
+        Room for the smoothed beliefs [scaled].
+    """
     rows, drives, measured, substeps = log
     starts, priors, posteriors = beliefs
     shift = np.zeros(starts.shape[2])
     for k in range(stop - 1, first - 1, -1):
         smooth(posteriors[k - first], adjoint, smoothed[k - first])
         hold(priors[k - first], rows, measured[k], shift)
-        if np.any(shift != 0.0):
+        if is_moved(shift):
             lift(posteriors[k - first], shift, adjoint)
         back_update(priors[k - first], adjoint, rows, measured[k])
         if k > 0:
             for j in range(substeps - 1, -1, -1):
                 back_predict(starts[k - first, j], adjoint, rows, drives[k - 1], drives[k], float(j))
+
+
+def is_moved(shift: Array) -> bool:
+    """Return whether a belief was moved to keep within its bounds."""
+    moved = False
+    for i in range(shift.shape[0]):
+        moved = moved or shift[i] != 0.0
+    return moved
 
 
 def _adjoint(n: int) -> tuple[list[Expression], Covariance]:
@@ -233,7 +283,7 @@ def smooth_expressions(model: ProcessModel) -> Outputs:
 
 
 @cache
-def compile_smoother(model: ProcessModel, channels: tuple[str, ...], robust: str) -> ModuleType:
+def compile_smoother(model: ProcessModel, channels: tuple[str, ...], robust: str) -> NativeKernel:
     """Generate and load the smoother's kernel.
 
     Parameters
@@ -243,7 +293,7 @@ def compile_smoother(model: ProcessModel, channels: tuple[str, ...], robust: str
 
     Returns
     -------
-    ModuleType
+    NativeKernel
         ``forward`` and ``backward`` over a chunk.
     """
     rule = weighing(EKF, robust)
@@ -264,9 +314,9 @@ def compile_smoother(model: ProcessModel, channels: tuple[str, ...], robust: str
         ("smooth", "state, adjoint, smoothed", smooth_expressions(model), smoothed),
     )
     parts = (
-        INTRINSICS,
         filtering.source,
         *(function_source(name, arguments, reads, outputs, writes) for name, arguments, outputs, writes in generated),
-        pasted(forward, backward, constants={"CONSTANTS": max(1, filtering.constants)}),
+        pasted(forward, backward, is_moved, constants={"CONSTANTS": max(1, filtering.constants)}),
     )
-    return load_kernel(f"smoother_{model.name}", kernel_text(f"smoother on the {model.name} form", *parts))
+    entries = {"forward": signature_of(forward), "backward": signature_of(backward)}
+    return load_native(f"smoother_{model.name}", kernel_text(f"smoother on the {model.name} form", *parts), entries)

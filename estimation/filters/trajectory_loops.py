@@ -8,8 +8,7 @@ place of the noise, a state that no noise moves and a start that is known exactl
 import math
 from collections.abc import Callable
 from functools import cache
-from types import ModuleType
-from typing import NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -19,11 +18,12 @@ from estimation.engine.layout import layout
 from estimation.engine.parts import data_places, function_source
 from estimation.engine.robust import inflation
 from estimation.filters.ekf import EKF
+from estimation.filters.linearised_log import Lines, Log
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import ONE, ZERO, jacobian, symbol
-from plant.compiled.kernel_file import load_kernel
-from plant.compiled.paste import BORROWING, kernel_text, pasted
-from plant.compiled.source import INTRINSICS
+from plant.compiled.native.load import NativeKernel, load_native
+from plant.compiled.native.signature import signature_of
+from plant.compiled.paste import kernel_text, pasted
 
 Advance: TypeAlias = Callable[[Array, Array, Array, Array, float], None]
 """``advance(state, rows, before, after, j)``: take sub-step j between samples of the drives."""
@@ -33,33 +33,6 @@ Differentiate: TypeAlias = Callable[[Array, Array, Array, Array, float, Array], 
 
 See: TypeAlias = Callable[[Array, Array, Array, Array], None]
 """``see(state, rows, seen, slope)``: what the model predicts of each channel, and its derivative by the state."""
-
-
-class Lines(NamedTuple):
-    """The log linearised along a trajectory, sample by sample [dimensionless; of residual and variance, SI].
-
-    Parameters
-    ----------
-    F : ndarray, shape (samples, n, n)
-        Jacobian of the step before each sample.
-    gain, slope : ndarray, shape (samples, channels, n)
-        The filter's gain, and the derivative of each channel.
-    residual, variance : ndarray, shape (samples, channels)
-        Innovations and their variances, NaN where nothing is measured.
-    kept : ndarray, shape (rows, n, n)
-        Covariance at every so many samples.
-    """
-
-    F: Array
-    gain: Array
-    slope: Array
-    residual: Array
-    variance: Array
-    kept: Array
-
-
-Log: TypeAlias = tuple[Array, Array, Array, Array, int]
-"""What the kernel reads and never changes, drives, measurements, their variances, and sub-steps a sample."""
 
 
 def roll(
@@ -78,6 +51,17 @@ def roll(
     """Run the model under its pushes, held to the states' bounds, and return the sum of squares.
 
     It is infinite where the run diverges, or begins out of bounds.
+
+    Parameters
+    ----------
+    start : ndarray, shape (n,)
+        First state [scaled].
+    adjoint, opened : ndarray, shape (samples, n)
+        Pushes, and the variance that each stands for [scaled].
+    bounds : ndarray, shape (n, 2)
+        Of the states [scaled].
+    trajectory : ndarray, shape (samples, n)
+        Room for the states [scaled].
     """
     rows, drives, measured, spread, substeps = log
     state, seen, slope = start.copy(), np.empty(CHANNELS), np.empty((CHANNELS, WIDTH))
@@ -119,7 +103,19 @@ def forward(
     differentiate: Differentiate,
     see: See,
 ) -> None:
-    """Filter deviations from the trajectory; leave the filter's last covariance in P, and some on the way in kept."""
+    """Filter deviations from the trajectory; leave the filter's last covariance in P, and some on the way in kept.
+
+    Parameters
+    ----------
+    prior : ndarray, shape (n,)
+        First state as it is believed [scaled].
+    P : ndarray, shape (n, n)
+        Its covariance [scaled].
+    trajectory, adjoint, opened : ndarray, shape (samples, n)
+        States, pushes and their variances [scaled].
+    every : int
+        Samples a row of the track.
+    """
     rows, drives, measured, spread, substeps = log
     F, _, slope, residual, variance, kept = lines
     m, state, before = np.empty(WIDTH), np.empty(WIDTH), np.empty(WIDTH)
@@ -191,14 +187,20 @@ def multiply(a: Array, b: Array, product: Array, *, WIDTH: int) -> None:
 
 
 def copy(a: Array, b: Array, *, WIDTH: int) -> None:
-    """Copy a matrix, for which Numba takes several seconds to compile an assignment."""
+    """Copy a matrix."""
     for i in range(WIDTH):
         for j in range(WIDTH):
             b[i, j] = a[i, j]
 
 
 def backward(lines: Lines, wanted: Array, *, WIDTH: int, CHANNELS: int) -> None:
-    """Carry the adjoint back over the log: what pushes the trajectory to where it fits best."""
+    """Carry the adjoint back over the log: what pushes the trajectory to where it fits best.
+
+    Parameters
+    ----------
+    wanted : ndarray, shape (samples, n)
+        Room for it.
+    """
     F, gain, slope, residual, variance, _ = lines
     u, earlier = np.zeros(WIDTH), np.empty(WIDTH)
     for k in range(residual.shape[0] - 1, -1, -1):
@@ -219,7 +221,13 @@ def backward(lines: Lines, wanted: Array, *, WIDTH: int, CHANNELS: int) -> None:
 
 
 def spread_back(lines: Lines, every: int, *, WIDTH: int, CHANNELS: int) -> None:
-    """Turn the covariances kept on the way, which knew the log up to there, into those that know all of it."""
+    """Turn the covariances kept on the way, which knew the log up to there, into those that know all of it.
+
+    Parameters
+    ----------
+    every : int
+        Samples a row of the track.
+    """
     F, gain, slope, residual, variance, kept = lines
     U, half, PU = np.zeros((WIDTH, WIDTH)), np.empty((WIDTH, WIDTH)), np.empty((WIDTH, WIDTH))
     UK = np.empty(WIDTH)
@@ -261,7 +269,15 @@ def reweigh(
     see: See,
     doubt: Callable[[Array], None],
 ) -> None:
-    """Set the variances of all samples by how far they lie from the trajectory; ``doubt`` makes a factor of a ratio."""
+    """Set the variances of all samples by how far they lie from the trajectory; ``doubt`` makes a factor of a ratio.
+
+    Parameters
+    ----------
+    trajectory : ndarray, shape (samples, n)
+        States [scaled].
+    variances : ndarray, shape (channels,)
+        Of the sensors [SI squared].
+    """
     rows, _, measured, spread, _ = log
     seen, slope, ratio = np.empty(CHANNELS), np.empty((CHANNELS, WIDTH)), np.empty(1)
     for k in range(measured.shape[0]):
@@ -273,7 +289,7 @@ def reweigh(
 
 
 @cache
-def compile_trajectory(model: ProcessModel, channels: tuple[str, ...], robust: str) -> ModuleType:
+def compile_trajectory(model: ProcessModel, channels: tuple[str, ...], robust: str) -> NativeKernel:
     """Generate and load the loops.
 
     Parameters
@@ -283,7 +299,7 @@ def compile_trajectory(model: ProcessModel, channels: tuple[str, ...], robust: s
 
     Returns
     -------
-    ModuleType
+    NativeKernel
         ``roll``, ``forward``, ``backward`` and ``spread_back``; ``reweigh`` where outliers count for less.
     """
     n, names = model.width, layout(EKF, model, channels).rows
@@ -302,15 +318,17 @@ def compile_trajectory(model: ProcessModel, channels: tuple[str, ...], robust: s
     }
     linear = {f"z{i}": z for i, z in enumerate(stepped)} | slopes
     parts = [
-        INTRINSICS,
         function_source("advance", "state, rows, before, after, j", reads, new, place),
         function_source("differentiate", "state, rows, before, after, j, jacobian", reads, linear, written),
         function_source("see", "state, rows, seen, slope", reads, {**shown, **H}, places),
         pasted(roll, forward, backward, spread_back, constants={"WIDTH": n, "CHANNELS": len(channels)}),
-        pasted(update, multiply, copy, options=BORROWING),
+        pasted(update, multiply, copy, inlined=True),
     ]
+    entries: list[Callable[..., Any]] = [roll, forward, backward, spread_back]
     if robust != "none":
         doubted = {"factor": inflation(robust, symbol("x"))}
         parts.append(function_source("doubt", "ratio", {"x": "ratio[0]"}, doubted, {"factor": "ratio[0]"}))
         parts.append(pasted(reweigh))
-    return load_kernel(f"trajectory_{model.name}", kernel_text(f"trajectories of the {model.name} form", *parts))
+        entries.append(reweigh)
+    text = kernel_text(f"trajectories of the {model.name} form", *parts)
+    return load_native(f"trajectory_{model.name}", text, {one.__name__: signature_of(one) for one in entries})

@@ -22,7 +22,7 @@ from plant.compiled.functions import Scalar
 from plant.compiled.hoist import hoisted
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import BORROWING, kernel_text, pasted
+from plant.compiled.paste import kernel_text, pasted
 from plant.solvers.steps import parameter_names, parameter_symbols, ros2_step
 
 Kernel: TypeAlias = Callable[..., tuple[float, Array, Array]]
@@ -298,7 +298,7 @@ def _source(model: GreyBoxModel) -> str:
         function_source("step", "point, fixed, before, after, start, end, h", reads, stepped),
         function_source("observe", "point, shown", point, seen, {place: place for place in seen}),
         f"load = loading({len(point)})",
-        pasted(absorb, constants=counts | settings, options=BORROWING),
+        pasted(absorb, constants=counts | settings, inlined=True),
         pasted(carry, correct, run),
     )
 

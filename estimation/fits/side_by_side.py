@@ -18,7 +18,7 @@ from plant.compiled.native.load import load_native
 from plant.compiled.native.machine import native_width
 from plant.compiled.native.signature import signature_of
 from plant.compiled.pack import packed_source
-from plant.compiled.paste import MERGED, kernel_text, pasted
+from plant.compiled.paste import kernel_text, pasted
 from plant.compiled.simplify import fused, simplified
 from plant.compiled.source import lines_source, operations_source
 from plant.solvers.fixed_step_loops import lay, share
@@ -86,6 +86,6 @@ def _source(model: GreyBoxModel) -> str:
     return kernel_text(
         f"residuals of the {model.name} model, {LANES} parameter sets side by side",
         operations_source(lines, {each: LANES * i for i, each in enumerate(every)}, vector),
-        pasted(lay, share, absorb, constants=sizes, options=MERGED),
+        pasted(lay, share, absorb, constants=sizes, inlined=True),
         pasted(residuals_side_by_side),
     )

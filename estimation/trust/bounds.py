@@ -19,7 +19,7 @@ from estimation.models.model import ProcessModel
 from plant.compiled.expression import ONE, ZERO, jacobian, symbol
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import BORROWING, kernel_text, pasted
+from plant.compiled.paste import kernel_text, pasted
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
 from plant.log.record import Record
@@ -252,7 +252,7 @@ def _compile(model: ProcessModel, channels: tuple[str, ...]) -> NativeKernel:
         times("left", "F, P, FP, c", "P[{}, c]", "FP[{}, c]"),
         times("right", "F, FP, P, c", "FP[c, {}]", "P[c, {}]"),
         function_source("look", "state, parameters, H", reads, seen, shown),
-        pasted(inform, options=BORROWING),
+        pasted(inform, inlined=True),
         pasted(run, constants={"WIDTH": n, "SLOPES": max(1, len(slopes))}),
     )
     title = f"the posterior Cramér-Rao bound of the {model.name} form, in scaled units"

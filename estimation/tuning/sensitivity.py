@@ -8,7 +8,6 @@ signs and choices are held constant. One kernel does so for any number of direct
 import math
 from collections.abc import Callable, Mapping
 from functools import cache
-from types import ModuleType
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -24,9 +23,9 @@ from estimation.filters.ekf import EKF
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import ZERO, Expression, jacobian, node, ordered, select, symbol
 from plant.compiled.hoist import hoisted
-from plant.compiled.kernel_file import load_kernel
+from plant.compiled.native.load import NativeKernel, load_native
+from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import kernel_text, pasted
-from plant.compiled.source import INTRINSICS
 
 
 def rewritten(outputs: Outputs, replacement: Mapping[str, Expression]) -> Outputs:
@@ -206,7 +205,23 @@ def run(
     vary_update: Vary,
     update: Act,
 ) -> None:
-    """Filter; carry the belief's derivatives along before each half of a step moves the belief itself."""
+    """Filter; carry the belief's derivatives along before each half of a step moves the belief itself.
+
+    Parameters
+    ----------
+    belief : ndarray, shape (belief,)
+        Mean and upper triangle of the covariance [scaled].
+    slopes : ndarray, shape (belief, directions)
+        Their derivatives [scaled over the direction's unit].
+    rows : ndarray, shape (rows,)
+        The filter's constants.
+    directions : ndarray, shape (rows, directions)
+        Their derivatives.
+    drives, measured : ndarray, shapes (samples, drives) and (samples, channels)
+        The log [SI].
+    substeps : int
+        Steps a sample.
+    """
     residuals, variances, moved, spread = found
     for k in range(measured.shape[0]):
         a, b, y = drives[max(k - 1, 0)], drives[k], measured[k]
@@ -223,7 +238,7 @@ def run(
 
 
 @cache
-def _compile(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> ModuleType:
+def _compile(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> NativeKernel:
     names = layout(rule, model, channels).rows
     carried = {name: i for i, name in enumerate(belief_names(model.width))}
     rates = {name: symbol(f"D{name}") for name in (*carried, *names) if name not in ("h", "share")}
@@ -236,7 +251,7 @@ def _compile(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> Modu
     written = {name: f"slopes[{i}, i]" for name, i in carried.items()}
     written |= {f"e{c}": f"moved[{c}, i]" for c in each} | {f"s{c}": f"spread[{c}, i]" for c in each}
     given = "belief, rows, before, after, sample, j"
-    parts = [INTRINSICS, pasted(run)]
+    parts = [pasted(run)]
     for name, outputs in (("predict", rule.predict(model)), ("update", rule.update(model, channels))):
         fixed, moving = hoisted(directional(outputs, rates), {f"D{name}" for name in rates}, "c")
         places = {name: f"fixed[{i}]" for i, name in enumerate(fixed)}
@@ -245,4 +260,5 @@ def _compile(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> Modu
         parts.append(function_source(f"vary_{name}", arguments, reads | along | places, moving, written))
         parts.append(function_source(name, f"{given}, residual, variance", reads, outputs, own | seen))
     title = f"{rule.name} on the {model.name} form, with derivatives along directions"
-    return load_kernel(f"sensitivity_{rule.name}_{model.name}", kernel_text(title, *parts))
+    name = f"sensitivity_{rule.name}_{model.name}"
+    return load_native(name, kernel_text(title, *parts), {"run": signature_of(run)})

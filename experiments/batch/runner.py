@@ -180,7 +180,7 @@ def manifest_of(plan: Plan, source: str) -> Mapping[str, Any]:
     Mapping[str, Any]
         The study, its hash, its seeds, versions and commit.
     """
-    packages = ("hydrostate", "numpy", "scipy", "numba", "pyarrow", "pandas")
+    packages = ("hydrostate", "numpy", "scipy", "llvmlite", "pyarrow", "pandas")
     return {
         "study": plan.study.name,
         "source": source,

@@ -117,7 +117,7 @@ def _prepare(out: Path) -> None:
 def _versions() -> dict[str, str]:
     from importlib.metadata import version
 
-    packages = {name: version(name) for name in ("hydrostate", "numpy", "numba")}
+    packages = {name: version(name) for name in ("hydrostate", "numpy", "llvmlite")}
     return {"python": platform.python_version(), **packages}
 
 

@@ -13,7 +13,8 @@ from experiments.open_benchmark.friction import MICRO_DAMPING, SLIPS, friction_f
 from experiments.open_benchmark.machine import ATMOSPHERE, LIFT, PRELOAD, Machine
 from experiments.open_benchmark.oil import THINNEST, air_space, liquid_space, specific_volume, stiffened, stiffness
 from plant.arrays import Array
-from plant.compiled.kernel_file import load_kernel
+from plant.compiled.native.load import load_native
+from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import kernel_text, pasted
 
 TICK = 1e-3
@@ -98,9 +99,9 @@ PARTS = (
 def compiled() -> Callable[..., Any]:
     """Return `trajectory`, compiled."""
     constants = {"ATMOSPHERE": ATMOSPHERE, "LIFT": LIFT, "PRELOAD": PRELOAD, "RECORD": RECORD}
-    constants |= {"SLIPS": SLIPS, "MICRO_DAMPING": MICRO_DAMPING, "THINNEST": THINNEST, "FIELDS": Machine._fields}
+    constants |= {"SLIPS": SLIPS, "MICRO_DAMPING": MICRO_DAMPING, "THINNEST": THINNEST}
     text = kernel_text("a run of the open benchmark's actuator", pasted(*PARTS, constants=constants))
-    return load_kernel("open_benchmark", text).trajectory
+    return load_native("open_benchmark", text, {"trajectory": signature_of(trajectory)}).trajectory
 
 
 def at_rest(m: Machine) -> Array:

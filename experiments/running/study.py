@@ -21,7 +21,7 @@ from experiments.running.progress import Track, in_one_piece
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-PACKAGES = ("hydrostate", "numpy", "scipy", "numba", "pandas", "control", "filterpy", "matplotlib")
+PACKAGES = ("hydrostate", "numpy", "scipy", "llvmlite", "pandas", "control", "filterpy", "matplotlib")
 """Whose versions a result keeps."""
 
 Settings = TypeVar("Settings", bound="DataclassInstance", contravariant=True)

@@ -32,7 +32,24 @@ def standardise(score: Array, away: float, memory: float) -> None:
 
 
 def threshold(peaks: Array, alarms: float, width: float, expected: float) -> float:
-    """Return the level that peaks are expected to pass `expected` times in the time that they were gathered."""
+    """Return the level that peaks are expected to pass `expected` times in the time that they were gathered.
+
+    Parameters
+    ----------
+    peaks : ndarray, shape (levels,)
+        How many excursions peaked at each level [count].
+    alarms : float
+        How many passed the threshold [count].
+    width : float
+        Of a level [standard deviations].
+    expected : float
+        How many may pass [count].
+
+    Returns
+    -------
+    float
+        The threshold [standard deviations].
+    """
     total = alarms
     for count in peaks:
         total += count

@@ -6,8 +6,7 @@ innovations of a *block* of intervals are its NIS, which feeds the CUSUM of `fau
 
 import math
 from functools import cache
-from types import ModuleType
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,19 +14,79 @@ from faults.watch import balances, cusum
 from faults.watch.balances import FEATURES, count_gains, learn, regress, shift, solve
 from faults.watch.cusum import MEAN, PEAK, SQUARES, SUM, THRESHOLD, VARIANCE, accumulate, standardise, threshold
 from plant.arrays import Array
-from plant.compiled.kernel_file import load_kernel
-from plant.compiled.paste import BORROWING, kernel_text, pasted
+from plant.compiled.native.load import NativeKernel, load_native
+from plant.compiled.native.signature import signature_of
+from plant.compiled.paste import kernel_text, pasted
 
-Memory: TypeAlias = tuple[Array, ...]
-"""The interval under way, clock, last intervals, information, moments and coefficients of the balances, their scores,
-counted peaks, and the last blocks' scores and gains."""
 
-WatchSetting: TypeAlias = tuple[float, float, float, float, float, float]
-"""By what a balance fades in an interval, the score's memory [blocks], false alarms a block, and what speed, the
-piston's way in a sample and pressure are relative to."""
+class Memory(NamedTuple):
+    """What a watch remembers, a row a balance; scores are dimensionless, gains in shares of the ratings.
 
-WatchSizes: TypeAlias = tuple[int, int, int, int]
-"""Samples an interval; blocks to settle, to learn, and until scores count again."""
+    Parameters
+    ----------
+    partial : ndarray, shape (7,)
+        The interval under way.
+    clock : ndarray, shape (4,)
+        Blocks so far: all, usable, where learning began anew, and those whose scores counted.
+    lags : ndarray, shape (8,)
+        The last intervals.
+    information : ndarray, shape (balances, features, features)
+        Of the balances' normal equations.
+    moment, found : ndarray, shape (balances, features)
+        Their right-hand sides, and the coefficients that follow.
+    score : ndarray, shape (balances, 7)
+        As `faults.watch.cusum` has it.
+    peaks : ndarray, shape (balances, levels)
+        How often excursions of the CUSUM peaked at a level, and alarms.
+    scores : ndarray, shape (balances, recent)
+        Of the last blocks.
+    gains : ndarray, shape (recent, gains)
+        Of the last blocks.
+    """
+
+    partial: Array
+    clock: Array
+    lags: Array
+    information: Array
+    moment: Array
+    found: Array
+    score: Array
+    peaks: Array
+    scores: Array
+    gains: Array
+
+
+class WatchSetting(NamedTuple):
+    """What a watch goes by.
+
+    Parameters
+    ----------
+    fade : float
+        By what a balance fades in an interval [fraction].
+    score_memory : float
+        Over how many blocks scores are remembered [count].
+    false_alarms : float
+        Alarms in a block of a healthy stream [count].
+    rated_speed, rated_step, relief : float
+        What speed, the piston's way in a sample and pressure are relative to [rad/s, m, Pa].
+    """
+
+    fade: float
+    score_memory: float
+    false_alarms: float
+    rated_speed: float
+    rated_step: float
+    relief: float
+
+
+class WatchSizes(NamedTuple):
+    """Samples an interval; blocks to settle, to learn, and until scores count again [count]."""
+
+    samples: int
+    settle: int
+    learning: int
+    resume: int
+
 
 ALLOWANCE = 0.5
 """What a block's score must exceed for the CUSUM to rise [standard deviations]."""
@@ -61,7 +120,20 @@ REFRESHED = 200
 
 
 def advance(rows: Array, first: int, setting: WatchSetting, sizes: WatchSizes, memory: Memory) -> tuple[int, int]:
-    """Take samples from `first` on, up to the end of them or of a block with news; return where, and the news."""
+    """Take samples from `first` on, up to the end of them or of a block with news; return where, and the news.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (samples, 3)
+        Motor speed [rad/s], position [m], differential pressure [Pa].
+    first : int
+        Which of them is the first.
+
+    Returns
+    -------
+    tuple of int
+        The sample after the last one taken, and what a block has said.
+    """
     partial, clock, lags, information, moment, found, score, _, _, gains = memory
     fade, _, _, rated_speed, rated_step, relief = setting
     samples, _, _, _ = sizes
@@ -165,7 +237,7 @@ def begin_again(memory: Memory) -> None:
 
 
 @cache
-def watch_kernel() -> ModuleType:
+def watch_kernel() -> NativeKernel:
     """Return the compiled kernel: `advance`, `begin_again` and `threshold`."""
     named = ("MEAN", "VARIANCE", "COUNT", "SUM", "PEAK", "THRESHOLD", "SQUARES")
     constants = {name: getattr(cusum, name) for name in named}
@@ -173,6 +245,7 @@ def watch_kernel() -> ModuleType:
     constants |= {"NOTHING": NOTHING, "READY": READY, "REFRESHED": REFRESHED, "INTERVALS": INTERVALS}
     constants |= {"ALLOWANCE": ALLOWANCE, "LARGEST_SCORE": LARGEST_SCORE, "LEVEL": LEVEL, "MOVING": MOVING}
     parts = (regress, shift, learn, count_gains, solve, accumulate, standardise, judge, end_block)
-    small = pasted(*parts, constants=constants, options=BORROWING)
+    small = pasted(*parts, constants=constants, inlined=True)
     large = pasted(threshold, advance, begin_again)
-    return load_kernel("watch", kernel_text("the watch over flow and force balances", small, large))
+    text = kernel_text("the watch over flow and force balances", small, large)
+    return load_native("watch", text, {one.__name__: signature_of(one) for one in (advance, begin_again, threshold)})

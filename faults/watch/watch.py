@@ -19,7 +19,19 @@ import numpy as np
 from faults.watch.balances import FEATURES, GAINS
 from faults.watch.cusum import SUM, THRESHOLD
 from faults.watch.events import Alarm, Change, Event, Ready, change_time
-from faults.watch.kernel import CLOCK, INTERVALS, LEVELS, PARTIAL, READY, RECENT, SCORE, watch_kernel
+from faults.watch.kernel import (
+    CLOCK,
+    INTERVALS,
+    LEVELS,
+    PARTIAL,
+    READY,
+    RECENT,
+    SCORE,
+    Memory,
+    WatchSetting,
+    WatchSizes,
+    watch_kernel,
+)
 from faults.watch.samples import watched_samples
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -104,13 +116,15 @@ class Watch:
         rated_velocity = parameters.pump_displacement * parameters.rated_speed / parameters.piston_area
         scales = parameters.rated_speed, rated_velocity * sample_time, parameters.relief_pressure
         fade = exp(-samples * sample_time / MEMORY)
-        self._setting = fade, SCORE_MEMORY / duration, false_alarms * duration / 3600.0, *scales
+        self._setting = WatchSetting(fade, SCORE_MEMORY / duration, false_alarms * duration / 3600.0, *scales)
         settle = round(SETTLE / duration)
-        self._sizes = samples, settle, round(learning / duration), 3 * settle
+        self._sizes = WatchSizes(samples, settle, round(learning / duration), 3 * settle)
         wide = len(self.balances)
         balance = (FEATURES, FEATURES), (FEATURES,), (FEATURES,)
         of_each = [np.zeros((wide, *shape)) for shape in (*balance, (SCORE,), (LEVELS + 1,), (RECENT,))]
-        self._memory = np.zeros(PARTIAL), np.zeros(CLOCK), np.zeros(8), *of_each, np.zeros((RECENT, GAINS))
+        self._memory = Memory._make(
+            (np.zeros(PARTIAL), np.zeros(CLOCK), np.zeros(8), *of_each, np.zeros((RECENT, GAINS)))
+        )
         self._partial, self._clock, *_, self._score, _, self._scores, self._gains = self._memory
         self._partial[3] = np.nan
         self._score[:, THRESHOLD] = np.inf

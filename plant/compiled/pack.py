@@ -10,7 +10,7 @@ from plant.compiled.expression import Expression, ordered
 from plant.compiled.source import function_source, leaf, spelt
 
 PACKED: Mapping[str, str] = {"/": "ratios", "sqrt": "roots"}
-"""Operations that are packed, and the functions of `plant.compiled.vector` that do it."""
+"""Operations that are packed, and the functions of `plant.compiled.native.lines` that do it."""
 
 
 def packed_source(name: str, outputs: Mapping[str, Expression]) -> str:

@@ -1,37 +1,30 @@
-"""Pastes functions into a kernel file: loops that linters, type checkers and tests see as ordinary Python.
+"""Pastes functions into a kernel's text: loops that linters, type checkers and tests see as ordinary Python.
 
-A kernel file contains all that it calls (`plant.compiled.kernel_file`). So its loops are written as functions of a
+A kernel contains all that it calls (`plant.compiled.native.load`). So its loops are written as functions of a
 module, and their source is copied; what tracing a model generates stands beside them, under the names by which they
 call it. In its own module such a name is a declaration, a keyword-only parameter without default, or an attribute of a
-parameter ``kernel``, which stands for the file: whoever runs the function as it is, in Python, passes them.
+parameter ``kernel``, which stands for the kernel: whoever runs the function as it is, in Python, passes them.
 """
 
 import ast
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import cache
 
-COMPILED = 'cache=True, nogil=True, error_model="numpy"'
-"""How Numba compiles a pasted function, unless told otherwise."""
-
 KERNEL = "kernel"
-"""Name of the parameter that stands for a kernel file."""
+"""Name of the parameter that stands for a kernel."""
 
-INLINED = 'forceinline=True, error_model="numpy"'
-"""How it compiles a function that becomes a part of whoever calls it."""
-
-MERGED = 'inline="always", error_model="numpy"'
-"""The same, before its types are inferred, which saves compiling it by itself."""
-
-BORROWING = INLINED + ", _nrt=False"
-"""How it compiles one that is inlined and makes no array: Numba does not count who holds those that it is given, which
-would take longer than a short function's work."""
+INLINED = "@inlined\n"
+"""What stands above a function that becomes a part of whoever calls it."""
 
 
 def pasted(
-    *functions: Callable[..., object], constants: Mapping[str, object] | None = None, options: str = COMPILED
+    *functions: Callable[..., object],
+    constants: Mapping[str, object] | None = None,
+    inlined: bool = False,
+    freely: Collection[str] = (),
 ) -> str:
-    """Return the text of functions, for a kernel file that imports ``numba`` and what else they name.
+    """Return the text of functions, for a kernel.
 
     Annotations, docstrings and comments stay behind: who edits one of them has nothing to compile anew.
 
@@ -41,44 +34,45 @@ def pasted(
         Functions of a module, without decorators. They may call each other, in any order.
     constants : Mapping[str, object], optional
         Values of names that the functions read, bound above them.
-    options : str
-        Arguments of ``numba.njit``.
+    inlined : bool
+        Whether they become a part of whoever calls them.
+    freely : collection of str
+        How freely LLVM may rearrange their arithmetic, as it names it.
 
     Examples
     --------
     >>> def grown(size: float) -> float:
     ...     return SHARE * size
-    >>> print(pasted(grown, constants={"SHARE": 0.5}, options="cache=True"))
+    >>> print(pasted(grown, constants={"SHARE": 0.5}, inlined=True))
     SHARE = 0.5
     <BLANKLINE>
     <BLANKLINE>
-    @numba.njit(cache=True)
+    @inlined
     def grown(size):
         return SHARE * size
     """
     bound = [f"{name} = {value!r}" for name, value in (constants or {}).items()]
-    texts = [f"@numba.njit({options})\n{bare_text(function)}" for function in functions]
+    above = (INLINED if inlined else "") + (f"@freely{tuple(sorted(freely))}\n" if freely else "")
+    texts = [above + bare_text(function) for function in functions]
     return "\n\n\n".join(["\n".join(bound), *texts] if bound else texts)
 
 
 def kernel_text(title: str, *parts: str) -> str:
-    """Return the text of a kernel file.
+    """Return the text of a kernel.
 
     Parameters
     ----------
     title : str
         What the kernel does, for its docstring.
     *parts : str
-        Functions and constants, in any order, but for what runs when the file is imported.
+        Functions and constants, in any order.
 
     Returns
     -------
     str
-        The text: ``math``, ``numba`` and ``numpy`` are imported, then the parts follow.
+        The text: ``math`` and ``numpy`` are imported, then the parts follow.
     """
-    return (
-        "\n\n\n".join([f'"""Generated: {title}."""\n\nimport math\n\nimport numba\nimport numpy as np', *parts]) + "\n"
-    )
+    return "\n\n\n".join([f'"""Generated: {title}."""\n\nimport math\n\nimport numpy as np', *parts]) + "\n"
 
 
 @cache

@@ -1,12 +1,11 @@
-"""Writes an expression graph as straight-line Python that Numba compiles."""
+"""Writes an expression graph as straight lines of Python, for kernels."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from plant.compiled.expression import Expression, ordered
 
 CALLED = ("present", "sign", "sqrt", "exp", "log", "tanh", "ratios", "roots", "where", "fma")
-"""Functions of `plant.compiled.vector` that lines call: no symbol may have their names."""
+"""Functions that lines call (`plant.compiled.native.lines`): no symbol may have their names."""
 
 _CALLS: Mapping[str, str] = {
     **{sign: f"{{0}} {sign} {{1}}" for sign in ("+", "-", "*", "/", "<", "<=", ">", ">=")},
@@ -18,14 +17,9 @@ _CALLS: Mapping[str, str] = {
 }
 """How each operation is spelt; a new one needs a line here and one in `expression.local_derivatives`."""
 
-_TEXTS = [Path(__file__).with_name(f"{name}.py").read_text("utf-8") for name in ("vector", "intrinsics")]
-
-INTRINSICS = "".join(_TEXTS).replace("from plant.compiled.vector", "# from")
-"""What a kernel begins with that Numba compiles and that calls them: it contains all that it calls."""
-
 
 def lines_source(name: str, outputs: Mapping[str, Expression]) -> str:
-    """Write straight lines as a function for `plant.compiled.intrinsics`.
+    """Write straight lines as a function for `plant.compiled.native.operations`.
 
     Parameters
     ----------
@@ -51,7 +45,6 @@ def lines_source(name: str, outputs: Mapping[str, Expression]) -> str:
     lines: list[str] = []
     for item in ordered(outputs.values()):
         if item.arguments:
-            # the underscore: Numba names a load of t7 at 2854 as it names one of t72 at 854
             target = f"t{len(lines)}_"
             lines.append(f"{target} = {spelt(item, names)}")
             names[id(item)] = target
@@ -92,7 +85,7 @@ def operations_source(lines: Mapping[str, str], slots: Mapping[str, int], width:
     Returns
     -------
     str
-        Their source, see `plant.compiled.intrinsics.stepping`.
+        Their source, see `plant.compiled.native.operations.stepping`.
     """
     made = "\n".join(f"{name}_at = stepping(SLOTS, {width}, {name})" for name in lines)
     return "\n\n\n".join([*lines.values(), f"SLOTS = {dict(slots)}\n\n{made}"])

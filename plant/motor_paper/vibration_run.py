@@ -5,12 +5,12 @@ the new velocity; with order 1 the fractional damper is the viscous one to the l
 """
 
 from functools import cache
-from types import ModuleType
 
 import numpy as np
 
 from plant.arrays import Array
-from plant.compiled.kernel_file import load_kernel
+from plant.compiled.native.load import NativeKernel, load_native
+from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import kernel_text, pasted
 from plant.motor_paper.fractional import fractional_history, fractional_push, gl_weights
 from plant.motor_paper.vibration_model import VibrationParameters, reduced_stiffness
@@ -32,7 +32,7 @@ def forced_vibration(
         On the cylinder [N].
     start, speed : float
         Displacement and velocity at the first sample [m], [m/s].
-    constants : tuple of float
+    constants : tuple (float; float; float; float; float)
         Mass [kg], stiffness [N/m], cubic stiffness [N/m^3], damping [N s/m], and fractional damping over ``h**a``
         [N/m].
     weights : ndarray, shape (m,)
@@ -63,12 +63,13 @@ def forced_vibration(
 
 
 @cache
-def _kernel() -> ModuleType:
+def _kernel() -> NativeKernel:
     parts = (
-        pasted(fractional_history, options='cache=True, nogil=True, fastmath={"reassoc", "contract"}'),
+        pasted(fractional_history, freely=("reassoc", "contract")),
         pasted(fractional_push, forced_vibration),
     )
-    return load_kernel("vibration", kernel_text("forced vibration with cubic spring and fractional damping", *parts))
+    text = kernel_text("forced vibration with cubic spring and fractional damping", *parts)
+    return load_native("vibration", text, {"forced_vibration": signature_of(forced_vibration)})
 
 
 def vibration_run(

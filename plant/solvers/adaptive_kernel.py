@@ -17,7 +17,7 @@ from plant.compiled.hoist import hoisted
 from plant.compiled.native.load import load_native
 from plant.compiled.native.machine import native_width
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import MERGED, kernel_text, pasted
+from plant.compiled.paste import kernel_text, pasted
 from plant.compiled.simplify import fused, share_ratios, simplified
 from plant.compiled.source import lines_source, operations_source
 from plant.solvers.adaptive_loop import INNER, ROUNDEST, TINY, run_controlled, smooth
@@ -155,7 +155,7 @@ def _text(name: str, derivative: Derivative, width: int, parameter_class: type[P
     sizes = {"LANES": lanes, "VECTOR": vector, "WIDTH": width, "COLUMNS": len(names), "NUMBERS": lanes * len(every)}
     parts = (
         operations_source(lines, slots, vector) + f"\nmove = moving({lanes})",
-        pasted(*INNER, constants={**sizes, "TINY": TINY, "ROUNDEST": ROUNDEST}, options=MERGED),
+        pasted(*INNER, constants={**sizes, "TINY": TINY, "ROUNDEST": ROUNDEST}, inlined=True),
         pasted(smooth, run_controlled),
     )
     title = f"trajectories of the {name} plant in steps of controlled error, {lanes} side by side"

@@ -16,7 +16,7 @@ from plant.compiled.native.load import load_native
 from plant.compiled.native.machine import native_width
 from plant.compiled.native.signature import signature_of
 from plant.compiled.pack import packed_source
-from plant.compiled.paste import MERGED, kernel_text, pasted
+from plant.compiled.paste import kernel_text, pasted
 from plant.compiled.simplify import fused, simplified
 from plant.compiled.source import lines_source, operations_source
 from plant.solvers.fixed_step_loops import lay, run_side_by_side, share
@@ -65,7 +65,7 @@ def compile_fixed_step(
     title = f"trajectories of the {name} plant in fixed steps, {lanes} side by side"
     parts = (
         operations_source(lines, slots, vector),
-        pasted(lay, share, constants=sizes, options=MERGED),
+        pasted(lay, share, constants=sizes, inlined=True),
         pasted(run_side_by_side),
     )
     takes = signature_of(run_side_by_side, lanes=lanes, states=width)

@@ -12,10 +12,10 @@ import numpy as np
 from plant.arrays import Array
 
 Operation: TypeAlias = Callable[[int, float], None]
-"""``operation(address, j)``: works on numbers in memory from an address on (`plant.compiled.intrinsics.stepping`)."""
+"""``operation(address, j)``: works on numbers in memory (`plant.compiled.native.operations.stepping`)."""
 
 Advance: TypeAlias = Callable[[Any, int], Any]
-"""``advance(numbers, address)``: a tuple of one and of numbers in memory (`plant.compiled.intrinsics.advancing`)."""
+"""``advance(numbers, address)``: on a tuple and on numbers in memory (`plant.compiled.native.operations.advancing`)."""
 
 
 class RunKernel(Protocol):

@@ -1,9 +1,6 @@
 """A linear process model, on which every filter has a textbook answer."""
 
-from collections.abc import Callable, Mapping
-from functools import partial
-from inspect import Parameter, signature
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
@@ -60,17 +57,3 @@ def transition() -> Array:
 def observation() -> Array:
     """H of the linear model, in SI."""
     return np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.25]])
-
-
-@pytest.fixture(scope="session")
-def as_python() -> Callable[..., Callable[..., Any]]:
-    """Return what makes of a loop as it is written, and of its kernel's own function, one that runs in Python.
-
-    The kernel gives it the sizes, and the functions that tracing wrote.
-    """
-
-    def bound(loop: Callable[..., Any], compiled: Any) -> Callable[..., Any]:
-        names = (p.name for p in signature(loop).parameters.values() if p.kind is Parameter.KEYWORD_ONLY)
-        return partial(loop, **{name: compiled.py_func.__globals__[name] for name in names})
-
-    return bound

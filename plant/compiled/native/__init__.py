@@ -11,5 +11,5 @@ with what `signature` reads off the documentation. `load` puts them together; `l
 module.
 
 Two departures from Python: a negative index counts from the end where it is a literal, and nowhere else; a whole
-number divided by zero gives zero, as with Numba.
+number divided by zero gives zero.
 """

@@ -66,6 +66,10 @@ def call(scope: Scope, node: ast.Call, read: Read) -> Held:
         return scope.program.call(name, given, scope)
     if module is None and name in _BUILTINS:
         return _BUILTINS[name](scope, given)
+    if module == "math" and name == "copysign":
+        size, sign = (f"double {convert(scope, one, FLOAT).parts[0]}" for one in given)
+        scope.program.declare("declare double @llvm.copysign.f64(double, double)")
+        return Held(FLOAT, (scope.op(f"call double @llvm.copysign.f64({size}, {sign})"),))
     if module is not None and name in _PREDICATES:
         part = convert(scope, given[0], FLOAT).parts[0]
         return Held(BOOL, (scope.op(_PREDICATES[name].format(part)),))

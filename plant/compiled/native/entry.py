@@ -98,22 +98,8 @@ class Entry:
         ValueError
             If an array has another shape, or overlaps with one that is changed.
         """
-        if len(given) != len(self._takes):
-            names = ", ".join(argument.name for argument in self._takes)
-            raise TypeError(f"{self.__name__} takes {len(self._takes)} arguments ({names}), got {len(given)}")
-        laid = _Given([], [], [], [], {})
-        for (argument, dtype, changed), value in zip(self._plan, given, strict=True):
-            if type(value) is np.ndarray and value.dtype is dtype and value.flags.carray:
-                self._place(argument, value, laid, changed=changed)
-            else:
-                self._lay(argument, value, laid, changed=changed)
-        if self._written:
-            self._apart(laid)
+        laid, packed = self._laid_out(given)
         room = self._room()
-        try:
-            packed = self._layout.pack(*laid.numbers)
-        except struct.error:
-            self._fail("a whole number", "64 bits", "more")
         self._call(packed, room)
         for array, copy in laid.back:
             array[...] = copy
@@ -125,6 +111,44 @@ class Entry:
         if ctypes.c_void_p.from_address(pointer).value:
             self._release(pointer, None)
         return result
+
+    def again(self, *given: Any) -> Callable[[], None]:
+        """Return a call on these arguments, laid out once: for a loop that fills the same arrays again and again.
+
+        Raises
+        ------
+        TypeError
+            If an argument is of another kind, or would have to be copied, or if the kernel returns something.
+        ValueError
+            As for a call.
+        """
+        laid, packed = self._laid_out(given)
+        if laid.copies or self._results.size:
+            raise TypeError(f"{self.__name__}: what is called again takes arrays as they are and returns nothing")
+        room = self._room()
+
+        def call(_kept: Sequence[Any] = given) -> None:  # the arrays live as long as the call
+            self._call(packed, room)
+
+        return call
+
+    def _laid_out(self, given: Sequence[Any]) -> tuple[_Given, bytes]:
+        """Return arguments as they are laid out for the machine code."""
+        if len(given) != len(self._takes):
+            names = ", ".join(argument.name for argument in self._takes)
+            raise TypeError(f"{self.__name__} takes {len(self._takes)} arguments ({names}), got {len(given)}")
+        laid = _Given([], [], [], [], {})
+        for (argument, dtype, changed), value in zip(self._plan, given, strict=True):
+            if type(value) is np.ndarray and value.dtype is dtype and value.flags.carray:
+                self._place(argument, value, laid, changed=changed)
+            else:
+                self._lay(argument, value, laid, changed=changed)
+        if self._written:
+            self._apart(laid)
+        try:
+            return laid, self._layout.pack(*laid.numbers)
+        except struct.error:
+            self._fail("a whole number", "64 bits", "more")
 
     def _fail(self, what: str, wanted: str, came: str) -> NoReturn:
         raise TypeError(f"{self.__name__}: {what} must be {wanted}, got {came}")

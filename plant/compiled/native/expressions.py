@@ -211,6 +211,8 @@ def _attribute(scope: Scope, node: ast.Attribute) -> Held:
             return several([Held(INT, (length,)) for length in value.lengths])
         case "T":
             return arrays.transposed(scope, value)
+        case name if isinstance(value.kind, Several) and name in value.kind.names:
+            return value.items[value.kind.names.index(name)]
         case "real" | "imag" if value.kind == COMPLEX:
             return Held(FLOAT, (value.parts[node.attr == "imag"],))
         case _:

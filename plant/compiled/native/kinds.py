@@ -89,9 +89,16 @@ class Range:
 
 @dataclass(frozen=True)
 class Several:
-    """A tuple."""
+    """A tuple.
+
+    Parameters
+    ----------
+    names : tuple of str
+        By which its items are read too, of a named tuple.
+    """
 
     items: tuple["AnyKind", ...]
+    names: tuple[str, ...] = ()
 
     @property
     def parts(self) -> tuple[str, ...]:

@@ -1,7 +1,6 @@
 """Straight lines of a kernel as instructions, on one number or on several side by side.
 
-What `plant.compiled.vector` and `plant.compiled.intrinsics` are to Numba, this file is here: the same lines, the same
-instructions, the same bits.
+The same lines serve one filter and many side by side, and give both the same bits.
 """
 
 import ast

@@ -46,7 +46,7 @@ class Loop(Generic[Parameters, Result]):
 def text_of(loop: Loop[..., Any]) -> str:
     """Return the text of a kernel: a loop, all that it calls, and their constants."""
     loops, constants = needed(loop)
-    texts = [pasted(one.__wrapped__, options=f"fastmath={one.freely}") for one in loops]
+    texts = [pasted(one.__wrapped__, freely=one.freely) for one in loops]
     return "\n\n".join([*(f"{key} = {value!r}" for key, value in constants.items()), *texts])
 
 

@@ -291,11 +291,11 @@ def _hints(node: ast.FunctionDef) -> tuple[str, bool]:
     flags: set[str] = set()
     inlined = False
     for decorator in node.decorator_list:
-        for keyword in decorator.keywords if isinstance(decorator, ast.Call) else ():
-            value = ast.literal_eval(keyword.value)
-            if keyword.arg == "fastmath":
-                flags = set(value)
-            inlined = (
-                inlined or (keyword.arg == "inline" and value == "always") or (keyword.arg == "forceinline" and value)
-            )
+        match decorator:
+            case ast.Name("inlined"):
+                inlined = True
+            case ast.Call(ast.Name("freely"), given):
+                flags |= {str(ast.literal_eval(one)) for one in given}
+            case _:
+                raise KernelError(f"the decorator {ast.unparse(decorator)} means nothing here")
     return "".join(f"{flag} " for flag in sorted(flags)), inlined

@@ -7,9 +7,9 @@ import ast
 import inspect
 import re
 import textwrap
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TypeAlias
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias, get_type_hints
 
 from plant.compiled.native.kinds import BOOL, COMPLEX, FLOAT, INT, AnyKind, ArrayKind, ScalarKind, Several
 
@@ -44,7 +44,7 @@ class Argument:
 Signature: TypeAlias = tuple[Argument, ...]
 
 
-def signature(documentation: str) -> Signature:
+def signature(documentation: str, known: Collection[str] = ()) -> Signature:
     r"""Read a kernel's arguments off the parameters of a numpydoc text.
 
     Parameters
@@ -52,6 +52,8 @@ def signature(documentation: str) -> Signature:
     documentation : str
         Entries such as ``drive : ndarray, shape (n, 2)``; a whole number or a name as a length is checked, what else
         stands there (``up to lanes``) is not. What begins with white space is an explanation.
+    known : collection of str
+        Arguments that are left out, since what they are is known.
 
     Raises
     ------
@@ -70,7 +72,7 @@ def signature(documentation: str) -> Signature:
         match = _ENTRY.match(line)
         if match:
             names = match[1].split(", ")
-            found += [_argument(name, match[2], place) for place, name in enumerate(names)]
+            found += [_argument(name, match[2], place) for place, name in enumerate(names) if name not in known]
     return tuple(found)
 
 
@@ -128,32 +130,46 @@ def signature_of(function: Callable[..., object], **lengths: int) -> Signature:
     >>> [argument.name for argument in signature_of(mean)]
     ['values', 'first']
     """
-    text = inspect.getdoc(function) or _documentation(function)
-    section = text.partition("Parameters\n----------\n")[2]
-    section = re.split(r"\n\n\w+\n-{3,}\n", section)[0]
-    found = {argument.name: argument for argument in signature(section)}
     names = [
         name
         for name, one in inspect.signature(function).parameters.items()
         if name != "kernel" and one.kind is not one.KEYWORD_ONLY
     ]
-    hinted = {name: _HINTED[hint] for name, hint in function.__annotations__.items() if hint in _HINTED}
-    found = {name: Argument(name, kind) for name, kind in hinted.items() if name in names} | found
+    hints = {name: hint for name, hint in function.__annotations__.items() if name in names}
+    hinted = {name: Argument(name, _HINTED[hint]) for name, hint in hints.items() if hint in _HINTED}
+    named = {name: _named_tuple(name, hint) for name, hint in hints.items() if hasattr(hint, "_fields")}
+    found = hinted | _documented(function, named) | named
     if set(names) != set(found):
         raise ValueError(f"{function.__qualname__} takes {names}, its documentation has {list(found)}")
     return tuple(_with(found[name], lengths) for name in names)
 
 
+def _named_tuple(name: str, of: Any) -> Argument:
+    """Return an argument that is a named tuple, of numbers or of arrays whose shapes its documentation has."""
+    shown, hints = _documented(of), get_type_hints(of)
+    items = [shown.get(field) or Argument(field, _HINTED[hints[field]]) for field in of._fields]
+    kind = Several(tuple(item.kind for item in items), of._fields)
+    return Argument(name, kind, items=tuple(replace(item, name=f"{name}.{item.name}") for item in items))
+
+
+def _documented(what: Any, known: Collection[str] = ()) -> dict[str, Argument]:
+    """Return what the documentation of a function or a named tuple has, but for what is known, by name."""
+    text = inspect.getdoc(what) or _documentation(what)
+    section = text.partition("Parameters\n----------\n")[2]
+    section = re.split(r"\n\n\w+\n-{3,}\n", section)[0]
+    return {argument.name: argument for argument in signature(section, known)}
+
+
 def _with(argument: Argument, lengths: dict[str, int]) -> Argument:
     known = tuple(lengths.get(one, one) if isinstance(one, str) else one for one in argument.lengths)
-    return Argument(argument.name, argument.kind, known, argument.items)
+    return Argument(argument.name, argument.kind, known, tuple(_with(item, lengths) for item in argument.items))
 
 
-def _documentation(function: Callable[..., object]) -> str:
-    """Return a function's documentation where Python has thrown it away (``python -OO``)."""
-    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+def _documentation(what: Any) -> str:
+    """Return the documentation of a function or a class where Python has thrown it away (``python -OO``)."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(what)))
     node = tree.body[0]
-    return (ast.get_docstring(node) if isinstance(node, ast.FunctionDef) else None) or ""
+    return (ast.get_docstring(node) if isinstance(node, ast.FunctionDef | ast.ClassDef) else None) or ""
 
 
 def spelt(kind: AnyKind) -> object:

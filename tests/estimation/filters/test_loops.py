@@ -1,8 +1,6 @@
 """Loops are Python: run as they are written they give, to the last bit, what the kernels pasted from them give."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,8 +14,8 @@ from estimation.models.model import ProcessModel
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from tests.estimation.filters.banks import Mode, MultipleModelEstimate, run_imm
+from tests.kernels import functions_of, text_of
 
-AsPython = Callable[..., Callable[..., Any]]
 PRIOR = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1e-4, 1e-3, 1.0]))
 
 
@@ -40,22 +38,23 @@ def assert_same(plain: Trace, compiled: Trace) -> None:
         np.testing.assert_array_equal(getattr(plain, field), getattr(compiled, field), err_msg=field)
 
 
-def test_the_smoother(linear: ProcessModel, as_python: AsPython, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_smoother(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> None:
     problem = task(linear)
     compiled = smoother.smoother(problem)
-    kernel = smoother.compile_smoother(problem.model, problem.channels, "none")
-    loops = {name: as_python(getattr(smoother_loops, name), getattr(kernel, name)) for name in ("forward", "backward")}
-    monkeypatch.setattr(smoother, "compile_smoother", lambda *_: SimpleNamespace(**loops))
+    given = problem.model, problem.channels, "none"
+    compile_it = smoother_loops.compile_smoother.__wrapped__
+    kernel = functions_of(text_of(monkeypatch, smoother_loops, lambda: compile_it(*given)))
+    monkeypatch.setattr(smoother, "compile_smoother", lambda *_: kernel)
     assert_same(smoother.smoother(problem), compiled)
 
 
-def test_the_iterated_smoother(linear: ProcessModel, as_python: AsPython, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_iterated_smoother(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> None:
     problem = replace(task(linear), robust="huber")
     compiled = iterated_smoother.iterated_smoother(problem)
-    kernel = iterated_smoother.compile_trajectory(problem.model, problem.channels, "huber")
-    names = ("roll", "forward", "backward", "spread_back", "reweigh")
-    loops = {name: as_python(getattr(trajectory_loops, name), getattr(kernel, name)) for name in names}
-    monkeypatch.setattr(iterated_smoother, "compile_trajectory", lambda *_: SimpleNamespace(**loops))
+    given = problem.model, problem.channels, "huber"
+    compile_it = trajectory_loops.compile_trajectory.__wrapped__
+    kernel = functions_of(text_of(monkeypatch, trajectory_loops, lambda: compile_it(*given)))
+    monkeypatch.setattr(iterated_smoother, "compile_trajectory", lambda *_: kernel)
     assert_same(iterated_smoother.iterated_smoother(problem), compiled)
 
 
@@ -64,14 +63,12 @@ def bank(model: ProcessModel) -> MultipleModelEstimate:
     return run_imm(modes, PRIOR, record(), dwell_time=0.01, keep_innovations=True)
 
 
-def test_the_bank_of_interacting_models(
-    linear: ProcessModel, as_python: AsPython, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    compiled, compile_imm = bank(linear), imm.compile_imm
+def test_the_bank_of_interacting_models(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    compiled, compile_imm = bank(linear), imm_loops.compile_imm
 
     def in_python(*what: Any) -> imm_loops.ImmKernel:
-        kernel = compile_imm(*what)
-        return replace(kernel, run=as_python(imm_loops.run, kernel.run))
+        text = text_of(monkeypatch, imm_loops, lambda: compile_imm.__wrapped__(*what))
+        return replace(compile_imm(*what), run=functions_of(text).run)
 
     monkeypatch.setattr(imm, "compile_imm", in_python)
     plain = bank(linear)
@@ -81,10 +78,11 @@ def test_the_bank_of_interacting_models(
         np.testing.assert_array_equal(getattr(plain.estimate, name), getattr(compiled.estimate, name), err_msg=name)
 
 
-def test_the_particle_filter(linear: ProcessModel, as_python: AsPython, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_particle_filter(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> None:
     problem = task(linear)
     compiled = particle.particle_filter(problem, 20, np.random.default_rng(1))
-    run = as_python(particle.run, particle.compile_particles(problem.model, problem.channels))
+    compile_it = particle.compile_particles.__wrapped__
+    run = functions_of(text_of(monkeypatch, particle, lambda: compile_it(problem.model, problem.channels))).run
     monkeypatch.setattr(particle, "compile_particles", lambda *_: run)
     plain = particle.particle_filter(problem, 20, np.random.default_rng(1))
     for field in Trace._fields:  # powers and exponentials of Python may round the other way

@@ -2,8 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -28,6 +26,7 @@ from plant.eha.simulate import LUMPED, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, drop_samples
 from tests.estimation.tuning.likelihood_fit import LUMPED_FORM
+from tests.kernels import functions_of, text_of
 
 Array = NDArray[np.float64]
 RIG = EhaParameters()
@@ -117,7 +116,7 @@ def test_the_information_is_the_covariance_of_the_scores() -> None:
 
 
 def test_the_loop_run_as_python_gives_what_its_kernel_gives(
-    linear: ProcessModel, as_python: Callable[..., Callable[..., Any]], monkeypatch: pytest.MonkeyPatch
+    linear: ProcessModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rng = np.random.default_rng(4)
     seen = {name: rng.normal(size=6) for name in ("position_m", "velocity_m_s")}
@@ -127,8 +126,9 @@ def test_the_loop_run_as_python_gives_what_its_kernel_gives(
     problem = filter_problem(linear, prior, record, RIG, variances={"position_m": 1e-2, "velocity_m_s": 0.1})
     directions = rng.normal(size=(len(constant_row(problem, {})), 2))
     compiled = innovation_sensitivity(problem, directions)
-    run = as_python(sensitivity.run, sensitivity._compile(EKF, linear, problem.channels).run)
-    monkeypatch.setattr(sensitivity, "_compile", lambda *_: SimpleNamespace(run=run))
+    compile_it = sensitivity._compile.__wrapped__
+    kernel = functions_of(text_of(monkeypatch, sensitivity, lambda: compile_it(EKF, linear, problem.channels)))
+    monkeypatch.setattr(sensitivity, "_compile", lambda *_: kernel)
     plain = innovation_sensitivity(problem, directions)
     for name in ("residuals", "variances", "residual_slopes", "variance_slopes"):
         np.testing.assert_array_equal(getattr(plain, name), getattr(compiled, name), err_msg=name)

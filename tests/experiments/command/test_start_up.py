@@ -21,7 +21,6 @@ DEAR = {
     "filterpy",
     "jinja2",
     "matplotlib",
-    "numba",
     "pandas",
     "pint",
     "rich",
@@ -73,7 +72,7 @@ def test_a_verb_on_a_log_imports_nothing_dear(logs: dict[str, Path], verb: str, 
 
 
 def test_help_imports_no_arithmetic() -> None:
-    assert not (DEAR - {"rich"} | {"numpy", "numba", "pyarrow"}) & loaded_by(["estimate", "--help"])
+    assert not (DEAR - {"rich"} | {"numpy", "pyarrow"}) & loaded_by(["estimate", "--help"])
 
 
 @pytest.mark.parametrize(("arguments", "code"), [(["conditions", "--json"], 0), (["estimate"], 2)])

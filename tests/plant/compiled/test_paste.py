@@ -1,4 +1,4 @@
-"""What is pasted into a kernel file is the function as written, less what a kernel has no use for."""
+"""What is pasted into a kernel is the function as written, less what a kernel has no use for."""
 
 import math
 from pathlib import Path
@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from plant.compiled.kernel_file import load_kernel
-from plant.compiled.paste import INLINED, bare_text, kernel_text, pasted
+from plant.compiled.native.load import load_native
+from plant.compiled.native.signature import signature
+from plant.compiled.paste import bare_text, kernel_text, pasted
 
 LIMIT = 3.0
 
@@ -30,9 +31,10 @@ def test_annotations_docstrings_and_comments_stay_behind() -> None:
 
 
 def test_a_pasted_function_computes_what_the_function_does() -> None:
-    text = kernel_text("a sum", pasted(clipped, options=INLINED, constants={"LIMIT": LIMIT}), pasted(total))
+    text = kernel_text("a sum", pasted(clipped, inlined=True, constants={"LIMIT": LIMIT}), pasted(total))
     values = np.array([0.5, 4.0, 16.0])
-    assert load_kernel("pasted_sum", text).total(values) == total(values)
+    kernel = load_native("pasted_sum", text, {"total": signature("values : ndarray, shape (n,)")})
+    assert kernel.total(values) == total(values)
 
 
 def test_only_what_def_defines_can_be_pasted() -> None:

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from benchmarks.peers.stiff_solvers import compile_model, reference_trajectory
+from benchmarks.peers.compiled_model import compile_model
+from benchmarks.peers.stiff_solvers import reference_trajectory
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.eha.model import PARAMETER_NAMES, EhaParameters, lumped_step, reduced_derivative
 from plant.eha.simulate import LUMPED, REDUCED

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.peers.stiff_solvers import Method, compile_model, reference_trajectory
+from benchmarks.peers.compiled_model import compile_model
+from benchmarks.peers.stiff_solvers import Method, reference_trajectory
 from plant.eha.circuit import circuit_derivative, circuit_scales
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.drives import sine

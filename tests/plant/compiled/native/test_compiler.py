@@ -194,7 +194,7 @@ def twofold(x: float) -> float:
 @pytest.mark.parametrize(
     ("function", "told"),
     [
-        (unknown, r"kernel unknown: unknown, line 4: with open\('x'\) as file:: With is not compiled"),
+        (unknown, r"kernel unknown: unknown, line 3: with open\('x'\) as file:: With is not compiled"),
         (twofold, "two names"),
     ],
 )

@@ -69,6 +69,19 @@ def test_what_does_not_fit_is_named(add: Any, given: tuple[Any, ...], error: typ
         add(*given)
 
 
+def test_a_call_on_the_same_arrays_is_laid_out_once() -> None:
+    text = "def double(values, result):\n    for i in range(len(values)):\n        result[i] = 2.0 * values[i]\n"
+    entry = load_native("doubling", text, {"double": signature("values, result : ndarray, shape (n,)")}).double
+    values, result = np.array([1.0, 2.0]), np.empty(2)
+    call = entry.again(values, result)
+    for size in (1.0, 3.0):
+        values[:] = size
+        call()
+        assert result.tolist() == [2.0 * size] * 2
+    with pytest.raises(TypeError, match="takes arrays as they are and returns nothing"):
+        entry.again(values[::-1], result)
+
+
 def test_python_runs_on_while_a_kernel_runs() -> None:
     text = "def turn(n):\n    x = 0.5\n    for k in range(n):\n        x = 3.7 * x * (1.0 - x)\n    return x\n"
     turn = load_native("turn", text, {"turn": signature("n : int")}).turn

@@ -1,0 +1,50 @@
+"""What the loops over a trajectory read, and a log that is linearised along it."""
+
+from typing import NamedTuple
+
+from estimation.arrays import Array
+
+
+class Lines(NamedTuple):
+    """The log linearised along a trajectory, sample by sample [dimensionless; of residual and variance, SI].
+
+    Parameters
+    ----------
+    F : ndarray, shape (samples, n, n)
+        Jacobian of the step before each sample.
+    gain, slope : ndarray, shape (samples, channels, n)
+        The filter's gain, and the derivative of each channel.
+    residual, variance : ndarray, shape (samples, channels)
+        Innovations and their variances, NaN where nothing is measured.
+    kept : ndarray, shape (rows, n, n)
+        Covariance at every so many samples.
+    """
+
+    F: Array
+    gain: Array
+    slope: Array
+    residual: Array
+    variance: Array
+    kept: Array
+
+
+class Log(NamedTuple):
+    """What the kernel reads; only the spread is changed, where outliers count for less.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (constants,)
+        Constants of the model.
+    drives, measured : ndarray, shapes (samples, drives) and (samples, channels)
+        The log [SI].
+    spread : ndarray, shape (samples, channels)
+        Variances of the samples [SI squared].
+    substeps : int
+        Steps a sample.
+    """
+
+    rows: Array
+    drives: Array
+    measured: Array
+    spread: Array
+    substeps: int

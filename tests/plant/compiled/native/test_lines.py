@@ -1,0 +1,71 @@
+"""What lines compute as instructions is what they compute in Python, to the bit, for one number and for several."""
+
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from plant.compiled.native.kinds import KernelError
+from plant.compiled.native.load import load_native
+from plant.compiled.native.signature import signature
+from plant.compiled.paste import kernel_text, pasted
+from tests.kernels import OPERATIONS, in_python, stepped
+
+exp, fma, log, present, sign, sqrt, tanh, where = (
+    OPERATIONS[name] for name in ("exp", "fma", "log", "present", "sign", "sqrt", "tanh", "where")
+)
+
+X = np.array([0.7, -1.3, 0.0, 2.5e-8, -4e3, 1.0, 12.0, -0.1])
+Y = np.array([-0.2, 0.4, 1.0, 3.0, 1e-3, 1.0, -12.0, 5e5])
+
+
+def plain(x: Any, y: Any) -> Mapping[str, Any]:
+    smooth = exp(-abs(x) / 7.0) + tanh(y - 0.5) * 2.0 - log(1.0 + y * y)
+    chosen = where(x <= y, where(y > 1.0, 3.0, x), where(x >= 4.0, y, sign(x) - sign(0.1 - y)))
+    return {"a": smooth, "b": chosen, "c": sqrt(x * x + 1.0), "d": 0.25, "e": where(x < 0.0, 1.0, 0.0)}
+
+
+def fused(x: Any, y: Any) -> Mapping[str, Any]:
+    return {"a": fma(x, y, 0.1), "b": fma(-x, 3.0, y), "c": where(present(0.0 / x), 1.0, 2.0)}
+
+
+def of(lines: Callable[..., Mapping[str, Any]], width: int) -> dict[str, list[float]]:
+    """What lines give of `X` and `Y`, so many at a time."""
+    found = stepped(pasted(lines), lines.__name__, {"x": X, "y": Y}, "abcde", width)
+    return {name: values.tolist() for name, values in found.items()}
+
+
+@pytest.mark.parametrize("width", [1, 2, 8])
+def test_lines_compute_what_python_does(width: int) -> None:
+    wanted = [in_python(plain)(x, y) for x, y in zip(X.tolist(), Y.tolist(), strict=True)]
+    assert of(plain, width) == {name: [one[name] for one in wanted] for name in "abcde"}
+
+
+@pytest.mark.parametrize("width", [1, 8])
+def test_a_fused_product_is_rounded_once_and_what_is_no_number_is_seen(width: int) -> None:
+    pairs = [(Fraction(x), Fraction(y)) for x, y in zip(X.tolist(), Y.tolist(), strict=True)]
+    found = of(fused, width)
+    assert found["a"] == [float(x * y + Fraction(0.1)) for x, y in pairs]
+    assert found["b"] == [float(y - 3 * x) for x, y in pairs]
+    assert found["c"] == [1.0 if x else 2.0 for x, _ in pairs]
+
+
+def both(x: float, y: float, *, of_both: Callable[[tuple[float, float]], tuple[float, ...]]) -> tuple[float, ...]:
+    return of_both((x, y))
+
+
+def test_a_function_of_numbers_gives_a_tuple() -> None:
+    text = kernel_text("lines of two numbers", pasted(plain), "of_both = function_of(plain, 5)", pasted(both))
+    kernel = load_native("lines_of_two", text, {"both": signature("x, y : float")})
+    assert kernel.both(0.7, -0.2) == tuple(in_python(plain)(0.7, -0.2).values())
+
+
+def wild(x: Any) -> Mapping[str, Any]:
+    return {"a": OPERATIONS["sin"](x)}
+
+
+def test_what_is_no_line_is_refused() -> None:
+    with pytest.raises(KernelError, match="is none of the operations that are compiled"):
+        stepped(pasted(wild), "wild", {"x": X}, "a", 1)

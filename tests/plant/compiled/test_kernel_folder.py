@@ -1,0 +1,14 @@
+"""Where compiled kernels are kept."""
+
+from pathlib import Path
+
+import pytest
+
+from plant.compiled.kernel_folder import cache_folder
+
+
+def test_the_environment_moves_the_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HYDROSTATE_CACHE", str(tmp_path / "kernels"))
+    assert cache_folder() == tmp_path / "kernels"
+    monkeypatch.delenv("HYDROSTATE_CACHE")
+    assert cache_folder().name == "hydrostate"
