@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from estimation.equations.definition import Parameter as Parameter
     from estimation.finding import Finding as Finding
     from estimation.identification.model.linear_model import LinearModel as LinearModel
+    from experiments.log_pages.own_equations import GreyBox as GreyBox
     from experiments.log_pages.relation import Relation
     from experiments.published import load as published_table
     from faults.conditions import CONDITIONS as conditions  # noqa: N811 - a face has plain names
@@ -36,11 +38,13 @@ __all__ = [
     "Answer",
     "Condition",
     "Finding",
+    "GreyBox",
     "HydrostateError",
     "LinearModel",
     "Log",
     "LogError",
     "Model",
+    "Parameter",
     "Record",
     "Rig",
     "RigError",

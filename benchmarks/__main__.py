@@ -17,6 +17,7 @@ NAMES = (
     "identification",
     "identification_tests",
     "identification_sets",
+    "own_equations",
     "circuit",
     "detection",
     "forecast",

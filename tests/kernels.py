@@ -76,7 +76,7 @@ def where(condition: bool, a: float, b: float) -> float:
 
 
 OPERATIONS: Mapping[str, Callable[..., Any]] = {
-    **{name: getattr(math, name) for name in ("sqrt", "exp", "log", "tanh")},
+    **{name: getattr(math, name) for name in ("sqrt", "exp", "log", "tanh", "sin", "cos", "atan")},
     "fma": fma,
     "where": where,
     "sign": lambda x: where(x > 0.0, 1.0, where(x < 0.0, -1.0, 0.0)),

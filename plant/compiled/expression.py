@@ -6,7 +6,7 @@ its size grows with the model's operations, not with the size of the expanded fo
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 Number: TypeAlias = float | int
 
@@ -68,9 +68,12 @@ class Expression:
     def __rtruediv__(self, other: Number) -> "Expression":
         return as_expression(other) / self
 
-    def __pow__(self, exponent: Number) -> "Expression":
-        if exponent != int(exponent):
-            raise TypeError(f"a model may raise to whole powers only, beside sqrt and exp, got {exponent}")
+    def __pow__(self, exponent: "Expression | Number") -> "Expression":
+        if isinstance(exponent, Expression) or exponent != int(exponent):
+            got = "a symbol" if isinstance(exponent, Expression) else exponent
+            raise TypeError(
+                f"a model may raise to whole powers only, beside sqrt and exp, got {got}: write exp(power * log(x))"
+            )
         result: Expression = ONE
         for _ in range(abs(int(exponent))):
             result = result * self
@@ -101,6 +104,16 @@ class Expression:
         raise TypeError("a model must compare with <, <=, > or >=, not with == or !=: its values are symbols here")
 
     __hash__ = object.__hash__
+
+    def __array_ufunc__(self, function: Any, method: str, *arguments: Any, **options: Any) -> "Expression":
+        from plant.compiled.numpy_calls import called
+
+        return called(function, method, arguments, options)
+
+    def __array_function__(self, function: Any, types: Any, arguments: Any, options: Any) -> "Expression":
+        from plant.compiled.numpy_calls import chosen
+
+        return chosen(function, arguments, options)
 
     def __bool__(self) -> bool:
         raise TypeError("a model must choose with where(condition, a, b), not with if: its values are symbols here")
@@ -164,7 +177,7 @@ ONE = constant(1.0)
 
 
 def unary(operation: str, a: Expression) -> Expression:
-    """Return a one-argument function of a node: ``abs sign sqrt exp tanh``."""
+    """Return a one-argument function of a node: ``abs sign sqrt exp log tanh sin cos atan``."""
     return node(operation, a)
 
 
@@ -243,6 +256,12 @@ def local_derivatives(item: Expression) -> Sequence[Expression]:
             return (ONE / a,)
         case "tanh":
             return (ONE - item * item,)
+        case "sin":
+            return (unary("cos", a),)
+        case "cos":
+            return (-unary("sin", a),)
+        case "atan":
+            return (ONE / (ONE + a * a),)
         case "where":
             return ZERO, select(a, ONE, ZERO), select(a, ZERO, ONE)
         case "sign" | "<" | "<=" | ">" | ">=" | "present":

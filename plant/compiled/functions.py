@@ -83,6 +83,54 @@ def tanh(x: Scalar) -> Scalar:
     return _apply("tanh", x)
 
 
+def sin(x: Scalar) -> Scalar:
+    """Return the sine.
+
+    Parameters
+    ----------
+    x : float, ndarray of shape (runs,), or Expression
+        Angle [rad].
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Between -1 and 1.
+    """
+    return _apply("sin", x)
+
+
+def cos(x: Scalar) -> Scalar:
+    """Return the cosine.
+
+    Parameters
+    ----------
+    x : float, ndarray of shape (runs,), or Expression
+        Angle [rad].
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Between -1 and 1.
+    """
+    return _apply("cos", x)
+
+
+def arctan(x: Scalar) -> Scalar:
+    """Return the angle of a tangent.
+
+    Parameters
+    ----------
+    x : float, ndarray of shape (runs,), or Expression
+        Dimensionless.
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Angle between -pi/2 and pi/2 [rad].
+    """
+    return unary("atan", x) if isinstance(x, Expression) else np.arctan(x)
+
+
 def sign(x: Scalar) -> Scalar:
     """Return -1, 0 or 1; held constant in derivatives.
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from plant.compiled.expression import Expression, ordered
 
-CALLED = ("present", "sign", "sqrt", "exp", "log", "tanh", "ratios", "roots", "where", "fma")
+CALLED = ("present", "sign", "sqrt", "exp", "log", "tanh", "sin", "cos", "atan", "ratios", "roots", "where", "fma")
 """Functions that lines call (`plant.compiled.native.lines`): no symbol may have their names."""
 
 _CALLS: Mapping[str, str] = {

@@ -23,9 +23,7 @@ KINDS: Mapping[str, str] = {
     "fms": "fused products",
     "/": "divisions",
     "sqrt": "square roots",
-    "exp": "calls of exp, log, tanh",
-    "log": "calls of exp, log, tanh",
-    "tanh": "calls of exp, log, tanh",
+    **dict.fromkeys(("exp", "log", "tanh", "sin", "cos", "atan"), "calls of exp, log, tanh"),
     "abs": "choices and comparisons",
     "sign": "choices and comparisons",
     "where": "choices and comparisons",
@@ -67,7 +65,7 @@ def spelt_in_c(item: Expression, operands: list[str], precision: Precision) -> s
             return f"({operands[0]} > {zero}) ? {one} : (({operands[0]} < {zero}) ? -{one} : {zero})"
         case "abs":
             return f"{precision.function('fabs')}({operands[0]})"
-        case "sqrt" | "exp" | "log" | "tanh":
+        case "sqrt" | "exp" | "log" | "tanh" | "sin" | "cos" | "atan":
             return f"{precision.function(item.operation)}({operands[0]})"
         case _:
             raise NotImplementedError(f"operation {item.operation!r} has no spelling in C yet")

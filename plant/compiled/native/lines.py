@@ -97,7 +97,7 @@ class Lines:
                 return self._called("where", [above, plus, other])
             case (("fma" | "sqrt" | "abs"), _):
                 return self._instruction("fabs" if name == "abs" else name, kind, given)
-            case (("exp" | "log" | "tanh"), [x]):
+            case (("exp" | "log" | "tanh" | "sin" | "cos" | "atan"), [x]):
                 return self._each(name, x)
             case _:
                 raise KernelError(f"{name} is none of the operations that are compiled")

@@ -17,7 +17,7 @@ from plant.compiled.expression import (
     ordered,
     symbol,
 )
-from plant.compiled.functions import absolute, exp, maximum, minimum, sign, sqrt, tanh, where
+from plant.compiled.functions import absolute, arctan, cos, exp, maximum, minimum, sign, sin, sqrt, tanh, where
 
 X, Y = symbol("x"), symbol("y")
 
@@ -35,6 +35,9 @@ ARITHMETIC: Mapping[str, Callable[..., float]] = {
     "sqrt": math.sqrt,
     "exp": math.exp,
     "tanh": math.tanh,
+    "sin": math.sin,
+    "cos": math.cos,
+    "atan": math.atan,
     "where": lambda condition, a, b: a if condition else b,
 }
 
@@ -73,6 +76,8 @@ def grow(inner: st.SearchStrategy[Expression]) -> st.SearchStrategy[Expression]:
         inner.map(absolute),
         inner.map(lambda a: sign(a) * a),
         inner.map(tanh),
+        inner.map(lambda a: sin(a) - cos(2.0 * a)),
+        inner.map(arctan),
         inner.map(lambda a: exp(tanh(a))),
         inner.map(lambda a: sqrt(a * a + 1.0)),
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.compiled.expression import constant, symbol
-from plant.compiled.functions import absolute, exp, maximum, minimum, sign, sqrt, tanh, where
+from plant.compiled.functions import absolute, arctan, cos, exp, maximum, minimum, sign, sin, sqrt, tanh, where
 from plant.compiled.source import lines_source, symbols_in
 from plant.eha.model import EhaParameters, lumped_step, reduced_derivative
 from plant.solvers.steps import GAMMA, StepFunction, parameter_row, ros2_step
@@ -69,12 +69,14 @@ def test_every_function_is_spelt() -> None:
         "a": sqrt(absolute(x)) + exp(y) - tanh(x * y) / 3.0,
         "b": where(x <= y, maximum(x, 0.5), minimum(y, -0.5)) * sign(x),
         "c": where(x >= y, where(x < 1.0, x, y), constant(-2.0)),
+        "d": sin(x) * cos(y) + arctan(x - y),
     }
     for values in ((0.7, -1.2), (-0.3, 0.4), (2.0, 2.0)):
         u, v = values
         scope = SimpleNamespace(**computed(outputs, x=u, y=v))
         assert scope.a == pytest.approx(math.sqrt(abs(u)) + math.exp(v) - math.tanh(u * v) / 3.0, rel=1e-15)
         assert scope.b == (max(u, 0.5) if u <= v else min(v, -0.5)) * math.copysign(1.0, u)
+        assert scope.d == pytest.approx(math.sin(u) * math.cos(v) + math.atan(u - v), rel=1e-15)
         assert scope.c == ((u if u < 1.0 else v) if u >= v else -2.0)
 
 

@@ -8,7 +8,7 @@ from plant.compiled.c99.files import checked_name
 from plant.compiled.c99.lines import KINDS, c_lines, operations_of
 from plant.compiled.c99.precision import DOUBLE, FLOAT, precision_of
 from plant.compiled.expression import Expression, node, symbol, unary
-from plant.compiled.functions import exp, log, maximum, sign, sqrt, tanh, where
+from plant.compiled.functions import arctan, cos, exp, log, maximum, sign, sin, sqrt, tanh, where
 from plant.errors import HydrostateError
 from tests.c_compiler import compiled, ran
 
@@ -30,6 +30,9 @@ EVERY: dict[str, Expression] = {
     "power": exp(X),
     "logarithm": log(Y),
     "bend": tanh(X),
+    "up": sin(X),
+    "along": cos(X),
+    "angle": arctan(X),
     "there": where(unary("present", X), X, Y),
 }
 
@@ -38,7 +41,8 @@ def values(x: float, y: float) -> list[float]:
     a, b = np.float64(x), np.float64(y)
     return [
         *(a + b, a - b, a * b, a / b, a * b + a, a - a * b, a * b - a, max(a, b), a if a <= b else -b),
-        *(a if a >= b else 3.0, np.sign(a), abs(a), np.sqrt(b), np.exp(a), np.log(b), np.tanh(a), a),
+        *(a if a >= b else 3.0, np.sign(a), abs(a), np.sqrt(b), np.exp(a), np.log(b), np.tanh(a)),
+        *(np.sin(a), np.cos(a), np.arctan(a), a),
     ]
 
 
@@ -69,7 +73,7 @@ def test_operations_are_counted_by_kind() -> None:
     counted = operations_of(EVERY)
     assert counted["fused products"] == 3
     assert counted["divisions"] == 1
-    assert counted["calls of exp, log, tanh"] == 3
+    assert counted["calls of exp, log, tanh"] == 6
     assert set(counted) == set(KINDS.values())
 
 

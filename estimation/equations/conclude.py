@@ -1,0 +1,330 @@
+"""How far to believe a fit of own equations: covariance, what the logs do not tell, and what speaks against it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import qr
+from scipy.special import stdtrit
+
+from estimation.arrays import Array
+from estimation.equations.notes import EquationsCode
+from estimation.equations.problem import Problem, spread
+from estimation.equations.search import MOST_STEPS, SETTLED, Solution, noise_of
+from estimation.equations.stops import standing
+from estimation.finding import Finding, Gate, Outcome, Quantity
+from estimation.fits.covariance import automatic_lags, least_squares_covariance
+from estimation.identification.fit.residual_tests import cross_correlation_test
+from plant.errors import HydrostateError
+from plant.notes import Note
+
+LOST = 1e-6
+"""Singular value of the scaled sensitivities, over the largest, below which a direction is not told [fraction]."""
+
+TOUCHED = 1e-3
+"""Share of an unknown in such a direction from which it is not told either [fraction]."""
+
+POOR = 0.5
+"""Relative deviation beyond which an unknown is called poorly told [fraction]."""
+
+CHANCE = 3.0
+"""Times the variance that as many unknowns explain of white noise, up to which nothing is explained [dimensionless]."""
+
+BEYOND = 1.2
+"""Residuals over noise that is given, beyond which the equations leave something out [dimensionless]."""
+
+CORRELATED = 0.2
+"""Correlation of neighbouring residuals beyond which they are not noise [dimensionless]."""
+
+FOLLOWED, SURE = 0.01, 1e-3
+"""Share of the residuals that an input's past explains [fraction] and its significance [probability], both of which
+speak against the equations."""
+
+MOST_TESTED = 20_000
+"""Samples of a log on which that is tested."""
+
+MISSED, LEAST = 3.0, 1e-3
+"""Residuals at a limit over the noise beyond which the equations leave the limit out [dimensionless], and the least
+noise that counts, over the channel's spread [fraction]."""
+
+AS_WELL = 2.0
+"""Difference of log-likelihood up to which two solutions explain the logs alike [dimensionless]."""
+
+APART = 3.0
+"""Standard deviations from which they are two."""
+
+
+@dataclass(frozen=True, eq=False)
+class Covariance:
+    """What is known of the unknowns' errors.
+
+    Parameters
+    ----------
+    std : ndarray, shape (unknowns,)
+        In the coordinates of the search; infinite where the logs do not tell [dimensionless].
+    correlation : ndarray, shape (unknowns, unknowns)
+        NaN where the logs do not tell.
+    condition : float
+        Condition number of the sensitivities, each scaled to one [dimensionless].
+    groups : tuple of tuple of int
+        Unknowns that the logs do not tell from each other, by place; one alone is not felt at all.
+    """
+
+    std: Array
+    correlation: Array
+    condition: float
+    groups: tuple[tuple[int, ...], ...]
+
+
+def covariance_of(problem: Problem, theta: Array) -> Covariance:
+    """Return the covariance of the unknowns, that of coloured residuals included, and which the logs do not tell.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (unknowns,)
+        The solution [dimensionless].
+    """
+    slopes = problem.slopes(theta)
+    errors = np.concatenate([one.ravel() for one in problem.residuals(theta)])
+    size = np.linalg.norm(slopes, axis=0)
+    felt = np.flatnonzero(size > 0.0)
+    groups = [(int(j),) for j in np.flatnonzero(size == 0.0)]
+    _, values, directions = np.linalg.svd(slopes[:, felt] / size[felt], full_matrices=False)
+    lost = values < LOST * values[0]
+    touched = felt[np.any(np.abs(directions[lost]) > TOUCHED, axis=0)]
+    groups += [tuple(int(felt[j]) for j in np.flatnonzero(np.abs(one) > TOUCHED)) for one in directions[lost]]
+    order = qr(slopes[:, felt] / size[felt], mode="r", pivoting=True)[1][: int(np.count_nonzero(~lost))]
+    kept = felt[np.sort(order)]
+    used = int(np.count_nonzero(np.concatenate([~np.isnan(part.measured).ravel() for part in problem.parts])))
+    std, correlation = np.full(len(theta), np.inf), np.full((len(theta), len(theta)), np.nan)
+    if used > len(kept):
+        spread_of = least_squares_covariance(
+            slopes[:, kept], errors, used, automatic_lags(errors), np.zeros(len(kept))
+        )[1]
+        variance = np.diag(spread_of)
+        known = np.sqrt(np.where(variance > 0.0, variance, np.inf))
+        std[kept] = known
+        correlation[np.ix_(kept, kept)] = spread_of / np.outer(known, known)
+        std[touched] = np.inf
+        correlation[touched] = correlation[:, touched] = np.nan
+    condition = float(values[0] / values[-1]) if values[-1] > 0.0 and not len(touched) else np.inf
+    return Covariance(std, correlation, condition, tuple(dict.fromkeys(groups)))
+
+
+def concluded(solution: Solution, given: Array) -> tuple[Finding, Covariance]:
+    """Return what a solution says.
+
+    Parameters
+    ----------
+    given : ndarray, shape (outputs,)
+        Noise that was given, NaN where it was read off the residuals [units of the outputs].
+
+    Returns
+    -------
+    tuple of Finding and Covariance
+        Quantities are the parameters, and the initial states that were fitted.
+    """
+    problem, theta = solution.problem, solution.point.theta
+    found = covariance_of(problem, theta)
+    residuals = problem.residuals(theta)
+    samples = int(np.count_nonzero(~np.isnan(np.concatenate([part.measured.ravel() for part in problem.parts]))))
+    chance = 100.0 * (1.0 - np.sqrt(max(1.0 - CHANCE * len(theta) / samples, 0.0)))
+    empty = [_nothing(problem, i, fit) for i, fit in enumerate(fits_of(problem, theta)) if not fit > chance]
+    limits, held = _limits(problem, residuals)
+    reasons = (
+        *empty,
+        *(() if empty else _misfits(problem, theta, residuals, given)),
+        *_at_bounds(problem, theta),
+        *_doubts(solution),
+        *limits,
+    )
+    quantities = _quantities(problem, theta, found, samples)
+    told = [one for one in problem.equations.parameters if quantities[one].value is not None]
+    outcome = Outcome.MISMATCH if empty else Outcome.OK if told else Outcome.NOT_OBSERVABLE
+    finding = Finding(
+        actuator="equations",
+        outcome=outcome,
+        quantities=quantities,
+        gate=Gate(not reasons, tuple(reasons)),
+        channels=(*problem.equations.inputs, *problem.equations.outputs),
+        notes=(*held, *_missing(problem), *_others(solution, found)),
+        not_told=_not_told(problem, theta, found),
+    )
+    return finding, found
+
+
+def fits_of(problem: Problem, theta: Array) -> list[float]:
+    """Return how well each output is followed.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (unknowns,)
+        The solution [dimensionless].
+
+    Returns
+    -------
+    list of float
+        One an output: 100 is perfect, 0 as good as its mean [percent].
+    """
+    errors = np.concatenate(problem.residuals(theta), axis=1) * problem.noise[:, None]
+    seen = ~np.isnan(np.concatenate([part.measured for part in problem.parts], axis=1))
+    typical = spread(problem.parts)
+    size = [float(np.sqrt(np.mean(row[kept] ** 2))) for row, kept in zip(errors, seen, strict=True)]
+    return [
+        100.0 * (1.0 - one / float(whole)) if whole > 0.0 else np.nan for one, whole in zip(size, typical, strict=True)
+    ]
+
+
+def _nothing(problem: Problem, place: int, fit: float) -> Note:
+    return EquationsCode.EQUATIONS_EXPLAIN_NOTHING.note(channel=list(problem.equations.outputs)[place], fit=fit)
+
+
+def _quantities(problem: Problem, theta: Array, found: Covariance, samples: int) -> dict[str, Quantity]:
+    values, free = problem.values(theta), max(samples - len(theta), 1)
+    reach, rows = float(stdtrit(free, 0.975)), dict[str, Quantity]()
+    for j, (name, one) in enumerate(zip(problem.names, problem.unknowns, strict=True)):
+        unit, std = one.unit if name in problem.equations.parameters else _unit(problem, name), float(found.std[j])
+        if not np.isfinite(std):
+            rows[name] = Quantity(None, unit)
+            continue
+        low, high = (theta[j] + side * reach * std for side in (-1.0, 1.0))
+        ends = (np.exp(low), np.exp(high)) if one.logarithmic else (low * one.size, high * one.size)
+        by_theta = values[j] if one.logarithmic else one.size
+        rows[name] = Quantity(float(values[j]), unit, (float(ends[0]), float(ends[1])), float(by_theta * std))
+    return rows
+
+
+def _unit(problem: Problem, name: str) -> str:
+    return problem.equations.states[name.removeprefix("initial ").partition(" of log ")[0]]
+
+
+def _misfits(problem: Problem, theta: Array, residuals: Sequence[Array], given: Array) -> list[Note]:
+    """Return how the residuals differ from the noise of a sensor."""
+    notes: list[Note] = []
+    slopes = np.split(problem.slopes(theta), np.cumsum([one.size for one in residuals])[:-1])
+    for i, channel in enumerate(problem.equations.outputs):
+        rows = [one[i] for one in residuals]
+        seen = [np.isfinite(part.measured[i]) for part in problem.parts]
+        power = sum(float(row @ row) for row in rows)
+        count = sum(int(np.count_nonzero(one)) for one in seen)
+        ratio = (power / count) ** 0.5
+        if np.isfinite(given[i]) and ratio > BEYOND:
+            notes.append(EquationsCode.MISFIT_BEYOND_NOISE.note(channel=channel, ratio=ratio))
+        neighbours = sum(float(row[1:] @ row[:-1]) for row in rows) / max(power, np.finfo(float).tiny)
+        if abs(neighbours) > max(CORRELATED, 4.0 / count**0.5):
+            notes.append(EquationsCode.MISFIT_CORRELATED.note(channel=channel, correlation=neighbours))
+        for j, source in enumerate(problem.equations.inputs):
+            shares = [
+                _followed(np.where(kept, row, np.nan), part.inputs[:, j], slope.reshape(len(one), len(row), -1)[i])
+                for row, kept, part, slope, one in zip(rows, seen, problem.parts, slopes, residuals, strict=True)
+            ]
+            if max(shares) > FOLLOWED:
+                notes.append(
+                    EquationsCode.MISFIT_FOLLOWS_INPUT.note(channel=channel, source=source, percent=100.0 * max(shares))
+                )
+    return notes
+
+
+def _followed(residual: Array, source: Array, slopes: Array) -> float:
+    """Return which share of a residual the past of an input explains; 0 where chance would [fraction]."""
+    part = slice(0, MOST_TESTED)
+    if np.ptp(source[part]) == 0.0:
+        return 0.0
+    moving = np.any(slopes[part] != 0.0, axis=0)
+    try:
+        test = cross_correlation_test(residual[part], source[part], jacobian=slopes[part][:, moving])
+    except HydrostateError:  # too few samples to say anything
+        return 0.0
+    return test.statistic / np.count_nonzero(np.isfinite(residual[part])) if test.p_value < SURE else 0.0
+
+
+def _at_bounds(problem: Problem, theta: Array) -> list[Note]:
+    notes: list[Note] = []
+    low, high = problem.bounds
+    for j, (name, one) in enumerate(zip(problem.names, problem.unknowns, strict=True)):
+        for place, bound in zip((low[j], high[j]), one.bounds, strict=True):
+            if np.isfinite(place) and abs(theta[j] - place) <= 1e-9 * max(1.0, abs(place)):
+                notes.append(EquationsCode.PARAMETER_AT_BOUND.note(parameter=name, bound=bound))
+    return notes
+
+
+def _doubts(solution: Solution) -> list[Note]:
+    notes: list[Note] = []
+    if solution.moved > SETTLED:
+        notes.append(EquationsCode.STEPS_TOO_LONG.note(deviations=solution.moved, steps=2 * MOST_STEPS))
+    if solution.evaluations:
+        notes.append(EquationsCode.NOT_CONVERGED.note(evaluations=solution.evaluations))
+    return notes
+
+
+def _limits(problem: Problem, residuals: Sequence[Array]) -> tuple[list[Note], list[Note]]:
+    """Return limits that the equations do not follow, and those that only should be known."""
+    against, known = list[Note](), list[Note]()
+    noise, typical = noise_of(problem.parts), spread(problem.parts)
+    for i, channel in enumerate(problem.equations.outputs):
+        for one in standing([part.measured[i] for part in problem.parts], float(noise[i])):
+            errors, there = np.concatenate([row[i] for row in residuals]), np.concatenate(one.where)
+            ratio = float(np.sqrt(np.mean(errors[there] ** 2)) * problem.noise[i] / max(noise[i], LEAST * typical[i]))
+            value, percent = one.value, 100.0 * one.share
+            if ratio > MISSED:
+                against.append(
+                    EquationsCode.LIMIT_UNEXPLAINED.note(
+                        channel=channel, end=one.end, value=value, percent=percent, ratio=ratio
+                    )
+                )
+            else:
+                known.append(
+                    EquationsCode.OUTPUT_AT_LIMIT.note(channel=channel, end=one.end, value=value, percent=percent)
+                )
+    for j, channel in enumerate(problem.equations.inputs):
+        for one in standing([part.inputs[:, j] for part in problem.parts], 0.0):
+            value, percent = one.value, 100.0 * one.share
+            known.append(EquationsCode.INPUT_AT_LIMIT.note(channel=channel, end=one.end, value=value, percent=percent))
+    return against, known
+
+
+def _missing(problem: Problem) -> list[Note]:
+    notes: list[Note] = []
+    for i, channel in enumerate(problem.equations.outputs):
+        rows = np.concatenate([part.measured[i] for part in problem.parts])
+        lost = int(np.count_nonzero(np.isnan(rows)))
+        if lost:
+            notes.append(EquationsCode.SAMPLES_MISSING.note(channel=channel, count=lost, total=len(rows)))
+    return notes
+
+
+def _not_told(problem: Problem, theta: Array, found: Covariance) -> tuple[Note, ...]:
+    """Return which unknowns the logs do not tell, or hardly."""
+    notes, names = list[Note](), problem.names
+    for group in found.groups:
+        alike = ", ".join(names[j] for j in group)
+        if len(group) > 1:
+            notes.append(EquationsCode.PARAMETERS_NOT_TOLD.note(names=alike))
+        else:
+            notes.append(EquationsCode.PARAMETER_NOT_FELT.note(name=alike))
+    values = problem.values(theta)
+    for j, name in enumerate(problem.equations.parameters):
+        one, std = problem.unknowns[j], found.std[j]
+        share = std if one.logarithmic else std * one.size / max(abs(values[j]), one.size)
+        if np.isfinite(std) and share > POOR:
+            others = np.where(np.arange(len(names)) == j, 0.0, np.nan_to_num(found.correlation[j]))
+            other = int(np.argmax(np.abs(others)))
+            correlation = float(others[other])
+            notes.append(
+                EquationsCode.PARAMETER_POORLY_TOLD.note(
+                    name=name, percent=100.0 * share, other=names[other], correlation=correlation
+                )
+            )
+    return tuple(notes)
+
+
+def _others(solution: Solution, found: Covariance) -> list[Note]:
+    """Return a solution from another start that explains the logs as well and lies elsewhere."""
+    problem, best = solution.problem, solution.point
+    for other in solution.others:
+        away = np.abs(other - best.theta) / np.where(np.isfinite(found.std), found.std, np.inf)
+        if away.max() > APART and problem.at(other).cost < best.cost + AS_WELL:
+            j = int(np.argmax(away))
+            value = float(problem.values(other)[j])
+            return [EquationsCode.STARTS_DISAGREE.note(parameter=problem.names[j], value=value)]
+    return []

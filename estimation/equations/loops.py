@@ -1,0 +1,81 @@
+"""The loop that runs a user's equations along a log, with exact sensitivities, as a plain function.
+
+`estimation.equations.kernel` pastes it into a kernel file. What it finds in such a file is its parameter ``kernel``.
+"""
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+
+from estimation.arrays import Array
+
+
+class EquationsKernel(Protocol):
+    """What the kernel of a model has.
+
+    A point is a tuple with a row for each state: the state, and its derivatives by the unknowns.
+
+    Attributes
+    ----------
+    UNKNOWNS, OUTPUTS : int
+        Counts of unknowns and outputs.
+    settle, begin : callable
+        From unknowns and known numbers: what is the same at every step, and the point at the first sample.
+    step : callable
+        ``step(point, fixed, before, after, start, end, h)``: the point ``h`` [s] later, while the inputs go from one
+        share of the way between samples to another [fraction].
+    observe : callable
+        ``observe(point, fixed, after, shown)``: fill in the outputs, and their derivatives.
+    """
+
+    UNKNOWNS: int
+    OUTPUTS: int
+    settle: Callable[[Array, Array], Any]
+    begin: Callable[[Array, Array], Any]
+    step: Callable[[Any, Any, Array, Array, float, float, float], Any]
+    observe: Callable[[Any, Any, Array, Array], None]
+
+
+def run(
+    kernel: EquationsKernel,
+    values: Array,
+    known: Array,
+    inputs: Array,
+    sample_time: float,
+    substeps: int,
+    predicted: Array,
+    slopes: Array,
+) -> None:
+    """Fill in what the equations predict at every sample.
+
+    Parameters
+    ----------
+    values : ndarray, shape (unknowns,)
+        Parameters that are fitted, then initial states that are [each its unit].
+    known : ndarray, shape (known,)
+        Parameters that are known, then initial states that are [each its unit]; one number at least.
+    inputs : ndarray, shape (n, inputs)
+        Inputs at the samples [their units].
+    sample_time : float
+        Seconds between samples [s].
+    substeps : int
+        Steps between samples.
+    predicted : ndarray, shape (outputs, n)
+        Room for the outputs.
+    slopes : ndarray, shape (slopes, samples, unknowns)
+        Room for their derivatives, or empty.
+    """
+    shown = np.zeros((kernel.OUTPUTS, 1 + kernel.UNKNOWNS))
+    fixed, point = kernel.settle(values, known), kernel.begin(values, known)
+    h = sample_time / substeps
+    for k in range(inputs.shape[0]):
+        if k > 0:
+            for j in range(substeps):
+                start, end = j / substeps, (j + 1.0) / substeps
+                point = kernel.step(point, fixed, inputs[k - 1], inputs[k], start, end, h)
+        kernel.observe(point, fixed, inputs[k], shown)
+        for i in range(kernel.OUTPUTS):
+            predicted[i, k] = shown[i, 0]
+            if slopes.size > 0:
+                slopes[i, k] = shown[i, 1:]

@@ -1,0 +1,268 @@
+"""Steps, starts and noise: how a user's equations are brought to the optimum on their logs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.equations.definition import Equations
+from estimation.equations.kernel import SCHEMES
+from estimation.equations.problem import Part, Problem, spread
+from estimation.fits.descent import Point, descend
+from estimation.log_checks.measurement_noise import NORMAL_MAD
+from plant.errors import HydrostateError
+
+MOST_STEPS = 64
+"""Model steps a sample at most."""
+
+STEPPED_WELL = 0.1
+"""Change of the prediction by steps of half the length, over the noise, up to which a search may begin [fraction]."""
+
+SETTLED = 0.05
+"""Change of the solution by steps of half the length, in its own standard deviations, up to which it stands."""
+
+BALANCED = 0.1
+"""Noise of every output while a search begins, over its spread [fraction]: none of them outweighs the others."""
+
+LEAST_NOISE = 1e-6
+"""Least noise of an output, over its spread [fraction]: a simulation without noise stays solvable."""
+
+EVALUATIONS, SCREENING = 100, 15
+"""Evaluations that a descent may take, and those that every start is given where there are several."""
+
+PROMISED = 1e-7
+"""Half the sum of squares that a further step must promise at the end: less moves no unknown by a 2000th of its
+deviation."""
+
+FINALISTS = 3
+"""Starts that are carried on."""
+
+LENGTHS = (1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
+"""Beginnings of the logs on which a search is led where it went astray on the whole [fraction]."""
+
+ASTRAY = 3.0
+"""Residuals over the noise that the log's own bends show, beyond which it is tried [dimensionless]."""
+
+FEWEST_AT_FIRST = 30
+"""Samples of the shortest beginning."""
+
+ROUNDS = 6
+"""How often noise is read off the residuals and the fit taken on; it settles within three."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where a search ended.
+
+    Parameters
+    ----------
+    problem : Problem
+        With its steps and the noise that the residuals show.
+    others : tuple of ndarray, shape (unknowns,)
+        Where other starts ended [dimensionless].
+    moved : float
+        By how much steps of half the length would move the solution, in its standard deviations [dimensionless].
+    evaluations : int
+        Evaluations allowed in a descent, where the last of them did not settle; 0 where it did.
+    """
+
+    problem: Problem
+    point: Point
+    others: tuple[Array, ...] = ()
+    moved: float = 0.0
+    evaluations: int = 0
+
+
+def searched(
+    equations: Equations, parts: Sequence[Part], noise: Array, *, robust: bool, starts: int, seed: int
+) -> Solution:
+    """Return the best fit that is found.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        The logs.
+    noise : ndarray, shape (outputs,)
+        Standard deviation of each output's noise [its unit]; NaN where it is to be read off the residuals.
+    robust : bool
+        Whether outliers count linearly.
+    starts : int
+        Starts: the parameters' own, the others drawn within their bounds.
+    seed : int
+        Of what is drawn.
+
+    Raises
+    ------
+    HydrostateError
+        If the equations run away from every start.
+    """
+    typical = spread(parts)
+    first = np.where(np.isnan(noise), np.maximum(noise_of(parts), LEAST_NOISE * typical), noise)
+    problem = Problem(equations, tuple(parts), "rk4", 1, first, robust)
+    guesses = _guesses(problem, starts, seed)
+    problem = stepped(problem, guesses[0])
+    rough = problem.with_noise(BALANCED * np.where(typical > 0.0, typical, 1.0))
+    ends = _descended(rough, guesses)
+    if not _explained(problem, ends[0].theta, first):
+        ends = sorted([*ends, _lengthened(rough, guesses[0])], key=lambda point: point.cost)
+    solution = _refined(problem, ends[0], noise, typical)
+    while solution.moved > SETTLED and solution.problem.substeps < MOST_STEPS:
+        finer = replace(solution.problem, substeps=2 * solution.problem.substeps)
+        solution = _refined(finer, solution.point, noise, typical)
+    return replace(solution, others=tuple(end.theta for end in ends[1:]))
+
+
+def noise_of(parts: Sequence[Part]) -> Array:
+    """Return the standard deviation of each output's noise by its second differences, which hold nothing smooth.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        The logs.
+
+    Returns
+    -------
+    ndarray, shape (outputs,)
+        Each in its unit.
+    """
+    found: list[float] = []
+    for rows in zip(*(part.measured for part in parts), strict=True):
+        bends = np.concatenate([np.diff(row[np.isfinite(row)], n=2) for row in rows])
+        found.append(NORMAL_MAD * float(np.median(np.abs(bends))) / 6.0**0.5 if len(bends) else 0.0)
+    return np.array(found)
+
+
+def _guesses(problem: Problem, starts: int, seed: int) -> list[Array]:
+    """Return the starts: the first as given, the others drawn within the bounds, initial states kept."""
+    given = problem.coordinates(np.array([one.start for one in problem.unknowns]))
+    low, high = problem.bounds
+    rng, found = np.random.default_rng(seed), [given]
+    near_low, near_high = np.maximum(low, given - 2.0), np.minimum(high, given + 2.0)
+    fitted = len(problem.equations.parameters)
+    for _ in range(starts - 1):
+        drawn = rng.uniform(np.where(np.isfinite(low), low, near_low), np.where(np.isfinite(high), high, near_high))
+        drawn[fitted:] = given[fitted:]
+        found.append(drawn)
+    return found
+
+
+def stepped(problem: Problem, theta: Array) -> Problem:
+    """Return the problem with the fewest steps that predict well: explicit ones, or implicit where they are stiff.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (unknowns,)
+        Where [dimensionless].
+
+    Raises
+    ------
+    HydrostateError
+        If the equations run away whatever the steps.
+    """
+    tried: list[tuple[float, Problem]] = []
+    for scheme in SCHEMES:
+        steps, runs = 1, dict[int, Array | None]()
+        while steps <= MOST_STEPS:
+            one = replace(problem, scheme=scheme, substeps=steps)
+            for count in (steps, 2 * steps):
+                if count not in runs:
+                    runs[count] = _whole(replace(one, substeps=count), theta)
+            coarse, fine = runs[steps], runs[2 * steps]
+            if coarse is not None and fine is not None:
+                change = float(np.sqrt(np.mean((coarse - fine) ** 2)))
+                if change < STEPPED_WELL:
+                    return one
+                tried.append((change, one))
+            steps *= 2
+    if not tried:
+        raise HydrostateError("the equations run away: their values leave all bounds; try other starts")
+    return min(tried, key=lambda pair: pair[0])[1]
+
+
+def _whole(problem: Problem, theta: Array) -> Array | None:
+    """Return all residuals, or None where they are not finite."""
+    errors = np.concatenate([one.ravel() for one in problem.residuals(theta)])
+    return errors if np.isfinite(errors).all() else None
+
+
+def _descended(problem: Problem, guesses: Sequence[Array]) -> list[Point]:
+    """Return where the better starts end, the best first."""
+    points = [problem.at(guess) for guess in guesses]
+    able = [point.theta for point in points if np.isfinite(point.cost)]
+    if not able:
+        raise HydrostateError("the equations run away from every start: their values leave all bounds; try others")
+    if len(able) > 1:
+        near = [descend(problem.at, guess, SCREENING, problem.bounds) for guess in able]
+        able = [point.theta for point in sorted(near, key=lambda point: point.cost)[:FINALISTS]]
+    ends = [descend(problem.at, guess, EVALUATIONS, problem.bounds) for guess in able]
+    return sorted(ends, key=lambda point: point.cost)
+
+
+def _explained(problem: Problem, theta: Array, noise: Array) -> bool:
+    """Return whether the residuals are of the size that the measured outputs' own noise has."""
+    errors = np.concatenate(problem.with_noise(noise).residuals(theta), axis=1)
+    return bool(np.isfinite(errors).all() and np.sqrt(np.mean(errors**2, axis=1)).max() < ASTRAY)
+
+
+def _lengthened(problem: Problem, guess: Array) -> Point:
+    """Return where a search ends that is led along ever longer beginnings: an oscillation then stays in phase."""
+    theta = guess
+    for share in LENGTHS:
+        counts = [max(round(share * part.measured.shape[1]), FEWEST_AT_FIRST) for part in problem.parts]
+        parts = [
+            replace(part, inputs=part.inputs[:count], measured=part.measured[:, :count])
+            for part, count in zip(problem.parts, counts, strict=True)
+        ]
+        beginning = replace(problem, parts=tuple(parts))
+        theta = descend(beginning.at, theta, EVALUATIONS, beginning.bounds).theta
+    return problem.at(theta)
+
+
+def _refined(problem: Problem, point: Point, noise: Array, typical: Array) -> Solution:
+    """Return the fit taken on until noise and unknowns agree, and how far it hangs on the steps' length."""
+    left = 0
+    for _ in range(ROUNDS):
+        deviations = np.where(np.isnan(noise), _shown(problem, point.theta, typical), noise)
+        same = bool(np.allclose(deviations, problem.noise, rtol=0.01))
+        problem = problem.with_noise(deviations)
+        point, left = _finished(problem, point.theta)
+        if same:
+            break
+    return Solution(problem, point, moved=_moved(problem, point), evaluations=left)
+
+
+def _finished(problem: Problem, theta: Array) -> tuple[Point, int]:
+    counted = 0
+
+    def at(where: Array) -> Point:
+        nonlocal counted
+        counted += 1
+        return problem.at(where)
+
+    point = descend(at, theta, EVALUATIONS, problem.bounds, PROMISED)
+    return point, EVALUATIONS if counted >= EVALUATIONS else 0
+
+
+def _shown(problem: Problem, theta: Array, typical: Array) -> Array:
+    """Return the deviation of each output's residuals, degrees of freedom shared by samples [its unit]."""
+    errors = np.concatenate(problem.residuals(theta), axis=1) * problem.noise[:, None]
+    seen = ~np.isnan(np.concatenate([part.measured for part in problem.parts], axis=1))
+    free = max(1.0 - len(theta) / np.count_nonzero(seen), 0.1)
+    if problem.robust:
+        size = [NORMAL_MAD * float(np.median(np.abs(row[kept]))) for row, kept in zip(errors, seen, strict=True)]
+    else:
+        size = [float(np.sqrt(np.mean(row[kept] ** 2) / free)) for row, kept in zip(errors, seen, strict=True)]
+    return np.maximum(size, LEAST_NOISE * np.where(typical > 0.0, typical, 1.0))
+
+
+def _moved(problem: Problem, point: Point) -> float:
+    """Return by how much steps of half the length would move the solution, in standard deviations: ``|Q'e|``."""
+    finer = _whole(replace(problem, substeps=2 * problem.substeps), point.theta)
+    coarse = _whole(problem, point.theta)
+    if finer is None or coarse is None:
+        return np.inf
+    values, vectors = np.linalg.eigh(point.gram)
+    kept = values > 1e-12 * values.max()
+    along = vectors[:, kept].T @ (problem.slopes(point.theta).T @ (finer - coarse)) / np.sqrt(values[kept])
+    return float(np.linalg.norm(along))

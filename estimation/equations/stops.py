@@ -1,0 +1,107 @@
+"""Channels that stand at an end of their range: end stops, saturation, clipped sensors."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.arrays import Array, BoolArray
+
+RUN = 3
+"""Samples in a row from which a channel is said to stand."""
+
+OFTEN = 0.01
+"""Share of the samples from which it counts [fraction]."""
+
+NEAR = 3.0
+"""How near the end counts, in standard deviations of the noise."""
+
+CROWDED = 5.0
+"""Samples at the end over those as far before it [dimensionless]; a sine has 2.4."""
+
+BLURRED = 0.1
+"""Reach over the channel's range, beyond which noise hides where it ends [fraction]."""
+
+TWICE, LONG = 2, 0.1
+"""Times that a channel has come there, or else share of the samples [fraction], from which it counts."""
+
+LEVELS = 20
+"""A channel of fewer values is one of levels, and has no ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A channel that stands at an end of its range.
+
+    Parameters
+    ----------
+    end : str
+        ``"least"`` or ``"largest"``.
+    value : float
+        Where it stands [its unit].
+    share : float
+        Of the samples [fraction].
+    where : sequence of ndarray of bool, shape (n,)
+        Which samples, one array a log.
+    """
+
+    end: str
+    value: float
+    share: float
+    where: Sequence[BoolArray]
+
+
+def standing(channels: Sequence[Array], noise: float) -> Iterator[Standing]:
+    """Yield the ends of its range at which a channel stands.
+
+    A channel that stops there stays for several samples, again and again or for long, and much more often than a smooth
+    signal lingers at its turning points; one of few levels, such as a square wave, only jumps between them and is
+    left out.
+
+    Parameters
+    ----------
+    channels : sequence of ndarray, shape (n,)
+        The channel in each log [its unit]; NaN is missing.
+    noise : float
+        Standard deviation of its noise [its unit].
+
+    Examples
+    --------
+    >>> wave = np.clip(np.sin(np.arange(2000) / 50.0), -1.0, 0.8)
+    >>> [(one.end, float(one.value)) for one in standing([wave], 0.0)]
+    [('largest', 0.8)]
+    """
+    every = np.concatenate(channels)
+    seen = every[np.isfinite(every)]
+    if len(np.unique(seen)) < LEVELS:
+        return
+    reach = NEAR * noise + 1e-9 * float(np.ptp(seen))
+    if reach > BLURRED * float(np.ptp(seen)):
+        return
+    for end, sign in (("least", -1.0), ("largest", 1.0)):
+        extreme = float((sign * seen).max())
+        level = sign * (extreme - reach)  # where noise lifts the largest sample above the level at which it stands
+        near = [np.abs(one - level) <= 1.001 * reach for one in channels]
+        where = [_in_runs(one) for one in near]
+        share = float(np.mean(np.concatenate(where)))
+        visits = sum(int(np.count_nonzero(np.diff(one.astype(np.int8)) == 1)) for one in where)
+        if share < OFTEN or not _stands(seen, level, sign, reach, visits, share):
+            continue
+        flat = [one[held] for one, held in zip(channels, where, strict=True)]
+        yield Standing(end, float(np.median(np.concatenate(flat))), share, where)
+
+
+def _in_runs(near: BoolArray) -> BoolArray:
+    """Return which samples are in runs of `RUN` or more."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(np.int8), [0]])))
+    kept = np.zeros_like(near)
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        kept[first:last] = last - first >= RUN
+    return kept
+
+
+def _stands(seen: Array, level: float, sign: float, reach: float, visits: int, share: float) -> bool:
+    """Return whether a channel is at its end much more often than just before it, and came there twice or for long."""
+    before = np.count_nonzero(np.abs(seen - (level - 2.0 * sign * reach)) < reach)
+    there = np.count_nonzero(np.abs(seen - level) <= 1.001 * reach)
+    return bool(there > CROWDED * before and (visits >= TWICE or share > LONG))

@@ -1,0 +1,163 @@
+"""A user's own equations in the hands of a Python user: written, fitted, printed, drawn, simulated."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from estimation.equations.definition import Equations, Parameter
+from experiments.log_pages.answers import Shown
+from experiments.log_pages.fitted_equations import FittedGreyBox, record_of, times_of
+from plant.errors import HydrostateError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class GreyBox(Shown):
+    """Equations with unknown parameters, to be fitted to logs.
+
+    Parameters
+    ----------
+    derivative : callable
+        ``derivative(state, inputs, parameters)``: the rate of every state a second, in the states' order. NumPy's
+        functions may be used; what depends on a state is chosen by ``np.where``, not by ``if``.
+    states, inputs, outputs : Mapping[str, str] or sequence of str
+        Names, with units or without. Inputs and outputs are channels of the log; outputs are states unless ``observe``
+        computes them.
+    parameters : Mapping[str, Parameter or float]
+        What is fitted, and numbers that are known [each its unit].
+    observe : callable, optional
+        ``observe(state, inputs, parameters)``: the outputs, in their order.
+    initial : Mapping[str, Parameter or float], optional
+        The states at the first sample [their units], held where a number is given; otherwise fitted, for every log
+        anew.
+    held : sequence of str
+        Inputs that stand still between samples, as a controller's commands do; the others are taken as linear.
+
+    Raises
+    ------
+    HydrostateError
+        If names or functions do not fit together.
+
+    Examples
+    --------
+    >>> def cooling(state, inputs, p):
+    ...     return -p.rate * (state.warm - inputs.room)
+    >>> GreyBox(cooling, states=["warm"], inputs=["room"], outputs=["warm"], parameters={"rate": Parameter(0.1)})
+    GreyBox of warm, driven by room, with unknown rate
+    """
+
+    def __init__(
+        self,
+        derivative: Callable[[Any, Any, Any], Any],
+        *,
+        states: Mapping[str, str] | Sequence[str],
+        inputs: Mapping[str, str] | Sequence[str] = (),
+        outputs: Mapping[str, str] | Sequence[str],
+        parameters: Mapping[str, Parameter | float],
+        observe: Callable[[Any, Any, Any], Any] | None = None,
+        initial: Mapping[str, Parameter | float] | None = None,
+        held: Sequence[str] = (),
+    ) -> None:
+        from estimation.equations.kernel import traceable
+
+        if not isinstance(parameters, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
+            raise HydrostateError(f"parameters must be a mapping of names, got {parameters!r}")
+        units = _named("states", states)
+        self.equations = Equations(
+            derivative,
+            states=units,
+            inputs=_named("inputs", inputs),
+            outputs={
+                name: unit if unit != "1" else units.get(name, "1") for name, unit in _named("outputs", outputs).items()
+            },
+            parameters={name: one for name, one in parameters.items() if isinstance(one, Parameter)},
+            known={name: one for name, one in parameters.items() if not isinstance(one, Parameter)},
+            observe=observe,
+            initial=dict(initial or {}),
+            held=(held,) if isinstance(held, str) else tuple(held),
+        )
+        traceable(self.equations)
+
+    def __str__(self) -> str:
+        model = self.equations
+        driven = f", driven by {', '.join(model.inputs)}" if model.inputs else ""
+        return f"GreyBox of {', '.join(model.states)}{driven}, with unknown {', '.join(model.parameters)}"
+
+    def fit(
+        self,
+        *logs: Any,
+        noise: Mapping[str, float] | None = None,
+        robust: bool = False,
+        starts: int = 1,
+        seed: int = 0,
+    ) -> FittedGreyBox:
+        """Fit the parameters to one log or several.
+
+        Parameters
+        ----------
+        *logs : Log, Record or pandas.DataFrame
+            With the inputs and outputs as channels; a table's index is the time [s].
+        noise : Mapping[str, float], optional
+            Standard deviation of an output's noise [its unit], where it is known.
+        robust : bool
+            Whether outliers count linearly.
+        starts : int
+            Starts of the search; those after the first are drawn within the bounds.
+        seed : int
+            Of what is drawn.
+
+        Returns
+        -------
+        FittedGreyBox
+            Values with intervals, whether to believe them, and what the logs do not tell.
+
+        Raises
+        ------
+        HydrostateError
+            If a log lacks a channel, an input has gaps, or the equations run away.
+        """
+        from estimation.equations.fit import fit_equations
+
+        records = [record_of(one) for one in logs]
+        return FittedGreyBox(
+            fit_equations(self.equations, records, noise=noise, robust=robust, starts=starts, seed=seed), records
+        )
+
+    def simulate(
+        self, log: Any, values: Mapping[str, float] | None = None, initial: Mapping[str, float] | None = None
+    ) -> "pd.DataFrame":
+        """Return what the equations give with parameters that are said.
+
+        Parameters
+        ----------
+        log : Log, Record or pandas.DataFrame
+            With the inputs.
+        values : Mapping[str, float], optional
+            Parameters [their units]; those not named have their starts.
+        initial : Mapping[str, float], optional
+            The states at the first sample [their units]; those not named begin as a fit would, or at zero.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One column an output, by time [s].
+        """
+        import pandas as pd
+
+        from estimation.equations.fit import simulated
+
+        record = record_of(log)
+        found = simulated(self.equations, record, values or {}, initial or {})
+        return pd.DataFrame(dict(found), index=times_of(log, record))
+
+
+def _named(what: str, names: Any) -> dict[str, str]:
+    """Return names with their units; ``"1"`` where none is given."""
+    if isinstance(names, Mapping):
+        return {str(name): str(unit) for name, unit in names.items()}
+    if isinstance(names, str) or not isinstance(names, Sequence):
+        raise HydrostateError(f"{what} must be a mapping of names to units, or a list of names, got {names!r}")
+    twice = [name for place, name in enumerate(names) if name in names[:place]]
+    if twice:
+        raise HydrostateError(f"{what} must have names of their own, got {twice[0]!r} twice")
+    return dict.fromkeys(names, "1")

@@ -1,0 +1,37 @@
+"""A channel at an end of its range is told from one that turns there."""
+
+import numpy as np
+import pytest
+
+from estimation.equations.stops import standing
+
+TIME = 0.01 * np.arange(2000)
+RNG = np.random.default_rng(0)
+NOISE = 0.003 * RNG.standard_normal(2000)
+
+
+@pytest.mark.parametrize(
+    ("values", "noise", "wanted"),
+    [
+        (np.clip(np.sin(TIME), -0.7, 0.5), 0.0, {"least": -0.7, "largest": 0.5}),
+        (np.clip(np.sin(TIME), -0.7, 2.0) + NOISE, 0.003, {"least": -0.7}),
+        (np.sin(TIME), 0.0, {}),
+        (np.sin(5.0 * TIME) + NOISE, 0.003, {}),
+        (np.sign(np.sin(TIME)), 0.0, {}),
+        (RNG.standard_normal(2000), 1.0, {}),
+        (np.cumsum(RNG.standard_normal(2000)), 0.0, {}),
+        (np.full(2000, np.nan), 0.0, {}),
+    ],
+    ids=["clipped", "stopped", "sine", "noisy-sine", "square", "noise", "walk", "missing"],
+)
+def test_where_a_channel_stands(values: np.ndarray, noise: float, wanted: dict[str, float]) -> None:  # type: ignore[type-arg]
+    found = {one.end: one.value for one in standing([values], noise)}
+    assert found == {end: pytest.approx(value, abs=0.005) for end, value in wanted.items()}
+
+
+def test_the_share_and_the_samples_are_those_that_stand() -> None:
+    values = np.sin(TIME)
+    values[values > 0.5] = 0.5
+    (found,) = standing([values], 0.0)
+    np.testing.assert_array_equal(found.where[0], values == 0.5)
+    assert found.share == pytest.approx(np.mean(values == 0.5))
