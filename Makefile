@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 SEED ?= 2024
 WORKERS ?= 2
 
-.PHONY: study test test-slow lint benchmark peers release docs clean
+.PHONY: study papers test test-slow lint benchmark peers release docs clean
 
 # One stamp a kind of install: re-made when the pins or the project's metadata change.
 $(VENV)/.installed: pyproject.toml constraints.txt
@@ -19,6 +19,9 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 
 study: $(VENV)/.installed
 	$(BIN)/hydrostate study --out results/nine-conditions --seed $(SEED)
+
+papers: $(VENV)/.installed
+	$(BIN)/hydrostate papers --out results/papers --seed $(SEED)
 
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m "not slow"

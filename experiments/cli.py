@@ -33,6 +33,7 @@ from experiments.library import command as library
 from experiments.motor_paper import command as motor_paper
 from experiments.nine_conditions import command as nine_conditions
 from experiments.open_benchmark import command as open_benchmark
+from experiments.papers import command as papers
 from experiments.piezo_stack import command as piezo_stack
 from plant.compiled.native.recipes import trust_sources
 
@@ -103,6 +104,7 @@ VERBS = (
     compare,
     fleet,
     motor_paper,
+    papers,
     size_cylinder,
 )
 for module in VERBS:

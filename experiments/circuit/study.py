@@ -33,15 +33,22 @@ from experiments.running.study import Found, Seeded, Study
 from plant.eha.circuit_parameters import CircuitParameters
 
 
-def circuit_studies(rig: CircuitParameters, seed: int) -> Mapping[str, Callable[[], pd.DataFrame]]:
+def circuit_studies(
+    rig: CircuitParameters, seed: int, settings: StudySettings | None = None
+) -> Mapping[str, Callable[[], pd.DataFrame]]:
     """Return the experiments, by the name of their table.
+
+    Parameters
+    ----------
+    settings : StudySettings, optional
+        First guesses and length of the runs of Figures 10 and 11; the paper's unless told.
 
     Returns
     -------
     Mapping[str, callable]
         Each returns its table when called.
     """
-    settings = StudySettings(seed=seed)
+    settings = settings or StudySettings(seed=seed)
     return {
         "figure 3 velocity against leakage throttle": lambda: throttle_curve(rig, LEAKAGE_SWEEP),
         "figure 4 pressure against friction throttle": lambda: throttle_curve(rig, FRICTION_SWEEP),

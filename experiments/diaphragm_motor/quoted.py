@@ -40,6 +40,69 @@ def straightness(x: pd.Series, y: pd.Series) -> float:
     return float(np.corrcoef(x, y)[0, 1] ** 2)
 
 
+def load_straightness(loads: pd.DataFrame, share: float) -> Mapping[float, float]:
+    """Return how straight velocity falls with load, below a share of the blocking force.
+
+    Parameters
+    ----------
+    loads : pandas.DataFrame
+        The table ``load sweep``.
+    share : float
+        Of the blocking force [dimensionless].
+
+    Returns
+    -------
+    Mapping[float, float]
+        R^2 by voltage peak to peak [V].
+    """
+    moving = loads[loads["load_n"] < share * loads["blocking_n"]]
+    groups = moving.groupby("voltage_v")
+    return {float(str(swing)): straightness(rows["load_n"], rows["velocity_m_s"]) for swing, rows in groups}
+
+
+def claimed_speeds(p: DiaphragmMotorParameters) -> pd.DataFrame:
+    """Return the velocities at the settings for which sections 7.2 and 7.3 print one.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns section, frequency_hz, load_n, voltage_v, velocity_m_s (as it comes out, negative where the load wins)
+        and published_mm_s.
+    """
+    most = 2.0 * HIGHEST_VOLTAGE
+    settings = (
+        ("7.2", 200.0, 0.0, most, 4.8),
+        ("7.2", 300.0, 50.0, most, 30.5),
+        ("7.2", 600.0, 100.0, most, 168.1),
+        ("7.3", 500.0, 0.0, 100.0, 30.5),
+    )
+    rows = [
+        (section, f, load, volts, operate(replace(p, load_force=load), f, volts).velocity, published)
+        for section, f, load, volts, published in settings
+    ]
+    names = ["section", "frequency_hz", "load_n", "voltage_v", "velocity_m_s", "published_mm_s"]
+    return pd.DataFrame(rows, columns=names)
+
+
+def root_efficiency(p: DiaphragmMotorParameters, sweep: pd.DataFrame) -> pd.DataFrame:
+    """Return the efficiency that equation 17 would need with the root of seven (errata M17).
+
+    Parameters
+    ----------
+    sweep : pandas.DataFrame
+        The table ``frequency sweep``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns frequency_hz and efficiency [dimensionless].
+    """
+    frequencies = sweep["frequency_hz"].to_numpy(dtype=np.float64)
+    eta = sweep["flow_m3_s"].to_numpy() / (np.sqrt(7.0) * p.volume_a_volt * SWING * frequencies)
+    at = np.array([100.0, 300.0, 480.0, 800.0])
+    return pd.DataFrame({"frequency_hz": at, "efficiency": np.interp(at, frequencies, eta)})
+
+
 def reproduced(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Return the claims of sections 7.1 to 7.3 that physics can bear, beside ours.
 
@@ -61,9 +124,7 @@ def reproduced(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     straight = {name: straightness(swings["voltage_v"], swings[f"{name.lower()}_v"]) for name in ("A3", "A4", "A5")}
     rising = all(bool(swings[name].is_monotonic_increasing) for name in swings.columns if name != "velocity_m_s")
     loads = tables["load sweep"]
-    moving = loads[loads["load_n"] < 0.7 * loads["blocking_n"]]
-    lines = {swing: straightness(rows["load_n"], rows["velocity_m_s"]) for swing, rows in moving.groupby("voltage_v")}
-    whole = [straightness(rows["load_n"], rows["velocity_m_s"]) for _, rows in loads.groupby("voltage_v")]
+    lines, whole = load_straightness(loads, 0.7), load_straightness(loads, 1.0).values()
     runs = tables["control"].set_index("run")
     rows: list[Row] = [
         ("7.1", "peak flow, 200 V [ml/min]", "110.11", f"{flow.max():.1f}", abs(flow.max() - 110.0) <= 2.0),
@@ -91,7 +152,7 @@ def _turned(course: pd.DataFrame) -> str:
     return "yes" if moved[1.0] > 0.0 > moved[-1.0] else "no"
 
 
-def not_reproduced(p: DiaphragmMotorParameters, tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def not_reproduced(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Return the claims that the plant does not bear, with what it gives in their place (errata M17, M25, M26, M31).
 
     Parameters
@@ -112,11 +173,9 @@ def not_reproduced(p: DiaphragmMotorParameters, tables: Mapping[str, pd.DataFram
     ]
     sweep = tables["frequency sweep"].set_index("frequency_hz")
     frequencies = sweep.index.to_numpy(dtype=np.float64)
-    eta = sweep["flow_m3_s"].to_numpy() / (np.sqrt(7.0) * p.volume_a_volt * SWING * frequencies)
-    efficiencies = np.interp((100.0, 300.0, 480.0, 800.0), frequencies, eta)
+    efficiencies = tables["efficiency by the root of 7"]["efficiency"]
     first = np.interp((440.0, 480.0, 600.0), frequencies, sweep["a1_v"])
-    settings = ((200.0, 0.0), (300.0, 50.0), (600.0, 100.0))
-    speeds = [1e3 * operate(replace(p, load_force=load), f, most).velocity for f, load in settings]
+    *speeds, weak = 1e3 * tables["claimed speeds"]["velocity_m_s"]
     a4 = tables["voltage sweep"].set_index("voltage_v")["a4_v"]
     rows = [
         ("7.2, Table 5", "largest velocity [mm/s]", "168.1", f"{free:.1f} at {most:.0f} V",
@@ -138,7 +197,7 @@ def not_reproduced(p: DiaphragmMotorParameters, tables: Mapping[str, pd.DataFram
         ("7.3", "A4's voltage at 100 and 300 V [V]", "800 at 100 V, 500 at 800 V",
          f"{a4[100.0]:.1f}, {a4[300.0]:.1f}", "Table 5's entries; our volts rest on an assumed gain (M15, M26)"),
         ("7.3", "velocity at 100 and 800 V [mm/s]", "30.5, 72.5",
-         f"{1e3 * operate(p, 500.0, 100.0).velocity:.1f} at 100 V", "Table 5's entries (M26)"),
+         f"{weak:.1f} at 100 V", "Table 5's entries (M26)"),
         ("abstract", "optimal frequencies with their loads and flows", "0.01378 rad/s and others", "none",
          "rows of Table 2 that do not belong together (M25)"),
     ]  # fmt: skip

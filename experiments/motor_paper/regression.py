@@ -116,6 +116,29 @@ def anova_table() -> pd.DataFrame:
     return table.assign(relative_difference=(table["anova"] / table["published"] - 1.0).abs())
 
 
+def limits_table() -> pd.DataFrame:
+    """Return the numbers of Figure 12 that are limits, mean squares and degrees of freedom, in the reading `anova`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns quantity and value.
+    """
+    found = fit(reading("anova"))
+    limits = found.conf_int(alpha=0.05)
+    values = {
+        "df_regression": float(found.df_model),
+        "df_residual": float(found.df_resid),
+        "df_total": float(found.df_model + found.df_resid),
+        "ms_regression": float(found.mse_model),
+        "ms_residual": float(found.mse_resid),
+    }
+    for theirs, ours in FITTED_AS.items():
+        low, high = limits.loc[theirs]
+        values |= {f"{ours}_low": float(low), f"{ours}_high": float(high)}
+    return pd.DataFrame({"quantity": list(values), "value": list(values.values())})
+
+
 @stacked
 def residual_table() -> Frames:
     """Return what the residual, line-fit and probability plots of Figures 10 to 16 show, in every reading.

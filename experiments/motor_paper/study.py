@@ -29,6 +29,7 @@ TABLES: Mapping[str, Callable[[Tables, int], pd.DataFrame]] = {
     "table 5": lambda _, __: tables.table_5(),
     "published motor": lambda _, __: tables.published_motor(),
     "regression": lambda _, __: regression.anova_table(),
+    "regression limits": lambda _, __: regression.limits_table(),
     "regression residuals": lambda _, __: regression.residual_table(),
     "decisions": lambda _, __: regression.decisions(),
     "circularity": lambda _, __: regression.circularity(),

@@ -88,3 +88,31 @@ def load(name: TableName | MotorTableName) -> pd.DataFrame:
     require_known("published table", name, _FILES)
     with files(__name__).joinpath(_FILES[name]).open(encoding="utf-8") as stream:
         return pd.read_csv(stream, keep_default_na=False)
+
+
+def as_printed(name: TableName | MotorTableName) -> pd.DataFrame:
+    """Return a published table as `load` does, every cell as the text that is printed.
+
+    Parameters
+    ----------
+    name : TableName or MotorTableName
+        Which table.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Text, digit for digit; a fresh copy at each call.
+
+    Raises
+    ------
+    HydrostateError
+        If there is no such table.
+
+    Examples
+    --------
+    >>> as_printed("friction")["a2_n_s_per_m"].tolist()
+    ['2.144e3', '-7.440e3', '1.863e4']
+    """
+    require_known("published table", name, _FILES)
+    with files(__name__).joinpath(_FILES[name]).open(encoding="utf-8") as stream:
+        return pd.read_csv(stream, keep_default_na=False, dtype=str)

@@ -36,11 +36,11 @@ def test_the_steady_gain_is_that_of_the_tables_over_the_whole_range(table: pd.Da
     assert (gains["value"].diff().dropna() > 0.0).all()
 
 
-def test_the_break_frequency_falls_with_the_mean_from_below_the_published_one(table: pd.DataFrame) -> None:
+def test_figure_5_is_not_reproduced_since_the_break_frequency_falls_with_the_mean(table: pd.DataFrame) -> None:
     found = of(table, "break frequency")
     assert (found["published"] == 25.0).all()
     assert (found["value"].diff().dropna() < 0.0).all()
-    assert found["value"].max() < 25.0
+    assert found["value"].max() < 0.9 * 25.0
 
 
 def test_breaking_loose_delays_the_start(table: pd.DataFrame) -> None:
@@ -48,7 +48,7 @@ def test_breaking_loose_delays_the_start(table: pd.DataFrame) -> None:
     assert 0.0 < moving < at_rest < 0.02
 
 
-def test_the_actuator_is_linear_in_the_mean_and_not_in_the_amplitude(table: pd.DataFrame) -> None:
+def test_the_low_frequency_gain_depends_less_on_the_mean_than_on_the_amplitude(table: pd.DataFrame) -> None:
     spreads = of(table, "gain spread")
     over_means, over_amplitudes, with_small_signals = (
         cell(spreads, at, "value") for at in ("means from 2 V", "amplitudes from 2 V", "amplitudes from 0.5 V")

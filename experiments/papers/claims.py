@@ -1,0 +1,207 @@
+"""Every row of the page: tables cell by cell, what the text claims from ``claims.csv``, and every figure."""
+
+import re
+from collections.abc import Iterator, Mapping
+from importlib.resources import files
+
+import numpy as np
+import pandas as pd
+
+from experiments.circuit.figures import CIRCUIT_FIGURES
+from experiments.diaphragm_motor.figures import MOTOR_FIGURES
+from experiments.motor_paper.study import MOTOR_PAPER_FIGURES
+from experiments.nine_conditions.figures import FIGURES
+from experiments.page.figure_files import Drawings
+from experiments.page.frames import Rows, tabled
+from experiments.page.words import in_words
+from experiments.papers.eha_claims import eha_ours, settled_by_condition
+from experiments.papers.eha_tables import eha_table_rows
+from experiments.papers.figures import PAPERS_FIGURES
+from experiments.papers.motor_claims import motor_ours
+from experiments.papers.motor_tables import motor_table_rows
+from experiments.papers.parts import Evidence
+from experiments.papers.stack_claims import stack_ours
+from experiments.papers.verdict import MISSED, Basis, Ours, Row, drawn_as, verdict_of
+from experiments.piezo_stack.figures import STACK_FIGURES
+from plant.errors import HydrostateError
+
+PAPERS: Mapping[str, str] = {
+    "002": "gear-pump EHA (002)",
+    "000": "piezo-stack EHA (000)",
+    "001": "diaphragm motor (001)",
+}
+"""The papers by number."""
+
+DRAWN_BY: Mapping[str, tuple[Drawings, str]] = {
+    "nine": (FIGURES, "hydrostate study"),
+    "circuit": (CIRCUIT_FIGURES, "hydrostate circuit"),
+    "piezo-stack": (STACK_FIGURES, "hydrostate piezo-stack"),
+    "diaphragm-motor": (MOTOR_FIGURES, "hydrostate diaphragm-motor"),
+    "motor-paper": (MOTOR_PAPER_FIGURES, "hydrostate motor-paper"),
+    "papers": (PAPERS_FIGURES, "hydrostate papers"),
+}
+"""Figures by study, and the command that draws them."""
+
+FILTER_NOTE = (
+    "Equations 7.1 to 7.4, E3 mended, printed Q and R, on the plant that they assume; P_0 is ours (errata E10)."
+)
+
+_BASES: Mapping[str, Basis] = {"computed": "computed", "model": "model", "target": "target"}
+
+
+def read_csv(name: str) -> list[dict[str, str]]:
+    """Return the lines of one of this folder's tables, as text.
+
+    Parameters
+    ----------
+    name : str
+        ``claims.csv`` or ``figures.csv``.
+    """
+    with files("experiments.papers").joinpath(name).open(encoding="utf-8") as stream:
+        frame = pd.read_csv(stream, dtype=str, keep_default_na=False)
+    return [{str(key): str(value) for key, value in row.items()} for row in frame.to_dict("records")]
+
+
+def all_rows(found: Evidence) -> list[Row]:
+    """Return every row of the tables and claims of the three papers.
+
+    Parameters
+    ----------
+    found : Evidence
+        Tables of every part.
+
+    Raises
+    ------
+    HydrostateError
+        If a claim has nothing beside it, or something stands beside no claim.
+    """
+    ours = {"002": eha_ours(found), "000": stack_ours(found["piezo-stack"]), "001": motor_ours(found)}
+    claims = read_csv("claims.csv")
+    for paper, of_paper in ours.items():
+        asked = {row["key"] for row in claims if row["paper"] == paper}
+        apart = sorted(asked ^ set(of_paper))
+        if apart:
+            raise HydrostateError(
+                f"claims.csv and what stands beside it must have equal keys, got {apart} in one alone"
+            )
+    rows = [*eha_table_rows(found), *motor_table_rows(found), *_filter_rows(found)]
+    rows += [_claim(row, ours[row["paper"]][row["key"]]) for row in claims]
+    order = list(PAPERS)
+    return sorted(rows, key=lambda row: order.index(row.paper))
+
+
+def _claim(row: Mapping[str, str], ours: Ours) -> Row:
+    text = row["value"]
+    value = None if not text else text if row["accept"] == "same" else float(text)
+    return Row(
+        paper=row["paper"],
+        where=row["where"],
+        claim=row["claim"],
+        printed=row["printed"],
+        value=value,
+        unit=row["unit"],
+        accept=row["accept"],
+        basis=_BASES[row["basis"]],
+        ours=ours,
+        errata=row["errata"],
+        shown_by=f"hydrostate {row['verb']}",
+        note=row["note"],
+    )
+
+
+def _filter_rows(found: Evidence) -> Iterator[Row]:
+    for condition, ours in settled_by_condition(found["study"]["bulk_modulus"]).items():
+        yield Row(
+            paper="002",
+            where="section 7, Figure 11",
+            claim=f"bulk modulus by the published EKF, {in_words(condition)}: where all first guesses settle",
+            printed="2.07e8",
+            value=2.07e8,
+            unit="Pa",
+            accept="± 3 %",
+            basis="computed",
+            ours=ours,
+            shown_by="hydrostate study",
+            note=FILTER_NOTE,
+        )
+
+
+@tabled
+def row_table(rows: list[Row]) -> Rows:
+    """Return the rows as a table, each with the verdict that the rule gives it.
+
+    Parameters
+    ----------
+    rows : list of Row
+        From `all_rows`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns paper, where, claim, printed, unit, ours, low, high, accept, basis, errata, verdict, shown_by, note.
+    """
+    for row in rows:
+        yield {
+            "paper": PAPERS[row.paper],
+            "where": row.where,
+            "claim": row.claim,
+            "printed": row.printed,
+            "unit": row.unit,
+            "ours": row.ours.value,
+            "low": row.ours.low,
+            "high": row.ours.high,
+            "accept": row.accept,
+            "basis": row.basis,
+            "errata": row.errata,
+            "verdict": verdict_of(row).value,
+            "shown_by": row.shown_by,
+            "note": " ".join(part for part in (row.ours.said and f"{row.ours.said}.", row.note) if part),
+        }
+
+
+@tabled
+def figure_table(rows: pd.DataFrame) -> Rows:
+    """Return every figure of the three papers: drawn, drawn with a difference, or not, and why.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        From `row_table`; those whose place names a figure speak of it.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns paper, figure, title, drawn, difference, missed (rows that did not come back), rows, shown_by.
+    """
+    for figure in read_csv("figures.csv"):
+        drawings, command = DRAWN_BY[figure["study"]] if figure["study"] else ({}, "")
+        drawing = figure["drawing"]
+        if drawing and drawing not in drawings:
+            raise HydrostateError(f"figures.csv: study {figure['study']} draws no {drawing!r}")
+        about = [figure["figure"] in _figures_named(str(where)) for where in rows["where"]]
+        own = rows[(rows["paper"] == PAPERS[figure["paper"]]) & np.array(about, dtype=bool)]
+        missed = own["verdict"].isin(list(MISSED))
+        yield {
+            "paper": PAPERS[figure["paper"]],
+            "figure": int(figure["figure"]),
+            "title": figure["title"],
+            "drawn": drawn_as(bool(drawing), figure["difference"], own["verdict"].tolist()).value,
+            "difference": figure["difference"],
+            "missed": int(missed.sum()),
+            "rows": len(own),
+            "shown_by": f"{command}: {drawing}" if drawing else "",
+        }
+
+
+def _figures_named(where: str) -> set[str]:
+    """Return the figures that a place names; a range counts whole.
+
+    Examples
+    --------
+    >>> sorted(_figures_named("section 5.1.2, Figures 22 to 24"))
+    ['22', '23', '24']
+    """
+    named = {str(number) for number in re.findall(r"Figure (\d+)", where)}
+    for low, high in re.findall(r"Figures (\d+) to (\d+)", where):
+        named |= {str(number) for number in range(int(low), int(high) + 1)}
+    return named

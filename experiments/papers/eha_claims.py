@@ -1,0 +1,209 @@
+"""What we find where the gear-pump paper's text claims something, by the key of ``claims.csv``."""
+
+from collections.abc import Mapping
+from inspect import signature
+
+import numpy as np
+import pandas as pd
+from scipy.constants import psi
+
+from estimation.eha.named import PRINTED_Q, PRINTED_R, PUBLISHED_TIME
+from estimation.identification.signals.preprocess import zero_phase_filter
+from experiments.circuit.curves import FIGURE_9_VOLTS
+from experiments.nine_conditions.bulk_modulus import (
+    PRESSURE_STEPS,
+    PUBLISHED_WAY,
+    PUBLISHED_WAY_STUCK,
+    Experiment,
+)
+from experiments.nine_conditions.findings import by_experiment, recoveries
+from experiments.page.frames import Tables, cell
+from experiments.papers.parts import Evidence
+from experiments.papers.verdict import Ours
+from experiments.published import SCALARS
+from faults.eha.physical import VOLTS_A
+from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.drives import HOLD_TIME, sine
+from plant.eha.model import EhaParameters, pressure_rate
+from plant.eha.throttles import SHUT_VOLTS
+
+RIG = EhaParameters()
+
+
+def eha_ours(found: Evidence) -> Mapping[str, Ours]:
+    """Return what stands beside each claim of the gear-pump paper.
+
+    Parameters
+    ----------
+    found : Evidence
+        Tables of every part.
+    """
+    return {
+        **_rig(),
+        **_settings(),
+        **_conditions(found["study"], found["circuit"]),
+        **_first_tests(found["study"], found["circuit"], found["library"]["library"]),
+        **_steady(found["circuit"]),
+        **_steps(found["circuit"]["figure_10_validation_input"]),
+        **_published_filter(found["study"]["bulk_modulus"]),
+        **_on_circuit(found["circuit"]["figure_11_bulk_modulus"]),
+    }
+
+
+def _rig() -> Mapping[str, Ours]:
+    return {
+        "accumulator_psi": Ours(RIG.accumulator_pressure / psi),
+        "relief_psi": Ours(RIG.relief_pressure / psi),
+        "shut_volts": Ours(SHUT_VOLTS),
+        "throttle_flow": Ours(CircuitParameters().throttle_rated_flow),
+        "kpa_58": Ours(1e-3 * SCALARS["normal_differential_pressure"].si_value),
+        "kpa_500": Ours(1e-3 * 500.0 * psi),
+        "throttle_a_minor": Ours(VOLTS_A[1]),
+        "throttle_a_major": Ours(VOLTS_A[2]),
+        "mass": Ours(RIG.moving_mass),
+        "rpm": Ours(RIG.rated_speed * 30.0 / np.pi),
+        "compression_factor": Ours(_compression_factor()),
+    }
+
+
+def _compression_factor() -> float:
+    """Return the plant's flow of compression over V_0/beta times the rate of differential pressure."""
+    rate = float(pressure_rate(0.0, 0.0, RIG.rated_speed, RIG))
+    pumped = RIG.pump_displacement * RIG.rated_speed - RIG.flow_bias
+    return pumped * RIG.bulk_modulus / (RIG.chamber_volume * rate)
+
+
+def _settings() -> Mapping[str, Ours]:
+    of_filter = signature(zero_phase_filter).parameters
+    quarter = sine(0.1, 1e-4, RIG.rated_speed)
+    return {
+        "prbs_volts": Ours(RIG.rated_speed / RIG.motor_speed_per_volt),
+        "prbs_hz": Ours(1.0 / HOLD_TIME),
+        "filter_order": Ours(float(of_filter["order"].default)),
+        "filter_cutoff": Ours(float(of_filter["cutoff_hz"].default)),
+        "friction_low": Ours(min(FIGURE_9_VOLTS)),
+        "friction_high": Ours(max(FIGURE_9_VOLTS)),
+        "sample_time": Ours(1e3 * PUBLISHED_TIME),
+        **{f"q{number}": Ours(value) for number, value in enumerate(PRINTED_Q, start=1)},
+        **{f"r{number}": Ours(value) for number, value in enumerate(PRINTED_R.values(), start=1)},
+        "sine_volts": Ours(float(quarter.max()) / RIG.motor_speed_per_volt),
+        "sine_hz": Ours(float(signature(sine).parameters["frequency"].default)),
+    }
+
+
+def _conditions(study: Tables, circuit: Tables) -> Mapping[str, Ours]:
+    table = study["conditions"].set_index("condition")
+    shares = {
+        f"{level}_{fault}_{of}": Ours(cell(table, f"{level}_{fault}", f"{of}_percent_of_normal"))
+        for fault, of in (("leakage", "velocity"), ("friction", "pressure"))
+        for level in ("minor", "major")
+    }
+    throttle = circuit["figure_3_velocity_against_leakage_throttle"].set_index("throttle_a_v")
+    pressures = circuit["figure_4_pressure_against_friction_throttle"]["differential_pressure_pa"]
+    return {
+        **shares,
+        "minor_leakage_circuit": Ours(cell(throttle, VOLTS_A[1], "percent_of_normal")),
+        "major_leakage_circuit": Ours(cell(throttle, VOLTS_A[2], "percent_of_normal")),
+        "normal_psi": Ours(cell(table, "normal", "steady_pressure_pa") / psi),
+        "saturation_psi": Ours(float(pressures.max()) / psi),
+    }
+
+
+def _first_tests(study: Tables, circuit: Tables, library: pd.DataFrame) -> Mapping[str, Ours]:
+    tests = circuit["section_4_first_tests"].set_index(["test", "at"])["value"]
+    models = study["transfer_functions"].set_index("condition")
+    kept = library.set_index("condition")
+    width, spread = cell(kept, "normal", "bandwidth_hz"), 1.96 * cell(kept, "normal", "bandwidth_std_hz")
+    better = study["validation_rmse"]["mathematical_is_better"]
+    return {
+        "mean_gain_spread": Ours(float(tests["gain spread", "means from 2 V"])),
+        "low_amplitude_spread": Ours(float(tests["gain spread", "amplitudes from 0.5 V"])),
+        **{f"break_{v}": Ours(float(tests["break frequency", f"mean {v} V"])) for v in (2, 4, 7)},
+        "dead_zone_major": Ours(float(tests["dead zone", "major_leakage"])),
+        "order_circuit": Ours(float(circuit["figure_7_singular_values"]["suggested_order"].iloc[0])),
+        "order_study": Ours(float(study["order"]["suggested_order"].iloc[0])),
+        "bandwidth_library": Ours(width, width - spread, width + spread),
+        "bandwidth_study": Ours(cell(models, "normal", "bandwidth_hz")),
+        "math_better": Ours(float(better.sum())),
+    }
+
+
+def _steady(circuit: Tables) -> Mapping[str, Ours]:
+    groups = circuit["figure_8_leakage_points"].groupby("level")
+    straight = [
+        float(np.corrcoef(rows["differential_pressure_pa"], rows["lost_flow_m3_s"])[0, 1] ** 2) for _, rows in groups
+    ]
+    refit = circuit["figure_8_leakage_flow_refitted"]
+    bias = refit[refit["coefficient"] == "flow_bias"]
+    return {"leakage_r2": Ours(min(straight)), "bias_low": Ours(float(bias["low"].min()))}
+
+
+def _steps(drive: pd.DataFrame) -> Mapping[str, Ours]:
+    volts = drive["motor_voltage_v"].to_numpy()
+    held = volts[np.append(True, np.abs(np.diff(volts)) > 0.0)]
+    held = held[held != 0.0]
+    size = np.abs(held)
+    return {
+        "steps": Ours(float(len(held))),
+        "step_low": Ours(float(size.min())),
+        "step_high": Ours(float(size.max())),
+        "switches": Ours(float(np.sum(np.diff(np.sign(held)) != 0.0))),
+    }
+
+
+def _published_filter(estimates: pd.DataFrame) -> Mapping[str, Ours]:
+    of = dict(by_experiment(estimates))
+    own, sticks = of[PUBLISHED_WAY], of[PUBLISHED_WAY_STUCK]
+    settled = own.groupby("condition")["filter_settled_at_pa"]
+    spread = 100.0 * (settled.max() - settled.min()) / settled.mean()
+    pressure = recoveries(estimates)[PRESSURE_STEPS]
+    starts = own["start_pa"].astype(float)
+    low, high = sticks["filter_settled_at_pa"].min(), sticks["filter_settled_at_pa"].max()
+    return {
+        "ekf_spread": Ours(float(spread.max())),
+        "ekf_sticks": Ours(
+            float(sticks["filter_settled_at_pa"].mean()), said=f"{low:.3g} to {high:.3g} Pa; {_gate(sticks)}"
+        ),
+        "start_low": Ours(float(starts.min())),
+        "start_high": Ours(float(starts.max())),
+        "pressure_mean": Ours(pressure.mean_pa, said=f"gate passes {pressure.passed} of {pressure.estimates}"),
+    }
+
+
+def _on_circuit(estimates: pd.DataFrame) -> Mapping[str, Ours]:
+    published = estimates[estimates["form"] == "acceleration"]
+    ours = estimates[estimates["form"] == "flow"]
+    out = 100.0 * float(published["value_pa"].notna().mean())
+    return {
+        "ekf_circuit_out": Ours(out, said=_gate(published)),
+        "flow_worst": Ours(float(ours["error_percent"].abs().max()), said=_gate(ours)),
+    }
+
+
+def settled_by_condition(estimates: pd.DataFrame, which: Experiment = PUBLISHED_WAY) -> Mapping[str, Ours]:
+    """Return where a filter settles in each condition, with its 95 % interval, gate and coverage.
+
+    Parameters
+    ----------
+    estimates : pandas.DataFrame
+        The study's table of bulk modulus.
+
+    Returns
+    -------
+    Mapping[str, Ours]
+        By condition [Pa]: mean over the first guesses, whether or not the gate lets it out.
+    """
+    rows = dict(by_experiment(estimates))[which]
+    return {str(name): _settled(of_one) for name, of_one in rows.groupby("condition", sort=False)}
+
+
+def _settled(rows: pd.DataFrame) -> Ours:
+    value = float(rows["filter_settled_at_pa"].mean())
+    spread = 1.96 * float(rows["filter_std_pa"].mean())
+    covered = (rows["filter_settled_at_pa"] - RIG.bulk_modulus).abs() <= 1.96 * rows["filter_std_pa"]
+    said = f"{_gate(rows)}; 95 % interval ± {1e-8 * spread:.2g}e8 Pa holds 2.07e8 Pa in {covered.sum()} of {len(rows)}"
+    return Ours(value, said=said)
+
+
+def _gate(rows: pd.DataFrame) -> str:
+    return f"gate passes {int(rows['gate_passed'].sum())} of {len(rows)}"

@@ -1,0 +1,98 @@
+"""Figures of the diaphragm-motor paper that its tables hold and no other study draws. They compute nothing."""
+
+import matplotlib.ticker as ticker
+from matplotlib.figure import Figure
+
+from experiments.page.figure_files import Drawings
+from experiments.page.frames import Tables
+from experiments.page.style import BLUE, Margins, panels
+
+
+def draw_table_4(tables: Tables) -> Figure:
+    """Draw flow and displacement of Table 4 over frequency, with its errors: Figures 36, 37, 49 and 50.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The study's tables.
+    """
+    margins = Margins(left=0.75, top=0.5, across=0.8, down=0.55)
+    figure, (flow, stroke, error, both) = panels("Table 4 of the diaphragm-motor paper", 2, 2, 5.6, margins)
+    rows = tables["table 4"]
+    frequency = rows["frequency_hz"]
+    flow.plot(frequency, rows["theory_ml_per_min"], color=BLUE, label="theory, computed anew")
+    flow.plot(frequency, rows["flowmeter_ml_per_min"], "o", color=BLUE, label="flow meter, as printed")
+    flow.set(xlabel="frequency [Hz]", ylabel="flow [mL/min]")
+    flow.legend()
+    stroke.plot(frequency, rows["pumping_displacement_mm"], "o-", color=BLUE)
+    stroke.set(xlabel="frequency [Hz]", ylabel="displacement [µm]")
+    error.plot(frequency, rows["error_by_flowmeter_percent"], color=BLUE, label="computed anew")
+    error.plot(frequency, rows["error_percent"], "o", color=BLUE, label="as printed")
+    error.set(xlabel="frequency [Hz]", ylabel="error [%]")
+    error.legend()
+    both.plot(rows["pumping_displacement_mm"], rows["flowmeter_ml_per_min"], "o-", color=BLUE)
+    both.set(xlabel="displacement [µm]", ylabel="flow [mL/min]")
+    return figure
+
+
+def draw_table_5(tables: Tables) -> Figure:
+    """Draw velocity and force of Table 5's actuators over their working frequency: Figure 46.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The study's tables.
+    """
+    margins = Margins(left=0.75, top=0.5, across=0.8)
+    figure, (speed, force) = panels("Table 5 of the diaphragm-motor paper: six actuators", 1, 2, 3.6, margins)
+    rows = tables["table 5"]
+    for axis, column, label in (
+        (speed, "no_load_velocity_mm_per_s", "no-load velocity [mm/s]"),
+        (force, "blocking_force_n", "blocking force [N]"),
+    ):
+        axis.plot(rows["frequency_hz"], rows[column], "o", color=BLUE)
+        axis.set(xlabel="working frequency [Hz]", ylabel=label)
+    return figure
+
+
+def draw_modes(tables: Tables) -> Figure:
+    """Draw the frequencies of the dry plate's first six modes: Figure 44.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The study's tables.
+    """
+    figure, (axis,) = panels("First six modes of the dry plate", 1, 1, 3.6, Margins(left=0.75, top=0.5))
+    rows = tables["dry modes"]
+    axis.plot(range(1, len(rows) + 1), 1e-3 * rows["frequency_hz"], "o-", color=BLUE)
+    axis.xaxis.set_major_locator(ticker.MaxNLocator(integer=True))
+    axis.set(xlabel="mode", ylabel="frequency [kHz]")
+    return figure
+
+
+def draw_poles(tables: Tables) -> Figure:
+    """Draw the poles of equation 20 for small voltages; it has no zeros: Figure 33.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The study's tables.
+    """
+    figure, (axis,) = panels("Poles of equation 20 for small voltages", 1, 1, 3.6, Margins(left=0.75, top=0.5))
+    poles = tables["poles"]
+    rows = poles[poles["model"] == "equation 20, small voltages"]
+    for sign in (1.0, -1.0):
+        axis.plot(rows["real_rad_s"], sign * 1e-3 * rows["imaginary_rad_s"], "x", color=BLUE)
+    axis.axvline(0.0, color="grey", linewidth=1.0)
+    axis.set(xlabel="real part [rad/s]", ylabel="imaginary part [10³ rad/s]")
+    return figure
+
+
+PAPERS_FIGURES: Drawings = {
+    "table_4": draw_table_4,
+    "table_5": draw_table_5,
+    "dry_modes": draw_modes,
+    "poles": draw_poles,
+}
+"""Figures by name."""

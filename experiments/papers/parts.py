@@ -1,0 +1,196 @@
+"""The studies whose results the rows are read from: each is run once, kept as a folder of tables, and read there."""
+
+import hashlib
+import json
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import pandas as pd
+
+import estimation
+import experiments
+import faults
+import plant
+from experiments.circuit.study import RIG as CIRCUIT_RIG
+from experiments.circuit.study import circuit_studies
+from experiments.diaphragm_motor.study import RIG as MOTOR_RIG
+from experiments.diaphragm_motor.study import claim_tables
+from experiments.library.library import read_library
+from experiments.library.tables import library_table, root_table
+from experiments.motor_paper.study import MOTOR_PAPER
+from experiments.nine_conditions.settings import StudySettings
+from experiments.nine_conditions.study import NINE_CONDITIONS
+from experiments.page.folder import check_target, write_tables
+from experiments.page.frames import Tables
+from experiments.piezo_stack import flow
+from experiments.piezo_stack.hysteresis import hysteresis_table
+from experiments.piezo_stack.quoted import quoted_numbers
+from experiments.piezo_stack.study import RIG as STACK_RIG
+from experiments.running.progress import Track, in_one_piece
+from experiments.running.study import Seeded, versions
+from plant.errors import LogWarning
+
+Evidence: TypeAlias = Mapping[str, Tables]
+"""Tables by part and name, as they stand in the folders."""
+
+
+@dataclass(frozen=True)
+class PapersSettings:
+    """How large the studies are that the rows are read from.
+
+    Parameters
+    ----------
+    starts : tuple of float
+        First guesses of bulk modulus [Pa], as in Figure 11.
+    duration : float
+        Length of the runs for estimation and validation [s].
+    sample_time : float
+        Their sample time, section 7 [s].
+    identification_duration : float
+        Length of the runs for identification [s].
+    seeds : int
+        Runs a condition for classification [count].
+    """
+
+    seed: int = 2024
+    starts: tuple[float, ...] = (0.0, 0.5e8, 1e8, 2e8, 3e8, 4e8, 5e8)
+    duration: float = 10.0
+    sample_time: float = 1e-4
+    identification_duration: float = 20.0
+    seeds: int = 20
+
+    @property
+    def study(self) -> StudySettings:
+        """The same for the studies of the gear-pump actuator."""
+        return StudySettings(**asdict(self))
+
+
+def quick_papers(seed: int) -> PapersSettings:
+    """Return a small size: the same rows, from fewer first guesses and shorter runs."""
+    return PapersSettings(seed, (0.0, 5e8), duration=2.0, sample_time=1e-3, identification_duration=8.0, seeds=1)
+
+
+def _nine(settings: PapersSettings, track: Track) -> Tables:
+    return NINE_CONDITIONS.find(settings.study, track).frames
+
+
+def _circuit(settings: PapersSettings, track: Track) -> Tables:
+    studies = circuit_studies(CIRCUIT_RIG, settings.seed, settings.study)
+    return {name: run() for name, run in track(studies.items(), description="the circuit's experiments")}
+
+
+def _library(_: PapersSettings, track: Track) -> Tables:
+    models = read_library()
+    makers = {"library": lambda: library_table(models), "roots": lambda: root_table(models)}
+    return {name: make() for name, make in track(makers.items(), description="the library")}
+
+
+def _stack(settings: PapersSettings, track: Track) -> Tables:
+    wanted = flow.figure_points()
+    points = [point for some in wanted.values() for point in some]
+    rows = iter(track(flow.sweep(STACK_RIG, points), len(points), description="the stack's operating points"))
+    tables = {name: pd.DataFrame([next(rows) for _ in some]) for name, some in wanted.items()}
+    tables["figure 10 loop widths"] = flow.loop_widths(flow.stack_loops(STACK_RIG))
+    peak = flow.OperatingPoint(275.0, flow.HIGH_VOLTAGE, flow.HIGH_BIAS, 0.0)
+    tables["pump cycle"] = flow.pump_cycle(STACK_RIG, peak)
+    tables["hysteresis parameters"] = hysteresis_table(STACK_RIG, settings.seed)
+    tables["quoted numbers"] = quoted_numbers(tables)
+    return tables
+
+
+def _motor(settings: PapersSettings, track: Track) -> Tables:
+    return claim_tables(MOTOR_RIG, settings.seed, track)
+
+
+def _motor_paper(settings: PapersSettings, track: Track) -> Tables:
+    return MOTOR_PAPER.find(Seeded(settings.seed), track).frames
+
+
+PARTS: Mapping[str, Callable[[PapersSettings, Track], Tables]] = {
+    "study": _nine,
+    "circuit": _circuit,
+    "library": _library,
+    "piezo-stack": _stack,
+    "diaphragm-motor": _motor,
+    "motor-paper": _motor_paper,
+}
+"""What makes each part, by the verb that shows it."""
+
+
+def gather(folder: Path, settings: PapersSettings, track: Track) -> Evidence:
+    """Return the tables of every part; those that an earlier run left behind unchanged are not made again.
+
+    Each part is written whole once it is made, so that an interrupted run goes on where it stopped.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of the parts, one folder a part.
+
+    Raises
+    ------
+    HydrostateError
+        If a part's folder cannot be written, or holds something that is not a study.
+    """
+    sources = sources_digest()
+    for name, make in PARTS.items():
+        # read back as JSON has it, so that it equals what a manifest keeps
+        manifest = json.loads(json.dumps(_manifest(name, settings, sources)))
+        if _kept(folder / name) != manifest:
+            check_target(folder / name)
+            with warnings.catch_warnings(action="ignore", category=LogWarning):
+                tables = make(settings, track)
+            in_one_piece(track, f"writing {name}", lambda: write_tables(tables, manifest, folder / name))  # noqa: B023 - called at once
+    return {name: read_tables(folder / name) for name in PARTS}
+
+
+def read_tables(folder: Path) -> Tables:
+    """Return the tables of a folder, by file name without its ending.
+
+    Parameters
+    ----------
+    folder : Path
+        As `write_tables` leaves it.
+    """
+    return {
+        path.stem: pd.read_csv(path, keep_default_na=False, na_values=[""])
+        for path in sorted((folder / "tables").glob("*.csv"))
+    }
+
+
+def sources_digest() -> str:
+    """Return what tells one state of the packages' sources from another; this folder, which only reads, is left out."""
+    digest = hashlib.sha256()
+    for path in _sources():
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _sources() -> Iterator[Path]:
+    for package in (plant, estimation, faults, experiments):
+        root = Path(str(package.__file__)).parent
+        for path in sorted(root.rglob("*.py")):
+            if Path(__file__).parent not in path.parents:
+                yield path
+
+
+def _manifest(name: str, settings: PapersSettings, sources: str) -> dict[str, Any]:
+    return {
+        "study": f"papers: {name}",
+        "settings": asdict(settings),
+        "versions": versions(),
+        "sources": sources,
+    }
+
+
+def _kept(folder: Path) -> dict[str, Any]:
+    """Return the manifest of an earlier run without its list of files; nothing where there is none."""
+    try:
+        found = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+        whole = all((folder / name).is_file() for name in found.pop("files"))
+    except (OSError, ValueError, KeyError, AttributeError, TypeError):
+        return {}
+    return found if whole else {}

@@ -1,0 +1,93 @@
+"""What we find where the piezo-stack paper's text claims something, by the key of ``claims.csv``."""
+
+from collections.abc import Mapping
+
+import pandas as pd
+
+from experiments.page.frames import Tables, cell
+from experiments.papers.verdict import Ours
+from experiments.piezo_stack import flow
+from plant.piezo_stack.run import HIGHEST_VOLTAGE
+from plant.units import LITRE_PER_MINUTE
+
+PEAK = 275.0
+"""The published best frequency [Hz]."""
+
+
+def stack_ours(found: Tables) -> Mapping[str, Ours]:
+    """Return what stands beside each claim of the piezo-stack paper.
+
+    Parameters
+    ----------
+    found : Mapping[str, pandas.DataFrame]
+        Tables of the part ``piezo-stack``.
+    """
+    return {**_no_load(found), **_loaded(found), **_loops(found), **_settings(), "nothing": Ours(None)}
+
+
+def _curve(frame: pd.DataFrame, by: str, value: float, axis: str = "frequency_hz") -> pd.Series:
+    """Return flow [L/min] by frequency or load."""
+    return frame[frame[by] == value].set_index(axis)["flow_m3_s"].astype(float) / LITRE_PER_MINUTE
+
+
+def _best(flows: pd.Series) -> Ours:
+    return Ours(float(str(flows.idxmax())))
+
+
+def _no_load(found: Tables) -> Mapping[str, Ours]:
+    bias, voltage = found["figure_11_flow_over_bias_pressure"], found["figure_12_flow_over_voltage"]
+    high = _curve(bias, "bias_pressure_pa", flow.HIGH_BIAS)
+    low = _curve(bias, "bias_pressure_pa", flow.LOW_BIAS)
+    weak = _curve(voltage, "voltage_v", flow.LOW_VOLTAGE)
+    return {
+        "flow_max": Ours(float(high.max())),
+        "flow_max_hz": _best(high),
+        "flow_at_275": Ours(float(high.loc[PEAK] / high.max())),
+        "flow_max_hz_low": _best(low),
+        "decline": Ours(float(high.iloc[-1] / high.max())),
+        "bias_ratio": Ours(float(low.loc[PEAK] / high.loc[PEAK])),
+        "bias_crossings": Ours(float((low > high).sum())),
+        "voltage_ratio": Ours(float(weak.loc[PEAK] / high.loc[PEAK])),
+        "flow_max_hz_weak": _best(weak),
+    }
+
+
+def _loaded(found: Tables) -> Mapping[str, Ours]:
+    fixed, loads = found["figure_13_flow_with_fixed_weight"], found["figure_14_flow_over_load"]
+    heavy = _curve(fixed, "load_kg", 20.0)
+    at_peak = _curve(fixed, "frequency_hz", PEAK, "load_kg")
+    falling = [_curve(loads, "frequency_hz", frequency, "load_kg") for frequency in flow.LOAD_FREQUENCIES]
+    rise = max(float((curve.diff() / curve.iloc[0]).max()) for curve in falling)
+    return {
+        "flow_20kg": Ours(float(heavy.loc[225.0:325.0].max())),
+        "weight_rise": Ours(float(at_peak.diff().max())),
+        "load_rise": Ours(100.0 * rise),
+        "least_20kg": Ours(min(float(curve.loc[20.0]) for curve in falling)),
+        "flow_50kg": Ours(max(float(curve.loc[50.0]) for curve in falling)),
+    }
+
+
+def _loops(found: Tables) -> Mapping[str, Ours]:
+    widths = found["figure_10_loop_widths"]["width_percent"]
+    hysteresis = found["hysteresis_parameters"].set_index("parameter")
+    ratios = {
+        key: cell(hysteresis, name, "printed") / cell(hysteresis, name, "truth")
+        for key, name in (("printed_alpha", "hysteresis"), ("printed_phi", "hysteresis_phi_1"))
+    }
+    return {
+        "loops_narrowing": Ours(float((widths.diff() <= 0.0).sum())),
+        **{key: Ours(ratio if ratio == ratio else None) for key, ratio in ratios.items()},
+        "reynolds": Ours(float(found["pump_cycle"]["reynolds_number"].abs().max())),
+    }
+
+
+def _settings() -> Mapping[str, Ours]:
+    return {
+        "loop_volts": Ours(flow.LOOP_VOLTAGE),
+        "high_volts": Ours(flow.HIGH_VOLTAGE),
+        "high_bias": Ours(1e-6 * flow.HIGH_BIAS),
+        "low_bias": Ours(1e-6 * flow.LOW_BIAS),
+        "high_hz": Ours(max(flow.FREQUENCIES)),
+        "rated_volts": Ours(HIGHEST_VOLTAGE),
+        "load_hz": Ours(flow.LOAD_FREQUENCIES[1]),
+    }

@@ -1,0 +1,141 @@
+"""The page of the three papers: every table, figure and claim, with what we find and the verdict of one rule."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from experiments.page.frames import Rows, Tables, tabled
+from experiments.page.numbers import number
+from experiments.page.tables import Cell, Column, Columns, Row, right
+from experiments.papers.claims import PAPERS, all_rows, figure_table, row_table
+from experiments.papers.figures import PAPERS_FIGURES
+from experiments.papers.parts import PapersSettings, gather, quick_papers
+from experiments.papers.verdict import Drawn, Verdict
+from experiments.running.progress import Track, in_one_piece
+from experiments.running.study import Found, Study
+from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
+from plant.eha.circuit_parameters import CircuitParameters
+from plant.piezo_stack.parameters import PiezoStackParameters
+
+TONES: Mapping[str, str] = {
+    "reproduced": "good",
+    "predicted": "good",
+    "calibrated to": "none",
+    "not reproduced": "bad",
+    "erratum": "bad",
+    "drawn": "good",
+    "drawn with a difference": "none",
+    "cannot be drawn": "bad",
+}
+"""How a verdict is coloured."""
+
+SECTIONS: Mapping[str, str] = {"002": "rows of 002", "000": "rows of 000", "001": "rows of 001"}
+"""The page's table of each paper."""
+
+
+def papers_study(parts: Path) -> Study[PapersSettings]:
+    """Return the study of the three papers, whose parts are kept in a folder.
+
+    Parameters
+    ----------
+    parts : Path
+        The folder of the parts; those that are there and unchanged are not made again.
+    """
+
+    def find(settings: PapersSettings, track: Track) -> Found:
+        found = gather(parts, settings, track)
+        rows = in_one_piece(track, "verdicts", lambda: row_table(all_rows(found)))
+        tables = {"rows": rows, "figures": figure_table(rows)}
+        tables["verdicts"] = verdict_counts(rows)
+        shown = {"table 4": found["motor-paper"]["table_4"], "table 5": found["motor-paper"]["table_5"]}
+        drawn = {"poles": found["motor-paper"]["poles"], "dry modes": found["diaphragm-motor"]["dry_modes"]}
+        return Found({**tables, **shown, **drawn})
+
+    return Study("papers", "papers/report.html", find, PAPERS_FIGURES, COLUMNS, PARAMETERS, _facts, "report")
+
+
+@tabled
+def verdict_counts(rows: pd.DataFrame) -> Rows:
+    """Return how many rows of each paper have which verdict.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        Of `row_table`.
+    """
+    for paper, of_one in rows.groupby("paper", sort=False):
+        counts = of_one["verdict"].value_counts()
+        yield {
+            "paper": paper,
+            **{verdict.value: int(counts.get(verdict.value, 0)) for verdict in Verdict},
+            "rows": len(of_one),
+        }
+
+
+def _facts(tables: Tables, settings: PapersSettings) -> Mapping[str, Any]:
+    rows, figures = tables["rows"], tables["figures"]
+    return {
+        **{name: rows[rows["paper"] == PAPERS[paper]] for paper, name in SECTIONS.items()},
+        "papers": {paper: (PAPERS[paper], name) for paper, name in SECTIONS.items()},
+        "drawn": {kind.value: int((figures["drawn"] == kind.value).sum()) for kind in Drawn},
+        "count": len(rows),
+        "quick": settings == quick_papers(settings.seed),
+    }
+
+
+def _verdict(word: str) -> Cell:
+    return Cell(word, TONES[word])
+
+
+def _ours(row: Row) -> Cell:
+    value = row["ours"]
+    if isinstance(value, str):
+        return Cell(value)
+    return right(number(None if value is None else float(value), 5))
+
+
+def _limits(row: Row) -> str:
+    low, high = row["low"], row["high"]
+    told = row["accept"]
+    if low is None or low != low:
+        return told
+    return f"{told}; ours {number(float(low))} to {number(float(high))}"
+
+
+def _errata(text: str) -> str:
+    return text
+
+
+_ROWS: Columns = (
+    *("where", "claim"),
+    Column("printed", words=right),
+    Column("ours", of_row=_ours),
+    "unit",
+    Column("accept", "tolerance or interval", of_row=_limits),
+    Column("verdict", words=_verdict),
+    Column("errata", words=_errata),
+    Column("shown_by", "command"),
+    "note",
+)
+
+COLUMNS: Mapping[str, Columns] = {
+    **dict.fromkeys(SECTIONS.values(), _ROWS),
+    "verdicts": ("paper", *(verdict.value for verdict in Verdict), "rows"),
+    "figures": (
+        *("paper", "figure", "title"),
+        Column("drawn", words=_verdict),
+        Column("missed", "rows that did not come back"),
+        Column("rows", "rows about it"),
+        Column("difference", "difference or reason"),
+        Column("shown_by", "command: drawing"),
+    ),
+}
+
+PARAMETERS = {
+    "circuit": asdict(CircuitParameters()),
+    "piezo-stack": asdict(PiezoStackParameters()),
+    "diaphragm-motor": asdict(DiaphragmMotorParameters()),
+}

@@ -1,0 +1,230 @@
+"""One row of the page, and the one rule that gives it its verdict. No verdict is written anywhere else."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Literal, TypeAlias, get_args
+
+from plant.errors import HydrostateError, require_known
+
+Basis: TypeAlias = Literal["computed", "model", "target"]
+"""Where ours is from: computed from what is printed or from data; predicted by a model that was not told the printed
+number; or a number that a model was given or calibrated to."""
+
+
+class Verdict(StrEnum):
+    """Whether a printed value came back."""
+
+    REPRODUCED = "reproduced"
+    PREDICTED = "predicted"
+    CALIBRATED = "calibrated to"
+    NOT_REPRODUCED = "not reproduced"
+    ERRATUM = "erratum"
+
+
+class Drawn(StrEnum):
+    """Whether a figure is drawn."""
+
+    ALIKE = "drawn"
+    DIFFERS = "drawn with a difference"
+    NOT = "cannot be drawn"
+
+
+AGREES: dict[Basis, Verdict] = {
+    "computed": Verdict.REPRODUCED,
+    "model": Verdict.PREDICTED,
+    "target": Verdict.CALIBRATED,
+}
+"""The verdict on what agrees, by where ours is from."""
+
+MISSED = frozenset({Verdict.NOT_REPRODUCED, Verdict.ERRATUM})
+"""The verdicts on what does not agree."""
+
+
+@dataclass(frozen=True)
+class Ours:
+    """What we find.
+
+    Parameters
+    ----------
+    value : float, str or None
+        The number [the row's unit], or words; None where we have none.
+    low, high : float, optional
+        Its own interval [the row's unit]; the number itself unless told.
+    said : str
+        What else there is to say of it.
+    """
+
+    value: float | str | None
+    low: float | None = None
+    high: float | None = None
+    said: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One printed value, or one claim, with what we find.
+
+    Parameters
+    ----------
+    printed : str
+        As printed.
+    value : float, str or None
+        The same as a number [`unit`], or as words that ours must equal.
+    accept : str
+        When ours counts as the printed value; see `accepted`.
+    errata : str
+        Numbers of the errata by which the printed value itself is wrong, ambiguous or contradicted by the paper; empty
+        if there are none.
+    shown_by : str
+        The command that shows it.
+    """
+
+    paper: str
+    where: str
+    claim: str
+    printed: str
+    value: float | str | None
+    unit: str
+    accept: str
+    basis: Basis
+    ours: Ours
+    errata: str = ""
+    shown_by: str
+    note: str = ""
+
+
+_LAST_DIGIT = re.compile(r"^-?\d*\.?(\d*)(?:e(-?\d+))?$")
+
+
+def digits_half(printed: str) -> float:
+    """Return half a unit of the last printed digit.
+
+    Parameters
+    ----------
+    printed : str
+        A number as printed, ``,`` between thousands allowed.
+
+    Returns
+    -------
+    float
+        In the number's unit.
+
+    Raises
+    ------
+    HydrostateError
+        If it is no plain number.
+
+    Examples
+    --------
+    >>> digits_half("3,447.5"), digits_half("4.784e-12"), digits_half("436")
+    (0.05, 5e-16, 0.5)
+    """
+    found = _LAST_DIGIT.match(printed.replace(",", ""))
+    if found is None:
+        raise HydrostateError(f"a printed number must be digits, a point and an exponent, got {printed!r}")
+    decimals, exponent = found.groups()
+    return 0.5 * float(f"1e{int(exponent or 0) - len(decimals)}")
+
+
+def accepted(row: Row) -> tuple[float, float]:
+    """Return the range in which ours counts as the printed value.
+
+    ``same`` is for words, which are compared as they are. ``digits`` is half a unit of the last printed digit, ``± x``
+    and ``± x %`` are about the printed value, ``a to b``, ``at least a`` and ``at most a`` stand for themselves.
+
+    Returns
+    -------
+    tuple of float
+        Lowest and highest [the row's unit].
+
+    Raises
+    ------
+    HydrostateError
+        If the row's `accept` is none of these, or there is no printed number that it could be about.
+
+    Examples
+    --------
+    >>> accepted(Row(paper="", where="", claim="", printed="25 Hz", value=25.0, unit="Hz", accept="± 10 %",
+    ...              basis="model", ours=Ours(None), shown_by=""))
+    (22.5, 27.5)
+    """
+    words = row.accept.split()
+    if words[:2] == ["at", "least"]:
+        return float(words[2]), math.inf
+    if words[:2] == ["at", "most"]:
+        return -math.inf, float(words[2])
+    if len(words) == 3 and words[1] == "to":
+        return float(words[0]), float(words[2])
+    if not isinstance(row.value, float):
+        raise HydrostateError(f"{row.where}: {row.accept!r} needs a printed number, got {row.value!r}")
+    if row.accept == "digits":
+        half = digits_half(row.printed)
+    elif words[:1] == ["±"] and len(words) in {2, 3}:
+        half = float(words[1]) * (0.01 * abs(row.value) if words[2:] == ["%"] else 1.0)
+    else:
+        raise HydrostateError(f"{row.where}: what is accepted cannot be read: {row.accept!r}")
+    return row.value - half, row.value + half
+
+
+def agrees(row: Row) -> bool:
+    """Tell whether ours counts as the printed value: its interval meets the accepted range, or words are the same.
+
+    Raises
+    ------
+    HydrostateError
+        As `accepted`.
+    """
+    ours = row.ours
+    if row.accept == "same":
+        return ours.value is not None and ours.value == row.value
+    if ours.value is None or isinstance(ours.value, str) or math.isnan(ours.value):
+        return False
+    low, high = accepted(row)
+    slack = 1e-9 * max(abs(edge) for edge in (low, high, 0.0) if math.isfinite(edge))
+    bottom = ours.value if ours.low is None else ours.low
+    top = ours.value if ours.high is None else ours.high
+    return bool(low - slack <= top and bottom <= high + slack)
+
+
+def verdict_of(row: Row) -> Verdict:
+    """Return the verdict on a row.
+
+    What agrees is *calibrated to* if a model was given it, *predicted* if a model was not told it, *reproduced* if it
+    was computed or estimated. What does not agree is an *erratum* if an erratum says that the printed value is wrong or
+    contradicted, and *not reproduced* otherwise.
+
+    Raises
+    ------
+    HydrostateError
+        If the row's basis is unknown, or as `accepted`.
+    """
+    require_known("basis", row.basis, get_args(Basis))
+    if agrees(row):
+        return AGREES[row.basis]
+    return Verdict.ERRATUM if row.errata else Verdict.NOT_REPRODUCED
+
+
+def drawn_as(drawing: bool, difference: str, verdicts: Sequence[str]) -> Drawn:
+    """Return how a figure of a paper is drawn.
+
+    Parameters
+    ----------
+    drawing : bool
+        Whether a study draws it.
+    difference : str
+        What is known to be different; empty if nothing.
+    verdicts : sequence of str
+        Those of the rows that speak of the figure: one that did not come back is a difference too.
+
+    Examples
+    --------
+    >>> print(drawn_as(True, "", [Verdict.PREDICTED]), drawn_as(True, "", [Verdict.ERRATUM]), sep=", ")
+    drawn, drawn with a difference
+    """
+    if not drawing:
+        return Drawn.NOT
+    missed = not MISSED.isdisjoint(verdicts)
+    return Drawn.DIFFERS if difference or missed else Drawn.ALIKE

@@ -1,0 +1,64 @@
+"""What stands in the two tables of claims and figures, without a run."""
+
+import re
+
+import pytest
+
+from experiments.page.errata import ERRATA
+from experiments.papers.claims import DRAWN_BY, PAPERS, read_csv
+from experiments.papers.verdict import Ours, Row, accepted
+
+CLAIMS, FIGURES = read_csv("claims.csv"), read_csv("figures.csv")
+
+
+@pytest.mark.parametrize(("paper", "count"), [("002", 11), ("000", 14), ("001", 50)])
+def test_every_figure_of_each_paper_has_one_row(paper: str, count: int) -> None:
+    assert [int(row["figure"]) for row in FIGURES if row["paper"] == paper] == list(range(1, count + 1))
+
+
+def test_a_figure_is_drawn_by_a_study_or_has_a_reason() -> None:
+    for row in FIGURES:
+        if row["drawing"]:
+            assert row["drawing"] in DRAWN_BY[row["study"]][0], row
+        else:
+            assert row["difference"], row
+            assert not row["study"], row
+
+
+def test_every_claim_has_a_tolerance_that_can_be_read_and_errata_that_exist() -> None:
+    for row in CLAIMS:
+        assert row["paper"] in PAPERS
+        for number in re.findall(r"\b[EPM]\d+\b", f"{row['errata']} {row['note']}"):
+            assert number in ERRATA, row
+        if row["accept"] == "same":
+            assert row["value"], row
+            continue
+        value = float(row["value"]) if row["value"] else None
+        low, high = accepted(
+            Row(
+                paper=row["paper"],
+                where=row["where"],
+                claim=row["claim"],
+                printed=row["value"],
+                value=value,
+                unit=row["unit"],
+                accept=row["accept"],
+                basis="model",
+                ours=Ours(None),
+                shown_by="",
+            )
+        )
+        assert low <= high
+        if value is not None and re.search(r"\d", row["printed"]) and "least" not in row["accept"]:
+            assert low <= value <= high, row
+
+
+def test_the_number_that_is_compared_is_the_one_that_is_printed() -> None:
+    words = {"linearly", "the same value", "second", "third", "nine", "each", "all", "1/2", "√5", "eight"}
+    superscripts = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+    for row in CLAIMS:
+        printed = row["printed"].replace(",", "").replace(" \N{MULTIPLICATION SIGN} 10", "e").translate(superscripts)
+        number = re.search(r"-?\d+\.?\d*(?:e-?\d+)?", printed)
+        if number is None or row["printed"] in words or not row["value"] or row["accept"] == "same":
+            continue
+        assert float(number[0]) == float(row["value"]), row

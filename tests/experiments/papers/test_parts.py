@@ -1,0 +1,116 @@
+"""The parts behind the page: kept, read again, made anew where anything changed; and the page made of real ones."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from rich.console import Console
+
+from experiments.page.frames import Tables
+from experiments.papers import parts
+from experiments.papers.claims import figure_table, row_table
+from experiments.papers.parts import PapersSettings, gather, quick_papers, read_tables
+from experiments.papers.study import papers_study
+from experiments.papers.verdict import Ours, Row
+from experiments.running.progress import Track, untracked
+from experiments.running.study import run_study
+
+QUICK = quick_papers(7)
+
+
+class Stop(KeyboardInterrupt):
+    pass
+
+
+def stand_in(monkeypatch: pytest.MonkeyPatch, stop_at: str = "") -> list[str]:
+    """Let three parts note that they are made; one of them may be interrupted."""
+    made: list[str] = []
+
+    def maker(name: str) -> Callable[[PapersSettings, Track], Tables]:
+        def make(settings: PapersSettings, _: Track) -> Tables:
+            if name == stop_at:
+                raise Stop
+            made.append(name)
+            return {"a table, named": pd.DataFrame({"level": ["none"], "value": [0.1 + 0.2], "seed": [settings.seed]})}
+
+        return make
+
+    names: Mapping[str, object] = {name: maker(name) for name in ("one", "two", "three")}
+    monkeypatch.setattr(parts, "PARTS", names)
+    return made
+
+
+def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = stand_in(monkeypatch, stop_at="three")
+    with pytest.raises(Stop):
+        gather(tmp_path, QUICK, untracked)
+    assert made == ["one", "two"]
+    made = stand_in(monkeypatch)
+    found = gather(tmp_path, QUICK, untracked)
+    assert made == ["three"]
+    assert list(found) == ["one", "two", "three"]
+
+
+def test_what_is_read_is_what_was_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stand_in(monkeypatch)
+    table = gather(tmp_path, QUICK, untracked)["two"]["a_table_named"]
+    assert table.to_dict("records") == [{"level": "none", "value": 0.1 + 0.2, "seed": 7}]
+
+
+@pytest.mark.parametrize("change", ["settings", "sources", "a file"])
+def test_a_part_is_made_anew_when_anything_changed(
+    change: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stand_in(monkeypatch)
+    gather(tmp_path, QUICK, untracked)
+    made = stand_in(monkeypatch)
+    if change == "sources":
+        monkeypatch.setattr(parts, "sources_digest", lambda: "another")
+    if change == "a file":
+        (tmp_path / "two" / "tables" / "a_table_named.csv").unlink()
+    gather(tmp_path, quick_papers(8) if change == "settings" else QUICK, untracked)
+    assert made == (["two"] if change == "a file" else ["one", "two", "three"])
+
+
+def test_a_row_that_names_a_figure_counts_for_it() -> None:
+    def row(where: str, ours: float) -> Row:
+        words = {"paper": "002", "where": where, "claim": "a claim", "printed": "1", "unit": "", "accept": "digits"}
+        return Row(**words, value=1.0, basis="model", ours=Ours(ours), shown_by="hydrostate circuit")
+
+    rows = row_table([row("section 4, Figure 5", 3.0), row("section 4, Figure 6", 1.0), row("Figures 9 to 10", 9.0)])
+    drawn = figure_table(rows).set_index(["paper", "figure"])["drawn"]["gear-pump EHA (002)"]
+    assert drawn.loc[[5, 6, 9, 10]].tolist() == [
+        "drawn with a difference",
+        "drawn",
+        "drawn with a difference",
+        "drawn with a difference",
+    ]
+
+
+SMALL = PapersSettings(7, (0.0, 5e8), duration=1.0, sample_time=1e-3, identification_duration=2.5, seeds=1)
+
+
+@pytest.mark.slow
+def test_the_page_is_built_and_no_row_is_without_a_verdict(tmp_path: Path) -> None:
+    page = run_study(papers_study(tmp_path / "parts"), SMALL, tmp_path / "papers", Console(quiet=True))
+    assert page.name == "report.html"
+    words = page.read_text(encoding="utf-8")
+    tables = read_tables(tmp_path / "papers")
+    rows, figures = tables["rows"], tables["figures"]
+    assert len(rows) > 480
+    assert set(rows["verdict"]) == {"reproduced", "predicted", "calibrated to", "not reproduced", "erratum"}
+    assert rows[["printed", "accept", "shown_by"]].notna().all().all()
+    assert not rows.duplicated(["paper", "where", "claim"]).any(), rows[rows.duplicated(["paper", "where", "claim"])]
+    assert figures["drawn"].notna().all()
+    assert len(figures) == 11 + 14 + 50
+    assert all(f">{verdict}<" in words for verdict in set(rows["verdict"]) | set(figures["drawn"]))
+    verdicts = rows.set_index(["where", "claim"])["verdict"]
+    assert verdicts["section 7.1, Figure 47", "peak flow"] == "calibrated to"
+    assert verdicts["Table 2", "(11) velocity, by equation 18 and one piston, row 3"] == "erratum"
+    assert (
+        verdicts["section 4, Figure 5", "curves share their shape: break frequency at a mean of 7 V"]
+        == "not reproduced"
+    )
+    assert verdicts["Figure 12", "r square"] == "reproduced"
+    assert verdicts["section 4", "dead zone under major leakage"] == "predicted"

@@ -1,0 +1,96 @@
+import math
+
+import pytest
+
+from experiments.papers.verdict import Basis, Ours, Row, accepted, agrees, digits_half, drawn_as, verdict_of
+from plant.errors import HydrostateError
+
+
+def row(
+    value: float | str | None = 2.0,
+    ours: Ours = Ours(2.0),  # noqa: B008 - frozen
+    *,
+    printed: str = "2.0",
+    accept: str = "digits",
+    basis: Basis = "computed",
+    errata: str = "",
+) -> Row:
+    return Row(
+        paper="002",
+        where="section 1",
+        claim="a claim",
+        printed=printed,
+        value=value,
+        unit="",
+        accept=accept,
+        basis=basis,
+        ours=ours,
+        errata=errata,
+        shown_by="hydrostate study",
+    )
+
+
+@pytest.mark.parametrize(
+    ("basis", "verdict"), [("computed", "reproduced"), ("model", "predicted"), ("target", "calibrated to")]
+)
+def test_what_agrees_is_called_by_where_ours_is_from(basis: Basis, verdict: str) -> None:
+    assert verdict_of(row(basis=basis)) == verdict
+    assert verdict_of(row(basis=basis, errata="E7")) == verdict
+
+
+def test_what_does_not_agree_is_an_erratum_only_where_one_is_cited() -> None:
+    assert verdict_of(row(ours=Ours(2.06))) == "not reproduced"
+    assert verdict_of(row(ours=Ours(2.06), errata="E7")) == "erratum"
+    assert verdict_of(row(ours=Ours(None), errata="E7")) == "erratum"
+    assert verdict_of(row(ours=Ours(math.nan), basis="target")) == "not reproduced"
+
+
+def test_digits_are_half_a_unit_of_the_last_one_printed() -> None:
+    assert agrees(row(ours=Ours(2.05)))
+    assert not agrees(row(ours=Ours(2.0501)))
+    assert not agrees(row(ours=Ours(2.05), printed="2.00"))
+    assert digits_half("-7.440e3") == 0.5
+
+
+def test_an_interval_of_ours_agrees_where_it_meets_the_tolerance() -> None:
+    assert agrees(row(ours=Ours(3.0, 2.04, 3.96)))
+    assert not agrees(row(ours=Ours(3.0, 2.06, 3.94)))
+    assert not agrees(row(ours=Ours(1.0, 0.0, 1.94)))
+
+
+@pytest.mark.parametrize(
+    ("accept", "limits"),
+    [
+        ("± 0.5", (1.5, 2.5)),
+        ("± 10 %", (1.8, 2.2)),
+        ("1 to 4", (1.0, 4.0)),
+        ("at least 1.5", (1.5, math.inf)),
+        ("at most 1.5", (-math.inf, 1.5)),
+    ],
+)
+def test_every_form_of_tolerance_is_read(accept: str, limits: tuple[float, float]) -> None:
+    assert accepted(row(accept=accept)) == pytest.approx(limits)
+
+
+@pytest.mark.parametrize("accept", ["near", "± 10 per cent of it", "", "±"])
+def test_a_tolerance_that_cannot_be_read_is_refused(accept: str) -> None:
+    with pytest.raises(HydrostateError, match="cannot be read"):
+        verdict_of(row(accept=accept))
+
+
+def test_a_tolerance_about_a_value_needs_one() -> None:
+    with pytest.raises(HydrostateError, match="needs a printed number"):
+        verdict_of(row(value=None, accept="± 1 %"))
+
+
+def test_words_are_compared_as_they_are() -> None:
+    assert agrees(row("Brass", Ours("Brass"), accept="same"))
+    assert not agrees(row("Brass", Ours("brass"), accept="same"))
+    assert not agrees(row("never falls", Ours(9.7), accept="same"))
+
+
+def test_a_figure_with_a_row_that_did_not_come_back_is_drawn_with_a_difference() -> None:
+    assert drawn_as(True, "", ["predicted", "not reproduced"]) == "drawn with a difference"
+    assert drawn_as(True, "signs mended", ["predicted"]) == "drawn with a difference"
+    assert drawn_as(True, "", []) == "drawn"
+    assert drawn_as(False, "a photograph", ["predicted"]) == "cannot be drawn"
