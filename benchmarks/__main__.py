@@ -18,6 +18,7 @@ NAMES = (
     "identification_tests",
     "identification_sets",
     "own_equations",
+    "bent_inputs",
     "circuit",
     "detection",
     "forecast",

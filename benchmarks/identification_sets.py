@@ -55,7 +55,7 @@ def main(arguments: list[str]) -> int:
     made = [one for seed in range(options.simulated) for one in simulated_sets(seed)]
     chosen = made if options.simulated else public_sets(options.sets)
     peers = [name for name in options.peers if (_root() / name / "bin" / "python").exists()] if not made else []
-    names = ("first", "scipy", "default", "auto", "narx", *peers)
+    names = ("first", "scipy", "default", "auto", "narx", "hammerstein", *peers)
     print(f"{'set':28s}" + "".join(f"{name:>12s}" for name in names) + "   seconds of ours")
     missed = 0
     for one in chosen:
@@ -91,7 +91,7 @@ def _runs(one: PublicSet, peers: list[str], timeout: float) -> tuple[dict[str, d
     data = channels_from([one.train[0]], [one.train[1]], one.sample_time, inputs, "y")
     found: dict[str, dict[str, Array]] = {"first": _first(one), "scipy": _scipy(one)}
     seconds: list[str] = []
-    for name, structure in (("default", "output-error"), ("auto", "auto"), ("narx", "narx")):
+    for name, structure in (("default", "output-error"), *((one, one) for one in ("auto", "narx", "hammerstein"))):
         begun = time.perf_counter()
         try:
             model = identify_channels(data, structure=structure).model

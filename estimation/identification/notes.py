@@ -47,6 +47,10 @@ class IdentificationCode(Code):
         "in the model of order {order} a pole and a zero nearly cancel, or its gain is not determined; one of order "
         "{taken} does nearly as well on what was held back, and is taken"
     )
+    NO_NONLINEARITY = (
+        "neither dead zone nor saturation nor backlash at the input explains {output!r} better on what was held back "
+        "than none: the linear model is taken"
+    )
     NO_FIT = (
         "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): nothing that it says "
         "is to be believed"

@@ -71,8 +71,8 @@ def identify(
         str,
         option(
             "NAME",
-            f"{', '.join([*STRUCTURES, 'narx'])}; auto takes the best on data held back, narx is polynomial and needs "
-            "--input and --output.",
+            f"{', '.join([*STRUCTURES, 'narx', 'hammerstein'])}; auto takes the best on data held back. With --input "
+            "and --output: narx is polynomial, hammerstein a dead zone, saturation or backlash before a linear model.",
         ),
     ] = "output-error",
     order: Annotated[
@@ -147,7 +147,7 @@ def identify(
     from plant.errors import NoChannelError
 
     any_columns = (inputs is not None or outputs is not None or simulate is not None) and rig is None and not columns
-    if any_columns or structure in ("narx",):
+    if any_columns or structure in ("narx", "hammerstein"):
         asked = Asked(
             names(inputs),
             names(outputs),

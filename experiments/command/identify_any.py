@@ -48,7 +48,7 @@ class Asked:
 BLANK: Result = {
     **dict.fromkeys(("inputs", "input", "output", "structure", "order", "n_values", "sample_time_s")),
     **dict.fromkeys(("fit_percent", "rmse", "one_step_percent", "one_step_rmse", "held_back_percent", "offset")),
-    **dict.fromkeys(("numerator", "denominator", "dc_gain", "poles", "delay", "test", "model")),
+    **dict.fromkeys(("numerator", "denominator", "dc_gain", "poles", "delay", "nonlinearity", "test", "model")),
     "candidates": [],
 }
 """Entries of a log that could not be used."""
@@ -131,6 +131,7 @@ def _identified(
 
 def entries(found: "Identified") -> dict[str, Any]:
     """Return what was identified by the names of the JSON contract."""
+    from estimation.identification.free_run.hammerstein_body import HammersteinBody
     from estimation.identification.free_run.identify import WARNED
 
     model, linear = found.model, found.model.linear
@@ -158,6 +159,8 @@ def entries(found: "Identified") -> dict[str, Any]:
         result |= {"numerator": [b.tolist() for b, _ in transfer], "denominator": transfer[0][1].tolist()}
         gains = [float(b.sum() / f.sum()) for b, f in transfer]
         result |= {"order": transfer[0][1].size - 1, "offset": model.offset, "dc_gain": {"value": gains}}
+    if isinstance(model.body, HammersteinBody):
+        result["nonlinearity"] = model.body.nonlinearity(model.scaling)
     quality = found.quality
     result["message"] = clauses(
         [
@@ -253,10 +256,23 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
             said,
         )
     yield shown
+    for result in results:
+        bend = result["nonlinearity"]
+        if bend is not None:
+            values = ", ".join(
+                f"{name.replace('_', ' ')} {_with_interval(one)}" for name, one in bend.items() if name != "kind"
+            )
+            yield f"{result['output']}: {bend['kind'].replace('-', ' ')} at {result['input']}, {values}"
     yield (
         f"From {', '.join(results[0]['inputs'])}. Fits are of free runs: on the logs fitted, on blocks held back "
         "from a fit to the others, and on --validate; one step ahead, models and candidates are in --json and --out."
     )
+
+
+def _with_interval(one: Mapping[str, Any]) -> str:
+    """Return a value with its 95 % interval."""
+    ends = one["ci95"]
+    return f"{one['value']:.4g}" + ("" if ends is None else f" ({ends[0]:.4g} to {ends[1]:.4g})")
 
 
 def _simulated_screen(results: Sequence[Result]) -> "Iterable[RenderableType]":

@@ -9,9 +9,16 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimation.identification.free_run.bodies import LinearBody, PolynomialBody
+from estimation.identification.free_run.choose_hammerstein import (
+    HammersteinCandidate,
+    chosen_hammerstein,
+    hammerstein_candidates,
+)
 from estimation.identification.free_run.choose_linear import Candidate, chosen, linear_candidates
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate, polynomial_candidates
 from estimation.identification.free_run.data import Channels, Scaling, scaled
+from estimation.identification.free_run.hammerstein_body import HammersteinBody
+from estimation.identification.free_run.hammerstein_fit import deviations, refitted
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
@@ -21,7 +28,7 @@ from estimation.identification.notes import IdentificationCode
 from plant.errors import HydrostateError, LogWarning, require_known
 from plant.notes import Note
 
-FREE_STRUCTURES = ("output-error", "narx", "auto", *ADOPTED)
+FREE_STRUCTURES = ("output-error", "narx", "hammerstein", "auto", *ADOPTED)
 """Structures between any channels; auto chooses between the first two."""
 
 WARNED = (IdentificationCode.TIME_CONSTANT_BEYOND_RECORD, IdentificationCode.NO_FIT, IdentificationCode.INTEGRATES)
@@ -35,6 +42,9 @@ MOST_CHOSEN, MOST_FITTED = 10_000, 100_000
 
 CLEAR_MARGIN = 0.15
 """Share by which a nonlinear model must do better than the linear one on what was held back."""
+
+BENT_MARGIN = 0.02
+"""Share by which a nonlinearity at the input must do better than none on what was held back."""
 
 NEARLY_AS_GOOD = 0.02
 """Share of held-back error that is given up for a model without cancelling or undetermined parts."""
@@ -89,8 +99,9 @@ def identify_channels(
         One log or several.
     structure : str
         ``"output-error"``: linear; ``"narx"``: polynomial, its terms chosen by the free run; ``"auto"``: linear,
-        unless the polynomial one is clearly better on blocks held back. Of one input also the keys of
-        `other_structures.ADOPTED`, at the order that output error is given.
+        unless the polynomial one is clearly better on blocks held back. Of one input also ``"hammerstein"``: a dead
+        zone, saturation or backlash in front of a linear model, where one of them is better there than none; and
+        the keys of `other_structures.ADOPTED`, at the order that output error is given.
     order, delay, n_numerator : int, optional
         Of every input; chosen by the free run on blocks held back where not given.
 
@@ -131,6 +142,12 @@ def _identified(
     sound = not best.doubt
     if structure in ADOPTED:
         return _adopted(structure, best, data, by, rows)
+    if structure == "hammerstein":
+        bent = _hammerstein(linear, best, data, whole, rows)
+        if bent is not None:
+            return bent
+        notes = [*notes, IdentificationCode.NO_NONLINEARITY.note(output=data.output)]
+        structure = "output-error"
     body, held_back, named = LinearBody.of(best.fit), best.held_back, "output-error"
     if structure != "output-error":
         polynomial = polynomial_candidates(linear if sound else [best], part)
@@ -153,6 +170,29 @@ def _identified(
         notes = [*notes, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
         sound = False
     return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(rows), tuple(notes), bool(sound))
+
+
+def _hammerstein(
+    linear: Sequence[Candidate], best: Candidate, data: Channels, whole: Channels, rows: list[dict[str, Any]]
+) -> Identified | None:
+    """Return the best model with a nonlinearity at its input, or None where none is better than the linear one."""
+    if len(data.inputs) > 1:
+        raise HydrostateError(f"structure hammerstein takes one input, got {', '.join(data.inputs)}: use narx")
+    found = hammerstein_candidates(linear, section(whole, MOST_CHOSEN))
+    rows += [_hammerstein_row(one) for one in found]
+    if not found:
+        return None
+    taken = chosen_hammerstein(found)
+    if not taken.held_back < (1.0 - BENT_MARGIN) * min(best.held_back, *(one.held_back for one in linear)):
+        return None
+    part = section(whole, MOST_FITTED)
+    fit = refitted(taken.fit, part)
+    body = HammersteinBody.of(fit, deviations(fit, part))
+    model = FreeRunModel(data.inputs, data.output, data.sample_time, "hammerstein", scaled(data)[1], body)
+    quality = model.quality(data.u, data.y)
+    sound = quality.fit_percent > 0.0 and taken.held_back < 1.0
+    notes = () if sound else (IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent),)
+    return Identified(model, quality, 100.0 * (1.0 - taken.held_back), tuple(rows), notes, sound)
 
 
 def _adopted(structure: str, best: Candidate, data: Channels, by: Scaling, rows: list[dict[str, Any]]) -> Identified:
@@ -258,6 +298,19 @@ def _row(one: Candidate) -> dict[str, Any]:
         "bic": one.bic,
         "aic": one.aic,
         "doubt": one.doubt or None,
+    }
+
+
+def _hammerstein_row(one: HammersteinCandidate) -> dict[str, Any]:
+    form = one.fit.linear.form
+    return {
+        "structure": "hammerstein",
+        "nonlinearity": one.fit.kind,
+        "order": form.order,
+        "numerator": list(form.sizes),
+        "delay": list(form.delays),
+        "held_back_percent": 100.0 * (1.0 - one.held_back),
+        "bic": one.bic,
     }
 
 

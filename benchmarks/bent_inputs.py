@@ -1,0 +1,93 @@
+"""A dead zone, a saturation and a backlash planted at a plant's input: whether they are found, and intervals cover.
+
+Each log has fresh inputs and noise. `identify_channels` is told the order of the linear part (2, one sample of dead
+time) and nothing of the nonlinearity, unless `--order auto` leaves that to the data as well, which takes longer.
+"""
+
+import argparse
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from benchmarks.targets import misses, say
+from estimation.arrays import Array
+from estimation.identification.free_run.bends import KINDS
+from estimation.identification.free_run.data import Channels, channels_from
+from estimation.identification.free_run.hammerstein_body import HammersteinBody
+from estimation.identification.free_run.identify import identify_channels
+from estimation.identification.model.recursion import filtered
+
+SAMPLES = 1500
+NOISE = 0.05
+"""Deviation of the sensor's noise over that of the output."""
+
+LEVEL, OFFSET = 2.0, 5.0
+"""Of the input, in the middle, and of the output at rest [their units]."""
+
+
+@dataclass(frozen=True)
+class Planted:
+    """A nonlinearity with its values in the unit of the input."""
+
+    kind: str
+    values: Mapping[str, float]
+    drive: Callable[[np.random.Generator], Array]
+
+
+def _steps(rng: np.random.Generator) -> Array:
+    return np.repeat(rng.normal(size=SAMPLES // 10), 10)
+
+
+def _wander(rng: np.random.Generator) -> Array:
+    slow = filtered([1.0], [1.0, -0.95], rng.normal(size=SAMPLES))
+    return slow / slow.std()
+
+
+PLANTED = (
+    Planted("dead-zone", {"lower": LEVEL - 0.4, "upper": LEVEL + 0.6}, _steps),
+    Planted("saturation", {"lower": LEVEL - 1.0, "upper": LEVEL + 0.8}, _steps),
+    Planted("backlash", {"half_width": 0.3}, _wander),
+)
+
+
+def logged(planted: Planted, seed: int) -> Channels:
+    """Return a log of one plant."""
+    rng = np.random.default_rng([seed, PLANTED.index(planted)])
+    u = LEVEL + planted.drive(rng)
+    bent, _ = KINDS[planted.kind].bend(u, np.array(list(planted.values.values())), float(u[0]))
+    y = filtered([0.0, 0.1, 0.05], [1.0, -1.6, 0.75], bent)[100:]
+    noisy = OFFSET + y + NOISE * y.std() * rng.normal(size=y.size)
+    return channels_from([u[100:, None]], [noisy], 0.01, ["u"], "y")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Count what is found and covered, and return how many wishes are missed."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--seeds", type=int, default=100)
+    options.add_argument("--order", default="2")
+    chosen = options.parse_args(arguments)
+    form: dict[str, Any] = {} if chosen.order == "auto" else {"order": int(chosen.order), "delay": 1}
+    misses.clear()
+    for planted in PLANTED:
+        found = [_found(planted, seed, form) for seed in range(chosen.seeds)]
+        hits = {name: np.array([one[name] for one in found if one]) for name in planted.values}
+        say(f"{planted.kind}: found [%]", 100.0 * sum(map(bool, found)) / chosen.seeds, 100.0, most=False)
+        for name, scores in hits.items():
+            covered = 100.0 * float(np.mean(np.abs(scores) <= 1.96))
+            print(f"{planted.kind}, {name}: error over its deviation {scores.mean():.2f} +- {scores.std():.2f}")
+            say(f"{planted.kind}, {name}: intervals that cover [%]", covered, 90.0, most=False)
+            say(f"{planted.kind}, {name}: intervals that cover [%]", covered, 98.0)
+    return len(misses)
+
+
+def _found(planted: Planted, seed: int, form: Mapping[str, Any]) -> dict[str, float]:
+    """Return the errors over their deviations; nothing where another kind is found."""
+    model = identify_channels(logged(planted, seed), structure="hammerstein", **form).model
+    if not isinstance(model.body, HammersteinBody) or model.body.bend != planted.kind:
+        return {}
+    said = model.body.nonlinearity(model.scaling)
+    return {
+        name: (said[name]["value"] - value) / (said[name]["std"] or np.inf) for name, value in planted.values.items()
+    }

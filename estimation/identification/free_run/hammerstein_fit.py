@@ -1,0 +1,241 @@
+"""Output error of a linear model behind a bent input (Hammerstein): all values together, with exact derivatives."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.arrays import Array, BoolArray
+from estimation.fits.covariance import automatic_lags, least_squares_covariance
+from estimation.identification.free_run.bends import KINDS
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem, fit_linear
+from estimation.identification.free_run.linear_kernel import decay_rows
+from estimation.identification.search.descent import stable
+from estimation.identification.search.levenberg import levenberg
+
+TOLERANCE, MOST_STEPS = 1e-9, 60
+"""Share of the cost that a further step may promise at the end, and evaluations at most."""
+
+REFINED = 3
+"""Starts that are carried on."""
+
+
+@dataclass(frozen=True, eq=False)
+class HammersteinFit:
+    """Where a fit has ended, in the data's scale.
+
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+    values : ndarray, shape (k,)
+        Of the nonlinearity.
+    starts : ndarray, shape (logs,)
+        Of a nonlinearity that remembers, one a log; empty otherwise.
+    linear : LinearFit
+        What follows it.
+    """
+
+    kind: str
+    values: Array
+    starts: Array
+    linear: LinearFit
+
+    @property
+    def cost(self) -> float:
+        """Sum of squared residuals [dimensionless]."""
+        return self.linear.cost
+
+    @property
+    def theta(self) -> Array:
+        """All values [dimensionless], shape (p,)."""
+        return np.concatenate([self.values, self.starts, self.linear.theta])
+
+
+class HammersteinProblem:
+    """Sensitivities of one kind and form on given data of one input."""
+
+    def __init__(self, kind: str, form: Form, data: Channels) -> None:
+        self.kind, self.form, self.data = KINDS[kind], form, data
+        self.name = kind
+        self.input = np.concatenate([u[:, 0] for u in data.u])
+        self.target = np.concatenate(data.y)
+        self.used: BoolArray = np.isfinite(self.target)
+        self.n_bend = len(self.kind.names)
+        self.n_starts = len(data.u) if self.kind.remembers else 0
+
+    def bent(self, values: Array, starts: Array) -> tuple[Channels, list[Array]]:
+        """Return the data behind the nonlinearity, and the derivatives of each log's bent input.
+
+        Parameters
+        ----------
+        values : ndarray, shape (k,)
+            Of the nonlinearity.
+        starts : ndarray, shape (logs,)
+            One a log, where it remembers.
+
+        Returns
+        -------
+        tuple of Channels and list of ndarray, shape (n, columns)
+            Columns are values, then the log's own start where there is one.
+        """
+        found = [
+            self.kind.bend(u[:, 0], values, float(starts[index]) if self.n_starts else 0.0)
+            for index, u in enumerate(self.data.u)
+        ]
+        return replace(self.data, u=tuple(one[:, None] for one, _ in found)), [slopes for _, slopes in found]
+
+    def jacobian(self, theta: Array) -> tuple[Array, Array]:
+        """Return the output and its derivative by every value.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (p,)
+            Nonlinearity, starts, then the linear model's values.
+
+        Returns
+        -------
+        tuple of ndarray, shapes (n,) and (n, p)
+            Output and derivatives, scaled.
+        """
+        ahead = self.n_bend + self.n_starts
+        values, starts, linear = theta[: self.n_bend], theta[self.n_bend : ahead], theta[ahead:]
+        data, slopes = self.bent(values, starts)
+        problem = Problem(self.form, data)
+        output, behind = problem.jacobian(linear)
+        jacobian = np.zeros((output.size, theta.size), order="F")
+        jacobian[:, ahead:] = behind
+        b = linear[: self.form.n_b]
+        f = np.concatenate([[1.0], linear[self.form.n_b : self.form.n_b + self.form.order]])
+        for index, by in enumerate(slopes):
+            part = slice(int(problem.bounds[index]), int(problem.bounds[index + 1]))
+            answers = _answers(by, b, f, self.form.delays[0])
+            jacobian[part, : self.n_bend] = answers[:, : self.n_bend]
+            if self.n_starts:
+                jacobian[part, self.n_bend + index] = answers[:, -1]
+        return output, jacobian
+
+    def descend(self, values: Array, starts: Array, linear: Array) -> HammersteinFit:
+        """Return the minimum that one start leads to.
+
+        Parameters
+        ----------
+        values, starts, linear : ndarray, shapes (k,), (logs,) and (p,)
+            Where to begin.
+        """
+        ahead, n_b, n = self.n_bend + self.n_starts, self.form.n_b, self.form.order
+        target = self.target[self.used]
+
+        def at(theta: Array) -> tuple[float, Array, Array]:
+            output, jacobian = self.jacobian(theta)
+            left, kept = output[self.used] - target, jacobian[self.used]
+            return float(left @ left), kept.T @ kept, kept.T @ left
+
+        def acceptable(theta: Array) -> bool:
+            return self.kind.may(self.input, theta[: self.n_bend]) and bool(
+                stable(theta[ahead + n_b : ahead + n_b + n])
+            )
+
+        start = np.concatenate([values, starts, linear])
+        cost, best = levenberg(at, start, acceptable, tolerance=TOLERANCE, most_steps=MOST_STEPS)
+        return HammersteinFit(
+            self.name, best[: self.n_bend], best[self.n_bend : ahead], LinearFit(self.form, best[ahead:], cost)
+        )
+
+
+def _answers(inputs: Array, b: Array, f: Array, delay: int) -> Array:
+    """Return what the linear model makes of each column, which stood at its first value before."""
+    rows = np.empty((inputs.shape[1], inputs.shape[0]))
+    padded = np.concatenate([np.repeat(inputs[:1], delay + b.size, axis=0), inputs])
+    for row, column in zip(rows, padded.T, strict=True):
+        row[:] = np.convolve(column, b)[b.size : b.size + row.size]
+    decay_rows(f, rows, float(b.sum()) * inputs[0], np.zeros(f.size))
+    return rows.T
+
+
+def fit_hammerstein(kind: str, form: Form, data: Channels, denominators: Sequence[Array]) -> HammersteinFit | None:
+    """Return the best model of one kind and form; None where the input's samples do not reach it.
+
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+    data : Channels
+        Scaled, one input.
+    denominators : sequence of ndarray, shape (order + 1,)
+        Where the linear part may begin.
+    """
+    problem = HammersteinProblem(kind, form, data)
+    tried: list[tuple[float, Array, Array]] = []
+    for values in problem.kind.starts(problem.input):
+        if not problem.kind.may(problem.input, values):
+            continue
+        bent, _ = problem.bent(values, _first(problem))
+        if any(np.ptp(u) == 0.0 for u in bent.u):
+            continue
+        inner = Problem(form, bent)
+        tried += [(inner.profiled(f)[0], values, f) for f in denominators]
+    fits: list[HammersteinFit] = []
+    for _, values, f in _apart(sorted(tried, key=lambda one: one[0])):
+        bent, _ = problem.bent(values, _first(problem))
+        near = fit_linear(form, bent, [f])
+        fits.append(problem.descend(values, _first(problem), near.theta))
+    return min(fits, key=lambda one: one.cost) if fits else None
+
+
+def _first(problem: HammersteinProblem) -> Array:
+    return np.array([u[0, 0] for u in problem.data.u]) if problem.n_starts else np.empty(0)
+
+
+def _apart(ranked: Sequence[tuple[float, Array, Array]]) -> list[tuple[float, Array, Array]]:
+    """Return the best starts of different values of the nonlinearity."""
+    kept: list[tuple[float, Array, Array]] = []
+    for one in ranked:
+        if len(kept) < REFINED and not any(np.array_equal(one[1], other[1]) for other in kept):
+            kept.append(one)
+    return kept
+
+
+def refitted(fit: HammersteinFit, data: Channels) -> HammersteinFit:
+    """Return the fit taken on, on other data of as many logs.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    """
+    problem = HammersteinProblem(fit.kind, fit.linear.form, data)
+    starts = fit.starts if len(fit.starts) == problem.n_starts else _first(problem)
+    bent, _ = problem.bent(fit.values, starts)
+    begun = fit_linear(fit.linear.form, bent, [fit.linear.f])
+    return problem.descend(fit.values, starts, begun.theta)
+
+
+def deviations(fit: HammersteinFit, data: Channels) -> Array:
+    """Return the standard deviations of the nonlinearity's values, coloured residuals allowed for.
+
+    Parameters
+    ----------
+    data : Channels
+        The data of the fit.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        In the data's scale; infinite where no sample tells a value [dimensionless].
+    """
+    problem = HammersteinProblem(fit.kind, fit.linear.form, data)
+    output, jacobian = problem.jacobian(fit.theta)
+    residual = np.where(problem.used, output - problem.target, 0.0)
+    jacobian[~problem.used] = 0.0
+    felt = np.flatnonzero(np.any(jacobian != 0.0, axis=0))
+    used = int(np.count_nonzero(problem.used))
+    spread = least_squares_covariance(
+        np.ascontiguousarray(jacobian[:, felt]), residual, used, automatic_lags(residual), np.zeros(len(felt))
+    )[1]
+    found = np.full(fit.theta.size, np.inf)
+    variance = np.diag(spread)
+    # of a residual as slow as the log the window's estimate need not be positive: then nothing is known
+    found[felt] = np.sqrt(np.where(variance > 0.0, variance, np.inf))
+    return found[: problem.n_bend]

@@ -1,0 +1,99 @@
+"""A linear model as it runs free, in the data's scale, with its JSON form."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem
+
+
+@dataclass(frozen=True, eq=False)
+class LinearBody:
+    """Transfer functions with one denominator, and an offset.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (p,)
+        Numerators, denominator behind its 1, offset.
+    """
+
+    form: Form
+    theta: Array
+    kind: ClassVar[str] = "linear"
+
+    @property
+    def n_values(self) -> int:
+        """Fitted coefficients."""
+        return self.theta.size
+
+    @property
+    def f(self) -> Array:
+        """Denominator, monic."""
+        n_b = self.form.n_b
+        return np.concatenate([[1.0], self.theta[n_b : n_b + self.form.order]])
+
+    def run(self, u: Array, y: Array) -> Array:
+        """Return the free run, its initial state by least squares of the outputs that are there.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n, m)
+            Inputs, scaled.
+        y : ndarray, shape (n,)
+            Output, scaled; NaN where missing.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output, scaled.
+        """
+        form, n_b = self.form, self.form.n_b
+        columns = Problem(form, Channels((), "", 1.0, (u,), (y,))).linear_columns(self.f)
+        driven = columns[:, : n_b + 1] @ np.concatenate([self.theta[:n_b], self.theta[-1:]])
+        known = np.isfinite(y)
+        if np.count_nonzero(known) <= form.order:
+            return driven
+        free = columns[:, n_b + 1 :]
+        return driven + free @ np.linalg.lstsq(free[known], (y - driven)[known], rcond=None)[0]
+
+    def one_step(self, u: Array, y: Array) -> Array:
+        """Return the free run: noise is taken to be the sensor's, so what was measured before tells nothing.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n, m)
+            Inputs, scaled.
+        y : ndarray, shape (n,)
+            Output, scaled; NaN where missing.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output, scaled.
+        """
+        return self.run(u, y)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return JSON values."""
+        form = self.form
+        return {
+            "order": form.order,
+            "sizes": list(form.sizes),
+            "delays": list(form.delays),
+            "values": self.theta.tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> "LinearBody":
+        """Return the body that `to_dict` wrote."""
+        form = Form(int(values["order"]), tuple(values["sizes"]), tuple(values["delays"]))
+        return cls(form, np.array(values["values"], dtype=np.float64))
+
+    @classmethod
+    def of(cls, fit: LinearFit) -> "LinearBody":
+        """Return the body of a fit."""
+        return cls(fit.form, fit.theta[: fit.form.n_values])

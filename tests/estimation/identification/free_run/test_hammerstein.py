@@ -1,0 +1,113 @@
+"""A nonlinearity at a model's input is found, with intervals in the input's unit, and saved with the model."""
+
+import json
+
+import numpy as np
+import pytest
+
+from benchmarks.bent_inputs import PLANTED, Planted, logged
+from estimation.identification.free_run.bends import KINDS, play
+from estimation.identification.free_run.data import Channels, channels_from, scaled
+from estimation.identification.free_run.hammerstein_body import HammersteinBody
+from estimation.identification.free_run.hammerstein_fit import HammersteinProblem, fit_hammerstein
+from estimation.identification.free_run.identify import Identified, identify_channels
+from estimation.identification.free_run.linear_fit import Form
+from estimation.identification.free_run.model import FreeRunModel
+from plant.errors import HydrostateError
+
+
+def identified(data: Channels) -> Identified:
+    return identify_channels(data, structure="hammerstein", order=2, delay=1)
+
+
+@pytest.fixture(scope="module", params=PLANTED, ids=lambda one: one.kind)
+def planted(request: pytest.FixtureRequest) -> Planted:
+    return request.param
+
+
+def test_what_was_planted_is_found_within_its_interval(planted: Planted) -> None:
+    found = identified(logged(planted, 1))
+    assert found.sound
+    assert found.model.structure == "hammerstein"
+    assert isinstance(found.model.body, HammersteinBody)
+    said = found.model.body.nonlinearity(found.model.scaling)
+    assert said["kind"] == planted.kind
+    for name, value in planted.values.items():
+        assert abs(said[name]["value"] - value) < 4.0 * said[name]["std"] < 0.1
+        assert said[name]["ci95"] == pytest.approx(
+            [said[name]["value"] + side * said[name]["std"] for side in (-1.96, 1.96)], rel=1e-3
+        )
+    assert found.held_back_percent > 94.0
+    kinds = {row["nonlinearity"] for row in found.candidates if row["structure"] == "hammerstein"}
+    assert kinds == set(KINDS)
+
+
+def test_a_model_is_the_same_after_it_was_saved(planted: Planted) -> None:
+    data = logged(planted, 2)
+    model = identified(data).model
+    again = FreeRunModel.from_dict(json.loads(json.dumps(model.to_dict())))
+    np.testing.assert_array_equal(again.simulate(data.u[0], data.y[0]), model.simulate(data.u[0], data.y[0]))
+    assert isinstance(again.body, HammersteinBody)
+    assert again.body.nonlinearity(again.scaling) == model.body.nonlinearity(model.scaling)  # type: ignore[attr-defined]
+    with pytest.raises(HydrostateError, match="a hammerstein model has no transfer function"):
+        model.to_control()
+
+
+def test_a_run_without_outputs_follows_all_the_same(planted: Planted) -> None:
+    data = logged(planted, 3)
+    model = identified(data).model
+    left = (model.simulate(data.u[0]) - data.y[0])[200:]
+    assert left.std() < 0.1 * data.y[0].std()
+
+
+def test_derivatives_are_exact_where_no_sample_changes_sides(planted: Planted) -> None:
+    data, by = scaled(logged(planted, 4))
+    problem = HammersteinProblem(planted.kind, Form(2, (2,), (1,)), data)
+    values = np.array(list(planted.values.values())) - (by.u_mean[0] if KINDS[planted.kind].level else 0.0)
+    starts = np.full(problem.n_starts, data.u[0][0, 0])
+    theta = np.concatenate([values / by.u_std[0], starts, [0.1, 0.05, -1.6, 0.75, 0.0, 0.1, 0.2]])
+    _, jacobian = problem.jacobian(theta)
+    for j, step in enumerate(1e-7 * np.eye(theta.size)):
+        rise = (problem.jacobian(theta + step)[0] - problem.jacobian(theta - step)[0]) / 2e-7
+        np.testing.assert_allclose(jacobian[:, j], rise, atol=1e-5 * max(np.abs(rise).max(), 1.0))
+
+
+def test_a_linear_plant_is_given_a_linear_model() -> None:
+    rng = np.random.default_rng(5)
+    u, y = np.repeat(rng.normal(size=120), 10), np.zeros(1200)
+    for k in range(2, 1200):
+        y[k] = 1.6 * y[k - 1] - 0.75 * y[k - 2] + 0.15 * u[k - 1]
+    found = identified(channels_from([u[:, None]], [y + 0.05 * rng.normal(size=1200)], 0.01, ["u"], "y"))
+    assert found.model.structure == "output-error"
+    assert "no_nonlinearity" in {str(note.code) for note in found.notes}
+
+
+def test_gaps_and_several_logs_are_borne() -> None:
+    parts = [logged(PLANTED[2], seed) for seed in (6, 7)]
+    outputs = [np.array(one.y[0]) for one in parts]
+    outputs[0][300:350] = np.nan
+    both = channels_from([one.u[0] for one in parts], outputs, 0.01, ["u"], "y")
+    found = identified(both)
+    assert isinstance(found.model.body, HammersteinBody)
+    said = found.model.body.nonlinearity(found.model.scaling)["half_width"]
+    assert abs(said["value"] - 0.3) < 4.0 * said["std"]
+
+
+def test_several_inputs_are_refused() -> None:
+    rng = np.random.default_rng(8)
+    data = channels_from([rng.normal(size=(100, 2))], [rng.normal(size=100)], 1.0, ["a", "b"], "y")
+    with pytest.raises(HydrostateError, match="structure hammerstein takes one input, got a, b"):
+        identify_channels(data, structure="hammerstein", order=1, delay=1)
+
+
+def test_an_input_that_has_no_such_values_is_given_no_fit() -> None:
+    data = channels_from([np.array([[0.0], [1.0]] * 30)], [np.sin(np.arange(60.0))], 1.0, ["u"], "y")
+    narrow = fit_hammerstein("saturation", Form(1, (1,), (1,)), scaled(data)[0], [np.array([1.0, -0.5])])
+    assert narrow is None or narrow.cost > 0.0
+
+
+def test_a_play_follows_at_half_its_width_and_stands_still_in_between() -> None:
+    out, slopes = np.empty(6), np.empty((6, 2))
+    play(np.array([0.0, 2.0, 1.5, 0.5, -1.0, 0.0]), 0.5, 0.2, out, slopes)
+    np.testing.assert_array_equal(out, [0.2, 1.5, 1.5, 1.0, -0.5, -0.5])
+    np.testing.assert_array_equal(slopes, [[0, 1], [-1, 0], [-1, 0], [1, 0], [1, 0], [1, 0]])
