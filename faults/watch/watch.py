@@ -145,6 +145,11 @@ class Watch:
         """Thresholds of the balances [dimensionless]; infinite while they are learnt."""
         return tuple(float(value) for value in self._score[:, THRESHOLD])
 
+    @property
+    def scores(self) -> tuple[float, ...]:
+        """The CUSUM of each balance [dimensionless]: an alarm is raised where one passes its threshold."""
+        return tuple(float(value) for value in self._score[:, SUM])
+
     def take(self, samples: Array) -> list[Event]:
         """Take samples, one or many: what comes of them does not depend on how they are cut.
 

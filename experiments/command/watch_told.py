@@ -1,0 +1,133 @@
+"""What a watch tells, as entries of the JSON contract: start, ready, alarm, change, end."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from experiments.command.options import PRESSURE
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from faults.watch.events import Alarm, Change, Event
+    from faults.watch.watch import Watch
+
+
+class Told:
+    """What is told of a watch, one entry after the other, and what has been so far, for the last one.
+
+    Parameters
+    ----------
+    say : callable
+        Takes the entries of an event: ``event``, ``time_s`` and what belongs to it.
+    """
+
+    def __init__(self, say: Callable[[dict[str, Any]], None]) -> None:
+        self._say = say
+        self.watch: Watch | None = None
+        self.began = 0.0
+        self.alarms = 0
+
+    def start(self, source: str, watch: "Watch", rig: str, false_alarms: float) -> None:
+        """Tell that a stream begins.
+
+        Parameters
+        ----------
+        rig : str
+            Name of the rig.
+        false_alarms : float
+            Of healthy, moving operation [1/h].
+        """
+        self.watch, self.began = watch, watch.last
+        about = {"file": source, "rig": rig, "rate_hz": round(1.0 / watch.sample_time, 6)}
+        about |= {"balances": list(watch.balances), "false_alarms_per_hour": false_alarms}
+        said = "learning what is normal" if len(watch.balances) == 2 else f"learning, without {PRESSURE}"
+        self._line("start", self.began, **about, message=said)
+        if self._armed:
+            self._ready(self.began, watch.thresholds)
+
+    @property
+    def _armed(self) -> bool:
+        return self.watch is not None and any(value < float("inf") for value in self.watch.thresholds)
+
+    def _ready(self, time: float, thresholds: Sequence[float]) -> None:
+        named = dict(zip(self.watch.balances, thresholds, strict=True)) if self.watch else {}
+        self._line("ready", time, thresholds=named, message="alarms can come from here on")
+
+    def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
+        """Take notice of samples that the watch has taken; nothing is told of them here.
+
+        Parameters
+        ----------
+        channels : Mapping[str, ndarray], shape (n,) each
+            Samples by channel [SI].
+        last : float
+            Time of the last one [s].
+        gap : bool
+            Whether rows are missing before them.
+        """
+
+    def events(self, events: "Sequence[Event]") -> None:
+        """Tell what has happened."""
+        from faults.watch.events import Alarm, Ready
+
+        for event in events:
+            if isinstance(event, Ready):
+                self._ready(event.time, event.thresholds)
+            elif isinstance(event, Alarm):
+                self.alarms += 1
+                said = f"the {event.balance} balance has changed since {event.since:.2f} s"
+                self._line("alarm", event.time, **_alarm(event), message=said)
+            else:
+                lost = dict(zip(("before", "after"), event.lost or (None, None), strict=True))
+                about = {
+                    "lost_flow_percent": {when: None if one is None else 100.0 * one for when, one in lost.items()},
+                    "pressure_change_percent": None if event.pressure is None else 100.0 * event.pressure,
+                }
+                self._line("change", event.time, **_alarm(event.alarm), **about, message=_reading(event))
+
+    def end(self, outcome: str, message: str) -> None:
+        """Tell that the stream has ended, and how.
+
+        Parameters
+        ----------
+        outcome : str
+            ``ok``, ``failed`` or ``interrupted``.
+        message : str
+            Why; the count of alarms where it is empty.
+        """
+        if self.watch is not None:
+            seconds = self.watch.last - self.began
+            message = message or f"{self.alarms} alarms in {seconds:.1f} s"
+            if outcome == "ok" and not self._armed:
+                message += "; the stream ended before enough was learnt, so no alarm could come"
+        time = None if self.watch is None else self.watch.last
+        self._line("end", time, outcome=outcome, alarms=self.alarms, message=message)
+
+    def _line(self, event: str, time: float | None, **entries: Any) -> None:
+        self._say({"event": event, "time_s": _rounded(time), **entries})
+
+
+def _rounded(time: float | None) -> float | None:
+    """Return a time to the microsecond, as far as any logger's clock goes [s]."""
+    return None if time is None else round(time, 6)
+
+
+def _alarm(alarm: "Alarm") -> dict[str, Any]:
+    return {
+        "balance": alarm.balance,
+        "since_s": _rounded(alarm.since),
+        "since_ci95_s": [_rounded(end) for end in alarm.interval],
+        "score": alarm.score,
+        "threshold": alarm.threshold,
+    }
+
+
+def _reading(event: "Change") -> str:
+    if event.lost is None or event.pressure is None:
+        return f"without {PRESSURE} it cannot be said what has changed"
+    before, after = (f"{100.0 * one:.0f} %" for one in event.lost)
+    return (
+        f"flow lost: {before} of what the pump delivers before, {after} after; "
+        f"differential pressure at the same velocity {100.0 * event.pressure:+.0f} %"
+    )

@@ -1,0 +1,240 @@
+"""What `hydrostate watch` does with a stream: rows to samples, and samples to a watch."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from experiments.command.logs import caught, read_log, with_rig_columns
+from experiments.command.options import PRESSURE
+from experiments.command.terminal import note
+from experiments.command.watch_told import Told
+from plant.errors import LogError
+from plant.log.stream_source import Received, stream_lines
+from plant.notes import distinct
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from faults.watch.watch import Watch
+    from plant.eha.rig import Rig
+    from plant.log.record import Record
+
+T = TypeVar("T")
+
+SAME_RATE = 0.01
+"""By how much the rates of a healthy log and of what is watched may differ [fraction]."""
+
+SAVED_EVERY = 10.0
+"""Time of a stream between two looks at its state file [s]."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """How a stream is to be watched.
+
+    Parameters
+    ----------
+    columns : Mapping[str, str]
+        Foreign column by channel.
+    false_alarms : float
+        Of healthy, moving operation [1/h].
+    learning : float
+        Healthy running before alarms can come [s].
+    healthy : Path or None
+        A healthy log to learn first.
+    """
+
+    bench: "Rig"
+    columns: Mapping[str, str]
+    false_alarms: float
+    learning: float
+    healthy: Path | None
+    no_pressure: bool
+
+    def watch(self, sample_time: float, pressure: bool, start: float) -> "Watch":
+        """Return the watch, with the healthy log learnt.
+
+        Parameters
+        ----------
+        sample_time : float
+            Time between samples [s].
+        pressure : bool
+            Whether differential pressure is logged.
+        start : float
+            Time of the first sample [s].
+
+        Raises
+        ------
+        LogError
+            If the healthy log does not go with the stream.
+        """
+        from faults.watch.events import Alarm
+        from faults.watch.watch import Watch
+
+        way: Any = {"false_alarms": self.false_alarms, "learning": self.learning, "start": start}
+        made = Watch(self.bench.parameters, sample_time, pressure=pressure and not self.no_pressure, **way)
+        if self.healthy is not None:
+            record = _read(self.healthy, self)
+            if abs(record.sample_time / sample_time - 1.0) > SAME_RATE:
+                raise LogError(
+                    f"{self.healthy}: the healthy log must have the rate of what is watched, {1.0 / sample_time:g} Hz, "
+                    f"got {1.0 / record.sample_time:g} Hz"
+                )
+            samples, logged = _samples(record.channels, record.sample_time, str(self.healthy))
+            if "motion" not in made.balances and not logged:
+                raise LogError(f"{self.healthy}: the healthy log must have {PRESSURE}, as what is watched has")
+            alarms = sum(isinstance(event, Alarm) for event in made.take(samples))
+            if alarms:
+                note(f"{self.healthy}: warning: {alarms} alarms while this was learnt as healthy")
+            made.interrupt()
+            made.clock_reads(start)
+        return made
+
+
+def watch_file(told: Told, path: Path, asked: Asked) -> None:
+    """Watch a log as if its rows came now.
+
+    Raises
+    ------
+    LogError
+        If it cannot be read or watched.
+    """
+    record = _read(path, asked)
+    samples, pressure = _samples(record.channels, record.sample_time, str(path))
+    watch = asked.watch(record.sample_time, pressure, record.start_time)
+    told.start(str(path), watch, asked.bench.name, asked.false_alarms)
+    told.events(watch.take(samples))
+
+
+def watch_network(told: Told, address: str, asked: Asked, state: Path | None) -> None:
+    """Watch a stream of the network until it ends.
+
+    Parameters
+    ----------
+    address : str
+        As `plant.log.stream_source.stream_lines` takes it.
+    state : Path or None
+        File in which the watch is kept over a restart.
+
+    Raises
+    ------
+    HydrostateError
+        If nobody answers there, or what comes cannot be watched.
+    """
+    received = Received()
+    try:
+        watch_rows(told, stream_lines(address, received), asked, address, state)
+    finally:
+        for count, said in (
+            (received.lost, "never came"),
+            (received.late, "came late or twice"),
+            (received.dropped, "found no room to wait"),
+        ):
+            if count:
+                note(f"{address}: warning: {count} batches {said} beside {received.batches} that were read")
+
+
+def watch_rows(told: Told, lines: Iterable[str], asked: Asked, source: str, state: Path | None) -> None:
+    """Watch header and rows as they come.
+
+    Parameters
+    ----------
+    source : str
+        What they are called in errors.
+    state : Path or None
+        File in which the watch is kept over a restart.
+
+    Raises
+    ------
+    LogError
+        If a row cannot be read, or the stream cannot be watched.
+    """
+    import numpy as np
+
+    from faults.watch.saved import save_watch
+    from plant.log.csv_stream import CsvStream
+
+    rest = iter(lines)
+    header = next((line for line in rest if line.strip()), "")
+
+    def opened(mapping: Mapping[str, str]) -> CsvStream:
+        return CsvStream(chain([header], rest), mapping, source=source)
+
+    stream = _noted(source, lambda: with_rig_columns(opened, asked.bench.columns, asked.columns))
+    _, pressure = _samples(dict.fromkeys(stream.channels, np.empty(0)), stream.sample_time, source)
+    watch, travelled = _begun(asked, stream.sample_time, pressure, stream.start_time, source, state)
+    T = watch.sample_time
+    told.start(source, watch, asked.bench.name, asked.false_alarms)
+    kept = watch.last
+    try:
+        for last, rows, gap in stream.samples(watch.block):
+            channels = dict(zip(stream.channels, rows.T, strict=True))
+            samples, _ = _samples(channels, T, source, travelled)
+            if "position_m" not in channels:
+                travelled += float(np.nansum(channels["velocity_m_s"])) * T
+            if gap:
+                watch.interrupt()
+                note(f"{source}: warning: rows are missing before {last:g} s, so what is normal is learnt again")
+            watch.clock_reads(last - (len(rows) - 1) * T)
+            told.events(watch.take(samples))
+            told.saw(channels, last, gap)
+            if state is not None and watch.last - kept > SAVED_EVERY:
+                kept = watch.last
+                save_watch(watch, state, travelled)
+    finally:
+        if state is not None:
+            save_watch(watch, state, travelled)
+    if stream.cut:
+        note(f"{source}: warning: the last row is cut short and left out")
+
+
+def _begun(
+    asked: Asked, sample_time: float, pressure: bool, start: float, source: str, state: Path | None
+) -> "tuple[Watch, float]":
+    """Return a watch, continued where there is a state of one, and how far the piston had come [m]."""
+    if state is None or not state.exists():
+        return asked.watch(sample_time, pressure, start), 0.0
+    import numpy as np
+
+    from faults.watch.saved import load_state
+    from plant.log.csv_stream import LONGEST_GAP
+
+    remembered, kept_time, travelled = load_state(state)
+    if abs(kept_time / sample_time - 1.0) > SAME_RATE:
+        raise LogError(f"{state} is of {1.0 / kept_time:g} Hz, the stream has {1.0 / sample_time:g} Hz", source)
+    watch = replace(asked, healthy=None).watch(kept_time, pressure, start)
+    watch.resume(remembered)
+    missing = round((start - watch.last) / kept_time)
+    if 0 <= missing * kept_time <= LONGEST_GAP:
+        watch.take(np.full((missing, 3), np.nan))
+    else:
+        watch.interrupt()
+        note(f"{source}: warning: the stream does not go on at {watch.last:g} s, so what is normal is learnt again")
+    return watch, travelled
+
+
+def _samples(
+    channels: "Mapping[str, NDArray[np.float64]]", sample_time: float, source: str, travelled: float = 0.0
+) -> "tuple[NDArray[np.float64], bool]":
+    from faults.watch.samples import watched_samples
+
+    try:
+        return watched_samples(channels, sample_time, travelled)
+    except LogError as error:
+        raise LogError(error.message, source) from error
+
+
+def _read(path: Path, asked: Asked) -> "Record":
+    return _noted(str(path), lambda: read_log(path, asked.bench.columns, asked.columns))
+
+
+def _noted(source: str, read: Callable[[], T]) -> T:
+    """Return what is read; what the reader should know of it goes to standard error."""
+    with caught() as said:
+        found = read()
+    for one in distinct(warning.note for warning in said):
+        note(f"{source}: warning: {one}")
+    return found
