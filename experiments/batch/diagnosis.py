@@ -49,6 +49,17 @@ def diagnosed(record: Record, rig: Rig) -> dict[str, Any]:
     for note in found.notes:
         if isinstance(note.code, SensorCode):
             warnings.warn(LogWarning(note), stacklevel=2)
+    return class_row(found)
+
+
+def class_row(found: Finding) -> dict[str, Any]:
+    """Return a diagnosis of the gear-pump actuator as entries of a row.
+
+    Returns
+    -------
+    dict[str, Any]
+        As `diagnosed` returns them.
+    """
     if not found.probabilities:
         return _without_class(found)
     (best, first), (second, other) = sorted(found.probabilities.items(), key=lambda item: -item[1])[:2]

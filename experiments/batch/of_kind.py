@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 
+from estimation.finding import Finding
 from experiments.actuator_kind import ActuatorKind, LogVerb
 from experiments.actuators import offered
 from experiments.batch.rows import Row
@@ -68,7 +69,17 @@ def found_of(kind: ActuatorKind, verb: str, record: Record, rig: Rig) -> Row:
         Outcome and reason; the condition, where one is named; every quantity.
     """
     asked: LogVerb = offered(kind, verb)
-    found = asked.run(record, *asked.prepare(rig, {**asked.options, "seed": 0}))
+    return row_of(asked.run(record, *asked.prepare(rig, {**asked.options, "seed": 0})))
+
+
+def row_of(found: Finding) -> Row:
+    """Return a finding as entries of a row.
+
+    Returns
+    -------
+    Row
+        As `found_of` returns them.
+    """
     reasons = [str(note) for note in distinct((*found.against, *found.gate.reasons, *found.notes))]
     shares = sorted(found.probabilities.items(), key=lambda item: -item[1])
     quantities = {name: quantity_entry(one) for name, one in {**found.quantities, **found.severities}.items()}

@@ -61,7 +61,7 @@ def fleet(
     from experiments.fleet.page import fleet_page
     from experiments.fleet.rows import log_rows
 
-    limits = _limits(limit or [])
+    limits = limits_of_options(limit or [])
     store = open_store(place)
     from_logs = store.manifest() is None
     if from_logs:
@@ -83,7 +83,24 @@ def fleet(
         raise typer.Exit(USAGE if failed == total else SOME_FAILED)
 
 
-def _limits(texts: Sequence[str]) -> dict[str, float]:
+def limits_of_options(texts: Sequence[str]) -> dict[str, float]:
+    """Return ``--limit`` as limits by severity.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        ``NAME=VALUE``.
+
+    Returns
+    -------
+    dict[str, float]
+        Limits [their units].
+
+    Raises
+    ------
+    HydrostateError
+        If a severity is not known, or a value is no number.
+    """
     from faults.diagnosis.severity import UNITS
 
     found: dict[str, float] = {}

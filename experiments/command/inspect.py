@@ -56,23 +56,44 @@ def inspect(
     kind, rig = load_actuator(plant, None)
 
     def work(log: Path) -> Result:
-        tables, guesses = _looked_at([log, *(beside or ())], kind, rig)
-        columns = {one.guess.channel: one.guess.spec for one in guesses if one.guess.sure >= 0.5}
-        reads = _reads(log, columns, kind, sample_time, beside or ())
-        found = _entries(tables, guesses, columns) | {"reads": reads["reads"], "message": reads["message"]}
-        found["options"] = _options(columns, sample_time, beside or ())
+        found, tables = looked_into(log, kind, rig, sample_time, beside or ())
         if html is not None:
             from experiments.log_pages.inspect_page import inspect_page
 
             write_whole(html, inspect_page({"file": str(log), **found}, tables), "--html")
         if write is not None:
-            _write_rig(write, columns, kind)
+            _write_rig(write, found["columns"], kind)
         return {"outcome": "ok", **found}
 
     if (html is not None or write is not None or beside) and len(logs) > 1:
         raise HydrostateError("--html, --write and --with go with one file, got several")
     batch = run_logs(logs, work, BLANK, "looking")
     finish(batch, _screen, as_json=as_json, out=out)
+
+
+def looked_into(
+    log: Path, kind: "ActuatorKind", rig: "Rig[Any]", sample_time: float | None = None, beside: Sequence[Path] = ()
+) -> "tuple[dict[str, Any], list[TableFacts]]":
+    """Return what a log holds, as entries of the JSON contract, and its tables.
+
+    Parameters
+    ----------
+    sample_time : float, optional
+        Time between rows [s] of a log that has no time.
+    beside : sequence of Path
+        Files of other loggers of the same test.
+
+    Raises
+    ------
+    LogError
+        If a file cannot be opened.
+    """
+    tables, guesses = _looked_at([log, *beside], kind, rig)
+    columns = {one.guess.channel: one.guess.spec for one in guesses if one.guess.sure >= 0.5}
+    reads = _reads(log, columns, kind, sample_time, beside)
+    found = _entries(tables, guesses, columns) | {"reads": reads["reads"], "message": reads["message"]}
+    found["options"] = _options(columns, sample_time, beside)
+    return found, tables
 
 
 def _looked_at(
