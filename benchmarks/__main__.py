@@ -30,6 +30,7 @@ NAMES = (
     "open_benchmark",
     "batch_scale",
     "archive",
+    "server",
 )
 """Every benchmark that needs nothing but the project, in the order of `make benchmark`."""
 

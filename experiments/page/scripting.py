@@ -17,8 +17,14 @@ NEEDED = (
     ('class="charts"', "charts.js"),
     ('class="limit"', "limits.js"),
     ('class="fleet-table"', "fleet.js"),
+    ('class="dropped-logs"', "serve.js"),
+    ('class="live-stream"', "uplot/uPlot.iife.min.js"),
+    ('class="live-stream"', "live.js"),
 )
 """A mark that a page may hold, and the script that then goes with it, in their order."""
+
+OF_A_SERVER = ('class="dropped-logs"', 'class="live-stream"')
+"""Marks of pages that may ask the server that they come from, and no other."""
 
 CHART_STYLE = "uplot/uPlot.min.css"
 
@@ -39,8 +45,9 @@ def with_scripts(page: str) -> str:
     str
         The same; scripts and styles are allowed by their hashes, images from inside the page, and nothing else.
     """
-    scripts = [_text(file) for mark, file in NEEDED if mark in page]
-    style = f"<style>{_text(CHART_STYLE)}</style>\n" if NEEDED[0][0] in page else ""
+    needed = [file for mark, file in NEEDED if mark in page]
+    scripts = [_text(file) for file in needed]
+    style = f"<style>{_text(CHART_STYLE)}</style>\n" if NEEDED[0][1] in needed else ""
     page = page.replace(SCRIPTS_HERE, "\n".join(f"<script>{one}</script>" for one in scripts))
     page = page.replace("</head>", f"{style}</head>", 1)
     styles = re.findall(r"<style>(.*?)</style>", page, re.DOTALL)
@@ -48,6 +55,8 @@ def with_scripts(page: str) -> str:
         f"default-src 'none'; img-src data:; style-src {_allowed(styles)}; script-src {_allowed(scripts)}; "
         "base-uri 'none'; form-action 'none'"
     )
+    if any(mark in page for mark in OF_A_SERVER):
+        policy += "; connect-src 'self'"
     return page.replace(POLICY_HERE, f'<meta http-equiv="Content-Security-Policy" content="{policy}">', 1)
 
 

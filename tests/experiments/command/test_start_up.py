@@ -18,14 +18,18 @@ from plant.sensors.sensors import BENCH
 DEAR = {
     "control",
     "distributed",
+    "fastapi",
     "filterpy",
     "jinja2",
     "matplotlib",
     "pandas",
+    "pebble",
     "pint",
     "rich",
     "scipy",
+    "starlette",
     "statsmodels",
+    "uvicorn",
 }
 """Modules that no verb needs for its JSON; what Typer imports by itself (pydantic) is not ours to leave out."""
 

@@ -1,0 +1,107 @@
+"""`hydrostate serve [FOLDER]`: logs, the fleet and live streams in a browser."""
+
+import re
+import secrets
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from experiments.command.options import Columns, Plant, RigFile, argument, load_actuator, load_columns, option
+from experiments.command.terminal import emit
+from plant.errors import HydrostateError
+
+FOLDER = Path("hydrostate-server")
+
+STREAM = re.compile(r"(?:(?P<name>[A-Za-z0-9_-]{1,40})=)?(?P<address>(?:tcp|mqtt)://.+)")
+
+commands = typer.Typer()
+
+
+@commands.command(epilog="Example: hydrostate serve bench-7 --watch press=tcp://192.168.0.7:9000")
+def serve(
+    folder: Annotated[Path, argument("FOLDER", "Where everything is kept; it goes on from there.")] = FOLDER,
+    host: Annotated[str, option("HOST", "Where it listens; any other than this machine's own wants a token.")] = (
+        "127.0.0.1"
+    ),
+    port: Annotated[int, option("PORT", "The port; 0 takes a free one.", min=0, max=65535)] = 8765,
+    token: Annotated[
+        str | None,
+        option("TEXT", "What clients must show; made up where one is wanted.", envvar="HYDROSTATE_TOKEN"),
+    ] = None,
+    watch: Annotated[
+        list[str] | None,
+        option("NAME=ADDRESS", "A stream to watch, such as press=tcp://HOST:PORT. Repeat it for more."),
+    ] = None,
+    false_alarms: Annotated[float, option("RATE", "False alarms an hour of each stream [1/h].")] = 1.0,
+    pattern: Annotated[
+        str | None, option("PATTERN", "How logs are named, such as '{actuator}_{date}.csv', for the fleet.")
+    ] = None,
+    limit: Annotated[
+        list[str] | None, option("NAME=VALUE", "Limit of a severity in its unit, such as leakage_flow=2.")
+    ] = None,
+    plant: Plant = None,
+    rig: RigFile = None,
+    columns: Columns = None,
+    workers: Annotated[int, option("N", "Logs that are worked on at once.", min=1, max=256)] = 1,
+    seconds: Annotated[float, option("S", "Longest work on a log [s].", min=1.0)] = 300.0,
+    memory: Annotated[int, option("MB", "Most memory for the work on a log [MB].", min=512)] = 3072,
+    largest: Annotated[int, option("MB", "Largest log that is taken [MB].", min=1)] = 256,
+    room: Annotated[int, option("MB", "Most that the folder may take [MB].", min=1)] = 10240,
+) -> None:
+    """Serve a page on which logs are dropped, the page of each, the fleet, comparisons and live streams.
+
+    The work on a log is done in a process of its own, which is ended when it takes too long or too much memory. What is
+    finished is kept in FOLDER and outlives any end of the server. Programs ask by HTTP: /openapi.json says how. This
+    verb needs `pip install 'hydrostate[serve]'`.
+    """
+    try:
+        from experiments.serve.server import run_server
+        from experiments.serve.settings import MB, Settings, is_loopback
+    except ImportError as error:
+        raise HydrostateError(
+            f"serve needs FastAPI, uvicorn and pebble: pip install 'hydrostate[serve]' ({error})"
+        ) from error
+    from experiments.command.fleet import limits_of_options
+    from experiments.fleet.naming import by_pattern
+
+    load_actuator(plant, rig)
+    if pattern is not None:
+        by_pattern([], pattern)
+    if token is None and not is_loopback(host):
+        token = secrets.token_urlsafe(24)
+    settings = Settings(
+        folder=folder,
+        host=host,
+        port=port,
+        token=token,
+        plant=plant,
+        rig=None if rig is None else rig.resolve(),
+        columns=load_columns(columns),
+        pattern=pattern,
+        limits=limits_of_options(limit or []),
+        workers=workers,
+        seconds=seconds,
+        memory=memory * MB,
+        largest=largest * MB,
+        room=room * MB,
+        streams=_streams(watch or []),
+        false_alarms=false_alarms,
+    )
+    run_server(settings, emit)
+
+
+def _streams(texts: list[str]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for place, text in enumerate(texts, start=1):
+        match = STREAM.fullmatch(text)
+        if match is None:
+            raise HydrostateError(
+                "--watch must be NAME=tcp://HOST:PORT or NAME=mqtt://HOST/TOPIC, NAME of letters, digits, - and _, "
+                f"got {text!r}"
+            )
+        name = match["name"] or str(place)
+        if name in found:
+            raise HydrostateError(f"--watch must name each stream once, got {name!r} twice")
+        found[name] = match["address"]
+    return found

@@ -1,0 +1,143 @@
+// The page of a stream: gauges, alarms and the last ten minutes, as the server tells them.
+"use strict";
+
+(() => {
+  const KEPT = 2400; // gauges that are kept, as the server does
+  const DRAWN = 500; // time between two drawings [ms]
+  const HEIGHT = 130; // of a chart [px]
+  const UNITS = {
+    _rad_s: ["rpm", 30 / Math.PI],
+    _m_s: ["mm/s", 1e3],
+    _m: ["mm", 1e3],
+    _pa: ["bar", 1e-5],
+    _v: ["V", 1],
+  };
+  const holder = document.querySelector(".live-stream");
+  const gauges = holder.querySelector(".gauges");
+  const histories = document.querySelector(".histories");
+  const state = document.querySelector(".live-state");
+  const alarms = document.querySelector(".alarms tbody");
+  const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  const digits = (value) => (value === null || value === undefined ? "–" : Number(value.toPrecision(4)).toString());
+  const charts = new Map();
+  let points = [];
+  let dirty = false;
+
+  function element(tag, attributes = {}, ...children) {
+    const made = document.createElement(tag);
+    for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+    made.append(...children);
+    return made;
+  }
+
+  function unitOf(channel) {
+    const ending = Object.keys(UNITS).sort((a, b) => b.length - a.length).find((one) => channel.endsWith(one));
+    const [unit, factor] = ending ? UNITS[ending] : ["", 1];
+    return { words: (ending ? channel.slice(0, -ending.length) : channel).replaceAll("_", " "), unit, factor };
+  }
+
+  const share = (point, balance) => {
+    const [score, threshold] = [point.scores[balance], point.thresholds[balance]];
+    return threshold ? (100 * score) / threshold : null;
+  };
+
+  function showState(one) {
+    const said = one.message ? `: ${one.message}` : "";
+    state.textContent = `${one.state[0].toUpperCase()}${one.state.slice(1)}${said}.`;
+    const rows = one.events.toReversed().map((event) =>
+      element(
+        "tr",
+        {},
+        element("th", { scope: "row" }, new Date(1000 * event.received).toLocaleString()),
+        element("td", { class: "number", "data-head": "time [s]" }, digits(event.time_s)),
+        element("td", { "data-head": "event", class: event.event === "alarm" ? "bad" : "" }, event.event),
+        element("td", { "data-head": "says" }, event.message ?? ""),
+      ),
+    );
+    alarms.replaceChildren(...rows);
+  }
+
+  function tile(words, value, unit, more) {
+    return element("li", {}, element("strong", {}, `${value}${unit ? ` ${unit}` : ""}`), words, element("br"), element("small", {}, more));
+  }
+
+  function showGauges(point) {
+    const tiles = Object.keys(point.values).map((channel) => {
+      const { words, unit, factor } = unitOf(channel);
+      const ends = [point.low[channel], point.high[channel]].map((one) => (one === undefined ? "–" : digits(factor * one)));
+      return tile(words, digits(point.values[channel] === null ? null : factor * point.values[channel]), unit, `${ends[0]} to ${ends[1]}`);
+    });
+    for (const balance of Object.keys(point.scores)) {
+      const part = share(point, balance);
+      tiles.push(tile(`${balance} balance, of an alarm`, part === null ? "learning" : digits(part), part === null ? "" : "%", "100 % raises one"));
+    }
+    tiles.push(tile("rows", String(point.rows), "", `${point.gaps} gaps, ${digits(point.time_s)} s`));
+    gauges.replaceChildren(...tiles);
+  }
+
+  function chart(label, unit, two) {
+    const known = charts.get(label);
+    if (known) return known;
+    const figure = element("figure", {}, element("figcaption", {}, unit ? `${label} [${unit}]` : label));
+    histories.append(figure);
+    const line = { stroke: css("blue"), width: 1, points: { show: false } };
+    const axis = { stroke: css("soft"), grid: { stroke: css("line"), width: 1 } };
+    const made = new uPlot(
+      {
+        width: figure.clientWidth || 320,
+        height: HEIGHT,
+        legend: { show: false },
+        cursor: { show: false },
+        scales: { x: { time: false } },
+        axes: [axis, { ...axis, size: 64 }],
+        series: two ? [{}, line, line] : [{}, line],
+        bands: two ? [{ series: [2, 1], fill: `${css("blue")}44` }] : [],
+      },
+      two ? [[], [], []] : [[], []],
+      figure,
+    );
+    charts.set(label, made);
+    new ResizeObserver(() => made.setSize({ width: figure.clientWidth, height: HEIGHT })).observe(figure);
+    return made;
+  }
+
+  function draw() {
+    if (!dirty || !points.length || document.hidden) return;
+    dirty = false;
+    const last = points.at(-1);
+    showGauges(last);
+    const times = points.map((one) => one.time_s);
+    for (const channel of Object.keys(last.values)) {
+      const { words, unit, factor } = unitOf(channel);
+      const ends = ["low", "high"].map((end) => points.map((one) => (one[end][channel] === undefined ? null : factor * one[end][channel])));
+      chart(words, unit, true).setData([times, ...ends]);
+    }
+    for (const balance of Object.keys(last.scores)) {
+      chart(`${balance} balance, of an alarm`, "%", false).setData([times, points.map((one) => share(one, balance))]);
+    }
+    document.documentElement.classList.add("live-drawn");
+  }
+
+  const usable = (point) => Object.keys(point.values).length > 0;
+  const source = new EventSource(`../api/streams/${holder.dataset.name}/events`);
+  source.addEventListener("history", (event) => {
+    const told = JSON.parse(event.data);
+    points = told.history.filter(usable);
+    dirty = true;
+    showState(told);
+    draw();
+  });
+  source.addEventListener("gauges", (event) => {
+    const point = JSON.parse(event.data);
+    if (!usable(point)) return;
+    if (points.length && point.time_s < points.at(-1).time_s) points = []; // the stream began again
+    points.push(point);
+    if (points.length > KEPT) points.shift();
+    dirty = true;
+  });
+  source.addEventListener("state", (event) => showState(JSON.parse(event.data)));
+  source.addEventListener("error", () => {
+    state.textContent = "The server does not answer; the view goes on when it does.";
+  });
+  setInterval(draw, DRAWN);
+})();

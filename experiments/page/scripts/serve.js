@@ -1,0 +1,186 @@
+// The page on which logs are dropped: it sends files to the server that it comes from, and shows what comes of them.
+"use strict";
+
+(() => {
+  const OFTEN = 1000; // time between two looks while something is unfinished [ms]
+  const SELDOM = 10000; // the same while nothing is [ms]
+  const MOST = 100; // logs that are asked for at once
+  const holder = document.querySelector(".dropped-logs");
+  const [input, verb] = [document.getElementById("file"), document.getElementById("verb")];
+  const body = holder.querySelector("tbody");
+  const [comparing, older] = [holder.querySelector("button.compare"), holder.querySelector("button.older")];
+  const status = holder.querySelector(".place");
+  const ticked = new Set();
+  const coming = new Map(); // files on their way, by a key: name and what share has come
+  let asked = MOST;
+  let due = 0;
+  let shown = "";
+
+  function element(tag, attributes = {}, ...children) {
+    const made = document.createElement(tag);
+    for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+    made.append(...children);
+    return made;
+  }
+
+  function stateWords(log) {
+    if (log.state === "running") return `running, ${log.phase}`;
+    return log.state;
+  }
+
+  function row(log) {
+    const named = element("th", { scope: "row" });
+    named.append(log.state === "done" ? element("a", { href: `logs/${log.id}` }, log.name) : log.name);
+    const tick = element("input", { type: "checkbox", "aria-label": `Compare ${log.name}` });
+    tick.checked = ticked.has(log.id);
+    tick.disabled = log.state !== "done";
+    tick.addEventListener("change", () => {
+      if (tick.checked) ticked.add(log.id);
+      else ticked.delete(log.id);
+      comparing.disabled = ticked.size !== 2;
+    });
+    const remove = element("button", { type: "button", "aria-label": `Delete ${log.name}` }, "Delete");
+    remove.addEventListener("click", async () => {
+      if (!window.confirm(`Delete ${log.name} and what came of it?`)) return;
+      await fetch(`api/logs/${log.id}`, { method: "DELETE" });
+      ticked.delete(log.id);
+      look();
+    });
+    return element(
+      "tr",
+      {},
+      named,
+      element("td", { "data-head": "state", class: log.state === "failed" ? "bad" : "" }, `${stateWords(log)} (${log.verb})`),
+      element("td", { "data-head": "verdict" }, log.message ?? ""),
+      element("td", { "data-head": "compare" }, tick),
+      element("td", { "data-head": "delete" }, remove),
+    );
+  }
+
+  function comingRow({ name, share }) {
+    const bar = element("progress", { max: "1", value: String(share), "aria-label": `${name} is sent` });
+    return element(
+      "tr",
+      {},
+      element("th", { scope: "row" }, name),
+      element("td", { "data-head": "state" }, "sending"),
+      element("td", {}, bar),
+      element("td"),
+      element("td"),
+    );
+  }
+
+  async function latest() {
+    let logs = [];
+    let counts = {};
+    while (logs.length < asked) {
+      const before = logs.length ? `&before=${logs.at(-1).number}` : "";
+      const answer = await fetch(`api/logs?most=${MOST}${before}`);
+      if (!answer.ok) throw new Error((await answer.json()).detail);
+      const page = await answer.json();
+      ({ counts } = page);
+      logs = logs.concat(page.logs);
+      if (page.logs.length < MOST) break;
+    }
+    return { logs, counts };
+  }
+
+  async function look() {
+    clearTimeout(due);
+    let unfinished = true;
+    try {
+      const { logs, counts } = await latest();
+      const total = Object.values(counts).reduce((sum, one) => sum + one, 0);
+      unfinished = (counts.unfinished ?? 0) > 0;
+      const text = JSON.stringify([logs, [...coming.values()]]);
+      if (text !== shown) {
+        shown = text;
+        const place = document.activeElement?.getAttribute("aria-label");
+        body.replaceChildren(...[...coming.values()].map(comingRow), ...logs.map(row));
+        if (place) body.querySelector(`[aria-label="${CSS.escape(place)}"]`)?.focus();
+      }
+      older.hidden = logs.length >= total;
+      comparing.disabled = ticked.size !== 2;
+      if (!coming.size) {
+        status.textContent = total ? `${total} logs, ${counts.unfinished ?? 0} not done yet.` : "There is no log yet.";
+      }
+    } catch (error) {
+      status.textContent = `The server does not answer: ${error.message}`;
+    }
+    due = setTimeout(look, unfinished ? OFTEN : SELDOM);
+  }
+
+  function send(file, wanted) {
+    return new Promise((done) => {
+      const key = Symbol(file.name);
+      coming.set(key, { name: file.name, share: 0 });
+      const request = new XMLHttpRequest(); // fetch does not tell how much was sent
+      request.open("POST", `api/logs?name=${encodeURIComponent(file.name)}&verb=${wanted}`);
+      request.upload.addEventListener("progress", (event) => {
+        coming.set(key, { name: file.name, share: event.total ? event.loaded / event.total : 0 });
+      });
+      request.addEventListener("loadend", () => {
+        coming.delete(key);
+        if (request.status === 429) {
+          done("busy");
+          return;
+        }
+        let said = "";
+        if (request.status !== 202) {
+          try {
+            said = JSON.parse(request.responseText).detail;
+          } catch {
+            said = "the server broke off";
+          }
+        }
+        done(said);
+      });
+      request.send(file);
+    });
+  }
+
+  async function take(files) {
+    const refusals = [];
+    for (const file of files) {
+      status.textContent = `Sending ${file.name}.`;
+      look();
+      let said = await send(file, verb.value);
+      while (said === "busy") {
+        status.textContent = `The server is busy; ${file.name} is sent again in five seconds.`;
+        await new Promise((later) => setTimeout(later, 5000));
+        said = await send(file, verb.value);
+      }
+      if (said) refusals.push(`${file.name}: ${said}`);
+      await look();
+    }
+    if (refusals.length) status.textContent = `Not taken: ${refusals.join("; ")}`;
+  }
+
+  const field = holder.querySelector(".drop-here");
+  for (const kind of ["dragenter", "dragover"]) {
+    field.addEventListener(kind, (event) => {
+      event.preventDefault();
+      field.classList.add("over");
+    });
+  }
+  field.addEventListener("dragleave", () => field.classList.remove("over"));
+  field.addEventListener("drop", (event) => {
+    event.preventDefault();
+    field.classList.remove("over");
+    take([...event.dataTransfer.files]);
+  });
+  input.addEventListener("change", async () => {
+    const files = [...input.files];
+    input.value = "";
+    await take(files);
+  });
+  comparing.addEventListener("click", () => {
+    const [second, first] = [...body.querySelectorAll("a")].map((one) => one.getAttribute("href").slice(5)).filter((id) => ticked.has(id));
+    window.location.assign(`compare?first=${first}&second=${second}`);
+  });
+  older.addEventListener("click", () => {
+    asked += MOST;
+    look();
+  });
+  look();
+})();

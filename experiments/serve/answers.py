@@ -1,0 +1,112 @@
+"""What the server answers, as its OpenAPI says it."""
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field
+
+from experiments.serve.jobs import Jobs
+from experiments.serve.store import UNFINISHED, Kept
+
+Verb = Literal["diagnose", "estimate", "inspect"]
+
+
+class Said(BaseModel):
+    """Why a request was not done."""
+
+    detail: str
+
+
+class Log(BaseModel):
+    """A log that the server has.
+
+    Parameters
+    ----------
+    received, ended : float, float or None
+        When it came and when the work on it was over, since 1970 [s].
+    """
+
+    number: int = Field(description="Later logs have larger numbers.")
+    id: str
+    name: str
+    verb: Verb
+    size: int = Field(description="Bytes of the file.")
+    state: Literal["waiting", "running", "done", "failed", "interrupted"]
+    phase: str | None = Field(description="Where the work is, while it runs.")
+    received: float = Field(description="When it came, seconds since 1970.")
+    ended: float | None = Field(description="When the work on it was over, seconds since 1970.")
+    outcome: str | None = Field(description="ok, not_observable, mismatch, diverged or failed.")
+    message: str | None = Field(description="What came of it, in a sentence.")
+
+
+class Logs(BaseModel):
+    """Logs, the latest first."""
+
+    logs: list[Log]
+    counts: dict[str, int] = Field(description="How many logs are in each state.")
+
+
+class Health(BaseModel):
+    """Whether the server has room."""
+
+    waiting: int = Field(description="Logs that are worked on or wait.")
+    most_waiting: int
+    room: int = Field(description="Bytes that the folder still takes.")
+    version: str
+
+
+class Difference(BaseModel):
+    """A quantity of two logs.
+
+    Parameters
+    ----------
+    difference : float or None
+        The second log's less the first's [unit].
+    interval : list of float or None
+        95 % interval of that [unit].
+    """
+
+    quantity: str
+    unit: str
+    first: dict[str, Any] | None
+    second: dict[str, Any] | None
+    difference: float | None
+    interval: list[float] | None = Field(description="95 % interval of the difference.")
+    changed: bool
+
+
+class Comparison(BaseModel):
+    """Two logs side by side."""
+
+    first: Log
+    second: Log
+    differences: list[Difference]
+
+
+class StreamState(BaseModel):
+    """A stream that is watched."""
+
+    name: str
+    state: Literal["connecting", "learning", "watching", "ended", "failed"]
+    message: str
+    gauges: dict[str, Any] | None = Field(description="The last of them; values in SI.")
+
+
+class StreamHistory(StreamState):
+    """A stream with what is remembered of it."""
+
+    history: list[dict[str, Any]]
+    events: list[dict[str, Any]]
+
+
+def log_of(kept: Kept, jobs: Jobs) -> Log:
+    """Return a log as it is answered."""
+    unfinished = kept.state == UNFINISHED
+    phase = jobs.phase(kept.id) if unfinished else None
+    state = ("waiting" if phase is None else "running") if unfinished else kept.state
+    return Log.model_validate(
+        {
+            **{name: getattr(kept, name) for name in Log.model_fields if name not in ("state", "phase")},
+            "state": state,
+            "phase": phase,
+        }
+    )

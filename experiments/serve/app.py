@@ -1,0 +1,284 @@
+"""`make_app(settings)`: the server, as FastAPI and its OpenAPI describe it."""
+
+import asyncio
+import re
+import secrets
+from collections.abc import AsyncGenerator, Callable, Mapping
+from contextlib import asynccontextmanager
+from importlib.metadata import version
+from typing import Annotated, Any
+
+from fastapi import FastAPI, Path, Query, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, Response
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.responses import StreamingResponse
+from starlette.routing import Match, Route
+from starlette.types import Scope
+
+from experiments.command.terminal import note, unexpected
+from experiments.serve.answers import Comparison, Health, Log, Logs, Said, StreamHistory, StreamState, Verb, log_of
+from experiments.serve.desk import Desk
+from experiments.serve.events import MOST_LOOKING, told
+from experiments.serve.limits import MOST_UPLOADS, Guard, RefusedError, receive_file, require_size
+from experiments.serve.pages import home_page, live_page, policy_of, policy_of_file
+from experiments.serve.settings import Settings
+from experiments.serve.views import compared
+from plant.errors import HydrostateError
+
+Identity = Annotated[str, Path(pattern=r"^[0-9a-f]{16}$", description="As the list of logs has it.")]
+Asked = Annotated[str, Query(pattern=r"^[0-9a-f]{16}$", description="Identity of a log that is done.")]
+Name = Annotated[str, Query(min_length=1, max_length=200, description="Name of the file.")]
+StreamName = Annotated[str, Path(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
+
+WHY: Mapping[int, str] = {
+    400: "This is no HTTP, or the body broke off.",
+    401: "A token is wanted.",
+    403: "A page of another site asks.",
+    404: "There is no such thing.",
+    405: "That cannot be done with it.",
+    408: "It comes too slowly.",
+    409: "It is not done yet.",
+    413: "It is too large, or the folder is full.",
+    415: "The body must be the file itself.",
+    421: "The server is not asked by its name.",
+    422: "A parameter is missing or wrong, or the body is empty.",
+    429: "The server is busy; come again after the seconds of Retry-After.",
+}
+
+_CONTROLS = re.compile(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff\u202a-\u202e\u2066-\u2069]")
+
+
+def why(*more: int, page: bool = False) -> dict[int | str, dict[str, Any]]:
+    """Return how a request may be refused, for OpenAPI; that of a page is refused as JSON too."""
+    schema = {"$ref": "#/components/schemas/Said"}
+    said: dict[str, Any] = {"content": {"application/json": {"schema": schema}}} if page else {"model": Said}
+    return {one: {"description": WHY[one], **said} for one in sorted((400, 401, 403, 405, 408, 421, 429, *more))}
+
+
+EVENTS = {"description": "Server-sent events.", "content": {"text/event-stream": {"schema": {"type": "string"}}}}
+
+BODY = {
+    "requestBody": {
+        "required": True,
+        "description": "The file itself, in any format that `hydrostate inspect` reads.",
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary", "minLength": 1}}},
+    }
+}
+
+
+def make_app(settings: Settings, refused: Callable[[HydrostateError], None] | None = None) -> FastAPI:
+    """Return the server.
+
+    Parameters
+    ----------
+    settings : Settings
+        What it is told.
+    refused : callable, optional
+        Is told why the folder cannot be opened; the error is raised too.
+
+    Returns
+    -------
+    FastAPI
+        Its folder is opened, and unfinished logs are taken up, when it starts.
+    """
+    desk = Desk(settings)
+
+    @asynccontextmanager
+    async def life(_: FastAPI) -> AsyncGenerator[None]:
+        try:
+            desk.open()
+        except HydrostateError as error:
+            if refused is not None:
+                refused(error)
+            raise
+        yield
+        await asyncio.to_thread(desk.close)
+
+    app = FastAPI(
+        title="Hydrostate",
+        version=version("hydrostate"),
+        description="Says what is wrong inside an electro-hydrostatic actuator. Values are in SI.",
+        docs_url=None,
+        redoc_url=None,
+        lifespan=life,
+        responses=why(),
+    )
+    app.add_middleware(Guard, settings=settings)
+    _answer_errors(app)
+    _offer_logs(app, desk)
+    _offer_comparison(app, desk)
+    _offer_streams(app, desk)
+    _offer_pages(app, desk)
+    return app
+
+
+def plain_name(name: str) -> str:
+    """Return the name of a file without folders and signs that no reader sees.
+
+    Examples
+    --------
+    >>> plain_name("C:/logs/../run 1.csv"), plain_name("..")
+    ('run 1.csv', 'log')
+    """
+    known = _CONTROLS.sub("", re.split(r"[/\\]", name)[-1]).strip()
+    return known if known.strip(".") else "log"
+
+
+def methods_at(app: FastAPI, scope: Scope) -> list[str]:
+    """Return the methods by which a path may be asked for."""
+    routes = [route for route in app.routes if isinstance(route, Route) and route.matches(scope)[0] is not Match.NONE]
+    return sorted({method for route in routes for method in route.methods or ()})
+
+
+def _answer_errors(app: FastAPI) -> None:
+    async def refused(_: Request, error: Exception) -> Response:
+        said = error if isinstance(error, RefusedError) else RefusedError(400, str(error))
+        return JSONResponse({"detail": said.detail}, said.status, said.headers)
+
+    async def http(request: Request, error: Exception) -> Response:
+        status = error.status_code if isinstance(error, HTTPException) else 400
+        headers = {"Allow": ", ".join(methods_at(app, request.scope))} if status == 405 else None
+        return JSONResponse({"detail": WHY.get(status, str(error))}, status, headers)
+
+    async def invalid(_: Request, error: Exception) -> Response:
+        found: Any = error.errors()[0] if isinstance(error, RequestValidationError) else {"loc": (), "msg": str(error)}
+        return JSONResponse({"detail": f"{' '.join(map(str, found['loc']))}: {found['msg']}"}, 422)
+
+    async def strange(_: Request, error: Exception) -> Response:
+        said = unexpected(error)
+        note(f"serve: {said}")
+        return JSONResponse({"detail": said}, 500)
+
+    async def left(_: Request, __: Exception) -> Response:
+        return JSONResponse({"detail": "the body broke off"}, 400)
+
+    app.add_exception_handler(RefusedError, refused)
+    app.add_exception_handler(HTTPException, http)
+    app.add_exception_handler(RequestValidationError, invalid)
+    app.add_exception_handler(ClientDisconnect, left)
+    app.add_exception_handler(Exception, strange)
+
+
+def _offer_logs(app: FastAPI, desk: Desk) -> None:
+    @app.post("/api/logs", status_code=202, responses=why(413, 415, 422), openapi_extra=BODY, tags=["logs"])
+    async def drop(request: Request, response: Response, name: Name, verb: Verb = "diagnose") -> Log:
+        """Take a log and put it into the queue; the body is the file itself."""
+        known = plain_name(name)
+        if request.headers.get("content-type", "").lower().startswith("multipart/"):
+            raise RefusedError(415, "the body must be the file itself, not a form: curl --data-binary @run.csv")
+        desk.require_place()
+        if desk.room.uploads >= MOST_UPLOADS:
+            raise RefusedError(429, f"{MOST_UPLOADS} logs are coming in, come again")
+        desk.room.uploads += 1
+        try:
+            room, length = desk.room.left(), request.headers.get("content-length", "")
+            require_size(int(length) if length.isdecimal() else 0, desk.settings.largest, room)
+            identity = secrets.token_hex(8)
+            part = desk.settings.work / f"{identity}.part"
+            size = await receive_file(request.stream(), part, desk.settings.largest, room)
+        finally:
+            desk.room.uploads -= 1
+        kept = await asyncio.to_thread(desk.take_in, identity, part, known, verb, size)
+        response.headers["Location"] = f"/api/logs/{identity}"
+        return log_of(kept, desk.jobs)
+
+    @app.get("/api/logs", responses=why(422), tags=["logs"])
+    def logs(
+        most: Annotated[int, Query(ge=1, le=500)] = 100, before: Annotated[int | None, Query(ge=0, le=1 << 60)] = None
+    ) -> Logs:
+        """Return logs, the latest first."""
+        found = desk.store.latest(most, before)
+        return Logs(logs=[log_of(one, desk.jobs) for one in found], counts=desk.store.counts())
+
+    @app.get("/api/logs/{id}", responses=why(404, 422), tags=["logs"])
+    def log(id: Identity) -> Log:  # noqa: A002 - a path's name
+        """Return what is known of a log."""
+        return log_of(desk.known(id), desk.jobs)
+
+    @app.get("/api/logs/{id}/result", responses=why(404, 409, 422), tags=["logs"])
+    def result(id: Identity) -> dict[str, Any]:  # noqa: A002 - a path's name
+        """Return what came of a log: the object that `hydrostate VERB --json` prints for it."""
+        return desk.result(id)
+
+    @app.delete("/api/logs/{id}", status_code=204, responses=why(404, 422), tags=["logs"])
+    def delete(id: Identity) -> None:  # noqa: A002 - a path's name
+        """Delete a log with its page and result; the work on it ends at once."""
+        desk.delete(id)
+
+    @app.get("/api/health", tags=["server"])
+    def health() -> Health:
+        """Return whether the server has room for more."""
+        waiting, most = desk.jobs.waiting, desk.settings.waiting
+        return Health(waiting=waiting, most_waiting=most, room=max(desk.room.left(), 0), version=version("hydrostate"))
+
+
+def _offer_comparison(app: FastAPI, desk: Desk) -> None:
+    @app.get("/api/compare", responses=why(404, 409, 422), tags=["logs"])
+    def compare(first: Asked, second: Asked) -> Comparison:
+        """Return what differs between two logs, second less first."""
+        pair = [desk.result(one) for one in (first, second)]
+        logs = [log_of(desk.known(one), desk.jobs) for one in (first, second)]
+        return Comparison.model_validate({"first": logs[0], "second": logs[1], "differences": compared(*pair)})
+
+
+def _offer_streams(app: FastAPI, desk: Desk) -> None:
+    @app.get("/api/streams", tags=["streams"])
+    def streams() -> list[StreamState]:
+        """Return the streams that are watched."""
+        return [StreamState.model_validate(one.state) for one in desk.streams.by_name.values()]
+
+    @app.get("/api/streams/{name}", responses=why(404, 422), tags=["streams"])
+    def stream(name: StreamName) -> StreamHistory:
+        """Return a stream with the last ten minutes of its gauges, and its events."""
+        one = desk.stream(name)
+        return StreamHistory.model_validate({**one.state, "history": one.since(0), "events": one.events()})
+
+    @app.get(
+        "/api/streams/{name}/events",
+        responses={
+            **why(404, 422, page=True),
+            200: {"content": {"text/event-stream": {}}, "description": "Server-sent events."},
+        },
+        response_class=StreamingResponse,
+        tags=["streams"],
+    )
+    async def follow(request: Request, name: StreamName) -> StreamingResponse:
+        """Return what a stream tells as it comes: `history` once, then `gauges`, and `state` with new events."""
+        one = desk.stream(name)
+        if desk.streams.looking >= MOST_LOOKING:
+            raise RefusedError(429, f"{MOST_LOOKING} views are open, close one")
+        return StreamingResponse(told(one, desk.streams, request.is_disconnected), media_type="text/event-stream")
+
+
+def _offer_pages(app: FastAPI, desk: Desk) -> None:
+    def shown(page: str) -> HTMLResponse:
+        return HTMLResponse(page, headers={"Content-Security-Policy": policy_of(page)})
+
+    @app.get("/", response_class=HTMLResponse, responses=why(page=True), tags=["pages"])
+    def home() -> HTMLResponse:
+        """Return the page on which logs are dropped."""
+        return shown(home_page(desk.settings))
+
+    @app.get("/logs/{id}", response_class=HTMLResponse, responses=why(404, 409, 422, page=True), tags=["pages"])
+    def page(id: Identity) -> FileResponse:  # noqa: A002 - a path's name
+        """Return the page of a log."""
+        path = desk.page(id)
+        return FileResponse(path, media_type="text/html", headers={"Content-Security-Policy": policy_of_file(path)})
+
+    @app.get("/fleet", response_class=HTMLResponse, responses=why(404, page=True), tags=["pages"])
+    async def fleet() -> HTMLResponse:
+        """Return the page of the fleet: a row an actuator, the sick ones on top."""
+        return shown(await desk.fleet())
+
+    @app.get("/compare", response_class=HTMLResponse, responses=why(404, 409, 422, page=True), tags=["pages"])
+    async def comparison(first: Asked, second: Asked) -> HTMLResponse:
+        """Return the page of two logs side by side."""
+        return shown(await desk.comparison(first, second))
+
+    @app.get("/live/{name}", response_class=HTMLResponse, responses=why(404, 422, page=True), tags=["pages"])
+    def live(name: StreamName) -> HTMLResponse:
+        """Return the page of a stream."""
+        desk.stream(name)
+        return shown(live_page(list(desk.streams.by_name), name))

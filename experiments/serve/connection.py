@@ -1,0 +1,98 @@
+"""Connections with an end to patience: slow headers, bodies nobody reads, readers that do not read, and too many."""
+
+import asyncio
+import resource
+from typing import Any
+
+import h11
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+HEADERS_IN = 10.0
+"""How long the headers of a request may take, or a body that nobody reads [s]."""
+
+READ_IN = 30.0
+"""How long a client may leave an answer unread [s]."""
+
+MOST_CONNECTIONS = 512
+"""Connections at once, fewer where the system allows fewer files [count]."""
+
+FULL = b"HTTP/1.1 429 Too Many Requests\r\nretry-after: 5\r\ncontent-length: 0\r\nconnection: close\r\n\r\n"
+
+LATE = b"HTTP/1.1 408 Request Timeout\r\ncontent-length: 0\r\nconnection: close\r\n\r\n"
+
+
+def most_connections() -> int:
+    """Return how many connections are held at once [count]; each may need a file beside itself."""
+    allowed, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    return MOST_CONNECTIONS if allowed < 0 else min(MOST_CONNECTIONS, max(allowed // 2 - 32, 8))
+
+
+class PatientProtocol(H11Protocol):
+    """HTTP/1.1 of uvicorn, which by itself waits for ever."""
+
+    _headers_due: asyncio.TimerHandle | None = None
+    _reading_due: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: Any) -> None:
+        """Take a connection, or say that there are too many."""
+        super().connection_made(transport)
+        if len(self.connections) > most_connections():
+            transport.write(FULL)
+            transport.close()
+            return
+        self._look()
+
+    def data_received(self, data: bytes) -> None:
+        """Take what came."""
+        if self.transport.is_closing():
+            return
+        super().data_received(data)
+        self._look()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the connection."""
+        for due in (self._headers_due, self._reading_due):
+            if due is not None:
+                due.cancel()
+        super().connection_lost(exc)
+
+    def pause_writing(self) -> None:
+        """Begin to wait for a client that does not read."""
+        super().pause_writing()
+        self._reading_due = self.loop.call_later(READ_IN, self.transport.abort)
+
+    def resume_writing(self) -> None:
+        """Stop waiting, the client reads."""
+        if self._reading_due is not None:
+            self._reading_due.cancel()
+            self._reading_due = None
+        super().resume_writing()
+
+    def send_400_response(self, msg: str) -> None:
+        """Refuse what is no HTTP; in the middle of an answer the connection can only end."""
+        try:
+            super().send_400_response(msg)
+        except h11.LocalProtocolError:
+            self.transport.abort()
+        cycle: Any = self.cycle
+        if cycle is not None and not cycle.response_complete:  # whoever works on an answer has nobody to tell it to
+            cycle.disconnected = True
+            cycle.message_event.set()
+
+    def _look(self) -> None:
+        """Wait for headers, or for the end of a body after its answer, for so long and no longer."""
+        unread = self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY
+        if self.conn.their_state is h11.IDLE or unread:
+            if self._headers_due is None:
+                self._headers_due = self.loop.call_later(HEADERS_IN, self._late)
+        elif self._headers_due is not None:
+            self._headers_due.cancel()
+            self._headers_due = None
+
+    def _late(self) -> None:
+        self._headers_due = None
+        if self.transport.is_closing():
+            return
+        if self.conn.our_state is h11.IDLE:
+            self.transport.write(LATE)
+        self.transport.close()

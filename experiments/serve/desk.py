@@ -1,0 +1,231 @@
+"""What stands behind the requests: the folder of a server, its store, its work, and what is asked of them."""
+
+import asyncio
+import fcntl
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TextIO, TypeVar
+
+from pebble import ProcessExpired
+
+from experiments.running.refusal import refused
+from experiments.serve.jobs import BusyError, Jobs, log_file, page_file, phase_file
+from experiments.serve.limits import RefusedError, Room
+from experiments.serve.live import Stream, Streams
+from experiments.serve.settings import Settings
+from experiments.serve.store import FAILED, INTERRUPTED, UNFINISHED, Kept, Store
+from experiments.serve.views import compare_view, fleet_view
+from plant.errors import HydrostateError
+
+T = TypeVar("T")
+
+LOCK = "in-use"
+
+
+class Desk:
+    """A server's folder and what is done in it.
+
+    Parameters
+    ----------
+    settings : Settings
+        What the server is told.
+    """
+
+    store: Store
+    jobs: Jobs
+    streams: Streams
+    room: Room
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self._lock: TextIO | None = None
+        self._fleet: tuple[str, asyncio.Future[str]] | None = None
+
+    def open(self) -> None:
+        """Open the folder and take up what is unfinished.
+
+        Raises
+        ------
+        HydrostateError
+            If it cannot be written, another server has it, or it holds something else.
+        """
+        settings = self.settings
+        with refused(f"{settings.folder}: the server's folder cannot be made"):
+            for folder in (settings.logs, settings.pages, settings.work):
+                folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            self._lock = (settings.folder / LOCK).open("a+")
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            self._lock.close()
+            raise HydrostateError(f"{settings.folder}: must be free, another server works in it") from error
+        self.store = Store(settings.database)
+        self.room = Room(settings)
+        delete_orphans(settings, self.store)
+        self.jobs = Jobs(settings, self.store)
+        self.jobs.resume()
+        self.streams = Streams(settings, self.store)
+        self.streams.start()
+
+    def close(self) -> None:
+        """End what is under way and let the folder go."""
+        self.streams.close()
+        self.jobs.close()
+        self.store.close()
+        if self._lock is not None:
+            self._lock.close()
+
+    def require_place(self) -> None:
+        """Refuse a log that would wait too long.
+
+        Raises
+        ------
+        RefusedError
+            If as many wait as may.
+        """
+        if self.jobs.waiting + self.room.uploads >= self.settings.waiting:
+            raise RefusedError(429, f"{self.settings.waiting} logs wait to be worked on, come again")
+
+    def take_in(self, identity: str, part: Path, name: str, verb: str, size: int) -> Kept:
+        """Keep a log that has come, and put it into the queue.
+
+        Parameters
+        ----------
+        part : Path
+            Its file, whole and on the disk.
+        size : int
+            Of the file [bytes].
+        """
+        place = log_file(self.settings, identity)
+        part.replace(place)
+        folder = os.open(place.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+        kept = self.store.add(identity, name, verb, size)
+        self.room.takes(size)
+        self.jobs.submit(kept)
+        return kept
+
+    def known(self, identity: str) -> Kept:
+        """Return a log.
+
+        Raises
+        ------
+        RefusedError
+            If there is none.
+        """
+        found = self.store.get(identity)
+        if found is None:
+            raise RefusedError(404, f"there is no log {identity}")
+        return found
+
+    def result(self, identity: str) -> dict[str, Any]:
+        """Return what came of a log.
+
+        Raises
+        ------
+        RefusedError
+            If there is no such log, or it is not done.
+        """
+        log, found = self.known(identity), self.store.result(identity)
+        if found is None:
+            raise RefusedError(409, f"the work on {log.name} is not done yet")
+        return found
+
+    def page(self, identity: str) -> Path:
+        """Return the page of a log.
+
+        Raises
+        ------
+        RefusedError
+            If there is none, or none yet.
+        """
+        log, path = self.known(identity), page_file(self.settings, identity)
+        if log.state == UNFINISHED:
+            raise RefusedError(409, f"the work on {log.name} is not done yet")
+        if log.state in (FAILED, INTERRUPTED) or not path.exists():
+            raise RefusedError(404, f"{log.name} has no page: {log.message}")
+        return path
+
+    def delete(self, identity: str) -> None:
+        """Delete a log with all that came of it.
+
+        Raises
+        ------
+        RefusedError
+            If there is none.
+        """
+        if not self.store.delete(identity):
+            raise RefusedError(404, f"there is no log {identity}")
+        self.jobs.cancel(identity)
+        for place in (log_file, page_file, phase_file):
+            place(self.settings, identity).unlink(missing_ok=True)
+
+    def stream(self, name: str) -> Stream:
+        """Return a stream.
+
+        Raises
+        ------
+        RefusedError
+            If there is none.
+        """
+        found = self.streams.by_name.get(name)
+        if found is None:
+            raise RefusedError(404, f"no stream {name!r} is watched")
+        return found
+
+    async def fleet(self) -> str:
+        """Return the page of the fleet; it is made anew when a log was diagnosed or deleted since.
+
+        Raises
+        ------
+        RefusedError
+            If no log was diagnosed yet, or too much is asked at once.
+        """
+        revision = await asyncio.to_thread(self.store.revision)
+        known = self._fleet
+        if known is None or known[0] != revision or known[1].cancelled():
+            rows = await asyncio.to_thread(lambda: list(self.store.diagnosed()))
+            if not rows:
+                raise RefusedError(404, "no log was diagnosed yet")
+            name = self.settings.folder.resolve().name
+            page = asyncio.ensure_future(
+                self._view(fleet_view, rows, self.settings.pattern, dict(self.settings.limits), name)
+            )
+            self._fleet = known = (revision, page)
+        try:
+            return await asyncio.shield(known[1])
+        except RefusedError:
+            self._fleet = None
+            raise
+
+    async def comparison(self, first: str, second: str) -> str:
+        """Return the page of two logs side by side.
+
+        Raises
+        ------
+        RefusedError
+            If one is not there or not done, or too much is asked at once.
+        """
+        pair = [await asyncio.to_thread(self.result, one) for one in (first, second)]
+        return await self._view(compare_view, *pair)
+
+    async def _view(self, make: Any, *args: Any) -> str:
+        try:
+            return await asyncio.wrap_future(self.jobs.view(make, *args))
+        except BusyError as error:
+            raise RefusedError(429, "too many pages over several logs are being made, come again") from error
+        except (TimeoutError, ProcessExpired) as error:
+            raise RefusedError(429, "the page took too long to make, come again") from error
+
+
+def delete_orphans(settings: Settings, store: Store) -> None:
+    """Delete files of logs that were deleted in the middle of the work on them."""
+    for folder in (settings.logs, settings.pages):
+        for path in folder.iterdir():
+            if store.get(path.stem) is None:
+                with suppress(OSError):
+                    path.unlink()

@@ -1,0 +1,68 @@
+"""Server-sent events of a stream: what is new, a few times a second, for as long as somebody looks."""
+
+import asyncio
+import json
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable
+from typing import Any
+
+from experiments.serve.gauges import EVERY
+from experiments.serve.live import Stream, Streams
+
+MOST_LOOKING = 64
+"""Views of streams that are open at once [count]."""
+
+ALIVE = 15.0
+"""Time after which something is sent even if nothing is new [s]."""
+
+
+def message(event: str, data: Any) -> bytes:
+    r"""Return one server-sent event.
+
+    Examples
+    --------
+    >>> message("state", {"a": 1})
+    b'event: state\ndata: {"a":1}\n\n'
+    """
+    return f"event: {event}\ndata: {json.dumps(data, separators=(',', ':'), allow_nan=False)}\n\n".encode()
+
+
+async def told(stream: Stream, streams: Streams, gone: Callable[[], Awaitable[bool]]) -> AsyncIterator[bytes]:
+    """Yield what a stream tells.
+
+    Parameters
+    ----------
+    streams : Streams
+        Counts who looks.
+    gone : callable
+        Says whether the client has gone.
+
+    Yields
+    ------
+    bytes
+        ``history`` first, then ``gauges`` and ``state`` as they come.
+    """
+    streams.looking += 1
+    try:
+        number, fresh = stream.revision
+        history = stream.since(0)
+        events = await asyncio.to_thread(stream.events)
+        yield message("history", {**stream.state, "history": history, "events": events})
+        spoke = time.monotonic()
+        while not await gone():
+            await asyncio.sleep(EVERY)
+            latest, changed = stream.revision
+            if changed != fresh:
+                fresh = changed
+                yield message("state", {**stream.state, "events": await asyncio.to_thread(stream.events)})
+                spoke = time.monotonic()
+            if latest != number:
+                new, number = stream.since(number), latest
+                for one in new:
+                    yield message("gauges", one)
+                spoke = time.monotonic()
+            if time.monotonic() - spoke > ALIVE:
+                yield b": still here\n\n"
+                spoke = time.monotonic()
+    finally:
+        streams.looking -= 1

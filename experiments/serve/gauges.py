@@ -1,0 +1,153 @@
+"""The process of a stream: it watches what comes and tells the server gauges a few times a second, and every event."""
+
+import contextlib
+import os
+import signal
+import threading
+import time
+from collections.abc import Mapping
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from experiments.command.json_output import plain
+from experiments.command.options import load_rig
+from experiments.command.terminal import unexpected
+from experiments.command.watch_told import Told
+from experiments.command.watching import Asked, watch_network
+from plant.errors import HydrostateError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+EVERY = 0.25
+"""Time between two messages of gauges [s]."""
+
+
+class Gauges(Told):
+    """What a watch tells, and what its channels read meanwhile.
+
+    Parameters
+    ----------
+    out : Connection
+        Receives ``("event", entries)`` and ``("gauges", entries)``.
+    """
+
+    def __init__(self, out: Connection) -> None:
+        super().__init__(lambda entries: out.send(("event", plain(entries))))
+        self._out = out
+        self._rows = self._gaps = 0
+        self._ends: dict[str, tuple[float, float]] = {}
+        self._sent = 0.0
+
+    def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
+        """Take notice of samples; every `EVERY` the range of each channel since then is told.
+
+        Parameters
+        ----------
+        channels : Mapping[str, ndarray], shape (n,) each
+            Samples by channel [SI].
+        last : float
+            Time of the last one [s].
+        gap : bool
+            Whether rows are missing before them.
+        """
+        import numpy as np
+
+        self._gaps += gap
+        missing = 0
+        for name, values in channels.items():
+            there = values[np.isfinite(values)]
+            missing = max(missing, len(values) - len(there))
+            if len(there):
+                low, high = self._ends.get(name, (np.inf, -np.inf))
+                self._ends[name] = min(low, float(there.min())), max(high, float(there.max()))
+        self._rows += max((len(values) for values in channels.values()), default=0) - missing
+        now = time.monotonic()
+        if now - self._sent < EVERY:
+            return
+        self._sent = now
+        self.flush(last, {name: float(values[-1]) for name, values in channels.items()})
+
+    def flush(self, last: float, values: Mapping[str, float]) -> None:
+        """Tell the gauges now.
+
+        Parameters
+        ----------
+        last : float
+            Time of the stream [s].
+        values : Mapping[str, float]
+            What each channel reads [SI].
+        """
+        if self.watch is None:
+            return
+        told = {
+            "time_s": last,
+            "rows": self._rows,
+            "gaps": self._gaps,
+            "values": dict(values),
+            "low": {name: low for name, (low, _) in self._ends.items()},
+            "high": {name: high for name, (_, high) in self._ends.items()},
+            "scores": dict(zip(self.watch.balances, self.watch.scores, strict=True)),
+            "thresholds": dict(zip(self.watch.balances, self.watch.thresholds, strict=True)),
+        }
+        self._out.send(("gauges", plain(told)))
+        self._ends = {}
+
+    @property
+    def rows(self) -> int:
+        """Rows that came, whole in every channel [count]."""
+        return self._rows
+
+
+def watch_stream(
+    out: Connection,
+    server: int,
+    address: str,
+    rig: Path | None,
+    columns: tuple[tuple[str, str], ...],
+    false_alarms: float,
+    state: Path,
+) -> None:
+    """Watch a stream until it ends, in a process of its own.
+
+    Parameters
+    ----------
+    out : Connection
+        To the server.
+    server : int
+        Process identity of the server, without which this one ends.
+    address : str
+        As `plant.log.stream_source.stream_lines` takes it.
+    columns : tuple of tuple
+        Pairs of channel and foreign column.
+    false_alarms : float
+        Of healthy, moving operation [1/h].
+    state : Path
+        File in which the watch is kept over a restart.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for name in ("OPENBLAS", "OMP", "MKL"):
+        os.environ.setdefault(f"{name}_NUM_THREADS", "1")
+
+    def look() -> None:
+        while os.getppid() == server:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=look, daemon=True).start()
+    told, outcome, said = Gauges(out), "failed", ""
+    with contextlib.suppress(BrokenPipeError):
+        try:
+            asked = Asked(load_rig(rig), dict(columns), false_alarms, 120.0, None, False)
+            watch_network(told, address, asked, state)
+            outcome = "ok"
+        except HydrostateError as error:
+            said = str(error)
+        except Exception as error:  # the server goes on, and says why this stream does not
+            said = unexpected(error)
+        if told.watch is not None:
+            told.flush(told.watch.last, {})
+        told.end(outcome, said)
+    out.close()

@@ -1,0 +1,203 @@
+"""The queue of a server: logs are worked on in processes with a limit of time and memory, and can be taken back."""
+
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Future
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pebble import ProcessExpired, ProcessPool
+
+from experiments.command.terminal import unexpected
+from experiments.serve.settings import MB, Settings
+from experiments.serve.store import DONE, FAILED, INTERRUPTED, Kept, Store
+from experiments.serve.work import Task, Worked, begin_worker, work_on
+
+MOST_TRIES = 3
+"""Servers that may end in the middle of the work on a log before it is given up [count]."""
+
+FRESH_AFTER = 50
+"""Logs after which a process is replaced by a new one [count], so that no library's leak grows."""
+
+VIEW_SECONDS = 60.0
+"""Longest work on a page over many logs [s]."""
+
+MOST_VIEWS = 8
+"""Such pages that may be under way or wait [count]."""
+
+T = TypeVar("T")
+
+
+class BusyError(RuntimeError):
+    """There is no room for more work now."""
+
+
+class Jobs:
+    """The work of a server.
+
+    Parameters
+    ----------
+    settings : Settings
+        How much of it is done at once, and its limits.
+    store : Store
+        Receives what comes of it.
+    """
+
+    def __init__(self, settings: Settings, store: Store) -> None:
+        self._settings, self._store = settings, store
+        self._waiting: dict[str, Future[Any]] = {}
+        self._views = 0
+        self._lock = threading.Lock()
+        self._closing = False
+        context = multiprocessing.get_context("spawn")
+        born: Any = {"initializer": begin_worker, "initargs": (os.getpid(), settings.memory), "context": context}
+        self._pool = ProcessPool(max_workers=settings.workers, max_tasks=FRESH_AFTER, **born)
+        self._drawing = ProcessPool(max_workers=1, max_tasks=FRESH_AFTER, **born)
+
+    @property
+    def waiting(self) -> int:
+        """Logs that are worked on or wait [count]."""
+        return len(self._waiting)
+
+    def resume(self) -> None:
+        """Take up what an earlier server did not finish; a log over which several ended is given up."""
+        for log in self._store.unfinished():
+            if phase_file(self._settings, log.id).exists():
+                self._store.tried(log.id)
+                if log.tries + 1 >= MOST_TRIES:
+                    said = f"interrupted: the server ended {MOST_TRIES} times in the middle of the work on this log"
+                    self._store.finish(log.id, INTERRUPTED, {"file": log.name, "outcome": "failed", "message": said})
+                    continue
+            if not log_file(self._settings, log.id).exists():
+                said = "interrupted: its file is no longer in the server's folder"
+                self._store.finish(log.id, INTERRUPTED, {"file": log.name, "outcome": "failed", "message": said})
+                continue
+            self.submit(log)
+        for left in self._settings.work.iterdir():
+            if left.suffix == ".part":
+                left.unlink(missing_ok=True)
+
+    def submit(self, log: Kept) -> None:
+        """Put a log into the queue."""
+        settings = self._settings
+        phase_file(settings, log.id).unlink(missing_ok=True)
+        task = Task(
+            log_file(settings, log.id),
+            log.name,
+            log.verb,
+            page_file(settings, log.id),
+            phase_file(settings, log.id),
+            settings.plant,
+            settings.rig,
+            tuple(settings.columns.items()),
+        )
+        with self._lock:
+            future: Future[Any] = self._pool.schedule(work_on, args=(task,), timeout=settings.seconds)
+            self._waiting[log.id] = future
+        future.add_done_callback(lambda done: self._ended(log, done))
+
+    def cancel(self, identity: str) -> None:
+        """Take a log back: out of the queue, or by the end of the process that works on it."""
+        with self._lock:
+            future = self._waiting.pop(identity, None)
+        if future is not None:
+            future.cancel()
+
+    def phase(self, identity: str) -> str | None:
+        """Return where the work on a log is, None while it waits."""
+        with suppress(OSError):
+            return phase_file(self._settings, identity).read_text(encoding="utf-8") or None
+        return None
+
+    def view(self, make: Callable[..., T], *args: Any) -> "Future[T]":
+        """Have a page made that is over many logs.
+
+        Parameters
+        ----------
+        make : callable
+            A function of a module, and its arguments, which go to another process.
+
+        Raises
+        ------
+        BusyError
+            If too many are under way.
+        """
+        with self._lock:
+            if self._views >= MOST_VIEWS:
+                raise BusyError
+            self._views += 1
+        future: Future[T] = self._drawing.schedule(make, args=args, timeout=VIEW_SECONDS)
+
+        def ended(_: "Future[T]") -> None:
+            with self._lock:
+                self._views -= 1
+
+        future.add_done_callback(ended)
+        return future
+
+    def close(self) -> None:
+        """End the processes; what is unfinished is taken up by the next server."""
+        self._closing = True
+        for pool in (self._pool, self._drawing):
+            pool.stop()
+        for pool in (self._pool, self._drawing):
+            pool.join()
+
+    def _ended(self, log: Kept, future: "Future[Any]") -> None:
+        if self._closing:
+            return
+        with self._lock:
+            taken_back = self._waiting.get(log.id) is not future
+        if taken_back:
+            self._forget(log.id)
+            return
+        try:
+            worked: Worked = future.result()
+        except CancelledError:
+            worked = self._lost("it was taken back", log)
+        except TimeoutError:
+            worked = self._lost(f"the work on it took longer than {self._settings.seconds:g} s and was ended", log)
+        except ProcessExpired as error:
+            most = self._settings.memory // MB
+            worked = self._lost(
+                f"the process that worked on it ended (code {error.exitcode}), perhaps for want of memory: it may use "
+                f"{most} MB",
+                log,
+            )
+        except Exception as error:  # what a worker could not even report
+            worked = self._lost(unexpected(error), log)
+        try:
+            state = FAILED if worked.result["outcome"] == "failed" else DONE
+            self._store.finish(log.id, state, worked.result, worked.entries)
+            if self._store.get(log.id) is None:
+                self._forget(log.id)
+        finally:
+            phase_file(self._settings, log.id).unlink(missing_ok=True)
+            with self._lock:
+                self._waiting.pop(log.id, None)
+
+    def _lost(self, message: str, log: Kept) -> Worked:
+        entries = {"outcome": "failed", "reason": message} if log.verb == "diagnose" else None
+        return Worked({"file": log.name, "outcome": "failed", "message": message}, entries)
+
+    def _forget(self, identity: str) -> None:
+        for path in (log_file, page_file, phase_file):
+            path(self._settings, identity).unlink(missing_ok=True)
+
+
+def log_file(settings: Settings, identity: str) -> Path:
+    """Return where a log is kept; formats are told by content, so that its name needs no suffix."""
+    return settings.logs / identity
+
+
+def page_file(settings: Settings, identity: str) -> Path:
+    """Return where the page of a log is kept."""
+    return settings.pages / f"{identity}.html"
+
+
+def phase_file(settings: Settings, identity: str) -> Path:
+    """Return the file that says where the work on a log is."""
+    return settings.work / identity

@@ -1,0 +1,306 @@
+"""Whom a server answers and how much it takes from them: who may ask, what a page may do, bodies, files, patience."""
+
+import asyncio
+import hmac
+import json
+import os
+import shutil
+import time
+from collections.abc import AsyncIterator, Mapping
+from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from experiments.serve.settings import MB, Settings, is_loopback
+
+MOST_REQUESTS = 256
+"""Requests that are answered at once [count]; more are told to come again."""
+
+MOST_UPLOADS = 16
+"""Logs that come in at once [count]."""
+
+IDLE = 15.0
+"""Longest silence within a body [s]."""
+
+GRACE, SLOWEST = 30.0, 10_000.0
+"""Time after which a body must have come faster than so much on average [s, bytes/s]."""
+
+DRAINED = 5.0
+"""How long what is still sent is thrown away after a refusal, so that the client reads why [s]."""
+
+SPARE = 256 * MB
+"""Space that is left on the disk [bytes]."""
+
+COOKIE = "hydrostate_token"
+
+RETRY = (b"retry-after", b"5")
+
+HEADERS: Mapping[bytes, bytes] = {
+    b"content-security-policy": b"default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    b"x-content-type-options": b"nosniff",
+    b"x-frame-options": b"DENY",
+    b"referrer-policy": b"no-referrer",
+    b"cross-origin-opener-policy": b"same-origin",
+    b"cross-origin-resource-policy": b"same-origin",
+    b"cache-control": b"no-store",
+}
+"""What every answer has, unless it says otherwise."""
+
+
+class RefusedError(Exception):
+    """A request is not done.
+
+    Parameters
+    ----------
+    status : int
+        Of HTTP.
+    detail : str
+        Why, in a sentence.
+    """
+
+    def __init__(self, status: int, detail: str) -> None:
+        super().__init__(detail)
+        self.status, self.detail = status, detail
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """What the client should know beside it: when to come again."""
+        return {"Retry-After": RETRY[1].decode()} if self.status == 429 else {}
+
+
+class Guard:
+    """Refuses those who may not ask, and puts the policy of pages on every answer.
+
+    Parameters
+    ----------
+    app : ASGIApp
+        What answers the others.
+    settings : Settings
+        Host and token.
+    """
+
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        self._app, self._token = app, settings.token
+        self._names = {"localhost", "127.0.0.1", "::1", settings.host.lower()}
+        self._loopback = is_loopback(settings.host)
+        self._busy = 0
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        exchange = _Exchange(receive, send)
+        headers = {name.lower(): value for name, value in scope["headers"]}
+        try:
+            self._busy += 1
+            moved = self._let_in(scope, headers)
+            if moved is not None:
+                await exchange.answer(303, "", moved)
+                return
+            await self._app(scope, exchange.receive, exchange.send)
+        except RefusedError as refused:
+            await exchange.answer(refused.status, refused.detail, [RETRY] if refused.status == 429 else [])
+        finally:
+            self._busy -= 1
+
+    def _let_in(self, scope: Scope, headers: Mapping[bytes, bytes]) -> list[tuple[bytes, bytes]] | None:
+        """Refuse a request or let it in; the headers of a redirection where it brought its token in the address."""
+        if self._busy > MOST_REQUESTS:
+            raise RefusedError(429, f"more than {MOST_REQUESTS} requests are being answered, come again")
+        host = headers.get(b"host", b"").decode("latin-1").lower()
+        if self._loopback and _host_name(host) not in self._names:
+            raise RefusedError(421, f"this server answers for localhost alone, the request is for {host[:80]!r}")
+        if scope["method"] not in ("GET", "HEAD", "OPTIONS"):
+            origin = headers.get(b"origin")
+            foreign = origin is not None and urlsplit(origin.decode("latin-1").lower()).netloc != host
+            if foreign or headers.get(b"sec-fetch-site", b"none") not in (b"none", b"same-origin"):
+                raise RefusedError(403, "a page of another site may not change anything here")
+        if self._token is None:
+            return None
+        if scope["path"] == "/" and b"token=" in scope["query_string"]:
+            given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
+            if _same(given, self._token):
+                cookie = f"{COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
+                return [(b"location", b"/"), (b"set-cookie", cookie.encode())]
+        if not (_same(_bearer(headers), self._token) or _same(_cookie(headers), self._token)):
+            raise RefusedError(
+                401, "a token is wanted: open the address that the server printed, or send a Bearer token"
+            )
+        return None
+
+
+def _same(given: str, token: str) -> bool:
+    return hmac.compare_digest(given.encode("utf-8", "replace"), token.encode())
+
+
+def _bearer(headers: Mapping[bytes, bytes]) -> str:
+    kind, _, given = headers.get(b"authorization", b"").decode("latin-1").partition(" ")
+    return given.strip() if kind.lower() == "bearer" else ""
+
+
+def _cookie(headers: Mapping[bytes, bytes]) -> str:
+    parts = [part.strip().partition("=") for part in headers.get(b"cookie", b"").decode("latin-1").split(";")]
+    return next((value for name, _, value in parts if name == COOKIE), "")
+
+
+def _host_name(host: str) -> str:
+    """Return a host header without its port.
+
+    Examples
+    --------
+    >>> _host_name("127.0.0.1:8765"), _host_name("[::1]:80")
+    ('127.0.0.1', '::1')
+    """
+    return host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]
+
+
+class _Exchange:
+    """A request and its answer: every answer has `HEADERS`, and a refusal is read before the connection ends."""
+
+    def __init__(self, receive: Receive, send: Send) -> None:
+        self._receive, self._send = receive, send
+        self._whole = self._gone = False
+        self._status = 0
+
+    async def receive(self) -> Message:
+        message = await self._receive()
+        self._gone = self._gone or message["type"] == "http.disconnect"
+        self._whole = self._whole or not message.get("more_body", False)
+        return message
+
+    async def send(self, message: Message) -> None:
+        if message["type"] == "http.response.start":
+            self._status = message["status"]
+            there = {name.lower() for name, _ in message["headers"]}
+            more = [(name, value) for name, value in HEADERS.items() if name not in there]
+            message = {**message, "headers": [*message["headers"], *more]}
+        elif not message.get("more_body", False) and self._status >= 400:
+            await self._send({**message, "more_body": True})
+            await self._drain()
+            message = {"type": "http.response.body", "body": b"", "more_body": False}
+        await self._send(message)
+
+    async def answer(self, status: int, detail: str, headers: list[tuple[bytes, bytes]]) -> None:
+        if self._status:  # an answer is under way, and can no longer be another one
+            return
+        body = json.dumps({"detail": detail}).encode()
+        about = [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode())]
+        await self.send({"type": "http.response.start", "status": status, "headers": [*about, *headers]})
+        await self.send({"type": "http.response.body", "body": body})
+
+    async def _drain(self) -> None:
+        try:
+            async with asyncio.timeout(DRAINED):
+                while not (self._whole or self._gone):
+                    await self.receive()
+        except TimeoutError:
+            return
+
+
+class Room:
+    """How much the folder of a server may still take.
+
+    Parameters
+    ----------
+    settings : Settings
+        Folder and limits.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._taken, self._looked = 0, -1e9
+        self.uploads = 0
+
+    def left(self) -> int:
+        """Return how many bytes may still come; looked at anew every few seconds."""
+        if time.monotonic() - self._looked > IDLE:
+            folders = (self._settings.logs, self._settings.pages, self._settings.work)
+            self._taken = sum(_size(entry) for folder in folders for entry in os.scandir(folder))
+            self._looked = time.monotonic()
+        free = shutil.disk_usage(self._settings.folder).free - SPARE
+        return min(self._settings.room - self._taken, free)
+
+    def takes(self, size: int) -> None:
+        """Count what has come [bytes]."""
+        self._taken += size
+
+
+def _size(entry: "os.DirEntry[str]") -> int:
+    try:
+        return entry.stat(follow_symlinks=False).st_size
+    except FileNotFoundError:  # deleted since it was listed
+        return 0
+
+
+async def receive_file(chunks: AsyncIterator[bytes], path: Path, most: int, room: int) -> int:
+    """Write a body to a file as it comes.
+
+    Parameters
+    ----------
+    chunks : AsyncIterator of bytes
+        The body.
+    path : Path
+        The file, which must not be there yet; it is deleted if the body is refused or breaks off.
+    most : int
+        Most that is taken [bytes].
+    room : int
+        What the folder still takes [bytes].
+
+    Returns
+    -------
+    int
+        Its size [bytes].
+
+    Raises
+    ------
+    RefusedError
+        If it is empty, too large or too slow, or the disk is full.
+    """
+    size, began, whole = 0, time.monotonic(), False
+    try:
+        with path.open("xb") as file:
+            while True:
+                async with asyncio.timeout(IDLE):
+                    chunk = await anext(chunks, None)
+                if chunk is None:
+                    break
+                size += len(chunk)
+                require_size(size, most, room)
+                took = time.monotonic() - began
+                if took > GRACE and size < took * SLOWEST:
+                    raise RefusedError(408, f"the file comes too slowly: {size / took:.0f} bytes a second")
+                file.write(chunk)
+            if not size:
+                raise RefusedError(422, "the body must be the file itself, it is empty")
+            file.flush()
+            await asyncio.to_thread(os.fsync, file.fileno())
+        whole = True
+    except TimeoutError as error:
+        raise RefusedError(408, f"the file stopped coming for {IDLE:g} s") from error
+    except OSError as error:
+        raise RefusedError(413, f"the server's folder takes no more: {error.strerror or error}") from error
+    finally:
+        if not whole:
+            path.unlink(missing_ok=True)
+    return size
+
+
+def require_size(size: int, most: int, room: int) -> None:
+    """Refuse a body that is too large for a log or for the folder.
+
+    Parameters
+    ----------
+    size, most, room : int
+        What comes or came, the most of a log, and what the folder still takes [bytes].
+
+    Raises
+    ------
+    RefusedError
+        If it is too large.
+    """
+    if size > most:
+        raise RefusedError(413, f"a log may have {most // MB} MB, this one has more")
+    if size > room:
+        raise RefusedError(413, "the server's folder is full: delete logs in it, or give it more room")

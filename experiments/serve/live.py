@@ -1,0 +1,155 @@
+"""Streams under watch: a process each, its gauges and events kept for whoever looks on, begun again when it ends."""
+
+import multiprocessing
+import os
+import threading
+import time
+from collections import deque
+from collections.abc import Mapping
+from multiprocessing.connection import Connection
+from typing import Any
+
+from experiments.serve.gauges import watch_stream
+from experiments.serve.settings import Settings
+from experiments.serve.store import Store
+
+KEPT = 2400
+"""Gauges that are remembered [count]: ten minutes of four a second."""
+
+AGAIN_AFTER = 5.0
+"""Time from the end of a stream to the next attempt [s]."""
+
+SHOWN_EVENTS = 200
+"""Events that a view begins with [count]."""
+
+
+class Stream:
+    """One stream.
+
+    Parameters
+    ----------
+    name : str
+        What it is asked for by.
+    address : str
+        Where it comes from.
+    settings, store : Settings, Store
+        Rig and columns; where its events are kept.
+    """
+
+    def __init__(self, name: str, address: str, settings: Settings, store: Store) -> None:
+        self.name, self.address = name, address
+        self._settings, self._store = settings, store
+        self._lock = threading.Lock()
+        self._gauges: deque[dict[str, Any]] = deque(maxlen=KEPT)
+        self._count, self._state, self._said, self._fresh = 0, "connecting", "", 0
+        self._process: Any = None
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=f"stream {name}", daemon=True)
+
+    def start(self) -> None:
+        """Begin to watch."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the watch and its process; it goes on from where it was when there is one again."""
+        self._closed.set()
+        process = self._process
+        if process is not None and process.is_alive():
+            process.terminate()
+        if self._thread.is_alive():
+            self._thread.join(AGAIN_AFTER)
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """What it does: ``state``, ``message``, and the last gauges."""
+        with self._lock:
+            last = self._gauges[-1] if self._gauges else None
+            return {"name": self.name, "state": self._state, "message": self._said, "gauges": last}
+
+    @property
+    def revision(self) -> tuple[int, int]:
+        """Numbers of the last gauges and of the last change of state or event: what is new has larger ones."""
+        return self._count, self._fresh
+
+    def since(self, number: int) -> list[dict[str, Any]]:
+        """Return the gauges after that number, each with its ``number``; all that are kept for 0."""
+        with self._lock:
+            new = min(self._count - number, len(self._gauges))
+            return list(self._gauges)[len(self._gauges) - new :] if new > 0 else []
+
+    def events(self) -> list[dict[str, Any]]:
+        """Return the last events, the latest last."""
+        return self._store.events(self.name, SHOWN_EVENTS)
+
+    def _run(self) -> None:
+        settings = self._settings
+        context = multiprocessing.get_context("spawn")
+        state = settings.folder / f"stream-{self.name}.npz"
+        columns = tuple(settings.columns.items())
+        while not self._closed.is_set():
+            ours, theirs = context.Pipe(duplex=False)
+            asked = (theirs, os.getpid(), self.address, settings.rig, columns, settings.false_alarms, state)
+            self._process = context.Process(target=watch_stream, args=asked, daemon=True)
+            self._process.start()
+            theirs.close()
+            self._listen(ours)
+            self._process.join(AGAIN_AFTER)
+            if self._process.is_alive():
+                self._process.kill()
+            self._closed.wait(AGAIN_AFTER)
+
+    def _listen(self, ours: Connection) -> None:
+        with ours:
+            while True:
+                try:
+                    kind, entries = ours.recv()
+                except (EOFError, OSError):
+                    break
+                if kind == "gauges":
+                    self._put(entries)
+                else:
+                    self._tell(entries)
+        with self._lock:
+            if self._state not in ("ended", "failed"):
+                self._state, self._said = "failed", "the process that watched it ended"
+                self._fresh += 1
+
+    def _put(self, entries: Mapping[str, Any]) -> None:
+        with self._lock:
+            self._count += 1
+            self._gauges.append({"number": self._count, "received": time.time(), **entries})
+
+    def _tell(self, entries: Mapping[str, Any]) -> None:
+        event = entries["event"]
+        told = {"start": "learning", "ready": "watching", "end": "ended"}.get(event)
+        failed = event == "end" and entries.get("outcome") == "failed"
+        if not (failed and self._state == "failed" and self._said == entries["message"]):
+            self._store.add_event(self.name, entries)
+        with self._lock:
+            self._state = "failed" if failed else told or self._state
+            self._said = str(entries.get("message") or "")
+            self._fresh += 1
+
+
+class Streams:
+    """The streams of a server, by name.
+
+    Parameters
+    ----------
+    settings, store : Settings, Store
+        Which they are; where their events are kept.
+    """
+
+    def __init__(self, settings: Settings, store: Store) -> None:
+        self.by_name = {name: Stream(name, address, settings, store) for name, address in settings.streams.items()}
+        self.looking = 0
+
+    def start(self) -> None:
+        """Begin to watch all."""
+        for one in self.by_name.values():
+            one.start()
+
+    def close(self) -> None:
+        """End all."""
+        for one in self.by_name.values():
+            one.close()

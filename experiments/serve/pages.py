@@ -1,0 +1,65 @@
+"""The server's own pages, and the policy that a page which is kept says of itself."""
+
+import html
+import re
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from experiments.serve.settings import MB, VERBS, Settings
+
+_POLICY = re.compile(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">')
+
+HEAD = 4096
+"""Letters of a page among which its policy stands [count]."""
+
+
+def policy_of(page: str) -> str:
+    """Return what a page allows itself, for the header: a page without a policy may do nothing.
+
+    Examples
+    --------
+    >>> policy_of("no page")
+    "default-src 'none'; frame-ancestors 'none'"
+    """
+    found = _POLICY.search(page[:HEAD])
+    allowed = html.unescape(found[1]) if found else "default-src 'none'"
+    return f"{allowed}; frame-ancestors 'none'"
+
+
+def policy_of_file(path: Path) -> str:
+    """Return the same of a page that is kept."""
+    with path.open(encoding="utf-8", errors="replace") as file:
+        return policy_of(file.read(HEAD))
+
+
+def home_page(settings: Settings) -> str:
+    """Return the page on which logs are dropped."""
+    return _rendered(
+        "serve/home.html",
+        (
+            ("verbs", VERBS),
+            ("largest", settings.largest // MB),
+            ("seconds", f"{settings.seconds:g}"),
+            ("streams", tuple(settings.streams)),
+        ),
+    )
+
+
+def live_page(names: Sequence[str], name: str) -> str:
+    """Return the page of a stream.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of all streams.
+    """
+    return _rendered("serve/live.html", (("streams", tuple(names)), ("name", name)))
+
+
+@cache
+def _rendered(template: str, facts: tuple[tuple[str, Any], ...]) -> str:
+    from experiments.page.render import render_page
+
+    return render_page(template, dict(facts), {}, {})

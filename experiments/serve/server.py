@@ -1,0 +1,109 @@
+"""`run_server(settings, say)`: listen, answer until asked to end, and let the folder go."""
+
+import errno
+import gc
+import logging
+import socket
+import sys
+from collections.abc import Callable
+
+import uvicorn
+
+from experiments.serve.app import make_app
+from experiments.serve.connection import PatientProtocol
+from experiments.serve.settings import Settings
+from plant.errors import HydrostateError
+
+LEFT_TO_END = 3
+"""How long answers under way are waited for at the end [s]."""
+
+LONGEST_HEADERS = 32 << 10
+"""Headers of a request [bytes]."""
+
+OBJECTS = 10_000
+"""More objects than were freed, after which garbage is looked for: a command looks seldom, a server must not grow."""
+
+BACKLOG = 512
+"""Connections that wait to be accepted [count]."""
+
+
+def run_server(settings: Settings, say: Callable[[str], None]) -> None:
+    """Serve until the process is asked to end.
+
+    Parameters
+    ----------
+    settings : Settings
+        What the server is told.
+    say : callable
+        Is told the address once it listens.
+
+    Raises
+    ------
+    HydrostateError
+        If it cannot listen there, or cannot have the folder.
+    """
+    logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)  # what goes wrong is told by the application
+    gc.freeze()
+    gc.set_threshold(OBJECTS)
+    desk_errors: list[HydrostateError] = []
+    app = make_app(settings, desk_errors.append)
+    with _listening(settings) as listener:
+        config = uvicorn.Config(
+            app,
+            http=PatientProtocol,
+            ws="none",
+            loop="asyncio",
+            log_config=None,
+            access_log=False,
+            server_header=False,
+            proxy_headers=False,
+            backlog=BACKLOG,
+            timeout_keep_alive=5,
+            timeout_graceful_shutdown=LEFT_TO_END,
+            h11_max_incomplete_event_size=LONGEST_HEADERS,
+        )
+        server = _Speaking(config, lambda: say(_address(settings, listener)))
+        try:
+            server.run(sockets=[listener])
+        except SystemExit:
+            if not desk_errors:
+                raise
+        if desk_errors:
+            raise desk_errors[0]
+
+
+class _Speaking(uvicorn.Server):
+    """A server that says when it listens."""
+
+    def __init__(self, config: uvicorn.Config, say: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._say = say
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        if self.started and not self.should_exit:
+            self._say()
+
+
+def _listening(settings: Settings) -> socket.socket:
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((settings.host, settings.port))
+        listener.listen(BACKLOG)
+    except OSError as error:
+        listener.close()
+        taken = "; another server listens there" if error.errno == errno.EADDRINUSE else ""
+        raise HydrostateError(
+            f"{settings.host}:{settings.port}: cannot listen there: {error.strerror}{taken}"
+        ) from error
+    return listener
+
+
+def _address(settings: Settings, listener: socket.socket) -> str:
+    port = listener.getsockname()[1]
+    host = f"[{settings.host}]" if ":" in settings.host else settings.host
+    token = f"?token={settings.token}" if settings.token else ""
+    sys.stdout.flush()
+    return f"http://{host}:{port}/{token}"

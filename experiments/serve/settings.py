@@ -1,0 +1,118 @@
+"""What a server is told: where it keeps things, whom it answers, and how much it takes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from ipaddress import ip_address
+from pathlib import Path
+
+from plant.errors import HydrostateError
+
+VERBS = ("diagnose", "estimate", "inspect")
+"""What may be done with a log."""
+
+LEAST_TOKEN = 16
+"""Letters of a token, at least [count]."""
+
+MB = 1 << 20
+
+PORT = 8765
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What a server is told.
+
+    Parameters
+    ----------
+    folder : Path
+        All that it keeps is in here.
+    host, port : str, int
+        Where it listens.
+    token : str or None
+        What a client must show; None only where this machine alone can connect.
+    plant, rig, columns : str or None, Path or None, Mapping[str, str]
+        Actuator of the logs, as the command line has it.
+    pattern : str or None
+        How logs are named, as `experiments.fleet.naming.by_pattern` takes it.
+    limits : Mapping[str, float]
+        Limits of severities [their units].
+    workers : int
+        Logs that are worked on at once [count].
+    seconds : float
+        Longest work on a log [s].
+    memory : int
+        Most memory of a process that works on a log [bytes].
+    largest : int
+        Largest log that is taken [bytes].
+    room : int
+        Most that the folder's logs and pages may take [bytes].
+    waiting : int
+        Logs that may wait to be worked on [count].
+    streams : Mapping[str, str]
+        Address of each stream that is watched, by its name.
+    false_alarms : float
+        Of each stream, of healthy, moving operation [1/h].
+
+    Raises
+    ------
+    HydrostateError
+        If a token is wanted and missing, or too short.
+    """
+
+    folder: Path
+    host: str = "127.0.0.1"
+    port: int = PORT
+    token: str | None = None
+    plant: str | None = None
+    rig: Path | None = None
+    columns: Mapping[str, str] = field(default_factory=dict[str, str])
+    pattern: str | None = None
+    limits: Mapping[str, float] = field(default_factory=dict[str, float])
+    workers: int = 1
+    seconds: float = 300.0
+    memory: int = 3072 * MB
+    largest: int = 256 * MB
+    room: int = 10240 * MB
+    waiting: int = 200
+    streams: Mapping[str, str] = field(default_factory=dict[str, str])
+    false_alarms: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.token is None and not is_loopback(self.host):
+            raise HydrostateError(f"--host {self.host} can be reached from other machines, so a token is wanted")
+        if self.token is not None and not (len(self.token) >= LEAST_TOKEN and self.token.isascii()):
+            raise HydrostateError(f"a token must have {LEAST_TOKEN} ASCII letters or digits at least")
+
+    @property
+    def logs(self) -> Path:
+        """Folder of the logs as they came."""
+        return self.folder / "logs"
+
+    @property
+    def pages(self) -> Path:
+        """Folder of their pages."""
+        return self.folder / "pages"
+
+    @property
+    def work(self) -> Path:
+        """Folder of what is under way; it is emptied at the start."""
+        return self.folder / "work"
+
+    @property
+    def database(self) -> Path:
+        """File of what is known of the logs."""
+        return self.folder / "hydrostate.sqlite"
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether this machine alone can connect to a host name or address.
+
+    Examples
+    --------
+    >>> is_loopback("127.0.0.1"), is_loopback("localhost"), is_loopback("0.0.0.0")
+    (True, True, False)
+    """
+    try:
+        return host == "localhost" or ip_address(host).is_loopback
+    except ValueError:
+        return False

@@ -1,0 +1,199 @@
+"""Pages over several logs, made in a process that can be killed: the fleet, and two logs side by side."""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from experiments.page.numbers import MISSING, number, pretty_unit
+from experiments.page.words import in_words, sentence
+from plant.errors import HydrostateError
+
+DEVIATIONS = 1.96
+"""Standard deviations from an estimate to the end of its 95 % interval [dimensionless]."""
+
+
+def fleet_view(
+    rows: Sequence[tuple[str, str, Mapping[str, Any]]], pattern: str | None, limits: Mapping[str, float], source: str
+) -> str:
+    """Return the page of the fleet.
+
+    Parameters
+    ----------
+    rows : sequence of tuple
+        Identity, name and entries of a row of each log that was diagnosed.
+    pattern : str or None
+        How logs are named.
+    limits : Mapping[str, float]
+        Limits of severities [their units].
+    """
+    from experiments.fleet.actuators import actuator_rows
+    from experiments.fleet.naming import UNNAMED, Named, by_pattern
+    from experiments.fleet.page import fleet_page
+    from experiments.fleet.rows import log_rows
+
+    counts = Counter(name for _, name, _ in rows)
+    files = {identity: name if counts[name] == 1 else f"{name} ({identity[:6]})" for identity, name, _ in rows}
+    names: dict[str, Named] = {}
+    for identity, name, _ in rows if pattern else ():
+        try:
+            names[files[identity]] = by_pattern([name], pattern or "")[name]
+        except HydrostateError:  # a date that is none
+            names[files[identity]] = UNNAMED
+    blank = dict.fromkeys(("outcome", "found_condition", "reason", "quantities"))
+    table = [{**blank, **entries, "verb": "diagnose", "file": files[identity]} for identity, _, entries in rows]
+    found = actuator_rows(log_rows(table, names, limits))
+    by_file = {file: identity for identity, file in files.items()}
+    links = {row.name: f"logs/{by_file[row.last.file]}" for row in found if row.last.state != "failed"}
+    return fleet_page(found, links, source)
+
+
+def compare_view(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
+    """Return the page of two logs side by side.
+
+    Parameters
+    ----------
+    first, second : Mapping
+        Their entries of the JSON contract.
+    """
+    import pandas as pd
+
+    from experiments.page.render import render_page
+    from experiments.page.tables import Column
+
+    rows = compared(first, second)
+    changed = [row["quantity"] for row in rows if row["changed"]]
+    shown = [
+        {
+            "quantity": row["quantity"].replace("_", " "),
+            **_in_a_readers_unit(row),
+            "says": "changed" if row["changed"] else "no certain change" if row["interval"] else "not told by both",
+        }
+        for row in rows
+    ]
+    shares = {
+        name: tuple((one.get("probabilities") or {}).get(name, 0.0) for one in (first, second))
+        for name in {**(first.get("probabilities") or {}), **(second.get("probabilities") or {})}
+    }
+    likely = sorted(((name, pair) for name, pair in shares.items() if max(pair) >= 1e-3), key=lambda one: -max(one[1]))
+    facts = {
+        "logs": [
+            {
+                "file": one["file"],
+                "message": sentence(one.get("message") or ""),
+            }
+            for one in (first, second)
+        ],
+        "title": _title(changed),
+        "quantities": pd.DataFrame(shown),
+        "probabilities": pd.DataFrame(
+            [{"condition": in_words(name), "first": _percent(a), "second": _percent(b)} for name, (a, b) in likely]
+        ),
+    }
+    names = [first["file"], second["file"]]
+    headed = {
+        "quantities": (
+            "quantity",
+            Column("first", names[0]),
+            Column("second", names[1]),
+            "difference",
+            Column("interval", "95 % interval of it"),
+            "unit",
+            Column("says", "verdict"),
+        ),
+        "probabilities": ("condition", Column("first", names[0], "%"), Column("second", names[1], "%")),
+    }
+    return render_page("serve/compare.html", facts, headed, {})
+
+
+def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the quantities of two logs with their differences.
+
+    Parameters
+    ----------
+    first, second : Mapping
+        Their entries of the JSON contract.
+
+    Returns
+    -------
+    list of dict
+        ``quantity``, ``unit``, ``first`` and ``second`` (entries with value and std, or None), ``difference`` second
+        less first, its 95 % ``interval`` as of independent errors, and whether that leaves out zero, ``changed``.
+    """
+    both = [quantities_of(one) for one in (first, second)]
+    rows: list[dict[str, Any]] = []
+    for name in {**both[0], **both[1]}:
+        pair = [one.get(name) for one in both]
+        known = [one for one in pair if one is not None and one.get("value") is not None]
+        row: dict[str, Any] = {"quantity": name, "unit": next(one["unit"] for one in pair if one is not None)}
+        row |= {"first": pair[0], "second": pair[1], "difference": None, "interval": None, "changed": False}
+        if len(known) == 2:
+            row["difference"] = known[1]["value"] - known[0]["value"]
+            stds = [std for std in map(std_of, known) if std is not None]
+            if len(stds) == 2:
+                half = DEVIATIONS * math.hypot(*stds)
+                row["interval"] = [row["difference"] - half, row["difference"] + half]
+                row["changed"] = abs(row["difference"]) > half
+        rows.append(row)
+    return rows
+
+
+def quantities_of(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return severities and quantities of a log by name, each with its ``unit``.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of the JSON contract, of any kind of actuator.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for group in ("severity", "quantities"):
+        for name, one in (result.get(group) or {}).items():
+            if isinstance(one, Mapping) and "value" in one:
+                found[name] = {"unit": one.get("unit") or "", **one}
+    bulk = result.get("bulk_modulus_pa")
+    if isinstance(bulk, Mapping) and bulk.get("value") is not None:
+        found.setdefault("bulk_modulus", {"unit": "Pa", **bulk})
+    return found
+
+
+def std_of(one: Mapping[str, Any]) -> float | None:
+    """Return the standard deviation of an entry, from its interval where it has no own [its unit]."""
+    if one.get("std") is not None:
+        return float(one["std"])
+    ends = one.get("ci95")
+    return None if not ends or None in ends else (float(ends[1]) - float(ends[0])) / (2.0 * DEVIATIONS)
+
+
+def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:
+    scale, unit = (1e-6, "MPa") if row["unit"] == "Pa" else (1.0, row["unit"])
+
+    def ends(interval: Sequence[float]) -> str:
+        return " to ".join(number(scale * end, 3) for end in interval)
+
+    def amount(one: Mapping[str, Any] | None) -> str:
+        if one is None or one.get("value") is None:
+            return MISSING
+        known = one.get("ci95")
+        return number(scale * one["value"]) + (f" ({ends(known)})" if known and None not in known else "")
+
+    difference = row["difference"]
+    return {
+        "first": amount(row["first"]),
+        "second": amount(row["second"]),
+        "difference": number(None if difference is None else scale * difference),
+        "interval": MISSING if row["interval"] is None else ends(row["interval"]),
+        "unit": pretty_unit(unit),
+    }
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f}"
+
+
+def _title(changed: Sequence[str]) -> str:
+    if not changed:
+        return "Nothing differs for certain between the two logs."
+    named = [one.replace("_", " ") for one in changed[:4]]
+    said = named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
+    return f"{said[:1].upper()}{said[1:]} {'differs' if len(named) == 1 else 'differ'} between the two logs."

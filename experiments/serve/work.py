@@ -1,0 +1,194 @@
+"""The work on a log, in a process that may be killed at any moment: it writes a page, whole or not at all."""
+
+import os
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from experiments.command.json_output import plain
+from experiments.command.log_verb import page_of
+from experiments.command.logs import caught, read_log
+from experiments.command.options import load_actuator
+from experiments.command.terminal import clauses, unexpected
+from plant.atomic import replacing
+from plant.errors import HydrostateError
+from plant.notes import distinct
+
+if TYPE_CHECKING:
+    from experiments.actuator_kind import ActuatorKind, LogVerb
+    from plant.eha.rig import Rig
+
+READING, WORKING, WRITING = "reading the log", "working it out", "writing the page"
+"""Where the work on a log is."""
+
+LOOKED_AFTER = 1.0
+"""Time between two looks whether the server is still there [s]."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A log that is to be worked on.
+
+    Parameters
+    ----------
+    log : Path
+        Its file.
+    name : str
+        What the client calls it.
+    page : Path
+        Where its page goes.
+    phase : Path
+        File that says where the work is.
+    plant, rig, columns : str or None, Path or None, tuple of tuple
+        As the server was told them; columns are pairs of channel and foreign column.
+    """
+
+    log: Path
+    name: str
+    verb: str
+    page: Path
+    phase: Path
+    plant: str | None
+    rig: Path | None
+    columns: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Worked:
+    """What came of a log.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of the JSON contract.
+    entries : Mapping or None
+        Those of a row of a batch, where the log was diagnosed.
+    """
+
+    result: Mapping[str, Any]
+    entries: Mapping[str, Any] | None
+
+
+def begin_worker(server: int, memory: int) -> None:
+    """Bind a process to its server's life and to a limit of memory.
+
+    Parameters
+    ----------
+    server : int
+        Process identity of the server.
+    memory : int
+        Most that it may ask for [bytes].
+    """
+    for name in ("OPENBLAS", "OMP", "MKL"):
+        os.environ.setdefault(f"{name}_NUM_THREADS", "1")
+    if sys.platform == "linux":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+    def look() -> None:
+        while os.getppid() == server:
+            time.sleep(LOOKED_AFTER)
+        os._exit(1)
+
+    threading.Thread(target=look, daemon=True).start()
+
+
+def work_on(task: Task) -> Worked:
+    """Say what a log holds and write its page.
+
+    Returns
+    -------
+    Worked
+        With the outcome ``failed`` where the log cannot be used.
+    """
+    blank: Mapping[str, Any] = {}
+    with caught() as said:
+        try:
+            task.phase.write_text(READING, encoding="utf-8")
+            blank = _blank(task)
+            worked = _inspected(task) if task.verb == "inspect" else _found(task)
+        except HydrostateError as error:
+            worked = _failed(task, blank, error.message if error.source == str(task.log) else str(error))
+        except MemoryError:
+            worked = _failed(task, blank, "the work on it needs more memory than the server gives to one log")
+        except Exception as error:  # whatever a log brings up is told to whoever sent it
+            worked = _failed(task, blank, unexpected(error))
+    raised = distinct(one.note for one in said)
+    told = list(dict.fromkeys([*map(str, raised), *worked.result.get("warnings", ())]))
+    notes = [*(one.to_dict() for one in raised), *worked.result.get("notes", ())]
+    result = plain({"file": task.name, **worked.result, "warnings": told, "notes": notes})
+    return Worked(_without_path(result, task), plain(worked.entries))
+
+
+def _found(task: Task) -> Worked:
+    kind, bench, chosen, rig, prepared = _prepared(task.plant, task.rig, task.verb)
+    record = read_log(task.log, bench.columns, dict(task.columns), kind.required)
+    task.phase.write_text(WORKING, encoding="utf-8")
+    found = chosen.run(record, rig, prepared)
+    result = {**chosen.blank, "plant": kind.name, "rig": bench.name, **chosen.entries(found)}
+    task.phase.write_text(WRITING, encoding="utf-8")
+    _write(task, page_of(chosen, {"file": task.name, **result}, found, record))
+    if task.verb != "diagnose":
+        return Worked(result, None)
+    if kind.name == "eha":
+        from experiments.batch.diagnosis import class_row as row
+    else:
+        from experiments.batch.of_kind import row_of as row
+    return Worked(result, dict(row(found)))
+
+
+def _inspected(task: Task) -> Worked:
+    from experiments.command.inspect import looked_into
+    from experiments.log_pages.inspect_page import inspect_page
+
+    kind, bench = load_actuator(task.plant, None)
+    found, tables = looked_into(task.log, kind, bench)
+    task.phase.write_text(WRITING, encoding="utf-8")
+    _write(task, inspect_page({"file": task.name, **found}, tables))
+    return Worked({"outcome": "ok", **found}, None)
+
+
+@cache
+def _prepared(
+    plant: str | None, rig: Path | None, verb: str
+) -> "tuple[ActuatorKind, Rig[Any], LogVerb, Rig[Any], Any]":
+    from experiments.actuators import offered
+
+    kind, bench = load_actuator(plant, rig)
+    chosen = offered(kind, verb)
+    return kind, bench, chosen, *chosen.prepare(bench, {**chosen.options, "seed": 0})
+
+
+def _blank(task: Task) -> Mapping[str, Any]:
+    if task.verb == "inspect":
+        from experiments.command.inspect import BLANK
+
+        return BLANK
+    kind, bench, chosen, *_ = _prepared(task.plant, task.rig, task.verb)
+    return {**chosen.blank, "plant": kind.name, "rig": bench.name}
+
+
+def _failed(task: Task, blank: Mapping[str, Any], message: str) -> Worked:
+    entries = {"outcome": "failed", "reason": message} if task.verb == "diagnose" else None
+    return Worked({**blank, "outcome": "failed", "message": clauses([message])}, entries)
+
+
+def _write(task: Task, page: str) -> None:
+    with replacing(task.page) as file:
+        file.write(page.encode())
+
+
+def _without_path(value: Any, task: Task) -> Any:
+    """Return entries in which the log has the name that the client gave it, and no place on this machine."""
+    if isinstance(value, str):
+        return value.replace(str(task.log), task.name).replace(task.log.name, task.name)
+    if isinstance(value, dict):
+        return {key: _without_path(one, task) for key, one in value.items()}
+    return [_without_path(one, task) for one in value] if isinstance(value, list) else value

@@ -1,0 +1,41 @@
+"""`hydrostate serve`: what it refuses before it listens, and what it says when a package is missing."""
+
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from experiments.cli import app
+
+
+def refused(*arguments: object) -> str:
+    done = CliRunner().invoke(app, ["serve", *map(str, arguments)])
+    assert done.exit_code == 2, done.output
+    return " ".join(done.stderr.split())
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--watch", "http://127.0.0.1"), "--watch must be NAME=tcp://HOST:PORT"),
+        (("--watch", "../x=tcp://127.0.0.1:1"), "--watch must be NAME=tcp://HOST:PORT"),
+        (("--watch", "a=tcp://h:1", "--watch", "a=tcp://h:2"), "'a' twice"),
+        (("--limit", "leak=2"), "--limit must be one of"),
+        (("--pattern", "{date}.csv"), "--pattern must hold {actuator} once"),
+        (("--token", "short"), "16 ASCII letters"),
+        (("--host", "203.0.113.1", "--port", "0"), "cannot listen there"),
+    ],
+)
+def test_what_cannot_be_served_is_refused_in_a_sentence(tmp_path: Path, options: tuple[str, ...], words: str) -> None:
+    assert words in refused(tmp_path / "kept", *options)
+
+
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    assert "the server's folder cannot be made" in refused(tmp_path / "file" / "kept", "--port", "0")
+
+
+def test_a_missing_package_is_named_with_what_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "experiments.serve.server", None)  # as where what it imports is missing
+    assert "pip install 'hydrostate[serve]'" in refused()

@@ -1,0 +1,220 @@
+"""What the server answers: logs that are dropped, and requests that are refused."""
+
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from experiments.serve import app as server
+from experiments.serve.limits import HEADERS
+
+Served = Callable[..., TestClient]
+
+
+def finished(client: TestClient, identity: str) -> dict[str, Any]:
+    until = time.monotonic() + 30.0
+    while time.monotonic() < until:
+        found = client.get(f"/api/logs/{identity}").json()
+        if found["state"] not in ("waiting", "running"):
+            return found
+        time.sleep(0.01)
+    raise TimeoutError(identity)
+
+
+def dropped(client: TestClient, name: str, content: bytes, verb: str = "inspect") -> dict[str, Any]:
+    answer = client.post("/api/logs", params={"name": name, "verb": verb}, content=content)
+    assert answer.status_code == 202, answer.text
+    return finished(client, answer.json()["id"])
+
+
+def test_a_dropped_log_is_worked_on_and_its_page_may_run_its_own_scripts_alone(served: Served, log: bytes) -> None:
+    client = served()
+    found = dropped(client, "run 1.csv", log, "estimate")
+    assert (found["state"], found["outcome"], found["name"]) == ("done", "ok", "run 1.csv")
+    result = client.get(f"/api/logs/{found['id']}/result").json()
+    assert result["file"] == "run 1.csv"
+    assert result["bulk_modulus_pa"]["value"] == pytest.approx(2.07e8, rel=0.01)
+    page = client.get(f"/logs/{found['id']}")
+    policy = page.headers["content-security-policy"]
+    said = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page.text)
+    assert said is not None
+    assert policy == f"{said[1]}; frame-ancestors 'none'"
+    assert "default-src 'none'" in policy
+    assert "connect-src" not in policy
+    assert "run 1.csv" in page.text
+
+
+def test_a_file_that_is_no_log_is_told_so_without_a_place_on_the_servers_machine(
+    served: Served, tmp_path: Path
+) -> None:
+    client = served()
+    found = dropped(client, "words.csv", b"these are, words\nand no, numbers\n", "diagnose")
+    assert found["state"] == "failed"
+    assert found["message"]
+    text = client.get(f"/api/logs/{found['id']}/result").text
+    assert str(tmp_path) not in text
+    assert found["id"] not in text.replace(f"/api/logs/{found['id']}", "")
+    assert client.get(f"/logs/{found['id']}").status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("name", "kept"),
+    [("../../evil.csv", "evil.csv"), ("C:\\x\\a.csv", "a.csv"), ("..", "log"), ("a\x00\x1b[2J.csv", "a[2J.csv")],
+)
+def test_a_name_leads_nowhere(served: Served, tmp_path: Path, name: str, kept: str) -> None:
+    before = set(tmp_path.rglob("*"))
+    client = served()
+    found = dropped(client, name, b"a,b\n1,2\n2,3\n")
+    assert found["name"] == kept
+    new = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*")} - {str(one) for one in before}
+    known = {"kept", "kept/logs", "kept/pages", "kept/work", "kept/in-use", f"kept/logs/{found['id']}"}
+    assert {one for one in new if "sqlite" not in one and not one.endswith(".html")} <= known
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "headers", "status"),
+    [
+        ("GET", "/api/logs/0123456789abcdef", {}, 404),
+        ("GET", "/api/logs/..%2f..%2fetc%2fpasswd", {}, 404),
+        ("GET", "/logs/%2e%2e%2f%2e%2e", {}, 404),
+        ("GET", "/api/logs/nonsense", {}, 422),
+        ("GET", "/api/logs?most=0", {}, 422),
+        ("GET", "/api/logs?before=99999999999999999999999", {}, 422),
+        ("GET", "/api/streams/bench", {}, 404),
+        ("GET", "/live/bench", {}, 404),
+        ("GET", "/fleet", {}, 404),
+        ("GET", "/docs", {}, 404),
+        ("PUT", "/api/logs", {}, 405),
+        ("GET", "/", {"host": "evil.example"}, 421),
+        ("POST", "/api/logs?name=a", {"origin": "http://evil.example"}, 403),
+        ("POST", "/api/logs?name=a", {"origin": "null"}, 403),
+        ("DELETE", "/api/logs/0123456789abcdef", {"sec-fetch-site": "cross-site"}, 403),
+        ("POST", "/api/logs", {}, 422),
+        ("POST", "/api/logs?name=a&verb=obey", {}, 422),
+        ("POST", "/api/logs?name=a", {}, 422),
+        ("POST", "/api/logs?name=a", {"content-length": "999999999999"}, 413),
+        ("POST", "/api/logs?name=a", {"content-type": "multipart/form-data; boundary=x"}, 415),
+    ],
+)
+def test_what_cannot_be_done_is_refused_in_a_sentence_with_every_header(
+    served: Served, method: str, path: str, headers: dict[str, str], status: int
+) -> None:
+    answer = served().request(method, path, headers=headers)
+    assert answer.status_code == status
+    assert isinstance(answer.json()["detail"], str)
+    assert {name.decode() for name in HEADERS} <= set(answer.headers)
+
+
+def test_without_its_token_nothing_is_answered(served: Served) -> None:
+    client = served(host="0.0.0.0", token="sixteen-letters-!")  # noqa: S104, S106
+    paths = ("/", "/api/logs", "/openapi.json", "/nowhere", "/?token=wrong")
+    assert {client.get(path).status_code for path in paths} == {401}
+    assert client.get("/api/logs", headers={"authorization": "Bearer sixteen-letters-!"}).status_code == 200
+    assert client.get("/api/logs", headers={"authorization": "Bearer sixteen-letters"}).status_code == 401
+    entry = client.get("/", params={"token": "sixteen-letters-!"})
+    assert (entry.status_code, entry.headers["location"]) == (303, "/")
+    assert {"HttpOnly", "SameSite=Strict"} <= set(entry.headers["set-cookie"].split("; "))
+    assert client.get("/api/logs").status_code == 200  # the client keeps the cookie
+
+
+def test_a_full_queue_says_when_to_come_again(served: Served) -> None:
+    answer = served(waiting=0).post("/api/logs", params={"name": "a.csv"}, content=b"a")
+    assert answer.status_code == 429
+    assert int(answer.headers["retry-after"]) > 0
+
+
+@pytest.mark.parametrize("settings", [{"largest": 1000}, {"room": 1000}])
+def test_a_body_that_is_too_large_is_refused_while_it_comes(
+    served: Served, tmp_path: Path, settings: dict[str, int]
+) -> None:
+    client, sent = served(**settings), list[int]()
+
+    def body() -> Any:
+        for number in range(10):
+            sent.append(number)
+            yield b"x" * 400
+
+    assert client.post("/api/logs", params={"name": "a.csv"}, content=body()).status_code == 413
+    assert not list((tmp_path / "kept" / "work").iterdir())
+    assert not list((tmp_path / "kept" / "logs").iterdir())
+    assert client.get("/api/logs").json()["logs"] == []
+
+
+def test_a_deleted_log_is_gone_with_its_page(served: Served, tmp_path: Path) -> None:
+    client = served()
+    found = dropped(client, "a.csv", b"a,b\n1,2\n2,3\n")
+    assert client.get(f"/logs/{found['id']}").status_code == 200
+    assert client.delete(f"/api/logs/{found['id']}").status_code == 204
+    assert {client.get(f"{path}/{found['id']}").status_code for path in ("/logs", "/api/logs")} == {404}
+    assert client.delete(f"/api/logs/{found['id']}").status_code == 404
+    assert not list((tmp_path / "kept").rglob(f"*{found['id']}*"))
+
+
+def test_what_is_not_done_yet_is_neither_a_result_nor_a_page(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    client = served()
+    monkeypatch.setattr("experiments.serve.jobs.Jobs.submit", lambda *_: None)
+    identity = client.post("/api/logs", params={"name": "a.csv"}, content=b"a").json()["id"]
+    assert client.get(f"/api/logs/{identity}").json()["state"] == "waiting"
+    assert {client.get(path).status_code for path in (f"/logs/{identity}", f"/api/logs/{identity}/result")} == {409}
+    assert client.get("/compare", params={"first": identity, "second": identity}).status_code == 409
+
+
+def test_two_logs_are_compared_and_the_fleet_has_both(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    from experiments.serve.work import Worked
+
+    def stand_in(task: Any) -> Worked:
+        value = 1.0 if task.name == "A_1.csv" else 3.0
+        one = {"value": value, "unit": "L/min", "std": 0.1, "ci95": [value - 0.2, value + 0.2], "ci95_total": None}
+        severity = {"leakage_flow": one}
+        row = {"outcome": "ok", "found_condition": "normal", "quantities": ""}
+        row["quantities"] = f'{{"leakage_flow": {{"value": {value}, "ci95": [{value - 0.2}, {value + 0.2}], '
+        row["quantities"] += '"unit": "L/min", "healthy": 0.0, "limit": 2.0}}'
+        result = {"file": task.name, "outcome": "ok", "message": "it is so", "severity": severity}
+        return Worked(result, row)
+
+    monkeypatch.setattr("experiments.serve.jobs.work_on", stand_in)
+    client = served(pattern="{actuator}_{date}.csv")
+    pair = [dropped(client, name, b"a", "diagnose")["id"] for name in ("A_1.csv", "<b>_2.csv")]
+    (row,) = client.get("/api/compare", params={"first": pair[0], "second": pair[1]}).json()["differences"]
+    assert (row["difference"], row["changed"]) == (2.0, True)
+    assert row["interval"] == pytest.approx([2.0 - 1.96 * 0.1 * 2**0.5, 2.0 + 1.96 * 0.1 * 2**0.5])
+    page = client.get("/compare", params={"first": pair[0], "second": pair[1]}).text
+    assert "Leakage flow differs between the two logs." in page
+    assert "<b>_2" not in page
+    fleet = client.get("/fleet")
+    assert "1 of 2 actuators is past a limit." in fleet.text
+    assert f"logs/{pair[1]}" in fleet.text
+    client.delete(f"/api/logs/{pair[1]}")
+    assert "None of 1 actuators is past a limit." in client.get("/fleet").text
+
+
+def test_logs_are_listed_the_latest_first_and_page_by_page(served: Served) -> None:
+    client = served()
+    names = [dropped(client, f"{number}.csv", b"a,b\n1,2\n2,3\n")["name"] for number in range(3)]
+    first = client.get("/api/logs", params={"most": 2}).json()
+    rest = client.get("/api/logs", params={"most": 2, "before": first["logs"][-1]["number"]}).json()
+    assert [one["name"] for one in first["logs"] + rest["logs"]] == names[::-1]
+    assert sum(first["counts"].values()) == 3
+
+
+def test_openapi_tells_every_refusal(served: Served) -> None:
+    paths = served().get("/openapi.json").json()["paths"]
+    assert {"/api/logs", "/api/compare", "/api/streams/{name}/events", "/fleet"} <= set(paths)
+    told = set(paths["/api/logs"]["post"]["responses"])
+    assert {str(status) for status in server.WHY} - {"404", "409"} | {"202"} == told
+
+
+def test_an_error_that_nobody_foresaw_is_told_in_a_sentence(
+    served: Served, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    client = served()
+    monkeypatch.setattr("experiments.serve.store.Store.counts", lambda _: 1 / 0)
+    client = TestClient(client.app, base_url="http://127.0.0.1", raise_server_exceptions=False)
+    answer = client.get("/api/logs")
+    assert answer.status_code == 500
+    assert "please report it" in answer.json()["detail"]
+    assert "Traceback" not in capsys.readouterr().err

@@ -1,0 +1,160 @@
+"""The queue: what a server that ended left is taken up, and work that is lost is told so."""
+
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pebble import ProcessExpired
+
+from experiments.serve.desk import Desk
+from experiments.serve.jobs import MOST_TRIES, Jobs, log_file, page_file, phase_file
+from experiments.serve.settings import MB, Settings
+from experiments.serve.store import Kept, Store
+from plant.errors import HydrostateError
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    made = Settings(folder=tmp_path)
+    for folder in (made.logs, made.pages, made.work):
+        folder.mkdir()
+    return made
+
+
+@pytest.fixture
+def store(settings: Settings) -> Iterator[Store]:
+    opened = Store(settings.database)
+    yield opened
+    opened.close()
+
+
+class Ending:
+    """A pool whose work ends as it is told."""
+
+    ends: Callable[["Future[Any]"], None]
+
+    def __init__(self, **_: Any) -> None:
+        self.asked = 0
+
+    def schedule(self, *_: Any, **__: Any) -> "Future[Any]":
+        future: Future[Any] = Future()
+        type(self).ends(future)
+        return future
+
+    def stop(self) -> None: ...
+
+    def join(self) -> None: ...
+
+
+def added(store: Store, settings: Settings, identity: str) -> Kept:
+    log_file(settings, identity).write_bytes(b"a,b\n1,2\n2,3\n")
+    return store.add(identity, f"{identity}.csv", "inspect", 12)
+
+
+def until(asked: Callable[[], bool], seconds: float = 30.0) -> None:
+    due = time.monotonic() + seconds
+    while not asked():
+        assert time.monotonic() < due
+        time.sleep(0.01)
+
+
+def test_what_is_unfinished_is_taken_up_in_its_order_and_what_ended_servers_is_given_up(
+    settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken: list[str] = []
+    monkeypatch.setattr(Ending, "ends", staticmethod(lambda _: None), raising=False)
+    monkeypatch.setattr("experiments.serve.jobs.ProcessPool", Ending)
+    for identity in ("first", "deadly", "second", "gone"):
+        added(store, settings, identity)
+    log_file(settings, "gone").unlink()
+    (settings.work / "half.part").write_bytes(b"x")
+    submit = Jobs.submit
+    monkeypatch.setattr(Jobs, "submit", lambda self, log: (taken.append(log.id), submit(self, log))[1])
+    for _ in range(MOST_TRIES):
+        phase_file(settings, "deadly").write_text("working")
+        Jobs(settings, store).resume()
+    assert taken[:3] == ["first", "deadly", "second"]
+    assert taken[-2:] == ["first", "second"]
+    deadly, gone = store.get("deadly"), store.get("gone")
+    assert deadly is not None
+    assert gone is not None
+    assert (deadly.state, gone.state) == ("interrupted", "interrupted")
+    assert f"ended {MOST_TRIES} times" in str(deadly.message)
+    assert "no longer in the server's folder" in str(gone.message)
+    assert not list(settings.work.glob("*.part"))
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (TimeoutError(), "took longer than 300 s"),
+        (ProcessExpired("gone", code=-9), "code -9"),
+        (ValueError("odd"), "please report it"),
+    ],
+)
+def test_work_that_is_lost_is_told_so(
+    settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch, error: Exception, words: str
+) -> None:
+    monkeypatch.setattr(Ending, "ends", staticmethod(lambda future: future.set_exception(error)), raising=False)
+    monkeypatch.setattr("experiments.serve.jobs.ProcessPool", Ending)
+    jobs = Jobs(settings, store)
+    jobs.submit(added(store, settings, "a"))
+    found = store.get("a")
+    assert found is not None
+    assert (found.state, jobs.waiting) == ("failed", 0)
+    assert words in str(found.message)
+
+
+def test_a_folder_has_one_server_and_no_files_of_logs_that_are_gone(
+    tmp_path: Path,
+    in_threads: None,  # noqa: ARG001
+) -> None:
+    settings = Settings(folder=tmp_path / "kept")
+    desk = Desk(settings)
+    desk.open()
+    try:
+        with pytest.raises(HydrostateError, match="another server works in it"):
+            Desk(settings).open()
+        page_file(settings, "0123456789abcdef").write_text("left")
+    finally:
+        desk.close()
+    again = Desk(settings)
+    again.open()
+    again.close()
+    assert not list(settings.pages.iterdir())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("limits", "words"),
+    [({"seconds": 1.0}, "took longer than 1 s"), ({"memory": 500 * MB}, "memory")],
+)
+def test_work_in_a_process_ends_at_its_limits_and_the_next_log_is_worked_on(
+    settings: Settings, store: Store, log: bytes, limits: dict[str, Any], words: str
+) -> None:
+    jobs = Jobs(replace(settings, **limits), store)
+    try:
+        kept = added(store, settings, "greedy")
+        log_file(settings, "greedy").write_bytes(b"a,b\n" + b"1.5,2.5\n" * 6_000_000)
+        jobs.submit(kept)
+        until(lambda: not jobs.waiting)
+        greedy = store.get("greedy")
+        assert greedy is not None
+        assert greedy.state == "failed"
+        assert words in str(greedy.message)
+        if "seconds" in limits:
+            return
+        kept = added(store, settings, "fine")
+        log_file(settings, "fine").write_bytes(log)
+        jobs.submit(kept)
+        until(lambda: not jobs.waiting)
+        fine = store.get("fine")
+        assert fine is not None
+        assert fine.state == "done", fine.message
+        assert page_file(settings, "fine").read_text("utf-8").startswith("<!DOCTYPE html>")
+    finally:
+        jobs.close()

@@ -1,0 +1,63 @@
+"""Bodies that are too large, too slow, empty or cut leave nothing behind; who may ask is asked first."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+from experiments.serve import limits
+from experiments.serve.limits import RefusedError, receive_file
+from experiments.serve.settings import Settings
+from plant.errors import HydrostateError
+
+
+async def chunks(*parts: bytes, pause: float = 0.0) -> AsyncIterator[bytes]:
+    for part in parts:
+        await asyncio.sleep(pause)
+        yield part
+
+
+def received(body: AsyncIterator[bytes], path: Path, most: int = 100, room: int = 100) -> int:
+    return asyncio.run(receive_file(body, path, most, room))
+
+
+def test_a_body_is_written_as_it_comes(tmp_path: Path) -> None:
+    assert received(chunks(b"ab", b"", b"c"), tmp_path / "a") == 3
+    assert (tmp_path / "a").read_bytes() == b"abc"
+
+
+@pytest.mark.parametrize(
+    ("parts", "most", "room", "status"),
+    [((b"x" * 60, b"x" * 60), 100, 1000, 413), ((b"x" * 60, b"x" * 60), 1000, 100, 413), ((), 100, 100, 422)],
+)
+def test_what_is_refused_leaves_no_file(
+    tmp_path: Path, parts: tuple[bytes, ...], most: int, room: int, status: int
+) -> None:
+    with pytest.raises(RefusedError) as refused:
+        received(chunks(*parts), tmp_path / "a", most, room)
+    assert refused.value.status == status
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_body_that_stops_or_drips_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "IDLE", 0.05)
+    with pytest.raises(RefusedError, match="stopped coming"):
+        received(chunks(b"a", b"b", pause=0.2), tmp_path / "a")
+    monkeypatch.setattr(limits, "GRACE", 0.05)
+    with pytest.raises(RefusedError, match="too slowly"):
+        received(chunks(*[b"a"] * 20, pause=0.02), tmp_path / "a")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_disk_that_takes_no_more_is_told_as_a_refusal(tmp_path: Path) -> None:
+    with pytest.raises(RefusedError, match="takes no more") as refused:
+        received(chunks(b"a"), tmp_path / "missing" / "a")
+    assert refused.value.status == 413
+
+
+@pytest.mark.parametrize("token", [None, "short", "sixteen-létters-!"])
+def test_a_host_that_others_reach_wants_a_token(tmp_path: Path, token: str | None) -> None:
+    with pytest.raises(HydrostateError, match="token"):
+        Settings(folder=tmp_path, host="192.168.0.7", token=token)
+    assert Settings(folder=tmp_path, host="192.168.0.7", token="0123456789abcdef").token  # noqa: S106

@@ -1,0 +1,118 @@
+"""Streams: gauges of what came, events that are kept, and what a view is told."""
+
+import asyncio
+import json
+import multiprocessing
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.server_trials import feeding
+from experiments.serve import gauges as module
+from experiments.serve.events import told
+from experiments.serve.gauges import Gauges
+from experiments.serve.live import KEPT, Stream, Streams
+from experiments.serve.settings import Settings
+from experiments.serve.store import Store
+
+
+@pytest.fixture
+def stream(tmp_path: Path) -> Iterator[Stream]:
+    store = Store(tmp_path / "a.sqlite")
+    yield Stream("bench", "tcp://127.0.0.1:1", Settings(folder=tmp_path), store)
+    store.close()
+
+
+def heard(stream: Stream, *messages: tuple[str, dict[str, Any]]) -> None:
+    """Let a stream hear what its process would say, and then that this has ended."""
+    ours, theirs = multiprocessing.Pipe(duplex=False)
+
+    def say() -> None:
+        with theirs:
+            for one in messages:
+                theirs.send(one)
+
+    saying = threading.Thread(target=say)
+    saying.start()
+    stream._listen(ours)
+    saying.join()
+
+
+def test_gauges_have_the_range_since_the_last_ones_and_count_whole_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "EVERY", 0.0)
+    sent: list[Any] = []
+    found = Gauges(SimpleNamespace(send=sent.append))  # type: ignore[arg-type]
+    found.watch = SimpleNamespace(balances=("flow",), scores=(1.0,), thresholds=(np.inf,))  # type: ignore[assignment]
+    found.saw({"a": np.array([1.0, np.nan, -2.0]), "b": np.array([5.0, 5.0, 5.0])}, 0.3, False)
+    found.saw({"a": np.array([4.0]), "b": np.array([6.0])}, 0.4, True)
+    (_, first), (_, second) = sent
+    assert (first["rows"], second["rows"], second["gaps"]) == (2, 3, 1)
+    assert (first["low"], first["high"]) == ({"a": -2.0, "b": 5.0}, {"a": 1.0, "b": 5.0})
+    assert (second["low"], second["values"]) == ({"a": 4.0, "b": 6.0}, {"a": 4.0, "b": 6.0})
+    assert first["thresholds"] == {"flow": None}
+
+
+def test_a_view_that_comes_back_gets_what_it_missed_and_no_more_than_is_kept(stream: Stream) -> None:
+    heard(stream, *[("gauges", {"time_s": float(k)}) for k in range(KEPT + 5)])
+    assert [one["number"] for one in stream.since(KEPT + 3)] == [KEPT + 4, KEPT + 5]
+    assert len(stream.since(0)) == KEPT
+    assert stream.since(KEPT + 5) == []
+
+
+def test_the_state_of_a_stream_is_that_of_its_last_event_and_events_are_kept(stream: Stream) -> None:
+    assert stream.state["state"] == "connecting"
+    heard(stream, ("event", {"event": "start", "time_s": 0.0, "message": "learning"}))
+    assert stream.state["state"] == "failed"  # its process ended without a word
+    for _ in range(3):
+        heard(stream, ("event", {"event": "end", "time_s": None, "outcome": "failed", "message": "nobody answers"}))
+    assert (stream.state["state"], stream.state["message"]) == ("failed", "nobody answers")
+    heard(stream, ("event", {"event": "ready", "time_s": 1.0, "message": "alarms can come"}))
+    assert [one["event"] for one in stream.events()] == ["start", "end", "ready"]
+
+
+def test_a_view_is_told_the_history_and_then_what_is_new(stream: Stream, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("experiments.serve.events.EVERY", 0.0)
+    heard(stream, ("gauges", {"time_s": 1.0}))
+    streams = SimpleNamespace(looking=0)
+    looks = iter([False, False, True])
+
+    async def gone() -> bool:
+        return next(looks)
+
+    async def looked() -> list[tuple[str, Any]]:
+        found: list[tuple[str, Any]] = []
+        async for text in told(stream, streams, gone):  # type: ignore[arg-type]
+            assert streams.looking == 1
+            head, data = text.decode().removeprefix("event: ").rstrip("\n").split("\ndata: ")
+            found.append((head, json.loads(data)))
+            if len(found) == 1:
+                heard(stream, ("gauges", {"time_s": 2.0}), ("event", {"event": "alarm", "time_s": 2.0}))
+        return found
+
+    found = asyncio.run(looked())
+    assert [head for head, _ in found] == ["history", "state", "gauges"]
+    assert [one["time_s"] for one in found[0][1]["history"]] == [1.0]
+    assert found[2][1]["time_s"] == 2.0
+    assert streams.looking == 0
+
+
+@pytest.mark.slow
+def test_a_stream_is_watched_in_a_process_whose_end_is_noticed(tmp_path: Path) -> None:
+    store = Store(tmp_path / "a.sqlite")
+    with feeding(3.0, 1000.0) as (address, sent):
+        streams = Streams(Settings(folder=tmp_path, streams={"bench": address}), store)
+        streams.start()
+        (one,) = streams.by_name.values()
+        try:
+            while not sent.ended or one.state["state"] not in ("ended", "failed"):
+                asyncio.run(asyncio.sleep(0.05))
+        finally:
+            streams.close()
+    assert one.state["gauges"]["rows"] == sent.rows == 3000
+    assert [event["event"] for event in store.events("bench", 10)] == ["start", "end"]
+    store.close()

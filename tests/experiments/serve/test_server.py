@@ -1,0 +1,143 @@
+"""A whole server in a process of its own: hostile clients, a kill in the middle of uploads, a fast stream, a browser.
+
+`python -m benchmarks server` measures the same at full length.
+"""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks.hostile_client import MIX, server_errors
+from benchmarks.server_process import Server
+from benchmarks.server_trials import attack, feeding, kill, settled, stream
+
+pytestmark = pytest.mark.slow
+
+MB = 1 << 20
+
+
+def test_hostile_clients_get_no_server_error_no_file_outside_the_folder_and_no_memory(tmp_path: Path) -> None:
+    found = attack(tmp_path, 300, 100, {**MIX, "chunked": 0.5})
+    assert not server_errors(found.answers)
+    assert not found.strange
+    assert found.most - found.memory[0] < 60 * MB
+    assert set(found.polite) <= {200, 429}
+    assert found.slowest < 10.0
+    slow = {kind: count for kind, count in found.answers.items() if kind.startswith(("slow", "huge", "chunked"))}
+    assert set(slow) <= {"slow 408", "huge 413", "huge 429", "chunked 413", "chunked 429"}
+
+
+def test_a_kill_in_the_middle_of_uploads_loses_no_finished_result_and_the_rest_is_done_later(tmp_path: Path) -> None:
+    found = kill(tmp_path, 8, 2)
+    assert found.finished >= 2
+    assert found.accepted > found.finished
+    assert not found.lost
+    assert not found.unfinished
+
+
+def test_a_stream_of_10_khz_is_taken_without_loss(tmp_path: Path) -> None:
+    found = stream(tmp_path, 5.0, 10_000.0)
+    assert found.taken == found.sent == 50_000
+    assert found.gaps == 0
+
+
+def test_what_openapi_allows_and_what_it_does_not_is_answered_as_it_says(tmp_path: Path) -> None:
+    pytest.importorskip("schemathesis", reason="needs schemathesis")
+    with Server(tmp_path / "kept") as server:
+        command = [str(Path(sys.executable).with_name("schemathesis")), "run", f"{server.base}/openapi.json"]
+        how = ["--checks", "all", "--max-examples", "10", "--phases", "coverage,fuzzing", "--seed", "1", "--no-color"]
+        done = subprocess.run([*command, *how], capture_output=True, text=True, check=False, cwd=tmp_path)  # noqa: S603
+    assert done.returncode == 0, done.stdout[-4000:]
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with (
+        feeding(60.0, 500.0) as (address, _),
+        Server(tmp_path_factory.mktemp("served") / "kept", "--watch", f"bench={address}") as server,
+    ):
+        yield server
+
+
+@pytest.fixture(scope="module")
+def paths(served: Server, log: bytes) -> dict[str, str]:
+    both = [served.drop(name, log, "diagnose") for name in ("one.csv", "two.csv")]
+    assert [served.finished(one)["state"] for one in both] == ["done", "done"]
+    settled(served, 1)
+    return {
+        "home": "/",
+        "log": f"/logs/{both[0]}",
+        "fleet": "/fleet",
+        "compare": f"/compare?first={both[0]}&second={both[1]}",
+        "live": "/live/bench",
+    }
+
+
+@pytest.fixture
+def opened(browser: Any, served: Server, paths: dict[str, str]) -> Iterator[Any]:
+    contexts: list[Any] = []
+
+    def visit(name: str, width: int = 1280, scheme: str = "light") -> Any:
+        context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        contexts.append(context)
+        page = context.new_page()
+        page.complaints, page.asked = [], []
+        page.on("console", lambda one: page.complaints.append(one.text))
+        page.on("pageerror", lambda one: page.complaints.append(str(one)))
+        page.on("request", lambda one: page.asked.append(one.url))
+        page.goto(served.base + paths[name])
+        if name == "home":
+            page.wait_for_selector(".logs tbody a")
+        if name == "live":
+            page.wait_for_selector("html.live-drawn", state="attached")
+        return page
+
+    yield visit
+    for context in contexts:
+        context.close()
+
+
+@pytest.mark.parametrize("name", ["home", "log", "fleet", "compare", "live"])
+@pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
+def test_a_page_of_the_server_fits_asks_nobody_else_and_axe_finds_nothing_serious(
+    opened: Any, served: Server, name: str, width: int, scheme: str
+) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
+    page = opened(name, width, scheme)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    found = axe.Axe().run(page).response["violations"]
+    assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
+    assert page.complaints == []
+    assert [url for url in page.asked if not url.startswith((served.base, "data:", "blob:"))] == []
+
+
+def test_a_log_that_is_chosen_is_sent_worked_on_and_listed_and_two_are_compared(
+    opened: Any, log: bytes, tmp_path: Path
+) -> None:
+    (tmp_path / "<i>three.csv").write_bytes(log)
+    page = opened("home")
+    page.select_option("#verb", "inspect")
+    page.set_input_files("#file", str(tmp_path / "<i>three.csv"))
+    page.get_by_role("link", name="<i>three.csv").wait_for(timeout=30_000)
+    for name in ("one.csv", "two.csv"):
+        page.get_by_role("checkbox", name=f"Compare {name}").check()
+    page.get_by_role("button", name="Compare the two ticked").click()
+    page.wait_for_url("**/compare?*")
+    assert page.locator("h1").inner_text() == "Nothing differs for certain between the two logs."
+
+
+def test_the_live_view_shows_gauges_and_what_the_watch_tells(opened: Any) -> None:
+    page = opened("live")
+    assert page.locator(".gauges li").count() == 6
+    assert page.locator(".histories canvas").count() == 5
+    assert page.locator(".alarms tbody tr").first.is_visible()
+    rows = int(page.locator(".gauges strong").last.inner_text())
+    for _ in range(50):
+        page.wait_for_timeout(200)
+        if int(page.locator(".gauges strong").last.inner_text()) > rows:
+            return
+    pytest.fail("no more rows came")

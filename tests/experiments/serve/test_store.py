@@ -1,0 +1,75 @@
+"""What a server keeps: it is there after the file is opened again, and nothing else is taken for it."""
+
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from experiments.serve import store as module
+from experiments.serve.store import DONE, FAILED, Store
+from plant.errors import HydrostateError
+
+RESULT = {"outcome": "ok", "message": "normal", "value": 1.5}
+
+
+def test_what_was_finished_is_there_when_the_file_is_opened_beside_one_that_was_never_closed(tmp_path: Path) -> None:
+    first = Store(tmp_path / "a.sqlite")
+    first.add("a", "run.csv", "diagnose", 10)
+    first.add("b", "rest.csv", "diagnose", 10)
+    first.finish("a", DONE, RESULT, {"outcome": "ok"})
+    second = Store(tmp_path / "a.sqlite")
+    assert second.result("a") == RESULT
+    assert [one.id for one in second.unfinished()] == ["b"]
+    assert second.counts() == {"done": 1, "unfinished": 1}
+    assert list(second.diagnosed()) == [("a", "run.csv", {"outcome": "ok"})]
+
+
+def test_a_log_that_was_deleted_stays_so_when_its_work_ends(tmp_path: Path) -> None:
+    store = Store(tmp_path / "a.sqlite")
+    store.add("a", "run.csv", "diagnose", 10)
+    assert store.delete("a")
+    store.finish("a", FAILED, RESULT)
+    assert store.get("a") is None
+    assert store.result("a") is None
+    assert not store.delete("a")
+
+
+def test_the_revision_changes_with_what_the_fleet_is_made_of(tmp_path: Path) -> None:
+    store = Store(tmp_path / "a.sqlite")
+    seen = [store.revision()]
+    for identity in ("a", "b"):
+        store.add(identity, "run.csv", "diagnose", 10)
+        assert store.revision() == seen[-1]
+        store.finish(identity, DONE, RESULT, {"outcome": "ok"})
+        seen.append(store.revision())
+    store.delete("a")
+    seen.append(store.revision())
+    assert len(set(seen)) == 4
+
+
+def test_events_are_kept_by_stream_and_the_oldest_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_EVENTS", 3)
+    store = Store(tmp_path / "a.sqlite")
+    for number in range(5):
+        store.add_event("press" if number % 2 else "lift", {"event": "alarm", "time_s": float(number)})
+    assert [one["time_s"] for one in store.events("lift", 10)] == [2.0, 4.0]
+    assert [one["time_s"] for one in store.events("press", 10)] == [3.0]
+
+
+def test_a_result_that_is_no_json_changes_nothing(tmp_path: Path) -> None:
+    store = Store(tmp_path / "a.sqlite")
+    store.add("a", "run.csv", "diagnose", 10)
+    with pytest.raises(ValueError, match="JSON"):
+        store.finish("a", DONE, {**RESULT, "value": float("nan")})
+    assert [one.id for one in store.unfinished()] == ["a"]
+
+
+def test_a_file_that_is_no_such_database_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "words.sqlite").write_text("no database, but words enough to be taken for a header of one" * 10)
+    with pytest.raises(HydrostateError, match=r"words\.sqlite: must be a database of this server"):
+        Store(tmp_path / "words.sqlite")
+    with sqlite3.connect(tmp_path / "later.sqlite") as connection:
+        connection.execute("PRAGMA user_version = 99")
+    connection.close()
+    with pytest.raises(HydrostateError, match="a later Hydrostate wrote version 99"):
+        Store(tmp_path / "later.sqlite")
