@@ -41,6 +41,7 @@ SETTING_UNITS: Mapping[str, str] = {
     "identification_duration": " [s]",
     "classification_sample_time": " [s]",
     "seeds": " [count]",
+    "filterpy_samples": " [count]",
 }
 
 
@@ -54,6 +55,7 @@ def report_frames(tables: Tables, settings: StudySettings) -> Tables:
     """
     named = {f"{spaced(name)}{SETTING_UNITS.get(name, '')}": value for name, value in asdict(settings).items()}
     return {
+        "filterpy by experiment": filterpy_by_experiment(tables["filterpy"]),
         "recoveries": pd.DataFrame([asdict(entry) for entry in recoveries(tables["bulk_modulus"]).values()]),
         "estimates by condition": _estimates(tables["bulk_modulus"]),
         "models": _models(tables["transfer_functions"]),
@@ -70,6 +72,28 @@ def _estimates(frame: pd.DataFrame) -> pd.DataFrame:
             row = rows.setdefault(str(condition), {"condition": str(condition)})
             row[experiment_in_words(key)] = _estimate(cell, key)
     return pd.DataFrame(list(rows.values()), dtype=object)
+
+
+def filterpy_by_experiment(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return what filterpy's filter and ours end at, one row a condition and one column an experiment.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        The table ``filterpy``.
+    """
+    rows: dict[str, dict[str, object]] = {}
+    for key, found in by_experiment(frame):
+        for entry in found.to_dict("records"):
+            row = rows.setdefault(str(entry["condition"]), {"condition": str(entry["condition"])})
+            row[experiment_in_words(key)] = _beside_filterpy(entry)
+    return pd.DataFrame(list(rows.values()), dtype=object)
+
+
+def _beside_filterpy(entry: Row) -> Cell:
+    ours, its = (number(TENTH_GIGA_PASCAL * entry[name], 5) for name in ("ours_pa", "filterpy_pa"))
+    apart = f"{entry['verdict']}, {number(entry['largest_difference'], 1)}"
+    return Cell(f"{ours}; {its} ({apart})", "good" if entry["verdict"] == "equal" else "bad")
 
 
 def _estimate(rows: pd.DataFrame, key: Experiment) -> Cell:
@@ -171,6 +195,7 @@ COLUMNS: Mapping[str, Columns] = {
         Column("unobservable", "conditions not observable", words=lambda names: right(str(len(names)))),
         Column("missed", "conditions missed", words=lambda names: "; ".join(names) or "none"),
     ),
+    "filterpy by experiment": (CONDITION, lambda name: Column(name, name, "1e8 Pa: ours; filterpy")),
     "estimates by condition": (CONDITION, lambda name: Column(name, name, "1e8 Pa, worst error")),
     "models": (
         Column("condition", words=lambda name: Cell(name, "name")),

@@ -19,6 +19,8 @@ class StudySettings:
         Length of the identification runs [s].
     classification_sample_time : float
         Sample time of the classification runs [s].
+    filterpy_samples : int
+        Samples of each log that filterpy's filter is given too, some 0.1 ms each [count].
     """
 
     seed: int = 2024
@@ -28,8 +30,11 @@ class StudySettings:
     identification_duration: float = 20.0
     seeds: int = 20
     classification_sample_time: float = 1e-3
+    filterpy_samples: int = 5000
 
 
 def quick_settings(seed: int) -> StudySettings:
     """Return a small study: the same nine conditions and parts, fewer first guesses and seeds, shorter runs."""
-    return StudySettings(seed=seed, starts=(0.0, 5e8), duration=4.0, identification_duration=8.0, seeds=2)
+    return StudySettings(
+        seed=seed, starts=(0.0, 5e8), duration=4.0, identification_duration=8.0, seeds=2, filterpy_samples=500
+    )

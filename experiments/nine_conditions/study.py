@@ -19,6 +19,7 @@ from experiments.nine_conditions.bulk_modulus import (
 from experiments.nine_conditions.columns import COLUMNS, report_frames
 from experiments.nine_conditions.conditions import condition_table, scalar_table
 from experiments.nine_conditions.figures import FIGURES
+from experiments.nine_conditions.filterpy_column import EQUAL, filterpy_study, verdict_counts
 from experiments.nine_conditions.findings import class_accuracies, recoveries, truth_of
 from experiments.nine_conditions.sentences import verdict
 from experiments.nine_conditions.settings import StudySettings, quick_settings
@@ -54,6 +55,7 @@ def _parts(settings: StudySettings, track: Track) -> Found:
     rmse, runs = in_one_piece(track, "validating on the nine steps", lambda: validation_study(RIG, library, settings))
     conditions = condition_table(RIG)
     tables = {
+        "filterpy": filterpy_study(RIG, settings, track),
         "conditions": conditions,
         "parameters": parameter_table(RIG),
         "bulk_modulus": estimates,
@@ -91,6 +93,9 @@ def _facts(tables: Tables, settings: StudySettings) -> Mapping[str, Any]:
         "ours": (found[PRESSURE_SINE], found[PRESSURE_STEPS]),
         "position_steps": found[POSITION_STEPS],
         "position_sine": found[POSITION_SINE],
+        "filterpy_steps": int(tables["filterpy"]["steps"].max()),
+        "filterpy_equal": EQUAL,
+        "filterpy_counts": verdict_counts(tables["filterpy"]),
         "classes": class_accuracies(tables),
         "better": int(rmse["mathematical_is_better"].sum()),
         "published_better": int(published_better.sum()),

@@ -15,7 +15,15 @@ from experiments.page.style import styled
 from experiments.running.progress import untracked
 from experiments.running.study import Found, write_result
 
-SMALL = StudySettings(seed=7, starts=(0.0, 4e8), duration=1.0, sample_time=1e-3, identification_duration=2.5, seeds=1)
+SMALL = StudySettings(
+    seed=7,
+    starts=(0.0, 4e8),
+    duration=1.0,
+    sample_time=1e-3,
+    identification_duration=2.5,
+    seeds=1,
+    filterpy_samples=100,
+)
 
 
 @pytest.fixture(scope="session")
