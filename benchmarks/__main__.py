@@ -19,6 +19,7 @@ NAMES = (
     "identification_sets",
     "own_equations",
     "bent_inputs",
+    "frequency_response",
     "circuit",
     "detection",
     "forecast",

@@ -1,0 +1,108 @@
+"""Frequency responses: whether intervals cover, and whether the level of a planted cubic's distortion is found.
+
+The local polynomial method is given one log of a lightly damped linear plant under noise, with transients; the
+multisine method some periods of odd multisines, one line in four left out at random, through a filter and a cubic, one
+log for each of six realisations. The truth of the distortion is the variance of the output's lines over noiseless
+realisations. A level from one log alone scatters more, the more so behind a resonance, where few lines hold all the
+power; that is printed beside.
+"""
+
+import argparse
+from collections.abc import Sequence
+
+import numpy as np
+
+from benchmarks.targets import misses, say
+from estimation.arrays import Array, IntArray
+from estimation.identification.model.recursion import filtered
+from estimation.identification.signals.distortion import best_linear_approximation
+from estimation.identification.signals.local_polynomial import local_polynomial_response
+
+NUMERATOR, DENOMINATOR = [0.0, 0.1, 0.05], [1.0, -1.6, 0.75]
+DAMPED = [1.0, -1.1, 0.4]
+"""Denominator of the plant with the cubic; the other one is tried beside it."""
+
+PERIOD, PERIODS, HIGHEST = 8192, 5, 3200
+"""Samples a period, periods of which the first settles, and the highest line."""
+
+CUBIC, NOISE = 0.3, 0.02
+"""Of the cubic over the filter's power, and deviation of the noise over the output's [fraction]."""
+
+SAMPLES, LOGS = 4096, 6
+"""Samples of a log under noise, and logs of multisines that a level is told from."""
+
+
+def odd_lines(rng: np.random.Generator) -> IntArray:
+    """Return odd lines of a multisine, of every four one left out at random."""
+    groups = np.arange(1, HIGHEST, 2)[: HIGHEST // 8 * 4].reshape(-1, 4)
+    kept = np.ones(groups.shape, dtype=bool)
+    kept[np.arange(len(groups)), rng.integers(0, 4, len(groups))] = False
+    return groups[kept]
+
+
+def multisine(lines: IntArray, rng: np.random.Generator) -> Array:
+    """Return a period of unit power."""
+    spectrum = np.zeros(PERIOD // 2 + 1, dtype=np.complex128)
+    spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
+    one = np.fft.irfft(spectrum)
+    return one / one.std()
+
+
+def bent(u: Array, denominator: Sequence[float]) -> Array:
+    """Return the plant's output: a filter, then a cubic."""
+    inner = filtered(NUMERATOR, denominator, u)
+    size = inner[PERIOD:].std()
+    return inner / size + CUBIC * (inner / size) ** 3
+
+
+def _true_level(realisations: int, denominator: Sequence[float]) -> float:
+    """Return the variance of the output's excited lines over realisations, the mean over lines."""
+    rng = np.random.default_rng(99)
+    lines = odd_lines(rng)
+    ratios = np.empty((realisations, len(lines)), dtype=np.complex128)
+    for row in ratios:
+        u = multisine(lines, rng)
+        y = bent(np.tile(u, 2), denominator)[PERIOD:]
+        row[:] = np.fft.rfft(y)[lines] / np.fft.rfft(u)[lines]
+    size = 1.0 / (2.0 * len(lines))  # |U/N|^2 of a multisine of unit power
+    return float(np.mean(np.var(ratios, axis=0, ddof=1)) * size)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Count, and return how many wishes are missed."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--seeds", type=int, default=50)
+    options.add_argument("--realisations", type=int, default=400)
+    chosen = options.parse_args(arguments)
+    misses.clear()
+    covered: list[float] = []
+    for seed in range(chosen.seeds):
+        rng = np.random.default_rng(seed)
+        u = rng.normal(size=SAMPLES + 50)
+        y = filtered(NUMERATOR, DENOMINATOR, u)[50:] + 0.1 * rng.normal(size=SAMPLES)
+        found = local_polynomial_response(u[50:], y, 1.0)
+        z = np.exp(-2j * np.pi * found.frequency)
+        truth = np.polyval(NUMERATOR[::-1], z) / np.polyval(DENOMINATOR[::-1], z)
+        covered.append(float(np.mean(np.abs(found.response - truth) <= found.radius())))
+    share = 100.0 * float(np.mean(covered))
+    say("local polynomial: circles that cover [%]", share, 93.0, most=False)
+    say("local polynomial: circles that cover [%]", share, 97.0)
+    for name, denominator in (("damped", DAMPED), ("resonant", DENOMINATOR)):
+        every = [[_levels(seed, one, denominator) for one in range(LOGS)] for seed in range(chosen.seeds)]
+        truth, levels = _true_level(chosen.realisations, denominator), np.mean(every, axis=1)
+        single, away = (10.0 * np.log10(one / truth) for one in (np.array(every)[:, 0, 0], levels[:, 0]))
+        print(f"planted cubic, {name}: error of its odd level {away.mean():.2f} +- {away.std():.2f} dB")
+        print(f"planted cubic, {name}: the same of one log alone {single.mean():.2f} +- {single.std():.2f} dB")
+        if name == "damped":
+            say("planted cubic: largest error of its odd level [dB]", float(np.abs(away).max()), 1.0)
+            even = float(np.abs(levels[:, 1]).max() / truth)
+            say("planted cubic: even level, which is not there, over the odd one", even, 0.05)
+    return len(misses)
+
+
+def _levels(seed: int, log: int, denominator: Sequence[float]) -> tuple[float, float]:
+    """Return the odd and even levels that one log tells."""
+    rng = np.random.default_rng([seed, log])
+    y = bent(u := np.tile(multisine(odd_lines(rng), rng), PERIODS), denominator)
+    told = best_linear_approximation(u, y + NOISE * y.std() * rng.normal(size=len(u)), 1.0)
+    return told.level(odd=True), told.level(odd=False)

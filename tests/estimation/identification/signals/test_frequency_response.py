@@ -1,0 +1,102 @@
+"""Responses come with circles that cover, and a multisine tells noise, odd and even distortion apart."""
+
+import numpy as np
+import pytest
+
+from benchmarks.frequency_response import DAMPED, NUMERATOR, PERIOD, PERIODS, bent, multisine, odd_lines
+from estimation.identification.model.recursion import filtered
+from estimation.identification.signals.distortion import best_linear_approximation, find_period
+from estimation.identification.signals.local_polynomial import local_polynomial_response
+from plant.errors import HydrostateError
+
+DENOMINATOR = [1.0, -1.6, 0.75]
+
+
+def _truth(frequency: np.ndarray, denominator: list[float]) -> np.ndarray:  # type: ignore[type-arg]
+    z = np.exp(-2j * np.pi * frequency)
+    return np.polyval(NUMERATOR[::-1], z) / np.polyval(denominator[::-1], z)
+
+
+def test_circles_of_the_local_polynomial_method_cover() -> None:
+    covered: list[float] = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        u = rng.normal(size=2048)
+        y = filtered(NUMERATOR, DENOMINATOR, u) + 0.1 * rng.normal(size=2048)
+        found = local_polynomial_response(u, y, 1.0)
+        covered.append(float(np.mean(np.abs(found.response - _truth(found.frequency, DENOMINATOR)) <= found.radius())))
+    assert 0.925 < np.mean(covered) < 0.975
+
+
+def test_leakage_is_modelled() -> None:
+    rng = np.random.default_rng(7)
+    u = rng.normal(size=3048)
+    y = filtered(NUMERATOR, DENOMINATOR, u)
+    found = local_polynomial_response(u[1000:], y[1000:], 1.0)
+    truth = _truth(found.frequency, DENOMINATOR)
+    error = np.abs(found.response - truth)
+    plain = np.fft.rfft(y[1000:])[1:1024] / np.fft.rfft(u[1000:])[1:1024]
+    assert np.median(error) < 0.05 * np.median(np.abs(plain - truth))
+
+
+@pytest.fixture(scope="module")
+def log() -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+    rng = np.random.default_rng(3)
+    u = np.tile(multisine(odd_lines(rng), rng), PERIODS)
+    return u, bent(u, DAMPED) + 0.02 * rng.normal(size=len(u))
+
+
+def test_noise_odd_and_even_distortion_are_told_apart(log: tuple[np.ndarray, np.ndarray]) -> None:  # type: ignore[type-arg]
+    u, y = log
+    told = best_linear_approximation(u, y, 1.0)
+    assert (told.period, told.periods) == (PERIOD, PERIODS - 1)
+    # a period's lines share the noise's variance; their mean over the periods has a part of it
+    assert np.mean(told.noise) == pytest.approx(0.02**2 / PERIOD / (PERIODS - 1), rel=0.05)
+    assert abs(told.level(odd=False)) < 0.1 * np.mean(told.noise)
+    assert told.level(odd=True) > 20.0 * np.mean(told.noise)
+    squared = best_linear_approximation(u, y + 0.3 * filtered(NUMERATOR, DAMPED, u) ** 2, 1.0)
+    assert squared.level(odd=False) > 10.0 * np.mean(told.noise)
+    assert squared.level(odd=True) == pytest.approx(told.level(odd=True), rel=0.2)
+
+
+def test_circles_of_the_best_linear_approximation_hold_its_distortion(log: tuple[np.ndarray, np.ndarray]) -> None:  # type: ignore[type-arg]
+    found = best_linear_approximation(*log, 1.0).response
+    linear = _truth(found.frequency, DAMPED)
+    gain = np.vdot(linear, found.response) / np.vdot(linear, linear)
+    assert 0.9 < np.mean(np.abs(found.response - gain * linear) <= found.radius()) < 0.99
+
+
+def test_a_multisine_without_silent_lines_tells_the_noise_alone() -> None:
+    rng = np.random.default_rng(5)
+    u = np.tile(multisine(np.arange(1, PERIOD // 2), rng), 3)
+    told = best_linear_approximation(u, u + 0.01 * rng.normal(size=len(u)), 1.0)
+    assert np.isnan(told.level(odd=True))
+    assert told.response.freedom == 1
+    assert np.median(np.abs(told.response.response - 1.0)) < 0.02
+
+
+def test_the_period_is_found_and_a_walk_has_none() -> None:
+    rng = np.random.default_rng(6)
+    one = rng.normal(size=250)
+    assert find_period(np.concatenate([np.tile(one, 4), one[:70]])) == 250
+    assert find_period(np.cumsum(rng.normal(size=1000))) is None
+    assert find_period(np.ones(100)) is None
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: local_polynomial_response(np.zeros(100), np.zeros(90), 1.0), "of one length without gaps"),
+        (
+            lambda: local_polynomial_response(np.arange(20.0), np.arange(20.0), 1.0),
+            "28 samples or more are wanted, got 20",
+        ),
+        (lambda: local_polynomial_response(np.zeros(100), np.ones(100), 1.0), "must hold all frequencies"),
+        (lambda: best_linear_approximation(np.arange(99.0), np.arange(99.0), 1.0), "does not repeat itself"),
+        (lambda: best_linear_approximation(np.tile(np.arange(50.0), 2), np.ones(100), 1.0), "got 1 of 50"),
+        (lambda: best_linear_approximation(np.full(99, np.nan), np.ones(99), 1.0), "without gaps"),
+    ],
+)
+def test_signals_that_tell_nothing_are_refused(call: object, said: str) -> None:
+    with pytest.raises(HydrostateError, match=said):
+        call()  # type: ignore[operator]
