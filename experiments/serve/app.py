@@ -3,6 +3,7 @@
 import asyncio
 import re
 import secrets
+import time
 from collections.abc import AsyncGenerator, Callable, Mapping
 from contextlib import asynccontextmanager
 from importlib.metadata import version
@@ -10,7 +11,7 @@ from typing import Annotated, Any
 
 from fastapi import FastAPI, Path, Query, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, Response
+from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import StreamingResponse
@@ -22,6 +23,7 @@ from experiments.serve.answers import Comparison, Health, Log, Logs, Said, Strea
 from experiments.serve.desk import Desk
 from experiments.serve.events import MOST_LOOKING, told
 from experiments.serve.limits import MOST_UPLOADS, Guard, RefusedError, receive_file, require_size
+from experiments.serve.metrics import exposition
 from experiments.serve.pages import home_page, live_page, policy_of, policy_of_file
 from experiments.serve.settings import Settings
 from experiments.serve.views import compared
@@ -212,6 +214,13 @@ def _offer_logs(app: FastAPI, desk: Desk) -> None:
         """Return whether the server has room for more."""
         waiting, most = desk.jobs.waiting, desk.settings.waiting
         return Health(waiting=waiting, most_waiting=most, room=max(desk.room.left(), 0), version=version("hydrostate"))
+
+    @app.get("/metrics", response_class=PlainTextResponse, responses=why(page=True), tags=["server"])
+    def metrics() -> PlainTextResponse:
+        """Return what a monitor wants to know, in the text format of Prometheus."""
+        streams = [(one.state, one.alarms) for one in desk.streams.by_name.values()]
+        text = exposition(desk.store.counts(), desk.jobs.waiting, streams, time.time())
+        return PlainTextResponse(text, media_type="text/plain; version=0.0.4")
 
 
 def _offer_comparison(app: FastAPI, desk: Desk) -> None:

@@ -42,6 +42,8 @@ class Stream:
         self._lock = threading.Lock()
         self._gauges: deque[dict[str, Any]] = deque(maxlen=KEPT)
         self._count, self._state, self._said, self._fresh = 0, "connecting", "", 0
+        self.alarms = 0
+        """Alarms since the server began [count]."""
         self._process: Any = None
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"stream {name}", daemon=True)
@@ -128,6 +130,7 @@ class Stream:
         with self._lock:
             self._state = "failed" if failed else told or self._state
             self._said = str(entries.get("message") or "")
+            self.alarms += event == "alarm"
             self._fresh += 1
 
 

@@ -42,8 +42,8 @@
   };
 
   function showState(one) {
-    const said = one.message ? `: ${one.message}` : "";
-    state.textContent = `${one.state[0].toUpperCase()}${one.state.slice(1)}${said}.`;
+    const said = one.message.startsWith(one.state) ? one.message : [one.state, one.message].filter(Boolean).join(": ");
+    state.textContent = `${said[0].toUpperCase()}${said.slice(1)}.`;
     const rows = one.events.toReversed().map((event) =>
       element(
         "tr",
@@ -51,7 +51,7 @@
         element("th", { scope: "row" }, new Date(1000 * event.received).toLocaleString()),
         element("td", { class: "number", "data-head": "time [s]" }, digits(event.time_s)),
         element("td", { "data-head": "event", class: event.event === "alarm" ? "bad" : "" }, event.event),
-        element("td", { "data-head": "says" }, event.message ?? ""),
+        element("td", { "data-head": "message" }, event.message ?? ""),
       ),
     );
     alarms.replaceChildren(...rows);
@@ -69,7 +69,7 @@
     });
     for (const balance of Object.keys(point.scores)) {
       const part = share(point, balance);
-      tiles.push(tile(`${balance} balance, of an alarm`, part === null ? "learning" : digits(part), part === null ? "" : "%", "100 % raises one"));
+      tiles.push(tile(`${balance} balance, share of an alarm`, part === null ? "learning" : digits(part), part === null ? "" : "%", "100 % raises one"));
     }
     tiles.push(tile("rows", String(point.rows), "", `${point.gaps} gaps, ${digits(point.time_s)} s`));
     gauges.replaceChildren(...tiles);
@@ -81,15 +81,16 @@
     const figure = element("figure", {}, element("figcaption", {}, unit ? `${label} [${unit}]` : label));
     histories.append(figure);
     const line = { stroke: css("blue"), width: 1, points: { show: false } };
-    const axis = { stroke: css("soft"), grid: { stroke: css("line"), width: 1 } };
+    const axis = { stroke: css("soft"), grid: { stroke: css("line"), width: 1 }, space: 28 };
+    const share = { range: (_, least, most) => [0, Math.max(100, most ?? 0)] }; // up to an alarm, at the least
     const made = new uPlot(
       {
         width: figure.clientWidth || 320,
         height: HEIGHT,
         legend: { show: false },
         cursor: { show: false },
-        scales: { x: { time: false } },
-        axes: [axis, { ...axis, size: 64 }],
+        scales: { x: { time: false }, y: two ? {} : share },
+        axes: [{ ...axis, space: 60 }, { ...axis, size: 64 }],
         series: two ? [{}, line, line] : [{}, line],
         bands: two ? [{ series: [2, 1], fill: `${css("blue")}44` }] : [],
       },
@@ -113,7 +114,7 @@
       chart(words, unit, true).setData([times, ...ends]);
     }
     for (const balance of Object.keys(last.scores)) {
-      chart(`${balance} balance, of an alarm`, "%", false).setData([times, points.map((one) => share(one, balance))]);
+      chart(`${balance} balance, share of an alarm`, "%", false).setData([times, points.map((one) => share(one, balance))]);
     }
     document.documentElement.classList.add("live-drawn");
   }

@@ -21,7 +21,7 @@ MB = 1 << 20
 
 
 def test_hostile_clients_get_no_server_error_no_file_outside_the_folder_and_no_memory(tmp_path: Path) -> None:
-    found = attack(tmp_path, 300, 100, {**MIX, "chunked": 0.5})
+    found = attack(tmp_path, 240, 80, {**MIX, "chunked": 0.5})
     assert not server_errors(found.answers)
     assert not found.strange
     assert found.most - found.memory[0] < 60 * MB

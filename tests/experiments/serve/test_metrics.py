@@ -1,0 +1,44 @@
+"""Metrics of a server in the text format of Prometheus."""
+
+import re
+from collections.abc import Callable
+
+import pytest
+from fastapi.testclient import TestClient
+
+from experiments.serve.metrics import exposition
+
+LINE = re.compile(r'[a-z_]+(\{([a-z]+="([^"\\\n]|\\[\\"n])*",?)+\})? [0-9.e+-]+|# (HELP|TYPE) [a-z_]+ .+')
+
+
+def test_every_stream_tells_rows_values_and_how_far_each_balance_is_from_an_alarm() -> None:
+    gauges = {"rows": 5000, "gaps": 1, "received": 97.5, "values": {"position_m": 0.25, "speed": None}}
+    gauges |= {"scores": {"flow": 3.0, "force": 1.0}, "thresholds": {"flow": 12.0, "force": None}}
+    state = {"name": "press", "state": "watching", "message": "", "gauges": gauges}
+    quiet = {"name": "lift", "state": "failed", "message": "nobody answers", "gauges": None}
+    lines = exposition({"done": 2, "failed": 1}, 3, [(state, 4), (quiet, 0)], 100.0).splitlines()
+    assert {
+        'hydrostate_logs{state="done"} 2',
+        "hydrostate_logs_waiting 3",
+        'hydrostate_stream_up{stream="press"} 1',
+        'hydrostate_stream_up{stream="lift"} 0',
+        'hydrostate_stream_rows_total{stream="press"} 5000',
+        'hydrostate_stream_age_seconds{stream="press"} 2.5',
+        'hydrostate_stream_alarm_share{stream="press",balance="flow"} 0.25',
+        'hydrostate_stream_alarms_total{stream="press"} 4',
+        'hydrostate_stream_value{stream="press",channel="position_m"} 0.25',
+    } <= set(lines)
+    assert not [line for line in lines if 'balance="force"' in line or 'channel="speed"' in line]
+    assert [line for line in lines if not LINE.fullmatch(line)] == []
+
+
+@pytest.mark.parametrize("name", ['a"b', "a\\b", "a\nb"])
+def test_no_name_breaks_a_line(name: str) -> None:
+    text = exposition({name: 1}, 0, [], 0.0)
+    assert [line for line in text.splitlines() if not LINE.fullmatch(line)] == []
+
+
+def test_the_server_offers_them(served: Callable[..., TestClient]) -> None:
+    answer = served().get("/metrics")
+    assert answer.headers["content-type"].startswith("text/plain; version=0.0.4")
+    assert "hydrostate_logs_waiting 0" in answer.text.splitlines()
