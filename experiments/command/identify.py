@@ -127,6 +127,12 @@ def identify(
     figure: Annotated[
         Path | None, option("PNG", "Draw measured beside simulated, the residual, its correlations, the gain.")
     ] = None,
+    response: Annotated[
+        Path | None,
+        option(
+            "PNG", "With --input: draw the frequency response; --json has it, a multisine's levels of distortion too."
+        ),
+    ] = None,
     rig: RigFile = None,
     columns: Columns = None,
     out: Out = None,
@@ -160,6 +166,7 @@ def identify(
             validate=tuple(validate or ()),
             figure=figure,
             simulated=simulated,
+            response=response,
         )
         if simulate is not None:
             simulate_any(logs, simulate, asked, as_json=as_json, out=out)

@@ -43,12 +43,14 @@ class Asked:
     validate: tuple[Path, ...] = ()
     figure: Path | None = None
     simulated: Path | None = None
+    response: Path | None = None
 
 
 BLANK: Result = {
     **dict.fromkeys(("inputs", "input", "output", "structure", "order", "n_values", "sample_time_s")),
     **dict.fromkeys(("fit_percent", "rmse", "one_step_percent", "one_step_rmse", "held_back_percent", "offset")),
     **dict.fromkeys(("numerator", "denominator", "dc_gain", "poles", "delay", "nonlinearity", "test", "model")),
+    "frequency_response": None,
     "candidates": [],
 }
 """Entries of a log that could not be used."""
@@ -126,7 +128,22 @@ def _identified(
         write_free_run(found.model, data, logs[0].name, figure)
     if asked.simulated is not None:
         _write_simulated(found.model, data, figure_path(asked.simulated, Path(output), len(asked.outputs)))
-    return {**BLANK, **entries(found), "test": test}
+    answer = None if asked.response is None else _response(data, logs[0].name, asked.response, len(asked.outputs))
+    return {**BLANK, **entries(found), "test": test, "frequency_response": answer}
+
+
+def _response(data: "Channels", log: str, path: Path, outputs: int) -> dict[str, Any]:
+    """Draw the frequency response of the first log, and return it."""
+    from estimation.identification.signals.measured_response import measured_response
+    from experiments.log_pages.response_figure import write_response
+
+    sources = ", ".join(data.inputs)
+    if len(data.inputs) > 1:
+        raise HydrostateError(f"--response takes one input, got {sources}")
+    found = measured_response(data.u[0][:, 0], data.y[0], data.sample_time)
+    target = figure_path(path, Path(data.output), outputs)
+    write_response(found, f"{log}, {sources} to {data.output}", target or path)
+    return found.to_dict()
 
 
 def entries(found: "Identified") -> dict[str, Any]:

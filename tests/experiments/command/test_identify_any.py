@@ -90,3 +90,36 @@ def test_a_model_at_a_longer_sample_time(logs: list[Path]) -> None:
     ran = run(logs[0], "--input", "load", "--output", "heat", "--order", 1, "--resample", 0.06, "--json")
     (one,) = json.loads(ran.stdout)
     assert one["sample_time_s"] == pytest.approx(0.06)
+
+
+def test_a_frequency_response_is_drawn_and_printed_with_its_levels(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    lines = np.arange(1, 400, 2)[np.arange(200) % 4 != 1]
+    spectrum = np.zeros(513, dtype=complex)
+    spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
+    one = np.fft.irfft(spectrum)
+    u = np.tile(one / one.std(), 4)
+    y = u + 0.1 * u**3 + 0.01 * rng.normal(size=len(u))
+    for name, table in (
+        ("multisine", pd.DataFrame({"u": u, "y": y})),
+        (
+            "local-polynomial",
+            pd.DataFrame({"u": (v := rng.normal(size=600)), "y": 2.0 * v + 0.1 * rng.normal(size=600)}),
+        ),
+    ):
+        table.index = pd.Index(0.01 * np.arange(len(table)), name="time_s")
+        table.to_csv(tmp_path / "log.csv")
+        picture = tmp_path / f"{name}.png"
+        arguments = ("--input", "u", "--output", "y", "--order", 1, "--delay", 0, "--response", picture, "--json")
+        ran = run(tmp_path / "log.csv", *arguments)
+        assert ran.exit_code == 0, ran.output
+        (found,) = json.loads(ran.stdout)
+        told = found["frequency_response"]
+        assert told["method"] == name
+        assert picture.read_bytes()[:4] == b"\x89PNG"
+        gain = np.hypot(told["real"], told["imag"])
+        assert np.median(gain) == pytest.approx(2.0 if told["periods"] is None else 1.3, rel=0.05)
+        if name == "multisine":
+            assert (told["period_samples"], told["periods"]) == (1024, 3)
+            assert told["odd_power"] > 100.0 * abs(told["even_power"])
+            assert told["noise_power"] == pytest.approx(1e-4 / 1024 / 3, rel=0.2)

@@ -7,6 +7,7 @@ from benchmarks.frequency_response import DAMPED, NUMERATOR, PERIOD, PERIODS, be
 from estimation.identification.model.recursion import filtered
 from estimation.identification.signals.distortion import best_linear_approximation, find_period
 from estimation.identification.signals.local_polynomial import local_polynomial_response
+from estimation.identification.signals.measured_response import measured_response
 from plant.errors import HydrostateError
 
 DENOMINATOR = [1.0, -1.6, 0.75]
@@ -100,3 +101,13 @@ def test_the_period_is_found_and_a_walk_has_none() -> None:
 def test_signals_that_tell_nothing_are_refused(call: object, said: str) -> None:
     with pytest.raises(HydrostateError, match=said):
         call()  # type: ignore[operator]
+
+
+def test_the_method_is_what_the_input_allows(log: tuple[np.ndarray, np.ndarray]) -> None:  # type: ignore[type-arg]
+    u, y = log
+    assert measured_response(u, y, 1.0).method == "multisine"
+    rng = np.random.default_rng(8)
+    told = measured_response(v := rng.normal(size=500), v, 0.1)
+    assert (told.method, told.to_dict()["periods"]) == ("local-polynomial", None)
+    with pytest.raises(HydrostateError, match="needs every sample of the output, got 1 that are missing"):
+        measured_response(v, np.where(np.arange(500) == 3, np.nan, v), 0.1)

@@ -1,0 +1,78 @@
+"""What one log says of a plant's frequency response, by the method that its input allows."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.identification.signals.distortion import Distortion, best_linear_approximation, find_period
+from estimation.identification.signals.local_polynomial import FrequencyResponse, local_polynomial_response
+from plant.errors import HydrostateError
+
+SETTLING, FEWEST_PERIODS = 1, 2
+"""Periods that are left out at the beginning, and periods wanted behind them."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredResponse:
+    """A frequency response, and by which method.
+
+    Parameters
+    ----------
+    method : str
+        ``"multisine"`` where the input is periodic, ``"local-polynomial"`` otherwise.
+    distortion : Distortion or None
+        Levels of noise and distortion, where the input is periodic.
+    """
+
+    method: str
+    response: FrequencyResponse
+    distortion: Distortion | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return JSON values: response with the radius of its 95 % circles, and levels a line where they are known."""
+        one, told = self.response, self.distortion
+        found: dict[str, Any] = {
+            "method": self.method,
+            "frequency_hz": one.frequency.tolist(),
+            "real": one.response.real.tolist(),
+            "imag": one.response.imag.tolist(),
+            "radius95": one.radius().tolist(),
+            **dict.fromkeys(("period_samples", "periods", "noise_power", "odd_power", "even_power")),
+        }
+        if told is not None:
+            levels = {name: told.level(odd=name == "odd_power") for name in ("odd_power", "even_power")}
+            found |= {name: level if np.isfinite(level) else None for name, level in levels.items()}
+            found |= {"period_samples": told.period, "periods": told.periods, "noise_power": float(told.noise.mean())}
+        return found
+
+
+def measured_response(u: Array, y: Array, sample_time: float) -> MeasuredResponse:
+    """Return the frequency response of one log: as a multisine's where its input repeats itself, else whatever it is.
+
+    Parameters
+    ----------
+    u, y : ndarray, shape (n,)
+        Input and output [any unit].
+    sample_time : float
+        Seconds between samples [s].
+
+    Returns
+    -------
+    MeasuredResponse
+        With its method.
+
+    Raises
+    ------
+    HydrostateError
+        If the output has gaps, or the input tells nothing.
+    """
+    lost = int(np.count_nonzero(~np.isfinite(y)))
+    if lost:
+        raise HydrostateError(f"a frequency response needs every sample of the output, got {lost} that are missing")
+    period = find_period(u)
+    if period is not None and len(u) // period - SETTLING >= FEWEST_PERIODS and period >= 8:
+        told = best_linear_approximation(u, y, sample_time, period=period, settling=SETTLING)
+        return MeasuredResponse("multisine", told.response, told)
+    return MeasuredResponse("local-polynomial", local_polynomial_response(u, y, sample_time))
