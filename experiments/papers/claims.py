@@ -14,7 +14,7 @@ from experiments.nine_conditions.figures import FIGURES
 from experiments.page.figure_files import Drawings
 from experiments.page.frames import Rows, tabled
 from experiments.page.words import in_words
-from experiments.papers.eha_claims import eha_ours, settled_by_condition
+from experiments.papers.eha_claims import eha_ours, printed_by_condition, settled_by_condition
 from experiments.papers.eha_tables import eha_table_rows
 from experiments.papers.figures import PAPERS_FIGURES
 from experiments.papers.motor_claims import motor_ours
@@ -123,6 +123,22 @@ def _filter_rows(found: Evidence) -> Iterator[Row]:
             ours=ours,
             shown_by="hydrostate study",
             note=FILTER_NOTE,
+        )
+
+    for condition, ours in printed_by_condition(found["study"]["printed_equations"]).items():
+        yield Row(
+            paper="002",
+            where="equations 7.1 to 7.7, Figure 11",
+            claim=f"bulk modulus by the EKF as printed, {in_words(condition)}: largest error of all first guesses",
+            printed="2.07e8",
+            value=None,
+            unit="%",
+            accept="0 to 3",
+            basis="computed",
+            ours=ours,
+            errata="E3",
+            shown_by="hydrostate papers",
+            note="Equation 7.3 as printed divides friction by the volume too.",
         )
 
 

@@ -197,6 +197,31 @@ def settled_by_condition(estimates: pd.DataFrame, which: Experiment = PUBLISHED_
     return {str(name): _settled(of_one) for name, of_one in rows.groupby("condition", sort=False)}
 
 
+def printed_by_condition(estimates: pd.DataFrame) -> Mapping[str, Ours]:
+    """Return how far the filter with equation 7.3 as printed ends from the truth.
+
+    Parameters
+    ----------
+    estimates : pandas.DataFrame
+        Of `printed_equations`.
+
+    Returns
+    -------
+    Mapping[str, Ours]
+        By condition: largest error over the first guesses [percent]; no number where none of them stays finite.
+    """
+    return {str(name): _as_printed(rows) for name, rows in estimates.groupby("condition", sort=False)}
+
+
+def _as_printed(rows: pd.DataFrame) -> Ours:
+    settled = rows["settled_pa"].dropna()
+    said = f"finite from {len(settled)} of {len(rows)} first guesses"
+    if len(settled):
+        said += f", ends at {settled.min():.3g} to {settled.max():.3g} Pa"
+    off = (settled / RIG.bulk_modulus - 1.0).abs().max()
+    return Ours(100.0 * float(off) if len(settled) == len(rows) else None, said=said)
+
+
 def _settled(rows: pd.DataFrame) -> Ours:
     value = float(rows["filter_settled_at_pa"].mean())
     spread = 1.96 * float(rows["filter_std_pa"].mean())

@@ -5,6 +5,7 @@ import json
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -21,8 +22,10 @@ from experiments.diaphragm_motor.study import claim_tables
 from experiments.library.library import read_library
 from experiments.library.tables import library_table, root_table
 from experiments.motor_paper.study import MOTOR_PAPER
+from experiments.nine_conditions.printed_equations import printed_equations
 from experiments.nine_conditions.settings import StudySettings
 from experiments.nine_conditions.study import NINE_CONDITIONS
+from experiments.nine_conditions.study import RIG as NINE_RIG
 from experiments.page.folder import check_target, write_tables
 from experiments.page.frames import Tables
 from experiments.piezo_stack import flow
@@ -74,7 +77,9 @@ def quick_papers(seed: int) -> PapersSettings:
 
 
 def _nine(settings: PapersSettings, track: Track) -> Tables:
-    return NINE_CONDITIONS.find(settings.study, track).frames
+    found = NINE_CONDITIONS.find(settings.study, track).frames
+    make = partial(printed_equations, NINE_RIG, settings.study)
+    return {**found, "printed equations": in_one_piece(track, "the published filter as printed", make)}
 
 
 def _circuit(settings: PapersSettings, track: Track) -> Tables:

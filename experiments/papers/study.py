@@ -1,5 +1,6 @@
 """The page of the three papers: every table, figure and claim, with what we find and the verdict of one rule."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from experiments.page.frames import Rows, Tables, tabled
-from experiments.page.numbers import number
+from experiments.page.numbers import MISSING, exact, number
 from experiments.page.tables import Cell, Column, Columns, Row, right
 from experiments.papers.claims import PAPERS, all_rows, figure_table, row_table
 from experiments.papers.figures import PAPERS_FIGURES
@@ -94,7 +95,11 @@ def _ours(row: Row) -> Cell:
     value = row["ours"]
     if isinstance(value, str):
         return Cell(value)
-    return right(number(None if value is None else float(value), 5))
+    if value is None or value != value:
+        return right(MISSING)
+    # one digit more than is printed, so that both can be compared
+    digits = max(5, 1 + len(re.sub(r"e.*|\D", "", str(row["printed"])).lstrip("0")))
+    return right(exact(float(f"{value:.{min(digits, 10)}g}")))
 
 
 def _limits(row: Row) -> str:
