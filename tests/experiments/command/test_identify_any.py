@@ -8,6 +8,8 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
 
+import hydrostate as hs
+from benchmarks.bent_inputs import PLANTED, logged
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
 from experiments.cli import app
@@ -123,3 +125,18 @@ def test_a_frequency_response_is_drawn_and_printed_with_its_levels(tmp_path: Pat
             assert (told["period_samples"], told["periods"]) == (1024, 3)
             assert told["odd_power"] > 100.0 * abs(told["even_power"])
             assert told["noise_power"] == pytest.approx(1e-4 / 1024 / 3, rel=0.2)
+
+
+def test_a_backlash_is_said_with_its_interval(tmp_path: Path) -> None:
+    data = logged(PLANTED[2], 1)
+    table = pd.DataFrame({"u": data.u[0][:, 0], "y": data.y[0]}, index=0.01 * np.arange(data.y[0].size))
+    table.to_csv(tmp_path / "play.csv", index_label="time_s")
+    arguments = ("--input", "u", "--output", "y", "--structure", "hammerstein", "--order", 2, "--delay", 1)
+    (one,) = json.loads(run(tmp_path / "play.csv", *arguments, "--json").stdout)
+    width = one["nonlinearity"]["half_width"]
+    assert (one["structure"], one["nonlinearity"]["kind"]) == ("hammerstein", "backlash")
+    assert width["ci95"][0] < width["value"] < width["ci95"][1]
+    assert abs(width["value"] - 0.3) < 4.0 * width["std"]
+    assert "backlash at u, half width 0.3" in run(tmp_path / "play.csv", *arguments).stdout
+    model = hs.read(tmp_path / "play.csv").identify(input="u", output="y", structure="hammerstein", order=2, delay=1)
+    assert model.nonlinearity["half_width"] == width
