@@ -11,8 +11,18 @@ from typing import Annotated, Any, TextIO
 
 import typer
 
+from experiments.command.heartbeat import beating, one_at_a_time
 from experiments.command.json_output import plain
-from experiments.command.options import Columns, RigFile, argument, flag, load_columns, load_rig, option
+from experiments.command.options import (
+    Columns,
+    RigFile,
+    argument,
+    flag,
+    load_columns,
+    load_rig,
+    option,
+    require_positive,
+)
 from experiments.command.terminal import SOME_FAILED, emit, note, unexpected
 from experiments.command.watch_told import Told
 from experiments.command.watching import Asked, watch_file, watch_network, watch_rows
@@ -49,25 +59,31 @@ def watch(
     no_pressure: Annotated[
         bool, flag("--no-pressure", "Use motion alone, even if differential pressure is logged.")
     ] = False,
+    heartbeat: Annotated[
+        float | None, option("S", "Also tell every so many seconds that the watch is alive, whether rows come or not.")
+    ] = None,
     state: Annotated[Path | None, option("FILE", "Continue a stream where this file says, and keep it there.")] = None,
 ) -> None:
     """Say when something changes inside the actuator: one JSON object a line, as it happens.
 
     Events: start; ready, learning is over; alarm, with since_s and its 95 % interval; change, two seconds later, by how
-    much lost flow and pressure changed; end. It learns what the actuator does while it is healthy and follows slow
-    drift, as of the oil's temperature, so it tells sudden changes; use diagnose for what has always been wrong.
+    much lost flow and pressure changed; alive, if --heartbeat asks for it; end. Each has the time of the stream and the
+    clock's (UTC). It learns what the actuator does while it is healthy and follows slow drift, as of the oil's
+    temperature, so it tells sudden changes; use diagnose for what has always been wrong.
     """
-    told = Told(_say)
+    require_positive("--heartbeat", heartbeat, "s")
+    told = Told(one_at_a_time(_say))
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         asked = Asked(load_rig(rig), load_columns(columns), false_alarms, learning, healthy, no_pressure)
-        if log == "-":
-            watch_rows(told, _lines(sys.stdin), asked, STANDARD_INPUT, state)
-        elif is_stream(log):
-            watch_network(told, log, asked, state)
-        else:
-            watch_file(told, Path(log), asked)
+        with beating(told, heartbeat):
+            if log == "-":
+                watch_rows(told, _lines(sys.stdin), asked, STANDARD_INPUT, state)
+            elif is_stream(log):
+                watch_network(told, log, asked, state)
+            else:
+                watch_file(told, Path(log), asked)
     except HydrostateError as error:
         told.end("failed", str(error))
         raise

@@ -1,6 +1,8 @@
 """What a watch tells, as entries of the JSON contract: start, ready, alarm, change, end."""
 
+import time
 from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.options import PRESSURE
@@ -26,7 +28,8 @@ class Told:
         self._say = say
         self.watch: Watch | None = None
         self.began = 0.0
-        self.alarms = 0
+        self.alarms = self.rows = 0
+        self._came = time.monotonic()
 
     def start(self, source: str, watch: "Watch", rig: str, false_alarms: float) -> None:
         """Tell that a stream begins.
@@ -54,8 +57,14 @@ class Told:
         named = dict(zip(self.watch.balances, thresholds, strict=True)) if self.watch else {}
         self._line("ready", time, thresholds=named, message="alarms can come from here on")
 
+    def alive(self) -> None:
+        """Tell that the watch is alive, how many samples it has taken, and for how long nothing has come."""
+        time_s = None if self.watch is None else self.watch.last
+        silent = round(time.monotonic() - self._came, 3)
+        self._line("alive", time_s, samples=self.rows, silent_s=silent, alarms=self.alarms, message="alive")
+
     def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
-        """Take notice of samples that the watch has taken; nothing is told of them here.
+        """Take notice of samples that the watch has taken: they are counted.
 
         Parameters
         ----------
@@ -66,6 +75,9 @@ class Told:
         gap : bool
             Whether rows are missing before them.
         """
+        del last, gap
+        self.rows += max((len(values) for values in channels.values()), default=0)
+        self._came = time.monotonic()
 
     def events(self, events: "Sequence[Event]") -> None:
         """Tell what has happened."""
@@ -104,8 +116,9 @@ class Told:
         time = None if self.watch is None else self.watch.last
         self._line("end", time, outcome=outcome, alarms=self.alarms, message=message)
 
-    def _line(self, event: str, time: float | None, **entries: Any) -> None:
-        self._say({"event": event, "time_s": _rounded(time), **entries})
+    def _line(self, event: str, time_s: float | None, **entries: Any) -> None:
+        clock = datetime.now(UTC).isoformat(timespec="milliseconds")
+        self._say({"event": event, "time_s": _rounded(time_s), "clock": clock, **entries})
 
 
 def _rounded(time: float | None) -> float | None:

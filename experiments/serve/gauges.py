@@ -37,7 +37,7 @@ class Gauges(Told):
     def __init__(self, out: Connection) -> None:
         super().__init__(lambda entries: out.send(("event", plain(entries))))
         self._out = out
-        self._rows = self._gaps = 0
+        self._whole = self._gaps = 0
         self._ends: dict[str, tuple[float, float]] = {}
         self._sent = 0.0
 
@@ -55,6 +55,7 @@ class Gauges(Told):
         """
         import numpy as np
 
+        super().saw(channels, last, gap)
         self._gaps += gap
         missing = 0
         for name, values in channels.items():
@@ -63,7 +64,7 @@ class Gauges(Told):
             if len(there):
                 low, high = self._ends.get(name, (np.inf, -np.inf))
                 self._ends[name] = min(low, float(there.min())), max(high, float(there.max()))
-        self._rows += max((len(values) for values in channels.values()), default=0) - missing
+        self._whole += max((len(values) for values in channels.values()), default=0) - missing
         now = time.monotonic()
         if now - self._sent < EVERY:
             return
@@ -84,7 +85,7 @@ class Gauges(Told):
             return
         told = {
             "time_s": last,
-            "rows": self._rows,
+            "rows": self._whole,
             "gaps": self._gaps,
             "values": dict(values),
             "low": {name: low for name, (low, _) in self._ends.items()},
@@ -94,11 +95,6 @@ class Gauges(Told):
         }
         self._out.send(("gauges", plain(told)))
         self._ends = {}
-
-    @property
-    def rows(self) -> int:
-        """Rows that came, whole in every channel [count]."""
-        return self._rows
 
 
 def watch_stream(

@@ -2,6 +2,8 @@ import io
 import json
 import socket
 import threading
+import time
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +150,40 @@ def test_a_stream_over_tcp_that_is_restarted_goes_on_where_it_was(log: Path, tmp
             code, events, said = _run(address, "--learning", "60", "--state", str(state))
         assert (code, said) == (0, "")
         found += events
-    told = [[one for one in events if one["event"] in ("ready", "alarm", "change")] for events in (found, wanted)]
+    told = [
+        [{**one, "clock": ""} for one in events if one["event"] in ("ready", "alarm", "change")]
+        for events in (found, wanted)
+    ]
     assert told[0] == told[1]
     assert [one["event"] for one in told[0]] == ["ready", "alarm", "change"]
+
+
+def test_a_heartbeat_comes_while_no_row_does_and_every_event_has_the_clock(log: Path) -> None:
+    header, *rows = log.read_text().splitlines(keepends=True)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            connection, _ = server.accept()
+            with connection:
+                connection.sendall("".join([header, *rows[:400]]).encode())
+                time.sleep(0.6)
+
+        threading.Thread(target=serve, daemon=True).start()
+        code, events, _ = _run(f"tcp://127.0.0.1:{server.getsockname()[1]}", "--heartbeat", "0.1")
+    assert code == 0
+    assert [one["event"] for one in events if one["event"] != "alive"] == ["start", "end"]
+    assert events[-1]["event"] == "end"
+    silent = [one["silent_s"] for one in events if one["event"] == "alive" and one["samples"]]
+    assert len(silent) >= 2
+    assert silent == sorted(silent)
+    assert {one["samples"] for one in events if one["event"] == "alive"} <= {0, 400}
+    stamps = [datetime.fromisoformat(one["clock"]) for one in events]
+    assert stamps == sorted(stamps)
+    assert stamps[-1].tzinfo is not None
+
+
+@pytest.mark.parametrize("every", ["0", "-1", "nan"])
+def test_a_heartbeat_that_is_no_time_is_refused(log: Path, every: str) -> None:
+    code, _, said = _run(str(log), "--heartbeat", every)
+    assert code == 2
+    assert "--heartbeat must be positive" in said

@@ -1,0 +1,51 @@
+"""A sign of life of a watch, also while nothing comes: a process that hangs is told from a bench that is silent."""
+
+import threading
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from typing import Any
+
+from experiments.command.watch_told import Told
+
+Say = Callable[[dict[str, Any]], None]
+
+
+def one_at_a_time(say: Say) -> Say:
+    """Return the same for several threads: a line is whole before the next begins."""
+    lock = threading.Lock()
+
+    def said(entries: dict[str, Any]) -> None:
+        with lock:
+            say(entries)
+
+    return said
+
+
+@contextmanager
+def beating(told: Told, every: float | None) -> Generator[None]:
+    """Tell in this block, every so often, that the watch is alive.
+
+    Parameters
+    ----------
+    every : float or None
+        Time between two signs of life [s]; None tells none.
+    """
+    if every is None:
+        yield
+        return
+    over = threading.Event()
+
+    def beat() -> None:
+        due = time.monotonic() + every
+        while not over.wait(max(due - time.monotonic(), 0.0)):
+            told.alive()
+            due += every
+
+    beats = threading.Thread(target=beat, name="heartbeat", daemon=True)
+    beats.start()
+    try:
+        yield
+    finally:
+        over.set()
+        beats.join()
