@@ -1,6 +1,9 @@
 """What stands in the two tables of claims and figures, without a run."""
 
 import re
+import tomllib
+from fnmatch import fnmatch
+from pathlib import Path
 
 import pytest
 
@@ -62,3 +65,10 @@ def test_the_number_that_is_compared_is_the_one_that_is_printed() -> None:
         if number is None or row["printed"] in words or not row["value"] or row["accept"] == "same":
             continue
         assert float(number[0]) == float(row["value"]), row
+
+
+def test_the_tables_are_part_of_the_package() -> None:
+    project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text(encoding="utf-8"))
+    patterns = project["tool"]["setuptools"]["package-data"]["experiments"]
+    for name in ("claims.csv", "figures.csv", "report.html"):
+        assert any(fnmatch(f"papers/{name}", pattern) for pattern in patterns), name
