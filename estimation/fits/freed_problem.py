@@ -17,7 +17,7 @@ from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
 
-NUDGE = 1e-5
+NUDGE = 1e-7
 """Step of the finite differences in the fitted coordinates [dimensionless]."""
 
 STRAIGHT = 1e-3

@@ -55,10 +55,15 @@ MOST_SAMPLES = 30_000
 SCREENED = 4_000
 """Samples on which starts are screened."""
 
-WAYS: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = (((1e2, 1e6), (1.0, 1e3)), ((1.0, 1.0), (1.0, 1.0)))
+WAYS: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = (
+    ((1.0, 1e6), (1.0, 1e3)),
+    ((1e2, 1e6), (1.0, 1e3)),
+    ((1.0, 1.0), (1.0, 1.0)),
+)
 """Ways down to the optimum: factors on variance and random walk of the residual while starts are screened and while
 they are brought near. With the true, small noise the least misfit of leakage piles up into the position and hides other
-ways down; with a larger walk what counts is increments. Failing that, straight down."""
+ways down; with a larger walk what counts is increments. Where no start gets down so, with a larger variance too, and
+failing that, straight down."""
 
 SCREENING, NEARING, FINISHING = 10, 12, 25
 """Evaluations of the model in the three stages."""
