@@ -59,6 +59,8 @@ def serve(
         from experiments.serve.server import run_server
         from experiments.serve.settings import MB, Settings, is_loopback
     except ImportError as error:
+        if error.name in ("fcntl", "resource"):
+            raise HydrostateError(f"serve runs on Linux and macOS, this system has no {error.name}") from error
         raise HydrostateError(
             f"serve needs FastAPI, uvicorn and pebble: pip install 'hydrostate[serve]' ({error})"
         ) from error

@@ -39,3 +39,10 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
 def test_a_missing_package_is_named_with_what_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "experiments.serve.server", None)  # as where what it imports is missing
     assert "pip install 'hydrostate[serve]'" in refused()
+
+
+def test_a_system_without_locks_is_told_apart_from_a_missing_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("server", "desk", "app"):
+        monkeypatch.delitem(sys.modules, f"experiments.serve.{name}", raising=False)
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    assert "serve runs on Linux and macOS, this system has no fcntl" in refused()
