@@ -14,6 +14,7 @@ NAMES = (
     "robustness",
     "efficiency",
     "convergence",
+    "chamber_filter",
     "identification",
     "identification_tests",
     "identification_sets",
