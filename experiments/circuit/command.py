@@ -1,23 +1,31 @@
 """`hydrostate circuit`: the paper's experiments on the circuit plant, as a folder with a report."""
 
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
-from experiments.command.options import SEED, Json, Seed
+from experiments.command.options import SEED, Json, Seed, flag
 from experiments.command.studies import Folder, finish_study
 
 commands = typer.Typer()
 
 
 @commands.command(epilog="Example: hydrostate circuit --out results/circuit --seed 2024")
-def circuit(out: Folder = Path("results/circuit"), seed: Seed = SEED, as_json: Json = False) -> None:
+def circuit(
+    out: Folder = Path("results/circuit"),
+    seed: Seed = SEED,
+    quick: Annotated[bool, flag("--quick", "Fewer first guesses and shorter runs of Figures 10 and 11.")] = False,
+    as_json: Json = False,
+) -> None:
     """Repeat the paper's experiments (Figures 3 to 11, section 4) on the circuit plant; write tables, figures, report.
 
     The circuit plant has two chambers, make-up, relief, throttles, presliding friction and motor lag, which no filter
-    here assumes. Takes one to four minutes. The last line of standard output is the manifest's path.
+    here assumes. Takes one to six minutes, a quick one half a minute. The last line of standard output is the
+    manifest's path.
     """
     from experiments.circuit.study import CIRCUIT
-    from experiments.running.study import Seeded
+    from experiments.nine_conditions.settings import StudySettings, quick_settings
 
-    finish_study(CIRCUIT, Seeded(seed), out, as_json=as_json)
+    settings = quick_settings(seed) if quick else StudySettings(seed=seed)
+    finish_study(CIRCUIT, settings, out, as_json=as_json)

@@ -29,7 +29,7 @@ from experiments.nine_conditions.settings import StudySettings
 from experiments.page.tables import Column, Columns, interval, spaced
 from experiments.running.progress import Track
 from experiments.running.random_streams import stream
-from experiments.running.study import Found, Seeded, Study
+from experiments.running.study import Found, Study
 from plant.eha.circuit_parameters import CircuitParameters
 
 
@@ -65,8 +65,8 @@ def circuit_studies(
     }
 
 
-def _find(settings: Seeded, track: Track) -> Found:
-    studies = circuit_studies(RIG, settings.seed)
+def _find(settings: StudySettings, track: Track) -> Found:
+    studies = circuit_studies(RIG, settings.seed, settings)
     return Found({name: run() for name, run in track(studies.items(), description="experiments on the circuit")})
 
 

@@ -39,7 +39,8 @@ def test_tables_never_replace_a_folder_that_no_study_wrote(tmp_path: Path) -> No
 
 @pytest.mark.slow
 def test_the_circuit_reproduces_the_definitions_that_tables_3_and_4_give(tmp_path: Path) -> None:
-    subprocess.run([COMMAND, "circuit", "--out", tmp_path / "circuit", "--seed", "7"], capture_output=True, check=True)  # noqa: S603 - our own command
+    line = [COMMAND, "circuit", "--quick", "--out", tmp_path / "circuit", "--seed", "7"]
+    subprocess.run(line, capture_output=True, check=True)  # noqa: S603 - our own command
     tables = tmp_path / "circuit" / "tables"
     assert len(list(tables.glob("*.csv"))) == 12
     assert (tmp_path / "circuit" / "report.html").read_text(encoding="utf-8").count("<figure") == len(CIRCUIT_FIGURES)
