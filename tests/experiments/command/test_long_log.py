@@ -18,10 +18,10 @@ COMMAND = Path(sys.executable).parent / "hydrostate"
 
 
 @pytest.mark.slow
-def test_ten_million_rows_are_estimated_and_diagnosed_in_under_four_gigabytes(tmp_path: Path) -> None:
+def test_a_million_rows_are_estimated_and_diagnosed_in_under_a_gigabyte_and_a_half(tmp_path: Path) -> None:
     p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(0)
     steps = nine_steps(10.0, 1e-4, p, rng)
-    record = simulate(LUMPED, np.tile(np.concatenate([steps, -steps]), 50), 1e-4, p, sensors=BENCH, rng=rng)
+    record = simulate(LUMPED, np.tile(np.concatenate([steps, -steps]), 5), 1e-4, p, sensors=BENCH, rng=rng)
     path = tmp_path / "long.csv"
     arrow_csv.write_csv(pa.table({"time_s": record.time, **{name: record[name].copy() for name in record}}), path)
     found: dict[str, dict[str, object]] = {}
@@ -33,4 +33,4 @@ def test_ten_million_rows_are_estimated_and_diagnosed_in_under_four_gigabytes(tm
     assert isinstance(modulus, dict)
     assert modulus["value"] == pytest.approx(2.07e8, rel=0.005)
     assert found["diagnose"]["condition"] == "minor_leakage"
-    assert peak < 4e9
+    assert peak < 1.5e9
