@@ -19,10 +19,12 @@ if TYPE_CHECKING:
     from estimation.finding import Finding as Finding
     from estimation.identification.model.linear_model import LinearModel as LinearModel
     from experiments.log_pages.own_equations import GreyBox as GreyBox
+    from experiments.log_pages.own_features import features as features
     from experiments.log_pages.relation import Relation
     from experiments.published import load as published_table
     from faults.conditions import CONDITIONS as conditions  # noqa: N811 - a face has plain names
     from faults.conditions import Condition as Condition
+    from faults.own_classes.face import Classifier as Classifier
     from plant.eha.rig import Rig as Rig
     from plant.eha.rig import read_rig as read_rig
     from plant.errors import HydrostateError as HydrostateError
@@ -36,6 +38,7 @@ PACKAGES = ("plant", "estimation", "faults", "experiments")
 
 __all__ = [
     "Answer",
+    "Classifier",
     "Condition",
     "Finding",
     "GreyBox",
@@ -51,6 +54,7 @@ __all__ = [
     "__version__",
     "actuators",
     "conditions",
+    "features",
     "load_model",
     "published_table",
     "read",

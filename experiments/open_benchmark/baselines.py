@@ -98,7 +98,7 @@ def forest_on_features(series: Array, y: Names) -> Verdicts:
     try:
         ensemble: Any = import_module("sklearn.ensemble")
     except ImportError as error:
-        raise HydrostateError("the forest needs scikit-learn: pip install 'hydrostate[rig-examples]'") from error
+        raise HydrostateError("the forest needs scikit-learn: pip install 'hydrostate[learn]'") from error
     forest = ensemble.RandomForestClassifier(n_estimators=400, random_state=0).fit(simple_features(series), y)
     return lambda other: np.asarray(forest.predict(simple_features(other)))
 

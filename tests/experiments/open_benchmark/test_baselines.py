@@ -35,7 +35,7 @@ def waves(seed: int, each: int = 12) -> tuple[Array, NDArray[np.str_]]:
 @pytest.mark.parametrize("name", LEARNT)
 def test_what_learns_tells_two_kinds_of_logs_apart(name: str) -> None:
     if "forest" in name:
-        pytest.importorskip("sklearn", reason="scikit-learn is not installed (extra rig-examples)")
+        pytest.importorskip("sklearn", reason="scikit-learn is not installed (extra learn)")
     verdicts = LEARNT[name](*waves(0))
     series, wanted = waves(1)
     assert np.mean(verdicts(series) == wanted) >= 0.9
@@ -43,7 +43,7 @@ def test_what_learns_tells_two_kinds_of_logs_apart(name: str) -> None:
 
 def test_the_forest_says_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sklearn.ensemble", None)
-    with pytest.raises(HydrostateError, match="rig-examples"):
+    with pytest.raises(HydrostateError, match="learn"):
         forest_on_features(*waves(0, each=1))
 
 

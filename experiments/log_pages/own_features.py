@@ -1,0 +1,118 @@
+"""Features of logs and cycles by one call: what a user's own classes are learnt from."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from experiments.log_pages.fitted_equations import record_of
+from plant.errors import HydrostateError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from plant.log.record import Record
+
+SAME_CLOCK = 1e-3
+"""Share by which sample times may differ and still be one."""
+
+
+def features(
+    runs: Any,
+    *,
+    channels: Sequence[str] | None = None,
+    cycle: float | None = None,
+    sample_time: float | None = None,
+    parts: int = 12,
+    bands: int | Sequence[float] = 8,
+) -> "pd.DataFrame":
+    """Return features of runs, a row a run: what `Classifier` learns from.
+
+    Of each channel: mean and deviation in equal parts of the run, skewness, kurtosis, crest factor, and logarithms of
+    deviation and of power in bands of frequency.
+
+    Parameters
+    ----------
+    runs : sequence of Log, Record or pandas.DataFrame, one of them, or ndarray of shape (runs, channels, samples)
+        A table's index is the time [s]. Gaps are bridged by straight lines.
+    channels : sequence of str, optional
+        Channels that are looked at, or names of an array's; all unless told.
+    cycle : float, optional
+        Length of a repeated cycle into which each log is cut [s]; a log is one run unless told.
+    sample_time : float, optional
+        Seconds between samples of an array [s]; 1 unless told.
+    parts : int
+        Parts of a run that give a mean and a deviation each: as many as a repeated cycle has steps or more, 1 where
+        runs have no common course.
+    bands : int or sequence of float
+        Octaves below half the sampling rate, or edges of bands [Hz].
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns are named after channel and feature; rows are numbered.
+
+    Raises
+    ------
+    HydrostateError
+        If runs have different channels or sample times, or are too short.
+
+    Examples
+    --------
+    >>> features(np.ones((3, 2, 60)), channels=["pressure", "flow"], parts=4, bands=0).shape
+    (3, 24)
+    """
+    from faults.own_classes.features import Recipe, channel_features
+
+    if isinstance(runs, np.ndarray):
+        names, values, step = _of_array(runs, channels, sample_time, cycle)
+    else:
+        names, values, step = _of_logs(runs, channels, sample_time, cycle)
+    if isinstance(bands, int):
+        recipe = Recipe(parts, octaves=bands)
+    else:
+        recipe = Recipe(parts, edges=tuple(float(one) for one in bands))
+    return channel_features(names, values, step, recipe)
+
+
+_Runs = tuple[list[str], list["np.ndarray[Any, np.dtype[np.float64]]"], float]
+
+
+def _of_array(
+    runs: "np.ndarray[Any, Any]", channels: Sequence[str] | None, sample_time: float | None, cycle: float | None
+) -> _Runs:
+    if runs.ndim != 3 or cycle is not None:
+        also = "" if cycle is None else " without a cycle, which is for logs"
+        raise HydrostateError(f"an array of shape (runs, channels, samples) is wanted{also}, got shape {runs.shape}")
+    names = [f"channel {k}" for k in range(runs.shape[1])] if channels is None else list(channels)
+    if len(names) != runs.shape[1]:
+        raise HydrostateError(f"a name for each of {runs.shape[1]} channels is wanted, got {len(names)}")
+    return names, list(runs.astype(np.float64)), 1.0 if sample_time is None else sample_time
+
+
+def _of_logs(runs: Any, channels: Sequence[str] | None, sample_time: float | None, cycle: float | None) -> _Runs:
+    from estimation.log_checks.bridging import bridged
+
+    if sample_time is not None:
+        raise HydrostateError("sample_time is that of an array; logs have their own")
+    records: list[Record] = [record_of(one) for one in (runs if isinstance(runs, list | tuple) else [runs])]
+    if not records:
+        raise HydrostateError("features of one run at least are wanted, got none")
+    names = list(records[0] if channels is None else channels)
+    step, values = records[0].sample_time, list[Any]()
+    for place, record in enumerate(records):
+        if abs(record.sample_time - step) > SAME_CLOCK * step:
+            raise HydrostateError(
+                f"run {place} has a sample every {record.sample_time:g} s, the first one every {step:g} s: resample it"
+            )
+        lacking = [name for name in names if name not in record]
+        if lacking:
+            raise HydrostateError(f"run {place} has no channel {lacking[0]!r}, it has {', '.join(record)}")
+        whole = np.stack([bridged(record[name]) for name in names])
+        length = whole.shape[1] if cycle is None else round(cycle / step)
+        if not 0 < length <= whole.shape[1]:
+            raise HydrostateError(
+                f"cycle must be as long as run {place} at most, {record.duration:g} s, got {cycle:g} s"
+            )
+        values += [whole[:, at : at + length] for at in range(0, whole.shape[1] - length + 1, length)]
+    return names, values, step

@@ -1,0 +1,303 @@
+"""A classifier of a user's own classes, after the conventions of scikit-learn."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator, ClassifierMixin
+from sklearn.utils.multiclass import check_classification_targets
+from sklearn.utils.validation import check_is_fitted, column_or_1d, validate_data
+
+from estimation.arrays import Array, IntArray
+from faults.own_classes.calibration import Calibration, calibrated, log_loss
+from faults.own_classes.discriminant import Discriminant, learn
+from faults.own_classes.groups import folds
+from faults.own_classes.verdicts import Verdicts
+from plant.errors import HydrostateError
+
+INNER = 5
+"""Folds by which a fit sees how sure it may be."""
+
+SHRINKAGES = (1.0, 0.1, 0.01)
+"""Shares of Ledoit and Wolf's shrinkage that are tried [fraction]."""
+
+CLEARLY = 0.05
+"""Share of the log loss by which less shrinkage must do better on runs held back [fraction]."""
+
+MOST = 0.5
+"""Share of a class that may be held back at once where a fit sees how sure it may be [fraction]."""
+
+UNKNOWN = "unknown"
+"""What a run is called that is like none of the runs learnt from."""
+
+Merge = str | Mapping[Any, Any] | Callable[[Any], Any] | None
+"""See `Classifier`."""
+
+
+class Classifier(ClassifierMixin, BaseEstimator):
+    """Learn classes from features of labelled runs; say of others which class, how probable, and whether it is one.
+
+    Linear discriminant analysis with a shrunk covariance. How much it is shrunk, and how sure probabilities may be, is
+    chosen on runs held back, in groups or contiguous blocks.
+
+    Parameters
+    ----------
+    merge : str, Mapping or callable, optional
+        From the classes that are learnt to those that are reported, where a state looks different under each load:
+        labels such as ``"worn@full load"`` are learnt one by one, and with ``"@"`` reported as ``"worn"``; a mapping
+        or a function says it of other labels.
+    unknown : float, optional
+        Share of runs of known classes that may be called ``"unknown"`` [fraction]; none is unless told.
+
+    Attributes
+    ----------
+    classes_ : ndarray
+        Classes that are reported.
+    learnt_classes_ : ndarray
+        Classes that were learnt.
+    calibration_ : Calibration
+        How probabilities are made of scores.
+    shrinkage_ : float
+        How much of Ledoit and Wolf's shrinkage was taken [fraction].
+    n_features_in_ : int
+        Features.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> labels = np.repeat(["sound", "worn"], 40)
+    >>> features = rng.standard_normal((80, 3)) + 4.0 * (labels == "worn")[:, None]
+    >>> Classifier().fit(features, labels).predict([[4.0, 4.0, 4.0]]).tolist()
+    ['worn']
+    """
+
+    def __init__(self, *, merge: Merge = None, unknown: float | None = None) -> None:
+        self.merge = merge
+        self.unknown = unknown
+
+    def fit(self, X: Any, y: Any, groups: Sequence[Any] | NDArray[Any] | None = None) -> "Classifier":
+        """Learn from labelled runs.
+
+        Parameters
+        ----------
+        X : array_like, shape (n, p)
+            Features of each run, in the order in which the runs were made [any unit].
+        y : array_like, shape (n,)
+            Class of each run.
+        groups : array_like, shape (n,), optional
+            Which runs belong together, as those of one specimen or one day; contiguous blocks of runs if not given.
+
+        Returns
+        -------
+        Classifier
+            This one.
+
+        Raises
+        ------
+        ValueError
+            If features are not finite numbers, or there are fewer than two classes.
+        """
+        share = self.unknown
+        if share is not None and not 0.0 < share < 1.0:
+            raise HydrostateError(f"unknown must be a share between 0 and 1, or None, got {share!r}")
+        checked: Any = validate_data(self, X, y, dtype=np.float64)
+        x, labels = checked
+        check_classification_targets(labels)
+        self.learnt_classes_, places = np.unique(labels, return_inverse=True)
+        self.classes_, self._merged = _merged(self.learnt_classes_, self.merge)
+        if len(self.classes_) < 2:
+            raise HydrostateError(f"two classes at least are wanted, got one class: {self.classes_[0]}")
+        self.shrinkage_, self.calibration_, self._far = _held_back(x, places, self._merged, groups)
+        self._learnt: Discriminant = learn(x, places, len(self.learnt_classes_), [self.shrinkage_])[0]
+        return self
+
+    def predict_proba(self, X: Any) -> Array:
+        """Return probabilities of the classes, given that a run is of one of them.
+
+        Parameters
+        ----------
+        X : array_like, shape (n, p)
+            Features [any unit].
+
+        Returns
+        -------
+        ndarray, shape (n, classes)
+            In the order of ``classes_`` [fraction].
+        """
+        x = self._features(X)
+        return self.calibration_.probabilities(self._learnt.scores(x), self._merged)
+
+    def likeness(self, X: Any) -> Array:
+        """Return how like the known classes runs are: the share of known runs that lie at least as far from them.
+
+        The known runs were held back for that (conformal anomaly detection, Laxhammar and Falkman 2015), so of runs of
+        known classes a share of at most ``s`` has a likeness of ``s`` or less, where new runs come as the old ones did.
+
+        Parameters
+        ----------
+        X : array_like, shape (n, p)
+            Features [any unit].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            One where nothing is known of that [fraction].
+        """
+        x = self._features(X)
+        return _likeness(self._far, self._learnt.distances(x))
+
+    def predict(self, X: Any) -> NDArray[Any]:
+        """Return the most probable class of each run, or ``"unknown"`` where that was asked for.
+
+        Parameters
+        ----------
+        X : array_like, shape (n, p)
+            Features [any unit].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Classes.
+        """
+        check_is_fitted(self)
+        found: NDArray[Any] = self.classes_[self.predict_proba(X).argmax(axis=1)]
+        if self.unknown is None:
+            return found
+        return np.where(self.likeness(X) <= self.unknown, UNKNOWN, found.astype(object))
+
+    def score(self, X: Any, y: Any, sample_weight: Any = None) -> float:
+        """Return the share of runs that is found right.
+
+        Parameters
+        ----------
+        X : array_like, shape (n, p)
+            Features [any unit].
+        y : array_like, shape (n,)
+            Their classes, those learnt or those reported.
+        sample_weight : array_like, shape (n,), optional
+            Weight of each run [dimensionless].
+
+        Returns
+        -------
+        float
+            Between 0 and 1 [fraction].
+        """
+        right = self.predict(X) == np.array([self._reported(one) for one in column_or_1d(y)], dtype=object)
+        return float(np.average(right, weights=sample_weight))
+
+    def judge(
+        self,
+        X: Any,
+        y: Any,
+        groups: Sequence[Any] | NDArray[Any] | None = None,
+        blocks: int = 10,
+    ) -> Verdicts:
+        """Judge every run by what the others teach, never those of its own group: cross-validation.
+
+        Parameters
+        ----------
+        X : array_like, shape (n, p)
+            Features of each run, in the order in which the runs were made [any unit].
+        y : array_like, shape (n,)
+            Class of each run.
+        groups : array_like, shape (n,), optional
+            Which runs belong together; contiguous blocks of runs if not given.
+        blocks : int
+            Parts that are held back one after the other.
+
+        Returns
+        -------
+        Verdicts
+            Of all runs. This classifier itself learns nothing.
+
+        Raises
+        ------
+        HydrostateError
+            If a reported class lies in one part alone, so that it cannot be learnt.
+        """
+        x, labels = np.asarray(X, dtype=np.float64), np.asarray(y)
+        if x.ndim != 2 or len(x) != len(labels) or not 2 <= blocks <= len(labels):
+            raise HydrostateError(
+                f"features of shape (runs, features), as many labels, and blocks from 2 to that are wanted, got "
+                f"features {x.shape}, {len(labels)} labels, {blocks} blocks"
+            )
+        learnt, places = np.unique(labels, return_inverse=True)
+        classes, merged = _merged(learnt, self.merge)
+        true, group = merged[places], None if groups is None else np.asarray(groups)
+        probabilities, likeness = np.zeros((len(x), len(classes))), np.zeros(len(x))
+        for held in folds(true if groups is None else places, group, blocks):
+            rest = np.setdiff1d(np.arange(len(x)), held)
+            lacking = np.setdiff1d(np.arange(len(classes)), true[rest])
+            if lacking.size:
+                raise HydrostateError(f"class {classes[lacking[0]]} occurs in one block alone, so it cannot be learnt")
+            part = type(self)(**self.get_params()).fit(x[rest], labels[rest], None if group is None else group[rest])
+            probabilities[held], likeness[held] = part.predict_proba(x[held]), part.likeness(x[held])
+        return Verdicts(tuple(str(one) for one in classes), true, probabilities, likeness)
+
+    def _features(self, X: Any) -> Array:
+        """Return features as they were learnt, after scikit-learn's checks."""
+        check_is_fitted(self)
+        checked: Any = validate_data(self, X, reset=False, dtype=np.float64)
+        return np.asarray(checked, dtype=np.float64)
+
+    def _reported(self, label: Any) -> Any:
+        """Return what a label is reported as; one that was not learnt stands for itself."""
+        known = np.flatnonzero(self.learnt_classes_ == label)
+        return self.classes_[self._merged[known[0]]] if known.size else label
+
+
+def _merged(learnt: NDArray[Any], merge: Merge) -> tuple[NDArray[Any], IntArray]:
+    """Return the classes that are reported, and the place of each learnt one among them."""
+    if merge is None:
+        return learnt, np.arange(len(learnt))
+    if isinstance(merge, str):
+        names = [str(one).split(merge)[0] for one in learnt]
+    elif isinstance(merge, Mapping):
+        names = [merge.get(one, one) for one in learnt.tolist()]
+    elif callable(merge):
+        names = [merge(one) for one in learnt.tolist()]
+    else:
+        raise HydrostateError(f"merge must be a text, a mapping or a function of a label, got {merge!r}")
+    classes, merged = np.unique(np.array(names), return_inverse=True)
+    return classes, merged.astype(np.int64)
+
+
+def _held_back(
+    x: Array, places: IntArray, merged: IntArray, groups: Sequence[Any] | NDArray[Any] | None
+) -> tuple[float, Calibration, Array]:
+    """Return shrinkage and calibration with which runs held back are most probable, and the distances of these."""
+    scores, far = [list[Array]() for _ in SHRINKAGES], [list[Array]() for _ in SHRINKAGES]
+    true = list[IntArray]()
+    try:
+        parts = folds(places, groups, INNER, MOST)
+    except HydrostateError:
+        parts = list[IntArray]()
+    for held in parts:
+        rest = np.setdiff1d(np.arange(len(x)), held)
+        judged = held[np.isin(merged[places[held]], merged[places[rest]])]
+        if len(np.unique(merged[places[rest]])) < 2 or not judged.size:
+            continue
+        true.append(merged[places[judged]])
+        for k, part in enumerate(learn(x[rest], places[rest], len(merged), SHRINKAGES)):
+            scores[k].append(part.scores(x[judged]))
+            far[k].append(part.distances(x[judged]))
+    if not true:
+        return SHRINKAGES[0], Calibration(), np.zeros((0, 2))
+    labels, best, loss = np.concatenate(true), 0, np.inf
+    found = [calibrated(np.concatenate(one), merged, labels) for one in scores]
+    for k, one in enumerate(found):
+        now = log_loss(one.probabilities(np.concatenate(scores[k]), merged), labels)
+        if now < (1.0 - CLEARLY) * loss:
+            best, loss = k, now
+    return SHRINKAGES[best], found[best], np.sort(np.concatenate(far[best]), axis=0)
+
+
+def _likeness(known: Array, distances: Array) -> Array:
+    """Return the share of known distances, and of the run itself, that are as large; twice the smaller of the two."""
+    if not len(known):
+        return np.ones(len(distances))
+    beyond = [
+        len(known) - np.searchsorted(one, other, side="left") for one, other in zip(known.T, distances.T, strict=True)
+    ]
+    return np.minimum(2.0 * (np.min(beyond, axis=0) + 1.0) / (len(known) + 1.0), 1.0)

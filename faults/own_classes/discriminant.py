@@ -1,0 +1,137 @@
+"""Linear discriminant analysis with a shrunk covariance: scores of classes, and how far a run is from all of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+
+from estimation.arrays import Array, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Discriminant:
+    """What was learnt of the classes: one normal distribution each, all of one covariance.
+
+    Parameters
+    ----------
+    mean, scale : ndarray, shape (p,)
+        By which features are standardised [the feature's unit].
+    centres : ndarray, shape (classes, p)
+        Means of the classes, standardised [dimensionless].
+    factor : ndarray, shape (p, p)
+        Lower Cholesky factor of the covariance [dimensionless].
+    log_priors : ndarray, shape (classes,)
+        Logarithm of each class's share; minus infinity for one that was not there [dimensionless].
+    """
+
+    mean: Array
+    scale: Array
+    centres: Array
+    factor: Array
+    log_priors: Array
+
+    def scores(self, x: Array) -> Array:
+        """Return log probabilities of classes, but for a constant of each run.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n, p)
+            Features.
+
+        Returns
+        -------
+        ndarray, shape (n, classes)
+            Scores [dimensionless].
+        """
+        weights = cho_solve((self.factor, True), self.centres.T)
+        shift = self.log_priors - 0.5 * np.einsum("ij,ji->i", self.centres, weights)
+        return (x - self.mean) / self.scale @ weights + shift
+
+    def distances(self, x: Array) -> Array:
+        """Return the Mahalanobis distance of every run from the nearest class: along the classes, and in all.
+
+        Along the classes is the space that their means span: there a class that was not learnt is not hidden by what
+        varies in every class, as temperatures do.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n, p)
+            Features.
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            Distances [standard deviations].
+        """
+        known = np.isfinite(self.log_priors)
+        white = _solved(self.factor, ((x - self.mean) / self.scale).T)
+        centres = _solved(self.factor, self.centres[known].T)
+        basis, size, _ = np.linalg.svd(centres - centres.mean(axis=1, keepdims=True), full_matrices=False)
+        basis = basis[:, size > 1e-9 * size[0]]
+        along = _nearest(basis.T @ white, basis.T @ centres)
+        return np.column_stack([along, _nearest(white, centres)])
+
+
+def _nearest(columns: Array, centres: Array) -> Array:
+    squares = [np.einsum("ij,ij->j", left, left) for left in (columns - one[:, None] for one in centres.T)]
+    return np.sqrt(np.min(squares, axis=0))
+
+
+def _solved(factor: Array, columns: Array) -> Array:
+    return np.asarray(solve_triangular(factor, columns, lower=True), dtype=np.float64)
+
+
+def learn(x: Array, places: IntArray, count: int, shares: Sequence[float] = (1.0,)) -> list[Discriminant]:
+    """Learn classes from labelled runs.
+
+    The covariance within classes is shrunk by the rule of Ledoit and Wolf (Journal of Multivariate Analysis 88, 2004,
+    page 365), after each feature is brought to unit deviation within classes, or by a share of what the rule asks.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n, p)
+        Features [any unit].
+    places : ndarray of int, shape (n,)
+        Class of each run.
+    count : int
+        Classes; one may be without runs.
+    shares : sequence of float
+        How much of the rule's shrinkage is taken [fraction].
+
+    Returns
+    -------
+    list of Discriminant
+        What was learnt, for each share.
+    """
+    from sklearn.covariance import ledoit_wolf_shrinkage
+
+    mean, scale = x.mean(axis=0), _positive(x.std(axis=0))
+    z = (x - mean) / scale
+    runs = np.bincount(places, minlength=count)
+    centres = np.stack([z[places == k].mean(axis=0) if runs[k] else np.zeros(z.shape[1]) for k in range(count)])
+    within = z - centres[places]
+    spread = _positive(within.std(axis=0))
+    within /= spread
+    rule = float(ledoit_wolf_shrinkage(within, assume_centered=True))
+    covariance = within.T @ within / len(within)
+    log_priors = np.full(count, -np.inf)
+    log_priors[runs > 0] = np.log(runs[runs > 0] / len(places))
+    return [
+        Discriminant(mean, scale, centres, spread[:, None] * _factor(covariance, share * rule), log_priors)
+        for share in shares
+    ]
+
+
+def _factor(covariance: Array, shrinkage: float) -> Array:
+    """Return the lower Cholesky factor of a covariance that is drawn towards a multiple of the unit matrix."""
+    level = float(np.trace(covariance)) / len(covariance)
+    shrunk = (1.0 - shrinkage) * covariance
+    # a covariance of fewer runs than features, or of constant ones, still needs an inverse
+    shrunk[np.diag_indices_from(shrunk)] += shrinkage * level + 1e-9 * (1.0 + level)
+    return np.tril(np.asarray(cho_factor(shrunk, lower=True)[0], dtype=np.float64))
+
+
+def _positive(deviation: Array) -> Array:
+    """Return deviations, 1 in place of those of features that do not vary."""
+    return np.where(deviation > 1e-12 * (1.0 + deviation.max(initial=0.0)), deviation, 1.0)

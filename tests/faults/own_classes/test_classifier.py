@@ -1,0 +1,161 @@
+import pickle
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.arrays import Array
+from plant.errors import HydrostateError
+
+pytest.importorskip("sklearn", reason="scikit-learn is not installed (extra learn)")
+
+from sklearn.base import clone
+from sklearn.model_selection import cross_val_score
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+from faults.own_classes.classifier import Classifier
+
+
+def runs(seed: int, count: int, apart: float, width: int = 3) -> tuple[Array, np.ndarray[Any, Any]]:
+    """Return features and labels of two classes that take turns every five runs."""
+    rng = np.random.default_rng(seed)
+    labels = np.tile(np.repeat(["sound", "worn"], 5), count // 10)
+    return rng.standard_normal((count, width)) + apart * (labels == "worn")[:, None], labels
+
+
+@parametrize_with_checks([Classifier()])
+@pytest.mark.filterwarnings("ignore")
+def test_it_keeps_the_conventions_of_scikit_learn(estimator: Any, check: Any) -> None:
+    # the checks divide by zero on purpose; our floating point raises otherwise
+    with np.errstate(all="ignore"):
+        check(estimator)
+
+
+def test_separate_classes_are_told_apart_from_other_blocks_alone() -> None:
+    verdicts = Classifier().judge(*runs(1, 200, 4.0))
+    assert verdicts.balanced_accuracy > 0.98
+    assert verdicts.classes == ("sound", "worn")
+    np.testing.assert_allclose(verdicts.probabilities.sum(axis=1), 1.0)
+
+
+def test_classes_that_are_noise_are_not_told_apart_and_nothing_is_claimed() -> None:
+    verdicts = Classifier().judge(*runs(2, 400, 0.0))
+    assert 0.4 < verdicts.balanced_accuracy < 0.6
+    assert verdicts.probabilities.max() < 0.7
+
+
+def test_probabilities_are_those_of_the_two_normal_distributions_that_made_the_runs() -> None:
+    x, labels = runs(3, 2000, 0.8)
+    learnt = Classifier().fit(x, labels)
+    other, _ = runs(4, 400, 0.8)
+    odds = 0.8 * (other.sum(axis=1) - 1.2)
+    truth = 1.0 / (1.0 + np.exp(-odds))
+    assert np.abs(learnt.predict_proba(other)[:, 1] - truth).max() < 0.08
+
+
+def test_neighbours_that_are_copies_do_not_make_probabilities_sure() -> None:
+    # every run ten times over, and blocks of ten apart from one another: the labels are noise
+    x, labels = runs(5, 60, 0.0)
+    order = np.random.default_rng(6).permutation(60)
+    x, labels = np.repeat(x[order], 10, axis=0), np.repeat(labels[order], 10)
+    groups = np.repeat(np.arange(60), 10)
+    assert Classifier().fit(x, labels, groups).predict_proba(x).max() < 0.75
+    assert 0.3 < Classifier().judge(x, labels, groups).balanced_accuracy < 0.7
+
+
+def signs(seed: int) -> tuple[Array, np.ndarray[Any, Any], list[str]]:
+    """Return runs whose state shows with the opposite sign under the other load."""
+    rng = np.random.default_rng(seed)
+    worn, load = np.arange(300) // 10 % 2, np.arange(300) // 5 % 2
+    x = np.column_stack([(2 * worn - 1.0) * (2 * load - 1.0), 5.0 * load]) + 0.3 * rng.standard_normal((300, 2))
+    states = np.where(worn == 1, "worn", "sound")
+    return x, states, [f"{state}@{place}" for state, place in zip(states, load, strict=True)]
+
+
+def test_a_state_that_looks_different_under_each_load_is_found_by_learning_both_and_reporting_one() -> None:
+    x, states, under_load = signs(7)
+    assert Classifier().judge(x, states).balanced_accuracy < 0.7
+    merged = Classifier(merge="@").judge(x, under_load)
+    assert merged.classes == ("sound", "worn")
+    assert merged.balanced_accuracy > 0.98
+
+
+@pytest.mark.parametrize(
+    "merge",
+    [
+        "@",
+        {f"{state}@{load}": state for state in ("sound", "worn") for load in (0, 1)},
+        lambda name: name.split("@")[0],
+    ],
+)
+def test_merging_is_said_by_a_text_a_mapping_or_a_function(merge: Any) -> None:
+    x, states, under_load = signs(8)
+    learnt = Classifier(merge=merge).fit(x, under_load)
+    assert learnt.classes_.tolist() == ["sound", "worn"]
+    assert learnt.learnt_classes_.tolist() == ["sound@0", "sound@1", "worn@0", "worn@1"]
+    assert learnt.score(x, states) == learnt.score(x, under_load) > 0.98
+
+
+def test_what_was_not_learnt_is_unknown_and_what_was_is_not() -> None:
+    x, labels = runs(9, 400, 5.0)
+    learnt = Classifier(unknown=0.01).fit(x, labels)
+    fresh, _ = runs(10, 2000, 5.0)
+    assert np.mean(learnt.predict(fresh) == "unknown") < 0.02
+    along = learnt.predict([[12.0, 12.0, 12.0]])
+    across = learnt.predict([[9.0, -9.0, 0.0]])
+    assert [*along, *across] == ["unknown", "unknown"]
+
+
+def test_a_new_class_along_the_others_is_not_hidden_by_what_varies_in_all() -> None:
+    x, labels = runs(11, 400, 6.0, width=1)
+    drift = 100.0 * np.random.default_rng(12).standard_normal((400, 1))
+    blocks = np.repeat(np.random.default_rng(13).standard_normal((4, 30)) * 20.0, 100, axis=0)
+    x = np.column_stack([x + drift, drift, blocks + np.random.default_rng(14).standard_normal((400, 30))])
+    learnt = Classifier(unknown=0.01).fit(x, labels)
+    worse = x[labels == "worn"] + np.concatenate([[9.0], np.zeros(31)])
+    assert np.mean(learnt.predict(worse) == "unknown") > 0.8
+    assert np.mean(learnt.predict(x) == "unknown") < 0.02
+
+
+def test_it_is_cloned_kept_and_scored_as_any_other() -> None:
+    x, labels = runs(15, 100, 3.0)
+    learnt = clone(Classifier(merge="@", unknown=0.02)).fit(x, labels)
+    again = pickle.loads(pickle.dumps(learnt))  # noqa: S301 -- our own
+    np.testing.assert_array_equal(again.predict_proba(x), learnt.predict_proba(x))
+    assert cross_val_score(Classifier(), x, labels).mean() > 0.95
+
+
+@pytest.mark.parametrize(
+    ("arguments", "labels", "message"),
+    [
+        ({"unknown": 1.5}, "ab", "unknown must be a share between 0 and 1"),
+        ({"merge": 3}, "ab", "merge must be a text, a mapping or a function"),
+        ({"merge": {"a": "c", "b": "c"}}, "ab", "two classes at least are wanted, got one class: c"),
+    ],
+)
+def test_what_cannot_be_learnt_is_refused(arguments: dict[str, Any], labels: str, message: str) -> None:
+    with pytest.raises(HydrostateError, match=message):
+        Classifier(**arguments).fit(np.arange(20.0)[:, None], list(labels) * 10)
+
+
+def test_a_class_in_one_group_alone_cannot_be_judged() -> None:
+    x, labels = runs(16, 100, 3.0)
+    groups = np.where(labels == "worn", 9, np.arange(100) // 10)
+    with pytest.raises(HydrostateError, match="class worn occurs in one block alone"):
+        Classifier().judge(x, labels, groups)
+
+
+@pytest.mark.parametrize(("labels", "blocks"), [(9, 2), (10, 1), (10, 11)])
+def test_labels_and_blocks_that_do_not_fit_are_refused(labels: int, blocks: int) -> None:
+    with pytest.raises(HydrostateError, match="as many labels, and blocks from 2 to that are wanted"):
+        Classifier().judge(np.zeros((10, 2)), np.arange(labels) % 2, blocks=blocks)
+
+
+def test_scikit_learn_is_asked_for_by_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    import faults.own_classes.face as face
+
+    monkeypatch.setitem(sys.modules, "sklearn.base", None)
+    monkeypatch.delitem(sys.modules, "faults.own_classes.classifier")
+    with pytest.raises(HydrostateError, match=r"hydrostate\[learn\]"):
+        face.Classifier(merge="@")

@@ -1,0 +1,78 @@
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import hydrostate as hs
+from estimation.arrays import Array
+from plant.errors import HydrostateError
+
+
+def table(values: Array, step: float = 0.01) -> pd.DataFrame:
+    return pd.DataFrame({"p": values, "q": 2.0 * values + 1.0}, index=np.arange(values.size) * step)
+
+
+def test_means_and_deviations_of_parts_ignore_the_order_within_a_part() -> None:
+    cycles = np.random.default_rng(0).standard_normal((4, 3, 60))
+    shuffled = cycles.copy()
+    shuffled[:, :, :5] = cycles[:, :, 4::-1]
+    one, other = (hs.features(x, bands=0) for x in (cycles, shuffled))
+    pd.testing.assert_frame_equal(one, other)
+    assert one.shape == (4, 3 * 28)
+
+
+def test_power_stands_in_the_band_of_the_tone_and_follows_its_size() -> None:
+    time = np.arange(1000) * 0.01
+    rows = [table(size * np.sin(2.0 * np.pi * 12.0 * time)) for size in (1.0, 10.0)]
+    found = hs.features(rows, parts=1, bands=[0.0, 5.0, 20.0, 50.0])
+    power = found[[name for name in found if name.startswith("p power")]]
+    assert power.iloc[0].idxmax() == "p power 5-20 Hz"
+    assert float(power.iloc[1].max() - power.iloc[0].max()) == pytest.approx(np.log(100.0), abs=1e-3)
+
+
+def test_a_long_log_is_cut_into_its_cycles() -> None:
+    values = np.repeat([1.0, 2.0, 5.0], 100)
+    found = hs.features(table(values), cycle=1.0, parts=2, bands=0)
+    assert found["p mean 1/2"].tolist() == [1.0, 2.0, 5.0]
+    assert found["q mean 2/2"].tolist() == [3.0, 5.0, 11.0]
+
+
+def test_logs_that_are_read_and_gaps_in_them_are_taken() -> None:
+    log = hs.simulate("normal", duration=1.0, sample_time=1e-3, seed=1)
+    found = hs.features([log, log.record], channels=["position_m"], parts=4)
+    np.testing.assert_array_equal(found.iloc[0], found.iloc[1])
+    holed = table(np.arange(100.0))
+    holed.iloc[50] = np.nan
+    np.testing.assert_allclose(hs.features(holed, parts=4), hs.features(table(np.arange(100.0)), parts=4))
+
+
+def test_a_constant_channel_has_finite_features() -> None:
+    found = hs.features(np.concatenate([np.zeros((2, 1, 40)), np.full((2, 1, 40), 7.0)], axis=1))
+    assert np.isfinite(found.to_numpy()).all()
+
+
+def test_columns_do_not_hang_on_the_other_runs() -> None:
+    short, long = table(np.random.default_rng(1).standard_normal(200)), table(np.arange(200.0))
+    pd.testing.assert_series_equal(hs.features([short, long]).iloc[0], hs.features(short).iloc[0])
+
+
+@pytest.mark.parametrize(
+    ("runs", "options", "message"),
+    [
+        (np.zeros((4, 60)), {}, r"shape \(runs, channels, samples\) is wanted"),
+        (np.zeros((4, 2, 60)), {"channels": ["p"]}, "a name for each of 2 channels"),
+        (np.zeros((4, 2, 60)), {"cycle": 1.0}, "without a cycle"),
+        (np.zeros((4, 2, 6)), {}, "parts must lie between 1 and the samples of the shortest run, 6"),
+        (np.full((1, 1, 60), np.inf), {}, "run 0 must hold finite values"),
+        ([], {}, "one run at least"),
+        ([table(np.arange(50.0))], {"channels": ["r"]}, "run 0 has no channel 'r', it has p, q"),
+        ([table(np.arange(50.0)), table(np.arange(50.0), 0.02)], {}, "run 1 has a sample every 0.02 s"),
+        ([table(np.arange(50.0))], {"cycle": 1.0}, "cycle must be as long as run 0 at most"),
+        ([table(np.arange(50.0))], {"bands": [5.0, 1.0]}, "two rising frequencies"),
+        ([table(np.arange(50.0))], {"bands": [5.0, 5.1]}, "the band 5 to 5.1 Hz holds no frequency"),
+    ],
+)
+def test_runs_that_do_not_fit_are_refused(runs: Any, options: dict[str, Any], message: str) -> None:
+    with np.errstate(all="ignore"), pytest.raises(HydrostateError, match=message):
+        hs.features(runs, **options)
