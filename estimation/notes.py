@@ -81,6 +81,10 @@ class EstimateCode(Code):
     FRICTION_LAWS_DISAGREE = (
         "two structures of friction explain the log alike and put bulk modulus at {least_pa:.3g} and {most_pa:.3g} Pa"
     )
+    FORCES_ON_ANY_SCALE = (
+        "position alone does not hold the scale of forces: bulk modulus between {least_pa:.3g} and {most_pa:.3g} Pa "
+        "explains the log, with friction in proportion"
+    )
     INNOVATIONS_LARGE = (
         "the residuals of {channel} are {ratio:.1f} times larger than the filter expects (NIS {nis:.1f}, "
         "1 is expected): model and log disagree, and the interval is too narrow"

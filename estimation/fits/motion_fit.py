@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from estimation.fits.descent import Point, descend, descend_together
 from estimation.fits.flow_fit import DRAIN_START, LEAD_START, LEAST_LEAKAGE
+from estimation.fits.force_scale import Way, rescaled
 from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
@@ -55,6 +56,9 @@ MOST_SAMPLES = 30_000
 SCREENED = 4_000
 """Samples on which starts are screened."""
 
+SEARCHED = 10_000
+"""Samples on which the likelier starts are carried on; a longer log goes on from where they end."""
+
 WAYS: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = (
     ((1.0, 1e6), (1.0, 1e3)),
     ((1e2, 1e6), (1.0, 1e3)),
@@ -67,6 +71,9 @@ failing that, straight down."""
 
 SCREENING, NEARING, FINISHING = 10, 12, 25
 """Evaluations of the model in the three stages."""
+
+NEAR_ENOUGH = 0.01
+"""Cost that a further step must promise while a start is only brought near [dimensionless]."""
 
 FINALISTS = 3
 """Starts that are carried on, until one explains the log."""
@@ -81,7 +88,7 @@ presliding is of another make, noise alone explains a tenth to a half of the err
 
 LARGEST_DISAGREEMENT = 0.05
 """Relative difference in bulk modulus of two structures of friction that explain the log alike, above which neither
-is believed [fraction]."""
+is believed; the same between optima of one structure with forces on another scale [fraction]."""
 
 ALIKE = 5.0
 """Difference of log-likelihood up to which two structures are said to explain a log alike [dimensionless]."""
@@ -124,13 +131,16 @@ def fit_motion(
     noise = (variances or measurement_variances(record, ("motor_speed_rad_s",)))["motor_speed_rad_s"]
     log = _log(record, parameters, uncertainties or {}, noise)
     starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
-    first = _searched(MOTION_FORMS[0], log, starts)
-    fits = [first, _compared(MOTION_FORMS[1], log, first, starts)]
+    first, others = _searched(MOTION_FORMS[0], log, starts)
+    second, more = _compared(MOTION_FORMS[1], log, first, starts)
+    fits, others = [first, second], [*others, *more]
     best = min(fits, key=lambda fit: fit.cost)
     found = weighed(fits)
     value, std = found["bulk_modulus"]
-    believed = with_structure(found, STRUCTURE)
-    return FormFit(believed, std / value, best.chi_square[0], _objections(fits, best), best.rig_slopes)
+    apart = max((abs(float(np.log(other / value))) for other in others), default=0.0)
+    believed = with_structure(found, float(np.hypot(STRUCTURE, apart)))
+    bound = float(np.hypot(std / value, apart))
+    return FormFit(believed, bound, best.chi_square[0], _objections(fits, best, others), best.rig_slopes)
 
 
 def _log(record: Record, p: EhaParameters, uncertainties: Mapping[str, float], speed_variance: float) -> GreyBoxLog:
@@ -194,17 +204,24 @@ def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
     ]
 
 
-def _searched(form: GreyBoxModel, log: GreyBoxLog, starts: list[dict[str, float]]) -> GreyBoxFit:
-    """Return the best of several starts; stop at one that explains the log."""
+def _searched(form: GreyBoxModel, log: GreyBoxLog, starts: list[dict[str, float]]) -> tuple[GreyBoxFit, list[float]]:
+    """Return the best of several starts, and other bulk moduli that explain the log; stop at a start that does."""
     whole = FreedProblem(form, log, UNKNOWNS, LINEAR)
+    part = whole.on(log.beginning(SEARCHED))
+    explained = 0.5 * EXPLAINED * len(part.log.measured)
     guesses, bounds = _guesses(whole, starts)
-    best: Point | None = None
-    for near in _brought_near(whole, guesses, bounds):
-        found = descend(whole.at, near, FINISHING, bounds)
-        best = found if best is None or found.cost < best.cost else best
-        if 2.0 * best.cost < EXPLAINED * len(log.measured):
+    best, others = part.at(guesses[0]), list[Point]()
+    for near in _brought_near(part, guesses, bounds):
+        best = min(best, descend(part.at, near, FINISHING, bounds), key=lambda point: point.cost)
+        if best.cost < explained:
+            near = part.on(part.log.softened(*WAYS[0][1]))
+            best, others = rescaled(part, best, Way(near, NEARING, NEAR_ENOUGH, FINISHING, bounds))
             break
-    return concluded(whole, best or whole.at(guesses[0]))
+    if len(part.log.measured) < len(log.measured):
+        best = descend(whole.at, best.theta, FINISHING, bounds)
+    return concluded(whole, best), [
+        part.model.values(other.theta)["bulk_modulus"] for other in others if other.cost < explained
+    ]
 
 
 def _guesses(problem: Problem, starts: list[dict[str, float]]) -> tuple[list[Array], tuple[Array, Array]]:
@@ -218,25 +235,30 @@ def _brought_near(whole: FreedProblem, guesses: list[Array], bounds: tuple[Array
     for first, second in WAYS:
         screen = whole.on(whole.log.softened(*first).beginning(SCREENED))
         near = whole.on(whole.log.softened(*second))
-        screened = descend_together(screen.at_each, guesses, SCREENING, bounds)
+        screened = descend_together(screen.at_each, guesses, SCREENING, bounds, NEAR_ENOUGH)
         for candidate in sorted(screened, key=lambda point: point.cost)[:FINALISTS]:
-            yield descend(near.at, candidate.theta, NEARING, bounds).theta
+            yield descend(near.at, candidate.theta, NEARING, bounds, NEAR_ENOUGH).theta
 
 
-def _compared(form: GreyBoxModel, log: GreyBoxLog, other: GreyBoxFit, starts: list[dict[str, float]]) -> GreyBoxFit:
+def _compared(
+    form: GreyBoxModel, log: GreyBoxLog, other: GreyBoxFit, starts: list[dict[str, float]]
+) -> tuple[GreyBoxFit, list[float]]:
     """Return the fit of the other structure: from where the first ended, or by itself where that explains nothing."""
     if other.chi_square[0] > EXPLAINED:
         return _searched(form, log, starts)
     whole = FreedProblem(form, log, UNKNOWNS, LINEAR)
     _, bounds = _guesses(whole, starts)
-    return concluded(whole, descend(whole.at, other.theta, NEARING, bounds))
+    return concluded(whole, descend(whole.at, other.theta, NEARING, bounds)), []
 
 
-def _objections(fits: list[GreyBoxFit], best: GreyBoxFit) -> tuple[Note, ...]:
+def _objections(fits: list[GreyBoxFit], best: GreyBoxFit, others: list[float]) -> tuple[Note, ...]:
     reasons: list[Note] = []
     if best.chi_square[0] > EXPLAINED:
         reasons.append(EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5))
     values = [fit.values["bulk_modulus"] for fit in fits if fit.cost < best.cost + ALIKE]
     if max(values) > (1.0 + LARGEST_DISAGREEMENT) * min(values):
         reasons.append(EstimateCode.FRICTION_LAWS_DISAGREE.note(least_pa=min(values), most_pa=max(values)))
+    scales = [*others, best.values["bulk_modulus"]]
+    if max(scales) > (1.0 + LARGEST_DISAGREEMENT) * min(scales):
+        reasons.append(EstimateCode.FORCES_ON_ANY_SCALE.note(least_pa=min(scales), most_pa=max(scales)))
     return tuple(reasons)

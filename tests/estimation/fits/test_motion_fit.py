@@ -6,10 +6,14 @@ import pytest
 
 from estimation.fits.motion_fit import fit_motion
 from estimation.notes import EstimateCode
+from faults.conditions import CONDITIONS, parameters_for
+from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
+from plant.eha.simulate import PLANTS, simulate
 from plant.errors import LogError
 from plant.log.files import read_record
 from plant.log.record import Record
+from plant.sensors.sensors import BENCH
 
 HEALTHY = EhaParameters()
 
@@ -48,6 +52,17 @@ def test_a_wrong_law_of_friction_is_objected_to(shared: Path) -> None:
     fit = fit_motion(record.replace(position_m=shaken), HEALTHY, HEALTHY.bulk_modulus)
     (large,) = (note for note in fit.reasons if note.code == EstimateCode.POSITION_RESIDUALS_LARGE)
     assert large.data["ratio"] == pytest.approx(fit.chi_square**0.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("condition", ["major_leakage_minor_friction", "minor_leakage_major_friction"])
+def test_a_log_that_does_not_hold_the_scale_of_forces_says_so(condition: str) -> None:
+    parameters = parameters_for(CONDITIONS[condition])
+    speed = make_drive("steps", 10.0, 1e-3, parameters, np.random.default_rng(1))
+    run = simulate(PLANTS["lumped"], speed, 1e-3, parameters, sensors=BENCH, rng=np.random.default_rng(2))
+    fit = fit_motion(run.replace(differential_pressure_pa=None), HEALTHY, HEALTHY.bulk_modulus)
+    value, std = fit.parameters["bulk_modulus"]
+    assert fit.reasons or abs(value - HEALTHY.bulk_modulus) < 3.0 * std
 
 
 def test_a_log_without_position_is_refused_with_what_it_lacks() -> None:
