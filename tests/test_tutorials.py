@@ -16,7 +16,7 @@ from tests.c_compiler import compiler
 ROOT = Path(__file__).resolve().parents[1]
 TUTORIALS = ROOT / "docs" / "tutorials"
 PAGES = sorted(path.stem for path in TUTORIALS.glob("*.md"))
-FAST = ("leaking", "your-log")
+FAST = ("your-log",)
 """Those that ask the two questions most users have; the others take the minutes of the slow tests."""
 
 BLOCK = re.compile(r"```(sh|python)\n(.*?)```", re.DOTALL)

@@ -149,13 +149,11 @@ CALLS: dict[str, tuple[str, ...]] = {
     "diagnose, without pressure": ("diagnose", "healthy.csv", "stuck.csv", "--no-pressure"),
 }
 
+SLOW = {name for name in CALLS if "without pressure" in name or "long" in name} | {"diagnose, most logs"}
+
 
 @pytest.mark.parametrize(
-    "call",
-    [
-        pytest.param(name, marks=pytest.mark.slow) if "without pressure" in name or "long" in name else name
-        for name in CALLS
-    ],
+    "call", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in CALLS]
 )
 def test_with_every_sentence_put_as_x_all_but_text_stays(
     call: str,

@@ -170,7 +170,7 @@ def test_without_pressure_the_motion_form_is_chosen(shared: Path) -> None:
     assert set(answer.others) == {"leakage_coefficient", "flow_bias"}
 
 
-@pytest.mark.parametrize("form", ["flow", "pressure"])
+@pytest.mark.parametrize("form", [pytest.param("flow", marks=pytest.mark.slow), "pressure"])
 def test_what_is_not_known_of_the_chamber_volume_is_not_known_of_bulk_modulus(form: str) -> None:
     log = bench_log("lumped", "steps", "normal")
     exact, vague = (

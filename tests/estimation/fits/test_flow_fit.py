@@ -85,6 +85,7 @@ def test_an_uncertain_chamber_volume_makes_bulk_modulus_as_uncertain() -> None:
     assert fit.rig_slopes["chamber_volume"]["bulk_modulus"] / value == pytest.approx(1.0, rel=0.05)
 
 
+@pytest.mark.slow
 def test_noise_of_speed_and_position_widens_the_interval() -> None:
     record = log("minor_friction", 15)
     calm = fit_flow(record, HEALTHY, 2e8)

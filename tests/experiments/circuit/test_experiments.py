@@ -130,6 +130,7 @@ def test_the_validation_input_is_nine_steps_that_turn_round() -> None:
     assert np.all((np.abs(steps) >= 2.5) & (np.abs(steps) <= 4.0))
 
 
+@pytest.mark.slow
 def test_the_flow_form_finds_it_from_every_start(estimates: pd.DataFrame) -> None:
     found = estimates[estimates["form"] == "flow"]
     assert len(found) == 2

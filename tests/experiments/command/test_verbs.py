@@ -243,6 +243,7 @@ def test_a_log_that_no_model_fits_is_called_so(steps: dict[str, Path], folder: P
     assert AdviceCode.FIT_DOUBTED in codes(one)
 
 
+@pytest.mark.slow
 def test_transfer_functions_are_scored_on_request(steps: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[float] = []
 
@@ -292,6 +293,7 @@ def test_identify_takes_another_structure(steps: dict[str, Path]) -> None:
     assert one["delay"] == {"samples": 3, "seconds": pytest.approx(6e-3)}
 
 
+@pytest.mark.slow
 def test_an_actuator_that_is_not_the_papers_comes_back_through_its_rig_file(folder: Path) -> None:
     rig = folder / "rig.toml"
     text = rig_template().replace("piston_area = 0.00152", "piston_area = 0.00304")
