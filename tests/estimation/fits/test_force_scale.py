@@ -60,7 +60,7 @@ def test_an_optimum_on_another_scale_that_is_as_good_is_told_of(scale: float) ->
 
 
 def test_all_forces_grow_together_and_what_yields_to_them_falls() -> None:
-    _, ends = searched(flat(lambda theta: 0.0))
+    _, ends = searched(flat(lambda _: 0.0))
     fixed = ("flow_bias", "speed_lead")
     for factor, end in zip((0.8, 1.25), ends, strict=True):
         before, after = MODEL.values(HERE), MODEL.values(end.theta)
