@@ -160,8 +160,9 @@ def circuit_flows(speed: Scalar, densities: tuple[Scalar, Scalar], pressures: Pr
     )
     # the drain's check valve: the case stands at the accumulator's pressure, or floats below it
     case = minimum(pressures.supply, 0.5 * (pressures.a + pressures.b))
-    drained_a = drain * (pressures.a - case) * upstream
-    drained_b = drain * (pressures.b - case) * upstream
+    # a chamber below the case takes what the other one leaks into it, and so the upstream oil
+    drained_a = drain * (pressures.a - case) * where(pressures.a > case, density_a, upstream)
+    drained_b = drain * (pressures.b - case) * where(pressures.b > case, density_b, upstream)
     made_up_a, made_up_b = (
         make_up_flow(chamber, other, pressures.supply, p.makeup_conductance, p.makeup_opening, p.pilot_share)
         for chamber, other in ((pressures.a, pressures.b), (pressures.b, pressures.a))

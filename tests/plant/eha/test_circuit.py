@@ -104,6 +104,20 @@ def test_a_drain_that_floats_passes_on_all_that_it_takes(a: float, b: float) -> 
     assert flows.a * (a - b) < 0.0
 
 
+@pytest.mark.parametrize("a_is_higher", [True, False])
+def test_a_chamber_above_the_case_drains_oil_of_its_own_density(*, a_is_higher: bool) -> None:
+    # half of the drain is all the leakage: nothing crosses inside
+    only_drained = replace(DRAINED, leakage_coefficient=1e-12, pump_crossport_leakage=0.0)
+    supply = only_drained.accumulator_pressure
+    high, low = (supply + 4e5, 1.04), (supply + 2e5, 1.01)
+    (a, density_a), (b, density_b) = (high, low) if a_is_higher else (low, high)
+    found = circuit_flows(0.0, (density_a, density_b), Pressures(a, b, supply), only_drained)
+    drain = only_drained.cylinder_drain_leakage + only_drained.pump_case_leakage
+    assert found.a == pytest.approx(-drain * (a - supply) * density_a, rel=1e-12)
+    assert found.b == pytest.approx(-drain * (b - supply) * density_b, rel=1e-12)
+    assert found.a + found.b + found.supply == pytest.approx(0.0, abs=1e-12 * found.supply)
+
+
 def test_a_drain_takes_oil_from_both_chambers_once_they_stand_above_the_accumulator() -> None:
     level = circuit_flows(0.0, (1.02, 1.02), Pressures(9e5, 9e5, 5e5), DRAINED)
     drain = DRAINED.cylinder_drain_leakage + DRAINED.pump_case_leakage
