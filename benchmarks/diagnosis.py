@@ -24,7 +24,7 @@ from benchmarks.diagnosis_checks import (
 )
 from benchmarks.population import TEST, Drawn, draw_logs
 from benchmarks.scores import calibration_error, share_interval
-from experiments.library.library import read_library
+from experiments.published.library import read_library
 from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.diagnose import Diagnosis, diagnose_log

@@ -21,7 +21,7 @@ from benchmarks.population import (
     draw_logs,
     draw_parameters,
 )
-from experiments.library.library import read_library
+from experiments.published.library import read_library
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuit_runs import Blocks, blocks_of, coordinates_of, predicted
 from faults.diagnosis.class_fit import Actuator

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from benchmarks.population import TRAINING, draw_logs
-from experiments.library.library import read_library
+from experiments.published.library import read_library
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.class_fit import Actuator

@@ -42,7 +42,7 @@ def diagnose(
         bool,
         flag(
             "--transfer-functions/--no-transfer-functions",
-            "Also score nine transfer functions, identified from simulated tests of the rig (some 20 s, once).",
+            "Also score nine transfer functions: the library; of another rig, identified from simulated tests (20 s).",
         ),
     ] = False,
     scores: Annotated[

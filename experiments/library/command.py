@@ -45,8 +45,8 @@ def library(
 
 
 def _show(file: Path | None, seed: int, as_json: bool) -> None:
-    from experiments.library.library import read_library
     from experiments.library.tables import library_table
+    from experiments.published.library import read_library
 
     models = read_library(file)
     rows = library_table(models).to_dict("records")

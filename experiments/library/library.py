@@ -8,8 +8,6 @@ what it was fitted to. It ships as ``experiments/published/transfer_function_lib
 import json
 import warnings
 from collections.abc import Mapping
-from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,18 +16,15 @@ from estimation.identification.fit.output_error import fit_output_error
 from estimation.identification.model.linear_model import LinearModel
 from experiments.circuit.passes import CHANNELS, SAMPLE_TIME, Passes, in_condition, run_passes
 from experiments.nine_conditions.printed_transfer_functions import known, pair, pairs, printed_model
+from experiments.published.library import FORMAT, VERSION
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS
+from faults.eha.bank import LIBRARY_DURATION, identify_bank
 from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.drives import HOLD_TIME as SWITCHING_TIME
 from plant.eha.simulate import CIRCUIT
-from plant.errors import HydrostateError, LogWarning
-
-FORMAT = "hydrostate transfer-function library"
-"""What the file says it is."""
-
-VERSION = 1
-"""Of the format; a reader refuses a later one."""
+from plant.errors import LogWarning
 
 DURATION = 80.0
 """Length of a test, all passes together [s]."""
@@ -80,23 +75,33 @@ def build_library(seed: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``format``, ``version``, how it was made, and by condition the model and Table 6.
+        ``format``, ``version``, how it was made, and by condition the model of section 4's test (``model``, second
+        order), that of a test around an input mean (``around_mean``, of the order that the data want), and Table 6.
     """
     rig = CircuitParameters()
+    with warnings.catch_warnings(action="ignore", category=LogWarning):  # a fit's doubts stand in its covariance
+        bank = identify_bank(rig, np.random.default_rng(seed), duration=LIBRARY_DURATION)
 
-    def identify(name: str) -> dict[str, Any]:
+    def described_entry(name: str) -> dict[str, Any]:
         speeds, velocities = circuit_passes(rig, name, stream(seed, "library", name))
-        model = determined_model(speeds, velocities)
-        return {"model": model.to_dict(), **described(model), "table_6": printed_model(name)}
+        around = determined_model(speeds, velocities)
+        models = {"model": bank[name].to_dict(), "around_mean": around.to_dict()}
+        return {**models, **described(bank[name]), "table_6": printed_model(name)}
 
     # one after the other: filters of warnings are the process's, and threads would undo each other's
-    entries = {name: identify(name) for name in CONDITIONS}
+    entries = {name: described_entry(name) for name in CONDITIONS}
     return {
         "format": FORMAT,
         "version": VERSION,
         "plant": CIRCUIT.name,
         "seed": seed,
         "drive": {
+            "kind": "random binary without a mean, as in section 4",
+            "amplitude_v": rig.rated_speed / rig.motor_speed_per_volt,
+            "hold_time_s": SWITCHING_TIME,
+            "duration_s": LIBRARY_DURATION,
+        },
+        "drive_around_mean": {
             "kind": "random binary around a mean, in passes",
             "mean_v": MEAN_V,
             "amplitude_v": AMPLITUDE_V,
@@ -165,50 +170,3 @@ def library_text(library: Mapping[str, Any]) -> str:
         As `build_library` returns it.
     """
     return json.dumps(library, indent=1, allow_nan=False) + "\n"
-
-
-def library_models(library: Mapping[str, Any]) -> dict[str, LinearModel]:
-    """Return the models of a library by condition, equal in every bit to those that went in.
-
-    Parameters
-    ----------
-    library : Mapping
-        As `build_library` returns it.
-
-    Returns
-    -------
-    dict[str, LinearModel]
-        Motor speed [rad/s] to velocity [m/s].
-    """
-    return {name: LinearModel.from_dict(entry["model"]) for name, entry in library["conditions"].items()}
-
-
-def read_library(path: Path | None = None) -> dict[str, LinearModel]:
-    """Return the models of a library's file.
-
-    Parameters
-    ----------
-    path : Path, optional
-        The file; the library that ships with the package unless told.
-
-    Returns
-    -------
-    dict[str, LinearModel]
-        As `library_models`.
-
-    Raises
-    ------
-    HydrostateError
-        If the file is no library, or of a later version.
-    """
-    source = files("experiments.published") / "transfer_function_library.json" if path is None else path
-    try:
-        library = json.loads(source.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise HydrostateError(f"library {source} cannot be read: {error}") from error
-    if not isinstance(library, dict) or library.get("format") != FORMAT or library.get("version", 0) > VERSION:
-        raise HydrostateError(f"library {source} must say format {FORMAT!r} and version {VERSION} or earlier")
-    try:
-        return library_models(library)
-    except (KeyError, TypeError, AttributeError) as error:
-        raise HydrostateError(f"library {source} must hold conditions with a model each, got {error!r}") from error

@@ -68,8 +68,9 @@ def order_sentences(found: pd.DataFrame) -> tuple[str, str]:
         f"values that stand above their noise floor say order {by_values}; the second value reaches {second.min():.2g} "
         f"to {second.max():.2g} of the floor. BIC asks for {by_bic}, but a second pole is worth {gained.min():.2g} to "
         f"{gained.max():.2g} percentage points of fit: what is missing is not a pole but friction and the relief "
-        "valve, which no linear order describes, and with enough samples BIC buys poles for them. The library keeps "
-        f"what BIC prefers among orders 1 and 2 whose poles and gain the data determine, order {kept}.",
+        "valve, which no linear order describes, and with enough samples BIC buys poles for them. Around a mean "
+        f"the library keeps what BIC prefers among orders 1 and 2 whose poles and gain the data determine, order "
+        f"{kept}.",
         f"The gain is 3 dB down at {free.min():.1f} to {free.max():.1f} Hz without added friction and at "
         f"{stiff.min():.1f} to {stiff.max():.1f} Hz with it. The paper's {PAPER_BANDWIDTH:g} Hz are judged from its "
         "Figures 5 and 6 (errata E14).",

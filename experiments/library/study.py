@@ -9,7 +9,7 @@ import pandas as pd
 from estimation.finding import NORMAL_95
 from estimation.identification.design.input_design import Limits
 from experiments.library.figures import LIBRARY_FIGURES
-from experiments.library.library import build_library, library_models, library_text
+from experiments.library.library import build_library, library_text
 from experiments.library.sentences import clock_sentences, order_sentences, structure_sentences
 from experiments.library.structures import clock_table, order_and_bandwidth, structure_table
 from experiments.library.tables import library_table, response_table, root_table
@@ -17,6 +17,7 @@ from experiments.page.frames import Rows, Tables, tabled
 from experiments.page.numbers import fixed, number
 from experiments.page.tables import Cell, Column, Columns, Row, right
 from experiments.page.words import CONDITION
+from experiments.published.library import library_models
 from experiments.running.progress import Track, in_one_piece
 from experiments.running.study import Found, Seeded, Study
 from plant.eha.circuit_parameters import CircuitParameters
@@ -26,15 +27,15 @@ RIG = CircuitParameters()
 
 def _find(settings: Seeded, track: Track) -> Found:
     built = in_one_piece(track, "identifying nine conditions", lambda: build_library(settings.seed))
-    models = library_models(built)
+    models, around = library_models(built), library_models(built, "around_mean")
     limits = Limits(RIG.rated_speed, stroke=RIG.stroke)
     makers = {
         "library": lambda: library_table(models),
         "roots": lambda: root_table(models),
         "responses": lambda: response_table(models),
-        "structures": lambda: structure_table(RIG, models, settings.seed),
-        "orders": lambda: order_and_bandwidth(RIG, models, settings.seed),
-        "clocks": lambda: clock_table(models["major_leakage"], limits, settings.seed).reset_index(),
+        "structures": lambda: structure_table(RIG, around, settings.seed),
+        "orders": lambda: order_and_bandwidth(RIG, around, settings.seed),
+        "clocks": lambda: clock_table(around["major_leakage"], limits, settings.seed).reset_index(),
     }
     tables = {name: make() for name, make in track(makers.items(), description="looking at it")}
     return Found(tables, files={"library.json": library_text(built).encode()})

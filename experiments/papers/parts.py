@@ -19,7 +19,6 @@ from experiments.circuit.study import RIG as CIRCUIT_RIG
 from experiments.circuit.study import circuit_studies
 from experiments.diaphragm_motor.study import RIG as MOTOR_RIG
 from experiments.diaphragm_motor.study import claim_tables
-from experiments.library.library import read_library
 from experiments.library.tables import library_table, root_table
 from experiments.motor_paper.study import MOTOR_PAPER
 from experiments.nine_conditions.printed_equations import printed_equations
@@ -32,6 +31,7 @@ from experiments.piezo_stack import flow
 from experiments.piezo_stack.hysteresis import hysteresis_table
 from experiments.piezo_stack.quoted import quoted_numbers
 from experiments.piezo_stack.study import RIG as STACK_RIG
+from experiments.published.library import read_library
 from experiments.running.progress import Track, in_one_piece
 from experiments.running.study import Seeded, versions
 from plant.errors import LogWarning

@@ -13,7 +13,7 @@ from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.arrays import Array
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
-from plant.eha.simulate import LUMPED, simulate
+from plant.eha.simulate import CIRCUIT, LUMPED, Plant, simulate
 from plant.errors import CovarianceWarning
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, Sensors
@@ -25,6 +25,9 @@ IDENTIFICATION_TIME = 0.001
 
 IDENTIFICATION_DURATION = 20.0
 """Length of the identification run [s]."""
+
+LIBRARY_DURATION = 60.0
+"""Length of each test behind a library that is kept [s]."""
 
 
 def mathematical_bank(rig: EhaParameters) -> Mapping[str, EhaParameters]:
@@ -66,6 +69,7 @@ def identification_run(
     *,
     sensors: Sensors = BENCH,
     duration: float = IDENTIFICATION_DURATION,
+    plant: Plant = LUMPED,
 ) -> Record:
     """Simulate the identification test of section 4: a pseudo-random binary signal of 4 V.
 
@@ -77,6 +81,8 @@ def identification_run(
         Source of the drive and of sensor noise.
     duration : float
         Length of the test [s].
+    plant : Plant
+        What is simulated.
 
     Returns
     -------
@@ -85,13 +91,13 @@ def identification_run(
     """
     parameters = parameters_for(condition, rig)
     drive = make_drive("prbs", duration, IDENTIFICATION_TIME, parameters, rng)
-    return simulate(LUMPED, drive, IDENTIFICATION_TIME, parameters, sensors=sensors, rng=rng)
+    return simulate(plant, drive, IDENTIFICATION_TIME, parameters, sensors=sensors, rng=rng)
 
 
 def identify_bank(
     rig: EhaParameters, rng: np.random.Generator, *, duration: float = IDENTIFICATION_DURATION
 ) -> Mapping[str, LinearModel]:
-    """Identify the nine transfer functions from simulated tests, as section 4 does from its bench.
+    """Identify the nine transfer functions from simulated tests of the circuit, as section 4 does from its bench.
 
     Each test is fitted with an output-error model of Table 6's structure: three numerator coefficients, second order.
     Input and output are used alike (errata E15).
@@ -114,9 +120,9 @@ def identify_bank(
 
     models: dict[str, LinearModel] = {}
     for (name, condition), stream in zip(CONDITIONS.items(), rng.spawn(len(CONDITIONS)), strict=True):
-        record = identification_run(rig, condition, stream, duration=duration)
+        record = identification_run(rig, condition, stream, duration=duration, plant=CIRCUIT)
         with warnings.catch_warnings():
             # the structure is Table 6's whatever the condition, and the bank asks for predictions, not for intervals
             warnings.simplefilter("ignore", CovarianceWarning)
-            models[name] = identify_record(record, sample_time=IDENTIFICATION_TIME)
+            models[name] = identify_record(record, sample_time=IDENTIFICATION_TIME, covariance="coloured")
     return MappingProxyType(models)

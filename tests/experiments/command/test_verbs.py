@@ -244,10 +244,13 @@ def test_a_log_that_no_model_fits_is_called_so(steps: dict[str, Path], folder: P
 
 
 @pytest.mark.slow
-def test_transfer_functions_are_scored_on_request(steps: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_transfer_functions_are_scored_on_request(
+    steps: dict[str, Path], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     drawn: list[float] = []
 
-    def bank(rig: EhaParameters, rng: np.random.Generator) -> dict[str, LinearModel]:
+    def bank(rig: EhaParameters, rng: np.random.Generator, *, duration: float) -> dict[str, LinearModel]:
+        assert duration > 0.0
         drawn.append(float(rng.random()))
         gains = rig.pump_displacement / rig.piston_area * np.linspace(1.0, 0.2, len(CONDITIONS))
         channels = ("motor_speed_rad_s", "velocity_m_s")
@@ -255,14 +258,16 @@ def test_transfer_functions_are_scored_on_request(steps: dict[str, Path], monkey
         return dict(zip(CONDITIONS, made, strict=True))
 
     monkeypatch.setattr(faults.eha.bank, "identify_bank", bank)
-    paths = list(steps.values())
-    first, second, _ = results("diagnose", *paths, "--transfer-functions", "--seed", 3)
+    paths, rig = list(steps.values()), folder / "no paper.toml"  # whose library is not the one that ships
+    rig.write_text(rig_template().replace("piston_area = 0.00152", "piston_area = 0.00153"))
+    first, second, _ = results("diagnose", *paths, "--transfer-functions", "--seed", 3, "--rig", rig)
     scores = first["transfer_function_scores"]
     assert list(scores) == list(CONDITIONS)
     assert first["transfer_function_condition"] == min(scores, key=scores.__getitem__)
     assert second["transfer_function_scores"] == pytest.approx(scores)
     assert drawn == [float(np.random.default_rng(3).random())]
     assert "best transfer function" in invoke("diagnose", paths[0], "--transfer-functions").stdout
+    assert len(drawn) == 1  # the paper's rig has the library that ships
 
 
 @pytest.mark.slow

@@ -14,13 +14,13 @@ from estimation.identification import LinearModel
 from estimation.identification.design.input_design import Limits
 from experiments.cli import app
 from experiments.library.figures import LIBRARY_FIGURES
-from experiments.library.library import read_library
 from experiments.library.sentences import structure_sentences
 from experiments.library.structures import clock_table, order_and_bandwidth, structure_table
 from experiments.library.study import LIBRARY
 from experiments.library.tables import library_table, response_table, root_table
 from experiments.page.figure_files import figure_files
 from experiments.page.render import render_page
+from experiments.published.library import read_library
 from experiments.running.study import Seeded, run_study
 from faults.conditions import CONDITIONS
 from plant.eha.circuit_parameters import CircuitParameters
@@ -32,7 +32,8 @@ SHOWN = ("normal", "minor_friction")
 def tables() -> Mapping[str, pd.DataFrame]:
     """Return what the command finds, by short tests of two conditions."""
     rig, library = CircuitParameters(), read_library()
-    models = {name: library[name] for name in SHOWN}
+    around = read_library(which="around_mean")
+    models = {name: around[name] for name in SHOWN}
     return {
         "library": library_table(library),
         "roots": root_table(library),

@@ -1,19 +1,32 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import control
 import numpy as np
 import pytest
 
 from estimation.identification.design.input_design import Limits
 from estimation.identification.fit.order import order_table
-from experiments.library.library import FORMAT, build_library, circuit_passes, library_text, read_library
+from experiments.eha.kind import EHA
+from experiments.library.library import build_library, circuit_passes, library_text
 from experiments.library.structures import MADE_FOR, clock_table
 from experiments.library.tables import library_table, root_table
 from experiments.nine_conditions.printed_transfer_functions import printed_model
+from experiments.nine_conditions.settings import StudySettings
+from experiments.nine_conditions.transfer_functions import identification_study
+from experiments.published.library import FORMAT, VERSION, read_library
 from experiments.running.random_streams import stream
-from faults.conditions import CONDITIONS
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.rmse import score_transfer_functions
+from faults.eha.inject import spread
 from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.eha.simulate import CIRCUIT, simulate
 from plant.errors import HydrostateError
+from plant.sensors.sensors import BENCH
 
 
 def test_the_library_that_ships_has_nine_stable_models_with_both_covariances() -> None:
@@ -23,6 +36,7 @@ def test_the_library_that_ships_has_nine_stable_models_with_both_covariances() -
         assert model.is_stable
         assert np.isfinite(model.covariance_white).all()
         assert np.isfinite(model.covariance_robust).all()
+        assert model.denominator.size == 3
         assert 0.0 < model.dc_gain_std < 0.1 * model.dc_gain
         assert model.data_hash
 
@@ -35,9 +49,10 @@ def test_gains_fall_with_leakage_and_with_friction() -> None:
 
 
 def test_nothing_jumps_as_the_printed_models_do() -> None:
-    """Errata E15: eight of the nine printed models do not roll off, and ours do."""
-    table = library_table(read_library())
-    assert (table["jump_ratio"].abs() < 0.15).all()
+    """Errata E15: eight of nine printed models do not roll off; ours jump where the piston sticks, by half as much."""
+    table, moving = library_table(read_library()), library_table(read_library(which="around_mean"))
+    assert (moving["jump_ratio"].abs() < 0.15).all()
+    assert (table["jump_ratio"].abs() < 0.45).all()
     assert (table["published_jump_ratio"] > 0.7).sum() == 8
 
 
@@ -52,7 +67,7 @@ def test_the_printed_digits_leave_the_normal_gain_open() -> None:
 def test_a_written_library_is_read_back_in_every_bit(tmp_path: Path) -> None:
     models = read_library()
     entries = {name: {"model": model.to_dict()} for name, model in models.items()}
-    (tmp_path / "library.json").write_text(library_text({"format": FORMAT, "version": 1, "conditions": entries}))
+    (tmp_path / "library.json").write_text(library_text({"format": FORMAT, "version": VERSION, "conditions": entries}))
     again = read_library(tmp_path / "library.json")
     assert all(again[name].to_dict() == model.to_dict() for name, model in models.items())
 
@@ -82,7 +97,7 @@ def test_passes_have_no_mean_and_alternate_without_changing_sign() -> None:
 
 
 def test_a_literal_five_hertz_clock_is_the_worst_at_25_hz() -> None:
-    table = clock_table(read_library()["major_leakage"], Limits(125.66), 1)
+    table = clock_table(read_library(which="around_mean")["major_leakage"], Limits(125.66), 1)
     assert table["at_25_hz"].idxmax() == "200 ms"
     assert table.loc[MADE_FOR, "at_25_hz"] < 1.1 * table["at_25_hz"].min()
 
@@ -102,6 +117,37 @@ def test_a_higher_order_never_fits_several_short_experiments_worse() -> None:
     u, y = circuit_passes(CircuitParameters(), condition, stream(2024, "order", condition), duration=20.0)
     table = order_table(u, y, 1e-3)
     assert (np.diff(table["rmse"]) <= 1e-6 * table["rmse"].iloc[0]).all()
+
+
+@pytest.mark.parametrize("drive", ["prbs", "steps"])
+def test_the_library_alone_tells_85_percent_of_circuit_logs_apart(drive: str) -> None:
+    """Section 6's rule, the smallest RMSE in velocity, on circuits spread about the nine; no seed is the library's."""
+    library, right = read_library(), []
+    for seed in range(3):
+        for name, condition in CONDITIONS.items():
+            rng = stream(777, drive, name, seed)
+            p = spread(parameters_for(condition, EhaParameters()), rng)
+            log = simulate(CIRCUIT, make_drive(drive, 20.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+            right.append(score_transfer_functions(log, library).condition == name)
+    assert np.mean(right) >= 0.85  # 108 of 108 and 101 of 108 were measured over twelve seeds
+
+
+def test_study_library_and_diagnose_hold_the_same_models() -> None:
+    shown = {name: model.to_dict() for name, model in read_library().items()}
+    of_study, _ = identification_study(EhaParameters(), replace(StudySettings(), identification_duration=1.0))
+    options = {"no_pressure": False, "transfer_functions": True, "seed": 1}
+    assert EHA.diagnose is not None
+    _, (_, of_diagnose) = EHA.diagnose.prepare(Rig("paper", EhaParameters()), options)
+    for found in (of_study, of_diagnose()):
+        assert {name: model.to_dict() for name, model in found.items()} == shown
+
+
+def test_a_model_of_the_library_is_a_transfer_function_of_python_control() -> None:
+    for name, model in read_library().items():
+        system = model.to_control()
+        assert isinstance(system, control.TransferFunction)
+        assert float(system.dcgain()) == pytest.approx(model.dc_gain, rel=1e-9), name
+        assert system.dt == 1e-3
 
 
 @pytest.mark.slow

@@ -1,0 +1,67 @@
+"""The library of nine transfer functions that ships: one file, read by the study, by `library` and by `diagnose`."""
+
+import json
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from estimation.identification.model.linear_model import LinearModel
+from plant.errors import HydrostateError
+
+FORMAT = "hydrostate transfer-function library"
+"""What the file says it is."""
+
+VERSION = 2
+"""Of the format; a reader refuses another one."""
+
+
+def library_models(library: Mapping[str, Any], which: str = "model") -> dict[str, LinearModel]:
+    """Return the models of a library by condition, equal in every bit to those that went in.
+
+    Parameters
+    ----------
+    library : Mapping
+        The values of a library's file.
+    which : str
+        ``model``, or ``around_mean`` for those of a test around an input mean.
+
+    Returns
+    -------
+    dict[str, LinearModel]
+        Motor speed [rad/s] to velocity [m/s].
+    """
+    return {name: LinearModel.from_dict(entry[which]) for name, entry in library["conditions"].items()}
+
+
+def read_library(path: Path | None = None, which: str = "model") -> dict[str, LinearModel]:
+    """Return the models of a library's file.
+
+    Parameters
+    ----------
+    path : Path, optional
+        The file; the library that ships with the package unless told.
+    which : str
+        As `library_models`.
+
+    Returns
+    -------
+    dict[str, LinearModel]
+        As `library_models`.
+
+    Raises
+    ------
+    HydrostateError
+        If the file is no library, or of another version.
+    """
+    source = files("experiments.published") / "transfer_function_library.json" if path is None else path
+    try:
+        library = json.loads(source.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise HydrostateError(f"library {source} cannot be read: {error}") from error
+    if not isinstance(library, dict) or library.get("format") != FORMAT or library.get("version") != VERSION:
+        raise HydrostateError(f"library {source} must say format {FORMAT!r} and version {VERSION}")
+    try:
+        return library_models(library, which)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise HydrostateError(f"library {source} must hold conditions with a model each, got {error!r}") from error
