@@ -42,7 +42,7 @@ def diagnose(
         bool,
         flag(
             "--transfer-functions/--no-transfer-functions",
-            "Also score nine transfer functions: the library; of another rig, identified from simulated tests (20 s).",
+            "Show a table of nine transfer functions' errors; for a rig of your own, identify them first (20 s).",
         ),
     ] = False,
     scores: Annotated[

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from experiments.eha.plain_verdict import sureness, verdict, what_to_do
-from experiments.eha.verdict_words import SHOWN, amount
+from experiments.eha.verdict_words import SHOWN, amount, library_said
 from experiments.log_pages.channels import channel_charts
 from experiments.page.charts import Charts, Curve, Mark, Panel
 from experiments.page.render import render_page
@@ -42,6 +42,7 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "title": verdict(result),
         "to_do": what_to_do(result),
         "sureness": sureness(result),
+        "library": library_said(result),
         "not_told": [sentence(said) for said in result["not_told"]],
         "warnings": [sentence(said) for said in result.get("warnings", [])],
         "shares": [(in_words(condition), 100.0 * share, share < LEAST_SHARE) for condition, share in shares],

@@ -16,7 +16,7 @@ from experiments.eha.identifiability import cards_of, experiment_entries, experi
 from experiments.eha.screens import diagnoses_shown, estimates_shown
 from faults.conditions import CONDITIONS, LEVELS, find_condition, parameters_for, severity
 from plant.eha.model import EhaParameters
-from plant.errors import HydrostateError, require_known
+from plant.errors import HydrostateError, LogError, require_known
 from plant.log.columns import CHANNELS
 from plant.notes import Code
 
@@ -154,9 +154,13 @@ def _taken_as_known(results: Sequence[Result]) -> Iterable[str]:
 
 
 def _prepared_diagnosis(rig: "Rig[Any]", options: Options) -> "tuple[Rig[Any], tuple[bool, Linear]]":
-    """Return the rig, whether pressure is unused, and what gives nine transfer functions, where they are wanted."""
+    """Return the rig, whether pressure is unused, and what gives nine transfer functions.
+
+    The library is read by default where it is this rig's; identifying one takes long, so it has to be asked for.
+    """
     linear = cache(lambda: _identified(rig.parameters, options["seed"]))
-    return rig, (options["no_pressure"], linear if options["transfer_functions"] else None)
+    wanted = options["transfer_functions"] or rig.parameters == EhaParameters()
+    return rig, (options["no_pressure"], linear if wanted else None)
 
 
 def _identified(parameters: EhaParameters, seed: int) -> "Mapping[str, LinearModel]":
@@ -185,7 +189,11 @@ def _diagnosed(record: "Record", rig: "Rig[Any]", asked: "tuple[bool, Linear]") 
     found = diagnose_log(record, rig)
     if linear is None:
         return found
-    scores = score_transfer_functions(record, linear())
+    try:
+        scores = score_transfer_functions(record, linear())
+    except LogError as error:
+        note(f"the transfer functions are left out: {error}")
+        return found
     return replace(found, evidence=replace(found.evidence, transfer_functions=scores))
 
 

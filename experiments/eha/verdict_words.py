@@ -1,4 +1,4 @@
-"""A diagnosis in words, made of its entries: five lines for a terminal, clauses for a page."""
+"""A diagnosis in words, made of its entries: lines for a terminal, clauses for a page."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -25,19 +25,22 @@ NEAREST = "UNKNOWN, in none of the nine conditions; the nearest: "
 
 
 def verdict_lines(result: Mapping[str, Any]) -> list[str]:
-    """Return the five lines that a reader gets of a log.
+    """Return the lines that a reader gets of a log.
 
     Returns
     -------
     list[str]
-        What it is, how bad in leakage, in friction and oil, whether to believe it, and what to measure next.
+        What it is, how bad in leakage, in friction and oil, whether to believe it, what to measure next, and what the
+        library of transfer functions says where it says anything.
     """
+    library = library_said(result)
     return [
         f"{result['file']}: {headline(result)}",
         f"  leakage   {amounts(result, ('leakage_flow', 'velocity_lost'))}",
         f"  friction  {amounts(result, ('added_friction', 'pressure_rise', 'bulk_modulus'))}",
         f"  believe   {believed(result)}",
         f"  next      {next_step(result)}",
+        *([f"  {library}"] if library else []),
     ]
 
 
@@ -128,6 +131,42 @@ def believed(result: Mapping[str, Any]) -> str:
 def next_step(result: Mapping[str, Any]) -> str:
     """Return what to do or to measure next."""
     return "; ".join(result["advice"])
+
+
+def library_said(result: Mapping[str, Any]) -> str:
+    """Return whether the library of transfer functions agrees with the verdict, which it never changes.
+
+    Returns
+    -------
+    str
+        One sentence; empty where no library was compared, where the log fits none of the nine conditions, and where
+        the condition changed within the log, since one transfer function describes one condition.
+
+    Examples
+    --------
+    >>> errors = {"normal": 0.0012, "minor_leakage": 0.0019}
+    >>> found = {"condition": "normal", "unknown": False, "since_s": None, "transfer_function_scores": errors}
+    >>> library_said(found)
+    'The library of transfer functions agrees: normal has the smallest error in velocity, 1.20 mm/s; the next, minor \
+leakage, has 1.90 mm/s.'
+    """
+    errors = result["transfer_function_scores"]
+    if not errors or result["unknown"] is not False or result["since_s"] is not None:
+        return ""
+    ours = result["condition"]
+    first, second = sorted(errors, key=errors.__getitem__)[:2]
+    if not math.isfinite(errors[second]):
+        return ""
+    shown = {name: f"{1e3 * errors[name]:.2f} mm/s" for name in (first, second, ours)}
+    if first == ours:
+        return (
+            f"The library of transfer functions agrees: {_said(first)} has the smallest error in velocity, "
+            f"{shown[first]}; the next, {_said(second)}, has {shown[second]}."
+        )
+    return (
+        f"The library of transfer functions names {_said(first)} instead: its error in velocity is {shown[first]}, "
+        f"that of {_said(ours)} {shown[ours]}. The verdict above does not count it."
+    )
 
 
 def margin_word(margin: float) -> str:

@@ -8,11 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from types import MappingProxyType
-from typing import Literal, TypeAlias, get_args
-
-import pandas as pd
+from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 
 from plant.errors import require_known
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TableName: TypeAlias = Literal["conditions", "parameters", "leakage", "friction", "rmse", "transfer_functions"]
 
@@ -60,7 +61,7 @@ _FILES: Mapping[TableName | MotorTableName, str] = {
 }
 
 
-def load(name: TableName | MotorTableName) -> pd.DataFrame:
+def load(name: TableName | MotorTableName) -> "pd.DataFrame":
     """Return a published table, one row a line of the paper's, columns named with their units.
 
     Parameters
@@ -85,12 +86,14 @@ def load(name: TableName | MotorTableName) -> pd.DataFrame:
     >>> table.loc["major", "leakage_coefficient_m3_per_s_pa"]
     np.float64(6.006e-11)
     """
+    import pandas as pd
+
     require_known("published table", name, _FILES)
     with files(__name__).joinpath(_FILES[name]).open(encoding="utf-8") as stream:
         return pd.read_csv(stream, keep_default_na=False)
 
 
-def as_printed(name: TableName | MotorTableName) -> pd.DataFrame:
+def as_printed(name: TableName | MotorTableName) -> "pd.DataFrame":
     """Return a published table as `load` does, every cell as the text that is printed.
 
     Parameters
@@ -113,6 +116,8 @@ def as_printed(name: TableName | MotorTableName) -> pd.DataFrame:
     >>> as_printed("friction")["a2_n_s_per_m"].tolist()
     ['2.144e3', '-7.440e3', '1.863e4']
     """
+    import pandas as pd
+
     require_known("published table", name, _FILES)
     with files(__name__).joinpath(_FILES[name]).open(encoding="utf-8") as stream:
         return pd.read_csv(stream, keep_default_na=False, dtype=str)

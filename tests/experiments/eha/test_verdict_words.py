@@ -1,10 +1,22 @@
 """A diagnosis in words."""
 
+from dataclasses import replace
+
 import pytest
 
 from estimation.finding import Change, Finding, Gate, Outcome, Quantity
 from experiments.eha.entries import diagnosis_entries
-from experiments.eha.verdict_words import amount, believed, headline, models_said, next_step, since
+from experiments.eha.verdict_words import (
+    SHOWN,
+    amount,
+    believed,
+    headline,
+    library_said,
+    models_said,
+    next_step,
+    since,
+    verdict_lines,
+)
 from faults.conditions import CONDITIONS
 from faults.diagnosis.diagnose import EhaEvidence
 from faults.diagnosis.rmse import Scores
@@ -94,3 +106,43 @@ def test_a_severity_that_is_not_told_is_not_determined() -> None:
     }
     assert amount(entries["severity"]["entrained_air"]) == "not determined"
     assert amount(entries["severity"]["leakage_flow"]) == "1.00 L/min (0.90 to 1.10)"
+
+
+def with_library(found: Finding, best: str) -> Finding:
+    """The same finding, with a library in which one condition errs least."""
+    errors = {name: 1e-3 if name == best else 2e-3 for name in CONDITIONS}
+    scores = Scores(errors, {"velocity_m_s": errors})
+    unknown = dict.fromkeys(SHOWN, Quantity(None, "1"))
+    evidence = replace(found.evidence, transfer_functions=scores)
+    return replace(found, severities={**unknown, **found.severities}, evidence=evidence)
+
+
+def test_the_library_agrees_or_names_another_and_changes_no_verdict() -> None:
+    alone = {**diagnosis_entries(found_as("minor_leakage")), "severity": None}
+    agrees = diagnosis_entries(with_library(found_as("minor_leakage"), "minor_leakage"))
+    differs = diagnosis_entries(with_library(found_as("minor_leakage"), "major_friction"))
+    assert "agrees: minor leakage has the smallest error in velocity, 1.00 mm/s" in library_said(agrees)
+    assert "names major friction instead: its error in velocity is 1.00 mm/s, that of minor leakage 2.00 mm/s" in (
+        library_said(differs)
+    )
+    for entries in (agrees, differs):
+        said = verdict_lines({"file": "run.csv", **entries})
+        assert said[-1].strip() == library_said(entries)
+        assert len(said) == 6
+        assert {key for key in alone if alone[key] != entries[key]} == {
+            "severity",
+            "transfer_function_scores",
+            "transfer_function_condition",
+        }
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        found_as("minor_leakage", against=AGAINST),
+        found_as("minor_leakage", Change(3.21, (3.1, 3.3), "normal")),
+    ],
+)
+def test_the_library_is_silent_where_the_log_is_not_of_one_known_condition(found: Finding) -> None:
+    assert library_said(diagnosis_entries(with_library(found, "normal"))) == ""
+    assert library_said(diagnosis_entries(found_as("minor_leakage"))) == ""
