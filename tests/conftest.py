@@ -1,6 +1,10 @@
 """What every test stands on: raising floating point, a hypothesis profile, a kernel cache, shared data."""
 
 import os
+import shutil
+import socket
+import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -39,3 +43,25 @@ def shared() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no shared data in {folder}: set HYDROSTATE_SHARED to the folder that holds bench/")
     return folder
+
+
+@pytest.fixture(scope="session")
+def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
+    """Return the port of a real broker, or skip where there is none."""
+    pytest.importorskip("paho.mqtt.client", reason="paho-mqtt is an extra")
+    program = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
+    if program is None:
+        pytest.skip("mosquitto is not installed")
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        port = int(one.getsockname()[1])
+    settings: Path = tmp_path_factory.mktemp("broker") / "mosquitto.conf"
+    settings.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\nmax_queued_messages 0\n")
+    with subprocess.Popen([program, "-c", str(settings)], stderr=subprocess.DEVNULL) as running:  # noqa: S603
+        for _ in range(100):
+            with socket.socket() as one:
+                if one.connect_ex(("127.0.0.1", port)) == 0:
+                    break
+            time.sleep(0.05)
+        yield port
+        running.terminate()

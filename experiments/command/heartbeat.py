@@ -2,24 +2,10 @@
 
 import threading
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import contextmanager
-from typing import Any
 
 from experiments.command.watch_told import Told
-
-Say = Callable[[dict[str, Any]], None]
-
-
-def one_at_a_time(say: Say) -> Say:
-    """Return the same for several threads: a line is whole before the next begins."""
-    lock = threading.Lock()
-
-    def said(entries: dict[str, Any]) -> None:
-        with lock:
-            say(entries)
-
-    return said
 
 
 @contextmanager

@@ -5,14 +5,14 @@ import json
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any, TextIO
 
 import typer
 
-from experiments.command.heartbeat import beating, one_at_a_time
-from experiments.command.json_output import plain
+from experiments.command.heartbeat import beating
 from experiments.command.options import (
     Columns,
     RigFile,
@@ -24,7 +24,8 @@ from experiments.command.options import (
     require_positive,
 )
 from experiments.command.terminal import SOME_FAILED, emit, note, unexpected
-from experiments.command.watch_told import Told
+from experiments.command.watch_outputs import Watched, metrics_offered, published
+from experiments.command.watch_view import lines_wanted, viewed
 from experiments.command.watching import Asked, watch_file, watch_network, watch_rows
 from plant.errors import HydrostateError, LogError
 from plant.log.stream_source import is_stream
@@ -63,6 +64,14 @@ def watch(
         float | None, option("S", "Also tell every so many seconds that the watch is alive, whether rows come or not.")
     ] = None,
     state: Annotated[Path | None, option("FILE", "Continue a stream where this file says, and keep it there.")] = None,
+    publish: Annotated[
+        str | None, option("mqtt://HOST[:PORT]/TOPIC", "Also publish every event at an MQTT broker.")
+    ] = None,
+    metrics: Annotated[
+        str | None,
+        option("[HOST:]PORT", "Also answer Prometheus at /metrics; on this machine alone unless a host is named."),
+    ] = None,
+    view: Annotated[bool, flag("--view", "Also draw gauges and the last events on standard error.")] = False,
 ) -> None:
     """Say when something changes inside the actuator: one JSON object a line, as it happens.
 
@@ -72,10 +81,13 @@ def watch(
     temperature, so it tells sudden changes; use diagnose for what has always been wrong.
     """
     require_positive("--heartbeat", heartbeat, "s")
-    told = Told(one_at_a_time(_say))
+    told = Watched(STANDARD_INPUT if log == "-" else log)
+    if lines_wanted(view):
+        told.to(_say)
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
+
+    def run() -> None:
         asked = Asked(load_rig(rig), load_columns(columns), false_alarms, learning, healthy, no_pressure)
         with beating(told, heartbeat):
             if log == "-":
@@ -84,13 +96,33 @@ def watch(
                 watch_network(told, log, asked, state)
             else:
                 watch_file(told, Path(log), asked)
+
+    with ExitStack() as outputs:  # they hear of the end before they are closed
+        _ended(told, lambda: _opened(told, outputs, publish, metrics, view), run)
+
+
+def _opened(told: Watched, outputs: ExitStack, publish: str | None, metrics: str | None, view: bool) -> None:
+    """Open the outputs that are asked for."""
+    if publish is not None:
+        told.to(outputs.enter_context(published(publish)))
+    if metrics is not None:
+        outputs.enter_context(metrics_offered(metrics, told))
+    if view:
+        outputs.enter_context(viewed(told))
+
+
+def _ended(told: Watched, *parts: Callable[[], None]) -> None:
+    """Do one part after the other; whatever ends them, the last line says so."""
+    try:
+        for part in parts:
+            part()
     except HydrostateError as error:
         told.end("failed", str(error))
         raise
     except KeyboardInterrupt:
         told.end("interrupted", "interrupted")
         raise
-    except BaseException as error:  # whatever ends it, the last line says so
+    except BaseException as error:
         said = unexpected(error)
         told.end("failed", said)
         note(said)
@@ -98,8 +130,8 @@ def watch(
     told.end("ok", "")
 
 
-def _say(entries: dict[str, Any]) -> None:
-    emit(json.dumps(plain(entries), allow_nan=False))
+def _say(entries: Mapping[str, Any]) -> None:
+    emit(json.dumps(entries, allow_nan=False))
 
 
 def _lines(file: TextIO) -> Iterator[str]:

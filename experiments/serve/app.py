@@ -23,7 +23,7 @@ from experiments.serve.answers import Comparison, Health, Log, Logs, Said, Strea
 from experiments.serve.desk import Desk
 from experiments.serve.events import MOST_LOOKING, told
 from experiments.serve.limits import MOST_UPLOADS, Guard, RefusedError, receive_file, require_size
-from experiments.serve.metrics import exposition
+from experiments.serve.metrics import PROMETHEUS_TEXT, exposition
 from experiments.serve.pages import home_page, live_page, policy_of, policy_of_file
 from experiments.serve.settings import Settings
 from experiments.serve.views import compared
@@ -220,7 +220,7 @@ def _offer_logs(app: FastAPI, desk: Desk) -> None:
         """Return what a monitor wants to know, in the text format of Prometheus."""
         streams = [(one.state, one.alarms) for one in desk.streams.by_name.values()]
         text = exposition(desk.store.counts(), desk.jobs.waiting, streams, time.time())
-        return PlainTextResponse(text, media_type="text/plain; version=0.0.4")
+        return PlainTextResponse(text, media_type=PROMETHEUS_TEXT)
 
 
 def _offer_comparison(app: FastAPI, desk: Desk) -> None:

@@ -17,11 +17,14 @@ MEANINGS: Mapping[str, tuple[str, str]] = {
 }
 """Kind and meaning of each metric."""
 
+PROMETHEUS_TEXT = "text/plain; version=0.0.4; charset=utf-8"
+"""Media type of the text."""
+
 Labels = Mapping[str, str]
 
 
 def exposition(
-    counts: Mapping[str, int], waiting: int, streams: Sequence[tuple[Mapping[str, Any], int]], now: float
+    counts: Mapping[str, int], waiting: int | None, streams: Sequence[tuple[Mapping[str, Any], int]], now: float
 ) -> str:
     """Return all metrics as text.
 
@@ -29,8 +32,8 @@ def exposition(
     ----------
     counts : Mapping[str, int]
         Logs by state.
-    waiting : int
-        Logs that are worked on or wait.
+    waiting : int or None
+        Logs that are worked on or wait; None of a watch, which has none.
     streams : sequence of tuple
         State of each stream as `experiments.serve.live.Stream.state` gives it, and its alarms.
     now : float
@@ -54,11 +57,12 @@ def exposition(
 
 
 def _values(
-    counts: Mapping[str, int], waiting: int, streams: Sequence[tuple[Mapping[str, Any], int]], now: float
+    counts: Mapping[str, int], waiting: int | None, streams: Sequence[tuple[Mapping[str, Any], int]], now: float
 ) -> Iterator[tuple[str, Labels, float]]:
     for state, count in counts.items():
         yield "hydrostate_logs", {"state": state}, count
-    yield "hydrostate_logs_waiting", {}, waiting
+    if waiting is not None:
+        yield "hydrostate_logs_waiting", {}, waiting
     for one, alarms in streams:
         labels, gauges = {"stream": one["name"]}, one["gauges"]
         yield "hydrostate_stream_up", labels, float(one["state"] in ("learning", "watching"))

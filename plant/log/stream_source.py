@@ -87,16 +87,66 @@ def stream_lines(address: str, received: Received) -> Iterator[str]:
     LogError
         If nobody answers there, or a message is no batch.
     """
+    scheme, host, port, topic = _parts(address)
+    if scheme == "tcp" and host and port:
+        return _tcp(host, port, address)
+    if scheme == "mqtt" and host and topic:
+        return _mqtt(host, port or MQTT_PORT, topic, address, received)
+    raise HydrostateError(f"a stream must be tcp://HOST:PORT or mqtt://HOST[:PORT]/TOPIC, got {address!r}")
+
+
+def broker_of(address: str) -> tuple[str, int, str]:
+    """Return host, port and topic of a broker's address.
+
+    Parameters
+    ----------
+    address : str
+        ``mqtt://HOST[:PORT]/TOPIC``.
+
+    Raises
+    ------
+    HydrostateError
+        If it is no such address, or its topic has wildcards.
+
+    Examples
+    --------
+    >>> broker_of("mqtt://bench/press/events")
+    ('bench', 1883, 'press/events')
+    """
+    scheme, host, port, topic = _parts(address)
+    if scheme != "mqtt" or not host or not topic or "+" in topic or "#" in address:
+        raise HydrostateError(f"a topic to publish on must be mqtt://HOST[:PORT]/TOPIC, got {address!r}")
+    return host, port or MQTT_PORT, topic
+
+
+def _parts(address: str) -> tuple[str, str | None, int | None, str]:
+    """Return scheme, host, port and path of an address."""
     parts = urlsplit(address)
     try:
-        host, port = parts.hostname, parts.port
+        return parts.scheme, parts.hostname, parts.port, parts.path.strip("/")
     except ValueError:
-        host, port = None, None
-    if parts.scheme == "tcp" and host and port:
-        return _tcp(host, port, address)
-    if parts.scheme == "mqtt" and host and parts.path.strip("/"):
-        return _mqtt(host, port or MQTT_PORT, parts.path.strip("/"), address, received)
-    raise HydrostateError(f"a stream must be tcp://HOST:PORT or mqtt://HOST[:PORT]/TOPIC, got {address!r}")
+        return parts.scheme, None, None, ""
+
+
+def broker_package(address: str) -> tuple[Any, Any]:
+    """Return paho's client and its versions of callbacks.
+
+    Parameters
+    ----------
+    address : str
+        For whom, as an error names it.
+
+    Raises
+    ------
+    HydrostateError
+        If it is not installed.
+    """
+    try:
+        from paho.mqtt import client as mqtt
+        from paho.mqtt.enums import CallbackAPIVersion
+    except ImportError as error:
+        raise HydrostateError(f"{address}: a broker needs paho-mqtt: pip install 'hydrostate[stream]'") from error
+    return mqtt, CallbackAPIVersion
 
 
 def _tcp(host: str, port: int, address: str) -> Iterator[str]:
@@ -133,13 +183,7 @@ def batch(number: int, header: str, rows: Sequence[str]) -> str:
 
 
 def _mqtt(host: str, port: int, topic: str, address: str, received: Received) -> Iterator[str]:
-    try:
-        from paho.mqtt import client as mqtt
-        from paho.mqtt.enums import CallbackAPIVersion
-    except ImportError as error:
-        raise HydrostateError(
-            f"{address}: streams from a broker need paho-mqtt: pip install 'hydrostate[stream]'"
-        ) from error
+    mqtt, version = broker_package(address)
     waiting: queue.Queue[str] = queue.Queue(QUEUED)
 
     def subscribe(client: Any, *_: Any) -> None:
@@ -151,7 +195,7 @@ def _mqtt(host: str, port: int, topic: str, address: str, received: Received) ->
         except queue.Full:
             received.dropped += 1
 
-    client = mqtt.Client(CallbackAPIVersion.VERSION2)
+    client = mqtt.Client(version.VERSION2)
     client.on_connect, client.on_message = subscribe, take
     try:
         client.connect(host, port)

@@ -1,0 +1,98 @@
+"""A watch on a terminal: how far each balance is from an alarm, what the channels read, the last events."""
+
+import sys
+import time
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from experiments.command.terminal import visible
+from experiments.command.watch_outputs import Watched
+
+if TYPE_CHECKING:
+    from rich.console import Console, Group
+
+EVENTS = 8
+"""Events that are shown [count]."""
+
+A_SECOND = 4
+"""How often the view is drawn [1/s]."""
+
+CALM, NEAR = 0.5, 0.8
+"""Shares of an alarm's threshold up to which a bar is green, and yellow [fraction]."""
+
+BAR = 30
+"""Length of a bar [characters]."""
+
+
+@contextmanager
+def viewed(told: Watched, console: "Console | None" = None) -> Generator[None]:
+    """Draw a watch on standard error in this block.
+
+    Parameters
+    ----------
+    told : Watched
+        The watch.
+    console : Console, optional
+        Where instead.
+    """
+    from rich.console import Console
+    from rich.live import Live
+
+    console = console or Console(stderr=True)
+    with Live(get_renderable=lambda: drawn(told), console=console, refresh_per_second=A_SECOND):
+        yield
+
+
+def lines_wanted(view: bool) -> bool:
+    """Return whether JSON lines are written: not beside a view on the same terminal."""
+    return not (view and sys.stdout.isatty())
+
+
+def drawn(told: Watched) -> "Group":
+    """Return one picture of a watch.
+
+    Parameters
+    ----------
+    told : Watched
+        The watch.
+    """
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    state = told.state()
+    gauges = state["gauges"]
+    lines: list[Any] = [Text(f"{visible(state['name'])}: {_standing(state, told.alarms)}", style="bold")]
+    if gauges is not None:
+        balances = Table("balance", "towards an alarm", "[%]", box=None)
+        for name, score in gauges["scores"].items():
+            balances.add_row(name, *_bar(score, gauges["thresholds"][name]))
+        channels = Table("channel", "now", box=None)
+        for name, value in gauges["values"].items():
+            channels.add_row(name, "-" if value is None else f"{value:.5g}")
+        lines += [balances, channels]
+    events = [one for one in list(told.last_events) if one["event"] != "alive"][-EVENTS:]
+    lines += [Text(f"{one['clock'][11:19]} UTC  {one['event']}: {visible(str(one['message']))}") for one in events]
+    return Group(*lines)
+
+
+def _standing(state: Mapping[str, Any], alarms: int) -> str:
+    gauges = state["gauges"]
+    counted = f"{alarms} alarm" if alarms == 1 else f"{alarms} alarms"
+    if gauges is None:
+        return f"{state['state']}, {counted}"
+    silent = max(time.time() - gauges["received"], 0.0)
+    said = f"{state['state']}, {gauges['time_s']:.1f} s of the stream, {gauges['rows']} rows, {counted}"
+    return said if silent < 1.0 else f"{said}, no row for {silent:.0f} s"
+
+
+def _bar(score: float, threshold: float | None) -> tuple[Any, str]:
+    """Return a bar as long as a score is of its threshold, and the share in percent."""
+    from rich.text import Text
+
+    if not threshold:
+        return Text("still learning", style="dim"), "-"
+    share = min(max(score / threshold, 0.0), 1.0)
+    colour = "green" if share < CALM else "yellow" if share < NEAR else "red"
+    return Text("#" * round(BAR * share), style=colour) + Text("." * (BAR - round(BAR * share))), f"{100.0 * share:.0f}"
