@@ -47,6 +47,7 @@ class ClassCode(Code):
         "a constant load of {force_n:.3g} N holds the rod back, or differential_pressure_pa reads {pressure_pa:.3g} Pa "
         "too much: the force balance does not tell the two apart"
     )
+    END_STOP = "the piston ran into a stop {reach_mm:.0f} mm from where the log begins; the circuit was fitted with it"
     PRESSURE_ABSENT_CLASS = (
         "without differential_pressure_pa friction shows in velocity alone: margins are smaller as a rule"
     )

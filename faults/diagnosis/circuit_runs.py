@@ -25,9 +25,13 @@ from plant.log.record import Record
 from plant.solvers.adaptive import ErrorControl, controlled_run
 from plant.solvers.steps import parameter_row
 
-COORDINATES = ("leakage", "bias", "friction_rest", "friction_quadratic", "friction_rated", "bulk_modulus", "pump")
+COORDINATES = ("leakage", "bias", "friction_rest", "friction_quadratic", "friction_rated", "bulk_modulus", "presliding")
 """What is fitted, as logarithms of: leakage coefficient, flow bias, friction force at rest, its quadratic part at rated
-velocity, all of it at rated velocity, bulk modulus, pump displacement."""
+velocity, all of it at rated velocity, bulk modulus, and presliding displacement over the rig's. The last is judged and
+differs from seal to seal; held where it is wrong, it bends friction and leakage."""
+
+PRESLIDING_REACH = 3.0
+"""Farthest that presliding displacement is taken from the rig's, as a logarithm [dimensionless]: 20 times."""
 
 BLOCK = 0.01
 """Time over which velocity and pressure are averaged [s]."""
@@ -75,6 +79,8 @@ class Blocks:
         Another circuit that ran up to a sample, as a row of parameters; None if one ran throughout.
     course : ndarray, shape (samples,), or None
         Leakage over what it is when the log ends [dimensionless]; None where it does not change.
+    stop : float or None
+        How far from where the log begins the piston ran into a stop [m]; None where only the rig knows of stops.
     """
 
     speed: Array
@@ -85,6 +91,7 @@ class Blocks:
     noise: Array
     earlier: tuple[int, Array] | None = None
     course: Array | None = None
+    stop: float | None = None
 
     @property
     def outputs(self) -> Array:
@@ -170,14 +177,17 @@ def _pooled(values: Array, pooled: int) -> Array:
 
 
 def _mean(values: Array, block: int, spare: int = 1) -> Array:
-    """Return the means of blocks over the samples that are there; NaN where there is none."""
+    """Return the means of blocks over the samples that are there; NaN where more than half are missing.
+
+    What a clipped sensor left out is not like what it kept: the mean of a small rest would lie off.
+    """
     count = (len(values) - spare) // block
     parts = values[: count * block].reshape(count, block)
     there = np.isfinite(parts)
     if np.all(there):
         return parts.mean(axis=1)
     seen = there.sum(axis=1)
-    return np.where(seen > 0, np.where(there, parts, 0.0).sum(axis=1) / np.maximum(seen, 1), np.nan)
+    return np.where(2 * seen >= block, np.where(there, parts, 0.0).sum(axis=1) / np.maximum(seen, 1), np.nan)
 
 
 def coordinates_of(p: EhaParameters, rated: float) -> Array:
@@ -197,7 +207,7 @@ def coordinates_of(p: EhaParameters, rated: float) -> Array:
     """
     a1, a2, a3 = p.friction_quadratic, p.friction_linear, p.friction_coulomb
     forces = a3, a1 * rated**2, a3 + a2 * rated + a1 * rated**2
-    return np.log([p.leakage_coefficient, p.flow_bias, *forces, p.bulk_modulus, p.pump_displacement])
+    return np.log([p.leakage_coefficient, p.flow_bias, *forces, p.bulk_modulus, 1.0])
 
 
 def parameter_rows(points: Array, rig: CircuitParameters, rated: float) -> Array:
@@ -217,7 +227,8 @@ def parameter_rows(points: Array, rig: CircuitParameters, rated: float) -> Array
     ndarray, shape (n, parameters)
         Rows for the circuit plant; the motor follows the logged speed at once.
     """
-    leakage, bias, rest, bent, full, modulus, pump = np.exp(points.T)
+    leakage, bias, rest, bent, full, modulus = np.exp(points[:, :-1].T)
+    yielding = np.exp(np.clip(points[:, -1], -PRESLIDING_REACH, PRESLIDING_REACH))
     linear = np.maximum(full - rest - bent, -1.9 * np.sqrt(bent * rest))  # friction must oppose motion at every speed
     rows = np.tile(parameter_row(replace(rig, motor_lag=0.0)), (len(points), 1))
     for name, values in (
@@ -227,7 +238,7 @@ def parameter_rows(points: Array, rig: CircuitParameters, rated: float) -> Array
         ("friction_linear", linear / rated),
         ("friction_coulomb", rest),
         ("bulk_modulus", modulus),
-        ("pump_displacement", pump),
+        ("presliding_displacement", rig.presliding_displacement * yielding),
     ):
         rows[:, _COLUMN[name]] = values
     share = np.minimum(1.0, leakage / rig.leakage_coefficient) if rig.leakage_coefficient > 0.0 else np.ones(len(rows))
@@ -287,8 +298,13 @@ _LEAKAGES = ("leakage_coefficient", "pump_crossport_leakage", "pump_case_leakage
 def _between_stops(blocks: Blocks, rows: Array) -> Array:
     """Return circuits with the stops of the rig's stroke where the log may show one, without stops elsewhere.
 
-    A piston that turned back before it came to a stop, or that went past it, shows none.
+    A piston that turned back before it came to a stop, or that went past it, shows none. A stop that the log itself
+    has shown goes before the rig's.
     """
+    if blocks.stop is not None:
+        rows = rows.copy()
+        rows[..., _COLUMN["stroke"]] = 2.0 * blocks.stop
+        return rows
     half = 0.5 * rows[..., _COLUMN["stroke"]]
     shown = np.abs(blocks.reach - half) <= AT_STOP * half
     rows = rows.copy()

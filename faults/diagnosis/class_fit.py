@@ -33,8 +33,8 @@ LEAST_SCALE = 1e-3
 LASTING = 30.0
 """Blocks over which a model's error lasts [dimensionless]: 0.3 s, a few reversals."""
 
-KNOWN = 1e-3
-"""Standard deviation of the logarithm of what is known [dimensionless]: the pump's displacement."""
+SEALS = 1.0
+"""Standard deviation of the logarithm of presliding displacement [dimensionless]: 7 to 50 um about 20 um."""
 
 
 def _prior(each: Sequence[float], rubbing_alike: float) -> Array:
@@ -45,10 +45,10 @@ def _prior(each: Sequence[float], rubbing_alike: float) -> Array:
     return covariance
 
 
-WITHIN = _prior((0.12, 0.12, 0.12, 0.10, 0.08, 0.2, KNOWN), 0.08)
+WITHIN = _prior((0.12, 0.12, 0.12, 0.10, 0.08, 0.2, SEALS), 0.08)
 """How actuators in one condition differ: covariance of the logarithms, shape (7, 7) [dimensionless]."""
 
-WEAK = _prior((0.5, 0.5, 0.3, 0.3, 0.2, 0.3, KNOWN), 0.5)
+WEAK = _prior((0.5, 0.5, 0.3, 0.3, 0.2, 0.3, SEALS), 0.5)
 """What is believed of an actuator in no known condition, about the nearest one: covariance, shape (7, 7)."""
 
 

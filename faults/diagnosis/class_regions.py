@@ -65,6 +65,8 @@ class ClassFits:
         How well each condition's region holds the fitted circuits: log-likelihoods [dimensionless].
     spread : ndarray, shape (7, 7)
         Covariance of the coordinates for intervals, see `spread_of` [dimensionless].
+    lasting : float
+        By what a model error that lasts divides the information [dimensionless], see `lasting_misfit`; 1 at the least.
     """
 
     best: PointFit
@@ -73,6 +75,15 @@ class ClassFits:
     nominal_scales: Array
     scores: Array
     spread: Array
+    lasting: float = 1.0
+
+    @property
+    def told(self) -> Array:
+        """What the log tells of the coordinates where a lasting model error is counted, shape (7, 7) [dimensionless].
+
+        It is the inverse covariance of the intervals, so that what they hold cannot be called impossible.
+        """
+        return self.information / self.lasting
 
     @property
     def covariance(self) -> Array:
@@ -109,8 +120,10 @@ def fit_classes(blocks: Blocks, actuator: Actuator) -> ClassFits:
     least, held = int(np.argmin([fit.cost for fit in fits])), np.max(scores, axis=0)
     centre = actuator.conditions[np.argmax(held)]
     best = fits[least] if blocks.pressure is not None else _scaled(fits[least], centre)
+    lasting = max(1.0, lasting_misfit(best.fitted, blocks))
     spread = spread_of(best, known[least], blocks, centre)
-    return ClassFits(best, known[least], nominal, np.array([scales_of(blocks, run) for run in runs]), held, spread)
+    errors = np.array([scales_of(blocks, run) for run in runs])
+    return ClassFits(best, known[least], nominal, errors, held, spread, lasting)
 
 
 def _scaled(fit: PointFit, centre: Array) -> PointFit:

@@ -150,6 +150,8 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
         return replace(without, notes=(*found.notes, said.note(reason=error.message)))
     if loaded.load_force != rig.parameters.load_force:
         found = replace(found, notes=(*found.notes, _load(loaded)))
+    if (stop := diagnosis.scoreboard.blocks.stop) is not None:
+        found = replace(found, notes=(*found.notes, ClassCode.END_STOP.note(reach_mm=1e3 * stop)))
     against = distinct((*doubts, *diagnosis.against))
     if against:  # nominal models alone are no judges of a circuit with another oil, but they say what is off
         against = distinct((*against, *verdict.against))
@@ -251,7 +253,7 @@ def diagnose_clean(
     board = weigh(log.record, actuator, library)
     pressure = board.blocks.pressure is not None
     probabilities = board.probabilities(numbers)
-    region = float(np.max(region_scores(board.fits.best, board.fits.information, actuator)))
+    region = float(np.max(region_scores(board.fits.best, board.fits.told, actuator)))
     against = (
         *log.objections,
         *sensors_disagree(board.window, board.blocks),

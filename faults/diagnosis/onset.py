@@ -15,6 +15,7 @@ from faults.conditions import CONDITIONS
 from faults.diagnosis.circuit_runs import LONGEST, Blocks, blocks_of, parameter_rows, predicted
 from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, least_scales, misfit
 from faults.diagnosis.class_regions import ClassFits, fit_classes, lasting_misfit
+from faults.diagnosis.end_stop import stopped
 from faults.watch.events import Alarm
 from faults.watch.watch import LEAST_LEARNING, SLOWEST, watch_record
 from plant.arrays import Array
@@ -92,7 +93,7 @@ def last_part(record: Record, actuator: Actuator) -> LastPart:
 
 def _last_of(window: Record, actuator: Actuator) -> LastPart:
     blocks = blocks_of(window)
-    fits = fit_classes(blocks, actuator)
+    blocks, fits = stopped(blocks, fit_classes(blocks, actuator), actuator)
     found = find_onset(blocks, fits, actuator)
     if found is None:
         return LastPart(window, window, blocks, fits, None)

@@ -5,21 +5,28 @@ does the circuit that does lie in or between the conditions' regions, and would 
 it better. The limits leave room for rigs that no circuit describes to the last digit.
 """
 
+import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from estimation.notes import SensorCode
-from faults.conditions import severity
+from faults.conditions import CONDITIONS, severity
 from faults.diagnosis.circuit_runs import COORDINATES, Blocks, blocks_of, coordinates_of, parameter_rows, predicted
-from faults.diagnosis.class_fit import WEAK, Actuator
+from faults.diagnosis.class_fit import STEP, WEAK, Actuator, PointFit, fit_freely
 from faults.diagnosis.class_regions import ClassFits, region_scores
 from faults.notes import AgainstCode
+from plant.eha.circuit_parameters import CircuitParameters
 from plant.log.record import Record
 from plant.notes import Note
 
 UNEXPLAINED = (0.12, 0.08)
 """Share of velocity and of pressure, root mean square, that the best circuit may leave [dimensionless]."""
+
+YIELDING = 0.015
+"""Share of the velocity at which the pump's whole flow would move the piston, root mean square, that may be left in any
+case [dimensionless]: a piston that hardly moves yields on its seals, which no circuit describes to the last digit."""
 
 FARTHEST_OUT = 7.0
 """Least log-likelihood of the nearest condition's region, below its centre's [dimensionless]."""
@@ -38,6 +45,9 @@ GRID = 9
 
 FREE_PUMP = 0.3
 """Standard deviation of the pump's displacement where a fit may change it [dimensionless]."""
+
+SMALLEST_PUMP = 0.3
+"""Share of the rig's displacement below which no pump is tried [dimensionless]."""
 
 AGREEMENT = 0.05
 """Share by which velocity and the slope of position may differ, root mean square [dimensionless]."""
@@ -65,7 +75,7 @@ def reasons_against(blocks: Blocks, fits: ClassFits, region: float, actuator: Ac
     list[Note]
         None for a log that fits.
     """
-    return [*_unexplained(blocks, fits), *_biases(blocks, fits, actuator), *_outside(fits, region, actuator)]
+    return [*_unexplained(blocks, fits, actuator), *_biases(blocks, fits, actuator), *_outside(fits, region, actuator)]
 
 
 def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
@@ -94,10 +104,13 @@ def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
     return () if differs <= allowed else (SensorCode.SENSORS_DISAGREE.note(difference_m_s=differs),)
 
 
-def _unexplained(blocks: Blocks, fits: ClassFits) -> list[Note]:
+def _unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
     sizes = np.sqrt(np.nanmean(blocks.outputs[blocks.first :] ** 2, axis=0))
     shares = fits.best.scales / np.maximum(sizes, np.finfo(float).tiny)
-    heard = fits.best.scales > 2.0 * blocks.noise
+    pump = actuator.circuit.pump_displacement / actuator.circuit.piston_area
+    yielding = YIELDING * pump * float(np.sqrt(np.mean(blocks.speed**2)))
+    least = np.array([yielding, 0.0])[: len(shares)]
+    heard = fits.best.scales > np.maximum(2.0 * blocks.noise, least)
     names = ("velocity", "differential pressure")
     return [
         AgainstCode.UNEXPLAINED.note(percent=100.0 * share, channel=name)
@@ -107,40 +120,60 @@ def _unexplained(blocks: Blocks, fits: ClassFits) -> list[Note]:
 
 
 def _biases(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
-    """Add a bias of each sensor and the pump's displacement to the fit, in one linear step."""
-    fit, first = fits.best, blocks.first
-    rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
+    """Return a note for each sensor that is biased, and for a pump that is another than the rig's.
+
+    Both are looked for in one linear step from the best circuit. What bends the other coordinates much is not found in
+    one step: a pump that is off is put into the circuit, and the step taken again.
+    """
     size = float(np.sqrt(np.mean(blocks.speed**2)))
     if size == 0.0:
         return []
-    nudge = 0.01 * size
-    faster = predicted(replace(blocks, speed=blocks.speed + nudge), rows)[0]
-    columns = [*fit.slopes, (faster - fit.fitted) / nudge]
-    names = ["motor_speed_rad_s"]
-    if blocks.pressure is not None:
-        columns.append(np.column_stack([np.zeros(len(blocks.velocity)), np.ones(len(blocks.velocity))]))
-        names.append("differential_pressure_pa")
-    seen = np.isfinite(blocks.outputs[first:])
-    weighted = np.where(seen, np.array(columns)[:, first:] / fit.scales, 0.0).reshape(len(columns), -1)
-    left = np.where(seen, (blocks.outputs - fit.fitted)[first:] / fit.scales, 0.0).ravel()
-    trust = float(np.trace(fits.information) / np.trace(fit.information))
-    pull = np.zeros((len(columns), len(columns)))
-    prior = WEAK.copy()
-    pump = COORDINATES.index("pump")
-    prior[pump, pump] = FREE_PUMP**2
-    pull[: len(WEAK), : len(WEAK)] = np.linalg.inv(prior)
-    covariance = np.linalg.pinv(trust * weighted @ weighted.T + pull)
-    found = covariance @ (trust * weighted @ left)
-    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    trust = float(np.trace(fits.information) / np.trace(fits.best.information))
     sizes = {"pump": 1.0, "motor_speed_rad_s": size}
     if blocks.pressure is not None:
         sizes["differential_pressure_pa"] = float(np.sqrt(np.nanmean(blocks.pressure**2)))
-    said: list[Note] = []
-    for name, place in [("pump", pump), *((name, len(WEAK) + i) for i, name in enumerate(names))]:
-        value, error = float(found[place]), float(errors[place])
-        if abs(value) > max(STANDARD_ERRORS * error, LEAST_BIAS[name] * sizes[name]):
-            said.append(_bias(name, value))
-    return said
+    found = _one_step(blocks, fits.best, trust, actuator, sizes)
+    matters = {name: abs(value) > _least(name, error, sizes) for name, (value, error) in found.items()}
+    pump = found["pump"][0]
+    if matters["pump"]:
+        healthy = actuator.circuit
+        other = replace(healthy, pump_displacement=healthy.pump_displacement * max(1.0 + pump, SMALLEST_PUMP))
+        tried = replace(actuator, circuit=other)
+        again = fit_freely(blocks, tried, list(CONDITIONS)[int(np.argmax(fits.scores))])
+        pump = (1.0 + pump) * (1.0 + _one_step(blocks, again, trust, tried, sizes)["pump"][0]) - 1.0
+    return [_bias(name, pump if name == "pump" else found[name][0]) for name in found if matters[name]]
+
+
+def _least(name: str, error: float, sizes: Mapping[str, float]) -> float:
+    return max(STANDARD_ERRORS * error, LEAST_BIAS[name] * sizes[name])
+
+
+def _one_step(
+    blocks: Blocks, fit: PointFit, trust: float, actuator: Actuator, sizes: Mapping[str, float]
+) -> Mapping[str, tuple[float, float]]:
+    """Return the pump's share and each sensor's bias with its standard error, by one linear step from a fit."""
+    first = blocks.first
+    rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
+    nudge = 0.01 * sizes["motor_speed_rad_s"]
+    faster = predicted(replace(blocks, speed=blocks.speed + nudge), rows)[0]
+    larger = predicted(blocks, parameter_rows(fit.coordinates[None], _larger_pump(actuator.circuit), actuator.rated))[0]
+    columns = [*fit.slopes, (larger - fit.fitted) / STEP, (faster - fit.fitted) / nudge]
+    if blocks.pressure is not None:
+        columns.append(np.column_stack([np.zeros(len(blocks.velocity)), np.ones(len(blocks.velocity))]))
+    seen = np.isfinite(blocks.outputs[first:])
+    weighted = np.where(seen, np.array(columns)[:, first:] / fit.scales, 0.0).reshape(len(columns), -1)
+    left = np.where(seen, (blocks.outputs - fit.fitted)[first:] / fit.scales, 0.0).ravel()
+    pull, pump = np.zeros((len(columns), len(columns))), len(WEAK)
+    pull[:pump, :pump] = np.linalg.inv(WEAK)
+    pull[pump, pump] = 1.0 / FREE_PUMP**2
+    covariance = np.linalg.pinv(trust * weighted @ weighted.T + pull)
+    found = covariance @ (trust * weighted @ left)
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return {name: (float(found[at]), float(errors[at])) for at, name in enumerate(sizes, start=pump)}
+
+
+def _larger_pump(circuit: CircuitParameters) -> CircuitParameters:
+    return replace(circuit, pump_displacement=circuit.pump_displacement * math.exp(STEP))
 
 
 def _bias(name: str, value: float) -> Note:
@@ -170,6 +203,6 @@ def _nearest_severity(fits: ClassFits, actuator: Actuator) -> tuple[float, float
     levels = np.linspace(0.0, 2.0, GRID)
     each = [(float(leakage), float(friction)) for leakage in levels for friction in levels]
     points = [coordinates_of(severity(*pair, actuator.circuit), actuator.rated) for pair in each]
-    scores = region_scores(fits.best, fits.information, replace(actuator, conditions=np.array(points)))
+    scores = region_scores(fits.best, fits.told, replace(actuator, conditions=np.array(points)))
     best = int(np.argmax(scores))
     return (*each[best], float(scores[best]))
