@@ -27,8 +27,14 @@ autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 
 
-def setup(_: Any) -> None:
+def inherited_from_scikit_learn(_app: Any, _what: str, name: str, *_: Any) -> bool | None:
+    """Leave out the setters of metadata that scikit-learn gives every estimator: its own site describes them."""
+    return True if name.startswith("set_") and name.endswith("_request") else None
+
+
+def setup(app: Any) -> None:
     """Write what is made from the code, before anything is read."""
+    app.connect("autodoc-skip-member", inherited_from_scikit_learn)
     made = DOCS / "generated"
     made.mkdir(exist_ok=True)
     for name, text in {**api_pages(), "house.svg": house_drawing(), "house.md": house_table()}.items():
