@@ -14,7 +14,7 @@ import numpy as np
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, severity
 from faults.diagnosis.circuit_runs import COORDINATES, Blocks, blocks_of, coordinates_of, parameter_rows, predicted
-from faults.diagnosis.class_fit import STEP, WEAK, Actuator, PointFit, fit_freely
+from faults.diagnosis.class_fit import LASTING, STEP, WEAK, Actuator, PointFit, fit_freely
 from faults.diagnosis.class_regions import ClassFits, region_scores
 from faults.notes import AgainstCode
 from plant.eha.circuit_parameters import CircuitParameters
@@ -48,6 +48,9 @@ FREE_PUMP = 0.3
 
 SMALLEST_PUMP = 0.3
 """Share of the rig's displacement below which no pump is tried [dimensionless]."""
+
+PUMP_GAIN = 3.0
+"""Log-posterior that another pump must gain, in `LASTING` blocks that count as one [dimensionless]."""
 
 AGREEMENT = 0.05
 """Share by which velocity and the slope of position may differ, root mean square [dimensionless]."""
@@ -122,8 +125,8 @@ def _unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[No
 def _biases(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
     """Return a note for each sensor that is biased, and for a pump that is another than the rig's.
 
-    Both are looked for in one linear step from the best circuit. What bends the other coordinates much is not found in
-    one step: a pump that is off is put into the circuit, and the step taken again.
+    Both are looked for in one linear step from the best circuit. A pump that is off bends the other coordinates, so it
+    is put into the circuit and the step taken again; it counts if the circuit then explains the log better.
     """
     size = float(np.sqrt(np.mean(blocks.speed**2)))
     if size == 0.0:
@@ -139,7 +142,9 @@ def _biases(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
         healthy = actuator.circuit
         other = replace(healthy, pump_displacement=healthy.pump_displacement * max(1.0 + pump, SMALLEST_PUMP))
         tried = replace(actuator, circuit=other)
-        again = fit_freely(blocks, tried, list(CONDITIONS)[int(np.argmax(fits.scores))])
+        nearest = list(CONDITIONS)[int(np.argmax(fits.scores))]
+        without, again = (fit_freely(blocks, one, nearest) for one in (actuator, tried))
+        matters["pump"] = without.cost - again.cost > PUMP_GAIN * LASTING
         pump = (1.0 + pump) * (1.0 + _one_step(blocks, again, trust, tried, sizes)["pump"][0]) - 1.0
     return [_bias(name, pump if name == "pump" else found[name][0]) for name in found if matters[name]]
 
