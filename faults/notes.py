@@ -77,4 +77,4 @@ class AdviceCode(Code):
     )
     CONDITIONS_OPEN = "log again with larger steps: this log leaves more than one condition open"
     CLOSER_SPEEDS = "log slower speeds too: at {speeds} speeds leakage and flow bias still look alike"
-    NOTHING = "nothing: the log decides"
+    NOTHING = "no further measurement is needed: this log decides"

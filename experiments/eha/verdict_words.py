@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from experiments.page.numbers import shop_unit
+from experiments.page.words import in_words
 
 SHOWN = {
     "leakage_flow": "leakage at rated pressure",
@@ -160,12 +161,12 @@ leakage, has 1.90 mm/s.'
     shown = {name: f"{1e3 * errors[name]:.2f} mm/s" for name in (first, second, ours)}
     if first == ours:
         return (
-            f"The library of transfer functions agrees: {_said(first)} has the smallest error in velocity, "
-            f"{shown[first]}; the next, {_said(second)}, has {shown[second]}."
+            f"The library of transfer functions agrees: {in_words(first)} has the smallest error in velocity, "
+            f"{shown[first]}; the next, {in_words(second)}, has {shown[second]}."
         )
     return (
-        f"The library of transfer functions names {_said(first)} instead: its error in velocity is {shown[first]}, "
-        f"that of {_said(ours)} {shown[ours]}. The verdict above does not count it."
+        f"The library of transfer functions names {in_words(first)} instead: its error in velocity is {shown[first]}, "
+        f"that of {in_words(ours)} {shown[ours]}. The verdict above does not count it."
     )
 
 

@@ -46,8 +46,8 @@ class Outlook:
     @cached_property
     def left(self) -> tuple[float, float, float] | None:
         """Logs to the limit: 5 %, median and 95 % [step]; None where the median is not within sight."""
-        crossing = self.trend.crossing
-        if crossing is None or not self.trend.certain:
+        crossing = self.trend.crossing if self.trend.certain else None
+        if crossing is None:
             return None
         low, _, middle, _, high = crossing.quantiles
         return (float(low), float(middle), float(high)) if math.isfinite(middle) else None

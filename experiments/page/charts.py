@@ -25,6 +25,12 @@ MOST_STILL = 1_600
 LEGEND_FROM = 2
 """Curves from which a still panel has a legend [count]."""
 
+LOW_FROM = 3
+"""Rows of a still picture from which each is lower, so that the picture fills the width of a page [count]."""
+
+ONE_COLUMN = 4
+"""Panels of a still picture in one column; more stand in two, so that they are not tiny on paper [count]."""
+
 COLOURS: Mapping[str, str] = {
     "blue": BLUE,
     "orange": ORANGE,
@@ -170,12 +176,19 @@ class Charts:
 
     def _still(self) -> Figure:
         with styled():
-            margins = Margins(left=0.9, top=0.1, down=0.3)
-            height = 0.7 + 1.5 * len(self.panels)
-            figure, axes = panels("", len(self.panels), 1, height, margins, sharex=True)
-            for axis, panel in zip(axes, self.panels, strict=True):
+            columns = 1 if len(self.panels) <= ONE_COLUMN else 2
+            rows = -(-len(self.panels) // columns)
+            margins = Margins(left=0.9, top=0.25, across=0.9, down=0.35)
+            figure, axes = panels(
+                "", rows, columns, 0.85 + (1.55 if rows < LOW_FROM else 1.05) * rows, margins, sharex=True
+            )
+            for axis, panel in zip(axes, self.panels, strict=False):
                 _draw_panel(axis, self.x, panel)
-            axes[-1].set_xlabel(self.label)
+            for axis in axes[len(self.panels) :]:
+                axis.set_visible(False)
+            for axis in axes[len(self.panels) - columns : len(self.panels)]:
+                axis.set_xlabel(self.label)
+                axis.tick_params(labelbottom=True)
         return figure
 
 
@@ -218,4 +231,5 @@ def _draw_panel(axis: Axes, x: Array, panel: Panel) -> None:
         draw(mark.at, color=VERMILION, ls="--", lw=1.1)
     axis.set_ylabel(f"{panel.label}\n[{panel.unit}]")
     if len(panel.curves) >= LEGEND_FROM:
-        axis.legend(loc="upper right", ncols=4, fontsize=7.5)
+        # above the panel, where it hides no data
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), borderaxespad=0.1, ncols=4, fontsize=7.5)

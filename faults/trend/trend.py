@@ -107,10 +107,14 @@ class Trend:
         """Logarithm of how much more probable the logs are with growth than without [dimensionless]."""
         return growth_evidence(self.belief, settings())
 
+    @property
+    def _short(self) -> bool:
+        return self.place - self.begin + 1 < FEWEST
+
     @cached_property
     def crossing(self) -> Crossing | None:
         """When the limit is reached; None before `FEWEST` logs of the stretch."""
-        if self.place - self.begin + 1 < FEWEST:
+        if self._short:
             return None
         return crossing(self.belief, settings(), np.random.default_rng(self.place))
 
@@ -123,7 +127,9 @@ class Trend:
     def alarm(self) -> bool:
         """Whether it grows for certain and probably reaches its limit within `AHEAD`, or is past it with `SURE`."""
         mean, std = moments(self.belief, settings())
-        if self.crossing is None or (not self.certain and mean + 3.0 * std < 1.0):
+        if self._short or (not self.certain and mean + 3.0 * std < 1.0):
+            return False  # before futures are drawn, which is what takes the time
+        if self.crossing is None:
             return False
         return self.crossing.within(0.0) >= SURE or (self.certain and self.crossing.within(AHEAD) >= 0.5)
 

@@ -1,5 +1,6 @@
 """Charts hold their numbers, a still picture, and a table."""
 
+import base64
 import json
 import re
 
@@ -24,6 +25,17 @@ def test_a_figure_has_a_still_picture_its_numbers_and_a_table() -> None:
     assert '<img alt="A caption." src="data:image/svg+xml;base64,' in html
     assert '<th scope="row">velocity, measured</th>' in html
     assert "<b>" not in html
+
+
+def test_the_still_picture_of_many_channels_is_not_a_thin_strip() -> None:
+    x = np.arange(20.0)
+    many = [Panel(f"channel {i}", "m", [Curve("value", x)]) for i in range(7)]
+    html = Charts(x, "time [s]", many, "run").html("one", "A caption.")
+    (coded,) = re.findall(r"data:image/svg\+xml;base64,([^\"]+)", html)
+    drawn = base64.b64decode(coded).decode()
+    (size,) = re.findall(r'viewBox="0 0 ([0-9.]+) ([0-9.]+)"', drawn)
+    assert float(size[0]) > float(size[1])
+    assert all(f"channel {i}" in drawn for i in range(7))
 
 
 def test_a_uniform_axis_is_a_start_and_a_step() -> None:
