@@ -41,7 +41,7 @@ def fleet(
     maintenance: Annotated[
         Path | None, option("CSV", "Repairs, with the columns actuator and date: trends begin anew.", "--maintenance")
     ] = None,
-    pages: Annotated[int, option("N", "Write pages of their own for the N sickest.", "--pages", min=0)] = 20,
+    pages: Annotated[int, option("N", "Write a page each for the N sickest actuators.", "--pages", min=0)] = 20,
     plant: Plant = None,
     rig: RigFile = None,
     columns: Columns = None,

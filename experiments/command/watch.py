@@ -44,16 +44,16 @@ def watch(
         str,
         argument(
             "LOG",
-            "A log, or - for rows of CSV on standard input: a header, then time_s, motor_speed_rad_s, and "
-            "position_m or velocity_m_s; differential_pressure_pa is optional. Another unit stands in the name.",
+            "A log, tcp://HOST:PORT, mqtt://HOST/TOPIC, or - for CSV on standard input: a header, then rows of time_s, "
+            "motor_speed_rad_s, and position_m or velocity_m_s; differential_pressure_pa is optional.",
         ),
     ],
-    false_alarms: Annotated[float, option("RATE", "False alarms an hour of healthy, moving operation [1/h].")] = 1.0,
-    learning: Annotated[
-        float, option("S", "Healthy running to learn before alarms can come [s], 60 at least.")
-    ] = 120.0,
+    false_alarms: Annotated[
+        float, option("RATE", "False alarms allowed per hour of healthy, moving operation [1/h].")
+    ] = 1.0,
+    learning: Annotated[float, option("S", "Healthy running to learn from before any alarm [s]; at least 60.")] = 120.0,
     healthy: Annotated[
-        Path | None, option("FILE", "A healthy log to learn first; an hour of one holds the rate best.")
+        Path | None, option("FILE", "A healthy log to learn from first; an hour keeps false alarms closest to RATE.")
     ] = None,
     rig: RigFile = None,
     columns: Columns = None,
@@ -61,9 +61,11 @@ def watch(
         bool, flag("--no-pressure", "Use motion alone, even if differential pressure is logged.")
     ] = False,
     heartbeat: Annotated[
-        float | None, option("S", "Also tell every so many seconds that the watch is alive, whether rows come or not.")
+        float | None, option("S", "Also report every S seconds that the watch is alive, whether rows come or not.")
     ] = None,
-    state: Annotated[Path | None, option("FILE", "Continue a stream where this file says, and keep it there.")] = None,
+    state: Annotated[
+        Path | None, option("FILE", "Keep what was learnt in this file, and go on from it after a restart.")
+    ] = None,
     publish: Annotated[
         str | None, option("mqtt://HOST[:PORT]/TOPIC", "Also publish every event at an MQTT broker.")
     ] = None,
@@ -77,8 +79,8 @@ def watch(
 
     Events: start; ready, learning is over; alarm, with since_s and its 95 % interval; change, two seconds later, by how
     much lost flow and pressure changed; alive, if --heartbeat asks for it; end. Each has the time of the stream and the
-    clock's (UTC). It learns what the actuator does while it is healthy and follows slow drift, as of the oil's
-    temperature, so it tells sudden changes; use diagnose for what has always been wrong.
+    clock's (UTC). It learns how the healthy actuator behaves and follows slow drift, such as warming oil, so it
+    reports sudden changes only; use diagnose for a fault that was there from the start.
     """
     require_positive("--heartbeat", heartbeat, "s")
     told = Watched(STANDARD_INPUT if log == "-" else log)

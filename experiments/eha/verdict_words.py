@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from experiments.page.condition_names import in_words
 from experiments.page.numbers import shop_unit
-from experiments.page.words import in_words
 
 SHOWN = {
     "leakage_flow": "leakage at rated pressure",

@@ -1,22 +1,7 @@
 """Names in results as a reader wants them."""
 
+from experiments.page.condition_names import in_words
 from experiments.page.tables import Cell, Column
-
-
-def in_words(condition: str) -> str:
-    """Return a condition's name for a reader.
-
-    Returns
-    -------
-    str
-        The same with spaces, both faults joined by a plus.
-
-    Examples
-    --------
-    >>> in_words("minor_leakage_major_friction")
-    'minor leakage + major friction'
-    """
-    return condition.replace("leakage_", "leakage + ").replace("_", " ")
 
 
 def in_short(condition: str) -> str:

@@ -42,7 +42,7 @@ def eha_ours(found: Evidence) -> Mapping[str, Ours]:
         **_rig(),
         **_settings(),
         **_conditions(found["study"], found["circuit"]),
-        **_first_tests(found["study"], found["circuit"], found["library"]["library"]),
+        **_first_tests(found["study"], found["circuit"], found["library"]),
         **_steady(found["circuit"]),
         **_steps(found["circuit"]["figure_10_validation_input"]),
         **_published_filter(found["study"]["bulk_modulus"]),
@@ -109,11 +109,8 @@ def _conditions(study: Tables, circuit: Tables) -> Mapping[str, Ours]:
     }
 
 
-def _first_tests(study: Tables, circuit: Tables, library: pd.DataFrame) -> Mapping[str, Ours]:
+def _first_tests(study: Tables, circuit: Tables, library: Tables) -> Mapping[str, Ours]:
     tests = circuit["section_4_first_tests"].set_index(["test", "at"])["value"]
-    models = study["transfer_functions"].set_index("condition")
-    kept = library.set_index("condition")
-    width, spread = cell(kept, "normal", "bandwidth_hz"), 1.96 * cell(kept, "normal", "bandwidth_std_hz")
     better = study["validation_rmse"]["mathematical_is_better"]
     return {
         "mean_gain_spread": Ours(float(tests["gain spread", "means from 2 V"])),
@@ -122,10 +119,16 @@ def _first_tests(study: Tables, circuit: Tables, library: pd.DataFrame) -> Mappi
         "dead_zone_major": Ours(float(tests["dead zone", "major_leakage"])),
         "order_circuit": Ours(float(circuit["figure_7_singular_values"]["suggested_order"].iloc[0])),
         "order_study": Ours(float(study["order"]["suggested_order"].iloc[0])),
-        "bandwidth_library": Ours(width, width - spread, width + spread),
-        "bandwidth_study": Ours(cell(models, "normal", "bandwidth_hz")),
+        "bandwidth_library": _bandwidth(library["library"]),
+        "bandwidth_around_mean": _bandwidth(library["around_mean"]),
         "math_better": Ours(float(better.sum())),
     }
+
+
+def _bandwidth(models: pd.DataFrame) -> Ours:
+    table = models.set_index("condition")
+    width, spread = cell(table, "normal", "bandwidth_hz"), 1.96 * cell(table, "normal", "bandwidth_std_hz")
+    return Ours(width, width - spread, width + spread)
 
 
 def _steady(circuit: Tables) -> Mapping[str, Ours]:

@@ -88,8 +88,12 @@ def _circuit(settings: PapersSettings, track: Track) -> Tables:
 
 
 def _library(_: PapersSettings, track: Track) -> Tables:
-    models = read_library()
-    makers = {"library": lambda: library_table(models), "roots": lambda: root_table(models)}
+    models, around = read_library(), read_library(which="around_mean")
+    makers = {
+        "library": lambda: library_table(models),
+        "roots": lambda: root_table(models),
+        "around_mean": lambda: library_table(around),
+    }
     return {name: make() for name, make in track(makers.items(), description="the library")}
 
 
