@@ -81,7 +81,7 @@ def held_back_blocks(fit: LinearFit, data: Channels) -> tuple[float, ...]:
     errors: list[float] = []
     for masks in blocks(data, BLOCKS):
         mask = np.concatenate(masks) & np.isfinite(target)
-        part = fit_linear(fit.form, data.without(masks), [fit.f])
+        part = fit_linear(fit.form, data.without(masks), [fit.f], bounded=fit.bounded)
         errors.append(block_error(Problem(fit.form, data).jacobian(part.theta)[0] - target, mask))
     return tuple(errors)
 
@@ -128,7 +128,8 @@ def pooled(errors: Sequence[float]) -> float:
 
 def candidate(fit: LinearFit, data: Channels) -> Candidate:
     """Return a fit with its held-back error, criteria, and what is doubtful in it."""
-    n, p = data.n_samples, fit.theta.size
+    # a dead time that was searched is one more value
+    n, p = data.n_samples, fit.theta.size + sum(delay > 1 for delay in fit.form.delays)
     deviance = n * float(np.log(max(fit.cost, 1e-300) / n))
     errors = held_back_blocks(fit, data)
     criteria = (deviance + p * float(np.log(n)), deviance + 2.0 * p)
@@ -190,16 +191,13 @@ def linear_candidates(
     found: list[Candidate] = []
     previous: list[Array] = []
     best, idle = np.inf, 0
-    kinds = list(range(FORMS if delays is None and sizes is None else 1))
     for order in orders:
-        forms = [form for kind, form in enumerate(_forms(order, late, m, sizes)) if kind in kinds]
-        fits = [_best_start(form, data, previous) for form in forms]
+        forms = _forms(order, late, m, sizes)
+        fits = [_best_start(form, data, previous) for form in (forms if delays is None else forms[:1])]
         tried = [candidate(fit, data) for fit in fits]
+        tried += [_within_record(one, data) for one in tried if one.doubt == "time_constant"]
         found += tried
         previous = [start for fit in fits for start in extended(fit)]
-        if len(found) >= 2 * FORMS:
-            ranked = np.argsort([one.held_back for one in tried], kind="stable")
-            kinds = [kinds[int(k)] for k in ranked[:2] if int(k) < len(kinds)]
         now = min((one.held_back for one in tried if not one.doubt), default=np.inf)
         idle = 0 if now < (1.0 - CLEARLY) * best else idle + 1
         best = min(best, now)
@@ -215,22 +213,29 @@ def _best_start(form: Form, data: Channels, previous: Sequence[Array]) -> Linear
     return min(fits, key=lambda fit: fit.cost)
 
 
+def _within_record(one: Candidate, data: Channels) -> Candidate:
+    """Return the best model of the same form whose time constants the record can hold."""
+    return candidate(fit_linear(one.form, data, [one.fit.f], bounded=True), data)
+
+
 def _forms(order: int, late: tuple[int, ...], m: int, sizes: int | None) -> list[Form]:
     """Return forms of one order: behind the estimated dead time, and behind none or one sample."""
     if sizes is not None:
         return [Form(order, (sizes,) * m, late)]
-    return [
+    forms = [
         Form(order, tuple(order + (delay == 0) for delay in late), late),
         Form(order, (order + 1,) * m, late),
         Form(order, (order + 1,) * m, (0,) * m),
         Form(order, (order,) * m, (1,) * m),
     ]
+    return list(dict.fromkeys(forms))
 
 
 def chosen(candidates: Sequence[Candidate]) -> Candidate:
-    """Return the smallest model that does nearly as well on held-back blocks as the best one that may be taken.
+    """Return, of the models that do nearly as well on held-back blocks as the best one, that of the least BIC.
 
-    A dead time of more than one sample was searched among many, and must do better than none by more than chance.
+    A dead time of more than one sample was searched among many and looks better than it is: it counts as a value in BIC,
+    and its price is what others are measured by.
 
     Parameters
     ----------
@@ -239,5 +244,5 @@ def chosen(candidates: Sequence[Candidate]) -> Candidate:
     """
     sound = [one for one in candidates if not one.doubt] or list(candidates)
     least = min(one.price for one in sound)
-    near = [one for one in sound if one.price <= (1.0 + CLEARLY) * least]
-    return min(near, key=lambda one: (one.form.n_values, one.held_back))
+    near = [one for one in sound if one.held_back <= (1.0 + CLEARLY) * least]
+    return min(near, key=lambda one: one.bic)

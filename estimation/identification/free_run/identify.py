@@ -160,7 +160,7 @@ def _identified(
             sound, notes = np.isfinite(held_back) and held_back < 1.0, []
     transfer = None
     if isinstance(body, LinearBody):
-        fit = fit_linear(best.form, whole, [best.fit.f])
+        fit = fit_linear(best.form, whole, [best.fit.f], bounded=best.fit.bounded)
         body = LinearBody.of(fit)
         transfer = linear_model(fit, whole, by) if len(data.inputs) == 1 else None
     model = FreeRunModel(data.inputs, data.output, data.sample_time, named, by, body, transfer)
@@ -209,8 +209,10 @@ def _believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) ->
     """Return the candidate that may be believed, and notes on those that were passed over for it."""
     notes: list[Note] = []
     best = chosen(candidates)
-    tempting = min(candidates, key=lambda one: one.held_back)
-    bar = BELIEVED if best.doubt else INTEGRATING * best.held_back
+    # a time constant held at the record's length does nearly what an integrator does, and is no other explanation
+    free = [one for one in candidates if not one.fit.bounded]
+    tempting, other = min(free, key=lambda one: one.held_back), chosen(free)
+    bar = BELIEVED if other.doubt else INTEGRATING * other.held_back
     if tempting.doubt == "time_constant" and tempting.held_back < bar:
         return replace(tempting, doubt=""), [IdentificationCode.INTEGRATES.note(output=data.output)]
     if best.doubt == "time_constant":

@@ -8,6 +8,7 @@ import numpy as np
 from estimation.arrays import Array, BoolArray
 from estimation.identification.fit.output_error import minimise
 from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.least_squares import least_squares
 from estimation.identification.free_run.linear_kernel import decay_rows
 from estimation.identification.search.criterion import Structure, polynomial, stabilised
 from estimation.identification.search.descent import stable
@@ -64,11 +65,14 @@ class LinearFit:
         Numerators, denominator behind its 1, offset, and the initial state of each log.
     cost : float
         Sum of squared residuals [dimensionless].
+    bounded : bool
+        Whether time constants were held within the record.
     """
 
     form: Form
     theta: Array
     cost: float
+    bounded: bool = False
 
     @property
     def numerators(self) -> list[Array]:
@@ -174,13 +178,15 @@ class Problem:
                 jacobian[part, n_b + k - 1] = -_shifted(moved[0], k, before / float(f.sum()))
         return output, jacobian
 
-    def descend(self, theta: Array) -> LinearFit:
+    def descend(self, theta: Array, *, bounded: bool = False) -> LinearFit:
         """Return the minimum that one start leads to.
 
         Parameters
         ----------
         theta : ndarray, shape (p,)
             All values.
+        bounded : bool
+            Whether every time constant must stay within the record.
         """
         n_b, n = self.form.n_b, self.form.order
         target = self.y[self.used]
@@ -191,10 +197,32 @@ class Problem:
             kept = jacobian if self.used.all() else jacobian[self.used]
             return float(left @ left), kept.T @ kept, kept.T @ left
 
+        # poles within a circle are those of the polynomial stretched by its radius within the unit circle
+        stretched = longest_pole(self.data.longest) ** -np.arange(1.0, n + 1.0) if bounded else np.ones(n)
         cost, best = levenberg(
-            at, theta, lambda values: stable(values[n_b : n_b + n]), tolerance=TOLERANCE, most_steps=MOST_STEPS
+            at,
+            theta,
+            lambda values: stable(values[n_b : n_b + n] * stretched),
+            tolerance=TOLERANCE,
+            most_steps=MOST_STEPS,
         )
-        return LinearFit(self.form, best, cost)
+        return LinearFit(self.form, best, cost, bounded)
+
+
+def longest_pole(n_samples: int) -> float:
+    """Return the pole whose time constant is a record's length.
+
+    Parameters
+    ----------
+    n_samples : int
+        Of the record.
+
+    Returns
+    -------
+    float
+        Distance from the origin [dimensionless].
+    """
+    return float(np.exp(-1.0 / n_samples))
 
 
 def _shifted(series: Array, lag: int, before: float) -> Array:
@@ -226,30 +254,7 @@ def columns_of(form: Form, u: Array) -> Array:
     return np.column_stack(shifted) if shifted else np.zeros((u.shape[0], 0))
 
 
-def least_squares(columns: Array, target: Array) -> tuple[Array, float]:
-    """Return values of a least-squares fit by scaled normal equations, and its cost.
-
-    Parameters
-    ----------
-    columns : ndarray, shape (n, p)
-        Regressors.
-    target : ndarray, shape (n,)
-        What they should give.
-
-    Returns
-    -------
-    tuple of ndarray, shape (p,), and float
-        Values, and the sum of squared residuals.
-    """
-    scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
-    scale[scale == 0.0] = 1.0
-    unit = columns / scale
-    values = np.linalg.lstsq(unit.T @ unit, unit.T @ target, rcond=None)[0]
-    left = target - unit @ values
-    return values / scale, float(left @ left)
-
-
-def fit_linear(form: Form, data: Channels, starts: Sequence[Array] = ()) -> LinearFit:
+def fit_linear(form: Form, data: Channels, starts: Sequence[Array] = (), *, bounded: bool = False) -> LinearFit:
     """Return the best linear model of one form.
 
     Parameters
@@ -258,6 +263,8 @@ def fit_linear(form: Form, data: Channels, starts: Sequence[Array] = ()) -> Line
         Scaled.
     starts : sequence of ndarray, shape (n + 1,)
         Denominators to begin at beside those that are searched; where some are given, only they are.
+    bounded : bool
+        Whether every time constant must stay within the record.
 
     Returns
     -------
@@ -266,12 +273,13 @@ def fit_linear(form: Form, data: Channels, starts: Sequence[Array] = ()) -> Line
     """
     problem = Problem(form, data)
     tried = list(starts) or [*_steiglitz_mcbride(problem), *_searched(problem)]
-    ranked = sorted((problem.profiled(_inside(f, data.longest)) for f in tried), key=lambda one: one[0])
+    radius = longest_pole(data.longest) ** 1.5 if bounded else 1.0 - 0.3 / data.longest
+    ranked = sorted((problem.profiled(_inside(f, data.longest, radius)) for f in tried), key=lambda one: one[0])
     kept: list[tuple[float, Array]] = []
     for cost, theta in ranked:
         if len(kept) < 3 and all(cost - other > 1e-7 * cost for other, _ in kept):
             kept.append((cost, theta))
-    return min((problem.descend(theta) for _, theta in kept), key=lambda fit: fit.cost)
+    return min((problem.descend(theta, bounded=bounded) for _, theta in kept), key=lambda fit: fit.cost)
 
 
 def extended(fit: LinearFit) -> list[Array]:
@@ -279,17 +287,16 @@ def extended(fit: LinearFit) -> list[Array]:
     return [np.convolve(fit.f, [1.0, -pole]) for pole in SLOWER]
 
 
-def _inside(f: Array, n_samples: int) -> Array:
+def _inside(f: Array, n_samples: int, limit: float) -> Array:
     f = stabilised(f, n_samples)
     roots = np.roots(f).astype(np.complex128)
-    limit = 1.0 - 0.3 / n_samples
     radius = np.abs(roots)
     return f if (radius <= limit).all() else polynomial(roots * np.minimum(1.0, limit / np.maximum(radius, limit)))
 
 
 def _steiglitz_mcbride(problem: Problem) -> list[Array]:
     """Return denominators of the iteration of Steiglitz and McBride (1965), begun at ARX; gaps end a run of rows."""
-    form, n = problem.form, problem.form.order
+    form, n, n_samples = problem.form, problem.form.order, problem.data.longest
     f, found = np.concatenate([[1.0], np.zeros(n)]), list[Array]()
     for _ in range(PASSES):
         rows, wanted = list[Array](), list[Array]()
@@ -306,7 +313,7 @@ def _steiglitz_mcbride(problem: Problem) -> list[Array]:
             rows.append(np.column_stack([series[:-1].T, -past])[near])
             wanted.append(out[near])
         values = least_squares(np.concatenate(rows), np.concatenate(wanted))[0]
-        new = _inside(np.concatenate([[1.0], values[form.n_b + 1 :]]), problem.data.longest)
+        new = _inside(np.concatenate([[1.0], values[form.n_b + 1 :]]), n_samples, 1.0 - 0.3 / n_samples)
         found.append(new)
         if np.abs(new - f).max() < 1e-6:
             break
