@@ -20,6 +20,7 @@ NAMES = (
     "identification_sets",
     "own_equations",
     "bent_inputs",
+    "state_space",
     "frequency_response",
     "circuit",
     "detection",

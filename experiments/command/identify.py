@@ -71,8 +71,9 @@ def identify(
         str,
         option(
             "NAME",
-            f"{', '.join([*STRUCTURES, 'narx', 'hammerstein'])}; auto takes the best on data held back. With --input "
-            "and --output: narx is polynomial, hammerstein a dead zone, saturation or backlash before a linear model.",
+            f"{', '.join([*STRUCTURES, 'narx', 'hammerstein', 'state-space'])}; auto takes the best on data held back. "
+            "With --input and --output: narx is polynomial, hammerstein a dead zone, saturation or backlash before a "
+            "linear model, state-space one model of all outputs, its order the number of states.",
         ),
     ] = "output-error",
     order: Annotated[
@@ -153,7 +154,7 @@ def identify(
     from plant.errors import NoChannelError
 
     any_columns = (inputs is not None or outputs is not None or simulate is not None) and rig is None and not columns
-    if any_columns or structure in ("narx", "hammerstein"):
+    if any_columns or structure in ("narx", "hammerstein", "state-space"):
         asked = Asked(
             names(inputs),
             names(outputs),
@@ -253,8 +254,8 @@ def linear_entries(model: "LinearModel") -> dict[str, Any]:
         **model.to_dict(),
         "bandwidth_hz": bandwidth,
         "bandwidth_std_hz": model.bandwidth_std_hz,
-        "poles": _with_std(model.poles, model.pole_std),
-        "zeros": _with_std(model.zeros, model.zero_std),
+        "poles": with_std(model.poles, model.pole_std),
+        "zeros": with_std(model.zeros, model.zero_std),
         "format_version": FORMAT_VERSION,
         "delay": {"samples": model.delay, "seconds": model.delay * model.sample_time},
         "message": (
@@ -288,7 +289,8 @@ def _judged(model: "LinearModel", u: "Array", y: "Array", log: Path, figure: Pat
     return entries | {"validation": tests}
 
 
-def _with_std(roots: Any, spreads: Any) -> list[dict[str, float]]:
+def with_std(roots: Any, spreads: Any) -> list[dict[str, float]]:
+    """Return complex numbers with their standard deviations, by the names of the JSON contract."""
     return [
         {"real": float(r.real), "imag": float(r.imag), "real_std": float(s.real), "imag_std": float(s.imag)}
         for r, s in zip(roots, spreads, strict=True)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from estimation.identification.free_run.data import Channels
     from estimation.identification.free_run.identify import Identified
     from estimation.identification.free_run.model import FreeRunModel
+    from estimation.identification.state_space.body import StateSpaceBody
     from plant.log.record import Record
 
 
@@ -76,16 +77,18 @@ def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path
         If an option is not usable.
     """
     from estimation.identification.free_run.identify import FREE_STRUCTURES
+    from estimation.identification.state_space.identify import STATE_SPACE
 
     if not asked.inputs or not asked.outputs:
         raise HydrostateError("--input and --output are wanted together, a column each at least")
     if twice := set(asked.inputs) & set(asked.outputs):
         raise HydrostateError(f"--input and --output must be different channels, got {min(twice)!r} for both")
-    require_known("--structure", asked.structure, FREE_STRUCTURES)
+    require_known("--structure", asked.structure, (*FREE_STRUCTURES, STATE_SPACE))
     require_positive("--sample-time", asked.sample_time, "s")
     require_positive("--resample", asked.resampled, "s")
     prepare_output(out)
     read: list[list[Record]] = []
+    shared: dict[str, Identified] = {}
 
     def work(name: Path) -> Result:
         output = str(name)
@@ -93,7 +96,11 @@ def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path
             wanted = (*asked.inputs, *asked.outputs)
             read.append([_record(log, wanted, asked.sample_time) for log in logs])
             read.append([_record(log, wanted, asked.sample_time) for log in asked.validate])
-        return _identified(read[0], read[1], output, asked, logs)
+        together = asked.structure == STATE_SPACE or (asked.structure == "auto" and len(asked.outputs) > 1)
+        if together and not shared:
+            shared.update(_together(read[0], asked, asked.outputs))
+        found = shared.get(output) or _together(read[0], asked, (output,))[output]
+        return _answer(found, read, output, asked, logs)
 
     batch = run_logs([Path(output) for output in asked.outputs], work, BLANK, "identifying")
     named = ", ".join(str(log) for log in logs)
@@ -107,16 +114,23 @@ def _record(log: Path, wanted: Sequence[str], sample_time: float | None) -> "Rec
     return read_any(log, wanted, sample_time=sample_time)
 
 
-def _identified(
-    records: "Sequence[Record]", tests: "Sequence[Record]", output: str, asked: Asked, logs: Sequence[Path]
+def _together(records: "Sequence[Record]", asked: Asked, outputs: Sequence[str]) -> "dict[str, Identified]":
+    """Return what is identified of some outputs, by their names."""
+    from estimation.identification.free_run.from_records import channels_of
+    from estimation.identification.state_space.identify import identify_outputs
+
+    data = [channels_of(records, asked.inputs, output, asked.resampled) for output in outputs]
+    form = {"order": asked.order, "delay": asked.delay, "n_numerator": asked.numerator}
+    return dict(zip(outputs, identify_outputs(data, structure=asked.structure, **form), strict=True))
+
+
+def _answer(
+    found: "Identified", read: "Sequence[Sequence[Record]]", output: str, asked: Asked, logs: Sequence[Path]
 ) -> Result:
     from estimation.identification.free_run.from_records import channels_of
-    from estimation.identification.free_run.identify import identify_channels
 
+    records, tests = read
     data = channels_of(records, asked.inputs, output, asked.resampled)
-    found = identify_channels(
-        data, structure=asked.structure, order=asked.order, delay=asked.delay, n_numerator=asked.numerator
-    )
     test = None
     if tests:
         held = channels_of(tests, asked.inputs, output, data.sample_time)
@@ -150,6 +164,7 @@ def entries(found: "Identified") -> dict[str, Any]:
     """Return what was identified by the names of the JSON contract."""
     from estimation.identification.free_run.hammerstein_body import HammersteinBody
     from estimation.identification.free_run.identify import WARNED
+    from estimation.identification.state_space.body import StateSpaceBody
 
     model, linear = found.model, found.model.linear
     result: dict[str, Any] = {
@@ -176,6 +191,8 @@ def entries(found: "Identified") -> dict[str, Any]:
         result |= {"numerator": [b.tolist() for b, _ in transfer], "denominator": transfer[0][1].tolist()}
         gains = [float(b.sum() / f.sum()) for b, f in transfer]
         result |= {"order": transfer[0][1].size - 1, "offset": model.offset, "dc_gain": {"value": gains}}
+    elif isinstance(model.body, StateSpaceBody):
+        result |= _state_space_entries(model, model.body)
     if isinstance(model.body, HammersteinBody):
         result["nonlinearity"] = model.body.nonlinearity(model.scaling)
     quality = found.quality
@@ -187,6 +204,26 @@ def entries(found: "Identified") -> dict[str, Any]:
         ]
     )
     return result
+
+
+def _state_space_entries(model: "FreeRunModel", body: "StateSpaceBody") -> dict[str, Any]:
+    """Return order, poles, steady gains and dead time of one output of a state space."""
+    from experiments.command.identify import with_std
+
+    system, gain = body.system, model.scaling.y_std / model.scaling.u_std
+    return {
+        "order": system.order,
+        "poles": with_std(system.poles, system.pole_std),
+        "dc_gain": {
+            "value": (system.dc_gain[body.place] * gain).tolist(),
+            "std": (system.dc_gain_std[body.place] * gain).tolist(),
+        },
+        "offset": model.offset,
+        "delay": {
+            "samples": list(system.delays),
+            "seconds": [delay * model.sample_time for delay in system.delays],
+        },
+    }
 
 
 def _quality(model: "FreeRunModel", data: "Channels") -> dict[str, Any]:

@@ -147,10 +147,10 @@ class Log(Shown):
         *logs : Log
             Further experiments, where ``input`` and ``output`` are given.
         **options
-            With ``input`` and ``output``, names or lists of them: ``structure`` ("output-error", "narx", "auto"),
-            ``order``, ``delay``, ``n_numerator``, ``sample_time`` [s]; what is not given the data choose. Without, or
-            with an option that only it has: as `estimation.identification.from_record.identify_record` takes them,
-            ``n_denominator=3``.
+            With ``input`` and ``output``, names or lists of them: ``structure`` ("output-error", "narx", "hammerstein",
+            "state-space", "auto"), ``order``, ``delay``, ``n_numerator``, ``sample_time`` [s]; what is not given the
+            data choose. Without, or with an option that only it has: as
+            `estimation.identification.from_record.identify_record` takes them, ``n_denominator=3``.
 
         Returns
         -------

@@ -9,11 +9,12 @@ from experiments.log_pages.answers import Shown
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
-    from control import TransferFunction
+    from control import StateSpace, TransferFunction
     from matplotlib.axes import Axes
 
     from estimation.identification.free_run.data import Channels
     from estimation.identification.free_run.model import FreeRunModel
+    from estimation.identification.state_space.body import StateSpaceBody
     from plant.log.record import Record
 
 _FIVE = "{:.5g}".format
@@ -93,16 +94,21 @@ class Relation(Shown):
         rows = {one.output: vars(one.quality(part.u, part.y)) for one, part in zip(self.models, parts, strict=True)}
         return pd.DataFrame.from_dict(rows, orient="index")
 
-    def to_control(self) -> "TransferFunction":
-        """Return linear models as one transfer function of python-control, a row an output.
+    def to_control(self) -> "TransferFunction | StateSpace":
+        """Return linear models as one object of python-control, a row an output.
 
         Returns
         -------
-        control.TransferFunction
-            Offsets are left out.
+        control.TransferFunction or control.StateSpace
+            The latter of a state space, in the channels' units. Offsets are left out.
         """
         import control
 
+        from estimation.identification.state_space.body import StateSpaceBody
+
+        bodies = [one.body for one in self.models if isinstance(one.body, StateSpaceBody)]
+        if bodies and len(bodies) == len(self.models) == len(bodies[0].system.c):
+            return _shared_states(self.models, bodies)
         if len(self.models) == 1:
             return self.models[0].to_control()
         parts = [one.to_control() for one in self.models]
@@ -150,6 +156,17 @@ class Relation(Shown):
         return [axis for model, data in pairs for axis in draw_free_run(model, data, "log").axes]
 
 
+def _shared_states(models: "Sequence[FreeRunModel]", bodies: "Sequence[StateSpaceBody]") -> "StateSpace":
+    """Return the state space that all outputs share, its dead times as states of their own."""
+    import control
+
+    from estimation.identification.state_space.body import system_in_units
+
+    one = system_in_units(bodies, [model.scaling for model in models])
+    names = {"inputs": list(models[0].inputs), "outputs": [model.output for model in models]}
+    return control.StateSpace(*one.with_delays_as_states(), one.sample_time, **names)
+
+
 def _channels(model: "FreeRunModel", record: "Record") -> "Channels":
     from estimation.identification.free_run.from_records import channels_of
 
@@ -166,10 +183,10 @@ def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: 
     inputs, outputs : str or sequence of str
         Channels.
     options : Mapping[str, Any]
-        As `identify_channels` takes them, and ``sample_time`` of the model [s].
+        As `identify_outputs` takes them, and ``sample_time`` of the model [s].
     """
     from estimation.identification.free_run.from_records import channels_of
-    from estimation.identification.free_run.identify import identify_channels
+    from estimation.identification.state_space.identify import identify_outputs
     from experiments.command.identify_any import entries
 
     asked = dict(options)
@@ -179,5 +196,5 @@ def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: 
         channels_of(records, sources, output, sample_time)
         for output in ([outputs] if isinstance(outputs, str) else list(outputs))
     ]
-    found = [identify_channels(one, **asked) for one in data]
+    found = identify_outputs(data, **asked)
     return Relation([one.model for one in found], [entries(one) for one in found], data)

@@ -11,6 +11,7 @@ from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.hammerstein_body import HammersteinBody
 from estimation.identification.free_run.linear_body import LinearBody as LinearBody
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, Variables, first_values, products
+from estimation.identification.state_space.body import StateSpaceBody as StateSpaceBody
 
 START_STEPS = 12
 """Refinements of the first outputs of a polynomial run."""
@@ -142,5 +143,5 @@ class PolynomialBody:
         return cls(fit.variables, fit.terms, fit.coefficients)
 
 
-BODIES: Mapping[str, Any] = {one.kind: one for one in (LinearBody, PolynomialBody, HammersteinBody)}
+BODIES: Mapping[str, Any] = {one.kind: one for one in (LinearBody, PolynomialBody, HammersteinBody, StateSpaceBody)}
 """Bodies by their name in JSON."""

@@ -234,8 +234,8 @@ def _forms(order: int, late: tuple[int, ...], m: int, sizes: int | None) -> list
 def chosen(candidates: Sequence[Candidate]) -> Candidate:
     """Return, of the models that do nearly as well on held-back blocks as the best one, that of the least BIC.
 
-    A dead time of more than one sample was searched among many and looks better than it is: it counts as a value in BIC,
-    and its price is what others are measured by.
+    A dead time of more than one sample was searched among many and looks better than it is: it counts as a value in
+    BIC, and its price is what others are measured by.
 
     Parameters
     ----------

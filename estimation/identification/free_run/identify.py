@@ -29,7 +29,7 @@ from plant.errors import HydrostateError, LogWarning, require_known
 from plant.notes import Note
 
 FREE_STRUCTURES = ("output-error", "narx", "hammerstein", "auto", *ADOPTED)
-"""Structures between any channels; auto chooses between the first two."""
+"""Structures between any channels; auto chooses between the first three."""
 
 WARNED = (IdentificationCode.TIME_CONSTANT_BEYOND_RECORD, IdentificationCode.NO_FIT, IdentificationCode.INTEGRATES)
 """Notes that are raised as warnings too; the others say only what was passed over."""
@@ -99,9 +99,9 @@ def identify_channels(
         One log or several.
     structure : str
         ``"output-error"``: linear; ``"narx"``: polynomial, its terms chosen by the free run; ``"auto"``: linear,
-        unless the polynomial one is clearly better on blocks held back. Of one input also ``"hammerstein"``: a dead
-        zone, saturation or backlash in front of a linear model, where one of them is better there than none; and
-        the keys of `other_structures.ADOPTED`, at the order that output error is given.
+        unless the polynomial one is clearly better on blocks held back, or of one input the next. Of one input also
+        ``"hammerstein"``: a dead zone, saturation or backlash in front of a linear model, where one of them is better
+        there than none; and the keys of `other_structures.ADOPTED`, at the order that output error is given.
     order, delay, n_numerator : int, optional
         Of every input; chosen by the free run on blocks held back where not given.
 
@@ -142,10 +142,12 @@ def _identified(
     sound = not best.doubt
     if structure in ADOPTED:
         return _adopted(structure, best, data, by, rows)
+    bend = None
+    if structure == "hammerstein" or (structure == "auto" and len(data.inputs) == 1):
+        bend = _worthwhile_bend(linear, best, whole, rows)
     if structure == "hammerstein":
-        bent = _hammerstein(linear, best, data, whole, rows)
-        if bent is not None:
-            return bent
+        if bend is not None:
+            return _bent(bend, data, whole, rows)
         notes = [*notes, IdentificationCode.NO_NONLINEARITY.note(output=data.output)]
         structure = "output-error"
     body, held_back, named = LinearBody.of(best.fit), best.held_back, "output-error"
@@ -155,7 +157,10 @@ def _identified(
         better = min(polynomial, key=lambda one: one.held_back, default=None)
         if better is None and structure == "narx":
             raise HydrostateError(f"no polynomial model of {data.output!r} runs free without growing beyond bounds")
-        if better is not None and (structure == "narx" or not sound or _clearly_better(better, best)):
+        taken = better is not None and (structure == "narx" or not sound or _clearly_better(better, best))
+        if bend is not None and not (taken and better is not None and better.held_back < bend.held_back):
+            return _bent(bend, data, whole, rows)
+        if taken and better is not None:
             body, held_back, named = _refitted(better, whole), better.held_back, "narx"
             sound, notes = np.isfinite(held_back) and held_back < 1.0, []
     transfer = None
@@ -172,19 +177,23 @@ def _identified(
     return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(rows), tuple(notes), bool(sound))
 
 
-def _hammerstein(
-    linear: Sequence[Candidate], best: Candidate, data: Channels, whole: Channels, rows: list[dict[str, Any]]
-) -> Identified | None:
-    """Return the best model with a nonlinearity at its input, or None where none is better than the linear one."""
-    if len(data.inputs) > 1:
-        raise HydrostateError(f"structure hammerstein takes one input, got {', '.join(data.inputs)}: use narx")
+def _worthwhile_bend(
+    linear: Sequence[Candidate], best: Candidate, whole: Channels, rows: list[dict[str, Any]]
+) -> HammersteinCandidate | None:
+    """Return the best model with a nonlinearity at its input, or None where none is better than every linear one."""
+    if len(whole.inputs) > 1:
+        raise HydrostateError(f"structure hammerstein takes one input, got {', '.join(whole.inputs)}: use narx")
     found = hammerstein_candidates(linear, section(whole, MOST_CHOSEN))
     rows += [_hammerstein_row(one) for one in found]
     if not found:
         return None
     taken = chosen_hammerstein(found)
-    if not taken.held_back < (1.0 - BENT_MARGIN) * min(best.held_back, *(one.held_back for one in linear)):
-        return None
+    bar = min(best.held_back, *(one.held_back for one in linear))
+    return taken if taken.held_back < (1.0 - BENT_MARGIN) * bar else None
+
+
+def _bent(taken: HammersteinCandidate, data: Channels, whole: Channels, rows: list[dict[str, Any]]) -> Identified:
+    """Return a model with a nonlinearity at its input, fitted to all data."""
     part = section(whole, MOST_FITTED)
     fit = refitted(taken.fit, part)
     body = HammersteinBody.of(fit, deviations(fit, part))

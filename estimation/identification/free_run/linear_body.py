@@ -36,6 +36,18 @@ class LinearBody:
         n_b = self.form.n_b
         return np.concatenate([[1.0], self.theta[n_b : n_b + self.form.order]])
 
+    @property
+    def level(self) -> float:
+        """Output where inputs stand at zero [scaled]."""
+        return float(self.theta[-1])
+
+    def transfer_functions(self) -> list[tuple[Array, Array]]:
+        """Return numerator and denominator from each input [scaled], in powers of the delay operator."""
+        parts = np.split(self.theta[: self.form.n_b], np.cumsum(self.form.sizes)[:-1])
+        return [
+            (np.concatenate([np.zeros(delay), b]), self.f) for b, delay in zip(parts, self.form.delays, strict=True)
+        ]
+
     def run(self, u: Array, y: Array) -> Array:
         """Return the free run, its initial state by least squares of the outputs that are there.
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.arrays import Array
-from estimation.identification.free_run.bodies import BODIES, Body, LinearBody
+from estimation.identification.free_run.bodies import BODIES, Body, LinearBody, StateSpaceBody
 from estimation.identification.free_run.data import Scaling
 from plant.errors import HydrostateError
 
@@ -153,25 +153,22 @@ class FreeRunModel:
             If the model is not linear.
         """
         body = self.body
-        if not isinstance(body, LinearBody):
+        if not isinstance(body, LinearBody | StateSpaceBody):
             raise HydrostateError(f"a {self.structure} model has no transfer function")
-        parts = np.split(body.theta[: body.form.n_b], np.cumsum(body.form.sizes)[:-1])
-        return [
-            (np.concatenate([np.zeros(delay), b * self.scaling.y_std / std]), body.f)
-            for b, delay, std in zip(parts, body.form.delays, self.scaling.u_std, strict=True)
-        ]
+        factors = self.scaling.y_std / self.scaling.u_std
+        return [(b * factor, f) for (b, f), factor in zip(body.transfer_functions(), factors, strict=True)]
 
     @property
     def level(self) -> float:
         """Output of a linear model whose inputs have long stood at the data's means [output unit]; NaN for others."""
-        if not isinstance(self.body, LinearBody):
+        if not isinstance(self.body, LinearBody | StateSpaceBody):
             return float("nan")
-        return self.scaling.y_mean + self.scaling.y_std * float(self.body.theta[-1])
+        return self.scaling.y_mean + self.scaling.y_std * self.body.level
 
     @property
     def offset(self) -> float:
         """Output at rest of a linear model whose inputs are zero [output unit]; NaN for others."""
-        if not isinstance(self.body, LinearBody):
+        if not isinstance(self.body, LinearBody | StateSpaceBody):
             return float("nan")
         gains = [float(b.sum() / f.sum()) for b, f in self.transfer_functions()]
         return self.level - float(np.dot(gains, self.scaling.u_mean))

@@ -70,6 +70,30 @@ def test_one_input_gives_a_transfer_function_with_its_uncertainty(logs: list[Pat
     assert "heat" in run(logs[0], "--input", "load", "--output", "heat", "--order", 1).stdout
 
 
+def test_a_state_space_is_one_model_of_all_outputs(logs: list[Path], tmp_path: Path) -> None:
+    saved = tmp_path / "model.json"
+    channels = ("--input", "Valve [%],load", "--output", "flow,heat", "--structure", "state-space", "--order", 3)
+    ran = run(*logs[:2], *channels, "--delay", 1, "--validate", logs[2], "--out", saved, "--json")
+    assert ran.exit_code == 0, ran.output
+    flow, heat = json.loads(ran.stdout)
+    assert (flow["structure"], flow["order"], flow["outcome"]) == ("state-space", 3, "ok")
+    assert flow["n_values"] == heat["n_values"] == 3 * (2 + 2) + 2
+    assert flow["dc_gain"]["value"] == pytest.approx([2.0, -0.5], abs=4.0 * max(flow["dc_gain"]["std"]))
+    assert flow["offset"] == pytest.approx(2.0, abs=0.05)
+    assert sorted(pole["real"] for pole in flow["poles"])[1:] == pytest.approx([0.5, 0.8], abs=0.05)
+    assert flow["test"]["fit_percent"] > 90.0
+    (one,) = json.loads(run(logs[2], "--simulate", saved, "--json").stdout)
+    assert one["outputs"][1]["fit_percent"] == pytest.approx(heat["test"]["fit_percent"], abs=1e-6)
+    assert "state-space, order 3" in run(logs[0], *channels, "--delay", 1).stdout
+
+    form = {"structure": "state-space", "order": 3, "delay": 1}
+    model = hs.read(logs[0]).identify(hs.read(logs[1]), input=["Valve [%]", "load"], output=["flow", "heat"], **form)
+    system = model.to_control()
+    assert (system.nstates, system.noutputs, system.ninputs) == (3, 2, 2)
+    assert system.dcgain()[0] == pytest.approx(flow["dc_gain"]["value"])
+    assert hs.load_model(saved).simulate(hs.read(logs[2])).shape == (300, 2)
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -111,3 +111,12 @@ def test_a_play_follows_at_half_its_width_and_stands_still_in_between() -> None:
     play(np.array([0.0, 2.0, 1.5, 0.5, -1.0, 0.0]), 0.5, 0.2, out, slopes)
     np.testing.assert_array_equal(out, [0.2, 1.5, 1.5, 1.0, -0.5, -0.5])
     np.testing.assert_array_equal(slopes, [[0, 1], [-1, 0], [-1, 0], [1, 0], [1, 0], [1, 0]])
+
+
+def test_auto_takes_a_bend_where_it_is_better_than_every_other_on_blocks_held_back(planted: Planted) -> None:
+    found = identify_channels(logged(planted, 5), structure="auto", order=2, delay=1)
+    assert found.model.structure == "hammerstein"
+    assert isinstance(found.model.body, HammersteinBody)
+    assert found.model.body.bend == planted.kind
+    rest = [row["held_back_percent"] for row in found.candidates if row["structure"] != "hammerstein"]
+    assert found.held_back_percent > max(rest)

@@ -1,10 +1,12 @@
 """Output error of several inputs with offset and initial states, and how its order is chosen."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from estimation.arrays import Array
-from estimation.identification.free_run.choose_linear import chosen, linear_candidates
+from estimation.identification.free_run.choose_linear import candidate, chosen, linear_candidates
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import Form, Problem, fit_linear
@@ -100,6 +102,37 @@ def test_a_drift_is_not_taken_for_a_time_constant_beyond_the_record() -> None:
     poles = np.abs(np.roots(best.fit.f))
     assert not best.doubt
     assert (-1.0 / np.log(poles) <= 400).all()
+
+
+def test_a_time_constant_beyond_the_record_is_tried_again_within_it() -> None:
+    rng = np.random.default_rng(3)
+    u = steps(400, 3, hold=5)
+    y = filtered([0.0, 0.4], [1.0, -0.6], u) + 0.05 * np.cumsum(rng.normal(size=400))
+    data = scaled(channels_from([u[:, None]], [y], 1.0, ["u"], "y"))[0]
+    candidates = linear_candidates(data, [2], (1,))
+    beyond = [one for one in candidates if one.doubt == "time_constant"]
+    within = [one for one in candidates if one.fit.bounded]
+    assert len(beyond) == len(within) == 1
+    slowest = -1.0 / np.log(np.abs(np.roots(within[0].fit.f)).max())
+    assert 100.0 < slowest <= 400.0
+    assert not within[0].doubt
+    # what the bound costs, beside what other poles would
+    assert within[0].fit.cost < 1.05 * beyond[0].fit.cost
+
+
+def test_of_models_that_do_as_well_the_most_probable_is_taken_and_a_dead_time_counts() -> None:
+    data = scaled(one_log(300))[0]
+    one = candidate(fit_linear(Form(1, (1,), (1,)), data), data)
+    tried = {
+        "small": replace(one, held_back=0.1005, bic=-900.0),
+        "probable": replace(one, held_back=0.1000, bic=-1000.0),
+        "worse": replace(one, held_back=0.1020, bic=-2000.0),
+        "beyond": replace(one, held_back=0.0500, bic=-3000.0, doubt="time_constant"),
+    }
+    assert chosen(list(tried.values())) is tried["probable"]
+    late, theta = fit_linear(Form(1, (1,), (3,)), data), one.fit.theta.size
+    n = data.n_samples
+    assert candidate(late, data).bic == pytest.approx(n * np.log(late.cost / n) + (theta + 1) * np.log(n))
 
 
 def test_a_model_no_better_than_the_mean_is_not_sound() -> None:

@@ -69,7 +69,7 @@ def test_the_product_that_the_plant_has_is_the_first_one_added() -> None:
 
 
 def test_auto_takes_the_polynomial_model_of_a_stiffening_spring_and_not_of_a_linear_one() -> None:
-    stiff = identify_channels(log(), structure="auto")
+    stiff = identify_channels(log(), structure="auto", order=2, delay=1)
     assert stiff.model.structure == "narx"
     u, y = duffing(400, 7)
     assert stiff.model.quality([u[:, None]], [y]).fit_percent > 95.0
@@ -79,7 +79,7 @@ def test_auto_takes_the_polynomial_model_of_a_stiffening_spring_and_not_of_a_lin
     for t in range(1, 300):
         y[t] = 0.8 * y[t - 1] + 0.3 * u[t - 1]
     linear = channels_from([u[:, None]], [y + 0.05 * rng.normal(size=300)], 1.0, ["u"], "y")
-    assert identify_channels(linear, structure="auto").model.structure == "output-error"
+    assert identify_channels(linear, structure="auto", order=1, delay=1).model.structure == "output-error"
 
 
 def test_a_saved_model_simulates_as_before(tmp_path: object) -> None:
@@ -111,7 +111,7 @@ def test_a_model_that_leaves_the_range_when_the_inputs_come_in_another_order_is_
 
 
 def test_a_run_beyond_what_was_seen_does_not_run_away() -> None:
-    model = identify_channels(log(), structure="narx").model
+    model = identify_channels(log(), structure="narx", order=2, delay=1).model
     assert np.isfinite(model.simulate(3.0 * duffing(400, 4)[0])).all()
 
 

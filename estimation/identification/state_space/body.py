@@ -1,0 +1,120 @@
+"""One output of a state space as it runs free, in the data's scale, with its JSON form."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.identification.free_run.data import Scaling
+from estimation.identification.state_space.joint import delayed
+from estimation.identification.state_space.kernel import run_states
+from estimation.identification.state_space.system import StateSpace
+
+
+@dataclass(frozen=True, eq=False)
+class StateSpaceBody:
+    """One output of a state space that all outputs share.
+
+    Parameters
+    ----------
+    system : StateSpace
+        All outputs, scaled.
+    place : int
+        Which of them this is.
+    """
+
+    system: StateSpace
+    place: int
+    kind: ClassVar[str] = "state-space"
+
+    @property
+    def n_values(self) -> int:
+        """Fitted coefficients of all outputs together."""
+        return self.system.n_values
+
+    @property
+    def level(self) -> float:
+        """Output where inputs stand at zero [scaled]."""
+        return float(self.system.level[self.place])
+
+    def run(self, u: Array, y: Array) -> Array:
+        """Return the free run, its initial state by least squares of the outputs that are there.
+
+        Where there are too few of them it begins at rest under the first inputs.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n, m)
+            Inputs, scaled.
+        y : ndarray, shape (n,)
+            Output, scaled; NaN where missing.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output, scaled.
+        """
+        one, n, known = self.system, self.system.order, np.isfinite(y)
+        late, a = delayed(u, one.delays), np.ascontiguousarray(one.a)
+        rest = np.asarray(np.linalg.lstsq(np.eye(n) - a, one.b @ late[0], rcond=None)[0], dtype=np.float64)
+        states, quiet = np.empty((len(u), n)), np.zeros((len(u), n))
+        run_states(a, np.ascontiguousarray(late @ one.b.T), rest, states)
+        out = states @ one.c[self.place] + late @ one.d[self.place] + self.level
+        if np.count_nonzero(known) <= n:
+            return out
+        free = np.empty((len(u), n))
+        for k in range(n):
+            run_states(a, quiet, np.eye(n)[k], states)
+            free[:, k] = states @ one.c[self.place]
+        return out + free @ np.linalg.lstsq(free[known], (y - out)[known], rcond=1e-10)[0]
+
+    def one_step(self, u: Array, y: Array) -> Array:
+        """Return the free run: noise is taken to be the sensor's, so what was measured before tells nothing.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n, m)
+            Inputs, scaled.
+        y : ndarray, shape (n,)
+            Output, scaled; NaN where missing.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output, scaled.
+        """
+        return self.run(u, y)
+
+    def transfer_functions(self) -> list[tuple[Array, Array]]:
+        """Return numerator and denominator from each input [scaled], in powers of the delay operator."""
+        from scipy.signal import ss2tf
+
+        one, found = self.system, list[tuple[Array, Array]]()
+        for k, delay in enumerate(one.delays):
+            b, f = ss2tf(one.a, one.b, one.c[self.place][None], one.d[self.place][None], input=k)
+            found.append((np.concatenate([np.zeros(delay), np.ravel(b)]), np.asarray(f, dtype=np.float64)))
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return JSON values."""
+        return {**self.system.to_dict(), "place": self.place}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> "StateSpaceBody":
+        """Return the body that `to_dict` wrote."""
+        return cls(StateSpace.from_dict(values), int(values["place"]))
+
+
+def system_in_units(bodies: Sequence[StateSpaceBody], scalings: Sequence[Scaling]) -> StateSpace:
+    """Return the state space that several outputs share, in the channels' units.
+
+    Parameters
+    ----------
+    bodies, scalings : sequence of StateSpaceBody, sequence of Scaling
+        One an output, all of them.
+    """
+    by = scalings[0]
+    mean, std = (np.array([getattr(one, name) for one in scalings]) for name in ("y_mean", "y_std"))
+    return bodies[0].system.in_units(by.u_mean, by.u_std, mean, std)

@@ -1,0 +1,104 @@
+"""Inputs and all outputs of one or more logs side by side, in their scale."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from estimation.arrays import Array, BoolArray
+from estimation.identification.free_run.data import Channels
+from plant.errors import HydrostateError
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """Inputs and outputs of one or more logs on one sample time.
+
+    Parameters
+    ----------
+    sample_time : float
+        Seconds between samples [s].
+    u : tuple of ndarray, shape (n, m)
+        Inputs of each log, no gaps.
+    y : tuple of ndarray, shape (n, p)
+        Outputs of each log; NaN where missing.
+    """
+
+    sample_time: float
+    u: tuple[Array, ...]
+    y: tuple[Array, ...]
+
+    @property
+    def slices(self) -> list[slice]:
+        """Where each log stands."""
+        ends = np.cumsum([0, *(len(one) for one in self.u)])
+        return [slice(int(a), int(b)) for a, b in pairwise(ends)]
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of all logs."""
+        return sum(len(one) for one in self.u)
+
+    def without(self, masks: Sequence[BoolArray]) -> "Joint":
+        """Return the same with samples of all outputs held back.
+
+        Parameters
+        ----------
+        masks : sequence of ndarray of bool, shape (n,)
+            Where, in each log.
+        """
+        return replace(self, y=tuple(np.where(mask[:, None], np.nan, y) for y, mask in zip(self.y, masks, strict=True)))
+
+    def delayed(self, delays: Sequence[int]) -> "Joint":
+        """Return the same with inputs that come some samples later; before the log they stood at their first values.
+
+        Parameters
+        ----------
+        delays : sequence of int
+            Of each input [samples].
+        """
+        return replace(self, u=tuple(delayed(u, delays) for u in self.u))
+
+
+def delayed(u: Array, delays: Sequence[int]) -> Array:
+    """Return inputs some samples later, their first values in front of them.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n, m)
+        Inputs.
+    delays : sequence of int
+        Of each input [samples].
+
+    Returns
+    -------
+    ndarray, shape (n, m)
+        Inputs.
+    """
+    rows = np.arange(len(u))[:, None] - np.asarray(delays)[None, :]
+    return np.take_along_axis(u, np.maximum(rows, 0), axis=0)
+
+
+def joined(data: Sequence[Channels]) -> Joint:
+    """Return outputs of the same logs side by side.
+
+    Parameters
+    ----------
+    data : sequence of Channels
+        One an output, inputs alike.
+
+    Raises
+    ------
+    HydrostateError
+        If the inputs differ.
+    """
+    first = data[0]
+    for one in data[1:]:
+        same = len(one.u) == len(first.u) and all(np.array_equal(a, b) for a, b in zip(one.u, first.u, strict=True))
+        if one.inputs != first.inputs or not same:
+            raise HydrostateError(
+                f"outputs of one state space must have the same inputs, {first.output!r} and {one.output!r} have not"
+            )
+    together = tuple(np.column_stack(parts) for parts in zip(*(one.y for one in data), strict=True))
+    return Joint(first.sample_time, first.u, together)

@@ -1,0 +1,67 @@
+"""Loops of a state-space model: its states, and what a push on each of them does to every output later."""
+
+from estimation.arrays import Array
+from estimation.identification.search.jit import compiled
+
+
+@compiled
+def run_states(a: Array, pushed: Array, start: Array, out: Array) -> None:
+    """Fill in the states: ``x[t + 1] = A x[t] + pushed[t]``.
+
+    Parameters
+    ----------
+    a : ndarray, shape (n, n)
+        Transition.
+    pushed : ndarray, shape (samples, n)
+        What inputs add.
+    start : ndarray, shape (n,)
+        State at the first sample.
+    out : ndarray, shape (samples, n)
+        Room for the states.
+    """
+    n = start.size
+    for i in range(n):
+        out[0, i] = start[i]
+    for t in range(1, out.shape[0]):
+        for i in range(n):
+            total = pushed[t - 1, i]
+            for j in range(n):
+                total += a[i, j] * out[t - 1, j]
+            out[t, i] = total
+
+
+@compiled
+def answers(a: Array, c: Array, source: Array, room: Array, out: Array) -> None:
+    """Fill in the outputs that follow where one series pushes each state in turn.
+
+    Parameters
+    ----------
+    a : ndarray, shape (n, n)
+        Transition.
+    c : ndarray, shape (p, n)
+        Outputs of states.
+    source : ndarray, shape (samples,)
+        The series.
+    room : ndarray, shape (n, r)
+        Zeros, twice as many columns as rows: state i of the run in which the source pushes state j, now and next.
+    out : ndarray, shape (samples, k)
+        Room for the outputs: output o of the run in which the source pushes state j stands at ``o n + j``.
+    """
+    n, p = a.shape[0], c.shape[0]
+    for t in range(source.size):
+        for o in range(p):
+            for j in range(n):
+                total = 0.0
+                for i in range(n):
+                    total += c[o, i] * room[i, j]
+                out[t, o * n + j] = total
+        for j in range(n):
+            for i in range(n):
+                total = 0.0
+                for k in range(n):
+                    total += a[i, k] * room[k, j]
+                room[i, n + j] = total
+            room[j, n + j] += source[t]
+        for i in range(n):
+            for j in range(n):
+                room[i, j] = room[i, n + j]

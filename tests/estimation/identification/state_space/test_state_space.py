@@ -1,0 +1,150 @@
+"""State space of several inputs and outputs: derivatives, start, covariance, order, and what is shared by outputs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.state_space import A, bound, identified, logged, plant, told
+from estimation.identification.free_run.data import Channels, channels_from, scaled
+from estimation.identification.free_run.saved import load_models, save_models
+from estimation.identification.model.recursion import filtered
+from estimation.identification.notes import IdentificationCode
+from estimation.identification.state_space.choose import chosen_state, state_candidates
+from estimation.identification.state_space.identify import identify_outputs, identify_state_space
+from estimation.identification.state_space.joint import joined
+from estimation.identification.state_space.problem import Problem, Size
+from estimation.identification.state_space.starts import subspace_starts
+from plant.errors import HydrostateError, LogWarning
+
+
+def in_scale(samples: int = 200, seed: int = 1) -> list[Channels]:
+    return [scaled(one)[0] for one in logged(seed, samples)]
+
+
+def test_sensitivities_are_the_derivatives_of_the_outputs() -> None:
+    size = Size(3, 2, 2, direct=True)
+    problem = Problem(size, joined(in_scale(60)))
+    theta = 0.3 * np.random.default_rng(2).normal(size=size.n_matrices + size.n)
+    _, slopes = problem.jacobian(theta)
+    for k in range(theta.size):
+        step = np.zeros(theta.size)
+        step[k] = 1e-6
+        moved = (problem.jacobian(theta + step)[0] - problem.jacobian(theta - step)[0]) / 2e-6
+        assert moved == pytest.approx(slopes[:, :, k], abs=1e-6)
+
+
+def test_another_basis_of_the_states_changes_no_output_and_is_no_direction_of_the_search() -> None:
+    size = Size(3, 2, 2, direct=False)
+    problem = Problem(size, joined(in_scale(60)))
+    theta = 0.3 * np.random.default_rng(3).normal(size=size.n_matrices + size.n)
+    turned = problem.balanced(theta)
+    assert problem.outputs(problem.unpacked(turned)) == pytest.approx(problem.outputs(problem.unpacked(theta)))
+    basis = problem.directions(theta)
+    assert basis.shape[1] == theta.size - 9
+    slopes = problem.jacobian(theta)[1].reshape(-1, theta.size)
+    assert np.linalg.matrix_rank(slopes) == np.linalg.matrix_rank(slopes @ basis)
+
+
+def test_the_subspace_start_is_near_the_poles() -> None:
+    starts = subspace_starts(joined(in_scale(600)), 3)
+    wanted = np.sort_complex(np.linalg.eigvals(A))
+    distance = [float(np.abs(np.sort_complex(np.linalg.eigvals(a)) - wanted).max()) for a, _ in starts]
+    assert min(distance) < 0.05
+
+
+def test_errors_are_at_the_bound_and_deviations_say_so() -> None:
+    truth, errors, own = told(plant())[0], [], []
+    for seed in range(8):
+        data = logged(seed, 500)
+        values, deviations = told(identified(data, 3))
+        limit = told(bound(data))[1]
+        free = limit > 1e-9
+        errors.append(((values - truth)[free] / limit[free]) ** 2)
+        own.append(((values - truth)[free] / deviations[free]) ** 2)
+    # eight logs of 23 values that hang together: the mean of squares scatters by 0.2
+    assert np.sqrt(np.mean(errors)) == pytest.approx(1.0, abs=0.3)
+    assert np.sqrt(np.mean(own)) == pytest.approx(1.0, abs=0.3)
+
+
+def test_the_number_of_states_is_chosen_on_blocks_held_back() -> None:
+    candidates = state_candidates(in_scale(400), [1, 2, 3, 4], delay=1)
+    best = chosen_state(candidates)
+    assert (best.fit.size.n, best.fit.size.direct, best.doubt) == (3, False, "")
+    assert best.price < 0.1
+    assert candidates[0].price > 2.0 * best.price
+
+
+def test_outputs_share_one_model_that_is_saved_with_its_covariance(tmp_path_factory: pytest.TempPathFactory) -> None:
+    data = logged(3, 400)
+    found = identify_state_space(data, order=3, delay=1)
+    path = tmp_path_factory.mktemp("saved") / "model.json"
+    save_models([one.model for one in found], path)
+    again = load_models(path)
+    for one, other, channels in zip(found, again, data, strict=True):
+        assert one.sound
+        assert one.quality.fit_percent > 90.0
+        ours = one.model.simulate(channels.u[0], channels.y[0])
+        assert other.simulate(channels.u[0], channels.y[0]) == pytest.approx(ours)
+        # without the output the run begins at rest, and forgets it
+        assert one.model.simulate(channels.u[0])[200:] == pytest.approx(ours[200:], abs=1e-3)
+    gains = [[float(b.sum() / f.sum()) for b, f in one.model.transfer_functions()] for one in found]
+    assert gains == pytest.approx(plant().dc_gain, abs=0.1)
+    assert [one.model.offset for one in found] == pytest.approx([5.0, -2.0], abs=0.05)
+
+
+def test_dead_time_is_a_state_of_its_own_or_a_late_input() -> None:
+    system = identified(logged(4, 400), 3)
+    late = replace(system, delays=(2, 0))
+    a, b, c, d = late.with_delays_as_states()
+    z = complex(np.exp(0.3j))
+    response = c @ np.linalg.inv(z * np.eye(len(a)) - a) @ b + d
+    assert response == pytest.approx(late.response(z)[0])
+
+
+def test_missing_samples_and_several_logs_are_one_fit() -> None:
+    first, second = logged(5, 300), logged(6, 300)
+    both = [
+        channels_from([*a.u, *b.u], [*a.y, np.where(np.arange(300) % 7 == k, np.nan, b.y[0])], 0.01, ["a", "b"], name)
+        for k, (a, b, name) in enumerate(zip(first, second, "yz", strict=True))
+    ]
+    found = identify_state_space(both, order=3, delay=1)
+    assert min(one.quality.fit_percent for one in found) > 90.0
+
+
+def test_auto_takes_the_state_space_where_outputs_share_their_dynamics() -> None:
+    shared = identify_outputs(logged(7, 300), structure="auto", order=3, delay=1)
+    assert {one.model.structure for one in shared} == {"state-space"}
+    compared = {row["structure"] for row in shared[0].candidates}
+    assert compared >= {"state-space", "output-error"}
+
+
+def test_outputs_that_share_nothing_keep_models_of_their_own() -> None:
+    rng = np.random.default_rng(8)
+    u = np.repeat(rng.normal(size=(60, 2)), 4, axis=0)
+    y = filtered([0.0, 0.4], [1.0, -0.8], u[:, 0]) + 0.05 * rng.normal(size=240)
+    z = filtered([0.0, 0.0, 0.0, 1.0], [1.0, -0.3], u[:, 1]) + 0.05 * rng.normal(size=240)
+    data = [channels_from([u], [one], 1.0, ["a", "b"], name) for one, name in ((y, "y"), (z, "z"))]
+    found = identify_outputs(data, structure="auto", order=1)
+    assert "state-space" not in {one.model.structure for one in found}
+
+
+def test_what_cannot_be_fitted_is_said() -> None:
+    data = logged(9, 40)
+    with pytest.raises(HydrostateError, match="give a lower order"):
+        identify_state_space(data, order=12)
+    with pytest.raises(HydrostateError, match="no numerator of its own"):
+        identify_outputs(data, structure="state-space", n_numerator=2)
+    other = channels_from([data[0].u[0]], [data[0].y[0]], 0.01, ["a", "c"], "y")
+    with pytest.raises(HydrostateError, match="must have the same inputs"):
+        identify_state_space([other, data[1]], order=1)
+
+
+def test_a_model_no_better_than_the_mean_is_not_sound() -> None:
+    rng = np.random.default_rng(10)
+    u = rng.normal(size=(200, 2))
+    data = [channels_from([u], [rng.normal(size=200)], 1.0, ["a", "b"], name) for name in "yz"]
+    with pytest.warns(LogWarning) as said:
+        found = identify_state_space(data, order=2, delay=1)
+    assert not any(one.sound for one in found)
+    assert IdentificationCode.NO_FIT in [one.message.note.code for one in said]  # type: ignore[union-attr]
