@@ -14,27 +14,31 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.diagnosis_checks import (
+    PAPER,
     Check,
     foreign_checks,
     limit_checks,
     onset_checks,
     speed_checks,
     stuck_checks,
+    told,
     unknown_checks,
 )
 from benchmarks.population import TEST, Drawn, draw_logs
 from benchmarks.scores import calibration_error, share_interval
-from experiments.published.library import read_library
+from estimation.finding import Finding
 from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.class_fit import Actuator
-from faults.diagnosis.diagnose import Diagnosis, diagnose_log
-from faults.diagnosis.evidence import EVIDENCES
+from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.rmse import score_mathematical
 from faults.diagnosis.severity import severities_at
 from faults.eha.bank import mathematical_bank
 from plant.eha.model import EhaParameters
 
 PRESSURE = "differential_pressure_pa"
+
+SHIPPED = ("models", "innovations", "parameters")
+"""Evidences that a diagnosis weighs."""
 
 LUMPED_SEEDS = 5
 """Seeds on which the paper's lumped models are scored too."""
@@ -45,7 +49,7 @@ class Judged:
     """One log of the population, diagnosed."""
 
     log: Drawn
-    found: Diagnosis
+    found: Finding
     covered: Mapping[str, bool]
 
 
@@ -71,12 +75,12 @@ def main(arguments: list[str]) -> int:
     for pressure in (True, False):
         checks += printed(other_circuits(actuator, seeds=max(1, options.seeds // 5), pressure=pressure))
     if options.draws:
-        checks += printed(limit_checks(actuator, seeds=max(2, options.seeds // 4), draws=options.draws))
-    checks += printed(onset_checks(actuator, seeds=max(1, options.seeds // 10)))
-    checks += printed(unknown_checks(actuator, seeds=max(1, options.seeds // 25)))
+        checks += printed(limit_checks(seeds=max(2, options.seeds // 4), draws=options.draws))
+    checks += printed(onset_checks(seeds=max(1, options.seeds // 10)))
+    checks += printed(unknown_checks(seeds=max(1, options.seeds // 25)))
     checks += printed(foreign_checks(actuator))
-    checks += printed(stuck_checks(actuator))
-    checks += printed(speed_checks(actuator))
+    checks += printed(stuck_checks())
+    checks += printed(speed_checks())
     short = sum(not check.met for check in checks)
     print(f"{short} of {len(checks)} fall short")
     return short
@@ -89,13 +93,11 @@ def which(pressure: bool) -> str:
 
 def judge(logs: Iterable[Drawn], actuator: Actuator, *, pressure: bool) -> Iterable[Judged]:
     """Diagnose logs and hold them against what was true."""
-    library = read_library()
     for log in logs:
         record = log.record if pressure else log.record.replace(**{PRESSURE: None})
-        found = diagnose_log(record, actuator, library)
+        found = diagnose_log(record, PAPER)
         true = severities_at(coordinates_of(log.parameters, actuator.rated), actuator)
-        covered = {name: one.covers(true[name]) for name, one in found.severity.items() if name != "entrained_air"}
-        yield Judged(log, found, covered)
+        yield Judged(log, found, told(found, true))
 
 
 def other_circuits(actuator: Actuator, seeds: int, *, pressure: bool) -> list[Check]:
@@ -104,7 +106,7 @@ def other_circuits(actuator: Actuator, seeds: int, *, pressure: bool) -> list[Ch
     name = f"{len(judged)} logs of other circuits {which(pressure)}"
     right = 100.0 * float(np.mean([one.found.condition == one.log.condition for one in judged]))
     covered = 100.0 * float(np.mean([list(one.covered.values()) for one in judged]))
-    dated = sum(one.found.scoreboard.onset is not None for one in judged)
+    dated = sum(one.found.since is not None for one in judged)
     return [
         Check(f"{name}: class right, %", right, 94.0, 100.0),
         Check(f"{name}: 95 % intervals that cover, %", covered, 85.0, 100.0),
@@ -124,7 +126,9 @@ def population_checks(judged: list[Judged], name: str, wanted: float) -> list[Ch
     right = np.array([one.found.condition == true for one, true in zip(judged, truths, strict=True)])
     sure = np.array([one.found.probabilities[one.found.condition] for one in judged])
     low, high = (100.0 * end for end in share_interval(int(right.sum()), len(right)))
-    each = {e: [one.found.scoreboard.choice(e) == one.log.condition for one in judged] for e in EVIDENCES}
+    each = {
+        e: [one.found.evidence.diagnosis.scoreboard.choice(e) == one.log.condition for one in judged] for e in SHIPPED
+    }
     print("each evidence alone, % right:", {e: round(100.0 * float(np.mean(hits)), 1) for e, hits in each.items()})
     brier = np.mean(
         [

@@ -3,7 +3,7 @@
 import os
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from benchmarks.population import (
     draw_logs,
     draw_parameters,
 )
-from experiments.published.library import read_library
+from estimation.finding import Finding
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuit_runs import Blocks, blocks_of, coordinates_of, predicted
 from faults.diagnosis.class_fit import Actuator
@@ -30,6 +30,7 @@ from faults.diagnosis.severity import severities_at
 from faults.eha.inject import abrupt
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
 from plant.eha.simulate import CIRCUIT, simulate, simulate_each
 from plant.log.files import read_record
 from plant.log.record import Record
@@ -43,8 +44,17 @@ PRESSURE = "differential_pressure_pa"
 WIDE = 0.2
 """Spread at which the limit is asked for [dimensionless]."""
 
+PAPER = Rig(EhaParameters())
+"""The rig of the paper, as a user who gives no rig file has it."""
+
 CHUNK = 64
 """Draws that are simulated at a time."""
+
+
+def told(found: Finding, true: Mapping[str, float]) -> dict[str, bool]:
+    """Return whether each severity that a diagnosis gives an interval covers what it truly is."""
+    names = [name for name, one in found.severities.items() if name in true and one.ci95 is not None]
+    return {name: found.severities[name].covers(true[name]) for name in names if name != "entrained_air"}
 
 
 @dataclass(frozen=True)
@@ -66,7 +76,7 @@ class Check:
         return f"{'met   ' if self.met else 'SHORT '} {self.what}: {self.value:.4g} ({said} wanted)"
 
 
-def limit_checks(actuator: Actuator, seeds: int, draws: int) -> list[Check]:
+def limit_checks(seeds: int, draws: int) -> list[Check]:
     """Compare with the likelihood marginalised over drawn actuators, at a wide spread; one drive of each kind."""
     rights: dict[str, list[tuple[bool, bool]]] = {"with dp": [], "without dp": []}
     for which, drive in enumerate(DRIVES):
@@ -79,7 +89,7 @@ def limit_checks(actuator: Actuator, seeds: int, draws: int) -> list[Check]:
         for name, found in marginal_choices(logs, speed, draws, np.random.default_rng([TRAINING, which])).items():
             for record, true, best in zip(records, truths, found, strict=True):
                 seen = record if name == "with dp" else record.replace(**{PRESSURE: None})
-                rights[name].append((diagnose_log(seen, actuator).condition == true, best == true))
+                rights[name].append((diagnose_log(seen, PAPER).condition == true, best == true))
     checks: list[Check] = []
     for name, pairs in rights.items():
         ours, best = (100.0 * float(np.mean(each)) for each in zip(*pairs, strict=True))
@@ -113,14 +123,14 @@ def _squares(measured: Array, runs: Array) -> Array:
     return np.sum(measured**2, axis=1)[:, None] - 2.0 * measured @ runs.T + np.sum(runs**2, axis=1)
 
 
-def unknown_checks(actuator: Actuator, seeds: int) -> list[Check]:
+def unknown_checks(seeds: int) -> list[Check]:
     """Count the out-of-model logs that are flagged, by kind."""
     flagged: Counter[str] = Counter()
     count = 0
     for log in draw_logs(range(TEST + 500, TEST + 500 + seeds)):
         count += 1
         for kind, changed in OUT_OF_MODEL.items():
-            flagged[kind] += diagnose_log(changed(log), actuator).unknown
+            flagged[kind] += diagnose_log(changed(log), PAPER).unknown
     print(f"\nout of the model, flagged of {count} logs each")
     for kind in OUT_OF_MODEL:
         print(f"  {kind}: {100.0 * flagged[kind] / count:.0f} %")
@@ -151,10 +161,10 @@ def foreign_checks(actuator: Actuator) -> list[Check]:
     for pressure in (True, False):
         right, flagged, covered = 0, 0, []
         for name, true, record in foreign_logs(folder):
-            found = diagnose_log(record if pressure else record.replace(**{PRESSURE: None}), actuator)
+            found = diagnose_log(record if pressure else record.replace(**{PRESSURE: None}), PAPER)
             right, flagged = right + (found.condition == name), flagged + found.unknown
             truth = severities_at(coordinates_of(true, actuator.rated), actuator)
-            covered += [one.covers(truth[key]) for key, one in found.severity.items() if key != "entrained_air"]
+            covered += told(found, truth).values()
         with_or_without = "with dp" if pressure else "without dp"
         share = 100.0 * float(np.mean(covered))
         checks.append(Check(f"foreign logs {with_or_without}: class right, of 18", right, 18, 18))
@@ -163,7 +173,7 @@ def foreign_checks(actuator: Actuator) -> list[Check]:
     return checks
 
 
-def onset_checks(actuator: Actuator, seeds: int) -> list[Check]:
+def onset_checks(seeds: int) -> list[Check]:
     """Diagnose logs of an actuator that was healthy until some time within the log."""
     names = [name for name in CONDITIONS if name != "normal"]
     checks: list[Check] = []
@@ -180,8 +190,8 @@ def onset_checks(actuator: Actuator, seeds: int) -> list[Check]:
         right, dated, held = 0, 0, 0
         late: list[float] = []
         for name, at, record in logs:
-            found = diagnose_log(record if pressure else record.replace(**{PRESSURE: None}), actuator)
-            onset = found.scoreboard.onset
+            found = diagnose_log(record if pressure else record.replace(**{PRESSURE: None}), PAPER)
+            onset = found.since
             right += found.condition == name
             if onset is not None:
                 dated, held = dated + 1, held + (onset.ci95[0] <= at <= onset.ci95[1])
@@ -194,21 +204,22 @@ def onset_checks(actuator: Actuator, seeds: int) -> list[Check]:
     return checks
 
 
-def stuck_checks(actuator: Actuator) -> list[Check]:
+def stuck_checks() -> list[Check]:
     """Diagnose a 10 Hz sine that leaves the piston stuck: leakage is right, friction open among what holds it."""
     right, widest = 0, 0.0
     for seed, (name, condition) in enumerate(CONDITIONS.items()):
         p = draw_parameters(name, np.random.default_rng([TEST, seed]), 0.0)
         drive = make_drive("sine", DURATION, SAMPLE_TIME, p, np.random.default_rng(seed))
         record = simulate(CIRCUIT, drive, SAMPLE_TIME, p, sensors=RIG, rng=np.random.default_rng(seed))
-        found = diagnose_log(record, actuator)
+        found = diagnose_log(record, PAPER)
         shares = found.probabilities
         level = {c: sum(v for n, v in shares.items() if CONDITIONS[n].leakage == c) for c in ("none", "minor", "major")}
         alike = [v for n, v in shares.items() if CONDITIONS[n].leakage == condition.leakage]
         travel = float(np.ptp(record["position_m"]))
+        untold = "; ".join(str(note) for note in found.not_told)
         print(
             f"sine, {name}: piston travels {1e3 * travel:.2f} mm; leakage {level[condition.leakage]:.2f}, "
-            f"friction none, minor, major {', '.join(f'{v:.2f}' for v in alike)}; {'; '.join(found.not_told)}"
+            f"friction none, minor, major {', '.join(f'{v:.2f}' for v in alike)}; {untold}"
         )
         right += max(level, key=lambda c: level[c]) == condition.leakage
         widest = max(widest, max(alike))
@@ -218,16 +229,15 @@ def stuck_checks(actuator: Actuator) -> list[Check]:
     ]
 
 
-def speed_checks(actuator: Actuator) -> list[Check]:
+def speed_checks() -> list[Check]:
     """Time one diagnosis by all four evidences, after start-up."""
-    library = read_library()
     checks: list[Check] = []
     for duration, sample_time, most in ((20.0, 1e-3, 0.5), (10.0, 1e-4, 2.0)):
         taken: list[float] = []
         for log in draw_logs([TEST + 900], duration=duration, sample_time=sample_time):
-            diagnose_log(log.record, actuator, library)
+            diagnose_log(log.record, PAPER)
             began = time.process_time()
-            diagnose_log(log.record, actuator, library)
+            diagnose_log(log.record, PAPER)
             taken.append(time.process_time() - began)
         what = f"one log of {duration:g} s at {1e-3 / sample_time:g} kHz, CPU s: median {np.median(taken):.2f}"
         checks.append(Check(f"{what}, slowest of {len(taken)}", max(taken), 0.0, most))

@@ -181,22 +181,21 @@ def _reversed(record: Record, long: ChannelBlocks, balance: FlowBalance | None) 
 def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: FlowBalance | None) -> tuple[Note, ...]:
     """Compare how far the piston goes with what is pumped, leakage and compression counted where pressure is logged."""
     together, ratio = gone_together(long.piston, long.pumped)
-    gone = times = p.piston_area * ratio
+    gone = p.piston_area * ratio
     far = gone > FARTHEST
+    turn = length = None
+    believed = False, False
     if balance is not None and 0.0 < balance.swept_std < KNOWN * balance.swept:
         times = 1.0 / balance.swept
         far = far and times > 1.0
         turn, length = (_near(times, slips, 1.0 / MOST, 1.0 / (LOST if far else LEAST)) for slips in (TURNS, LENGTHS))
         believed = (far or times < 1.0,) * 2
-    elif far and together > FOLLOWS:
-        turn, length = (_near(times, slips, LOST) for slips in (TURNS, LENGTHS))
+    elif together > SURE and balance is None and not far:
+        length = _near(gone, LENGTHS)
+        believed = False, gone < TINY * NEAR and _resolved(record, long)
+    if turn is None and length is None and far and together > FOLLOWS:  # a balance may take motion for leakage
+        turn, length = (_near(gone, slips, LOST) for slips in (TURNS, LENGTHS))
         believed = True, True
-    elif together > SURE and balance is None:
-        turn, length = None, _near(times, LENGTHS)
-        believed = False, times < TINY * NEAR and _resolved(record, long)
-    else:
-        turn = length = None
-        believed = False, False
     if together > FOLLOWS and _too_fast(record, p) and gone < NEAR * min(TURNS):
         turn, believed = min(TURNS), (True, believed[1])
     moved = _moved(record)
