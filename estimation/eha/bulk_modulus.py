@@ -16,10 +16,12 @@ from estimation.finding import Gate, Outcome
 from estimation.fits.flow_fit import FLOW_CHANNELS, REPORTED, fit_flow
 from estimation.fits.form_fit import FormFit
 from estimation.fits.motion_fit import MOTION_CHANNELS, fit_motion
+from estimation.log_checks.channel_physics import FARTHEST, POSITION, RPM, TURNS
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.log_checks.first_belief import START_STD, first_belief, first_load
 from estimation.log_checks.sensor_check import PRESSURE, PRESSURES
 from estimation.models.eha_forms import FORMS
+from estimation.notes import ChannelCode
 from estimation.trust.bounds import bulk_modulus_bound
 from estimation.trust.consistency import MISMATCH_NIS
 from plant.eha.doubts import Spread
@@ -208,6 +210,8 @@ def estimate_clean(
         unseen = without_number(Outcome.NOT_OBSERVABLE, (too_wide(bound),), form, MOTION_CHANNELS, bound)
         return _doubting_sensors(unseen, log)
     fit = None if filtering else _fit(log, parameters, form, guess, spreads, chosen=options.method == LEAST_SQUARES)
+    if fit is not None and (slip := _impossible_delivery(fit, parameters)) is not None:
+        return without_number(Outcome.MISMATCH, (slip,), form, FITTED[form][1])
     if fit is not None:
         found = _fitted(fit, form, FITTED[form][1])
         if form == "flow":
@@ -293,6 +297,16 @@ def rigid_bound(log: CleanLog, parameters: EhaParameters) -> float:
     variances = {channel: log.variances[channel] for channel in channels}
     std = bulk_modulus_bound(model, prior, log.record, parameters, channels=channels, variances=variances)
     return std / parameters.bulk_modulus
+
+
+def _impossible_delivery(fit: FormFit, parameters: EhaParameters) -> Note | None:
+    """Return a note where a log is explained by a pump that delivers what none can: its speed is in another unit."""
+    if fit.explanation is None or "pump_displacement" not in fit.explanation.values:
+        return None
+    share = fit.explanation.values["pump_displacement"][0] / parameters.pump_displacement
+    if share <= FARTHEST:
+        return None
+    return ChannelCode.CHANNEL_UNIT.note(channel=SPEED, against=POSITION, factor=1.0 / share, slip=TURNS[RPM])
 
 
 def _misread(log: CleanLog, form: str) -> BulkModulusEstimate:

@@ -4,12 +4,17 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from estimation.eha import bulk_modulus
 from estimation.eha.estimate import estimate_log
 from estimation.finding import Outcome
+from estimation.fits.form_fit import FormFit
+from estimation.log_checks import channel_physics
+from estimation.log_checks.channel_blocks import FlowBalance
 from estimation.log_checks.channel_physics import channel_mistakes
 from estimation.notes import ChannelCode
 from faults.conditions import CONDITIONS, parameters_for
@@ -105,6 +110,30 @@ def test_a_mistake_is_named(
     for drive in ("steps", "prbs"):
         (said,) = channel_mistakes(mistake(run(condition, drive)), HEALTHY)
         assert (said.code, said.data["channel"]) == (code, channel)
+
+
+def test_a_piston_too_far_for_its_pump_tells_the_unit_where_the_balance_takes_motion_for_leakage(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    misled = FlowBalance(swept=0.0457, swept_std=0.0035, compressed=0.083, compressed_std=0.004, explained=0.998)
+    monkeypatch.setattr(channel_physics, "flow_balance", lambda *_: misled)
+    (said,) = channel_mistakes(scaled(SPEED, 1.0 / RPM)(run("normal", "prbs")), HEALTHY)
+    assert (said.code, said.data["channel"]) == (ChannelCode.CHANNEL_UNIT, SPEED)
+    assert said.data["slip"] == "rad/s read as rpm"
+
+
+@pytest.mark.parametrize(("share", "named"), [(9.0, True), (3.2, True), (2.5, False), (0.8, False)])
+def test_a_pump_that_would_deliver_what_none_can_is_a_speed_in_another_unit(
+    share: float, named: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    delivered = {"pump_displacement": (share * HEALTHY.pump_displacement, 1e-9), "bulk_modulus": (2e8, 1e5)}
+    explanation = SimpleNamespace(values=delivered)
+    fit = FormFit(delivered, 5e-4, 1.0, (), {}, explanation)
+    monkeypatch.setattr(bulk_modulus, "_fit", lambda *_, **__: fit)
+    found = bulk_modulus.estimate_bulk_modulus(run(), HEALTHY)
+    assert (found.outcome is Outcome.MISMATCH) == named
+    assert [note.data["channel"] for note in found.gate.reasons] == ([SPEED] if named else [])
+    assert (found.value is None) == named
 
 
 @pytest.mark.parametrize("mistake", [scaled(SPEED, -1.0), swapped, scaled(POSITION, -1.0), scaled(VELOCITY, 1e3)])
