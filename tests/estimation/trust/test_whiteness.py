@@ -7,7 +7,16 @@ from statsmodels.stats.diagnostic import acorr_ljungbox
 
 from estimation.filters.run import Estimate
 from estimation.models.model import ProcessModel
-from estimation.trust.whiteness import LAGS, Whiteness, _autocorrelations, _ljung_box, quantum, whiteness
+from estimation.trust.whiteness import (
+    LAGS,
+    SEGMENTS,
+    Whiteness,
+    _autocorrelations,
+    _explained,
+    _ljung_box,
+    quantum,
+    whiteness,
+)
 from plant.log.record import Record
 
 Array = NDArray[np.float64]
@@ -128,3 +137,13 @@ def test_the_test_for_remaining_structure_is_ljungs_and_boxs(memory: float) -> N
     values -= values.mean()
     wanted = acorr_ljungbox(values, lags=[LAGS])["lb_pvalue"].iloc[0]
     assert _ljung_box(_autocorrelations(values), len(values)) == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize(("driven", "share"), [(0.0, 0.0), (1.0, 0.5), (2.0, 0.8), (1e3, 1.0)])
+def test_the_share_that_the_drive_explains_is_without_bias_in_so_few_segments(driven: float, share: float) -> None:
+    rng = np.random.default_rng(7)
+    found: list[float] = []
+    for _ in range(20):
+        push, own = rng.standard_normal((2, SEGMENTS * 250))
+        found.append(_explained(driven * push + own, push, 250))
+    assert np.mean(found) == pytest.approx(share, abs=0.02)

@@ -18,7 +18,14 @@ from faults.diagnosis.circuit_runs import (
 )
 from faults.diagnosis.class_fit import Actuator, PointFit, scales_of
 from faults.diagnosis.class_regions import ClassFits, fit_classes, region_scores
-from faults.diagnosis.out_of_model import LEAST_BIAS, SOFT, UNEXPLAINED, reasons_against, sensors_disagree
+from faults.diagnosis.out_of_model import (
+    LEAST_BIAS,
+    SOFT,
+    UNEXPLAINED,
+    YIELDING,
+    reasons_against,
+    sensors_disagree,
+)
 from faults.notes import AgainstCode
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -124,6 +131,28 @@ def test_an_oil_less_than_half_or_more_than_twice_as_stiff_is_another_oil(share:
     near = shifted(bulk_modulus=float(np.log(0.75 if share < 1.0 else 1.3)))
     assert not {AgainstCode.OIL_SOFT, AgainstCode.OIL_STIFF} & set(reasons(run_of(tuple(near.tolist())), near))
     assert 0.4 < SOFT < 0.75
+
+
+@pytest.mark.parametrize(("known", "said"), [(0.01, True), (0.3, False)])
+def test_an_oil_is_another_only_where_the_log_knows_how_stiff_it_is(known: float, *, said: bool) -> None:
+    point = shifted(bulk_modulus=float(np.log(0.45)))
+    log = run_of(tuple(point.tolist()))
+    fits = replace(fitted(log, point), information=np.diag([1e4, 1e4, 1e4, 1e4, 1e4, known**-2, 1e4]))
+    found = reasons_against(log, fits, 0.0, ACTUATOR)
+    assert (AgainstCode.OIL_SOFT in [note.code for note in found]) == said
+
+
+def test_a_piston_that_only_yields_on_its_seals_need_not_be_followed_to_the_last_digit() -> None:
+    place = ACTUATOR.conditions[0]
+    log, pump = healthy(), ACTUATOR.circuit.pump_displacement / ACTUATOR.circuit.piston_area
+    whole = pump * float(np.sqrt(np.mean(log.speed**2)))
+    alternating = np.where(np.arange(len(log.velocity)) % 2, 1.0, -1.0)
+    for share, said in ((0.7 * YIELDING, False), (1.5 * YIELDING, True)):
+        creeping = replace(log, velocity=1e-6 + share * whole * alternating)
+        fits = replace(fitted(log, place).best, fitted=np.column_stack([0.0 * log.velocity, log.pressure]))
+        fits = replace(fits, scales=scales_of(creeping, fits.fitted))
+        found = reasons_against(creeping, replace(fitted(log, place), best=fits), 0.0, ACTUATOR)
+        assert (AgainstCode.UNEXPLAINED in [note.code for note in found]) == said
 
 
 def test_halfway_between_two_levels_of_leakage_lies_in_no_region_and_the_severity_is_told() -> None:
