@@ -12,7 +12,7 @@ from estimation.fits.explain import WORTH, explain, promised
 from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
 from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, roughly
 from estimation.fits.greybox_problem import GreyBoxLog, Problem, greybox_log
-from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, START_LOAD, Hypothesis
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, OFFSET, START_LOAD, Hypothesis
 from estimation.fits.wide_problem import flow_bounds
 from estimation.log_checks.bridging import bridged, gaps
 from estimation.log_checks.measurement_noise import measurement_variances
@@ -165,8 +165,8 @@ def _asked(log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, 
     """
     if len(log.drives) > MOST_ASKED:
         return ()
-    if loaded:
-        return (START_LOAD,)
+    if loaded:  # a sensor that reads too much looks loaded at rest
+        return (START_LOAD, OFFSET)
     if not _explains(swinging):
         return HYPOTHESES
     gain, size = promised(log, parameters, swinging.values, DELIVERY)

@@ -40,9 +40,11 @@ DELIVERY = Hypothesis("delivery", ("pump_displacement",))
 
 START_LOAD = Hypothesis("start_load", ("start_pressure", "start_level"))
 
+OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
+
 HYPOTHESES = (
     Hypothesis("pressure_late", ("pressure_lag",), ({"pressure_lag": 1e-3},), (0.0, 2e-3, 5e-3, 9e-3)),
-    Hypothesis("pressure_offset", ("pressure_offset",)),
+    OFFSET,
     Hypothesis("encoder_zero", ("position_zero",), ({"position_zero": -0.06}, {"position_zero": 0.06})),
     DELIVERY,
     Hypothesis("volume", ("chamber_volume",)),

@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from estimation.eha.estimate import estimate_log
 from estimation.eha.explained import notes_of, rig_set_right, set_right
 from estimation.fits.explain import Explanation
 from estimation.fits.flow_fit import fit_flow
 from estimation.log_checks.clean import clean_log
+from estimation.log_checks.first_belief import first_load
 from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters
 from estimation.notes import RigCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, IDEAL, Sensors
@@ -87,6 +90,16 @@ def test_a_pressure_offset_of_one_bar_is_named_and_taken_off() -> None:
     assert notes_of(found, HEALTHY)[0].data["offset_pa"] == pytest.approx(1e5, rel=0.02)
     mended = set_right(clean_log(off, HEALTHY), found).record[PRESSURE]
     assert np.mean(mended - record[PRESSURE]) == pytest.approx(0.0, abs=2e3)
+
+
+def test_a_pressure_that_reads_too_much_at_rest_is_an_offset_and_no_load_at_the_start() -> None:
+    record = log()
+    found = estimate_log(record.replace(**{PRESSURE: record[PRESSURE] + 1e5}), Rig(HEALTHY))
+    assert first_load(record.replace(**{PRESSURE: record[PRESSURE] + 1e5})) != 0.0
+    (offset,) = [note.data["offset_pa"] for note in found.notes if note.code is RigCode.PRESSURE_OFFSET]
+    assert offset == pytest.approx(1e5, rel=0.02)
+    assert found.gate.passed
+    assert found.quantities["bulk_modulus"].value == pytest.approx(HEALTHY.bulk_modulus, rel=0.01)
 
 
 def test_an_encoder_that_was_homed_at_the_end_stop_is_named_and_shifted() -> None:
