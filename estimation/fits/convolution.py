@@ -33,9 +33,9 @@ def convolved(values: Array, kernel: Array) -> Array:
     n, overlap = len(values), len(kernel) - 1
     if overlap == 0:
         return values * kernel
-    size, same = _smooth_length(_cheapest_block(overlap), (2, 3, 5, 7, 11)), slice(overlap // 2, overlap // 2 + n)
+    size, same = smooth_length(_cheapest_block(overlap), (2, 3, 5, 7, 11)), slice(overlap // 2, overlap // 2 + n)
     if size >= n:
-        return _product(values, kernel, _smooth_length(n + overlap, (2, 3, 5)))[same]
+        return _product(values, kernel, smooth_length(n + overlap, (2, 3, 5)))[same]
     step = size - overlap
     cut = np.zeros((ceil((n + overlap) / step), step))
     cut.flat[:n] = values
@@ -58,8 +58,26 @@ def _cheapest_block(overlap: int) -> int:
     return ceil(length)
 
 
-def _smooth_length(least: int, primes: tuple[int, ...]) -> int:
-    """Return the least length from there on that is a product of these primes, which are quick to transform."""
+def smooth_length(least: int, primes: tuple[int, ...]) -> int:
+    """Return the least length from there on that is a product of these primes, which are quick to transform.
+
+    Parameters
+    ----------
+    least : int
+        Shortest length that will do [samples].
+    primes : tuple of int
+        The factors that are allowed.
+
+    Returns
+    -------
+    int
+        The length [samples].
+
+    Examples
+    --------
+    >>> smooth_length(1001, (2, 3, 5))
+    1024
+    """
     length = least
     while True:
         rest = length

@@ -4,10 +4,13 @@ import warnings
 
 import numpy as np
 
-from estimation.fits.convolution import convolved
+from estimation.fits.convolution import convolved, smooth_length
 from estimation.notes import EstimateCode
 from plant.arrays import Array
 from plant.errors import LogWarning
+
+FEW_LAGS = 32
+"""Lags up to which an autocovariance is summed lag by lag, and not by a transform."""
 
 LARGEST_PART = 100_000
 """Rows of a Jacobian that are factored at a time."""
@@ -93,8 +96,12 @@ def _parts(jacobian: Array) -> list[Array]:
 
 def _autocovariance(residual: Array, n_used: int, lags: int) -> Array:
     """Return the autocovariance at no lag and up to so many, under a Bartlett window."""
-    shifted = [float(residual[lag:] @ residual[: residual.size - lag]) for lag in range(lags + 1)]
-    return np.array(shifted) / n_used * (1.0 - np.arange(lags + 1) / (lags + 1.0))
+    if lags <= FEW_LAGS:
+        shifted = np.array([float(residual[lag:] @ residual[: residual.size - lag]) for lag in range(lags + 1)])
+    else:  # a transform that holds the longest shift takes hundreds of lags at the price of a few
+        size = smooth_length(residual.size + lags, (2, 3, 5))
+        shifted = np.fft.irfft(np.abs(np.fft.rfft(residual, size)) ** 2, size)[: lags + 1]
+    return shifted / n_used * (1.0 - np.arange(lags + 1) / (lags + 1.0))
 
 
 def _meat(columns: Array, autocovariance: Array) -> Array:

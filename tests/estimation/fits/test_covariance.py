@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.fits.covariance import automatic_lags, least_squares_covariance
+from estimation.fits.covariance import FEW_LAGS, _autocovariance, automatic_lags, least_squares_covariance
 from estimation.notes import EstimateCode
 from plant.errors import LogWarning
 
@@ -58,3 +58,13 @@ def test_what_is_known_beforehand_tells_parameters_apart() -> None:
     _, spread = least_squares_covariance(np.column_stack([column, column]), noise, 4000, 0, np.array([0.0, 25.0]))
     assert np.sqrt(np.diag(spread)) == pytest.approx([0.2, 0.2], rel=0.01)
     assert spread.sum() == pytest.approx(1.0 / (column @ column), rel=0.05)
+
+
+@pytest.mark.parametrize("lags", [0, FEW_LAGS, FEW_LAGS + 1, 400])
+def test_an_autocovariance_is_the_windowed_sum_of_products_however_many_lags(lags: int) -> None:
+    rng = np.random.default_rng(4)
+    residual = np.convolve(rng.standard_normal(3001), np.ones(30), "same")
+    residual[700:720] = 0.0
+    window = 1.0 - np.arange(lags + 1) / (lags + 1.0)
+    summed = [np.sum(residual[lag:] * residual[: len(residual) - lag]) / 2981 for lag in range(lags + 1)]
+    assert _autocovariance(residual, 2981, lags) == pytest.approx(window * np.array(summed), rel=1e-9, abs=1e-9)
