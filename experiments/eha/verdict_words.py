@@ -109,17 +109,19 @@ def amount(one: Mapping[str, Any]) -> str:
     '207.0 MPa (205.0 to 209.0)'
     >>> amount({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8], "ci95_total": [1.5e8, 2.8e8]})
     '207.0 MPa (205.0 to 209.0; with the rig 150.0 to 280.0)'
+    >>> amount({"value": -0.01, "unit": "N", "ci95": [-3.0, 4.0]})
+    '0.0 N (-3.0 to 4.0)'
     """
     if any(number is None or not math.isfinite(number) for number in (one["value"], *one["ci95"])):
         return "not determined"
     scale, unit = shop_unit(one["unit"])
     value, low, high = (scale * float(number) for number in (one["value"], *one["ci95"]))
     decimals = min(max(1 - math.floor(math.log10(high - low)), 0), 4) if high > low else 2
-    said = f"{low:.{decimals}f} to {high:.{decimals}f}"
-    total = [None if end is None else f"{scale * end:.{decimals}f}" for end in one.get("ci95_total", [None])]
+    said = f"{low:z.{decimals}f} to {high:z.{decimals}f}"
+    total = [None if end is None else f"{scale * end:z.{decimals}f}" for end in one.get("ci95_total", [None])]
     if None not in total and " to ".join(map(str, total)) != said:
         said += f"; with the rig {total[0]} to {total[1]}"
-    return f"{value:.{decimals}f} {unit} ({said})"
+    return f"{value:z.{decimals}f} {unit} ({said})"
 
 
 def believed(result: Mapping[str, Any]) -> str:
