@@ -104,10 +104,20 @@ def _ours(row: Row) -> Cell:
 
 def _limits(row: Row) -> str:
     low, high = row["low"], row["high"]
-    told = row["accept"]
+    told = _tolerance(row["accept"])
     if low is None or low != low:
         return told
     return f"{told}; ours {number(float(low))} to {number(float(high))}"
+
+
+def _tolerance(accept: str) -> str:
+    """Return what a row accepts as a reader wants it: ranges in few digits, and no word of the rule's own."""
+    if accept == "digits":
+        return "half a unit of the last digit"
+    words = accept.split()
+    if len(words) == 3 and words[1] == "to":
+        return f"{number(float(words[0]))} to {number(float(words[2]))}"
+    return accept
 
 
 def _errata(text: str) -> str:

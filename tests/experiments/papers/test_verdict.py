@@ -2,6 +2,7 @@ import math
 
 import pytest
 
+from experiments.papers.study import _tolerance
 from experiments.papers.verdict import Basis, Ours, Row, accepted, agrees, digits_half, drawn_as, verdict_of
 from plant.errors import HydrostateError
 
@@ -94,3 +95,16 @@ def test_a_figure_with_a_row_that_did_not_come_back_is_drawn_with_a_difference()
     assert drawn_as(True, "signs mended", ["predicted"]) == "drawn with a difference"
     assert drawn_as(True, "", []) == "drawn"
     assert drawn_as(False, "a photograph", ["predicted"]) == "cannot be drawn"
+
+
+@pytest.mark.parametrize(
+    ("accept", "said"),
+    [
+        ("digits", "half a unit of the last digit"),
+        ("0.32258064516132 to 7.777777777777871", "0.3226 to 7.778"),
+        ("± 10 %", "± 10 %"),
+        ("at least 2", "at least 2"),
+    ],
+)
+def test_a_reader_sees_a_tolerance_in_words_and_few_digits(accept: str, said: str) -> None:
+    assert _tolerance(accept) == said
