@@ -136,3 +136,12 @@ def test_the_truth_of_what_changes_is_that_of_the_middle() -> None:
     grown = make("leakage_grows", "test", 0)
     healthy, row = grown.setup.machine.leakage, truth_of(grown, "test", 0)
     assert row["leak_coeff"] == pytest.approx(np.sqrt(healthy * 6.006e-11))
+
+
+@pytest.mark.parametrize(("index", "opened"), [(0, True), (1, False)])
+def test_a_relief_valve_that_never_opened_need_not_be_named(index: int, *, opened: bool) -> None:
+    made = make("relief_set_low", "test", index)
+    row = truth_of(made, "test", index)
+    assert (row["dpmax"] > made.setup.machine.relief) == opened
+    assert row["accept"] == ("unknown" if opened else f"unknown;{row['condition']}")
+    assert row["named"] == ("relief" if opened else "")
