@@ -66,7 +66,8 @@ class ClassFits:
     spread : ndarray, shape (7, 7)
         Covariance of the coordinates for intervals, see `spread_of` [dimensionless].
     lasting : float
-        By what a model error that lasts divides the information [dimensionless], see `lasting_misfit`; 1 at the least.
+        By what a model error that lasts divides the information [dimensionless], see `lasting_misfit`; 1 at the least,
+        and without pressure.
     """
 
     best: PointFit
@@ -120,7 +121,8 @@ def fit_classes(blocks: Blocks, actuator: Actuator) -> ClassFits:
     least, held = int(np.argmin([fit.cost for fit in fits])), np.max(scores, axis=0)
     centre = actuator.conditions[np.argmax(held)]
     best = fits[least] if blocks.pressure is not None else _scaled(fits[least], centre)
-    lasting = max(1.0, lasting_misfit(best.fitted, blocks))
+    # without pressure no balance of flows looks for another pump or other faults, so regions alone have to
+    lasting = 1.0 if blocks.pressure is None else max(1.0, lasting_misfit(best.fitted, blocks))
     spread = spread_of(best, known[least], blocks, centre)
     errors = np.array([scales_of(blocks, run) for run in runs])
     return ClassFits(best, known[least], nominal, errors, held, spread, lasting)

@@ -26,7 +26,8 @@ UNEXPLAINED = (0.12, 0.08)
 
 YIELDING = 0.015
 """Share of the velocity at which the pump's whole flow would move the piston, root mean square, that may be left in any
-case [dimensionless]: a piston that hardly moves yields on its seals, which no circuit describes to the last digit."""
+case where pressure is followed [dimensionless]: a piston that hardly moves yields on its seals, which no circuit
+describes to the last digit."""
 
 FARTHEST_OUT = 7.0
 """Least log-likelihood of the nearest condition's region, below its centre's [dimensionless]."""
@@ -49,10 +50,11 @@ FREE_PUMP = 0.3
 SMALLEST_PUMP = 0.3
 """Share of the rig's displacement below which no pump is tried [dimensionless]."""
 
-PUMP_GAIN = 20.0
-"""Log-posterior that another pump must gain, in `LASTING` blocks that count as one [dimensionless]: on logs of other
-physics a pump 10 % off gained up to 15 without being there; on nine steps one 15 % off gains 44 to 154, and 9
-to 18 where leakage and friction are major."""
+PUMP_GAIN, PUMP_GAIN_WITHOUT = 20.0, 3.0
+"""Log-posterior that another pump must gain, with pressure and without, in `LASTING` blocks that count as one
+[dimensionless]. On logs of other physics a pump 10 % off gained up to 15 without being there; on nine steps one 15 %
+off gains 44 to 154, and 9 to 18 where leakage and friction are major. With pressure the balance of flows looks for a
+worn pump too; without, nothing else does."""
 
 AGREEMENT = 0.05
 """Share by which velocity and the slope of position may differ, root mean square [dimensionless]."""
@@ -114,7 +116,7 @@ def _unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[No
     shares = fits.best.scales / np.maximum(sizes, np.finfo(float).tiny)
     pump = actuator.circuit.pump_displacement / actuator.circuit.piston_area
     yielding = YIELDING * pump * float(np.sqrt(np.mean(blocks.speed**2)))
-    least = np.array([yielding, 0.0])[: len(shares)]
+    least = np.array([0.0] if blocks.pressure is None else [yielding, 0.0])
     heard = fits.best.scales > np.maximum(2.0 * blocks.noise, least)
     names = ("velocity", "differential pressure")
     return [
@@ -146,7 +148,8 @@ def _biases(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
         tried = replace(actuator, circuit=other)
         nearest = list(CONDITIONS)[int(np.argmax(fits.scores))]
         without, again = (fit_freely(blocks, one, nearest) for one in (actuator, tried))
-        matters["pump"] = without.cost - again.cost > PUMP_GAIN * LASTING
+        least = PUMP_GAIN_WITHOUT if blocks.pressure is None else PUMP_GAIN
+        matters["pump"] = without.cost - again.cost > least * LASTING
         pump = (1.0 + pump) * (1.0 + _one_step(blocks, again, trust, tried, sizes)["pump"][0]) - 1.0
     return [_bias(name, pump if name == "pump" else found[name][0]) for name in found if matters[name]]
 

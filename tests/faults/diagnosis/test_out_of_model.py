@@ -155,6 +155,21 @@ def test_a_piston_that_only_yields_on_its_seals_need_not_be_followed_to_the_last
         assert (AgainstCode.UNEXPLAINED in [note.code for note in found]) == said
 
 
+def test_without_pressure_a_misfit_of_velocity_counts_however_small_and_so_does_one_that_lasts() -> None:
+    place = ACTUATOR.conditions[0]
+    log, pump = healthy(), ACTUATOR.circuit.pump_displacement / ACTUATOR.circuit.piston_area
+    left = 0.5 * YIELDING * pump * float(np.sqrt(np.mean(log.speed**2)))
+    velocity = left * np.where(np.arange(len(log.velocity)) % 20 < 10, 1.0, -1.0)
+    alone = replace(log, velocity=velocity, pressure=None, noise=NOISE[:1])
+    whole = fitted(log, place)
+    best = replace(whole.best, fitted=np.zeros((len(velocity), 1)), slopes=whole.best.slopes[..., :1])
+    best = replace(best, scales=scales_of(alone, best.fitted))
+    found = reasons_against(alone, replace(whole, best=best), 0.0, ACTUATOR)
+    assert AgainstCode.UNEXPLAINED in [note.code for note in found]
+    assert fit_classes(alone, ACTUATOR).lasting == 1.0
+    assert fit_classes(replace(log, velocity=log.velocity + velocity), ACTUATOR).lasting > 2.0
+
+
 def test_halfway_between_two_levels_of_leakage_lies_in_no_region_and_the_severity_is_told() -> None:
     point = at(0.5, 0.0)
     said = reasons(run_of(tuple(point.tolist())), point)
