@@ -33,13 +33,20 @@ Array = NDArray[np.float64]
 
 SAMPLES, SAMPLE_TIME, ROUNDS = 100_000, 1e-4, 9
 WANTED = {"agreement": 1e-12, "acceleration": 25.0, "pressure": 60.0}
+BRANCHING = ("-fno-if-conversion", "-fno-if-conversion2", "-fno-tree-slp-vectorize")
 BUILDS = {
     "gcc": ("gcc", FUSING),
     "gcc, no fma": ("gcc", ()),
-    "gcc, branches": ("gcc", (*FUSING, "-fno-if-conversion", "-fno-if-conversion2")),
+    "gcc, contracting": ("gcc", ("-std=gnu17", "-march=native")),
+    "gcc, branches": ("gcc", ("-march=native", *BRANCHING)),
     "clang": ("clang", FUSING),
+    "clang, no fma": ("clang", ()),
 }
-"""Compilers with their flags beside ``-std=c99 -O2``."""
+"""Compilers with their flags beside ``-std=c99 -O2``: as the Makefile has it, for any x86-64 processor, where
+the compiler may fuse by itself, and with choices left to the processor's prediction."""
+
+AGREEING = ("gcc", "gcc, no fma", "gcc, contracting", "clang", "clang, no fma")
+"""Builds that are compared with Python over every form and condition."""
 
 BINS = (50, 100, 200, 300, 500, 1000, 2000, 5000, 10_000, 100_000, 1_000_000, 10_000_000)
 """Edges of the histogram of steps [ns]."""
@@ -82,7 +89,7 @@ def agreement(folder: Path, samples: int) -> Iterator[tuple[str, str, str, float
         for condition in CONDITIONS:
             problem = task(form, condition, samples)
             for method in ("ekf", "imm") if form == "pressure" else ("ekf",):
-                for name in ("gcc", "gcc, no fma", "clang"):
+                for name in AGREEING:
                     compiler, flags = BUILDS[name]
                     where = folder / f"{form}_{method}_{condition}_{name}".replace(", ", "_").replace(" ", "_")
                     c = built(problem, method, where, compiler=compiler, flags=flags)

@@ -13,15 +13,20 @@ from plant.compiled.c99.lines import c_lines, operations_of
 from plant.compiled.c99.precision import Precision
 
 ARGUMENTS: Mapping[str, tuple[str, ...]] = {
-    "prepare": ("const {real} *rows", "{real} *constants"),
+    "prepare": ("const {real} *restrict rows", "{real} *restrict constants"),
     "predict": (
-        "{real} *state",
-        "const {real} *constants",
-        "const {real} *before",
-        "const {real} *after",
+        "{real} *restrict state",
+        "const {real} *restrict constants",
+        "const {real} *restrict before",
+        "const {real} *restrict after",
         "{real} j",
     ),
-    "update": ("{real} *state", "const {real} *constants", "const {real} *sample", "{real} *seen"),
+    "update": (
+        "{real} *restrict state",
+        "const {real} *restrict constants",
+        "const {real} *restrict sample",
+        "{real} *restrict seen",
+    ),
 }
 """What each function takes; ``before`` and ``after`` are drives, ``j`` counts steps of the model since the sample."""
 

@@ -60,6 +60,22 @@ def test_without_fused_products_it_differs_by_rounding_alone(form: str, tmp_path
     assert 0.0 < apart(in_c(tmp_path, problem, "ekf", "-O2")[0], in_python(problem)) < 1e-12
 
 
+@pytest.mark.parametrize("form", [form for form in EXPORTED_FORMS if form not in ("acceleration", "pressure")])
+def test_a_form_that_rounding_spoils_is_fused_on_every_processor_unless_it_is_told_otherwise(
+    form: str, tmp_path: Path
+) -> None:
+    problem = task(form, "normal", SHORT)
+    exact = in_c(tmp_path, problem, "ekf", "-O2")[0]
+    assert apart(exact, in_python(problem)) < 1e-14
+    assert apart(in_c(tmp_path, problem, "ekf", "-DEXPORTED_ROUNDED_TWICE")[0], exact) > 1e-14
+
+
+def test_a_compiler_that_may_fuse_by_itself_changes_no_bit(tmp_path: Path) -> None:
+    problem = task("pressure", "minor_friction", SHORT)
+    found = in_c(tmp_path, problem, "ekf", "-std=gnu17", "-march=native", EXACT)[0]
+    assert np.array_equal(found, in_c(tmp_path, problem)[0])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(  # three of the nine conditions each; `benchmarks export_c` has every pair
     ("form", "condition"),

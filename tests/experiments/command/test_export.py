@@ -45,6 +45,13 @@ def test_without_a_log_it_is_made_for_a_simulated_bench_and_a_plant_for_none(tmp
     assert "every 0.0002 s" in (tmp_path / "plant" / "circuit_plant.h").read_text()
 
 
+@pytest.mark.parametrize(("form", "warned"), [("pressure", False), ("acceleration", True)])
+def test_a_form_that_float_is_too_coarse_for_is_written_with_a_warning(form: str, warned: bool, tmp_path: Path) -> None:
+    done = export("c", "--form", form, "--precision", "float", "--out", tmp_path)
+    assert done.exit_code == 0
+    assert ("needs double" in done.stderr) == warned
+
+
 def test_an_fmu_of_a_plant_and_of_a_filter_is_written(tmp_path: Path) -> None:
     plant, kalman = tmp_path / "plant.fmu", tmp_path / "filter.fmu"
     done = export("fmu", "--plant", "reduced", "--fmi", "3.0", "--out", plant, "--json")
