@@ -5,7 +5,7 @@ same operations whatever the data, or at most as many as the header says.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from math import log, pi
 
@@ -19,22 +19,15 @@ from estimation.engine.rule import Rule, Setting, chosen_settings, weighing
 from estimation.engine.runner import constant_row
 from estimation.export.bank_in_c import BankInC, bank_in_c
 from estimation.export.rule_in_c import RuleInC, rule_in_c
-from estimation.filters.ckf import CKF
 from estimation.filters.ekf import EKF
-from estimation.filters.iekf import IEKF
 from estimation.filters.imm import IMM_SETTINGS, bank_parameters, log_transitions
-from estimation.filters.sif import SIF
-from estimation.filters.svsf import SVSF
-from estimation.filters.ukf import UKF
+from estimation.filters.online import RULES
 from estimation.trust.consistency import LARGEST_NIS, MISMATCH_NIS
 from plant.compiled.c99.files import c_files, checked_name
 from plant.compiled.c99.precision import Precision, precision_of
 from plant.errors import require_known
 from plant.log.record import CHANNELS
 from plant.units import notes
-
-RULES: Mapping[str, Rule] = {rule.name: rule for rule in (EKF, IEKF, UKF, CKF, SVSF, SIF)}
-"""Filters that predict, then update, by name."""
 
 EXPORTED = (*RULES, "imm")
 """Methods that can be exported."""

@@ -93,7 +93,7 @@ def watch(
         asked = Asked(load_rig(rig), load_columns(columns), false_alarms, learning, healthy, no_pressure)
         with beating(told, heartbeat):
             if log == "-":
-                watch_rows(told, _lines(sys.stdin), asked, STANDARD_INPUT, state)
+                watch_rows(told, stream_input(sys.stdin), asked, STANDARD_INPUT, state)
             elif is_stream(log):
                 watch_network(told, log, asked, state)
             else:
@@ -136,8 +136,14 @@ def _say(entries: Mapping[str, Any]) -> None:
     emit(json.dumps(entries, allow_nan=False))
 
 
-def _lines(file: TextIO) -> Iterator[str]:
-    """Yield the lines of a stream; bytes that are no text, and a line without end, are refused later as no numbers."""
+def stream_input(file: TextIO) -> Iterator[str]:
+    """Yield the lines of a stream; bytes that are no text are refused later as no numbers.
+
+    Raises
+    ------
+    LogError
+        If a line does not end.
+    """
     if not isinstance(file, io.TextIOWrapper):
         yield from file
         return

@@ -128,13 +128,18 @@ def watch_network(told: Told, address: str, asked: Asked, state: Path | None) ->
     try:
         watch_rows(told, stream_lines(address, received), asked, address, state)
     finally:
-        for count, said in (
-            (received.lost, "never came"),
-            (received.late, "came late or twice"),
-            (received.dropped, "found no room to wait"),
-        ):
-            if count:
-                note(f"{address}: warning: {count} batches {said} beside {received.batches} that were read")
+        told_of(address, received)
+
+
+def told_of(address: str, received: Received) -> None:
+    """Say on standard error what became of the batches of a stream, where one is missing."""
+    for count, said in (
+        (received.lost, "never came"),
+        (received.late, "came late or twice"),
+        (received.dropped, "found no room to wait"),
+    ):
+        if count:
+            note(f"{address}: warning: {count} {received.what} {said} beside {received.batches} that were read")
 
 
 def watch_rows(told: Told, lines: Iterable[str], asked: Asked, source: str, state: Path | None) -> None:

@@ -35,12 +35,15 @@ class Received:
     ----------
     batches, late, lost, dropped : int
         How many were read, came late or twice, never came, and found no room.
+    what : str
+        What they are: batches of a broker, or rows of a ring.
     """
 
     batches: int = 0
     late: int = 0
     lost: int = 0
     dropped: int = 0
+    what: str = field(default="batches", repr=False)
     expected: int | None = field(default=None, repr=False)
 
     def takes(self, number: int) -> bool:

@@ -1,0 +1,159 @@
+"""A filter whose samples come a block at a time: the kernel that filters a log, its memory kept between blocks.
+
+What comes of a stream does not depend on how it is cut, and all that the filter remembers is arrays: it is saved and
+continues to the last bit.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.engine.contract import FilterProblem, empty_trace
+from estimation.engine.rule import Rule
+from estimation.engine.runner import prepared, read_off
+from estimation.filters.ckf import CKF
+from estimation.filters.ekf import EKF
+from estimation.filters.iekf import IEKF
+from estimation.filters.sif import SIF
+from estimation.filters.svsf import SVSF
+from estimation.filters.ukf import UKF
+from plant.errors import HydrostateError, require_known
+
+RULES: Mapping[str, Rule] = {rule.name: rule for rule in (EKF, IEKF, UKF, CKF, SVSF, SIF)}
+"""Filters that predict, then update, by name: those that can filter a stream."""
+
+NEVER = 1 << 62
+"""So many samples between rows of a track that only the first is kept [samples]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Now:
+    """What a filter believes after its last sample, in SI.
+
+    Parameters
+    ----------
+    values, deviations : ndarray, shape (states,)
+        Means and standard deviations [SI].
+    nis, count : ndarray, shape (channels,)
+        Sums of squared normalised innovations, and samples present [dimensionless].
+    log_likelihood : float
+        Of all samples [dimensionless].
+    """
+
+    values: Array
+    deviations: Array
+    nis: Array
+    count: Array
+    log_likelihood: float
+
+
+class OnlineFilter:
+    """A filter of a stream; its memory does not grow.
+
+    Parameters
+    ----------
+    problem : FilterProblem
+        The task; its log plays no part.
+    method : str
+        One of `RULES`.
+
+    Raises
+    ------
+    HydrostateError
+        If method or a setting is not known.
+    """
+
+    def __init__(self, problem: FilterProblem, method: str = "ekf") -> None:
+        require_known("a method that filters a stream", method, RULES)
+        self.problem, self.method = problem, method
+        self._places, self._kernel, self._work = prepared(RULES[method], [problem])
+        self._logs = np.zeros((len(problem.channels), 1))
+        self._track = np.empty((2, 1, problem.model.width))
+        self._seen = np.empty((2, 0, len(problem.channels)))
+        self._drive = np.full(len(problem.model.drives), np.nan)
+        self.taken = 0
+        """Samples taken so far."""
+
+    def take(self, drives: Array, measured: Array) -> None:
+        """Take samples, one or many.
+
+        Parameters
+        ----------
+        drives : ndarray, shape (n, drives)
+            What drives the model [SI]; a missing one (NaN) is held at the last, and so is the belief's trust in it.
+        measured : ndarray, shape (n, channels)
+            Measurements [SI]; NaN is missing.
+
+        Raises
+        ------
+        HydrostateError
+            If the shapes are not these, or no drive was ever there.
+        """
+        wide = len(drives), len(self._drive)
+        if drives.shape != wide or measured.shape != (wide[0], len(self.problem.channels)):
+            wanted = f"(n, {wide[1]}) and (n, {len(self.problem.channels)})"
+            raise HydrostateError(f"samples must have shapes {wanted}, got {drives.shape} and {measured.shape}")
+        if not wide[0]:
+            return
+        held = self._held(drives)
+        seen = np.ascontiguousarray(measured, np.float64)
+        where = held.ctypes.data, seen.ctypes.data
+        results = (*self._track, self._logs, *self._seen)
+        substeps = self.problem.substeps
+        self._kernel.steps(self._work.ravel(), *where, self.taken, 0, len(held), substeps, NEVER, results)
+        self.taken += len(held)
+        self._drive = held[-1].copy()
+
+    def _held(self, drives: Array) -> Array:
+        """Return the drives with missing ones held at the last."""
+        rows = np.vstack([self._drive, drives])
+        known = np.isfinite(rows)
+        last = np.maximum.accumulate(np.where(known, np.arange(len(rows))[:, None], 0), axis=0)
+        held = np.take_along_axis(rows, last, axis=0)[1:]
+        if not np.all(np.isfinite(held)):
+            names = ", ".join(self.problem.model.drives)
+            raise HydrostateError(f"the first sample of a stream must have every drive ({names}), got one missing")
+        return np.ascontiguousarray(held, np.float64)
+
+    def now(self) -> Now:
+        """Return what is believed after the last sample."""
+        (trace,) = read_off(self._places, [self.problem], self._work, self._logs, [empty_trace(self.problem)])
+        values, slope = self.problem.model.to_si(trace.mean)
+        deviations = np.sqrt(np.maximum(np.diag(trace.covariance), 0.0)) * slope
+        return Now(values, deviations, trace.nis, trace.count, trace.log_likelihood)
+
+    def remembered(self) -> dict[str, Array]:
+        """Return all that the filter remembers, for `resume`.
+
+        Returns
+        -------
+        dict[str, ndarray]
+            Copies, by name.
+        """
+        return {
+            "work": self._work.copy(),
+            "logs": self._logs.copy(),
+            "drive": self._drive.copy(),
+            "taken": np.array([self.taken]),
+        }
+
+    def resume(self, kept: Mapping[str, Array]) -> None:
+        """Continue where another filter of the same task was: to the last bit.
+
+        Parameters
+        ----------
+        kept : Mapping[str, ndarray], each of its own shape
+            What it remembered [any unit].
+
+        Raises
+        ------
+        HydrostateError
+            If that filter had another model, other channels or another method.
+        """
+        own = self.remembered()
+        if any(name not in kept or kept[name].shape != own[name].shape for name in own):
+            raise HydrostateError("a filter can only continue one of the same form, method, states and channels")
+        self._work[:], self._logs[:], self._drive[:] = kept["work"], kept["logs"], kept["drive"]
+        self.taken = int(kept["taken"][0])

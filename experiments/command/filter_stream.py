@@ -1,0 +1,140 @@
+"""`hydrostate filter -`: what a filter believes of a stream, as it comes, one JSON object a line."""
+
+import json
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from experiments.command.filtering import Filtering
+from experiments.command.json_output import plain
+from experiments.command.logs import read_log
+from experiments.command.options import (
+    Columns,
+    RigFile,
+    argument,
+    flag,
+    load_columns,
+    load_rig,
+    option,
+    require_positive,
+)
+from experiments.command.terminal import SOME_FAILED, emit, note, unexpected
+from experiments.command.watch import STANDARD_INPUT, stream_input
+from experiments.command.watch_outputs import published
+from experiments.command.watching import told_of
+from plant.errors import HydrostateError
+from plant.log.stream_source import Received, is_stream, stream_lines
+
+commands = typer.Typer()
+
+
+@commands.command(
+    name="filter", epilog="Example: hydrostate filter mqtt://bench/rows --rig rig.toml --state filter.npz"
+)
+def filter_stream(
+    stream: Annotated[
+        str,
+        argument(
+            "STREAM",
+            "tcp://HOST:PORT, mqtt://HOST/TOPIC, ring:PATH, a CSV file, or - for CSV on standard input: a header, then "
+            "rows of time_s, motor_speed_rad_s and what the form needs.",
+        ),
+    ],
+    form: Annotated[
+        str, option("FORM", "What the filter believes: a form of `estimate` that is filtered, or flow.")
+    ] = "pressure",
+    method: Annotated[str, option("METHOD", "ekf, iekf, ukf, ckf, svsf or sif.")] = "ekf",
+    states: Annotated[
+        str, option("NAMES", "What is estimated beside bulk modulus, comma-separated: parameters' names.")
+    ] = "",
+    like: Annotated[
+        Path | None,
+        option(
+            "LOG",
+            "A log of the same bench that the noise levels are read off.",
+            show_default="the stream's first second",
+        ),
+    ] = None,
+    tune: Annotated[bool, flag("--tune", "Tune the noise levels by likelihood on what they are read off.")] = False,
+    every: Annotated[float, option("S", "Time of the stream between two estimates [s].")] = 1.0,
+    rig: RigFile = None,
+    columns: Columns = None,
+    state: Annotated[
+        Path | None, option("FILE", "Keep the filter in this file, and go on from it after a restart.")
+    ] = None,
+    publish: Annotated[
+        str | None, option("mqtt://HOST[:PORT]/TOPIC", "Also publish every line at an MQTT broker.")
+    ] = None,
+) -> None:
+    """Say what a filter believes while rows come: bulk modulus and whatever else it estimates, with deviations.
+
+    It is the filter that `export c` writes for a controller, with the same numbers. Events: start; estimate, with
+    values, standard deviations, the mean squared innovation of each channel since the last one, and what speaks against
+    it (gate); end. A missing sample changes nothing; a missing drive is held; after more than a second without rows the
+    filter begins again where the actuator is.
+    """
+    require_positive("--every", every, "s")
+    sinks: list[Any] = [_say]
+
+    def say(entries: Mapping[str, Any]) -> None:
+        shown = plain(dict(entries))
+        for sink in sinks:
+            sink(shown)
+
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    from estimation.eha.online import Asked
+
+    with ExitStack() as outputs:
+        bench, named = load_rig(rig), load_columns(columns)
+        asked = Asked(bench.parameters, form, method, tuple(one for one in states.split(",") if one), tune)
+        log = None if like is None else read_log(like, bench.columns, named)
+        source = STANDARD_INPUT if stream == "-" else stream
+        told = Filtering(say, asked, (bench.columns, named), every, log, state, source)
+        if publish is not None:
+            sinks.append(outputs.enter_context(published(publish)))
+        _ended(told, stream)
+
+
+def _ended(told: Filtering, stream: str) -> None:
+    """Filter a stream; whatever ends it, the last line says so."""
+    received = Received()
+    try:
+        told.follow(_lines(stream, received))
+    except HydrostateError as error:
+        told.end("failed", str(error))
+        raise
+    except KeyboardInterrupt:
+        told.end("interrupted", "interrupted")
+        raise
+    except BaseException as error:
+        said = unexpected(error)
+        told.end("failed", said)
+        note(said)
+        raise typer.Exit(SOME_FAILED) from error
+    finally:
+        told_of(stream, received)
+    told.end("ok", "")
+
+
+def _lines(stream: str, received: Received) -> Iterator[str]:
+    if is_stream(stream):
+        yield from stream_lines(stream, received)
+    elif stream == "-":
+        yield from stream_input(sys.stdin)
+    else:
+        try:
+            with Path(stream).open(encoding="utf-8", errors="replace", newline="\n") as file:
+                yield from file
+        except OSError as error:
+            raise HydrostateError(f"{stream}: it cannot be read: {error.strerror or error}") from error
+
+
+def _say(entries: Mapping[str, Any]) -> None:
+    emit(json.dumps(entries, allow_nan=False))

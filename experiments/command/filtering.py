@@ -1,0 +1,228 @@
+"""What `hydrostate filter` does with a stream: rows to samples, samples to a filter, and what it believes to lines."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from experiments.command.logs import caught, with_rig_columns
+from experiments.command.terminal import note
+from plant.errors import LogError
+from plant.notes import distinct
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from estimation.eha.online import Asked
+    from estimation.filters.online import OnlineFilter
+    from plant.log.csv_stream import CsvStream
+    from plant.log.record import Record
+
+LEARNING = 1.0
+"""What a stream begins with from which noise and first belief are read [s], where no log is named."""
+
+FEWEST = 200
+"""Rows that this takes at the least."""
+
+TOGETHER = 0.1
+"""Rows are taken up to so long together [s]; what comes of them does not depend on it."""
+
+SAVED_EVERY = 10.0
+"""Time of a stream between two looks at its state file [s]."""
+
+
+@dataclass
+class Filtering:
+    """A stream that is filtered, and what is told of it.
+
+    Parameters
+    ----------
+    say : callable
+        Takes the entries of a line.
+    asked : Asked
+        The filter.
+    every : float
+        Time of the stream between two estimates [s].
+    """
+
+    say: Callable[[dict[str, Any]], None]
+    asked: "Asked"
+    columns: tuple[Mapping[str, str], Mapping[str, str]]
+    every: float
+    like: "Record | None" = None
+    state: Path | None = None
+    source: str = "standard input"
+    last: float | None = field(default=None, init=False)
+    filtered: "OnlineFilter | None" = field(default=None, init=False)
+    _sums: "tuple[NDArray[np.float64], NDArray[np.float64]] | None" = field(default=None, init=False)
+
+    def follow(self, lines: Iterable[str]) -> None:
+        """Filter header and rows as they come, until they end.
+
+        Raises
+        ------
+        HydrostateError
+            If a row cannot be read, or the stream is not one that can be filtered.
+        """
+        from estimation.eha.online import save_filter
+
+        stream = self._opened(lines)
+        saved = told = stream.start_time
+        try:
+            for last, rows, gap in self._pieces(stream):
+                filtered = self._ready(stream, rows, last, gap)
+                channels = dict(zip(stream.channels, rows.T, strict=True))
+                self._take(filtered, channels)
+                self.last = last
+                if last - told >= self.every - 0.5 * stream.sample_time:
+                    told += self.every * round((last - told) // self.every or 1)
+                    self._estimate(filtered)
+                if self.state is not None and last - saved > SAVED_EVERY:
+                    saved = last
+                    save_filter(self.state, self.asked, filtered, last)
+        finally:
+            if self.state is not None and self.filtered is not None and self.last is not None:
+                save_filter(self.state, self.asked, self.filtered, self.last)
+        if self.filtered is not None and self.last is not None and self.last > told:
+            self._estimate(self.filtered)
+        if stream.cut:
+            note(f"{self.source}: warning: the last row is cut short and left out")
+
+    def end(self, outcome: str, message: str) -> None:
+        """Tell that the stream has ended, and how."""
+        taken = 0 if self.filtered is None else self.filtered.taken
+        self._line("end", outcome=outcome, samples=taken, message=message or f"{taken} samples filtered")
+
+    def _opened(self, lines: Iterable[str]) -> "CsvStream":
+        from plant.log.csv_stream import CsvStream
+
+        rest = iter(lines)
+        header = next((line for line in rest if line.strip()), "")
+        with caught() as said:
+            stream = with_rig_columns(
+                lambda mapping: CsvStream(chain([header], rest), mapping, source=self.source), *self.columns
+            )
+        for one in distinct(warning.note for warning in said):
+            note(f"{self.source}: warning: {one}")
+        return stream
+
+    def _pieces(self, stream: "CsvStream") -> "Iterator[tuple[float, NDArray[np.float64], bool]]":
+        """Yield rows; together those that a filter begins with, first and after a gap."""
+        import numpy as np
+
+        resumes = self.state is not None and self.state.exists()
+        wanted = 0 if resumes else self._wanted(stream)
+        first: list[NDArray[np.float64]] = []
+        after_gap, last = False, stream.start_time
+        for last, rows, gap in stream.samples(max(1, round(min(self.every, TOGETHER) / stream.sample_time))):
+            if gap:
+                if first:
+                    note(f"{self.source}: warning: rows before a gap at {last:g} s were too few to begin from")
+                first, after_gap, wanted = [], True, self._wanted(stream)
+            first.append(rows)
+            if sum(map(len, first)) >= wanted:
+                yield last, np.concatenate(first), after_gap
+                first, after_gap, wanted = [], False, 0
+        if first:
+            yield last, np.concatenate(first), after_gap
+
+    def _wanted(self, stream: "CsvStream") -> int:
+        """Return how many rows a filter begins from."""
+        return 1 if self.like is not None else max(round(LEARNING / stream.sample_time), FEWEST)
+
+    def _ready(self, stream: "CsvStream", rows: "NDArray[np.float64]", last: float, gap: bool) -> "OnlineFilter":
+        """Return the filter; it begins, goes on from its state, or begins again after a gap."""
+        from estimation.eha.online import begun
+        from plant.log.record import Record
+
+        T = stream.sample_time
+        if self.filtered is None and not gap and self.state is not None and self.state.exists():
+            self._resume(T, last - (len(rows) - 1) * T)
+        if self.filtered is None or gap:
+            if gap:
+                note(f"{self.source}: warning: rows are missing before {last:g} s, so the filter begins again")
+            record = Record(T, dict(zip(stream.channels, rows.T, strict=True)))
+            try:
+                self.filtered, self._sums = begun(self.asked, record, self.like), None
+            except LogError as error:
+                raise LogError(error.message, self.source) from error
+            self._start(T, "begun")
+        return self.filtered
+
+    def _resume(self, sample_time: float, start: float) -> None:
+        """Go on from the state file; rows that are missing up to here are missing samples."""
+        import numpy as np
+
+        from estimation.eha.online import SAME_RATE, load_filter
+        from plant.log.csv_stream import LONGEST_GAP
+
+        if self.state is None:
+            return
+        filtered, last = load_filter(self.state, self.asked)
+        T = filtered.problem.sample_time
+        if abs(T / sample_time - 1.0) > SAME_RATE:
+            raise LogError(f"{self.state} is of {1.0 / T:g} Hz, the stream has {1.0 / sample_time:g} Hz", self.source)
+        missing = round((start - last) / T) - 1
+        if not 0 <= missing * T <= LONGEST_GAP:
+            note(f"{self.source}: warning: the stream does not go on at {last:g} s, so the filter begins again")
+            return
+        wide = len(filtered.problem.model.drives), len(filtered.problem.channels)
+        filtered.take(np.full((missing, wide[0]), np.nan), np.full((missing, wide[1]), np.nan))
+        self.filtered, self.last = filtered, last
+        now = filtered.now()
+        self._sums = now.nis, now.count
+        self._start(T, "continued")
+
+    def _take(self, filtered: "OnlineFilter", channels: "Mapping[str, NDArray[np.float64]]") -> None:
+        from estimation.eha.online import samples_of
+
+        try:
+            filtered.take(*samples_of(filtered, channels))
+        except LogError as error:
+            raise LogError(error.message, self.source) from error
+
+    def _start(self, sample_time: float, how: str) -> None:
+        if self.filtered is not None:
+            task = self.filtered.problem
+            about = {"form": self.asked.form, "method": self.asked.method, "channels": list(task.channels)}
+            self._line("start", file=self.source, rate_hz=round(1.0 / sample_time, 6), **about, message=how)
+
+    def _estimate(self, filtered: "OnlineFilter") -> None:
+        """Tell what is believed, and how large innovations were since it was last told."""
+        import numpy as np
+
+        from estimation.trust.consistency import LARGEST_NIS, MISMATCH_NIS
+
+        now, names = filtered.now(), [state.name for state in filtered.problem.model.states]
+        before = (0.0 * now.nis, 0.0 * now.count) if self._sums is None else self._sums
+        self._sums = now.nis, now.count
+        came = now.count - before[1]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            nis = np.where(came > 0.0, (now.nis - before[0]) / came, np.nan)
+        finite = bool(np.all(np.isfinite([now.values, now.deviations])))
+        worst = float(np.nanmax(nis)) if np.any(came > 0.0) else 0.0
+        gate = [code for code, held in (
+            ("not_finite", finite), ("mismatch", not worst > MISMATCH_NIS), ("overconfident", not worst > LARGEST_NIS)
+        ) if not held]  # fmt: skip
+        self._line(
+            "estimate",
+            values=_listed(names, now.values),
+            std=_listed(names, now.deviations),
+            nis=_listed(filtered.problem.channels, nis),
+            samples=filtered.taken,
+            gate=gate,
+        )
+
+    def _line(self, event: str, **entries: Any) -> None:
+        clock = datetime.now(UTC).isoformat(timespec="milliseconds")
+        time_s = None if self.last is None else round(self.last, 6)
+        self.say({"event": event, "time_s": time_s, "clock": clock, **entries})
+
+
+def _listed(names: Iterable[str], values: "NDArray[np.float64]") -> dict[str, float | None]:
+    """Return numbers by name; what is no number is null."""
+    shown = (float(value) for value in values)
+    return {name: value if abs(value) < float("inf") else None for name, value in zip(names, shown, strict=True)}

@@ -1,0 +1,71 @@
+"""What runs for weeks, kept over a restart: arrays in one file that is there whole or not at all."""
+
+import io
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from plant.arrays import Array
+from plant.atomic import replacing
+from plant.errors import HydrostateError
+
+
+def write_kept(path: Path, kind: str, values: Mapping[str, Any]) -> None:
+    """Write arrays into a file of a kind.
+
+    Parameters
+    ----------
+    path : Path
+        Where to.
+    kind : str
+        What wrote it, with the number of its format: ``hydrostate watch 1``.
+    values : Mapping[str, ndarray], each of its own shape
+        Numbers or texts by name [any unit].
+
+    Raises
+    ------
+    HydrostateError
+        If the file cannot be written.
+    """
+    content = io.BytesIO()
+    named: dict[str, Any] = {"format": np.array(kind), **values}
+    np.savez(content, **named)
+    try:
+        with replacing(path) as file:
+            file.write(content.getvalue())
+    except OSError as error:
+        raise HydrostateError(f"{path}: the state cannot be written: {error.strerror or error}") from error
+
+
+def read_kept(path: Path, kind: str) -> dict[str, Array]:
+    """Read arrays from a file of a kind.
+
+    Parameters
+    ----------
+    path : Path
+        A file of `write_kept`.
+    kind : str
+        What must have written it.
+
+    Returns
+    -------
+    dict[str, ndarray]
+        Its arrays by name.
+
+    Raises
+    ------
+    HydrostateError
+        If the file cannot be read or is of another kind.
+    """
+    wanted = f"a state of {kind.rpartition(' ')[0]} is wanted"
+    try:
+        with np.load(path, allow_pickle=False) as kept:
+            values = {name: kept[name] for name in kept.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise HydrostateError(f"{path}: {wanted}: {error}") from error
+    if str(values.pop("format", "")) != kind:
+        raise HydrostateError(f"{path}: {wanted}, the file is none of this version")
+    return values
