@@ -40,13 +40,14 @@ benchmark: $(VENV)/.installed-dev
 
 # Each peer pins old versions of what the others need, so each has an environment of its own.
 .peers/.installed:
-	for peer in sippy pysib pysid jax-sysid sysidentpy jax; do $(PYTHON) -m venv .peers/$$peer || exit 1; done
+	for peer in sippy pysib pysid jax-sysid sysidentpy jax fmu; do $(PYTHON) -m venv .peers/$$peer || exit 1; done
 	.peers/sippy/bin/python -m pip install --quiet sippy-unipi==1.0.1
 	.peers/pysib/bin/python -m pip install --quiet pysib==0.2.5
 	.peers/pysid/bin/python -m pip install --quiet pysid==0.1.1 "scipy<1.15" "numpy<2.3" ipython
 	.peers/jax-sysid/bin/python -m pip install --quiet jax-sysid==1.1.0
 	.peers/sysidentpy/bin/python -m pip install --quiet sysidentpy
 	.peers/jax/bin/python -m pip install --quiet jax
+	.peers/fmu/bin/python -m pip install --quiet libcosimpy==0.0.6 ecospy==0.7.2
 	touch $@
 
 # All three are run, whatever the first ones miss.
@@ -57,6 +58,7 @@ peers: $(VENV)/.installed-dev .peers/.installed
 	$(BIN)/python -m benchmarks identification_sets || status=1; \
 	$(BIN)/python -m benchmarks filter_speed --jax .peers/jax/bin/python || status=1; \
 	$(BIN)/python -m benchmarks circuit || status=1; \
+	$(BIN)/python -m benchmarks fmu --tools .peers/fmu/bin/python || status=1; \
 	exit $$status
 
 $(VENV)/.installed-docs: $(VENV)/.installed

@@ -10,6 +10,7 @@ NAMES = (
     "filter_speed",
     "start_up",
     "export_c",
+    "fmu",
     "many_filters",
     "robustness",
     "efficiency",

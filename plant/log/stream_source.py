@@ -1,4 +1,4 @@
-"""Lines of a stream that comes over a network: from a TCP connection, or in numbered batches from an MQTT broker.
+"""Lines of a stream: from a TCP connection, in numbered batches from an MQTT broker, or from a ring in memory.
 
 Over TCP nothing is lost: rows that are not read yet wait at the sender. From a broker rows come in batches, since one
 row a message reaches some thousand a second. A batch is text: ``rows N`` with its number, the header, the rows; an
@@ -10,12 +10,14 @@ import queue
 import socket
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 from plant.errors import HydrostateError, LogError
+from plant.log.ring import ring_lines
 
-SCHEMES = ("tcp", "mqtt")
+SCHEMES = ("tcp", "mqtt", "ring")
 """What an address of a stream begins with."""
 
 QUEUED = 1000
@@ -79,7 +81,7 @@ def stream_lines(address: str, received: Received) -> Iterator[str]:
     Parameters
     ----------
     address : str
-        ``tcp://HOST:PORT`` or ``mqtt://HOST[:PORT]/TOPIC``.
+        ``tcp://HOST:PORT``, ``mqtt://HOST[:PORT]/TOPIC`` or ``ring:PATH``, see `plant.log.ring`.
     received : Received
         Receives what became of batches.
 
@@ -95,7 +97,9 @@ def stream_lines(address: str, received: Received) -> Iterator[str]:
         return _tcp(host, port, address)
     if scheme == "mqtt" and host and topic:
         return _mqtt(host, port or MQTT_PORT, topic, address, received)
-    raise HydrostateError(f"a stream must be tcp://HOST:PORT or mqtt://HOST[:PORT]/TOPIC, got {address!r}")
+    if scheme == "ring" and address != "ring:":
+        return _ring(address, received)
+    raise HydrostateError(f"a stream must be tcp://HOST:PORT, mqtt://HOST[:PORT]/TOPIC or ring:PATH, got {address!r}")
 
 
 def broker_of(address: str) -> tuple[str, int, str]:
@@ -150,6 +154,15 @@ def broker_package(address: str) -> tuple[Any, Any]:
     except ImportError as error:
         raise HydrostateError(f"{address}: a broker needs paho-mqtt: pip install 'hydrostate[stream]'") from error
     return mqtt, CallbackAPIVersion
+
+
+def _ring(address: str, received: Received) -> Iterator[str]:
+    received.what = "rows"
+
+    def count(taken: int, lost: int) -> None:
+        received.batches, received.lost = taken, lost
+
+    return ring_lines(Path(address.removeprefix("ring:")), count)
 
 
 def _tcp(host: str, port: int, address: str) -> Iterator[str]:

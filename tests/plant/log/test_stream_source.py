@@ -85,7 +85,7 @@ def test_what_is_no_stream_is_refused_in_a_sentence() -> None:
     assert is_stream("tcp://here:1")
     assert not is_stream("bench.csv")
     for address in ("tcp://here", "tcp://:99", "mqtt://here", "tcp://here:99999999"):
-        with pytest.raises(HydrostateError, match="a stream must be tcp://HOST:PORT or mqtt://"):
+        with pytest.raises(HydrostateError, match="a stream must be tcp://HOST:PORT, mqtt://"):
             stream_lines(address, Received())
     with pytest.raises(LogError, match="nobody answers"):
         next(stream_lines(f"tcp://127.0.0.1:{free_port()}", Received()))
