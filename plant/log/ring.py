@@ -1,9 +1,9 @@
 """Rows of numbers in a ring: a file, best in shared memory, that one program writes and another reads as it grows.
 
-Layout, little-endian: at 0 the magic ``HYDRING1``; at 8 columns and at 12 slots (32 bits each); at 16 rows written and at
-24 rows read (64 bits each); at 32 whether it has ended and at 36 how many bytes the header has (32 bits each); at 64
-the header, a line of CSV. Rows stand from 4096 on, each of so many doubles, row n in slot ``n mod slots``. A row counts
-as written when its numbers are there.
+Layout, little-endian: at 0 the magic ``HYDRING1``; at 8 columns and at 12 slots (32 bits each); at 16 rows written and
+at 24 rows read (64 bits each); at 32 whether it has ended and at 36 how many bytes the header has (32 bits each); at
+64 the header, a line of CSV. Rows stand from 4096 on, each of so many doubles, row n in slot ``n mod slots``. A row
+counts as written when its numbers are there.
 
 A writer that must not wait writes over the oldest rows; those that the reader had not taken are counted there as lost.
 One that may wait does so until there is room: that is back-pressure. No row can come late, since the rows are in order.
