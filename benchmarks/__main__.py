@@ -11,6 +11,7 @@ NAMES = (
     "start_up",
     "export_c",
     "fmu",
+    "restored",
     "many_filters",
     "robustness",
     "efficiency",

@@ -1,3 +1,4 @@
+import ctypes
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -6,6 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.export_c import task
+from benchmarks.peers.c_filter import built
 from estimation.engine.contract import FilterProblem
 from estimation.export.c_filter import EXPORTED, filter_in_c
 from estimation.export.task import EXPORTED_FORMS, filter_task
@@ -16,8 +18,9 @@ from faults.conditions import CONDITIONS
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError, LogError
 from plant.log.record import Record
-from tests.c_compiler import SANITIZED, compiled, ran
+from tests.c_compiler import SANITIZED, compiled, compiler, ran
 
+DOUBLES = ctypes.POINTER(ctypes.c_double)
 SHORT, LONG = 3_000, 100_000
 EXACT = "-DEXPORTED_EXACT"
 """Products are fused by the library, so that no test depends on the processor."""
@@ -143,6 +146,30 @@ def test_in_float_its_bulk_modulus_stays_within_two_percent_of_pythons(tmp_path:
     found, wanted = in_c(tmp_path, problem, precision="float")[0][0], in_python(problem)[0]
     place = problem.model.index(BULK_MODULUS)
     assert 0.0 < abs(found[-1, place] / wanted[-1, place] - 1.0) < 0.02
+
+
+@pytest.mark.parametrize("method", ["ekf", "imm"])
+def test_a_copy_of_a_filter_continues_to_the_bit(method: str, tmp_path: Path) -> None:
+    compiler("gcc")
+    problem, half = task("pressure", "normal", 400), 200
+    library = built(problem, method, tmp_path, flags=()).library
+    first = ctypes.create_string_buffer(1 << 16)
+    rows = [
+        (np.ascontiguousarray(u), np.ascontiguousarray(y))
+        for u, y in zip(problem.drives, problem.measured, strict=True)
+    ]
+
+    def step(filtered: object, begin: int, end: int) -> None:
+        for drive, sample in rows[begin:end]:
+            library.exported_step(filtered, drive.ctypes.data_as(DOUBLES), sample.ctypes.data_as(DOUBLES))
+
+    library.exported_start(first, ctypes.byref(ctypes.c_char.in_dll(library, "exported_defaults")))
+    step(first, 0, half)
+    copy = ctypes.create_string_buffer(first.raw, 1 << 16)
+    step(first, half, 400)
+    assert copy.raw != first.raw
+    step(copy, half, 400)
+    assert copy.raw == first.raw
 
 
 def test_header_and_source_allocate_nothing_recurse_nowhere_and_jump_nowhere() -> None:

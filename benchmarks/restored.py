@@ -1,0 +1,69 @@
+"""Filters of a stream that are saved, ended and begun again from their file: how many continue to the last bit.
+
+Every form under every method that filters streams, with five restarts at random samples of a log of the plant, cut at
+random; what is compared with the filter that ran through is its whole memory, not what it shows.
+"""
+
+import argparse
+import tempfile
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from estimation.eha.online import Asked, begun, load_filter, save_filter
+from estimation.export.task import EXPORTED_FORMS
+from estimation.filters.online import RULES, OnlineFilter
+from plant.eha.drives import sine
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import LUMPED, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+SAMPLE_TIME, RESTARTS = 1e-3, 5
+
+
+def filter_on(filtered: OnlineFilter, record: Record, begin: int, end: int) -> None:
+    """Filter samples of a log, cut at random."""
+    rng, task = np.random.default_rng(begin), filtered.problem
+    drives, measured = (np.column_stack([record[one] for one in names]) for names in (task.model.drives, task.channels))
+    while begin < end:
+        stop = min(end, begin + int(rng.integers(1, 500)))
+        filtered.take(drives[begin:stop], measured[begin:stop])
+        begin = stop
+
+
+def same(ours: OnlineFilter, wanted: OnlineFilter) -> bool:
+    """Return whether two filters remember the same bits of belief, sums and count."""
+    a, b = ours.now(), wanted.now()
+    pairs = ((a.values, b.values), (a.deviations, b.deviations), (a.nis, b.nis), (a.count, b.count))
+    alike = all(x.tobytes() == y.tobytes() for x, y in pairs)
+    return alike and a.log_likelihood == b.log_likelihood and ours.taken == wanted.taken
+
+
+def main(arguments: list[str]) -> int:
+    """Print each form and method; return how many do not continue to the last bit."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--samples", type=int, default=5000)
+    samples: int = parser.parse_args(arguments).samples
+    p, rng, missed, count = EhaParameters(), np.random.default_rng(0), 0, 0
+    drive = sine(samples * SAMPLE_TIME, SAMPLE_TIME, p.rated_speed, 5.0)
+    record = simulate(LUMPED, drive, SAMPLE_TIME, p, sensors=BENCH, rng=rng)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "filter.npz"
+        for form in EXPORTED_FORMS:
+            for method in RULES:
+                asked = Asked(p, form, method)
+                whole, ours = begun(asked, record), begun(asked, record)
+                filter_on(whole, record, 0, len(record))
+                places = [0, *sorted(rng.integers(1, len(record), RESTARTS).tolist()), len(record)]
+                for begin, end in pairwise(places):
+                    filter_on(ours, record, begin, end)
+                    save_filter(path, asked, ours, 0.0)
+                    ours, _ = load_filter(path, asked)
+                met = same(ours, whole)
+                missed, count = missed + (not met), count + 1
+                finite = bool(np.all(np.isfinite(whole.now().values)))
+                print(f"{form:18s}{method:6s}{'to the bit' if met else 'MISSED'}{'' if finite else ' (it diverged)'}")
+    print(f"{count - missed} of {count} continue to the last bit over {RESTARTS} restarts")
+    return missed
