@@ -3,13 +3,16 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import ceil
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.fits.descent import descend
+from estimation.fits.averaged import averaged
+from estimation.fits.descent import Point, descend
 from estimation.fits.explain import WORTH, explain, promised
 from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
+from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, roughly
 from estimation.fits.greybox_problem import GreyBoxLog, Problem, greybox_log
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, OFFSET, START_LOAD, Hypothesis
@@ -17,7 +20,15 @@ from estimation.fits.wide_problem import flow_bounds
 from estimation.log_checks.bridging import bridged, gaps
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.outliers import without_outliers
-from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS, reaches_relief, relieving
+from estimation.models.flow import (
+    FLOW_FORM,
+    HELD_FLOW_FORM,
+    MASS_FLOW_FORM,
+    STIFFNESS,
+    flow_parameters,
+    reaches_relief,
+    relieving,
+)
 from estimation.notes import EstimateCode
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
@@ -25,6 +36,7 @@ from plant.log.record import Record
 from plant.notes import Note
 
 Array = NDArray[np.float64]
+Bounds: TypeAlias = tuple[Array, Array]
 
 FLOW_CHANNELS = ("position_m", "differential_pressure_pa")
 """Channels that the flow form needs beside motor speed."""
@@ -50,6 +62,9 @@ make-up valves never open, no log tells a drain from leakage, and any drain woul
 
 SCREENED_SECONDS = 4.0
 """Starts are compared on the beginning of the log: it tells a wrong valley from a right one [s]."""
+
+FINISHING = 15
+"""Evaluations with short model steps: what is not there by then is a conductance that vanishes, a little at a time."""
 
 LARGEST_CHI_SQUARE = 1.2
 """Mean squared normalised residual above which the model is said to leave something out [dimensionless]."""
@@ -146,16 +161,21 @@ def _balanced(
     relieved = reaches_relief(log.measured, parameters.relief_pressure)
     forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
     search = Search(screened=ceil(SCREENED_SECONDS / log.sample_time))
-    fits: list[GreyBoxFit] = []
+    rough: list[tuple[Problem, Point, Bounds]] = []
     for form in forms:
-        problem = Problem(form, log)
-        guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in starts]
+        problem = Problem(form, log) if log.gaps.size else FreedProblem.of(form, log)  # what gaps leave open, once
+        tried = [{STIFFNESS: 0.0, **rough[0][0].model.values(rough[0][1].theta)}] if rough else starts
+        guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in tried]
         bounds = flow_bounds(form, guesses, log)
-        near = roughly(problem, [form.theta({STIFFNESS: 0.0, **fits[0].values})] if fits else guesses, search, bounds)
-        # twice what counts leaves room for the error of long model steps
-        if not fits or near.cost < min(map(_cost, fits)) + 2.0 * UNLIKELY:
-            fits.append(concluded(problem, descend(problem.at, near.theta, search.evaluations, bounds)))
-    return fits
+        rough.append((problem, roughly(problem, guesses, search, bounds), bounds))
+    least = min(point.cost for _, point, _ in rough)
+    done = [
+        (problem, descend(problem.at, point.theta, FINISHING, bounds))
+        for k, (problem, point, bounds) in enumerate(rough)
+        if k == 0 or point.cost < least + 2.0 * UNLIKELY  # twice what counts: long model steps have errors
+    ]
+    least = min(point.cost for _, point in done)
+    return [concluded(problem, point, disturbed=point.cost < least + UNLIKELY) for problem, point in done]
 
 
 def _asked(log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, loaded: bool) -> tuple[Hypothesis, ...]:
@@ -233,9 +253,14 @@ def _log(
     record: Record, parameters: EhaParameters, uncertainties: Mapping[str, float], variances: Mapping[str, float]
 ) -> GreyBoxLog:
     log = greybox_log(
-        FLOW_FORM, record, parameters, longest_step=LONGEST_STEP, variances=variances, uncertainties=uncertainties
+        FLOW_FORM,
+        record,
+        flow_parameters(parameters),
+        longest_step=LONGEST_STEP,
+        variances=variances,
+        uncertainties=uncertainties,
     )
-    return replace(
+    log = replace(
         log,
         # where the piston is within a gap of its position is not known, where it is after it is
         measured=np.where(_within_gaps(record["position_m"])[:, None], np.nan, log.measured),
@@ -245,6 +270,7 @@ def _log(
             "makeup_opening": (OPENING_START, PRESUMED_STD),
         },
     )
+    return averaged(log, LONGEST_STEP)
 
 
 def _within_gaps(position: Array) -> NDArray[np.bool_]:

@@ -177,7 +177,7 @@ def _cost(point: Point) -> float:
     return point.cost
 
 
-def concluded(problem: Problem, point: Point) -> GreyBoxFit:
+def concluded(problem: Problem, point: Point, *, disturbed: bool = True) -> GreyBoxFit:
     """Return what a solution says, with its deviations.
 
     Parameters
@@ -186,6 +186,8 @@ def concluded(problem: Problem, point: Point) -> GreyBoxFit:
         The problem.
     point : Point
         Its solution.
+    disturbed : bool
+        Whether the deviations hold the drives' noise too, and what the rig's own doubts would change is told.
 
     Returns
     -------
@@ -207,10 +209,11 @@ def concluded(problem: Problem, point: Point) -> GreyBoxFit:
         def response(shift: Array) -> Array:
             return bread @ (slopes.T @ shift.ravel())
 
-        variance = np.diag(spread) + _drive_variance(problem, theta, response)
+        variance = np.diag(spread) + (_drive_variance(problem, theta, response) if disturbed else 0.0)
         # the window's estimate need not be positive: then nothing is known
         noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))
-        rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in _rig_slopes(problem, theta, response)}
+        if disturbed:
+            rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in _rig_slopes(problem, theta, response)}
     sizes = dict(model.linear)
     values = model.values(theta)
     unit = np.array([sizes.get(name, values[name]) for name in model.unknowns])
@@ -249,12 +252,16 @@ def _drive_variance(problem: Problem, theta: Array, response: Callable[[Array], 
 
 def _rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Array]) -> Iterator[tuple[str, Array]]:
     """Yield by how much the unknowns would differ per relative change of each uncertain parameter of the rig."""
-    known, names = problem.residuals(theta), parameter_names(problem.model.parameters)
-    for name, relative in problem.log.uncertainties.items():
-        if relative > 0.0 and name in names and name not in problem.model.unknowns:
-            nudged = problem.log.parameters.copy()
-            nudged[names.index(name)] *= 1.0 + RIG_NUDGE
-            yield name, -response(problem.residuals(theta, parameters=nudged) - known) / RIG_NUDGE
+    names, row = parameter_names(problem.model.parameters), problem.log.parameters
+    asked = [
+        name
+        for name, relative in problem.log.uncertainties.items()
+        if relative > 0.0 and name in names and name not in problem.model.unknowns
+    ]
+    nudged = [np.where(np.arange(len(row)) == names.index(name), row * (1.0 + RIG_NUDGE), row) for name in asked]
+    known, *shifted = problem.residuals_of(theta, [row, *nudged])
+    for name, errors in zip(asked, shifted, strict=True):
+        yield name, -response(errors - known) / RIG_NUDGE
 
 
 def _spread_out(values: Array, places: NDArray[np.intp], length: int) -> Array:

@@ -283,6 +283,23 @@ class Problem:
         self._run(theta, errors, np.empty((0, 0, 0)), drives, parameters)
         return errors
 
+    def residuals_of(self, theta: Array, parameters: Sequence[Array]) -> list[Array]:
+        """Return the normalised residuals under several parameters of the rig.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        parameters : sequence of ndarray, shape (parameters,)
+            Parameters of the rig [SI].
+
+        Returns
+        -------
+        list of ndarray, shape (outputs, blocks)
+            As of `residuals`.
+        """
+        return [self.residuals(theta, parameters=row) for row in parameters]
+
     def slopes(self, theta: Array) -> Array:
         """Return the derivatives of the normalised residuals.
 

@@ -6,6 +6,7 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.fits.averaged import block_means, samples_a_block
 from estimation.fits.descent import Point, descend, descend_together
 from estimation.fits.flow_fit import DRAIN_START, LEAD_START, LEAST_LEAKAGE
 from estimation.fits.force_scale import Way, rescaled
@@ -144,9 +145,9 @@ def fit_motion(
 
 
 def _log(record: Record, p: EhaParameters, uncertainties: Mapping[str, float], speed_variance: float) -> GreyBoxLog:
-    block = max(1, round(SHORTEST_SAMPLE / record.sample_time))
+    block = samples_a_block(record.sample_time, SHORTEST_SAMPLE)
     sample_time = block * record.sample_time
-    speed, position = (_averaged(record[name], block)[:MOST_SAMPLES] for name in ("motor_speed_rad_s", "position_m"))
+    speed, position = (block_means(record[name], block)[:MOST_SAMPLES] for name in ("motor_speed_rad_s", "position_m"))
     moved = bridged(position)
     drives = np.column_stack([bridged(speed), moved])
     drift = (p.pump_displacement / p.piston_area) ** 2 * speed_variance * record.sample_time
@@ -159,12 +160,6 @@ def _log(record: Record, p: EhaParameters, uncertainties: Mapping[str, float], s
         noise=(OutputNoise(position_variance(record["position_m"]) / block, drift),),
         uncertainties=uncertainties,
     )
-
-
-def _averaged(values: Array, block: int) -> Array:
-    """Return means over whole blocks; one is missing where any of its samples is."""
-    whole = len(values) // block * block
-    return values[:whole].reshape(-1, block).mean(axis=1)
 
 
 def _steps(drives: Array, sample_time: float) -> NDArray[np.int64]:

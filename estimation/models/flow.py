@@ -5,7 +5,7 @@ the piston sweeps. Differential pressure is then a balance of two chambers with 
 appear at all.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -19,6 +19,38 @@ from plant.components.oil import ATMOSPHERE
 from plant.components.valves import pumped_flow
 from plant.eha.circuit import chamber_volumes
 from plant.eha.model import EhaParameters, piston_areas
+from plant.units import si
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlowParameters(EhaParameters):
+    """The actuator's parameters, and those that the flow form adds."""
+
+    makeup_opening: float = si(1e3, "Pa", "drop at which a make-up valve is half open", "fitted")
+    case_leakage: float = si(0.0, "m^3/(s Pa)", "drain of a port to the inner circuit", "fitted")
+    speed_lead: float = si(0.0, "s", "lead of the motor on the line between samples", "fitted")
+    accumulator_stiffness: float = si(
+        0.0, "Pa/m^3", "rise of the inner circuit's pressure per volume pushed back into it", "fitted"
+    )
+
+    def __post_init__(self) -> None:
+        """Take any finite number: a fit keeps to its own bounds."""
+
+
+def flow_parameters(p: EhaParameters) -> FlowParameters:
+    """Return an actuator's parameters as the flow form takes them.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    FlowParameters
+        With the defaults of what the form adds.
+    """
+    return FlowParameters(**{one.name: getattr(p, one.name) for one in fields(EhaParameters)})
 
 
 class Delivery(NamedTuple):
@@ -248,7 +280,7 @@ FLOW_FORM = GreyBoxModel(
     initial=_at_rest,
     rates=flow_rates,
     observe=_differential,
-    parameters=EhaParameters,
+    parameters=FlowParameters,
     linear=(("speed_lead", 1e-5),),
     jump=(0.5, -0.5),
 )
@@ -303,6 +335,4 @@ def reaches_relief(pressure: Array, setting: float) -> bool:
 
 def relieving(form: GreyBoxModel) -> GreyBoxModel:
     """Return the form for a log in which the relief valve opens: its setting and slope are then unknown too."""
-    return replace(
-        form, name=f"{form.name}_relieving", unknowns=(*form.unknowns, "relief_pressure", "relief_conductance")
-    )
+    return replace(form, unknowns=(*form.unknowns, "relief_pressure", "relief_conductance"))

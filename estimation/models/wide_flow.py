@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
-from estimation.models.flow import delivered_flow, leaked_flow, port_flows
+from estimation.models.flow import FlowParameters, delivered_flow, leaked_flow, port_flows
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.functions import Scalar, maximum, minimum, where
 from plant.components.check_valve import make_up_flow
 from plant.components.oil import ATMOSPHERE
 from plant.eha.circuit import chamber_volumes
-from plant.eha.model import EhaParameters, piston_areas
+from plant.eha.model import piston_areas
 from plant.units import si
 
 VAPOUR = 2e4
@@ -31,12 +31,9 @@ SHORTEST_LAG = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
-class WideFlowParameters(EhaParameters):
-    """The actuator's parameters, and those of what a strange rig, oil or logger may add; absent by default."""
+class WideFlowParameters(FlowParameters):
+    """The flow form's parameters, and those of what a strange rig, oil or logger may add; absent by default."""
 
-    makeup_opening: float = si(1e3, "Pa", "drop at which a make-up valve is half open", "fitted")
-    case_leakage: float = si(0.0, "m^3/(s Pa)", "drain of a port to the inner circuit", "fitted")
-    speed_lead: float = si(0.0, "s", "lead of the motor on the line between samples", "fitted")
     pressure_lag: float = si(0.0, "s", "first-order lag of the pressure sensor", "fitted")
     pressure_offset: float = si(0.0, "Pa", "offset of the differential pressure", "fitted")
     position_zero: float = si(0.0, "m", "encoder's reading in the middle position", "fitted")
@@ -53,13 +50,7 @@ class WideFlowParameters(EhaParameters):
     makeup_share_b: float = si(1.0, "1", "conductance of valve B over that of A", "fitted")
     drain_share_a: float = si(1.0, "1", "drain of port A over the case leakage", "fitted")
     drain_share_b: float = si(1.0, "1", "drain of port B over the case leakage", "fitted")
-    accumulator_stiffness: float = si(
-        0.0, "Pa/m^3", "rise of the inner circuit's pressure per volume pushed back into it", "fitted"
-    )
     by_mass: float = si(0.0, "1", "1: balanced by mass, 0: by volume", "chosen")
-
-    def __post_init__(self) -> None:
-        """Take any finite number: a fit keeps to its own bounds."""
 
 
 def _stiffness(pressure: Scalar, elapsed: Scalar, p: SimpleNamespace) -> Scalar:

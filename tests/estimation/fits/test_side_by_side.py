@@ -1,5 +1,7 @@
 """Residuals under parameter sets side by side are those of one run after the other."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,13 +11,14 @@ from estimation.fits.greybox_problem import OUTLIER, Problem, greybox_log
 from estimation.fits.hypotheses import HYPOTHESES
 from estimation.fits.side_by_side import LANES, compile_side_by_side
 from estimation.fits.wide_problem import freed, usual_values, widened
-from estimation.models.flow import FLOW_FORM
+from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, flow_parameters
+from estimation.models.greybox import GreyBoxModel
 from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.sensors.sensors import BENCH
-from plant.solvers.steps import parameter_names
+from plant.solvers.steps import parameter_names, parameter_row
 
 HEALTHY = EhaParameters()
 VARIANCES = {"motor_speed_rad_s": 1e-4, "position_m": 1e-12, "differential_pressure_pa": 1e7}
@@ -28,7 +31,7 @@ def problem() -> FreedProblem:
     pressure = record["differential_pressure_pa"].copy()
     pressure[[20, 21, 22, 23, 300]] = np.nan
     record = record.replace(differential_pressure_pa=pressure)
-    log = greybox_log(FLOW_FORM, record, HEALTHY, longest_step=2.5e-4, variances=VARIANCES)
+    log = greybox_log(FLOW_FORM, record, flow_parameters(HEALTHY), longest_step=2.5e-4, variances=VARIANCES)
     return freed(widened(log, HEALTHY), HYPOTHESES)
 
 
@@ -88,3 +91,28 @@ def test_a_run_that_escapes_keeps_a_finite_residual_and_leaves_its_neighbours_al
     others = np.delete(errors, 3, axis=-1)
     assert np.all(others == others[..., :1])
     assert np.max(np.abs(others)) < RUNAWAY
+
+
+@pytest.mark.parametrize("form", [FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM], ids=lambda form: form.name)
+def test_finite_differences_give_the_normal_equations_of_exact_derivatives(
+    problem: FreedProblem, form: GreyBoxModel
+) -> None:
+    p = flow_parameters(HEALTHY)
+    log = replace(problem.log, drives=problem.log.drives[:, :2], parameters=parameter_row(p))
+    start = {"case_leakage": 1e-13, "speed_lead": 1e-5, "accumulator_stiffness": 1e8, "makeup_opening": 1e3}
+    theta = form.theta({**vars(p), **start})
+    near, exact = FreedProblem.of(form, log).at(theta), Problem(form, log).at(theta)
+    assert near.cost == pytest.approx(exact.cost, rel=1e-9)
+    assert near.gradient == pytest.approx(exact.gradient, rel=1e-4, abs=1e-4 * np.max(np.abs(exact.gradient)))
+    scale = np.sqrt(np.outer(np.diag(exact.gram), np.diag(exact.gram)))
+    np.testing.assert_allclose(near.gram / scale, exact.gram / scale, atol=1e-4)
+
+
+def test_residuals_under_several_rigs_are_those_of_each(problem: FreedProblem) -> None:
+    (theta,) = points(problem, 1)
+    wider = problem.log.parameters.copy()
+    wider[parameter_names(WideFlowParameters).index("piston_area")] *= 1.01
+    both = problem.residuals_of(theta, [problem.log.parameters, wider])
+    assert np.max(np.abs(both[1] - both[0])) > 0.1
+    for found, row in zip(both, (problem.log.parameters, wider), strict=True):
+        np.testing.assert_allclose(found, problem.residuals(theta, parameters=row), rtol=1e-7, atol=1e-7)
