@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.fits.greybox_problem import GreyBoxLog, OutputNoise
+from estimation.fits.greybox_log import GreyBoxLog, OutputNoise
 from plant.arrays import Array
 from plant.runs import steps_a_sample
 

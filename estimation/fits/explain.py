@@ -14,7 +14,7 @@ import numpy as np
 from estimation.fits.descent import Point, descend
 from estimation.fits.form_fit import weighed
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
-from estimation.fits.greybox_problem import GreyBoxLog
+from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
 from estimation.fits.wide_problem import (
     delayed,

@@ -14,7 +14,8 @@ from estimation.fits.explain import WORTH, explain, promised
 from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, roughly
-from estimation.fits.greybox_problem import GreyBoxLog, Problem, greybox_log
+from estimation.fits.greybox_log import GreyBoxLog, greybox_log
+from estimation.fits.greybox_problem import Problem
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, OFFSET, START_LOAD, Hypothesis
 from estimation.fits.wide_problem import flow_bounds
 from estimation.log_checks.bridging import bridged, gaps

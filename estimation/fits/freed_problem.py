@@ -4,14 +4,16 @@
 kernel without unknowns serves every hypothesis.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
 from estimation.fits.descent import Point
+from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_loops import compile_kernel
-from estimation.fits.greybox_problem import OUTLIER, GreyBoxLog, Problem
+from estimation.fits.greybox_problem import OUTLIER, Problem
 from estimation.fits.side_by_side import LANES, compile_side_by_side
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
@@ -19,6 +21,9 @@ from plant.solvers.steps import parameter_names
 
 NUDGE = 1e-7
 """Step of the finite differences in the fitted coordinates [dimensionless]."""
+
+MOST_SIDE_BY_SIDE = 200_000
+"""Longest log whose drives are copied once for each run side by side [samples]: some 30 MB."""
 
 STRAIGHT = 1e-3
 """Weight in ``J'J`` of a residual that counts linearly, as in the kernel of `Problem` [dimensionless]."""
@@ -90,9 +95,47 @@ class FreedProblem(Problem):
         return [self._point(at, *_weighed(*_differences(part))) for at, part in zip(thetas, parts, strict=True)]
 
     def residuals_of(self, theta: Array, parameters: Sequence[Array]) -> list[Array]:
-        """Return the normalised residuals under several parameters of the rig; see `Problem.residuals_of`."""
+        """Return the normalised residuals under several parameters of the rig, side by side.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        parameters : sequence of ndarray, shape (parameters,)
+            Parameters of the rig [SI].
+
+        Returns
+        -------
+        list of ndarray, shape (outputs, blocks)
+            As of `residuals`.
+        """
         found = self._residuals(np.vstack([self._rows(theta[None], row) for row in parameters]), None)
         return [found[..., i] for i in range(len(parameters))]
+
+    def disturbed(self, theta: Array, drives: Iterable[Array]) -> Iterator[Array]:
+        """Yield the normalised residuals under other driving channels than the log's, several side by side.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        drives : iterable of ndarray, shape (n, channels)
+            The channels [SI].
+
+        Yields
+        ------
+        ndarray, shape (outputs, blocks)
+            As of `residuals`.
+        """
+        if self.log.gaps.size or len(self.log.drives) > MOST_SIDE_BY_SIDE:
+            yield from super().disturbed(theta, drives)
+            return
+        rows = np.repeat(self._rows(theta[None], self.log.parameters), LANES, axis=0)
+        waiting = iter(drives)
+        while some := list(islice(waiting, LANES)):
+            filled = [*some, *some[-1:] * (LANES - len(some))]
+            found = self._side_by_side(rows, np.stack(filled, axis=-1))
+            yield from (found[..., i] for i in range(len(some)))
 
     def _run(
         self,
@@ -126,14 +169,17 @@ class FreedProblem(Problem):
         # one run is cheaper alone, and what a gap leaves open only its kernel follows
         if len(rows) == 1 or self.log.gaps.size:
             return np.stack([self._alone(row, drives) for row in rows], axis=-1)
-        run, log = compile_side_by_side(self._bare), self.log
         filled = np.concatenate([rows, np.repeat(rows[-1:], -len(rows) % LANES, axis=0)])
-        found = np.zeros((len(filled) // LANES, *self._room(LANES).shape))
+        shared = (self.log.drives if drives is None else drives)[..., None]
+        found = [self._side_by_side(filled[i : i + LANES], shared) for i in range(0, len(filled), LANES)]
+        return np.concatenate(found, axis=-1)[..., : len(rows)]
+
+    def _side_by_side(self, rows: Array, drives: Array) -> Array:
+        """Return the normalised residuals of `LANES` runs, shape (outputs, blocks, lanes)."""
+        found = self._room(LANES)
         with np.errstate(all="ignore"):  # a try that runs away is stepped back from
-            for i in range(len(found)):
-                part = filled[LANES * i : LANES * (i + 1)]
-                run(part, log.drives if drives is None else drives, log.measured, *self._course(), found[i])
-        return np.moveaxis(found, 0, -2).reshape(*found.shape[1:3], -1)[..., : len(rows)]
+            compile_side_by_side(self._bare)(rows, drives, self.log.measured, *self._course(), found)
+        return found
 
     def _alone(self, row: Array, drives: Array | None) -> Array:
         errors = self._room()

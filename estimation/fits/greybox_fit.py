@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from estimation.fits.covariance import automatic_lags, least_squares_covariance
 from estimation.fits.descent import Point, descend
-from estimation.fits.greybox_problem import GreyBoxLog, Problem, search_bounds
+from estimation.fits.greybox_log import GreyBoxLog
+from estimation.fits.greybox_problem import Problem, search_bounds
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
@@ -114,7 +115,7 @@ def fit_greybox(
     model : GreyBoxModel
         The model.
     log : GreyBoxLog
-        The log, see `estimation.fits.greybox_problem.greybox_log`.
+        The log, see `estimation.fits.greybox_log.greybox_log`.
     starts : sequence of Mapping[str, float]
         First guesses of the unknowns in SI.
     search : Search
@@ -240,14 +241,9 @@ def _drive_variance(problem: Problem, theta: Array, response: Callable[[Array], 
         return 0.0
     rough = problem.on(log.coarsened())
     undisturbed = rough.residuals(theta)
-    rng = np.random.default_rng(0)  # the same draws for every log, so that a result can be repeated
-    shaken, squares = np.empty_like(log.drives), 0.0
-    for _ in range(DRIVE_DRAWS):
-        rng.standard_normal(out=shaken)
-        shaken *= log.drive_std
-        shaken += log.drives
-        squares = squares + response(rough.residuals(theta, drives=shaken) - undisturbed) ** 2
-    return squares / DRIVE_DRAWS
+    rng, spread = np.random.default_rng(0), np.array(log.drive_std)  # the same draws for every log: it can be repeated
+    draws = (log.drives + spread * rng.standard_normal(log.drives.shape) for _ in range(DRIVE_DRAWS))
+    return sum(response(errors - undisturbed) ** 2 for errors in rough.disturbed(theta, draws)) / DRIVE_DRAWS
 
 
 def _rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Array]) -> Iterator[tuple[str, Array]]:

@@ -1,19 +1,14 @@
-"""The least-squares problem that a grey-box model and a log make, with the log's noise."""
+"""The least-squares problem that a grey-box model and a log make."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from estimation.arrays import Array, IntArray
 from estimation.fits.descent import Point
+from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_loops import Kernel, compile_kernel
-from estimation.log_checks.bridging import bridged
-from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.greybox import GreyBoxModel
-from plant.log.record import Record
-from plant.runs import steps_a_sample
-from plant.solvers.steps import Parameters, parameter_row
 
 OUTLIER = 3.0
 """Residuals beyond this many standard deviations count linearly (Huber 1964) [dimensionless]."""
@@ -23,150 +18,6 @@ BLOCK = 1e-3
 
 UPWARD, DOWNWARD = np.log(1e3), 70.0
 """How far the logarithm of an unknown may leave its starts: three decades up; down until it is as good as absent."""
-
-
-@dataclass(frozen=True)
-class OutputNoise:
-    """Noise of an output.
-
-    Parameters
-    ----------
-    variance : float
-        Of its white noise, a sample [SI squared].
-    walk : float
-        Variance that its random walk gathers [SI squared a second]; white noise of a rate, such as measured speed,
-        that the model integrates.
-    """
-
-    variance: float
-    walk: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class GreyBoxLog:
-    """A log, as a fit sees it.
-
-    Parameters
-    ----------
-    drives : ndarray, shape (n, channels)
-        Driving channels in SI, no sample missing.
-    measured : ndarray, shape (n, outputs)
-        Outputs in SI; NaN is missing.
-    parameters : ndarray, shape (parameters,)
-        Row of the actuator's parameters; the unknowns' entries are not used.
-    sample_time : float
-        Seconds between samples [s].
-    steps : ndarray of int, shape (n,)
-        Model steps up to each sample.
-    noise : tuple of OutputNoise
-        Of each output.
-    drive_std : tuple of float
-        Standard deviation of each driving channel's noise, where the outputs' noise does not hold it already [SI].
-    uncertainties : Mapping[str, float]
-        Relative standard deviation of the actuator's parameters [fraction]; those of unknowns are not used.
-    gaps : ndarray, shape (gaps, 3)
-        First and last sample on which a gap in the drives acts, and the variance that it adds to the state from one
-        sample to the next, in units of `GreyBoxModel.jump`; in order of time, none overlapping.
-    presumed : Mapping[str, tuple of float]
-        What is known of positive unknowns before the log is seen: value [SI] and standard deviation of its logarithm.
-    """
-
-    drives: Array
-    measured: Array
-    parameters: Array
-    sample_time: float
-    steps: IntArray
-    noise: tuple[OutputNoise, ...]
-    drive_std: tuple[float, ...] = ()
-    uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
-    gaps: Array = field(default_factory=lambda: np.empty((0, 3)))
-    presumed: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
-
-    def beginning(self, samples: int) -> "GreyBoxLog":
-        """Return the log's first part.
-
-        Parameters
-        ----------
-        samples : int
-            How many samples are kept [samples].
-
-        Returns
-        -------
-        GreyBoxLog
-            The shorter log.
-        """
-        return replace(self, drives=self.drives[:samples], measured=self.measured[:samples], steps=self.steps[:samples])
-
-    def coarsened(self) -> "GreyBoxLog":
-        """Return the log with one model step a sample: predicted faster and less exactly.
-
-        Returns
-        -------
-        GreyBoxLog
-            The same log.
-        """
-        return replace(self, steps=np.ones_like(self.steps))
-
-    def softened(self, variance: float, walk: float) -> "GreyBoxLog":
-        """Return the log as if its noise were larger, which makes the way to the optimum smoother.
-
-        Parameters
-        ----------
-        variance, walk : float
-            Factors on the white noise's variance and on the random walk's [dimensionless].
-
-        Returns
-        -------
-        GreyBoxLog
-            The same log under that noise.
-        """
-        return replace(self, noise=tuple(OutputNoise(n.variance * variance, n.walk * walk) for n in self.noise))
-
-
-def greybox_log(
-    model: GreyBoxModel,
-    record: Record,
-    parameters: Parameters,
-    *,
-    longest_step: float,
-    variances: Mapping[str, float] | None = None,
-    uncertainties: Mapping[str, float] | None = None,
-) -> GreyBoxLog:
-    """Return a record as a fit of a model sees it.
-
-    Parameters
-    ----------
-    model : GreyBoxModel
-        The model.
-    record : Record
-        The log, with the model's drives and outputs.
-    parameters : dataclass
-        What is known of the plant, with the fields of the model's parameters.
-    longest_step : float
-        Longest step of the model [s].
-    variances : Mapping[str, float], optional
-        Of the noise of channels [SI squared]; of outputs read off the log by default, of drives none.
-    uncertainties : Mapping[str, float], optional
-        Relative standard deviation of the plant's parameters [fraction]; none by default.
-
-    Returns
-    -------
-    GreyBoxLog
-        The log, its drives without gaps.
-    """
-    noise = dict(variances or {})
-    if unknown := [channel for channel in model.outputs if channel not in noise]:
-        noise |= measurement_variances(record, unknown)
-    return GreyBoxLog(
-        drives=np.column_stack([bridged(record[channel]) for channel in model.drives]),
-        measured=np.column_stack([record[channel] for channel in model.outputs]),
-        parameters=parameter_row(parameters, model.parameters),
-        sample_time=record.sample_time,
-        steps=np.full(len(record), steps_a_sample(record.sample_time, longest_step)),
-        noise=tuple(OutputNoise(noise[channel]) for channel in model.outputs),
-        drive_std=tuple(noise.get(channel, 0.0) ** 0.5 for channel in model.drives),
-        uncertainties=uncertainties or {},
-    )
 
 
 def search_bounds(
@@ -299,6 +150,23 @@ class Problem:
             As of `residuals`.
         """
         return [self.residuals(theta, parameters=row) for row in parameters]
+
+    def disturbed(self, theta: Array, drives: Iterable[Array]) -> Iterator[Array]:
+        """Yield the normalised residuals under other driving channels than the log's.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        drives : iterable of ndarray, shape (n, channels)
+            The channels [SI].
+
+        Yields
+        ------
+        ndarray, shape (outputs, blocks)
+            As of `residuals`.
+        """
+        return (self.residuals(theta, drives=one) for one in drives)
 
     def slopes(self, theta: Array) -> Array:
         """Return the derivatives of the normalised residuals.

@@ -13,7 +13,8 @@ from estimation.fits.force_scale import Way, rescaled
 from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
-from estimation.fits.greybox_problem import GreyBoxLog, OutputNoise, Problem, search_bounds
+from estimation.fits.greybox_log import GreyBoxLog, OutputNoise
+from estimation.fits.greybox_problem import Problem, search_bounds
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from estimation.models.greybox import GreyBoxModel

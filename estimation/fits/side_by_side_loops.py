@@ -54,8 +54,8 @@ def residuals_side_by_side(
     ----------
     parameters : ndarray, shape (lanes, parameters)
         Parameter rows.
-    drives : ndarray, shape (n, drives)
-        Drives at the samples [their SI units], linear between.
+    drives : ndarray, shape (n, drives, one or lanes)
+        Drives at the samples [their SI units], linear between; of all sets alike, or of each.
     measured : ndarray, shape (n, outputs)
         Outputs; NaN is missing.
     sample_time : float
@@ -79,7 +79,7 @@ def residuals_side_by_side(
     lay(kernel, work, pace + lanes, parameters.T, kernel.COLUMNS)
     excess, level = np.zeros((kernel.OUTPUTS, lanes)), np.zeros((kernel.OUTPUTS, lanes))
     present, spread = np.zeros(kernel.OUTPUTS), np.zeros(kernel.OUTPUTS)
-    n, steps = drives.shape[0], 0
+    n, steps, own = drives.shape[0], 0, drives.shape[2] > 1
     for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
         kernel.begin_at(slots + first, 0.0)
     for k in range(n):
@@ -90,10 +90,15 @@ def residuals_side_by_side(
                 for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
                     kernel.settle_at(slots + first, 0.0)
             for i in range(kernel.DRIVES):
-                rise = (drives[k, i] - drives[k - 1, i]) / steps
-                for lane in range(lanes):
-                    work[bases + i * lanes + lane] = drives[k - 1, i]
-                    work[rises + i * lanes + lane] = rise
+                if own:
+                    for lane in range(lanes):
+                        work[bases + i * lanes + lane] = drives[k - 1, i, lane]
+                        work[rises + i * lanes + lane] = (drives[k, i, lane] - drives[k - 1, i, lane]) / steps
+                else:
+                    rise = (drives[k, i, 0] - drives[k - 1, i, 0]) / steps
+                    for lane in range(lanes):
+                        work[bases + i * lanes + lane] = drives[k - 1, i, 0]
+                        work[rises + i * lanes + lane] = rise
             for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
                 for j in range(steps):
                     kernel.step_at(slots + first, float(j))

@@ -6,7 +6,8 @@ from dataclasses import fields, replace
 import numpy as np
 
 from estimation.fits.freed_problem import FreedProblem
-from estimation.fits.greybox_problem import GreyBoxLog, search_bounds
+from estimation.fits.greybox_log import GreyBoxLog
+from estimation.fits.greybox_problem import search_bounds
 from estimation.fits.hypotheses import LIMITS, PRESUMED, Hypothesis
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel

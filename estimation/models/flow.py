@@ -260,6 +260,10 @@ def _at_rest(p: SimpleNamespace) -> tuple[Scalar, Scalar]:
     return p.accumulator_pressure, p.accumulator_pressure
 
 
+def _all_at_rest(p: SimpleNamespace) -> tuple[Scalar, Scalar, Scalar]:
+    return p.accumulator_pressure, p.accumulator_pressure, p.accumulator_pressure
+
+
 def _differential(state: tuple[Scalar, ...]) -> tuple[Scalar]:
     return (state[0] - state[1],)
 
@@ -294,7 +298,7 @@ MASS_FLOW_FORM = replace(
     FLOW_FORM,
     name="flow_mass",
     unknowns=(*FLOW_FORM.unknowns, STIFFNESS),
-    initial=lambda p: (*_at_rest(p), p.accumulator_pressure),
+    initial=_all_at_rest,
     rates=_by_mass,
     linear=(*FLOW_FORM.linear, (STIFFNESS, 1e8)),
     jump=(0.5, -0.5, 0.0),

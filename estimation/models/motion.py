@@ -116,6 +116,10 @@ def _at_rest(p: SimpleNamespace) -> tuple[Scalar, ...]:
     return 0.0, 0.0, 0.0, supply + maximum(held, 0.0), supply + maximum(-held, 0.0)
 
 
+def _position(state: Any) -> tuple[Scalar]:
+    return (state[0],)
+
+
 def _form(name: str, friction: Friction) -> GreyBoxModel:
     def rates(state: Any, drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
         _, velocity, bristle, p1, p2 = state
@@ -135,7 +139,7 @@ def _form(name: str, friction: Friction) -> GreyBoxModel:
         unknowns=(),
         initial=_at_rest,
         rates=rates,
-        observe=lambda state: (state[0],),
+        observe=_position,
         parameters=MotionParameters,
     )
 

@@ -200,7 +200,9 @@ def misfit(blocks: Blocks, fitted: Array) -> float:
     return float(counts @ np.log(scales_of(blocks, fitted)))
 
 
-def fit_freely(blocks: Blocks, actuator: Actuator, condition: str) -> PointFit:
+def fit_freely(
+    blocks: Blocks, actuator: Actuator, condition: str, start: Array | None = None, gained: float = GAINED
+) -> PointFit:
     """Fit the circuit to a log with next to no prior.
 
     Parameters
@@ -210,7 +212,11 @@ def fit_freely(blocks: Blocks, actuator: Actuator, condition: str) -> PointFit:
     actuator : Actuator
         The healthy actuator.
     condition : str
-        The nearest condition: where the search begins, and about which the weak prior lies.
+        The nearest condition, about which the weak prior lies.
+    start : ndarray, shape (7,), optional
+        Coordinates where the search begins [dimensionless]; those of the condition if not given.
+    gained : float
+        Gain in log-likelihood below which the search ends [dimensionless].
 
     Returns
     -------
@@ -219,15 +225,14 @@ def fit_freely(blocks: Blocks, actuator: Actuator, condition: str) -> PointFit:
     """
     centre = actuator.conditions[list(CONDITIONS).index(condition)]
     pull = np.asarray(LASTING * np.linalg.inv(WEAK), dtype=np.float64)
-    best, step, reach = _at(blocks, actuator, centre, centre, pull), np.zeros(len(centre)), 0.0
+    best, step, reach = _at(blocks, actuator, centre, centre if start is None else start, pull), centre, 0.0
     for _ in range(ROUNDS):  # a step that gains nothing is taken a third as long
         if reach == 0.0:
             step, reach = _step(blocks, best, centre, pull), 1.0
-        point = best.coordinates + reach * step
-        there = _at(blocks, actuator, centre, point, pull)
+        there = _at(blocks, actuator, centre, best.coordinates + reach * step, pull)
         if there.cost < best.cost:
             gain, best, reach = best.cost - there.cost, there, 0.0
-            if gain < GAINED:
+            if gain < gained:
                 break
         else:
             reach *= 0.3

@@ -13,6 +13,7 @@ import numpy as np
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuit_runs import COORDINATES, Blocks
 from faults.diagnosis.class_fit import (
+    GAINED,
     LASTING,
     STARTS,
     WEAK,
@@ -26,6 +27,9 @@ from faults.diagnosis.class_fit import (
     scales_of,
 )
 from plant.arrays import Array
+
+ROUGHLY_GAINED = 10.0
+"""Gain in log-likelihood below which a search from near by ends [dimensionless]: a third of what counts as one."""
 
 YIELDING = 5.0
 """Travel in presliding displacements below which a piston counts as stuck [dimensionless]."""
@@ -92,7 +96,9 @@ class ClassFits:
         return np.asarray(np.linalg.inv(self.information + np.linalg.inv(WEAK)), dtype=np.float64)
 
 
-def fit_classes(blocks: Blocks, actuator: Actuator) -> ClassFits:
+def fit_classes(
+    blocks: Blocks, actuator: Actuator, *, runs: Array | None = None, start: Array | None = None
+) -> ClassFits:
     """Fit circuits to a log from the nearest conditions and weigh all nine.
 
     Parameters
@@ -101,17 +107,23 @@ def fit_classes(blocks: Blocks, actuator: Actuator) -> ClassFits:
         The log.
     actuator : Actuator
         The healthy actuator.
+    runs : ndarray, shape (9, n, outputs), optional
+        What the nine nominal circuits do [m/s, Pa]; run here if not given.
+    start : ndarray, shape (7,), optional
+        Coordinates of a circuit near by [dimensionless]: one search begins there, in place of one from each condition
+        that is near, and ends where it gains little.
 
     Returns
     -------
     ClassFits
         The best circuit, and the conditions' scores.
     """
-    runs = nominal_runs(blocks, actuator)
+    runs = nominal_runs(blocks, actuator) if runs is None else runs
     nominal = np.array([misfit(blocks, run) for run in runs])
-    order = np.argsort(nominal)[:STARTS]
+    order = np.argsort(nominal)[: STARTS if start is None else 1]
     near = [int(i) for i in order if nominal[i] <= nominal[order[0]] + len(blocks.velocity)]
-    fits = [fit_freely(blocks, actuator, list(CONDITIONS)[i]) for i in near or [int(order[0])]]
+    gained = GAINED if start is None else ROUGHLY_GAINED
+    fits = [fit_freely(blocks, actuator, list(CONDITIONS)[i], start, gained) for i in near or [int(order[0])]]
     stuck = is_stuck(blocks, actuator)
     known = [believed_information(fit, blocks, stuck=stuck) for fit in fits]
     scores = [

@@ -13,7 +13,7 @@ import numpy as np
 from estimation.finding import Change
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuit_runs import LONGEST, Blocks, blocks_of, parameter_rows, predicted
-from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, least_scales, misfit
+from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, least_scales, misfit, nominal_runs
 from faults.diagnosis.class_regions import ClassFits, fit_classes, lasting_misfit
 from faults.diagnosis.end_stop import stopped
 from faults.watch.events import Alarm
@@ -136,7 +136,8 @@ def find_onset(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Cha
     if place is None:
         return None
     parts = part_of(blocks, 0, place), part_of(blocks, place, len(blocks.velocity))
-    found = [fit_classes(part, actuator) for part in parts]
+    runs, start = nominal_runs(blocks, actuator), fits.best.coordinates
+    found = [fit_classes(part, actuator, runs=runs, start=start) for part in parts]
     gain = misfit(blocks, fits.best.fitted) - sum(
         misfit(part, one.best.fitted) for part, one in zip(parts, found, strict=True)
     )

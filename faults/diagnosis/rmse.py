@@ -12,7 +12,7 @@ import numpy as np
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.signals.preprocess import resample
 from estimation.log_checks.bridging import bridged
-from faults.eha.bank import predict_run
+from faults.eha.bank import predict_runs
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
@@ -108,7 +108,7 @@ def score_mathematical(record: Record, bank: Mapping[str, EhaParameters], *, pre
         measured["differential_pressure_pa"] = record["differential_pressure_pa"]
     rows = {
         name: {channel: rmse(measured[channel], predicted[channel]) for channel in measured}
-        for name, predicted in ((name, predict_run(record, parameters)) for name, parameters in bank.items())
+        for name, predicted in predict_runs(record, bank).items()
     }
     return _scored(rows, measured)
 
@@ -135,10 +135,13 @@ def score_transfer_functions(record: Record, bank: Mapping[str, LinearModel]) ->
     """
     speed = bridged(record["motor_speed_rad_s"])
     velocity = measured_velocity(record)
+    at = {
+        sample_time: tuple(resample(x, record.sample_time, sample_time) for x in (speed, velocity))
+        for sample_time in {model.sample_time for model in bank.values()}
+    }
     rows: dict[str, dict[str, float]] = {}
     for name, model in bank.items():
-        u = resample(speed, record.sample_time, model.sample_time)
-        y = resample(velocity, record.sample_time, model.sample_time)
+        u, y = at[model.sample_time]
         rows[name] = {"velocity_m_s": rmse(y, model.simulate(u))}
     return _scored(rows, {"velocity_m_s": velocity})
 

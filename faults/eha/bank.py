@@ -17,6 +17,8 @@ from plant.eha.simulate import CIRCUIT, LUMPED, Plant, simulate
 from plant.errors import CovarianceWarning
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, Sensors
+from plant.solvers.adaptive import LANES
+from plant.solvers.fixed_step_kernel import compile_fixed_step
 from plant.solvers.steps import parameter_row
 from plant.solvers.trajectory import compile_trajectory
 
@@ -60,6 +62,41 @@ def predict_run(record: Record, parameters: EhaParameters) -> Mapping[str, Array
     substeps = PRESSURE_FORM.substeps(record.sample_time)
     states = run(np.zeros(len(LUMPED.states)), speed, rows, record.sample_time, substeps)
     return LUMPED.channels(states, rows)
+
+
+def predict_runs(record: Record, bank: Mapping[str, EhaParameters]) -> Mapping[str, Mapping[str, Array]]:
+    """Return what each lumped model of a bank does from rest under a record's drive, several side by side.
+
+    Parameters
+    ----------
+    record : Record
+        The log; only its motor speed is used.
+    bank : Mapping[str, EhaParameters]
+        Parameters by condition name.
+
+    Returns
+    -------
+    Mapping[str, Mapping[str, ndarray of shape (n,)]]
+        By condition, as of `predict_run`.
+    """
+    names = list(bank)
+    together, alone = names[: len(names) // LANES * LANES], names[len(names) // LANES * LANES :]
+    found = {name: predict_run(record, bank[name]) for name in alone}
+    for first in range(0, len(together), LANES):
+        some = together[first : first + LANES]
+        rows = np.array([parameter_row(bank[name]) for name in some])
+        states = _side_by_side(record, rows)
+        found |= {name: LUMPED.channels(states[..., i], rows[i : i + 1]) for i, name in enumerate(some)}
+    return {name: found[name] for name in names}
+
+
+def _side_by_side(record: Record, rows: Array) -> Array:
+    """Return the states of `LANES` lumped models at the samples, shape (n, states, lanes)."""
+    width, speed = len(LUMPED.states), bridged(record["motor_speed_rad_s"])
+    run = compile_fixed_step(LUMPED.name, LUMPED.step, width, LUMPED.parameter_class, LANES)
+    drives, states = np.repeat(speed[:, None], LANES, axis=1), np.empty((len(speed), width, LANES))
+    run(np.zeros((width, LANES)), drives, rows, record.sample_time, PRESSURE_FORM.substeps(record.sample_time), states)
+    return states
 
 
 def identification_run(

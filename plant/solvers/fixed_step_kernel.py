@@ -51,6 +51,18 @@ def compile_fixed_step(
         ``run(starts (states, lanes), drives (n, lanes), parameters (lanes, parameters), sample time [s], substeps,
         states (n, states, up to lanes))``.
     """
+    takes = signature_of(run_side_by_side, lanes=lanes, states=width)
+    made_of = (name, step, width, parameter_class, lanes, native_width())
+    return load_native(
+        f"{name}_fixed_step_{lanes}",
+        lambda: _source(name, step, width, parameter_class, lanes),
+        {"run_side_by_side": takes},
+        made_of,
+    ).run_side_by_side
+
+
+def _source(name: str, step: StepFunction, width: int, parameter_class: type[Parameters], lanes: int) -> str:
+    """Write the kernel."""
     names = parameter_names(parameter_class)
     state = tuple(symbol(f"x{i}") for i in range(width))
     start = symbol("drive") + symbol("j") * symbol("rise")
@@ -68,7 +80,4 @@ def compile_fixed_step(
         pasted(lay, share, constants=sizes, inlined=True),
         pasted(run_side_by_side),
     )
-    takes = signature_of(run_side_by_side, lanes=lanes, states=width)
-    return load_native(
-        f"{name}_fixed_step_{lanes}", kernel_text(title, *parts), {"run_side_by_side": takes}
-    ).run_side_by_side
+    return kernel_text(title, *parts)

@@ -1,11 +1,13 @@
 """What may be done to input and output before a fit: removing means, zero-phase filtering, resampling."""
 
 import warnings
+from math import ceil
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.arrays import Array
+from estimation.fits.convolution import smooth_length
 from estimation.identification.notes import IdentificationCode
 from estimation.log_checks.bridging import bridged
 from plant.errors import HydrostateError, LogWarning
@@ -148,8 +150,6 @@ def resample(x: ArrayLike, sample_time: float, new_sample_time: float) -> Array:
 
 
 def _low_pass(x: Array, sample_time: float, cutoff_hz: float, order: int) -> Array:
-    from scipy.signal import butter, sosfiltfilt
-
     nyquist = 0.5 / sample_time
     if not 0.0 < cutoff_hz < nyquist:
         raise HydrostateError(
@@ -157,13 +157,22 @@ def _low_pass(x: Array, sample_time: float, cutoff_hz: float, order: int) -> Arr
         )
     if order < 1:
         raise HydrostateError(f"the filter's order must be at least 1, got {order}")
-    sections = butter(order, cutoff_hz, fs=1.0 / sample_time, output="sos")
-    # the filter rings for about its order in cutoff periods; odd extension over that keeps the ends usable
-    pad = int(np.ceil(order / (cutoff_hz * sample_time)))
-    if x.size < 4 * len(sections) + 2:
+    if x.size < 4 * ceil(order / 2) + 2:
         raise HydrostateError(
-            f"filtering at {cutoff_hz:g} Hz, order {order}, needs more than {4 * len(sections) + 1} samples, "
+            f"filtering at {cutoff_hz:g} Hz, order {order}, needs more than {4 * ceil(order / 2) + 1} samples, "
             f"got {x.size}"
         )
-    filtered = sosfiltfilt(sections, bridged(x), padlen=min(pad, x.size - 1))
+    # the filter rings for about its order in cutoff periods; odd extension over that keeps the ends usable
+    pad = min(ceil(order / (cutoff_hz * sample_time)), x.size - 1)
+    longer = np.pad(bridged(x), pad, mode="reflect", reflect_type="odd")
+    half = smooth_length(longer.size - 1, (2, 3, 5))
+    there = np.pad(longer, (0, half + 1 - longer.size), mode="edge")
+    spectrum = np.fft.rfft(
+        np.concatenate([there, there[-2:0:-1]])
+    )  # forth and back again, so that no end meets another
+    # two passes of a Butterworth filter that the bilinear transform has made digital: its gain squared, and no phase
+    ratio = np.tan(np.linspace(0.0, 0.5 * np.pi, spectrum.size)) / np.tan(np.pi * cutoff_hz * sample_time)
+    with np.errstate(over="ignore"):
+        gain = 1.0 / (1.0 + ratio ** (2 * order))
+    filtered = np.fft.irfft(spectrum * gain, 2 * half)[pad : pad + x.size]
     return np.where(np.isfinite(x), filtered, np.nan)

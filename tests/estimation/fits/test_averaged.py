@@ -7,7 +7,7 @@ import pytest
 
 from estimation.fits.averaged import averaged
 from estimation.fits.flow_fit import fit_flow
-from estimation.fits.greybox_problem import GreyBoxLog, OutputNoise
+from estimation.fits.greybox_log import GreyBoxLog, OutputNoise
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters

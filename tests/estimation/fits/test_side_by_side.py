@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from estimation.fits.freed_problem import NUDGE, FreedProblem
+from estimation.fits.greybox_log import greybox_log
 from estimation.fits.greybox_loops import RUNAWAY
-from estimation.fits.greybox_problem import OUTLIER, Problem, greybox_log
+from estimation.fits.greybox_problem import OUTLIER, Problem
 from estimation.fits.hypotheses import HYPOTHESES
 from estimation.fits.side_by_side import LANES, compile_side_by_side
 from estimation.fits.wide_problem import freed, usual_values, widened
@@ -86,7 +87,17 @@ def test_a_run_that_escapes_keeps_a_finite_residual_and_leaves_its_neighbours_al
     rows[3] = mad
     errors = np.zeros((1, len(log.measured), LANES))
     noise = log.noise[0]
-    run(rows, log.drives, log.measured, log.sample_time, log.steps, 1, np.array([noise.variance]), np.zeros(1), errors)
+    run(
+        rows,
+        log.drives[..., None],
+        log.measured,
+        log.sample_time,
+        log.steps,
+        1,
+        np.array([noise.variance]),
+        np.zeros(1),
+        errors,
+    )
     assert np.max(np.abs(errors[..., 3])) == RUNAWAY
     others = np.delete(errors, 3, axis=-1)
     assert np.all(others == others[..., :1])

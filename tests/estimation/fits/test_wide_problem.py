@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.fits.greybox_problem import greybox_log
+from estimation.fits.greybox_log import greybox_log
 from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
 from estimation.fits.wide_problem import freed, own_starts, widened
 from estimation.models.flow import FLOW_FORM, flow_parameters

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from estimation.fits.freed_problem import FreedProblem
-from estimation.fits.greybox_problem import GreyBoxLog, OutputNoise, Problem
+from estimation.fits.greybox_log import GreyBoxLog, OutputNoise
+from estimation.fits.greybox_problem import Problem
 from estimation.models.motion import (
     LINEAR,
     MOTION_FORMS,

@@ -113,7 +113,7 @@ def test_of_two_circuits_that_were_fitted_the_one_that_follows_the_log_decides(m
     followed = {next(iter(CONDITIONS)): 1.0158, list(CONDITIONS)[4]: 1.0}
     runs = np.array([log.outputs * followed.get(name, 2.0) for name in CONDITIONS])
 
-    def fitted_from(_: Blocks, __: Actuator, condition: str) -> PointFit:
+    def fitted_from(_: Blocks, __: Actuator, condition: str, *___: object) -> PointFit:
         place = list(CONDITIONS).index(condition)
         scale = 1e-3 + 0.1 * (followed[condition] - 1.0)
         return replace(fit(place, scale), fitted=runs[place], cost=float(scale))

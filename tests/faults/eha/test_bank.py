@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
-from faults.eha.bank import IDENTIFICATION_TIME, identification_run, identify_bank, mathematical_bank, predict_run
+from faults.eha.bank import (
+    IDENTIFICATION_TIME,
+    identification_run,
+    identify_bank,
+    mathematical_bank,
+    predict_run,
+    predict_runs,
+)
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
@@ -42,6 +49,15 @@ def test_a_prediction_reads_the_drive_alone_and_bridges_its_gaps() -> None:
     for channel, values in whole.items():
         assert np.all(np.isfinite(bridged[channel]))
         np.testing.assert_allclose(bridged[channel], values, atol=0.2 * np.max(np.abs(values)))
+
+
+def test_predictions_side_by_side_are_those_of_each_model_alone() -> None:
+    record, bank = run_of(RIG), mathematical_bank(RIG)
+    found = predict_runs(record, bank)
+    assert list(found) == list(bank)
+    for name, channels in found.items():
+        for channel, values in predict_run(record, bank[name]).items():
+            np.testing.assert_allclose(channels[channel], values, atol=1e-9 * np.max(np.abs(values)))
 
 
 @pytest.mark.parametrize("name", CONDITIONS)
