@@ -19,8 +19,9 @@ from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
 
-NUDGE = 1e-7
-"""Step of the finite differences in the fitted coordinates [dimensionless]."""
+NUDGE = 1e-4
+"""Step of the finite differences in the fitted coordinates [dimensionless]. Residuals of a piston that sticks and slips
+have many small corners: a step of 1e-7 sees the slope between two of them, and searches stop far from the optimum."""
 
 MOST_SIDE_BY_SIDE = 200_000
 """Longest log whose drives are copied once for each run side by side [samples]: some 30 MB."""
