@@ -10,6 +10,7 @@ from experiments.eha.plain_verdict import sureness, verdict, what_to_do
 from experiments.eha.verdict_words import SHOWN, amount, library_said
 from experiments.log_pages.channels import channel_charts
 from experiments.page.charts import Charts, Curve, Mark, Panel
+from experiments.page.numbers import percent_said
 from experiments.page.render import render_page
 from experiments.page.severity_rows import severity_rows
 from experiments.page.words import in_words, sentence
@@ -45,7 +46,10 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "library": library_said(result),
         "not_told": [sentence(said) for said in result["not_told"]],
         "warnings": [sentence(said) for said in result.get("warnings", [])],
-        "shares": [(in_words(condition), 100.0 * share, share < LEAST_SHARE) for condition, share in shares],
+        "shares": [
+            (in_words(condition), 100.0 * share, percent_said(share), share < LEAST_SHARE)
+            for condition, share in shares
+        ],
         "rows": severity_rows(found.severities, found.healthy, found.evidence.diagnosis.limits, SHOWN),
         "amounts": {name: amount(one) for name, one in result["severity"].items()},
         "not_determined": [SHOWN[name] for name, one in found.severities.items() if one.value is None],

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from experiments.page.condition_names import in_words
-from experiments.page.numbers import shop_unit
+from experiments.page.numbers import percent_said, shop_unit
 
 SHOWN = {
     "leakage_flow": "leakage at rated pressure",
@@ -56,9 +56,9 @@ def headline(result: Mapping[str, Any]) -> str:
     ranked = sorted(result["probabilities"].items(), key=lambda item: -item[1])
     (best, first), (second, other) = ranked[:2]
     parts = [
-        f"{_said(best)}, probability {_percent(first)}",
+        f"{_said(best)}, probability {percent_said(first)} %",
         since(result),
-        f"second most likely {_said(second)}, {_percent(other)}",
+        f"second most likely {_said(second)}, {percent_said(other)} %",
     ]
     named = "; ".join(part for part in parts if part)
     return f"{NEAREST}{named}" if result["unknown"] else named
@@ -108,7 +108,7 @@ def amount(one: Mapping[str, Any]) -> str:
     >>> amount({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8]})
     '207.0 MPa (205.0 to 209.0)'
     >>> amount({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8], "ci95_total": [1.5e8, 2.8e8]})
-    '207.0 MPa (205.0 to 209.0; with the rig 150.0 to 280.0)'
+    '207.0 MPa (205.0 to 209.0; with the rig 150 to 280)'
     >>> amount({"value": -0.01, "unit": "N", "ci95": [-3.0, 4.0]})
     '0.0 N (-3.0 to 4.0)'
     """
@@ -116,12 +116,21 @@ def amount(one: Mapping[str, Any]) -> str:
         return "not determined"
     scale, unit = shop_unit(one["unit"])
     value, low, high = (scale * float(number) for number in (one["value"], *one["ci95"]))
-    decimals = min(max(1 - math.floor(math.log10(high - low)), 0), 4) if high > low else 2
-    said = f"{low:z.{decimals}f} to {high:z.{decimals}f}"
-    total = [None if end is None else f"{scale * end:z.{decimals}f}" for end in one.get("ci95_total", [None])]
-    if None not in total and " to ".join(map(str, total)) != said:
-        said += f"; with the rig {total[0]} to {total[1]}"
-    return f"{value:z.{decimals}f} {unit} ({said})"
+    said = _interval(low, high)
+    total = one.get("ci95_total", [None])
+    if None not in total and (wider := _interval(*(scale * end for end in total))) != said:
+        said += f"; with the rig {wider}"
+    return f"{value:z.{_decimals(low, high)}f} {unit} ({said})"
+
+
+def _interval(low: float, high: float) -> str:
+    decimals = _decimals(low, high)
+    return f"{low:z.{decimals}f} to {high:z.{decimals}f}"
+
+
+def _decimals(low: float, high: float) -> int:
+    """Return the decimals that leave two digits of an interval's width."""
+    return min(max(1 - math.floor(math.log10(high - low)), 0), 4) if high > low else 2
 
 
 def believed(result: Mapping[str, Any]) -> str:
@@ -221,9 +230,3 @@ def models_said(result: Mapping[str, Any]) -> str:
 
 def _said(condition: str) -> str:
     return condition.replace("_", " ")
-
-
-def _percent(probability: float) -> str:
-    if probability > 0.999:
-        return "> 99.9 %"
-    return "< 0.1 %" if probability < 0.001 else f"{100.0 * probability:.1f} %"

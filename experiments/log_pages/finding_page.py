@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from experiments.log_pages.channels import channel_charts
-from experiments.page.numbers import MISSING, number, pretty_unit
+from experiments.page.numbers import MISSING, number, percent_said, pretty_unit
 from experiments.page.render import render_page
 from experiments.page.tables import Column
 from experiments.page.words import sentence
@@ -55,7 +55,7 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
         "notes": [sentence(str(note)) for note in found.all_notes if note not in found.advice],
         "quantities": pd.DataFrame([_row(name, one) for name, one in shown.items()]),
         "probabilities": pd.DataFrame(
-            [(name.replace("_", " "), f"{100.0 * share:.1f}") for name, share in shares if share >= LEAST_SHARE],
+            [(name.replace("_", " "), percent_said(share)) for name, share in shares if share >= LEAST_SHARE],
             columns=["condition", "percent"],
         ),
         "charts": {"measured": channel_charts(record, found, Path(file).stem)},

@@ -44,6 +44,24 @@ def number(value: float | None, digits: int = 4) -> str:
     return f"{mantissa}{TIMES}10{str(exponent).translate(SUPERSCRIPTS)}"
 
 
+def percent_said(probability: float) -> str:
+    """Return a probability in percent, never nought and never a hundred.
+
+    Parameters
+    ----------
+    probability : float
+        Between 0 and 1 [probability].
+
+    Examples
+    --------
+    >>> percent_said(0.99995), percent_said(0.873), percent_said(0.0)
+    ('> 99.9', '87.3', '< 0.1')
+    """
+    if probability > 0.999:
+        return "> 99.9"
+    return "< 0.1" if probability < 0.001 else f"{100.0 * probability:.1f}"
+
+
 def fixed(value: float | None, decimals: int) -> str:
     """Write a number with so many decimals, for columns that are compared.
 

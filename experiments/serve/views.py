@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from experiments.page.numbers import MISSING, number, pretty_unit
+from experiments.page.numbers import MISSING, number, percent_said, pretty_unit
 from experiments.page.words import in_words, sentence
 from plant.errors import HydrostateError
 
@@ -87,7 +87,10 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
         "title": _title(changed),
         "quantities": pd.DataFrame(shown),
         "probabilities": pd.DataFrame(
-            [{"condition": in_words(name), "first": _percent(a), "second": _percent(b)} for name, (a, b) in likely]
+            [
+                {"condition": in_words(name), "first": percent_said(a), "second": percent_said(b)}
+                for name, (a, b) in likely
+            ]
         ),
     }
     names = [first["file"], second["file"]]
@@ -185,10 +188,6 @@ def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:
         "interval": MISSING if row["interval"] is None else ends(row["interval"]),
         "unit": pretty_unit(unit),
     }
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.1f}"
 
 
 def _title(changed: Sequence[str]) -> str:

@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from experiments.page.numbers import TIMES, exact, fixed, number, pretty_unit
+from experiments.page.numbers import TIMES, exact, fixed, number, percent_said, pretty_unit
 from experiments.page.tables import Cell, Column, html_table
 
 
@@ -60,3 +60,10 @@ def test_values_are_scaled_to_the_unit_of_the_header() -> None:
 def test_a_cell_carries_its_tone() -> None:
     html = html_table(pd.DataFrame({"v": [True]}), (Column("v", "v", words=lambda _: Cell("yes", "good")),), "")
     assert '<td class="good">yes</td>' in html
+
+
+@pytest.mark.parametrize(
+    ("probability", "said"), [(1.0, "> 99.9"), (0.9991, "> 99.9"), (0.999, "99.9"), (0.001, "0.1"), (0.0009, "< 0.1")]
+)
+def test_a_probability_is_never_nought_and_never_a_hundred(probability: float, said: str) -> None:
+    assert percent_said(probability) == said
