@@ -15,7 +15,6 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from plant.errors import HydrostateError, LogError
-from plant.log.ring import ring_lines
 
 SCHEMES = ("tcp", "mqtt", "ring")
 """What an address of a stream begins with."""
@@ -161,6 +160,8 @@ def _ring(address: str, received: Received) -> Iterator[str]:
 
     def count(taken: int, lost: int) -> None:
         received.batches, received.lost = taken, lost
+
+    from plant.log.ring import ring_lines  # a call for help need not wait for arrays
 
     return ring_lines(Path(address.removeprefix("ring:")), count)
 
