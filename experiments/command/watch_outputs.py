@@ -6,7 +6,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.json_output import plain
@@ -191,6 +190,7 @@ def metrics_offered(where: str, told: Watched) -> Generator[int]:
     HydrostateError
         If nothing can be offered there.
     """
+    from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer  # which no other verb needs
 
     class Answer(BaseHTTPRequestHandler):
         timeout = 10.0  # a client that says nothing holds no thread for longer [s]

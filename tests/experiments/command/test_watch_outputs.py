@@ -160,4 +160,4 @@ def test_lines_stay_on_standard_output_beside_a_view_that_is_not_on_the_same_ter
     done = CliRunner().invoke(app, ["watch", str(log), "--view", "--metrics", "0"])
     assert done.exit_code == 0, done.stderr
     assert [json.loads(line)["event"] for line in done.stdout.splitlines()] == ["start", "end"]
-    assert "ended, 0 alarms" in done.stderr
+    assert "ended, 0 alarms" in " ".join(done.stderr.split())  # a long path breaks the line
