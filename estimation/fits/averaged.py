@@ -13,7 +13,7 @@ SHORTEST_SAMPLE = 5e-4
 modulus of leaky actuators 0.1 % high, five put it 0.04 % high."""
 
 MOST_LOST = 0.1
-"""Largest share of blocks with a sample missing at which a log is averaged [fraction]."""
+"""Largest share of the samples that are there which may fall into blocks that are not whole [fraction]."""
 
 
 def samples_a_block(sample_time: float, length: float) -> int:
@@ -88,7 +88,7 @@ def averaged(log: GreyBoxLog, longest_step: float) -> GreyBoxLog:
     if block == 1 or log.gaps.size or len(log.drives) < begun + block:
         return log
     outputs = block_means(log.measured[begun:], block)
-    if np.mean(np.isnan(outputs)) > np.mean(np.isnan(log.measured)) + MOST_LOST:
+    if block * np.count_nonzero(np.isfinite(outputs)) < (1.0 - MOST_LOST) * np.count_nonzero(np.isfinite(log.measured)):
         return log
     line = np.linalg.lstsq(np.vander(np.arange(block), 2), log.drives[:block], rcond=None)[0]
     sample_time = block * log.sample_time

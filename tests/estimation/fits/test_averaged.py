@@ -48,7 +48,7 @@ def test_a_block_with_a_sample_missing_is_missing() -> None:
     assert np.flatnonzero(np.isnan(averaged(log, 1.0).measured[:, 0])).tolist() == [0, 10]
 
 
-@pytest.mark.parametrize("case", ["slow", "gaps", "every second sample missing"])
+@pytest.mark.parametrize("case", ["slow", "gaps", "every second sample missing", "every tenth sample alone there"])
 def test_a_log_that_would_lose_by_it_stays_as_it_is(case: str) -> None:
     log = fast()
     match case:
@@ -56,8 +56,10 @@ def test_a_log_that_would_lose_by_it_stays_as_it_is(case: str) -> None:
             log = replace(log, sample_time=4e-4)
         case "gaps":
             log = replace(log, gaps=np.array([[3.0, 4.0, 1.0]]))
-        case _:
+        case "every second sample missing":
             log.measured[::2] = np.nan
+        case _:
+            log.measured[np.arange(len(log.measured)) % 10 != 0] = np.nan
     assert averaged(log, 1.0) is log
 
 
