@@ -68,7 +68,8 @@ class Outlook:
         if middle <= 0.0:
             return "past the limit"
         end = f"{high:.0f}" if math.isfinite(high) else "more than 300"
-        return f"limit in {middle:.0f} logs ({low:.0f} to {end})"
+        logs = "log" if f"{middle:.0f}" == "1" else "logs"
+        return f"limit in {middle:.0f} {logs} ({low:.0f} to {end})"
 
 
 def outlook_of(logs: Sequence[LogRow], name: str, maintained: Sequence[float] = ()) -> Outlook | None:

@@ -2,7 +2,8 @@
 "use strict";
 
 (() => {
-  const ROW = 36; // height of a row [px], as in the style
+  const narrow = matchMedia("(max-width: 40rem)"); // there a row is a card of three lines
+  const rowHeight = () => (narrow.matches ? 96 : 36); // [px], as in the style
   const SPARE = 12; // rows above and below those in sight
 
   function element(tag, attributes = {}, ...children) {
@@ -17,13 +18,13 @@
   function cell(column, value, link) {
     if (column.kind === "number") {
       const words = value === null ? "–" : `${numberText.format(value)}${column.unit ? ` ${column.unit}` : ""}`;
-      return element("td", { class: "number" }, words);
+      return element("td", { class: "number", role: "cell", "data-head": column.label }, words);
     }
-    if (column.kind === "state") return element("td", { class: `fleet-${value}` }, column.words[value]);
+    if (column.kind === "state") return element("td", { class: `fleet-${value}`, role: "cell" }, column.words[value]);
     if (column.kind === "name") {
-      return element("th", { scope: "row" }, link ? element("a", { href: link }, value) : value);
+      return element("th", { scope: "row", role: "rowheader" }, link ? element("a", { href: link }, value) : value);
     }
-    return element("td", { title: value }, value);
+    return element("td", { title: value, role: "cell", "data-head": column.label }, value);
   }
 
   function start(holder) {
@@ -37,9 +38,9 @@
     const state = element("select", { id: "fleet-state" }, element("option", { value: "" }, "all"));
     for (const name of ranks) state.append(element("option", { value: name }, columns[states].words[name]));
     const count = element("p", { class: "place", role: "status" });
-    const head = element("tr");
-    const body = element("tbody");
-    const table = element("table", { class: "fleet" }, element("caption", {}, holder.dataset.caption), element("thead", {}, head), body);
+    const head = element("tr", { role: "row" });
+    const body = element("tbody", { role: "rowgroup" });
+    const table = element("table", { class: "fleet", role: "table" }, element("caption", {}, holder.dataset.caption), element("thead", { role: "rowgroup" }, head), body);
     const view = element("div", { class: "window", tabindex: "0", role: "region", "aria-label": holder.dataset.caption }, table);
 
     function key(row, column) {
@@ -70,23 +71,23 @@
 
     function spacer(rowsAway) {
       const gap = element("tr", { "aria-hidden": "true" }, element("td", { colspan: String(columns.length), class: "gap" }));
-      gap.style.height = `${rowsAway * ROW}px`;
+      gap.style.height = `${rowsAway * rowHeight()}px`;
       return gap;
     }
 
     function draw() {
-      const first = Math.max(0, Math.floor(view.scrollTop / ROW) - SPARE);
-      const last = Math.min(order.length, first + Math.ceil(view.clientHeight / ROW) + 2 * SPARE);
+      const first = Math.max(0, Math.floor(view.scrollTop / rowHeight()) - SPARE);
+      const last = Math.min(order.length, first + Math.ceil(view.clientHeight / rowHeight()) + 2 * SPARE);
       const shown = order.slice(first, last).map((row, i) => {
         const cells = columns.map((column, place) => cell(column, rows[row][place], links[row]));
-        return element("tr", { "aria-rowindex": String(first + i + 2) }, ...cells);
+        return element("tr", { role: "row", "aria-rowindex": String(first + i + 2) }, ...cells);
       });
       body.replaceChildren(...(first > 0 ? [spacer(first)] : []), ...shown, ...(last < order.length ? [spacer(order.length - last)] : []));
     }
 
-    table.style.minWidth = `${columns.reduce((sum, column) => sum + column.width, 0)}rem`;
+    table.style.setProperty("--least", `${columns.reduce((sum, column) => sum + column.width, 0)}rem`);
     columns.forEach((column, place) => {
-      const heading = element("th", { scope: "col", "aria-sort": "none", class: column.kind === "number" ? "number" : "" });
+      const heading = element("th", { scope: "col", role: "columnheader", "aria-sort": "none", class: column.kind === "number" ? "number" : "" });
       const sort = element("button", { type: "button" }, column.label);
       sort.addEventListener("click", () => {
         sorted = { column: place, down: sorted.column === place ? !sorted.down : column.kind === "number" };
@@ -106,6 +107,7 @@
       element("label", { for: "fleet-state" }, "in state"), state);
     holder.querySelector(".still").before(element("div", { class: "live" }, filters, count, view));
     holder.classList.add("is-live");
+    narrow.addEventListener("change", draw);
     new ResizeObserver(draw).observe(view);
     arrange();
     document.documentElement.classList.add("table-drawn");

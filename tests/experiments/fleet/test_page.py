@@ -119,3 +119,18 @@ def test_axe_finds_nothing_serious_and_the_page_fits_a_phone(page: Any) -> None:
     found = axe.Axe().run(page).response["violations"]
     assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def in_sight(page: Any, heading: str) -> bool:
+    """Return whether a cell of the first row lies within the window that scrolls."""
+    cell = page.locator(f'.window tbody tr >> nth=0 >> td[data-head="{heading}"]').bounding_box()
+    window = page.locator(".window").bounding_box()
+    return cell is not None and cell["x"] + cell["width"] <= window["x"] + window["width"]
+
+
+@pytest.mark.slow
+def test_a_phone_shows_what_is_worst_and_a_wide_screen_every_column(page: Any) -> None:
+    assert all(in_sight(page, heading) for heading in ("found", "worst", "of the limit", "outlook"))
+    assert page.locator(".window").evaluate("one => one.scrollWidth <= one.clientWidth")
+    page.set_viewport_size({"width": 1280, "height": 800})
+    assert all(in_sight(page, heading) for heading in ("worst", "logs left", "last log", "logs"))
