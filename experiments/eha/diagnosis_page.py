@@ -9,8 +9,9 @@ import numpy as np
 from experiments.eha.plain_verdict import sureness, verdict, what_to_do
 from experiments.eha.verdict_words import SHOWN, amount, library_said
 from experiments.log_pages.channels import channel_charts
-from experiments.page.charts import Charts, Curve, Mark, Panel
+from experiments.page.charts import Charts
 from experiments.page.numbers import percent_said
+from experiments.page.panels import Curve, Mark, Panel
 from experiments.page.render import render_page
 from experiments.page.severity_rows import severity_rows
 from experiments.page.words import in_words, sentence

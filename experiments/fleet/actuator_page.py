@@ -10,8 +10,9 @@ from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.outlook import Outlook, outlook_of
 from experiments.fleet.page import SHOWN, found_in
 from experiments.fleet.rows import STATES
-from experiments.page.charts import Charts, Curve, Mark, Panel
+from experiments.page.charts import Charts
 from experiments.page.numbers import MISSING, number, shop_unit
+from experiments.page.panels import Curve, Mark, Panel
 from experiments.page.render import render_page
 from experiments.page.tables import Column
 from faults.trend.kalman import moments, moved, settings

@@ -2,7 +2,8 @@
 
 from typing import TYPE_CHECKING
 
-from experiments.page.charts import Charts, Curve, Panel
+from experiments.page.charts import Charts
+from experiments.page.panels import Curve, Panel
 from plant.log.columns import UNITS, unit_ending
 
 if TYPE_CHECKING:

@@ -6,95 +6,17 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from experiments.page.figure_files import image_of
 from experiments.page.numbers import number
 from experiments.page.packed import ends_of_stretches, packed, stretch_length
+from experiments.page.panels import Curve, Panel
 from experiments.page.scripting import data_block
-from experiments.page.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILION, Margins, panels, styled
+from experiments.page.still import still_picture
 from plant.arrays import Array
 
 MOST_DRAWN = 200_000
 """A longer series is carried as the ends of so many half stretches [count]: 20 s at 10 kHz are carried whole."""
-
-MOST_STILL = 1_600
-"""Points of a series in the still picture [count]."""
-
-LEGEND_FROM = 2
-"""Curves from which a still panel has a legend [count]."""
-
-LOW_FROM = 3
-"""Rows of a still picture from which each is lower, so that the picture fills the width of a page [count]."""
-
-ONE_COLUMN = 4
-"""Panels of a still picture in one column; more stand in two, so that they are not tiny on paper [count]."""
-
-COLOURS: Mapping[str, str] = {
-    "blue": BLUE,
-    "orange": ORANGE,
-    "green": GREEN,
-    "vermilion": VERMILION,
-    "purple": PURPLE,
-    "grey": GREY,
-    "black": BLACK,
-}
-"""Names of colours: a page's style gives each a value for a light and for a dark ground; here that on paper."""
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """One curve.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        One a place on the x axis [the panel's unit]; NaN is missing.
-    colour : str
-        Of `COLOURS`.
-    look : str
-        ``"line"``, ``"dots"``, or ``"edge"`` for the edge of a band.
-    """
-
-    name: str
-    values: Array
-    colour: str = "blue"
-    look: str = "line"
-
-
-@dataclass(frozen=True)
-class Mark:
-    """A dashed line across a panel.
-
-    Parameters
-    ----------
-    axis : str
-        ``"x"`` or ``"y"``: the axis on which it stands.
-    at : float
-        Where [that axis' unit].
-    """
-
-    axis: str
-    at: float
-    words: str
-
-
-@dataclass(frozen=True, eq=False)
-class Panel:
-    """Curves of one unit.
-
-    Parameters
-    ----------
-    bands : sequence of tuple
-        Places of two curves, the upper and the lower, between which it is shaded.
-    """
-
-    label: str
-    unit: str
-    curves: Sequence[Curve]
-    marks: Sequence[Mark] = ()
-    bands: Sequence[tuple[int, int]] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +49,9 @@ class Charts:
         name : str
             Anchor of the figure.
         """
-        still = Markup('<div class="still">{}</div>').format(image_of(self._still(), caption))
+        still = Markup('<div class="still">{}</div>').format(
+            image_of(still_picture(self.x, self.label, self.panels), caption)
+        )
         body = Markup('<script type="application/json" class="numbers">{}</script>').format(self._json())
         said = Markup('<figure class="charts" id="figure-{}">{}<figcaption>{}</figcaption>{}{}</figure>')
         return said.format(name, still, caption, self._table(), body)
@@ -174,23 +98,6 @@ class Charts:
         )
         return made.format(head, Markup("\n").join(rows))
 
-    def _still(self) -> Figure:
-        with styled():
-            columns = 1 if len(self.panels) <= ONE_COLUMN else 2
-            rows = -(-len(self.panels) // columns)
-            margins = Margins(left=0.9, top=0.25, across=0.9, down=0.35)
-            figure, axes = panels(
-                "", rows, columns, 0.85 + (1.55 if rows < LOW_FROM else 1.05) * rows, margins, sharex=True
-            )
-            for axis, panel in zip(axes, self.panels, strict=False):
-                _draw_panel(axis, self.x, panel)
-            for axis in axes[len(self.panels) :]:
-                axis.set_visible(False)
-            for axis in axes[len(self.panels) - columns : len(self.panels)]:
-                axis.set_xlabel(self.label)
-                axis.tick_params(labelbottom=True)
-        return figure
-
 
 _SUMMARY = ("curve", "least", "largest", "mean", "RMS", "unit")
 
@@ -215,21 +122,3 @@ def _places(x: Array, length: int) -> Mapping[str, Any]:
         start = float(x[0]) if length == 1 else float(x[0]) + 0.25 * length * step
         return {"start": start, "step": step if length == 1 else 0.5 * length * step, "count": shown}
     return packed(x)
-
-
-def _draw_panel(axis: Axes, x: Array, panel: Panel) -> None:
-    for upper, lower in panel.bands:
-        axis.fill_between(x, panel.curves[upper].values, panel.curves[lower].values, color=BLUE, alpha=0.15, lw=0)
-    for curve in panel.curves:
-        values = ends_of_stretches(np.asarray(curve.values, dtype=np.float64), MOST_STILL)
-        places = np.interp(np.linspace(0.0, 1.0, len(values)), np.linspace(0.0, 1.0, len(x)), x)
-        dots = curve.look == "dots"
-        look: Any = {"ls": "none", "marker": "o", "ms": 3} if dots else {"lw": 0.4 if curve.look == "edge" else 0.9}
-        axis.plot(places, values, color=COLOURS[curve.colour], label=curve.name, **look)
-    for mark in panel.marks:
-        draw = axis.axvline if mark.axis == "x" else axis.axhline
-        draw(mark.at, color=VERMILION, ls="--", lw=1.1)
-    axis.set_ylabel(f"{panel.label}\n[{panel.unit}]")
-    if len(panel.curves) >= LEGEND_FROM:
-        # above the panel, where it hides no data
-        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), borderaxespad=0.1, ncols=4, fontsize=7.5)

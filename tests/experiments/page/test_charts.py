@@ -6,7 +6,8 @@ import re
 
 import numpy as np
 
-from experiments.page.charts import MOST_DRAWN, Charts, Curve, Mark, Panel
+from experiments.page.charts import MOST_DRAWN, Charts
+from experiments.page.panels import Curve, Mark, Panel
 
 
 def numbers_of(charts: Charts) -> dict[str, object]:

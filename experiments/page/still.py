@@ -1,0 +1,183 @@
+"""The still picture of a chart as SVG, written directly: a plotting library takes 50 ms for one."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+from markupsafe import escape
+from matplotlib.ticker import MaxNLocator
+
+from experiments.page.packed import ends_of_stretches
+from experiments.page.panels import COLOURS, Curve, Panel
+from experiments.page.style import BLUE
+from plant.arrays import Array
+
+MOST_STILL = 1_600
+"""Points of a series in the still picture [count]."""
+
+LEGEND_FROM = 2
+"""Curves from which a still panel has a legend [count]."""
+
+LOW_FROM = 3
+"""Rows of a still picture from which each is lower, so that the picture fills the width of a page [count]."""
+
+ONE_COLUMN = 4
+"""Panels of a still picture in one column; more stand in two, so that they are not tiny on paper [count]."""
+
+WIDTH, LEFT, RIGHT, TOP, BOTTOM, ACROSS, DOWN = 720.0, 66.0, 10.0, 20.0, 38.0, 70.0, 26.0
+"""Of the picture, of its margins, and between panels [point]."""
+
+TALL, LOW = 100.0, 72.0
+"""Height of a panel, and of one where there are `LOW_FROM` rows or more [point]."""
+
+LETTER = 4.6
+"""Mean width of a letter of a legend [point]."""
+
+MOST_ACROSS, MOST_UP = 8, 4
+"""Steps between ticks at most [count]."""
+
+ROOM = 0.05
+"""Room above and below the data, as a share of their range [fraction]."""
+
+STYLE = (
+    "text{font:8.5px 'DejaVu Sans',Verdana,sans-serif;fill:#000}.grid{stroke:#e3e3e3;stroke-width:.6}"
+    ".frame{stroke:#000;stroke-width:.8;fill:none}.mark{stroke:#d55e00;stroke-width:1.1;stroke-dasharray:4 2}"
+    ".line{fill:none;stroke-linejoin:round}.dots{fill:none;stroke-linecap:round;stroke-width:3.4}"
+)
+
+STROKES: Mapping[str, str] = {"dots": 'class="dots"', "edge": 'class="line" stroke-width=".4"'}
+"""How a curve is drawn, by its look; any other look is a line."""
+
+
+def still_picture(x: Array, label: str, panels: Sequence[Panel]) -> bytes:
+    """Return the picture as an SVG file.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+        Places of the values, rising [unit of the label].
+    label : str
+        Of the x axis, with its unit.
+    panels : sequence of Panel
+        From the top; two in a row where there are more than `ONE_COLUMN`.
+    """
+    columns = 1 if len(panels) <= ONE_COLUMN else 2
+    rows = -(-len(panels) // columns)
+    high = TALL if rows < LOW_FROM else LOW
+    wide = (WIDTH - LEFT - RIGHT - (columns - 1) * ACROSS) / columns
+    height = TOP + rows * high + (rows - 1) * DOWN + BOTTOM
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH:g}pt" height="{height:g}pt" '
+        f'viewBox="0 0 {WIDTH:g} {height:g}"><style>{STYLE}</style><rect width="100%" height="100%" fill="#fff"/>'
+    ]
+    for place, panel in enumerate(panels):
+        row, column = divmod(place, columns)
+        corner = f"{LEFT + column * (wide + ACROSS):g} {TOP + row * (high + DOWN):g}"
+        last = place >= len(panels) - columns
+        parts.append(f'<g transform="translate({corner})">')
+        parts.extend(_panel(x, panel, (wide, high), f"p{place}", label if last else ""))
+        parts.append("</g>")
+    return "".join([*parts, "</svg>"]).encode()
+
+
+def _panel(x: Array, panel: Panel, size: tuple[float, float], name: str, label: str) -> Iterator[str]:
+    wide, high = size
+    across, up = _range(x, 0.0), _range(_every(panel), ROOM)
+    places = (x - across[0]) * (wide / (across[1] - across[0]))
+    scale = high / (up[1] - up[0])
+
+    def heights(values: Array) -> Array:
+        return high - (values - up[0]) * scale
+
+    yield f'<clipPath id="{name}"><path d="M0 -2H{wide:g}V{high + 2:g}H0z"/></clipPath>'
+    for tick, words in _ticks(*across, MOST_ACROSS):
+        at = (tick - across[0]) * wide / (across[1] - across[0])
+        yield f'<path class="grid" d="M{at:.1f} 0V{high:g}"/>'
+        yield f'<text x="{at:.1f}" y="{high + 11:g}" text-anchor="middle">{words}</text>'
+    for tick, words in _ticks(*up, MOST_UP):
+        at = high - (tick - up[0]) * scale
+        yield f'<path class="grid" d="M0 {at:.1f}H{wide:g}"/>'
+        yield f'<text x="-4" y="{at + 3:.1f}" text-anchor="end">{words}</text>'
+    yield f'<g clip-path="url(#{name})">'
+    for upper, lower in panel.bands:
+        edges = [
+            (places, heights(panel.curves[upper].values)),
+            (places[::-1], heights(panel.curves[lower].values[::-1])),
+        ]
+        outline = _points(*np.concatenate(edges, axis=1))
+        yield f'<polygon points="{outline}" fill="{BLUE}" fill-opacity=".15"/>'
+    for curve in panel.curves:
+        yield _curve(curve, places, heights)
+    for mark in panel.marks:
+        along = (mark.at - across[0]) * wide / (across[1] - across[0])
+        line = f"M{along:.1f} 0V{high:g}" if mark.axis == "x" else f"M0 {high - (mark.at - up[0]) * scale:.1f}H{wide:g}"
+        yield f'<path class="mark" d="{line}"/>'
+    yield f'</g><path class="frame" d="M0 0V{high:g}H{wide:g}"/>'
+    for words, shift in ((panel.label, 48.0), (f"[{panel.unit}]", 38.0)):
+        turned = f'transform="translate({-shift:g} {high / 2:g}) rotate(-90)"'
+        yield f'<text {turned} text-anchor="middle">{escape(words)}</text>'
+    if label:
+        yield f'<text x="{wide / 2:g}" y="{high + 25:g}" text-anchor="middle">{escape(label)}</text>'
+    if len(panel.curves) >= LEGEND_FROM:
+        yield from _legend(panel.curves, wide)
+
+
+def _curve(curve: Curve, places: Array, heights: Callable[[Array], Array]) -> str:
+    values = ends_of_stretches(np.asarray(curve.values, dtype=np.float64), MOST_STILL)
+    along = np.interp(np.linspace(0.0, 1.0, len(values)), np.linspace(0.0, 1.0, len(places)), places)
+    stroke = STROKES.get(curve.look, 'class="line" stroke-width=".9"')
+    path = _path(along, heights(values), dots=curve.look == "dots")
+    return f'<path {stroke} stroke="{COLOURS[curve.colour]}" d="{path}"/>'
+
+
+def _path(x: Array, y: Array, *, dots: bool) -> str:
+    """Return a path that is broken where a value is missing; dots are strokes of no length."""
+    said: list[str] = []
+    down = False
+    for one, other in zip(x.tolist(), y.tolist(), strict=True):
+        if not math.isfinite(other):
+            down = False
+            continue
+        said.append(f"{'L' if down else 'M'}{one:.1f} {other:.1f}{'h0' if dots else ''}")
+        down = not dots
+    return "".join(said)
+
+
+def _points(x: Array, y: Array) -> str:
+    there = np.isfinite(y)
+    return " ".join(f"{one:.1f},{other:.1f}" for one, other in zip(x[there].tolist(), y[there].tolist(), strict=True))
+
+
+def _every(panel: Panel) -> Array:
+    """Return all values of a panel and the places of lines across it."""
+    lines = [mark.at for mark in panel.marks if mark.axis == "y"]
+    return np.concatenate([np.asarray(lines, dtype=np.float64), *(curve.values for curve in panel.curves)])
+
+
+def _range(values: Array, room: float) -> tuple[float, float]:
+    there = values[np.isfinite(values)]
+    low, high = (float(there.min()), float(there.max())) if len(there) else (0.0, 1.0)
+    if high - low <= 1e-9 * max(abs(low), abs(high), 1e-300):
+        half = 0.05 * abs(low) or 0.5
+        return low - half, high + half
+    return low - room * (high - low), high + room * (high - low)
+
+
+def _ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
+    """Return round places within a range, with their words."""
+    ticks = [float(one) for one in MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)]
+    step = ticks[1] - ticks[0]
+    within = [0.0 if abs(one) < 1e-6 * step else one for one in ticks if low - 1e-9 * step <= one <= high + 1e-9 * step]
+    digits = min(max(math.ceil(math.log10(max(map(abs, within), default=1.0) / step + 1e-300)) + 2, 3), 12)
+    return [(one, f"{one:.{digits}g}".replace("-", "\N{MINUS SIGN}")) for one in within]
+
+
+def _legend(curves: Sequence[Curve], wide: float) -> Iterator[str]:
+    """Yield the names of the curves above a panel, where they hide no data, the last at the right."""
+    at = wide
+    for curve in reversed(curves):
+        at -= LETTER * len(curve.name)
+        yield f'<text x="{at:.1f}" y="-5">{escape(curve.name)}</text>'
+        at -= 18.0
+        yield f'<path stroke="{COLOURS[curve.colour]}" stroke-width="2" d="M{at:.1f} -8h14"/>'
+        at -= 12.0

@@ -1,0 +1,76 @@
+"""The still picture of a chart: well-formed, broken where values are missing, with round ticks."""
+
+import re
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from experiments.page.panels import Curve, Mark, Panel
+from experiments.page.still import MOST_STILL, still_picture
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def drawn(values: list[float], *marks: Mark, look: str = "line", x: list[float] | None = None) -> ET.Element:
+    places = np.arange(float(len(values))) if x is None else np.array(x)
+    panel = Panel(
+        "speed <&>", "mm/s", [Curve("a & b", np.array(values), look=look), Curve("c", np.array(values))], marks
+    )
+    return ET.fromstring(still_picture(places, "time [s]", [panel]))  # noqa: S314 -- our own picture
+
+
+def path_of(picture: ET.Element, kind: str) -> str:
+    return next(one.attrib["d"] for one in picture.iter(f"{SVG}path") if one.get("class") == kind)
+
+
+def words_of(picture: ET.Element) -> list[str]:
+    return [one.text or "" for one in picture.iter(f"{SVG}text")]
+
+
+def test_a_line_is_broken_where_a_value_is_missing() -> None:
+    path = path_of(drawn([0.0, 1.0, np.nan, 3.0, 2.0]), "line")
+    assert re.sub(r"[^ML]", "", path) == "MLML"
+    assert re.sub(r"[^MLh]", "", path_of(drawn([0.0, np.nan, 3.0], look="dots"), "dots")) == "MhMh"
+
+
+def test_the_largest_value_stands_highest_and_the_last_place_at_the_right() -> None:
+    points = [
+        (float(a), float(b)) for a, b in re.findall(r"[ML](\S+) ([\d.]+)", path_of(drawn([1.0, 9.0, 5.0]), "line"))
+    ]
+    assert min(points, key=lambda one: one[1]) == points[1]
+    assert [one[0] for one in points] == pytest.approx([0.0, 322.0, 644.0], abs=0.1)
+
+
+def test_a_line_across_is_within_the_picture_and_where_it_should_be() -> None:
+    mark = path_of(drawn([0.0, 1.0], Mark("y", 3.0, "limit")), "mark")
+    height = float(re.findall(r"M0 ([\d.]+)H", mark)[0])
+    assert 0.0 < height < 10.0
+    assert path_of(drawn([0.0, 1.0, 2.0], Mark("x", 1.0, "change")), "mark").startswith("M322.0 0V")
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ([0.0, 10.0], ["0", "5", "10"]),
+        ([-0.02, 0.02], ["\N{MINUS SIGN}0.02", "0", "0.02"]),
+        ([1e5 + 1.0, 1e5 + 5.0], ["100002", "100004"]),
+        ([5.0, 5.0], ["5"]),
+        ([np.nan, np.nan], ["0.5"]),
+    ],
+)
+def test_ticks_are_round_and_told_apart(values: list[float], words: list[str]) -> None:
+    found = words_of(drawn(values))
+    assert set(words) <= set(found)
+    heights = [one for one in found if one.lstrip("\N{MINUS SIGN}").replace(".", "").isdigit()]
+    assert len(heights) >= 3
+
+
+def test_names_are_escaped_and_a_long_log_keeps_its_peak_with_few_points() -> None:
+    values = np.zeros(100_000)
+    values[77_777] = 1.0
+    picture = drawn(values.tolist())
+    assert {"speed <&>", "a & b", "time [s]"} <= set(words_of(picture))
+    path = path_of(picture, "line")
+    assert len(re.findall("[ML]", path)) <= MOST_STILL
+    assert min(float(one) for one in re.findall(r"[ML]\S+ ([\d.]+)", path)) < 10.0
