@@ -35,6 +35,7 @@ NAMES = (
     "open_benchmark",
     "batch_scale",
     "archive",
+    "fleet",
     "server",
 )
 """Every benchmark that needs nothing but the project, in the order of `make benchmark`."""
