@@ -39,12 +39,13 @@ def diagnose(
     sample_time: SampleTime = None,
     beside: Beside = None,
     transfer_functions: Annotated[
-        bool,
+        bool | None,
         flag(
             "--transfer-functions/--no-transfer-functions",
-            "Show a table of nine transfer functions' errors; for a rig of your own, identify them first (20 s).",
+            "Show a table of nine transfer functions' errors (identified first for a rig of your own: 20 s), or leave "
+            "out the line on them that the paper's rig gets.",
         ),
-    ] = False,
+    ] = None,
     scores: Annotated[
         bool, flag("--scores/--no-scores", "Also show every condition's model error in a table.")
     ] = False,

@@ -156,10 +156,12 @@ def _taken_as_known(results: Sequence[Result]) -> Iterable[str]:
 def _prepared_diagnosis(rig: "Rig[Any]", options: Options) -> "tuple[Rig[Any], tuple[bool, Linear]]":
     """Return the rig, whether pressure is unused, and what gives nine transfer functions.
 
-    The library is read by default where it is this rig's; identifying one takes long, so it has to be asked for.
+    Unless told either way, the library is read where it is this rig's; identifying one takes long, so it has to be
+    asked for.
     """
     linear = cache(lambda: _identified(rig.parameters, options["seed"]))
-    wanted = options["transfer_functions"] or rig.parameters == EhaParameters()
+    asked = options["transfer_functions"]
+    wanted = rig.parameters == EhaParameters() if asked is None else asked
     return rig, (options["no_pressure"], linear if wanted else None)
 
 
@@ -230,7 +232,7 @@ EHA = ActuatorKind(
     diagnose=LogVerb(
         run=_diagnosed,
         prepare=_prepared_diagnosis,
-        options={"no_pressure": False, "scores": False, "transfer_functions": False},
+        options={"no_pressure": False, "scores": False, "transfer_functions": None},
         entries=diagnosis_entries,
         blank=NO_DIAGNOSIS,
         screen=diagnoses_shown,

@@ -142,6 +142,22 @@ def test_study_library_and_diagnose_hold_the_same_models() -> None:
         assert {name: model.to_dict() for name, model in found.items()} == shown
 
 
+@pytest.mark.parametrize(
+    ("asked", "of_paper", "of_another"), [(None, True, False), (False, False, False), (True, True, True)]
+)
+def test_transfer_functions_are_left_out_where_they_are_refused(
+    asked: bool | None,
+    of_paper: bool,
+    of_another: bool,
+) -> None:
+    assert EHA.diagnose is not None
+    paper = Rig("paper", EhaParameters())
+    another = Rig("mine", replace(EhaParameters(), moving_mass=9.0))
+    for rig, wanted in ((paper, of_paper), (another, of_another)):
+        _, (_, models) = EHA.diagnose.prepare(rig, {**EHA.diagnose.options, "seed": 0, "transfer_functions": asked})
+        assert (models is not None) == wanted
+
+
 def test_a_model_of_the_library_is_a_transfer_function_of_python_control() -> None:
     for name, model in read_library().items():
         system = model.to_control()
