@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from importlib.resources import files
 
 import numpy as np
 import pandas as pd
@@ -20,8 +19,9 @@ from experiments.papers.figures import PAPERS_FIGURES
 from experiments.papers.motor_claims import motor_ours
 from experiments.papers.motor_tables import motor_table_rows
 from experiments.papers.parts import Evidence
+from experiments.papers.printed import claimed, read_csv
 from experiments.papers.stack_claims import stack_ours
-from experiments.papers.verdict import MISSED, Basis, Ours, Row, drawn_as, verdict_of
+from experiments.papers.verdict import MISSED, Row, drawn_as, verdict_of
 from experiments.piezo_stack.figures import STACK_FIGURES
 from plant.errors import HydrostateError
 
@@ -45,21 +45,6 @@ DRAWN_BY: Mapping[str, tuple[Drawings, str]] = {
 FILTER_NOTE = (
     "Equations 7.1 to 7.4, E3 mended, printed Q and R, on the plant that they assume; P_0 is ours (errata E10)."
 )
-
-_BASES: Mapping[str, Basis] = {"computed": "computed", "model": "model", "target": "target"}
-
-
-def read_csv(name: str) -> list[dict[str, str]]:
-    """Return the lines of one of this folder's tables, as text.
-
-    Parameters
-    ----------
-    name : str
-        ``claims.csv`` or ``figures.csv``.
-    """
-    with files("experiments.papers").joinpath(name).open(encoding="utf-8") as stream:
-        frame = pd.read_csv(stream, dtype=str, keep_default_na=False)
-    return [{str(key): str(value) for key, value in row.items()} for row in frame.to_dict("records")]
 
 
 def all_rows(found: Evidence) -> list[Row]:
@@ -85,28 +70,9 @@ def all_rows(found: Evidence) -> list[Row]:
                 f"claims.csv and what stands beside it must have equal keys, got {apart} in one alone"
             )
     rows = [*eha_table_rows(found), *motor_table_rows(found), *_filter_rows(found)]
-    rows += [_claim(row, ours[row["paper"]][row["key"]]) for row in claims]
+    rows += [claimed(row, ours[row["paper"]][row["key"]]) for row in claims]
     order = list(PAPERS)
     return sorted(rows, key=lambda row: order.index(row.paper))
-
-
-def _claim(row: Mapping[str, str], ours: Ours) -> Row:
-    text = row["value"]
-    value = None if not text else text if row["accept"] == "same" else float(text)
-    return Row(
-        paper=row["paper"],
-        where=row["where"],
-        claim=row["claim"],
-        printed=row["printed"],
-        value=value,
-        unit=row["unit"],
-        accept=row["accept"],
-        basis=_BASES[row["basis"]],
-        ours=ours,
-        errata=row["errata"],
-        shown_by=f"hydrostate {row['verb']}",
-        note=row["note"],
-    )
 
 
 def _filter_rows(found: Evidence) -> Iterator[Row]:

@@ -4,7 +4,7 @@ import hashlib
 import json
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -29,7 +29,7 @@ from experiments.page.folder import check_target, write_tables
 from experiments.page.frames import Tables
 from experiments.piezo_stack import flow
 from experiments.piezo_stack.hysteresis import hysteresis_table
-from experiments.piezo_stack.quoted import quoted_numbers
+from experiments.piezo_stack.left_out import TURNS, figure_12_left_out
 from experiments.piezo_stack.study import RIG as STACK_RIG
 from experiments.published.library import read_library
 from experiments.running.progress import Track, in_one_piece
@@ -56,6 +56,8 @@ class PapersSettings:
         Length of the runs for identification [s].
     seeds : int
         Runs a condition for classification [count].
+    calibrations, turns : int
+        Calibrations of the piezo-stack plant without Figure 12, and most steps of each [count].
     """
 
     seed: int = 2024
@@ -64,16 +66,21 @@ class PapersSettings:
     sample_time: float = 1e-4
     identification_duration: float = 20.0
     seeds: int = 20
+    calibrations: int = 3
+    turns: int = TURNS
 
     @property
     def study(self) -> StudySettings:
         """The same for the studies of the gear-pump actuator."""
-        return StudySettings(**asdict(self), filterpy_samples=2)  # which no row reads
+        shared = {one.name for one in fields(StudySettings)} & set(asdict(self))
+        return StudySettings(**{name: getattr(self, name) for name in shared}, filterpy_samples=2)  # which no row reads
 
 
 def quick_papers(seed: int) -> PapersSettings:
     """Return a small size: the same rows, from fewer first guesses and shorter runs."""
-    return PapersSettings(seed, (0.0, 5e8), duration=2.0, sample_time=1e-3, identification_duration=8.0, seeds=1)
+    return PapersSettings(
+        seed, (0.0, 5e8), duration=2.0, sample_time=1e-3, identification_duration=8.0, seeds=1, calibrations=1, turns=1
+    )
 
 
 def _nine(settings: PapersSettings, track: Track) -> Tables:
@@ -106,7 +113,9 @@ def _stack(settings: PapersSettings, track: Track) -> Tables:
     peak = flow.OperatingPoint(275.0, flow.HIGH_VOLTAGE, flow.HIGH_BIAS, 0.0)
     tables["pump cycle"] = flow.pump_cycle(STACK_RIG, peak)
     tables["hysteresis parameters"] = hysteresis_table(STACK_RIG, settings.seed)
-    tables["quoted numbers"] = quoted_numbers(tables)
+    tables["figure 12 left out"] = figure_12_left_out(
+        STACK_RIG, settings.seed, settings.calibrations, settings.turns, track
+    )
     return tables
 
 

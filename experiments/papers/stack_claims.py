@@ -22,7 +22,19 @@ def stack_ours(found: Tables) -> Mapping[str, Ours]:
     found : Mapping[str, pandas.DataFrame]
         Tables of the part ``piezo-stack``.
     """
-    return {**_no_load(found), **_loaded(found), **_loops(found), **_settings(), "nothing": Ours(None)}
+    return {**figures_ours(found), **_hysteresis(found), **_left_out(found), **_settings(), "nothing": Ours(None)}
+
+
+def figures_ours(found: Tables) -> Mapping[str, Ours]:
+    """Return what stands beside each claim about a curve of Figures 10 to 14.
+
+    Parameters
+    ----------
+    found : Mapping[str, pandas.DataFrame]
+        As `stack_ours`; the tables of the figures and of the loops' widths are enough.
+    """
+    widths = found["figure_10_loop_widths"]["width_percent"]
+    return {**_no_load(found), **_loaded(found), "loops_narrowing": Ours(float((widths.diff() <= 0.0).sum()))}
 
 
 def _curve(frame: pd.DataFrame, by: str, value: float, axis: str = "frequency_hz") -> pd.Series:
@@ -67,17 +79,31 @@ def _loaded(found: Tables) -> Mapping[str, Ours]:
     }
 
 
-def _loops(found: Tables) -> Mapping[str, Ours]:
-    widths = found["figure_10_loop_widths"]["width_percent"]
+def _hysteresis(found: Tables) -> Mapping[str, Ours]:
     hysteresis = found["hysteresis_parameters"].set_index("parameter")
     ratios = {
         key: cell(hysteresis, name, "printed") / cell(hysteresis, name, "truth")
         for key, name in (("printed_alpha", "hysteresis"), ("printed_phi", "hysteresis_phi_1"))
     }
     return {
-        "loops_narrowing": Ours(float((widths.diff() <= 0.0).sum())),
         **{key: Ours(ratio if ratio == ratio else None) for key, ratio in ratios.items()},
         "reynolds": Ours(float(found["pump_cycle"]["reynolds_number"].abs().max())),
+    }
+
+
+def _left_out(found: Tables) -> Mapping[str, Ours]:
+    """Return the worst of what calibrations without Figure 12 say of it."""
+    table = found["figure_12_left_out"]
+    best = table["best_weak_hz"]
+    worst = best[(best - PEAK).abs().idxmax()]
+    told = "Hz, ".join(f"{value:.0f} " for value in best)
+    return {
+        "left_out_ratio": Ours(float(table["ratio"].max()), said=f"{len(table)} calibrations from separate beginnings"),
+        "left_out_hz": Ours(float(worst), said=f"{told}Hz by {len(table)} calibrations from separate beginnings"),
+        "left_out_both_peaks": Ours(
+            float((table[["best_high_hz", "best_low_hz"]] - PEAK).abs().max(axis=1).min()),
+            said="the nearest that a calibration comes with both bias pressures",
+        ),
     }
 
 

@@ -14,24 +14,12 @@ from experiments.page.tables import Cell, Column, Columns, Row, right
 from experiments.papers.claims import PAPERS, all_rows, figure_table, row_table
 from experiments.papers.figures import PAPERS_FIGURES
 from experiments.papers.parts import PapersSettings, gather, quick_papers
-from experiments.papers.verdict import Drawn, Verdict
+from experiments.papers.verdict import TONES, Drawn, Verdict
 from experiments.running.progress import Track, in_one_piece
 from experiments.running.study import Found, Study
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.piezo_stack.parameters import PiezoStackParameters
-
-TONES: Mapping[str, str] = {
-    "reproduced": "good",
-    "predicted": "good",
-    "calibrated to": "none",
-    "not reproduced": "bad",
-    "erratum": "bad",
-    "drawn": "good",
-    "drawn with a difference": "none",
-    "cannot be drawn": "bad",
-}
-"""How a verdict is coloured."""
 
 SECTIONS: Mapping[str, str] = {"002": "rows of 002", "000": "rows of 000", "001": "rows of 001"}
 """The page's table of each paper."""

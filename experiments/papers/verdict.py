@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal, TypeAlias, get_args
@@ -41,6 +41,19 @@ AGREES: dict[Basis, Verdict] = {
 
 MISSED = frozenset({Verdict.NOT_REPRODUCED, Verdict.ERRATUM})
 """The verdicts on what does not agree."""
+
+
+TONES: Mapping[str, str] = {
+    "reproduced": "good",
+    "predicted": "good",
+    "calibrated to": "none",
+    "not reproduced": "bad",
+    "erratum": "bad",
+    "drawn": "good",
+    "drawn with a difference": "none",
+    "cannot be drawn": "bad",
+}
+"""How a verdict is coloured."""
 
 
 @dataclass(frozen=True)

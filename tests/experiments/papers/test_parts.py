@@ -88,7 +88,9 @@ def test_a_row_that_names_a_figure_counts_for_it() -> None:
     ]
 
 
-SMALL = PapersSettings(7, (0.0, 5e8), duration=1.0, sample_time=1e-3, identification_duration=2.5, seeds=1)
+SMALL = PapersSettings(
+    7, (0.0, 5e8), duration=1.0, sample_time=1e-3, identification_duration=2.5, seeds=1, calibrations=1, turns=1
+)
 
 
 @pytest.mark.slow

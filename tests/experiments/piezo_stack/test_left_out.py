@@ -1,0 +1,57 @@
+"""Figure 12 left out: a calibration never runs at 100 V, moves towards its targets, and then says what 100 V gives."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import pytest
+
+from experiments.piezo_stack import left_out
+from experiments.piezo_stack.flow import HIGH_VOLTAGE, OperatingPoint
+from plant.piezo_stack.parameters import PiezoStackParameters
+
+RIG = PiezoStackParameters()
+
+Case = tuple[PiezoStackParameters, OperatingPoint]
+
+
+def stand_in(cases: Sequence[Case]) -> Iterator[dict[str, float]]:
+    """Yield flows of a formula in the freed values: their top lies at 275 Hz times line area over that of the rig."""
+    for p, at in cases:
+        best = 275.0 * p.line_area / RIG.line_area
+        size = 1.6 * (p.piston_area / RIG.piston_area) * (at.voltage_v / HIGH_VOLTAGE) * (1.0 - 0.019 * at.load_kg)
+        yield {"flow_m3_s": size / 60000.0 * (1.0 - ((at.frequency_hz - best) / 400.0) ** 2)}
+
+
+@pytest.fixture
+def seen(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Return the voltages of every run, which the list grows with."""
+    voltages: list[float] = []
+
+    def noted(cases: Sequence[Case]) -> Iterator[dict[str, float]]:
+        voltages.extend(at.voltage_v for _, at in cases)
+        yield from stand_in(cases)
+
+    monkeypatch.setattr(left_out, "rows_of", noted)
+    return voltages
+
+
+def test_a_calibration_sees_no_run_at_the_lower_voltage_and_reaches_its_targets(seen: list[float]) -> None:
+    start = left_out.changed(RIG, np.where(np.arange(len(left_out.FREED)) == 0, 0.3, 0.2))
+    found = left_out.calibrated(start)
+    assert set(seen) == {HIGH_VOLTAGE}
+    assert found.piston_area == pytest.approx(RIG.piston_area, rel=0.05)
+    assert found.line_area == pytest.approx(RIG.line_area, rel=0.05)
+
+
+def test_figure_12_is_asked_of_what_was_calibrated_without_it(seen: list[float]) -> None:
+    table = left_out.figure_12_left_out(RIG, 1, 2)
+    assert table["ratio"].tolist() == pytest.approx([100.0 / 140.0] * 2)
+    assert (abs(table["best_weak_hz"] - 275.0) <= 12.5).all()
+    assert seen.count(100.0) == 2 * 18
+
+
+def test_values_that_stand_together_change_by_one_factor() -> None:
+    one = left_out.changed(RIG, np.log(np.full(len(left_out.FREED), 1.1)))
+    for name in ("outlet_reed_stiffness", "inlet_reed_stiffness", "return_length", "air_fraction"):
+        assert getattr(one, name) == pytest.approx(1.1 * getattr(RIG, name))
+    assert one.stack_stiffness == RIG.stack_stiffness
