@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.circuit.curves import steady_runs
+from experiments.circuit.doubted_breaks import doubted_breaks
 from experiments.circuit.experiments import AMPLITUDE_INPUTS, MEAN_INPUTS, frequency_responses, low_frequency_gains
 from experiments.circuit.passes import in_condition
 from experiments.page.frames import Rows, tabled
@@ -24,6 +25,9 @@ LEVELS_V = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
 BREAK_MEANS_V = (2.0, 4.0, 7.0)
 """Input means at which the break frequency is looked for [V]."""
 
+WITHIN_DOUBTS = "break frequency within the parameters' uncertainty"
+"""What the two rows of `doubted_breaks` are called."""
+
 ROOMY_STROKE = 2.0
 """Stroke in which the piston settles at 8 V [m], as that of `experiments.circuit.curves` at 4 V."""
 
@@ -39,7 +43,8 @@ def first_tests(rig: CircuitParameters, seed: int, levels_v: Iterable[float] = L
 
     Dead time is until the encoder leaves its line by five counts, at a step of 4 V from rest, where the pressure that
     breaks the seals loose has to build up, and from 2 V to 4 V in motion. The break frequency is where the empirical
-    gain is 3 dB below that at its lowest frequency. Linearity is the largest low-frequency gain over the smallest.
+    gain is 3 dB below that at its lowest frequency; what parameters within their uncertainty could make of it comes
+    from the linearised equations. Linearity is the largest low-frequency gain over the smallest.
 
     Parameters
     ----------
@@ -65,6 +70,9 @@ def first_tests(rig: CircuitParameters, seed: int, levels_v: Iterable[float] = L
     for mean in BREAK_MEANS_V:
         found = break_frequency(means[means["mean_v"] == mean])
         yield _row("break frequency", f"mean {mean:g} V", found, "Hz", published=SCALARS["bandwidth"].si_value)
+    highest, least = doubted_breaks(rig, BREAK_MEANS_V[0], BREAK_MEANS_V[-1])
+    yield _row(WITHIN_DOUBTS, "mean 7 V, highest", highest, "Hz", published=SCALARS["bandwidth"].si_value)
+    yield _row(WITHIN_DOUBTS, "mean 2 V over mean 7 V, least", least, "1")
     gains = low_frequency_gains(means, "mean_v")
     yield _row("gain spread", "means from 2 V", _spread(gains[gains.index >= 2.0]), "1")
     gains = low_frequency_gains(frequency_responses(rig, seed, AMPLITUDE_INPUTS), "amplitude_v")

@@ -221,6 +221,15 @@ COLUMNS: Mapping[str, Columns] = {
         Column("published_rmse_mathematical_m_s", "mathematical model, Table 5", digits=2),
         Column("mathematical_is_better", "mathematical model better, ours"),
     ),
+    "validation_on_circuit": (
+        CONDITION,
+        Column("rmse_transfer_function_m_s", "transfer function", digits=3),
+        Column("least_transfer_function_m_s", "its least of a circuit", digits=3),
+        Column("largest_transfer_function_m_s", "its largest", digits=3),
+        Column("rmse_mathematical_m_s", "mathematical model", digits=3),
+        Column("least_mathematical_m_s", "its least of a circuit", digits=3),
+        Column("largest_mathematical_m_s", "its largest", digits=3),
+    ),
     "class accuracies": (
         Column("bank", "models", words=bank_in_words),
         Column("variant", "parameters"),

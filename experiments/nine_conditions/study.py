@@ -31,6 +31,7 @@ from experiments.nine_conditions.transfer_functions import (
     transfer_function_table,
 )
 from experiments.nine_conditions.validation import classification_study, validation_study
+from experiments.nine_conditions.validation_on_circuit import validation_on_circuit
 from experiments.page.folder import json_file
 from experiments.page.frames import Tables, parameter_table
 from experiments.running.progress import Track, in_one_piece
@@ -61,6 +62,7 @@ def _parts(settings: StudySettings, track: Track) -> Found:
         "bulk_modulus": estimates,
         "transfer_functions": transfer_function_table(library),
         "validation_rmse": rmse,
+        "validation_on_circuit": validation_on_circuit(RIG, library, settings, track),
         "filtering": filtering_table(stream(settings.seed, "filtering"), settings.identification_duration),
         "scalars": scalar_table(conditions, library, _mean_estimate(estimates)),
         **classification_study(RIG, library, settings, track),

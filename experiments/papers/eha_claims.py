@@ -10,6 +10,7 @@ from scipy.constants import psi
 from estimation.eha.named import PRINTED_Q, PRINTED_R, PUBLISHED_TIME
 from estimation.identification.signals.preprocess import zero_phase_filter
 from experiments.circuit.curves import FIGURE_9_VOLTS
+from experiments.circuit.first_tests import WITHIN_DOUBTS
 from experiments.nine_conditions.bulk_modulus import (
     PRESSURE_STEPS,
     PUBLISHED_WAY,
@@ -111,11 +112,14 @@ def _conditions(study: Tables, circuit: Tables) -> Mapping[str, Ours]:
 
 def _first_tests(study: Tables, circuit: Tables, library: Tables) -> Mapping[str, Ours]:
     tests = circuit["section_4_first_tests"].set_index(["test", "at"])["value"]
-    better = study["validation_rmse"]["mathematical_is_better"]
+    errors = study["validation_on_circuit"]
+    better = errors["rmse_mathematical_m_s"] < errors["rmse_transfer_function_m_s"]
     return {
         "mean_gain_spread": Ours(float(tests["gain spread", "means from 2 V"])),
         "low_amplitude_spread": Ours(float(tests["gain spread", "amplitudes from 0.5 V"])),
         **{f"break_{v}": Ours(float(tests["break frequency", f"mean {v} V"])) for v in (2, 4, 7)},
+        "break_7_doubted": Ours(float(tests[WITHIN_DOUBTS, "mean 7 V, highest"])),
+        "break_ratio_doubted": Ours(float(tests[WITHIN_DOUBTS, "mean 2 V over mean 7 V, least"])),
         "dead_zone_major": Ours(float(tests["dead zone", "major_leakage"])),
         "order_circuit": Ours(float(circuit["figure_7_singular_values"]["suggested_order"].iloc[0])),
         "order_study": Ours(float(study["order"]["suggested_order"].iloc[0])),

@@ -4,9 +4,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.circuit.first_tests import break_frequency, dead_time, dead_zone, first_tests
+from experiments.circuit.first_tests import (
+    BREAK_MEANS_V,
+    WITHIN_DOUBTS,
+    break_frequency,
+    dead_time,
+    dead_zone,
+    first_tests,
+)
 from experiments.circuit.passes import in_condition
 from experiments.page.frames import cell
+from plant.eha.around_mean import break_frequency_about
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.errors import HydrostateError
 
@@ -41,6 +49,19 @@ def test_figure_5_is_not_reproduced_since_the_break_frequency_falls_with_the_mea
     assert (found["published"] == 25.0).all()
     assert (found["value"].diff().dropna() < 0.0).all()
     assert found["value"].max() < 0.9 * 25.0
+
+
+def test_no_parameters_within_their_uncertainty_give_figure_5(table: pd.DataFrame) -> None:
+    found, measured = of(table, WITHIN_DOUBTS)["value"], of(table, "break frequency")["value"]
+    assert measured["mean 7 V"] < found["mean 7 V, highest"] < 0.9 * 25.0
+    assert 1.5 < found["mean 2 V over mean 7 V, least"] < measured["mean 2 V"] / measured["mean 7 V"] + 0.2
+
+
+@pytest.mark.parametrize("mean_v", BREAK_MEANS_V)
+def test_the_linearised_break_frequency_is_near_the_one_that_is_measured(table: pd.DataFrame, mean_v: float) -> None:
+    measured = cell(of(table, "break frequency"), f"mean {mean_v:g} V", "value")
+    linear = break_frequency_about(mean_v * RIG.motor_speed_per_volt, RIG)
+    assert linear == pytest.approx(measured, rel=0.2)
 
 
 def test_breaking_loose_delays_the_start(table: pd.DataFrame) -> None:
