@@ -213,6 +213,14 @@ COLUMNS: Mapping[str, Columns] = {
         Column("dc_gain", "steady gain", "ratio"),
         Column("jump_ratio", "b0 / gain", "ratio", words=decimals(3)),
     ),
+    "printed_test": (
+        CONDITION,
+        *(Column(name, words=number) for name in COEFFICIENTS),
+        Column("dc_gain", "steady gain", "m/rad", digits=3),
+        Column("bandwidth_hz", f"{MINUS}3 dB", "Hz", digits=3),
+        Column("fit_percent", "fit", "%", digits=3),
+        Column("held", "cells of Table 6 held", "of 5"),
+    ),
     "validation_rmse": (
         CONDITION,
         Column("rmse_transfer_function_m_s", "transfer function, ours", digits=3),

@@ -21,6 +21,7 @@ from experiments.nine_conditions.conditions import condition_table, scalar_table
 from experiments.nine_conditions.figures import FIGURES
 from experiments.nine_conditions.filterpy_column import EQUAL, filterpy_study, verdict_counts
 from experiments.nine_conditions.findings import class_accuracies, recoveries, truth_of
+from experiments.nine_conditions.printed_test import printed_test
 from experiments.nine_conditions.sentences import verdict
 from experiments.nine_conditions.settings import StudySettings, quick_settings
 from experiments.nine_conditions.transfer_functions import (
@@ -61,6 +62,7 @@ def _parts(settings: StudySettings, track: Track) -> Found:
         "parameters": parameter_table(RIG),
         "bulk_modulus": estimates,
         "transfer_functions": transfer_function_table(library),
+        "printed_test": printed_test(RIG, settings.seed, settings.identification_duration, track),
         "validation_rmse": rmse,
         "validation_on_circuit": validation_on_circuit(RIG, library, settings, track),
         "filtering": filtering_table(stream(settings.seed, "filtering"), settings.identification_duration),

@@ -21,7 +21,7 @@ from experiments.papers.motor_tables import motor_table_rows
 from experiments.papers.parts import Evidence
 from experiments.papers.printed import claimed, read_csv
 from experiments.papers.stack_claims import stack_ours
-from experiments.papers.verdict import MISSED, Row, drawn_as, verdict_of
+from experiments.papers.verdict import MISSED, Row, drawn_as, excluded, verdict_of
 from experiments.piezo_stack.figures import STACK_FIGURES
 from plant.errors import HydrostateError
 
@@ -137,7 +137,7 @@ def row_table(rows: list[Row]) -> Rows:
             "errata": row.errata,
             "verdict": verdict_of(row).value,
             "shown_by": row.shown_by,
-            "note": " ".join(part for part in (row.ours.said and f"{row.ours.said}.", row.note) if part),
+            "note": " ".join(part for part in (row.ours.said and f"{row.ours.said}.", excluded(row), row.note) if part),
         }
 
 

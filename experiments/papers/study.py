@@ -61,6 +61,7 @@ def verdict_counts(rows: pd.DataFrame) -> Rows:
             "paper": paper,
             **{verdict.value: int(counts.get(verdict.value, 0)) for verdict in Verdict},
             "rows": len(of_one),
+            "empty": int(of_one["ours"].isna().sum()),
         }
 
 
@@ -126,7 +127,12 @@ _ROWS: Columns = (
 
 COLUMNS: Mapping[str, Columns] = {
     **dict.fromkeys(SECTIONS.values(), _ROWS),
-    "verdicts": ("paper", *(verdict.value for verdict in Verdict), "rows"),
+    "verdicts": (
+        "paper",
+        *(verdict.value for verdict in Verdict),
+        "rows",
+        Column("empty", "of these we have nothing to compare"),
+    ),
     "figures": (
         *("paper", "figure", "title"),
         Column("drawn", words=_verdict),

@@ -1,12 +1,12 @@
 """One row of the page, and the one rule that gives it its verdict. No verdict is written anywhere else."""
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal, TypeAlias, get_args
 
+from experiments.published.digits import digits_half
 from plant.errors import HydrostateError, require_known
 
 Basis: TypeAlias = Literal["computed", "model", "target"]
@@ -109,39 +109,6 @@ class Row:
     note: str = ""
 
 
-_LAST_DIGIT = re.compile(r"^-?\d*\.?(\d*)(?:e(-?\d+))?$")
-
-
-def digits_half(printed: str) -> float:
-    """Return half a unit of the last printed digit.
-
-    Parameters
-    ----------
-    printed : str
-        A number as printed, ``,`` between thousands allowed.
-
-    Returns
-    -------
-    float
-        In the number's unit.
-
-    Raises
-    ------
-    HydrostateError
-        If it is no plain number.
-
-    Examples
-    --------
-    >>> digits_half("3,447.5"), digits_half("4.784e-12"), digits_half("436")
-    (0.05, 5e-16, 0.5)
-    """
-    found = _LAST_DIGIT.match(printed.replace(",", ""))
-    if found is None:
-        raise HydrostateError(f"a printed number must be digits, a point and an exponent, got {printed!r}")
-    decimals, exponent = found.groups()
-    return 0.5 * float(f"1e{int(exponent or 0) - len(decimals)}")
-
-
 def accepted(row: Row) -> tuple[float, float]:
     """Return the range in which ours counts as the printed value.
 
@@ -218,6 +185,19 @@ def verdict_of(row: Row) -> Verdict:
     if agrees(row):
         return AGREES[row.basis]
     return Verdict.ERRATUM if row.errata else Verdict.NOT_REPRODUCED
+
+
+def excluded(row: Row) -> str:
+    """Return a sentence where our own interval excludes the printed value and what its digits leave open; else nothing.
+
+    Examples
+    --------
+    >>> excluded(Row(paper="", where="", claim="", printed="1.89", value=1.89, unit="", accept="digits", basis="model",
+    ...              ours=Ours(1.95, 1.93, 1.97), shown_by=""))
+    'Our 95 % interval excludes it.'
+    """
+    compared = row.ours.low is not None and not row.accept.startswith(("same", "at "))
+    return "Our 95 % interval excludes it." if compared and not agrees(row) else ""
 
 
 def drawn_as(drawing: bool, difference: str, verdicts: Sequence[str]) -> Drawn:

@@ -3,7 +3,8 @@ import math
 import pytest
 
 from experiments.papers.study import _tolerance
-from experiments.papers.verdict import Basis, Ours, Row, accepted, agrees, digits_half, drawn_as, verdict_of
+from experiments.papers.verdict import Basis, Ours, Row, accepted, agrees, drawn_as, excluded, verdict_of
+from experiments.published.digits import digits_half
 from plant.errors import HydrostateError
 
 
@@ -108,3 +109,10 @@ def test_a_figure_with_a_row_that_did_not_come_back_is_drawn_with_a_difference()
 )
 def test_a_reader_sees_a_tolerance_in_words_and_few_digits(accept: str, said: str) -> None:
     assert _tolerance(accept) == said
+
+
+def test_an_interval_that_excludes_the_printed_value_is_said() -> None:
+    assert excluded(row(2.0, Ours(2.5, 2.4, 2.6)))
+    assert not excluded(row(2.0, Ours(2.1, 1.9, 2.3)))
+    assert not excluded(row(2.0, Ours(2.5)))
+    assert not excluded(row(None, Ours(0.5, 0.4, 0.6), accept="at least 1"))

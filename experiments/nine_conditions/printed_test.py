@@ -1,0 +1,90 @@
+"""Table 6 by section 4's own experiment, to the letter, on the circuit.
+
+A binary signal of 4 V without a mean that may switch at 5 Hz, the output alone filtered forth and back by a 12th-order
+Butterworth filter of 30 Hz, and an output-error model of second order.
+"""
+
+from estimation.finding import NORMAL_95
+from estimation.identification.fit.output_error import fit_output_error
+from estimation.identification.model.linear_model import LinearModel
+from estimation.identification.signals.preprocess import zero_phase_filter
+from experiments.nine_conditions.transfer_functions import COEFFICIENTS
+from experiments.page.frames import Rows, tabled
+from experiments.published import as_printed
+from experiments.published.digits import digits_half
+from experiments.running.executors import side_by_side
+from experiments.running.progress import Track, untracked
+from experiments.running.random_streams import stream
+from faults.conditions import CONDITIONS, parameters_for
+from faults.eha.bank import IDENTIFICATION_TIME
+from plant.eha.drives import prbs
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.sensors.sensors import BENCH
+
+CLOCK_HZ = 5.0
+"""How often the printed signal may switch [Hz]."""
+
+
+def printed_test_model(rig: EhaParameters, condition: str, seed: int, duration: float) -> LinearModel:
+    """Return the model that section 4's experiment gives of a circuit.
+
+    Parameters
+    ----------
+    duration : float
+        Length of the test [s].
+    """
+    rng = stream(seed, "Table 6 to the letter", condition)
+    p, T = parameters_for(CONDITIONS[condition], rig), IDENTIFICATION_TIME
+    drive = prbs(duration, T, p.rated_speed, 1.0 / CLOCK_HZ, rng)
+    run = simulate(CIRCUIT, drive, T, p, sensors=BENCH, rng=rng)
+    u, y = zero_phase_filter(run["motor_speed_rad_s"], run["velocity_m_s"], T, filter_input=False)
+    return fit_output_error(
+        u,
+        y,
+        T,
+        n_numerator=3,
+        n_denominator=2,
+        covariance="coloured",
+        input_name="motor_speed_rad_s",
+        output_name="velocity_m_s",
+    )
+
+
+@tabled
+def printed_test(rig: EhaParameters, seed: int, duration: float, track: Track = untracked) -> Rows:
+    """Return the models that section 4's experiment gives of nine circuits, beside Table 6.
+
+    Parameters
+    ----------
+    duration : float
+        Length of each test [s].
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row a condition: coefficients with standard deviations, gain, bandwidth, fit, and ``held``, the coefficients
+        whose 95 % interval meets the printed value within half a unit of its last digit.
+    """
+    published = as_printed("transfer_functions").set_index("condition")
+    done = side_by_side(lambda name: printed_test_model(rig, name, seed, duration), CONDITIONS)
+    done = track(done, len(CONDITIONS), description="Table 6 to the letter")
+    for name, model in zip(CONDITIONS, done, strict=True):
+        values = dict(zip(COEFFICIENTS, [*model.numerator, *model.denominator[1:]], strict=True))
+        stds = dict(zip(COEFFICIENTS, model.coefficient_std, strict=True))
+        printed = {key: str(published.loc[name, key]) for key in COEFFICIENTS}
+        held = [
+            key
+            for key in COEFFICIENTS
+            if abs(values[key] - float(printed[key])) <= NORMAL_95 * stds[key] + digits_half(printed[key])
+        ]
+        yield {
+            "condition": name,
+            **values,
+            **{f"{key}_std": float(std) for key, std in stds.items()},
+            "dc_gain": model.dc_gain,
+            "dc_gain_std": model.dc_gain_std,
+            "bandwidth_hz": model.bandwidth_hz,
+            "fit_percent": model.fit_percent,
+            "held": len(held),
+        }
