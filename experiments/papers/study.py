@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from experiments.page.frames import Rows, Tables, tabled
-from experiments.page.numbers import MISSING, exact, number
+from experiments.page.numbers import MINUS, MISSING, exact, number
 from experiments.page.tables import Cell, Column, Columns, Row, right
 from experiments.papers.claims import PAPERS, all_rows, figure_table, row_table
 from experiments.papers.figures import PAPERS_FIGURES
@@ -86,6 +86,10 @@ def _ours(row: Row) -> Cell:
         return Cell(value)
     if value is None or value != value:
         return right(MISSING)
+    powers = re.fullmatch(r"-?\d\.?(\d*)e(-?\d+)", str(row["printed"]))
+    if powers is not None:  # in the power of ten that is printed, with one digit more, so that both can be compared
+        decimals, exponent = len(powers[1]) + 1, int(powers[2])
+        return right(f"{value / float(f'1e{exponent}'):.{decimals}f}e{exponent}".replace("-", MINUS, int(value < 0.0)))
     # one digit more than is printed, so that both can be compared
     digits = max(5, 1 + len(re.sub(r"e.*|\D", "", str(row["printed"])).lstrip("0")))
     return right(exact(float(f"{value:.{min(digits, 10)}g}")))

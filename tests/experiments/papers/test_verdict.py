@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from experiments.papers.study import _tolerance
+from experiments.papers.study import _ours, _tolerance
 from experiments.papers.verdict import Basis, Ours, Row, accepted, agrees, drawn_as, excluded, verdict_of
 from experiments.published.digits import digits_half
 from plant.errors import HydrostateError
@@ -116,3 +116,12 @@ def test_an_interval_that_excludes_the_printed_value_is_said() -> None:
     assert not excluded(row(2.0, Ours(2.1, 1.9, 2.3)))
     assert not excluded(row(2.0, Ours(2.5)))
     assert not excluded(row(None, Ours(0.5, 0.4, 0.6), accept="at least 1"))
+
+
+@pytest.mark.parametrize(
+    ("printed", "value", "shown"),
+    [("5.57e-7", 5.57e-7, "5.570e-7"), ("-7.440e3", -7451.0, "\N{MINUS SIGN}7.4510e3"), ("58", 62.11, "62.11")],
+)
+def test_ours_stands_in_the_power_of_ten_that_is_printed(printed: str, value: float, shown: str) -> None:
+    cell = _ours({"ours": value, "printed": printed})
+    assert shown in str(getattr(cell, "text", cell))
