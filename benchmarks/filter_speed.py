@@ -8,6 +8,7 @@ of this project.
 """
 
 import argparse
+import os
 import subprocess
 import sys
 import tempfile
@@ -152,8 +153,17 @@ def jax_costs(python: str, batch: list[FilterProblem], rounds: int) -> tuple[lis
             measured=_lanes([scaled(one)[3] for one in batch]),
         )
         script = str(Path(__file__).parent / "peers" / "jax_lanes.py")
+        # one thread, as every other engine here; XLA's pool would spend processor time on waiting
+        alone = {
+            "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1",
+            "OMP_NUM_THREADS": "1",
+        }
         done = subprocess.run(  # noqa: S603  the user names the interpreter, the script is ours
-            [python, script, str(source), str(target), str(rounds)], check=True, capture_output=True, text=True
+            [python, script, str(source), str(target), str(rounds)],
+            check=True,
+            capture_output=True,
+            text=True,
+            env={**os.environ, **alone},
         )
         return [float(line) for line in done.stdout.split()], np.load(target)
 
