@@ -25,8 +25,10 @@ from experiments.circuit.experiments import (
 )
 from experiments.circuit.figures import CIRCUIT_FIGURES
 from experiments.circuit.first_tests import first_tests
+from experiments.circuit.modelled_chambers import modelled_chambers
 from experiments.nine_conditions.settings import StudySettings
 from experiments.page.tables import Column, Columns, interval, spaced
+from experiments.page.words import CONDITION
 from experiments.running.progress import Track
 from experiments.running.random_streams import stream
 from experiments.running.study import Found, Study
@@ -62,6 +64,7 @@ def circuit_studies(
         "figure 9 friction refitted": lambda: friction_refit(rig, stream(seed, "friction refit")),
         "figure 10 validation input": lambda: validation_input(rig, settings),
         "figure 11 bulk modulus": lambda: bulk_modulus_on_circuit(rig, settings),
+        "figure 11 modelled chambers": lambda: modelled_chambers(rig, seed, settings.duration),
     }
 
 
@@ -107,6 +110,14 @@ COLUMNS: Mapping[str, Columns] = {
     ),
     "figure 8 leakage flow refitted": _REFIT,
     "figure 9 friction refitted": _REFIT,
+    "figure 11 modelled chambers": (
+        CONDITION,
+        Column("value_pa", "bulk modulus", "MPa", 1e-6, 5),
+        Column("std_pa", "its deviation", "MPa", 1e-6, 3),
+        Column("error_percent", "error", "%", digits=2),
+        Column("z", "error over deviation", digits=2),
+        Column("gate_passed", "gate passes"),
+    ),
 }
 
 CIRCUIT = Study("circuit", "circuit/report.html", _find, CIRCUIT_FIGURES, COLUMNS, asdict(RIG))
