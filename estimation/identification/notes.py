@@ -47,6 +47,11 @@ class IdentificationCode(Code):
         "in the model of order {order} a pole and a zero nearly cancel, or its gain is not determined; one of order "
         "{taken} does nearly as well on what was held back, and is taken"
     )
+    INPUT_BEYOND_RANGE = (
+        "input {channel!r} goes from {least:.4g} to {greatest:.4g}, the polynomial model was fitted to {low:.4g} to "
+        "{high:.4g}: in {share:.1%} of the samples its products say nothing, and a linear model (--structure "
+        "output-error) may follow better"
+    )
     NO_NONLINEARITY = (
         "neither dead zone nor saturation nor backlash at the input explains {output!r} better on what was held back "
         "than none: the linear model is taken"

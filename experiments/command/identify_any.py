@@ -1,5 +1,6 @@
 """`hydrostate identify LOG --input U --output Y`: a model between any columns, validated, saved and simulated again."""
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +10,7 @@ from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish, run_logs
 from experiments.command.options import figure_path, require_positive
 from experiments.command.terminal import clauses, table
-from plant.errors import HydrostateError, require_known
+from plant.errors import HydrostateError, LogWarning, require_known
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -134,6 +135,7 @@ def _answer(
     test = None
     if tests:
         held = channels_of(tests, asked.inputs, output, data.sample_time)
+        _warn_of_range(found.model, held)
         test = {"files": [str(one) for one in asked.validate], **_quality(found.model, held)}
     figure = figure_path(asked.figure, Path(output), len(asked.outputs))
     if figure is not None:
@@ -230,6 +232,13 @@ def _quality(model: "FreeRunModel", data: "Channels") -> dict[str, Any]:
     return vars(model.quality(data.u, data.y))
 
 
+def _warn_of_range(model: "FreeRunModel", data: "Channels") -> None:
+    from estimation.identification.free_run.input_range import inputs_beyond
+
+    for note in inputs_beyond(model, data):
+        warnings.warn(LogWarning(note), stacklevel=2)
+
+
 def simulate_any(logs: Sequence[Path], path: Path, asked: Asked, *, as_json: bool, out: Path | None) -> None:
     """Simulate a saved model on every log, say how well it follows, and leave with the exit code.
 
@@ -259,6 +268,7 @@ def simulate_any(logs: Sequence[Path], path: Path, asked: Asked, *, as_json: boo
                 )
             record = _record(log, (*inputs, outputs[index]), asked.sample_time)
             data = channels_of([record], inputs, outputs[index], model.sample_time)
+            _warn_of_range(model, data)
             quality = _quality(model, data)
             results.append({"inputs": list(inputs), "output": outputs[index], "structure": model.structure, **quality})
             if asked.simulated is not None:

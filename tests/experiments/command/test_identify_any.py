@@ -164,3 +164,24 @@ def test_a_backlash_is_said_with_its_interval(tmp_path: Path) -> None:
     assert "backlash at u, half width 0.3" in run(tmp_path / "play.csv", *arguments).stdout
     model = hs.read(tmp_path / "play.csv").identify(input="u", output="y", structure="hammerstein", order=2, delay=1)
     assert model.nonlinearity["half_width"] == width
+
+
+def test_a_test_log_whose_input_leaves_the_fitted_range_is_named(tmp_path: Path) -> None:
+    for name, scale in (("fit", 1.0), ("alike", 1.0), ("wider", 3.0)):
+        rng = np.random.default_rng(1)
+        u, y = scale * np.repeat(rng.uniform(-1.0, 1.0, 75), 4), np.zeros(300)
+        for t in range(1, 300):
+            y[t] = 0.8 * y[t - 1] + 0.3 * u[t - 1] - 0.2 * y[t - 1] * abs(y[t - 1])
+        table = pd.DataFrame({"u": u, "y": y + 0.01 * rng.normal(size=300)}, index=0.01 * np.arange(300))
+        table.to_csv(tmp_path / f"{name}.csv", index_label="time_s")
+    channels = ("--input", "u", "--output", "y", "--order", 1, "--delay", 1)
+    for structure, test, named in (("narx", "wider", True), ("narx", "alike", False), ("output-error", "wider", False)):
+        arguments = (*channels, "--structure", structure, "--validate", tmp_path / f"{test}.csv", "--json")
+        ran = run(tmp_path / "fit.csv", *arguments)
+        assert ran.exit_code == 0, ran.output
+        (one,) = json.loads(ran.stdout)
+        codes = [note["code"] for note in one["notes"]]
+        assert ("input_beyond_range" in codes) is named
+        if named:
+            (note,) = [note for note in one["notes"] if note["code"] == "input_beyond_range"]
+            assert note["data"]["greatest"] == pytest.approx(3.0 * note["data"]["high"], rel=0.01)
