@@ -30,11 +30,13 @@ from estimation.models.flow import (
     reaches_relief,
     relieving,
 )
+from estimation.models.greybox import GreyBoxModel
 from estimation.notes import EstimateCode
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
 from plant.log.record import Record
 from plant.notes import Note
+from plant.spare_processors import each
 
 Array = NDArray[np.float64]
 Bounds: TypeAlias = tuple[Array, Array]
@@ -162,21 +164,28 @@ def _balanced(
     relieved = reaches_relief(log.measured, parameters.relief_pressure)
     forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
     search = Search(screened=ceil(SCREENED_SECONDS / log.sample_time))
-    rough: list[tuple[Problem, Point, Bounds]] = []
-    for form in forms:
+
+    def sought(form: GreyBoxModel, tried: Sequence[Mapping[str, float]]) -> tuple[Problem, Point, Bounds]:
         problem = Problem(form, log) if log.gaps.size else FreedProblem.of(form, log)  # what gaps leave open, once
-        tried = [{STIFFNESS: 0.0, **rough[0][0].model.values(rough[0][1].theta)}] if rough else starts
         guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in tried]
         bounds = flow_bounds(form, guesses, log)
-        rough.append((problem, roughly(problem, guesses, search, bounds), bounds))
+        return problem, roughly(problem, guesses, search, bounds), bounds
+
+    first = sought(forms[0], starts)
+    near = [{STIFFNESS: 0.0, **first[0].model.values(first[1].theta)}]
+    rough = [first, *each(lambda form: sought(form, near), forms[1:])]
     least = min(point.cost for _, point, _ in rough)
-    done = [
-        (problem, descend(problem.at, point.theta, FINISHING, bounds))
-        for k, (problem, point, bounds) in enumerate(rough)
-        if k == 0 or point.cost < least + 2.0 * UNLIKELY  # twice what counts: long model steps have errors
+    likely = [  # twice what counts: long model steps have errors
+        one for one in rough if one is first or one[1].cost < least + 2.0 * UNLIKELY
     ]
+
+    def finished(one: tuple[Problem, Point, Bounds]) -> tuple[Problem, Point]:
+        problem, point, bounds = one
+        return problem, descend(problem.at, point.theta, FINISHING, bounds)
+
+    done = each(finished, likely)
     least = min(point.cost for _, point in done)
-    return [concluded(problem, point, disturbed=point.cost < least + UNLIKELY) for problem, point in done]
+    return each(lambda one: concluded(*one, disturbed=one[1].cost < least + UNLIKELY), done)
 
 
 def _asked(log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, loaded: bool) -> tuple[Hypothesis, ...]:

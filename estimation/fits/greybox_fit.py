@@ -17,6 +17,7 @@ from estimation.fits.greybox_problem import Problem, search_bounds
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
+from plant.spare_processors import each
 
 LEAST_EFFECT = 1.0
 """An unknown whose unit change moves the prediction by less, in standard deviations of one sample, is not felt."""
@@ -161,7 +162,7 @@ def roughly(problem: Problem, guesses: Sequence[Array], search: Search, bounds: 
         return descend(part.at, guess, evaluations, bounds, NEAR_ENOUGH)
 
     if len(guesses) > 1:
-        screened = [descended(guess, search.screened, search.screening) for guess in guesses]
+        screened = each(lambda guess: descended(guess, search.screened, search.screening), guesses)
         guesses = [point.theta for point in sorted(screened, key=_cost)[: search.finalists]]
     points: list[Point] = []
     for guess in guesses:

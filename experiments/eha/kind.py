@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from estimation.eha.bulk_modulus import EstimateOptions
     from estimation.finding import Finding
     from estimation.identification.model.linear_model import LinearModel
+    from faults.diagnosis.rmse import Scores
     from plant.eha.rig import Rig
     from plant.log.record import Record
 
@@ -184,15 +185,21 @@ def _identified(parameters: EhaParameters, seed: int) -> "Mapping[str, LinearMod
 def _diagnosed(record: "Record", rig: "Rig[Any]", asked: "tuple[bool, Linear]") -> "Finding":
     from faults.diagnosis.diagnose import diagnose_log
     from faults.diagnosis.rmse import score_transfer_functions
+    from plant.spare_processors import begun
 
     no_pressure, linear = asked
     if no_pressure:
         record = record.replace(**{PRESSURE: None})
-    found = diagnose_log(record, rig)
     if linear is None:
-        return found
+        return diagnose_log(record, rig)
+
+    def scored() -> "Scores":
+        return score_transfer_functions(record, linear())
+
+    waiting = begun(scored) or scored
+    found = diagnose_log(record, rig)
     try:
-        scores = score_transfer_functions(record, linear())
+        scores = waiting()
     except LogError as error:
         note(f"the transfer functions are left out: {error}")
         return found

@@ -4,9 +4,10 @@ The same pass as `estimation.eha.estimate.estimate_log`, carried on: the log is 
 estimated once, and where its gate refuses the fit the class is unknown for the same reasons.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,6 +38,7 @@ from plant.eha.rig import Rig
 from plant.errors import LogError, RigError
 from plant.log.record import Record
 from plant.notes import Note, distinct
+from plant.spare_processors import begun
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +124,7 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
         If the log has neither position nor velocity, or cannot be estimated.
     """
     log = clean_log(record, rig.parameters)
+    plain = _Plain(log, rig.parameters, begun(partial(_of_clean, log, rig.parameters)))
     estimate = estimated(log, rig, EstimateOptions())[1]
     found, strange = finding_of(log, estimate, rig), explained(estimate, rig.parameters)
     outside = tuple(note for note in strange if note.code in OUTSIDE)
@@ -143,7 +146,7 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
         return replace(found, evidence=EhaEvidence(estimate, scores, None))
     doubts = (*refused(estimate), *outside, *log.objections)
     try:
-        diagnosis, loaded = _diagnosed(log, rig.parameters, estimate)
+        diagnosis, loaded = _diagnosed(log, rig.parameters, estimate, plain)
     except (RigError, LogError) as error:
         without = _without_class(found, log, scores, distinct((*doubts, *verdict.against)))
         said = ClassCode.NO_CIRCUIT if isinstance(error, RigError) else ClassCode.NO_PROBABILITIES
@@ -170,13 +173,33 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
     )
 
 
+class _Plain(NamedTuple):
+    """A diagnosis of the log as it came and around the rig as its file says: most logs need no other.
+
+    It is begun beside the estimate of bulk modulus, which may set log and rig right; then it is not asked for.
+    """
+
+    log: CleanLog
+    parameters: EhaParameters
+    result: Callable[[], Diagnosis] | None
+
+    def of(self, log: CleanLog, parameters: EhaParameters) -> Diagnosis:
+        if self.result is not None and log is self.log and parameters == self.parameters:
+            return self.result()
+        return _of_clean(log, parameters)
+
+
+def _of_clean(log: CleanLog, parameters: EhaParameters) -> Diagnosis:
+    return diagnose_clean(log, actuator_of(parameters))
+
+
 def _diagnosed(
-    log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate
+    log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain
 ) -> tuple[Diagnosis, EhaParameters]:
     """Return a diagnosis, under a load where the flow balance holds and the force balance wants one."""
 
     def of(tried: EhaParameters) -> Diagnosis:
-        return diagnose_clean(log, actuator_of(tried))
+        return plain.of(log, tried)
 
     if estimate.form != "flow" or not estimate.gate.passed:
         return of(parameters), parameters

@@ -1,6 +1,7 @@
 """How bad is it? A fitted circuit in the units of a shop, each number with a 95 % interval."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -58,20 +59,24 @@ def severities_at(point: Array, actuator: Actuator) -> Mapping[str, float]:
     Mapping[str, float]
         In the units of `UNITS`.
     """
+    return {name: float(values[0]) for name, values in _of_circuits(point[None], actuator).items()}
+
+
+def _of_circuits(points: Array, actuator: Actuator) -> Mapping[str, Array]:
+    """Return the severities of many circuits, each of shape (n,)."""
     healthy = actuator.circuit
-    (row,) = parameter_rows(point[None], healthy, actuator.rated)
-    p = circuit_values(row)
+    p = circuit_values(parameter_rows(points, healthy, actuator.rated))
     velocity, pressure = steady_state(healthy.rated_speed, p)
     sound_velocity, sound_pressure = steady_state(healthy.rated_speed, healthy)
     rubbing, sound = (
-        float(quadratic_friction(actuator.rated, 1.0, q.friction_quadratic, q.friction_linear, q.friction_coulomb))
+        quadratic_friction(actuator.rated, 1.0, q.friction_quadratic, q.friction_linear, q.friction_coulomb)
         for q in (p, healthy)
     )
     return {
         "leakage_flow": 6e4 * (p.leakage_coefficient * healthy.relief_pressure + p.flow_bias),
         "velocity_lost": 100.0 * (1.0 - velocity / sound_velocity),
         "added_friction": rubbing - sound,
-        "pressure_rise": 100.0 * (pressure / sound_pressure - 1.0) if sound_pressure > 0.0 else 0.0,
+        "pressure_rise": 100.0 * (pressure / sound_pressure - 1.0) if sound_pressure > 0.0 else np.zeros(len(points)),
         "bulk_modulus": p.bulk_modulus,
         "entrained_air": _air(p.bulk_modulus, actuator),
     }
@@ -100,13 +105,13 @@ def severities(
     centre = fits.best.coordinates
     drawn = rng.multivariate_normal(centre, fits.spread, DRAWS, method="cholesky")
     with np.errstate(all="ignore"):  # friction that falls faster than leakage holds has no steady state
-        table, best = [severities_at(point, actuator) for point in drawn], severities_at(centre, actuator)
+        table, best = _of_circuits(drawn, actuator), severities_at(centre, actuator)
     found: dict[str, Quantity] = {}
     for name, value in best.items():
         if not np.isfinite(value):
             found[name] = Quantity(None, UNITS[name])
             continue
-        low, high = (float(end) for end in np.nanpercentile([row[name] for row in table], (2.5, 97.5)))
+        low, high = (float(end) for end in np.nanpercentile(table[name], (2.5, 97.5)))
         stretch = 1.0 if widths is None else widths.get(name, 1.0)
         ends = value - stretch * (value - low), value + stretch * (high - value)
         found[name] = Quantity(value, UNITS[name], ends)
@@ -167,11 +172,11 @@ def with_bulk_modulus(found: Mapping[str, Quantity], estimated: Quantity, actuat
     return {**found, "bulk_modulus": estimated, "entrained_air": _with_air(air, estimated, actuator)}
 
 
-def _air(bulk_modulus: float, actuator: Actuator) -> float:
-    """Return the air at atmospheric pressure that would make the oil so soft [%]."""
+def _air(bulk_modulus: Any, actuator: Actuator) -> Any:
+    """Return the air at atmospheric pressure that would make the oil so soft [%], of one modulus or many."""
     healthy = actuator.circuit
     softness = 1.0 / bulk_modulus - 1.0 / healthy.bulk_modulus
-    return 100.0 * max(0.0, softness * healthy.accumulator_pressure**2 / ATMOSPHERE)
+    return 100.0 * np.maximum(0.0, softness * healthy.accumulator_pressure**2 / ATMOSPHERE)
 
 
 def _with_air(air: Quantity, modulus: Quantity, actuator: Actuator) -> Quantity:

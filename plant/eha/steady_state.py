@@ -1,13 +1,15 @@
 """Where the actuator settles under a constant motor speed: equations 5.7, 5.8 and 5.11."""
 
-from math import copysign
+from typing import Any
+
+import numpy as np
 
 from plant.components.friction import quadratic_friction, velocity_under_friction
 from plant.components.valves import pumped_flow
 from plant.eha.model import EhaValues
 
 
-def steady_state(speed: float, p: EhaValues) -> tuple[float, float]:
+def steady_state(speed: float, p: EhaValues) -> tuple[Any, Any]:
     """Return velocity and differential pressure in the steady state, with dead zone and relief (errata E7, E8).
 
     With no rates left, the flow balance gives the pressure as a line in velocity, and the force balance becomes the
@@ -17,12 +19,12 @@ def steady_state(speed: float, p: EhaValues) -> tuple[float, float]:
     ----------
     speed : float
         Motor speed [rad/s].
-    p : EhaParameters or namespace of float
-        The actuator.
+    p : EhaParameters or namespace of float or ndarray
+        The actuator, or many that differ in some parameters.
 
     Returns
     -------
-    tuple of float
+    tuple of float or ndarray
         Velocity [m/s] and differential pressure [Pa].
 
     Examples
@@ -32,21 +34,21 @@ def steady_state(speed: float, p: EhaValues) -> tuple[float, float]:
     >>> round(velocity, 4), round(pressure / 1e5, 2)
     (0.0431, 4.28)
     """
-    pumped = float(pumped_flow(speed, p.pump_displacement, p.flow_bias))
-    velocity, pressure = _settled(pumped, p.leakage_coefficient, 0.0, p)
-    if abs(pressure) <= p.relief_pressure:
-        return velocity, pressure
-    held = p.relief_conductance * p.relief_pressure * (1.0 if pressure > 0.0 else -1.0)
-    return _settled(pumped + held, p.leakage_coefficient, p.relief_conductance, p)
+    pumped = pumped_flow(speed, p.pump_displacement, p.flow_bias)
+    closed = _settled(pumped, p.leakage_coefficient, p)
+    held = p.relief_conductance * p.relief_pressure * np.where(closed[1] > 0.0, 1.0, -1.0)
+    relieved = _settled(pumped + held, p.leakage_coefficient + p.relief_conductance, p)
+    below = np.abs(closed[1]) <= p.relief_pressure
+    velocity, pressure = (np.where(below, one, other) for one, other in zip(closed, relieved, strict=True))
+    return (velocity, pressure) if velocity.ndim else (float(velocity), float(pressure))
 
 
-def _settled(flow: float, leakage: float, relief: float, p: EhaValues) -> tuple[float, float]:
-    A, conductance = p.piston_area, leakage + relief
-    if conductance == 0.0:
-        velocity, direction = flow / A, copysign(1.0, flow)
-        force = quadratic_friction(velocity, direction, p.friction_quadratic, p.friction_linear, p.friction_coulomb)
-        return velocity, float(force) / A
-    resistance = A * A / conductance + p.friction_linear
-    push = A * flow / conductance
-    velocity = float(velocity_under_friction(push, resistance, p.friction_quadratic, p.friction_coulomb))
-    return velocity, (flow - A * velocity) / conductance
+def _settled(flow: Any, conductance: Any, p: EhaValues) -> tuple[Any, Any]:
+    """Return velocity and pressure where this flow passes piston and leakage paths."""
+    area, quadratic, coulomb = p.piston_area, p.friction_quadratic, p.friction_coulomb
+    tight = np.asarray(conductance == 0.0)  # all of the flow moves the piston, whatever the pressure
+    paths = np.where(tight, 1.0, conductance)
+    leaking = velocity_under_friction(area * flow / paths, area**2 / paths + p.friction_linear, quadratic, coulomb)
+    velocity = np.where(tight, flow / area, leaking)
+    force = quadratic_friction(velocity, np.copysign(1.0, flow), quadratic, p.friction_linear, coulomb)
+    return velocity, np.where(tight, force / area, (flow - area * velocity) / paths)

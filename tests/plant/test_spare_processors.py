@@ -1,0 +1,75 @@
+"""Spare processors change when an answer comes, never what it is."""
+
+import threading
+import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+from plant import spare_processors
+from plant.spare_processors import begun, each
+
+
+@pytest.fixture
+def two(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine of two processors."""
+    monkeypatch.setattr(spare_processors, "spare_processors", lambda: 1)
+
+
+def _no_number(case: float) -> float:
+    if case < 0.0:
+        raise ValueError(case)
+    return case
+
+
+def test_no_processor_is_spare_in_a_pools_process_or_in_a_thread() -> None:
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        assert pool.submit(spare_processors.spare_processors).result() == 0
+    found: list[int] = []
+    thread = threading.Thread(target=lambda: found.append(spare_processors.spare_processors()))
+    thread.start()
+    thread.join()
+    assert found == [0]
+
+
+@pytest.mark.usefixtures("two")
+def test_what_was_begun_runs_meanwhile_and_its_thread_ends_though_nobody_asks() -> None:
+    began = threading.Event()
+    waiting = begun(began.set)
+    assert waiting is not None
+    assert began.wait(5.0)
+    until = time.monotonic() + 5.0
+    while threading.active_count() > 1 and time.monotonic() < until:
+        time.sleep(0.01)
+    assert threading.active_count() == 1
+    waiting()
+
+
+@pytest.mark.usefixtures("two")
+def test_what_goes_wrong_meanwhile_is_raised_where_the_result_is_asked_for() -> None:
+    waiting = begun(lambda: _no_number(-1.0))
+    assert waiting is not None
+    with pytest.raises(ValueError, match="-1"):
+        waiting()
+    with pytest.raises(ValueError, match="-2"):
+        each(_no_number, [1.0, -2.0, 3.0])
+
+
+@pytest.mark.usefixtures("two")
+def test_cases_keep_their_order_and_how_numpy_takes_errors() -> None:
+    def slow_first(case: int) -> tuple[int, str]:
+        time.sleep(0.02 / (1 + case))
+        return case, np.geterr()["divide"]
+
+    with np.errstate(divide="ignore"):
+        assert each(slow_first, range(4)) == [(case, "ignore") for case in range(4)]
+
+
+def test_nothing_is_begun_without_a_spare_processor(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spare_processors, "spare_processors", lambda: 0)
+    names: list[str] = []
+    assert begun(lambda: names.append("begun")) is None
+    each(lambda _: names.append(threading.current_thread().name), [1, 2])
+    assert names == [threading.current_thread().name] * 2
