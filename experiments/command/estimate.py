@@ -72,7 +72,13 @@ def estimate(
             "position, pressure. All by default.",
         ),
     ] = "",
-    tune: Annotated[bool, flag("--tune", "Tune the filter's noise levels to the log by likelihood.")] = False,
+    tune: Annotated[
+        bool | None,
+        flag(
+            "--tune/--no-tune",
+            "Tune the filter's noise levels to the log by likelihood; by default where --form pressure has pressure.",
+        ),
+    ] = None,
     smooth: Annotated[
         bool, flag("--smooth", "Smooth: what the whole log says of every sample (method smoother).")
     ] = False,

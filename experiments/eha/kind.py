@@ -38,7 +38,7 @@ ITS_CHANNELS = ("motor_speed_rad_s", *SENSORS.values(), "pressure_a_pa", "pressu
 
 NOT_FAULTY = dict.fromkeys(("condition", "leakage_severity", "friction_severity"))
 AS_THE_LOG_ALLOWS = {"form": "auto", "method": "auto", "sensors": "", "no_pressure": False, "condition": None}
-OF_A_FILTER = {"states": "", "robust": "none", "tune": False, "smooth": False, "figure": None}
+OF_A_FILTER = {"states": "", "robust": "none", "tune": None, "smooth": False, "figure": None}
 FIRST_GUESS = {"start": None, "start_std": 3e8}
 EXPERIMENT = {"sensors": ",".join(SENSORS), "noise": "bench", "drive": "steps", "seconds": 10.0, "rate": 1000.0}
 
@@ -85,12 +85,17 @@ def _faulty(rig: EhaParameters, options: Options) -> tuple[EhaParameters, dict[s
 
 def _prepared_estimation(
     rig: "Rig[Any]", options: Options
-) -> "tuple[Rig[Any], tuple[EstimateOptions, frozenset[str]]]":
-    """Return the rig in its condition, how its log is estimated, and the channels that are not to be used."""
+) -> "tuple[Rig[Any], tuple[EstimateOptions, frozenset[str], bool]]":
+    """Return the rig in its condition, how its log is estimated, what channels not to use, and if tuning is open.
+
+    Unless told either way, the pressure form is tuned where it has pressure: with noise levels for any rig its interval
+    is several times too wide.
+    """
     how, unused = _how(options), _unused(options["sensors"], options["no_pressure"])
+    open_choice = options["tune"] is None and how.form == "pressure" and how.method in ("auto", "ekf")
     if options["condition"] is not None:
         rig = replace(rig, parameters=parameters_for(find_condition(options["condition"]), rig.parameters))
-    return rig, (how, unused)
+    return rig, (how, unused, open_choice)
 
 
 def _how(options: Options) -> "EstimateOptions":
@@ -115,7 +120,7 @@ def _how(options: Options) -> "EstimateOptions":
     if start != 0.0:
         require_positive("--start", start, "Pa")
     method = "smoother" if options["smooth"] else method
-    return EstimateOptions(form, method, start, options["start_std"], wanted, options["tune"], robust)
+    return EstimateOptions(form, method, start, options["start_std"], wanted, bool(options["tune"]), robust)
 
 
 def _unused(sensors: str, no_pressure: bool) -> frozenset[str]:
@@ -131,11 +136,14 @@ def _listed(names: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in names.split(",") if name.strip())
 
 
-def _estimated(record: "Record", rig: "Rig[Any]", asked: "tuple[EstimateOptions, frozenset[str]]") -> "Finding":
+def _estimated(record: "Record", rig: "Rig[Any]", asked: "tuple[EstimateOptions, frozenset[str], bool]") -> "Finding":
     from estimation.eha.estimate import estimate_log
 
-    how, unused = asked
-    return estimate_log(record.replace(**{channel: None for channel in unused if channel in record}), rig, how)
+    how, unused, open_choice = asked
+    record = record.replace(**{channel: None for channel in unused if channel in record})
+    if open_choice and PRESSURE in record:
+        how = replace(how, tuned=True)
+    return estimate_log(record, rig, how)
 
 
 def _innovations(found: "Finding", log: str, path: Path) -> None:

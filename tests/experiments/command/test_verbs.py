@@ -138,6 +138,22 @@ def test_estimate_keeps_its_contract(
     assert 0.0 < one["bound_percent"] < 3.0
 
 
+@pytest.mark.parametrize(
+    ("options", "tuned"),
+    [
+        (("--form", "pressure"), True),
+        (("--form", "pressure", "--no-tune"), False),
+        (("--form", "pressure", "--no-pressure"), False),
+        (("--method", "ekf"), False),
+    ],
+)
+def test_the_pressure_form_is_tuned_where_it_has_pressure_unless_told_otherwise(
+    steps: dict[str, Path], options: tuple[str, ...], tuned: bool
+) -> None:
+    (one,) = results("estimate", steps[".csv"], "--condition", "minor_friction", *options)
+    assert (one["noise"] is not None) == tuned
+
+
 def test_both_engines_and_both_forms_can_be_chosen(folder: Path) -> None:
     path = folder / "reduced.parquet"
     made = invoke(
