@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.fits.descent import Point, descend
+from estimation.fits.descent import Point, descend_together
 from estimation.fits.freed_problem import FreedProblem
 from plant.arrays import Array
 
@@ -77,7 +77,7 @@ def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[
     """
     others: list[Point] = []
     for _ in range(RESCALED):
-        ends = [_ended(problem, best, factor, way) for factor in SCALES]
+        ends = _ended(problem, best, way)
         lowest = min(ends, key=lambda point: point.cost)
         if lowest.cost > best.cost - BETTER:
             return best, [*others, *ends]
@@ -85,11 +85,13 @@ def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[
     return best, others
 
 
-def _ended(problem: FreedProblem, best: Point, factor: float, way: Way) -> Point:
-    """Return the optimum downhill from another's, all forces multiplied by a factor."""
-    values = dict(problem.model.values(best.theta))
-    values |= {name: values[name] * factor for name in GROWING}
-    values |= {name: values[name] / factor for name in FALLING}
-    start = np.clip(problem.model.theta(values), *way.bounds)
-    near = descend(way.near.at, start, way.nearing, way.bounds, way.near_enough)
-    return descend(problem.at, near.theta, way.finishing, way.bounds)
+def _ended(problem: FreedProblem, best: Point, way: Way) -> list[Point]:
+    """Return the optima downhill from another's, all forces multiplied by each of `SCALES`; searched side by side."""
+    starts: list[Array] = []
+    for factor in SCALES:
+        values = dict(problem.model.values(best.theta))
+        values |= {name: values[name] * factor for name in GROWING}
+        values |= {name: values[name] / factor for name in FALLING}
+        starts.append(np.clip(problem.model.theta(values), *way.bounds))
+    near = descend_together(way.near.at_each, starts, way.nearing, way.bounds, way.near_enough)
+    return descend_together(problem.at_each, [one.theta for one in near], way.finishing, way.bounds)

@@ -18,6 +18,7 @@ from estimation.fits.side_by_side import LANES, compile_side_by_side
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
+from plant.spare_processors import each
 
 NUDGE = 1e-4
 """Step of the finite differences in the fitted coordinates [dimensionless]. Residuals of a piston that sticks and slips
@@ -172,7 +173,7 @@ class FreedProblem(Problem):
             return np.stack([self._alone(row, drives) for row in rows], axis=-1)
         filled = np.concatenate([rows, np.repeat(rows[-1:], -len(rows) % LANES, axis=0)])
         shared = (self.log.drives if drives is None else drives)[..., None]
-        found = [self._side_by_side(filled[i : i + LANES], shared) for i in range(0, len(filled), LANES)]
+        found = each(lambda some: self._side_by_side(some, shared), np.split(filled, len(filled) // LANES))
         return np.concatenate(found, axis=-1)[..., : len(rows)]
 
     def _side_by_side(self, rows: Array, drives: Array) -> Array:

@@ -20,7 +20,7 @@ FAR = np.full(len(UNKNOWNS), 40.0)
 
 def searched(at: Callable[[np.ndarray], Point]) -> tuple[Point, list[Point]]:
     """Return the best and the other optima of a misfit, as they are found from the point `HERE`."""
-    problem = cast("FreedProblem", SimpleNamespace(model=MODEL, at=at))
+    problem = cast("FreedProblem", SimpleNamespace(model=MODEL, at_each=lambda thetas: [at(theta) for theta in thetas]))
     return rescaled(problem, at(HERE), Way(problem, 12, 0.01, 25, (-FAR, FAR)))
 
 

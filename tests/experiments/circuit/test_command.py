@@ -42,7 +42,7 @@ def test_the_circuit_reproduces_the_definitions_that_tables_3_and_4_give(tmp_pat
     line = [COMMAND, "circuit", "--quick", "--out", tmp_path / "circuit", "--seed", "7"]
     subprocess.run(line, capture_output=True, check=True)  # noqa: S603 - our own command
     tables = tmp_path / "circuit" / "tables"
-    assert len(list(tables.glob("*.csv"))) == 12
+    assert len(list(tables.glob("*.csv"))) == 13
     assert (tmp_path / "circuit" / "report.html").read_text(encoding="utf-8").count("<figure") == len(CIRCUIT_FIGURES)
     leakage = pd.read_csv(tables / "figure_3_velocity_against_leakage_throttle.csv").set_index("throttle_a_v")
     assert leakage.loc[2.0, "percent_of_normal"] == pytest.approx(71.4, abs=0.5)
