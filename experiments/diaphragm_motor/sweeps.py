@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from experiments.page.frames import Rows, tabled
-from plant.diaphragm_motor.composite_plate import PlateParameters, plate_coefficients, plate_modes
+from plant.diaphragm_motor.composite_plate import (
+    PlateParameters,
+    mode_shape,
+    plate_coefficients,
+    plate_deflection,
+    plate_modes,
+)
 from plant.diaphragm_motor.flow import OperatingPoint, operate, pump_alone
 from plant.diaphragm_motor.model import FLOWS, OPENINGS, PRESSURES
 from plant.diaphragm_motor.parameters import DIAPHRAGMS, DiaphragmMotorParameters
@@ -30,7 +36,7 @@ FREQUENCIES = (20.0, 60.0, *np.arange(100.0, 401.0, 25.0).tolist(), *np.arange(4
 SWINGS = (100.0, 150.0, 200.0, 250.0, 300.0)
 """Voltages peak to peak [V]: the range of section 7.1."""
 
-SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.95)
+SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0)
 """Loads as shares of the blocking force [dimensionless]."""
 
 LOADS = (0.0, 12.5, 25.0, 37.5)
@@ -257,3 +263,33 @@ def dry_modes() -> pd.DataFrame:
     """
     rows = [(mode.diameters, mode.circles, mode.root, mode.frequency) for mode in plate_modes(PlateParameters())]
     return pd.DataFrame(rows, columns=["diameters", "circles", "root", "frequency_hz"])
+
+
+def bent_plate() -> pd.DataFrame:
+    """Return how the dry diaphragm bends along a radius, in place of Figure 42 (Table 1).
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns radius_m, at_100_v_m (without pressure) and at_10_kpa_m (without voltage).
+    """
+    plate = PlateParameters()
+    radii = np.linspace(0.0, plate.clamp_radius, 57)
+    volts, pressure = (plate_deflection(plate, *load, radii) for load in ((0.0, 100.0), (1e4, 0.0)))
+    return pd.DataFrame({"radius_m": radii, "at_100_v_m": volts, "at_10_kpa_m": pressure})
+
+
+@tabled
+def mode_shapes() -> Rows:
+    """Return the shapes of the dry diaphragm's first six modes, in place of Figure 43.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns mode, diameters, circles, frequency_hz, share_of_radius, angle_rad, shape.
+    """
+    radii, angles = (found.ravel() for found in np.meshgrid(np.linspace(0.0, 1.0, 21), np.linspace(0.0, 2 * np.pi, 49)))
+    for number, mode in enumerate(plate_modes(PlateParameters()), start=1):
+        named = {"mode": number, "diameters": mode.diameters, "circles": mode.circles, "frequency_hz": mode.frequency}
+        for radius, angle, shape in zip(radii, angles, mode_shape(mode, radii, angles), strict=True):
+            yield {**named, "share_of_radius": radius, "angle_rad": angle, "shape": shape}

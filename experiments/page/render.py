@@ -41,8 +41,8 @@ def render_page(
         The page; it loads nothing.
     """
 
-    def table(name: str, caption: str) -> Markup:
-        return html_table(facts[name], columns[name], " ".join(caption.split()))
+    def table(name: str, caption: str, *, cards: bool = False) -> Markup:
+        return html_table(facts[name], columns[name], " ".join(caption.split()), cards=cards)
 
     def figure(name: str, caption: str) -> Markup:
         caption = " ".join(caption.split())

@@ -143,10 +143,10 @@ def interval(low: str, high: str, digits: int = 4) -> Callable[[Row], str]:
     return lambda row: f"{number(row[low], digits)} to {number(row[high], digits)}"
 
 
-def html_table(frame: pd.DataFrame, columns: Columns, caption: str) -> Markup:
-    """Return a data frame as an HTML table in a box that scrolls sideways."""
+def html_table(frame: pd.DataFrame, columns: Columns, caption: str, *, cards: bool = False) -> Markup:
+    """Return a data frame as an HTML table in a box that scrolls sideways; with cards, a card a row on a phone."""
     shown = [column.in_full() for column in _named(frame, columns)]
-    body = [[_cell(column, row) for column in shown] for row in frame.to_dict("records")]
+    body = [[_cell(column, row, named=cards) for column in shown] for row in frame.to_dict("records")]
     head = Markup("").join(
         Markup('<th scope="col" class="{}">{}{}</th>').format(
             "number" if all('class="number"' in cell for cell in cells) else "",
@@ -157,9 +157,9 @@ def html_table(frame: pd.DataFrame, columns: Columns, caption: str) -> Markup:
     )
     rows = Markup("\n").join(Markup("<tr>{}</tr>").format(Markup("").join(cells)) for cells in body)
     return Markup(
-        '<div class="scroll" tabindex="0" role="region" aria-label="{}"><table>\n<caption>{}</caption>\n'
+        '<div class="scroll" tabindex="0" role="region" aria-label="{}"><table{}>\n<caption>{}</caption>\n'
         "<thead><tr>{}</tr></thead>\n<tbody>\n{}\n</tbody></table></div>"
-    ).format(caption, caption, head, rows)
+    ).format(caption, Markup(' class="cards whole"') if cards else "", caption, head, rows)
 
 
 def _named(frame: pd.DataFrame, columns: Columns) -> Iterator[Column]:
@@ -172,7 +172,8 @@ def _named(frame: pd.DataFrame, columns: Columns) -> Iterator[Column]:
             yield Column(entry) if isinstance(entry, str) else entry
 
 
-def _cell(column: Column, row: Row) -> Markup:
+def _cell(column: Column, row: Row, *, named: bool) -> Markup:
+    head = Markup(' data-head="{}"').format(column.header) if named else ""
     value = row[column.source]
     if column.of_row is not None:
         shown = column.of_row(row)
@@ -181,8 +182,8 @@ def _cell(column: Column, row: Row) -> Markup:
     else:
         shown = _by_type(column, value)
     if isinstance(shown, Cell):
-        return Markup('<td class="{}">{}</td>').format(shown.tone, shown.text)
-    return Markup("<td>{}</td>").format(shown)
+        return Markup('<td class="{}"{}>{}</td>').format(shown.tone, head, shown.text)
+    return Markup("<td{}>{}</td>").format(head, shown)
 
 
 def _by_type(column: Column, value: Any) -> Shown:

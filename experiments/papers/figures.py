@@ -1,11 +1,16 @@
 """Figures of the diaphragm-motor paper that its tables hold and no other study draws. They compute nothing."""
 
 import matplotlib.ticker as ticker
+import numpy as np
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from experiments.page.figure_files import Drawings
 from experiments.page.frames import Tables
-from experiments.page.style import BLUE, Margins, panels
+from experiments.page.style import BLUE, VERMILION, Margins, panels
+
+RISING = LinearSegmentedColormap.from_list("rising", (VERMILION, "#f7f7f7", BLUE))
+"""Colours of what falls, rests and rises."""
 
 
 def draw_table_4(tables: Tables) -> Figure:
@@ -71,6 +76,42 @@ def draw_modes(tables: Tables) -> Figure:
     return figure
 
 
+def draw_bent_plate(tables: Tables) -> Figure:
+    """Draw how the diaphragm bends at a voltage and under a pressure: Figure 42.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The study's tables.
+    """
+    figure, (axis,) = panels("Deflection of the dry diaphragm along a radius", 1, 1, 3.6, Margins(left=0.75, top=0.5))
+    rows = tables["bent plate"]
+    axis.plot(1e3 * rows["radius_m"], 1e6 * rows["at_100_v_m"], color=BLUE, label="100 V, no pressure")
+    axis.plot(1e3 * rows["radius_m"], 1e6 * rows["at_10_kpa_m"], "--", color=VERMILION, label="10 kPa, no voltage")
+    axis.set(xlabel="distance from the centre [mm]", ylabel="deflection [µm]")
+    axis.legend()
+    return figure
+
+
+def draw_mode_shapes(tables: Tables) -> Figure:
+    """Draw the shapes of the dry plate's first six modes: Figure 43.
+
+    Parameters
+    ----------
+    tables : Mapping[str, pandas.DataFrame]
+        The study's tables.
+    """
+    margins = Margins(left=0.3, top=0.75, across=0.4, down=0.5, bottom=0.2)
+    figure, axes = panels("Shapes of the dry plate's first six modes: blue rises while red falls", 2, 3, 5.4, margins)
+    for axis, (number, rows) in zip(axes, tables["mode shapes"].groupby("mode"), strict=True):
+        radius, angle = rows["share_of_radius"], rows["angle_rad"]
+        across, up = radius * np.cos(angle), radius * np.sin(angle)
+        axis.tricontourf(across, up, rows["shape"], levels=np.linspace(-1.0, 1.0, 15), cmap=RISING)
+        axis.set(aspect="equal", title=f"mode {number}: {1e-3 * rows['frequency_hz'].iloc[0]:.1f} kHz")
+        axis.set_axis_off()
+    return figure
+
+
 def draw_poles(tables: Tables) -> Figure:
     """Draw the poles of equation 20 for small voltages; it has no zeros: Figure 33.
 
@@ -92,6 +133,8 @@ def draw_poles(tables: Tables) -> Figure:
 PAPERS_FIGURES: Drawings = {
     "table_4": draw_table_4,
     "table_5": draw_table_5,
+    "bent_plate": draw_bent_plate,
+    "mode_shapes": draw_mode_shapes,
     "dry_modes": draw_modes,
     "poles": draw_poles,
 }

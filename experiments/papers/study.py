@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from experiments.diaphragm_motor.sweeps import bent_plate, mode_shapes
 from experiments.page.frames import Rows, Tables, tabled
 from experiments.page.numbers import MINUS, MISSING, exact, number
 from experiments.page.tables import Cell, Column, Columns, Row, right
@@ -41,7 +42,8 @@ def papers_study(parts: Path) -> Study[PapersSettings]:
         tables["verdicts"] = verdict_counts(rows)
         shown = {"table 4": found["motor-paper"]["table_4"], "table 5": found["motor-paper"]["table_5"]}
         drawn = {"poles": found["motor-paper"]["poles"], "dry modes": found["diaphragm-motor"]["dry_modes"]}
-        return Found({**tables, **shown, **drawn})
+        ours = {"bent plate": bent_plate(), "mode shapes": mode_shapes()}
+        return Found({**tables, **shown, **drawn, **ours})
 
     return Study("papers", "papers/report.html", find, PAPERS_FIGURES, COLUMNS, PARAMETERS, _facts, "report")
 

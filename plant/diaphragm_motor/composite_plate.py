@@ -150,8 +150,18 @@ def _shares(region: _Region, nu: float, r: float, pressure: float) -> tuple[Arra
     return constants, loaded, np.array([0.0, 0.0, -region.force, -region.moment])
 
 
-def _bent(p: PlateParameters, pressure: float, volts: float) -> tuple[float, float]:
-    """Return volume [m^3] and deflection of the centre [m] under pressure on the ceramic's side and voltage."""
+class _Bent(NamedTuple):
+    """Constants of the two regions' closed forms: what grows with r, what falls with it, and what pressure adds."""
+
+    inner: float
+    outer: float
+    outer_inverse: float
+    turned_inner: float
+    turned_outer: float
+
+
+def _bent(p: PlateParameters, pressure: float, volts: float) -> _Bent:
+    """Return how the plate bends under pressure on the ceramic's side and voltage."""
     covered, bare = _regions(p)
     nu, b, a = p.poisson_ratio, p.ceramic_radius, p.clamp_radius
     inner, inner_load, inner_volt = _shares(covered, nu, b, pressure)
@@ -165,13 +175,47 @@ def _bent(p: PlateParameters, pressure: float, volts: float) -> tuple[float, flo
     columns = np.abs(matrix / scale[:, None]).max(axis=0)
     c_in, _, c, c_inverse, _, _ = np.linalg.solve(matrix / scale[:, None] / columns, right / scale) / columns
     turned_in, turned_out = (-pressure / (16.0 * (x.bend - x.couple**2 / x.stretch)) for x in (covered, bare))
+    return _Bent(float(c_in), float(c), float(c_inverse), turned_in, turned_out)
 
-    # w is the slope's integral from the rim inwards; the volume is pi times the integral of slope r^2
-    rise = 0.5 * c * (a**2 - b**2) + c_inverse * np.log(a / b) + 0.25 * turned_out * (a**4 - b**4)
-    rise += 0.5 * c_in * b**2 + 0.25 * turned_in * b**4
-    volume = 0.25 * c * (a**4 - b**4) + 0.5 * c_inverse * (a**2 - b**2) + turned_out * (a**6 - b**6) / 6.0
-    volume += 0.25 * c_in * b**4 + turned_in * b**6 / 6.0
-    return pi * float(volume), float(rise)
+
+def _volume(p: PlateParameters, bent: _Bent) -> float:
+    """Return the volume [m^3]: pi times the integral of slope r^2."""
+    b, a = p.ceramic_radius, p.clamp_radius
+    outer = 0.25 * bent.outer * (a**4 - b**4) + 0.5 * bent.outer_inverse * (a**2 - b**2)
+    outer += bent.turned_outer * (a**6 - b**6) / 6.0
+    return pi * (outer + 0.25 * bent.inner * b**4 + bent.turned_inner * b**6 / 6.0)
+
+
+def plate_deflection(p: PlateParameters, pressure: float, volts: float, radii: Array) -> Array:
+    """Return how far the plate bends along a radius, by composite thin-plate theory (Table 1, errata M14).
+
+    Parameters
+    ----------
+    pressure : float
+        On the ceramic's side [Pa].
+    volts : float
+        Across the ceramic [V].
+    radii : ndarray, shape (n,)
+        Distances from the centre, at most the clamp's [m].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Deflection [m]; zero at the clamp.
+
+    Examples
+    --------
+    >>> profile = plate_deflection(PlateParameters(), 0.0, 1.0, np.array([0.0, 7e-3, 14e-3]))
+    >>> np.abs(np.round(1e9 * profile, 1)).tolist()
+    [83.8, 60.3, 0.0]
+    """
+    bent, b, a = _bent(p, pressure, volts), p.ceramic_radius, p.clamp_radius
+    # the slope's integral from the rim inwards
+    r = np.maximum(radii, b)
+    outer = 0.5 * bent.outer * (a**2 - r**2) + bent.outer_inverse * np.log(a / r)
+    outer += 0.25 * bent.turned_outer * (a**4 - r**4)
+    r = np.minimum(radii, b)
+    return outer + 0.5 * bent.inner * (b**2 - r**2) + 0.25 * bent.turned_inner * (b**4 - r**4)
 
 
 def plate_coefficients(p: PlateParameters) -> PlateCoefficients:
@@ -188,8 +232,8 @@ def plate_coefficients(p: PlateParameters) -> PlateCoefficients:
     >>> [float(f"{value:.3g}") for value in found]
     [1.17e-13, 2.31e-11, 5.19e-10, 8.38e-08]
     """
-    volume, rise = _bent(p, 1.0, 0.0)
-    pumped, lifted = _bent(p, 0.0, 1.0)
+    volume, pumped = (_volume(p, _bent(p, *load)) for load in ((1.0, 0.0), (0.0, 1.0)))
+    rise, lifted = (float(plate_deflection(p, *load, np.zeros(1))[0]) for load in ((1.0, 0.0), (0.0, 1.0)))
     return PlateCoefficients(abs(volume), abs(pumped), abs(rise), abs(lifted))
 
 
@@ -242,3 +286,31 @@ def plate_modes(p: PlateParameters, count: int = 6) -> list[PlateMode]:
     mass = p.brass_density * p.brass_thickness + covered * p.ceramic_density * p.ceramic_thickness
     rate = sqrt(stiffness / mass) / (2.0 * pi * a**2)
     return [PlateMode(n, s, root, root * rate) for n, s, root in clamped_plate_roots(count)]
+
+
+def mode_shape(mode: PlateMode, radii: Array, angles: Array) -> Array:
+    """Return the shape in which a clamped round plate rings. Source: Leissa, Vibration of Plates (1969), section 2.1.
+
+    Parameters
+    ----------
+    mode : PlateMode
+        Of `plate_modes`.
+    radii : ndarray, shape (n,)
+        Distances from the centre over the clamp's radius, 0 to 1 [dimensionless].
+    angles : ndarray, shape (n,)
+        From the line along which it moves most [rad].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Deflection over the largest of those asked for [dimensionless].
+
+    Examples
+    --------
+    >>> first = plate_modes(PlateParameters(), 1)[0]
+    >>> mode_shape(first, np.array([0.0, 0.5, 1.0]), np.zeros(3)).round(3).tolist()
+    [1.0, 0.525, 0.0]
+    """
+    n, wave = mode.diameters, sqrt(mode.root)
+    shape = (jv(n, wave * radii) - jv(n, wave) / iv(n, wave) * iv(n, wave * radii)) * np.cos(n * angles)
+    return shape / np.abs(shape).max()

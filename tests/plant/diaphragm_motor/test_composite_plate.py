@@ -9,7 +9,9 @@ import pytest
 from plant.diaphragm_motor.composite_plate import (
     PlateParameters,
     clamped_plate_roots,
+    mode_shape,
     plate_coefficients,
+    plate_deflection,
     plate_modes,
 )
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
@@ -60,3 +62,32 @@ def test_the_first_dry_mode_is_far_above_the_drive() -> None:
 def test_an_impossible_plate_is_refused(name: str, value: float) -> None:
     with pytest.raises(RigError, match=f"{name} must"):
         PlateParameters(**{name: value})
+
+
+@pytest.mark.parametrize(("pressure", "volts"), [(1e4, 0.0), (0.0, 100.0)])
+def test_the_volume_is_that_under_the_deflected_plate(pressure: float, volts: float) -> None:
+    radii = np.linspace(0.0, PLATE.clamp_radius, 2001)
+    bent = plate_deflection(PLATE, pressure, volts, radii)
+    found = plate_coefficients(PLATE)
+    under = 2.0 * pi * np.trapezoid(bent * radii, radii)
+    assert abs(under) == pytest.approx(found.compliance * pressure + found.volume_a_volt * volts, rel=1e-5)
+    assert abs(bent[0]) == pytest.approx(found.deflection_a_pascal * pressure + found.deflection_a_volt * volts)
+
+
+def test_bare_brass_bends_as_in_the_textbook_and_is_held_at_the_clamp() -> None:
+    bare = replace(PLATE, ceramic_thickness=0.0)
+    bend = bare.brass_modulus * bare.brass_thickness**3 / (12.0 * (1.0 - bare.poisson_ratio**2))
+    radii = np.linspace(0.0, bare.clamp_radius, 29)
+    wanted = 1e4 / (64.0 * bend) * (bare.clamp_radius**2 - radii**2) ** 2
+    np.testing.assert_allclose(np.abs(plate_deflection(bare, 1e4, 0.0, radii)), wanted, rtol=1e-9, atol=1e-18)
+
+
+def test_modes_have_their_nodal_lines_and_neither_move_nor_turn_at_the_clamp() -> None:
+    radii, angles = np.linspace(0.0, 1.0, 501), np.linspace(0.01, 2.0 * pi + 0.01, 721)
+    for mode in plate_modes(PLATE):
+        along = mode_shape(mode, radii, np.zeros(501))
+        assert np.sum(along[1:-2] * along[2:-1] < 0.0) == mode.circles
+        around = mode_shape(mode, np.full(721, 0.3), angles)
+        assert np.sum(around[:-1] * around[1:] < 0.0) == 2 * mode.diameters
+        assert abs(along[-1]) < 1e-9
+        assert abs(along[-2]) < 1e-3
