@@ -3,8 +3,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 SEED ?= 2024
 WORKERS ?= 2
+ORDER := $(or $(ORDER),$(shell date +%s))
 
-.PHONY: study papers test test-slow lint benchmark peers release docs clean
+.PHONY: study papers test test-random test-slow coverage lint benchmark peers release docs clean
 
 # One stamp a kind of install: re-made when the pins or the project's metadata change.
 $(VENV)/.installed: pyproject.toml constraints.txt
@@ -25,6 +26,17 @@ papers: $(VENV)/.installed
 
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m "not slow"
+
+# Files, and the tests of each, in an order that ORDER gives: without it, another each time.
+test-random: $(VENV)/.installed-dev
+	@echo "make test-random ORDER=$(ORDER)"
+	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m "not slow" \
+		--random-order-bucket=module --random-order-seed=$(ORDER)
+
+# What it leaves in build/coverage tells `python -m benchmarks mutants` which tests execute a line.
+coverage: $(VENV)/.installed-dev
+	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m "not slow" --cov --cov-context=test --cov-report=
+	$(BIN)/python -m coverage report --skip-covered --precision=1
 
 test-slow: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m slow

@@ -1,23 +1,33 @@
-"""Do the tests bite? Faults are planted in a copy of the tree, and the tests that mirror each file are run on it.
+"""Do the tests bite? Faults are planted in a copy of the tree, and the fast tests that can notice them are run on it.
 
-`python -m benchmarks mutants --folder plant/eha --sample 40 --seed 0` draws faults at random from a folder's formulas
-(see `benchmarks.mutation`), runs the fast tests of the mirrored folder for each, stops at the first that fails, and
-lists the faults that none noticed. ``--own`` asks each file's own test alone. With ``--then-all`` survivors go to the
-rest of the fast suite. A fault that makes the tests hang counts as noticed. Kernels go to ``HYDROSTATE_CACHE`` if that
-is set, so that a second run finds them.
+`make coverage` records which test executes which line. Then `python -m benchmarks mutants --sample 600 --results FILE`
+draws faults at random from the formulas of `plant`, `estimation` and `faults` (see `benchmarks.mutation`). Each is
+tried on the tests that execute its line, its own file's before the others, until one fails (`benchmarks.executed`). A
+fault that makes the tests hang counts as noticed. Faults come in random order, so that a part of a run is a fair sample
+too; what ``--results`` holds is not tried again. Without a record, or where a file was edited since, a fault is tried
+on the tests of the mirrored folder.
+
+Kernels go to ``HYDROSTATE_CACHE`` if that is set, so that a second run finds them.
 """
 
 import argparse
+import hashlib
+import json
 import os
 import random
 import shutil
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
 
+from benchmarks.executed import Executed
 from benchmarks.mutation import Mutant, count_mutants, mirrored, mutants_of
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -25,8 +35,8 @@ FOLDERS = ("plant", "estimation", "faults")
 LEAST_SCORE = 0.9
 """Share of the faults that the fast tests are to notice [fraction]."""
 
-PATIENCE, LEAST_WAIT = 5.0, 120.0
-"""A run that takes so many times as long as without a fault hangs, but not before so many seconds [s]."""
+RECORD = "build/coverage/data"
+"""Where `make coverage` leaves which test executes which line."""
 
 LEFT_BEHIND = (".git", ".venv", ".peers", "results", "build", "dist", ".hypothesis", ".ruff_cache", "__pycache__")
 
@@ -34,17 +44,27 @@ LEFT_BEHIND = (".git", ".venv", ".peers", "results", "build", "dist", ".hypothes
 def main(arguments: Sequence[str]) -> int:
     """Print the score and the survivors; return whether the score is too low."""
     given = _options().parse_args(arguments)
+    record = ROOT / given.record
+    executed = Executed(ROOT, record) if record.is_file() else None
+    if executed is None:
+        print(f"no {given.record}: run `make coverage` first to try each fault on all tests that execute its line")
     chosen = draw(ROOT, given.folder or FOLDERS, given.sample, given.seed)
-    with tempfile.TemporaryDirectory(prefix="mutants-") as kept:
-        copy = Path(kept) / "tree"
-        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(*LEFT_BEHIND), symlinks=True)
-        kernels = Path(os.environ.get("HYDROSTATE_CACHE", Path(kept) / "kernels"))
-        survivors = _tried(copy, kernels, chosen, own=given.own, then_all=given.then_all)
-    score = 1.0 - len(survivors) / max(len(chosen), 1)
-    print(f"\n{len(chosen) - len(survivors)} of {len(chosen)} planted faults noticed: {score:.1%}")
-    for one in survivors:
-        print(f"  {one.path}:{one.line}  {one.change}")
-    return int(score < LEAST_SCORE)
+    results = Results(None if given.results is None else Path(given.results))
+    with ExitStack() as stack:
+        free: SimpleQueue[Tree] = SimpleQueue()
+        for _ in range(given.workers):
+            free.put(stack.enter_context(Tree()))
+
+        def tried(mutant: Mutant) -> None:
+            tree = free.get()
+            tests = _tests(executed, mutant)
+            verdict = tree.verdict(mutant, tests, given.seconds)
+            free.put(tree)
+            results.add(mutant, verdict)
+
+        with ThreadPoolExecutor(given.workers) as threads:
+            list(threads.map(tried, [mutant for mutant in chosen if results.verdict(mutant) is None]))
+    return _said(chosen, results)
 
 
 def _options() -> argparse.ArgumentParser:
@@ -52,10 +72,10 @@ def _options() -> argparse.ArgumentParser:
     parser.add_argument("--folder", action="append", help="folder or file of plant, estimation or faults; repeatable")
     parser.add_argument("--sample", type=int, default=40, help="how many faults are drawn")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument(
-        "--own", action="store_true", help="run a file's own test alone, where it has one: seconds a fault"
-    )
-    parser.add_argument("--then-all", action="store_true", help="give survivors to the whole fast suite")
+    parser.add_argument("--record", default=RECORD, help="what `make coverage` left")
+    parser.add_argument("--results", help="file of verdicts, one a line; those it has are not tried again")
+    parser.add_argument("--workers", type=int, default=1, help="how many faults are tried at once")
+    parser.add_argument("--seconds", type=float, default=120.0, help="processor time after which a fault has survived")
     return parser
 
 
@@ -76,18 +96,14 @@ def draw(root: Path, folders: Sequence[str], sample: int, seed: int) -> list[Mut
     Returns
     -------
     list of Mutant
-        By file and line.
+        In random order.
     """
     files = sorted({path for folder in folders for path in _sources(root / folder)})
     texts = {path: path.read_text(encoding="utf-8") for path in files}
     all_of_them = [(path, number) for path in files for number in range(count_mutants(texts[path]))]
     drawn = random.Random(seed).sample(all_of_them, min(sample, len(all_of_them)))  # noqa: S311  no secret
     return [
-        mutant
-        for path in files
-        for mutant in mutants_of(
-            str(path.relative_to(root)), texts[path], sorted(number for at, number in drawn if at == path)
-        )
+        mutant for path, number in drawn for mutant in mutants_of(str(path.relative_to(root)), texts[path], [number])
     ]
 
 
@@ -95,40 +111,146 @@ def _sources(place: Path) -> list[Path]:
     return [place] if place.is_file() else [path for path in place.rglob("*.py") if path.name != "__init__.py"]
 
 
-def _tried(copy: Path, kernels: Path, chosen: Sequence[Mutant], *, own: bool, then_all: bool) -> list[Mutant]:
-    """Return the faults that no test noticed."""
-    waits: dict[tuple[str, ...], float] = {}
-    survivors: list[Mutant] = []
-    for number, mutant in enumerate(chosen, start=1):
-        tests = tuple(mirrored(copy, mutant.path))
-        tests = tests[:-1] if own and len(tests) > 2 else tests
-        if tests not in waits:
-            begin = time.perf_counter()
-            if not _passes(copy, kernels, tests, None):
-                raise SystemExit(f"{' '.join(tests)} fail without any fault")
-            waits[tests] = max(LEAST_WAIT, PATIENCE * (time.perf_counter() - begin))
-        place = copy / mutant.path
-        sound = place.read_text(encoding="utf-8")
-        place.write_text(mutant.source, encoding="utf-8")
-        begin = time.perf_counter()
-        survives = _passes(copy, kernels, tests, waits[tests])
-        if survives and then_all:
-            survives = _passes(copy, kernels, ("tests", *FOLDERS), None)
-        place.write_text(sound, encoding="utf-8")
-        said = "SURVIVES" if survives else "noticed "
-        took = time.perf_counter() - begin
-        print(f"{number:4d} {said} {took:6.1f} s  {mutant.path}:{mutant.line}  {mutant.change}", flush=True)
-        survivors += [mutant] if survives else []
-    return survivors
+def _tests(executed: Executed | None, mutant: Mutant) -> list[str]:
+    return mirrored(ROOT, mutant.path) if executed is None else executed.tests(mutant.path, mutant.line)
 
 
-def _passes(copy: Path, kernels: Path, tests: Sequence[str], wait: float | None) -> bool:
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-m", "not slow", "-p", "no:cacheprovider", *tests]
-    environment = {**os.environ, "HYDROSTATE_CACHE": str(kernels), "PYTHONDONTWRITEBYTECODE": "1"}
-    try:
-        done = subprocess.run(  # noqa: S603  our own
-            command, cwd=copy, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=wait
+class Tree:
+    """A copy of the project in which one fault at a time is planted, and a process that runs tests there."""
+
+    def __enter__(self) -> "Tree":
+        self._stack = ExitStack()
+        kept = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="mutants-")))
+        self.place = kept / "tree"
+        shutil.copytree(ROOT, self.place, ignore=shutil.ignore_patterns(*LEFT_BEHIND), symlinks=True)
+        environment = {
+            "HYDROSTATE_CACHE": str(kept / "kernels"),
+            **os.environ,
+            "PYTHONPATH": str(self.place),
+            "OPENBLAS_NUM_THREADS": "1",
+        }
+        self._runner = self._stack.enter_context(
+            subprocess.Popen(
+                [sys.executable, "-m", "benchmarks.forked"],
+                cwd=self.place,
+                env=environment,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+            )
         )
-    except subprocess.TimeoutExpired:
-        return False
-    return done.returncode == 0
+        self._sound: dict[str, bool] = {}
+        self._planted = 0
+        self.ran([], ["tests/plant/eha", "tests/faults/diagnosis"], 300.0, collect=True)  # imports what is imported
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        assert self._runner.stdin is not None  # noqa: S101  it is a pipe
+        self._runner.stdin.close()
+        self._stack.close()
+
+    def ran(self, tests: Sequence[str], files: Sequence[str], seconds: float, **how: bool) -> dict[str, Any]:
+        """Run tests in the copy as it stands, see `benchmarks.forked.ran`."""
+        assert self._runner.stdin is not None  # noqa: S101  it is a pipe
+        assert self._runner.stdout is not None  # noqa: S101  likewise
+        print(
+            json.dumps({"tests": tests, "files": files, "seconds": seconds, **how}),
+            file=self._runner.stdin,
+            flush=True,
+        )
+        return json.loads(self._runner.stdout.readline())
+
+    def verdict(self, mutant: Mutant, tests: Sequence[str], seconds: float) -> dict[str, Any]:
+        """Plant a fault, run tests until one fails that passes without it, and take the fault out.
+
+        Returns
+        -------
+        dict
+            ``noticed``, ``by`` which test, ``tried`` tests [count], whether ``cut_short``, and ``seconds``.
+        """
+        place, spent = self.place / mutant.path, 0.0
+        sound, dated = place.read_text(encoding="utf-8"), place.stat()
+        while True:
+            self._planted += 1
+            chosen = [test for test in tests if self._sound.get(test, True)]
+            place.write_text(mutant.source, encoding="utf-8")
+            os.utime(place, (self._planted, self._planted))  # no two faults share compiled code
+            found = self._of(chosen, seconds)
+            place.write_text(sound, encoding="utf-8")
+            os.utime(place, ns=(dated.st_atime_ns, dated.st_mtime_ns))
+            spent += found["seconds"]
+            by = next(iter(found["failed"]), None)
+            if found["code"] in {0, 5} or by is None or self._passes(by):
+                noticed = found["code"] not in {0, 5} and not found["cut_short"]
+                told = {key: found[key] for key in ("code", "tried", "cut_short")}
+                return {"noticed": noticed or by is not None, "by": by, **told, "seconds": round(spent, 1)}
+
+    def _of(self, tests: Sequence[str], seconds: float, **how: bool) -> dict[str, Any]:
+        files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
+        if not files:
+            return {"code": 5, "failed": [], "tried": 0, "cut_short": False, "seconds": 0.0}
+        return self.ran([test for test in tests if "::" in test], files, seconds, **how)
+
+    def _passes(self, test: str) -> bool:
+        """Return whether a test passes without any fault."""
+        if test not in self._sound:
+            self._sound[test] = self._of([test], 300.0)["code"] in {0, 5}
+            if not self._sound[test]:
+                print(f"fails without any fault: {test}", flush=True)
+        return self._sound[test]
+
+
+class Results:
+    """Verdicts, kept in a file as they come.
+
+    Parameters
+    ----------
+    file : Path or None
+        One verdict a line; none keeps them in memory alone.
+    """
+
+    def __init__(self, file: Path | None) -> None:
+        self._file = file
+        self._lock = threading.Lock()
+        lines = file.read_text(encoding="utf-8").splitlines() if file is not None and file.exists() else []
+        self._known: dict[str, dict[str, Any]] = {one["id"]: one for one in map(json.loads, lines)}
+
+    def verdict(self, mutant: Mutant) -> dict[str, Any] | None:
+        """Return the verdict on a fault, if there is one."""
+        return self._known.get(_id(mutant))
+
+    def add(self, mutant: Mutant, verdict: dict[str, Any]) -> None:
+        """Keep and print a verdict."""
+        with self._lock:
+            self._known[_id(mutant)] = one = {"id": _id(mutant), "fault": _name(mutant), **verdict}
+            said = "noticed " if verdict["noticed"] else "SURVIVES"
+            print(f"{len(self._known):4d} {said} {verdict['seconds']:6.1f} s  {_name(mutant)}", flush=True)
+            if self._file is not None:
+                with self._file.open("a", encoding="utf-8") as file:
+                    print(json.dumps(one), file=file)
+
+
+def _id(mutant: Mutant) -> str:
+    """Return what tells a fault from all others, those of the file's earlier texts included."""
+    return hashlib.sha256(f"{mutant.path}\n{mutant.source}".encode()).hexdigest()[:16]
+
+
+def _name(mutant: Mutant) -> str:
+    return f"{mutant.path}:{mutant.line}  {mutant.change}"
+
+
+def _said(chosen: Sequence[Mutant], results: Results) -> int:
+    verdicts = [(mutant, found) for mutant, found in _with_verdicts(chosen, results)]
+    survivors = [mutant for mutant, found in verdicts if not found["noticed"]]
+    score = 1.0 - len(survivors) / max(len(verdicts), 1)
+    print(f"\n{len(verdicts) - len(survivors)} of {len(verdicts)} planted faults noticed: {score:.1%}")
+    for mutant in survivors:
+        print(f"  {_name(mutant)}")
+    return int(score < LEAST_SCORE)
+
+
+def _with_verdicts(chosen: Sequence[Mutant], results: Results) -> Iterator[tuple[Mutant, dict[str, Any]]]:
+    for mutant in chosen:
+        found = results.verdict(mutant)
+        if found is not None:
+            yield mutant, found
