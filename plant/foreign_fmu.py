@@ -37,7 +37,7 @@ def simulate_fmu(
     path : Path
         The FMU, of FMI 2.0 or 3.0, with a binary for this machine.
     drive : ndarray, shape (n,)
-        Motor speed at the samples [rad/s], held from each to the next.
+        Motor speed at the samples [rad/s], linear between; an FMU holds its inputs, so it gets the mean of each step.
     sample_time : float
         Seconds between samples [s], one communication step.
     columns : Mapping[str, str], optional
@@ -63,10 +63,7 @@ def simulate_fmu(
         If FMPy is missing, the FMU cannot be run, lacks what is wanted, or its run stops being finite.
     """
     speed, fmpy = checked_series(drive), _package()
-    try:
-        told = fmpy.read_model_description(str(path))
-    except Exception as error:  # whatever is wrong with a file of others
-        raise HydrostateError(f"{path}: an FMU is wanted: {error}") from error
+    told = _description(path)
     if told.coSimulation is None:
         raise HydrostateError(f"{path}: an FMU for co-simulation is wanted, this one is for model exchange alone")
     numbers = [one for one in told.modelVariables if one.causality in ("input", "output", "local")]
@@ -98,6 +95,35 @@ def simulate_fmu(
     return measure(truth, sensors, rng)
 
 
+def fmu_variables(path: Path) -> frozenset[str]:
+    """Return the names of an FMU's variables.
+
+    Parameters
+    ----------
+    path : Path
+        The FMU.
+
+    Returns
+    -------
+    frozenset of str
+        Inputs, outputs, parameters and what is inside.
+
+    Raises
+    ------
+    HydrostateError
+        If FMPy is missing or the file is no FMU.
+    """
+    return frozenset(one.name for one in _description(path).modelVariables)
+
+
+def _description(path: Path) -> Any:
+    fmpy = _package()
+    try:
+        return fmpy.read_model_description(str(path))
+    except Exception as error:  # whatever is wrong with a file of others
+        raise HydrostateError(f"{path}: an FMU is wanted: {error}") from error
+
+
 def _package() -> Any:
     try:
         import fmpy
@@ -112,6 +138,7 @@ def _run(
     """Return the wanted variables at every sample, by name."""
     time = sample_time * np.arange(len(speed))
     foreign = (speed - driven.offset) / driven.factor
+    foreign[:-1] = 0.5 * (foreign[:-1] + foreign[1:])
     signals = np.array(list(zip(time, foreign, strict=True)), dtype=[("time", float), (driven.name, float)])
     span: dict[str, Any] = {"start_time": 0.0, "stop_time": time[-1], "step_size": sample_time}
     try:

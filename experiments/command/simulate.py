@@ -11,6 +11,7 @@ from experiments.command.json_output import json_text
 from experiments.command.options import (
     SEED,
     BiasPressure,
+    Columns,
     ConditionName,
     Frequency,
     Json,
@@ -79,11 +80,22 @@ def simulate(
         str | None,
         option("NAME", "piezo-stack: a condition, or such as air_doubled; diaphragm-motor: such as valve_4_leak=0.1."),
     ] = None,
+    fmu: Annotated[
+        Path | None,
+        option(
+            "FILE", "In place of a plant of ours: another tool's FMU for co-simulation, with a binary for this machine."
+        ),
+    ] = None,
+    columns: Columns = None,
+    parameter: Annotated[
+        list[str] | None, option("NAME=VALUE", "Start value of one of the FMU's variables, in its own unit. Repeat it.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Simulate a run and write it as a log in SI, with what made it: parameters, condition, seed, versions.
 
-    Columns have the project's own names, whatever the rig calls its logs' columns.
+    Columns have the project's own names, whatever the rig calls its logs' columns. Of an FMU, --columns names the
+    variables; a condition sets those of its parameters' names. An FMU is a program: run none that you do not trust.
     """
     from experiments.actuators import offered
     from plant.log.files import write_record

@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.actuator_kind import ActuatorKind, Experiment, LogVerb, Options, Run, Simulation
+from experiments.actuator_kind import ActuatorKind, Experiment, LogVerb, Options, Simulation
 from experiments.command.json_output import Result
 from experiments.command.options import PRESSURE, require_positive
 from experiments.command.terminal import note
@@ -14,11 +14,11 @@ from experiments.eha.entries import NO_DIAGNOSIS, NO_ESTIMATE, diagnosis_entries
 from experiments.eha.identifiability import CHANNELS as SENSORS
 from experiments.eha.identifiability import cards_of, experiment_entries, experiments_shown
 from experiments.eha.screens import diagnoses_shown, estimates_shown
-from faults.conditions import CONDITIONS, LEVELS, find_condition, parameters_for, severity
+from experiments.eha.simulated import simulated
+from faults.conditions import CONDITIONS, find_condition, parameters_for
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError, LogError, require_known
 from plant.log.columns import CHANNELS
-from plant.notes import Code
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -41,46 +41,6 @@ AS_THE_LOG_ALLOWS = {"form": "auto", "method": "auto", "sensors": "", "no_pressu
 OF_A_FILTER = {"states": "", "robust": "none", "tune": None, "smooth": False, "figure": None}
 FIRST_GUESS = {"start": None, "start_std": 3e8}
 EXPERIMENT = {"sensors": ",".join(SENSORS), "noise": "bench", "drive": "steps", "seconds": 10.0, "rate": 1000.0}
-
-
-class RunCode(Code):
-    """Notes on a simulated run."""
-
-    PRESSURE_NOT_LOGGED = "{channel} is not logged by these sensors: estimate and diagnose will be less certain"
-
-
-def _simulated(rig: "Rig[Any]", options: Options) -> Run:
-    import numpy as np
-
-    from plant.eha.drives import DRIVES, make_drive
-    from plant.eha.simulate import PLANTS, simulate
-    from plant.sensors.sensors import SENSORS as NOISE
-
-    plant = options["plant"] if options["plant"] in PLANTS else "lumped"
-    drive, sensors, seed = options["drive"], options["sensors"], options["seed"]
-    require_known("--drive", drive, list(DRIVES))
-    require_known("--sensors", sensors, list(NOISE))
-    parameters, made_of = _faulty(rig.parameters, options)
-    drive_rng, sensor_rng = np.random.default_rng(seed).spawn(2)
-    speed = make_drive(drive, options["duration"], options["sample_time"], parameters, drive_rng)
-    record = simulate(
-        PLANTS[plant], speed, options["sample_time"], parameters, sensors=NOISE[sensors], rng=sensor_rng
-    ).annotate(**made_of, drive=drive, rig=rig.name, seed=seed)
-    said = {"plant": plant, **made_of, "drive": drive, "sensors": sensors, "seed": seed}
-    return Run(record, said, () if PRESSURE in record else (RunCode.PRESSURE_NOT_LOGGED.note(channel=PRESSURE),))
-
-
-def _faulty(rig: EhaParameters, options: Options) -> tuple[EhaParameters, dict[str, Any]]:
-    """Return the faulty actuator, and what made it so."""
-    name, leakage, friction = (options[key] for key in ("condition", "leakage_severity", "friction_severity"))
-    if leakage is None and friction is None:
-        found = find_condition(name or "normal")
-        name, leakage, friction = found.name, float(LEVELS.index(found.leakage)), float(LEVELS.index(found.friction))
-    elif name is not None:
-        raise HydrostateError("a --condition or severities are wanted, got both")
-    leaking, rubbing = leakage or 0.0, friction or 0.0
-    made_of = {"condition": name, "leakage_severity": leaking, "friction_severity": rubbing}
-    return severity(leaking, rubbing, rig), made_of
 
 
 def _prepared_estimation(
@@ -231,8 +191,10 @@ EHA = ActuatorKind(
     models=("reduced", "lumped", "circuit"),
     rig_name="paper",
     simulate=Simulation(
-        run=_simulated,
-        options=NOT_FAULTY | {"drive": "steps", "duration": 10.0, "sample_time": 1e-4, "sensors": "bench"},
+        run=simulated,
+        options=NOT_FAULTY
+        | {"drive": "steps", "duration": 10.0, "sample_time": 1e-4, "sensors": "bench"}
+        | {"fmu": None, "columns": None, "parameter": None},
     ),
     estimate=LogVerb(
         run=_estimated,
