@@ -35,17 +35,17 @@ SAMPLES, SAMPLE_TIME, ROUNDS = 100_000, 1e-4, 9
 WANTED = {"agreement": 1e-12, "acceleration": 25.0, "pressure": 60.0}
 BRANCHING = ("-fno-if-conversion", "-fno-if-conversion2", "-fno-tree-slp-vectorize")
 BUILDS = {
-    "gcc": ("gcc", FUSING),
+    "gcc": ("gcc", ("-march=native", *BRANCHING)),
+    "gcc, choices": ("gcc", FUSING),
     "gcc, no fma": ("gcc", ()),
     "gcc, contracting": ("gcc", ("-std=gnu17", "-march=native")),
-    "gcc, branches": ("gcc", ("-march=native", *BRANCHING)),
-    "clang": ("clang", FUSING),
+    "clang": ("clang", ("-march=native",)),
     "clang, no fma": ("clang", ()),
 }
-"""Compilers with their flags beside ``-std=c99 -O2``: as the Makefile has it, for any x86-64 processor, where
-the compiler may fuse by itself, and with choices left to the processor's prediction."""
+"""Compilers with their flags beside ``-std=c99 -O2``: as the Makefile has it, with choices that the compiler may make
+without branches, for any x86-64 processor, and where the compiler may fuse by itself."""
 
-AGREEING = ("gcc", "gcc, no fma", "gcc, contracting", "clang", "clang, no fma")
+AGREEING = ("gcc", "gcc, choices", "gcc, no fma", "gcc, contracting", "clang", "clang, no fma")
 """Builds that are compared with Python over every form and condition."""
 
 BINS = (50, 100, 200, 300, 500, 1000, 2000, 5000, 10_000, 100_000, 1_000_000, 10_000_000)
