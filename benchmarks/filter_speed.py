@@ -1,10 +1,10 @@
 """Cost of one filter step: compiled filters, alone and in lanes, beside the same filter in other tools.
 
 Every peer runs in the same run, interleaved with ours, CPU time, medians over the rounds. "Lanes" is the verb, from
-separate logs to separate results; "lanes, kernel" finds the logs side by side already, as the C++ kernel does. filterpy
-is written as its users write it (`benchmarks.peers.filterpy_user`), C++ and JAX as an expert would (`ekf_simd.cpp`,
-`jax_lanes.py`). JAX runs in the environment that ``--jax`` names (a Python that imports jax), since it is no dependency
-of this project.
+separate logs to separate results; "lanes, kernel" finds the logs side by side already, as the C++ kernel and JAX do, so
+their ratios are to it. filterpy is written as its users write it (`benchmarks.peers.filterpy_user`), C++ and JAX as
+an expert would (`ekf_simd.cpp`, `jax_lanes.py`). "Bridge" is filterpy with our compiled model. JAX has one thread and
+runs in the environment that ``--jax`` names (a Python that imports jax), since it is no dependency of this project.
 """
 
 import argparse
@@ -46,7 +46,18 @@ CHANNELS = ("position_m", "velocity_m_s")
 VARIANCES = {"position_m": 1e-12, "velocity_m_s": 1e-6}
 SAMPLE_TIME = 1e-4
 ROUNDS = 7
-WANTED = {"lanes ns": 13.0, "of C++": 1.6, "filterpy": 3500.0, "JAX": 5.0, "one ns": 35.0, "pressure filterpy": 2000.0}
+WANTED = {
+    "lanes ns": 13.0,
+    "of C++": 1.6,
+    "filterpy": 3500.0,
+    "JAX": 5.0,
+    "one ns": 35.0,
+    "pressure filterpy": 2000.0,
+    "pressure bridge": 1000.0,
+}
+SAME = 1e-4
+"""Largest relative difference of states that are taken for equal: the peer's Jacobian is of differences [fraction]."""
+
 FLOPS_A_SECOND = 44.7e9
 """Peak of one core as measured for the research behind the design; the share of it is an order of magnitude."""
 
@@ -184,6 +195,23 @@ def filterpy_work(problem: FilterProblem) -> Callable[[], None]:
     return work
 
 
+def filterpy_pressure(problem: FilterProblem) -> tuple[Callable[[], None], Array]:
+    """Return the work of a user's own loop on the pressure form, and where its last mean ends up."""
+    scale = np.array([state.scale for state in problem.model.states])
+    speed, measured = problem.drives[:, 0], problem.measured / scale[:2]
+    ended = np.empty(4)
+
+    def work() -> None:
+        kalman = filterpy_user.PressureFilter(EhaParameters(), problem.sample_time, scale)
+        kalman.x, kalman.P = problem.mean.copy(), problem.covariance.copy()
+        kalman.Q = np.diag(problem.noise * problem.sample_time)
+        kalman.R = np.diag(problem.variances / scale[:2] ** 2)
+        filterpy_user.run_pressure(kalman, speed, measured)
+        ended[:] = kalman.x
+
+    return work, ended
+
+
 def acceleration_table(count: int, samples: int, jax: str | None) -> Iterator[tuple[str, float]]:
     """Yield each engine's median cost on the acceleration form; the first is ours in lanes."""
     batch = problems("acceleration", count, samples)
@@ -205,15 +233,20 @@ def acceleration_table(count: int, samples: int, jax: str | None) -> Iterator[tu
 
 
 def pressure_table(count: int, samples: int) -> Iterator[tuple[str, float]]:
-    """Yield each engine's median cost on the pressure form; filterpy has our compiled step and Jacobian there."""
+    """Yield each engine's median cost on the pressure form; the bridge gives filterpy our compiled model."""
     batch = problems("pressure", count, samples)
-    short = replace(batch[0], drives=batch[0].drives[:1000], measured=batch[0].measured[:1000])
+    short = replace(batch[0], drives=batch[0].drives[:1000], measured=batch[0].measured[:1000], every=1)
     long = problems("pressure", 1, 100_000)[0]
+    by_hand, ended = filterpy_pressure(short)
     rounds: dict[str, list[float]] = {}
     for _ in range(ROUNDS + 1):
         rounds.setdefault("lanes", []).append(cost(lambda: list(filter_batch(batch)), count * samples))
         rounds.setdefault("one filter", []).append(cost(lambda: ekf(long), len(long.measured)))
-        rounds.setdefault("filterpy", []).append(cost(lambda: filterpy_ekf(short), 1000))
+        rounds.setdefault("filterpy", []).append(cost(by_hand, 1000))
+        rounds.setdefault("bridge", []).append(cost(lambda: filterpy_ekf(short), 1000))
+    apart = np.max(np.abs(ended - ekf(short).track[-1]) / np.abs(ended))
+    if apart > SAME:
+        raise SystemExit(f"filterpy by hand and our filter are {apart:.1g} apart on the pressure form")
     for name, values in rounds.items():
         yield name, median(values[1:])
 
@@ -235,17 +268,18 @@ def main(arguments: list[str]) -> int:
     found = dict(acceleration_table(options.filters, options.samples, options.jax))
     pressure = dict(pressure_table(options.filters, options.samples))
     print(f"{'engine':14s}{'acceleration ns':>18s}{'pressure ns':>14s}")
-    for name in found:
-        print(f"{name:14s}{found[name]:18.1f}{pressure.get(name, float('nan')):14.1f}")
+    for name in (*found, "bridge"):
+        print(f"{name:14s}{found.get(name, float('nan')):18.1f}{pressure.get(name, float('nan')):14.1f}")
     floor = 1e9 * operations() / FLOPS_A_SECOND
     print(f"{operations()} operations a step: floor {floor:.1f} ns, share of it {100.0 * floor / found['lanes']:.0f} %")
     measured = {
         "lanes ns": found["lanes"],
         "of C++": found["lanes, kernel"] / found["C++ SIMD"] if "C++ SIMD" in found else None,
         "filterpy": found["filterpy"] / found["lanes"],
-        "JAX": found["JAX"] / found["lanes"] if "JAX" in found else None,
+        "JAX": found["JAX"] / found["lanes, kernel"] if "JAX" in found else None,
         "one ns": found["one filter"],
         "pressure filterpy": pressure["filterpy"] / pressure["lanes"],
+        "pressure bridge": pressure["bridge"] / pressure["lanes"],
     }
     missed = 0
     for name, wanted in WANTED.items():

@@ -1,9 +1,10 @@
-"""The acceleration form in filterpy as its users write it: NumPy functions for model and Jacobian, one loop."""
+"""Both forms in filterpy as its users write it: NumPy functions for model and Jacobian, one loop."""
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 
+from estimation.models.eha_forms import pressure_step
 from plant.eha.model import EhaParameters
 
 Array = NDArray[np.float64]
@@ -55,4 +56,32 @@ def run(kalman: AccelerationFilter, speed: Array, measured: Array) -> None:
     for k in range(len(speed)):
         if k:
             kalman.predict(u=speed[k - 1])
+        kalman.update(measured[k], HJacobian=lambda _: H, Hx=lambda x: H @ x)
+
+
+class PressureFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy carries no types
+    """filterpy's filter on the pressure form: the plant's step in plain Python, its Jacobian by differences."""
+
+    def __init__(self, p: EhaParameters, step: float, scale: Array) -> None:
+        super().__init__(dim_x=4, dim_z=2)
+        self.p, self.step, self.scale = p, step, scale
+
+    def moved(self, state: Array, speeds: tuple[float, float]) -> Array:
+        """Return the scaled state one step later."""
+        found = pressure_step(tuple((state * self.scale).tolist()), speeds, self.p, self.step)
+        return np.array([float(one) for one in found]) / self.scale
+
+    def predict_x(self, u: tuple[float, float] = (0.0, 0.0)) -> None:
+        """Move the mean by one step between two motor speeds."""
+        here = self.moved(self.x, u)
+        self.F = np.column_stack([(self.moved(self.x + 1e-6 * one, u) - here) / 1e-6 for one in np.eye(4)])
+        self.x = here
+
+
+def run_pressure(kalman: PressureFilter, speed: Array, measured: Array) -> None:
+    """Filter a log: speed (n,), position and velocity (n, 2), both scaled."""
+    speeds = speed.tolist()
+    for k in range(len(speed)):
+        if k:
+            kalman.predict(u=(speeds[k - 1], speeds[k]))
         kalman.update(measured[k], HJacobian=lambda _: H, Hx=lambda x: H @ x)
