@@ -35,7 +35,8 @@ test-random: $(VENV)/.installed-dev
 
 # What it leaves in build/coverage tells `python -m benchmarks mutants` which tests execute a line.
 coverage: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m "not slow" --cov --cov-context=test --cov-report=
+	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m "not slow" \
+		-p tests.alone --deselect tests/plant/test_spare_processors.py --cov --cov-context=test --cov-report=
 	$(BIN)/python -m coverage report --skip-covered --precision=1
 
 test-slow: $(VENV)/.installed-dev
