@@ -4,6 +4,7 @@ import ast
 import ctypes
 import inspect
 import math
+import sys
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 from types import FunctionType, ModuleType, SimpleNamespace
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from plant.compiled.expression import Expression
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature_of
-from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.paste import bare_text, kernel_text, pasted
 from plant.compiled.source import lines_source
 
 
@@ -36,14 +37,15 @@ def text_of(monkeypatch: pytest.MonkeyPatch, module: ModuleType, compile_it: Cal
 
 
 def functions_of(text: str) -> SimpleNamespace:
-    """A kernel's constants and functions, as Python."""
+    """A kernel's constants and functions, as Python; what was pasted has the lines of its file, for coverage."""
     tree = ast.parse(text)
-    kept = [node for node in tree.body if not _is_made(node)]
-    for node in kept:
+    names: dict[str, Any] = {}
+    for node in tree.body:
         if isinstance(node, ast.FunctionDef):
             node.decorator_list = []
-    names: dict[str, Any] = {}
-    exec(compile(ast.Module(kept, []), "kernel", "exec"), names)  # noqa: S102  our own text
+        if not _is_made(node):
+            file = _as_in_its_file(node) if isinstance(node, ast.FunctionDef) else None
+            exec(compile(ast.Module([node], []), file or "kernel", "exec"), names)  # noqa: S102  our own text
     for node in tree.body:
         match node:
             case ast.Assign([ast.Name(made)], ast.Call(ast.Name("function_of"), [ast.Name(lines), _])):
@@ -51,6 +53,42 @@ def functions_of(text: str) -> SimpleNamespace:
             case _:
                 pass
     return SimpleNamespace(**names)
+
+
+def _as_in_its_file(pasted: ast.FunctionDef) -> str | None:
+    """Give a pasted function's statements the lines that they have in its file, which is returned."""
+    text = ast.unparse(pasted)
+    for module in list(sys.modules.values()):
+        function = getattr(module, pasted.name, None)
+        if not isinstance(function, FunctionType) or function.__module__ != module.__name__ or _bare(function) != text:
+            continue
+        lines, first = inspect.getsourcelines(function)
+        written = ast.parse("".join(lines)).body[0]
+        assert isinstance(written, ast.FunctionDef)
+        if ast.get_docstring(written) is not None:
+            written.body = written.body[1:]
+        ours, theirs = ([n for n in ast.walk(tree) if isinstance(n, ast.stmt)] for tree in (pasted, written))
+        for mine, origin in zip(ours, theirs, strict=True):
+            _onto(mine, origin.lineno + first - 1)
+        return inspect.getsourcefile(function)
+    return None
+
+
+def _bare(function: FunctionType) -> str | None:
+    try:
+        return bare_text(function)
+    except (OSError, TypeError, SyntaxError):
+        return None
+
+
+def _onto(statement: ast.stmt, line: int) -> None:
+    """Put a statement and its expressions, but not the statements in it, onto a line."""
+    waiting: list[ast.AST] = [statement]
+    while waiting:
+        node = waiting.pop()
+        if hasattr(node, "lineno"):
+            node.lineno = node.end_lineno = line  # type: ignore[attr-defined]
+        waiting += [child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.stmt)]
 
 
 def _of_a_tuple(lines: FunctionType) -> Callable[[tuple[float, ...]], tuple[float, ...]]:
