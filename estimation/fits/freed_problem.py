@@ -201,7 +201,7 @@ def _differences(found: Array) -> tuple[Array, Array]:
 
 def _weighed(here: Array, columns: Array) -> tuple[float, Array, Array]:
     """Return cost, gradient and lower triangle of ``J'J``; what is grossly off counts linearly."""
-    weight = np.minimum(1.0, OUTLIER / np.maximum(np.abs(here), OUTLIER))
+    weight = OUTLIER / np.maximum(np.abs(here), OUTLIER)
     cost = float(np.sum((1.0 - 0.5 * weight) * weight * here**2))
     slopes = columns.reshape(here.size, -1)
     bent = slopes * np.where(weight < 1.0, STRAIGHT, 1.0).reshape(-1, 1)

@@ -115,7 +115,13 @@ def _if(scope: Scope, node: ast.If) -> None:
         scope.forget({name for name in scope.known if scope.known[name] is not ends[1].get(name)})
 
 
+def _without_else(node: ast.For | ast.While) -> None:
+    if node.orelse:
+        raise KernelError("the else of a loop is not compiled")
+
+
 def _for(scope: Scope, node: ast.For) -> None:
+    _without_else(node)
     changed = assigned_in([*node.body, node.target])
     value = read(scope, node.iter)
     if isinstance(value.kind, Range):
@@ -138,6 +144,7 @@ def _positive(scope: Scope, step: str) -> str:
 
 
 def _while(scope: Scope, node: ast.While) -> None:
+    _without_else(node)
     head, body, done = (scope.fresh(name) for name in ("while", "do", "end"))
     changed = assigned_in(node.body)
     scope.forget(changed)
