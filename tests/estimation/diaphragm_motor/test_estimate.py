@@ -8,6 +8,7 @@ import pytest
 from estimation.diaphragm_motor.card import flow_change, motor_card
 from estimation.diaphragm_motor.estimate import MotorEstimate, estimate_motor
 from estimation.diaphragm_motor.signature import (
+    TOLERANCE,
     logged_signature,
     modelled_signature,
     steady_drive,
@@ -48,6 +49,23 @@ def test_the_covariance_of_a_signature_is_its_scatter_over_noise() -> None:
     logs = [logged_signature(log_of(MOTOR, 0.2, seed)) for seed in range(40)]
     scatter = np.var([one.values for one in logs], axis=0, ddof=1) / np.diag(logs[0].covariance)
     assert 0.8 < float(np.mean(scatter)) < 1.25
+
+
+def test_the_velocitys_deviation_is_its_scatter_over_noise_of_the_position() -> None:
+    log, rng = log_of(MOTOR, 0.2), np.random.default_rng(2)
+    noise = [1e-5 * rng.standard_normal(len(log)) for _ in range(30)]
+    seen = [logged_signature(log.replace(position_m=log["position_m"] + one)) for one in noise]
+    said = float(np.sqrt(seen[0].covariance[-1, -1]))
+    assert 0.7 < np.std([one.values[-1] for one in seen], ddof=1) / said < 1.4
+
+
+def test_a_motor_that_is_off_by_a_tolerance_is_off_by_about_one_deviation() -> None:
+    covariance = tolerance(MOTOR, 480.0, 200.0)
+    base = modelled_signature(MOTOR, 480.0, 200.0)
+    for name, share in TOLERANCE.items():
+        moved = replace(MOTOR, **{name: (1.0 + share) * getattr(MOTOR, name)})
+        off = modelled_signature(moved, 480.0, 200.0) - base
+        assert 0.3 < np.sqrt(off @ np.linalg.solve(covariance, off)) < 1.0, name
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,57 @@
+"""A circuit is fitted to a log by steps down the slope of its log-posterior."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS
+from faults.diagnosis import class_fit
+from faults.diagnosis.circuit_runs import Blocks, parameter_rows, predicted
+from faults.diagnosis.class_fit import FARTHEST, LASTING, WEAK, Actuator, fit_freely
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+
+ACTUATOR = Actuator.of(EhaParameters())
+PULL = np.asarray(LASTING * np.linalg.inv(WEAK))
+CENTRE = ACTUATOR.conditions[0]
+APART = np.array([0.05, -0.05, 0.08, 0.04, 0.03, 0.05, 0.02])
+
+
+@cache
+def log() -> Blocks:
+    """Return the log of a circuit beside the healthy one, without noise."""
+    speed = np.repeat([60.0, 120.0, -120.0, -70.0], 500)
+    empty = np.zeros(len(speed) // 10)
+    blank = Blocks(np.append(speed, speed[-1]), 1e-3, 10, empty, empty, np.array([1e-4, 2e3]))
+    (found,) = predicted(blank, parameter_rows((CENTRE + APART)[None], ACTUATOR.circuit, ACTUATOR.rated))
+    return replace(blank, velocity=found[:, 0], pressure=found[:, 1])
+
+
+def cost(point: Array) -> float:
+    return class_fit._at(log(), ACTUATOR, CENTRE, point, PULL).cost
+
+
+def test_a_step_is_down_the_slope_of_the_log_posterior() -> None:
+    start = CENTRE + 0.4 * APART
+    here = class_fit._at(log(), ACTUATOR, CENTRE, start, PULL)
+    step = class_fit._step(log(), here, CENTRE, PULL)
+    sides = 1e-3 * np.eye(7)
+    downward = np.array([cost(start - side) - cost(start + side) for side in sides]) / 2e-3
+    assert (here.information + PULL) @ step == pytest.approx(downward, rel=0.1, abs=0.02 * np.abs(downward).max())
+
+
+def test_no_step_is_longer_than_the_longest_and_short_ones_are_whole() -> None:
+    here = class_fit._at(log(), ACTUATOR, CENTRE, CENTRE, PULL)
+    left = (log().outputs - here.fitted)[log().first :] / here.scales**2
+    whole = np.linalg.solve(here.information + PULL, np.einsum("ink,nk->i", here.slopes[:, log().first :], left))
+    far = replace(here, slopes=here.slopes / 100.0, information=here.information / 1e4)
+    assert class_fit._step(log(), here, CENTRE, PULL) == pytest.approx(whole)
+    assert np.abs(class_fit._step(log(), far, CENTRE, 1e-9 * PULL)).max() == pytest.approx(FARTHEST)
+
+
+def test_the_circuit_that_left_a_log_is_found() -> None:
+    found = fit_freely(log(), ACTUATOR, next(iter(CONDITIONS)), gained=1e-3)
+    assert found.cost < cost(CENTRE)
+    assert np.abs(found.coordinates - CENTRE - APART)[:4] == pytest.approx(0.0, abs=0.02)
