@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.log_checks.sensor_check import holds, sensor_objections, without_saturated
+from estimation.log_checks.sensor_check import _slid, holds, sensor_objections, without_saturated
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
@@ -147,3 +147,13 @@ def test_an_encoder_is_not_accused_where_the_pressure_that_held_the_piston_was_c
 def test_a_missing_sample_ends_a_hold() -> None:
     starts, lengths = holds(np.array([1.0, 1.0, np.nan, 1.0, 1.0]))
     assert list(zip(starts.tolist(), lengths.tolist(), strict=True)) == [(0, 2), (2, 1), (3, 2)]
+
+
+@pytest.mark.parametrize(("speed", "found"), [(1e-3, (True, False)), (1e-4, (False, True))])
+def test_a_piston_slid_if_its_velocity_makes_more_way_than_the_encoder_resolves(
+    speed: float, found: tuple[bool, bool]
+) -> None:
+    noise = 1e-7 * np.random.default_rng(1).standard_normal(400)
+    steps = 1e-5 * np.round(np.linspace(0.0, 40.0, 400))
+    record = Record(1e-3, {"position_m": steps, "velocity_m_s": speed + noise})
+    assert _slid(record, slice(100, 300)) == found
