@@ -33,9 +33,11 @@ test-random: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m "not slow" \
 		--random-order-bucket=module --random-order-seed=$(ORDER)
 
-# What it leaves in build/coverage tells `python -m benchmarks mutants` which tests execute a line.
+# Kernels are compiled anew, so that the compiler's own lines are seen. What it leaves in build/coverage tells
+# `python -m benchmarks mutants` which tests execute a line.
 coverage: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m "not slow" \
+	rm -rf build/coverage
+	HYDROSTATE_CACHE=$(CURDIR)/build/coverage/kernels $(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m "not slow" \
 		-p tests.alone --deselect tests/plant/test_spare_processors.py --cov --cov-context=test --cov-report=
 	$(BIN)/python -m coverage report --skip-covered --precision=1
 
