@@ -179,3 +179,13 @@ def test_other_structures_run_free_with_an_offset(structure: str) -> None:
     assert found.held_back_percent > 70.0
     assert found.model.linear is not None
     assert found.model.linear.offset == pytest.approx(found.model.offset, abs=0.05)
+
+
+def test_a_further_value_costs_two_by_akaike_and_the_logarithm_of_the_samples_by_schwarz() -> None:
+    data, _ = scaled(one_log(200))
+    small, large = (candidate(fit_linear(Form(order, (1,), (1,)), data), data) for order in (1, 2))
+    values = large.fit.theta.size - small.fit.theta.size
+    assert values > 0
+    gained = data.n_samples * float(np.log(small.fit.cost / large.fit.cost))
+    assert small.aic - large.aic == pytest.approx(gained - 2.0 * values)
+    assert small.bic - large.bic == pytest.approx(gained - values * float(np.log(data.n_samples)))

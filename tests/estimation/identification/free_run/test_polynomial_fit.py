@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.arrays import Array
+from estimation.identification.free_run.choose_polynomial import _pruned
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import Form, fit_linear
@@ -124,3 +125,17 @@ def test_products_are_held_at_the_ends_of_what_was_seen_and_single_terms_are_not
     single, square = products(start.variables, terms, far, np.zeros(5))[-1]
     assert single == 100.0
     assert square == pytest.approx(start.variables.limits[2, 1] ** 2)
+
+
+def test_pruning_takes_out_a_product_that_explains_nothing_and_keeps_the_plants_own() -> None:
+    data, _ = scaled(log())
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    own = one_more(start, candidate_terms(start.variables), data)
+    assert own is not None
+    assert np.array_equal(_pruned(own, data).terms, own.terms)
+    idle = next(term for term in candidate_terms(start.variables) if {start.variables.source[v] for v in term} == {1})
+    terms, k = np.vstack([own.terms, idle]), own.terms.shape[0]
+    both = Runs(own.variables, terms, data).fit(np.insert(own.theta, k, 0.0), 5)
+    assert both is not None
+    assert np.array_equal(_pruned(both, data).terms, own.terms)
