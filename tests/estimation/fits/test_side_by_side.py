@@ -1,17 +1,19 @@
 """Residuals under parameter sets side by side are those of one run after the other."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from estimation.fits import freed_problem
+from estimation.fits import freed_problem, side_by_side
 from estimation.fits.freed_problem import NUDGE, FreedProblem
 from estimation.fits.greybox_log import greybox_log
 from estimation.fits.greybox_loops import RUNAWAY
 from estimation.fits.greybox_problem import OUTLIER, Problem
 from estimation.fits.hypotheses import HYPOTHESES
 from estimation.fits.side_by_side import LANES, compile_side_by_side
+from estimation.fits.side_by_side_loops import residuals_side_by_side
 from estimation.fits.wide_problem import freed, usual_values, widened
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, flow_parameters
 from estimation.models.greybox import GreyBoxModel
@@ -21,6 +23,7 @@ from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.sensors.sensors import BENCH
 from plant.solvers.steps import parameter_names, parameter_row
+from tests.kernels import functions_of, on_memory, text_of
 
 HEALTHY = EhaParameters()
 VARIANCES = {"motor_speed_rad_s": 1e-4, "position_m": 1e-12, "differential_pressure_pa": 1e7}
@@ -129,3 +132,25 @@ def test_residuals_under_several_rigs_are_those_of_each(problem: FreedProblem) -
     assert np.max(np.abs(both[1] - both[0])) > 0.1
     for found, row in zip(both, (problem.log.parameters, wider), strict=True):
         np.testing.assert_allclose(found, problem.residuals(theta, parameters=row), rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["one_drive", "drives_of_each"])
+def test_the_loop_run_as_python_gives_what_its_kernel_gives(
+    problem: FreedProblem, own: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    n, rng = 10, np.random.default_rng(5)
+    rows = parameter_row(flow_parameters(HEALTHY)) * (1.0 + 0.01 * rng.standard_normal((LANES, 1)))
+    drives = problem.log.drives[200 : 200 + n, :2, None] * (1.0 + 0.1 * np.arange(LANES if own else 1))
+    measured = problem.log.measured[200 : 200 + n].copy()
+    measured[4:6] = np.nan
+    given = measured, 1e-3, np.array([0, *[2] * (n - 3), 3, 3]), 2, np.array([1e7]), np.array([1e6])
+    text = text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(FLOW_FORM))
+    file = functions_of(text)
+    plain = SimpleNamespace(**vars(file))
+    plain.VECTOR = 1
+    for name in ("begin", "settle", "step", "show"):
+        setattr(plain, f"{name}_at", on_memory(file, getattr(file, name)))
+    found, wanted = (np.full((1, n // 2, LANES), np.nan) for _ in range(2))
+    residuals_side_by_side(plain, rows, drives, *given, found)
+    compile_side_by_side(FLOW_FORM)(rows, drives, *given, wanted)
+    np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9)
