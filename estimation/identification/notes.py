@@ -20,6 +20,10 @@ class IdentificationCode(Code):
         "amplifies its noise"
     )
     INPUT_BRIDGED = "input {channel!r} misses {count} of {total} samples: they are bridged by straight lines"
+    INPUT_SPLIT = (
+        "input {channel!r} misses {count} of {total} samples, and no line stands for them: the log is taken as "
+        "{pieces} experiments, each with its own beginning"
+    )
     OUTPUT_ALONE_FILTERED = (
         "only the output is filtered: poles come out 20-30 % off and the gain does not roll off (errata E15); filter "
         "input and output alike, or neither"

@@ -120,7 +120,7 @@ def _together(records: "Sequence[Record]", asked: Asked, outputs: Sequence[str])
     from estimation.identification.free_run.from_records import channels_of
     from estimation.identification.state_space.identify import identify_outputs
 
-    data = [channels_of(records, asked.inputs, output, asked.resampled) for output in outputs]
+    data = [channels_of(records, asked.inputs, output, asked.resampled, split=True) for output in outputs]
     form = {"order": asked.order, "delay": asked.delay, "n_numerator": asked.numerator}
     return dict(zip(outputs, identify_outputs(data, structure=asked.structure, **form), strict=True))
 
@@ -131,12 +131,14 @@ def _answer(
     from estimation.identification.free_run.from_records import channels_of
 
     records, tests = read
-    data = channels_of(records, asked.inputs, output, asked.resampled)
     test = None
     if tests:
-        held = channels_of(tests, asked.inputs, output, data.sample_time)
+        held = channels_of(tests, asked.inputs, output, found.model.sample_time, split=True)
         _warn_of_range(found.model, held)
         test = {"files": [str(one) for one in asked.validate], **_quality(found.model, held)}
+    if not (asked.figure or asked.simulated or asked.response):
+        return {**BLANK, **entries(found), "test": test, "frequency_response": None}
+    data = channels_of(records, asked.inputs, output, asked.resampled)
     figure = figure_path(asked.figure, Path(output), len(asked.outputs))
     if figure is not None:
         from experiments.log_pages.free_run_figure import write_free_run
@@ -269,7 +271,7 @@ def simulate_any(logs: Sequence[Path], path: Path, asked: Asked, *, as_json: boo
             record = _record(log, (*inputs, outputs[index]), asked.sample_time)
             data = channels_of([record], inputs, outputs[index], model.sample_time)
             _warn_of_range(model, data)
-            quality = _quality(model, data)
+            quality = _quality(model, channels_of([record], inputs, outputs[index], model.sample_time, split=True))
             results.append({"inputs": list(inputs), "output": outputs[index], "structure": model.structure, **quality})
             if asked.simulated is not None:
                 several = figure_path(asked.simulated, log, len(logs))

@@ -193,7 +193,7 @@ def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: 
     sample_time = asked.pop("sample_time", None)
     sources = [inputs] if isinstance(inputs, str) else list(inputs)
     data = [
-        channels_of(records, sources, output, sample_time)
+        channels_of(records, sources, output, sample_time, split=True)
         for output in ([outputs] if isinstance(outputs, str) else list(outputs))
     ]
     found = identify_outputs(data, **asked)

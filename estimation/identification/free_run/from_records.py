@@ -1,14 +1,15 @@
-"""From logs to channels: columns chosen, gaps of inputs bridged, everything on one sample time."""
+"""From logs to channels: columns chosen, gaps of inputs bridged or split at, everything on one sample time."""
 
 import warnings
 from collections.abc import Sequence
 
 import numpy as np
 
-from estimation.identification.free_run.data import Channels, channels_from
+from estimation.arrays import BoolArray
+from estimation.identification.free_run.data import FEWEST, Channels, channels_from
 from estimation.identification.notes import IdentificationCode
 from estimation.identification.signals.preprocess import resample
-from estimation.log_checks.bridging import bridged
+from estimation.log_checks.bridging import bridged, gaps
 from plant.arrays import Array
 from plant.errors import HydrostateError, LogWarning
 from plant.log.record import Record
@@ -16,9 +17,23 @@ from plant.log.record import Record
 SAME_CLOCK = 1e-3
 """Share by which sample times may differ and still be one."""
 
+SPOILT = 0.05
+"""Squared errors of a line over a gap, summed, over the input's variance, from which a log is split there [samples]."""
+
+MOST_GAPS = 30
+"""Gaps of one input at which a log is split at most, the worst ones: each part has a beginning that is estimated."""
+
+TRIED = 400
+"""Stretches of an input that are bridged for comparison, at most."""
+
 
 def channels_of(
-    records: Sequence[Record], inputs: Sequence[str], output: str, sample_time: float | None = None
+    records: Sequence[Record],
+    inputs: Sequence[str],
+    output: str,
+    sample_time: float | None = None,
+    *,
+    split: bool = False,
 ) -> Channels:
     """Return inputs and one output of logs on one sample time.
 
@@ -30,6 +45,9 @@ def channels_of(
         Channels.
     sample_time : float, optional
         Wanted [s]; the longest of the logs' unless told.
+    split : bool
+        Whether a log is split where an input is not known, see `pieces`. A model that is fitted or judged across such
+        a gap answers for what was never put in.
 
     Returns
     -------
@@ -44,17 +62,84 @@ def channels_of(
     Warns
     -----
     LogWarning
-        If samples of an input are bridged.
+        If samples of an input are bridged, or a log is split.
     """
     if output in inputs:
         raise HydrostateError(f"input and output must be different channels, got {output!r} for both")
     wanted = max(one.sample_time for one in records) if sample_time is None else sample_time
     u, y = list[Array](), list[Array]()
-    for record in records:
+    for record in (part for one in records for part in (pieces(one, inputs) if split else [one])):
         columns = [_on_clock(without_gaps(record[name], name), record.sample_time, wanted) for name in inputs]
         u.append(np.column_stack(columns))
         y.append(_on_clock(record[output], record.sample_time, wanted))
     return channels_from(u, y, wanted, inputs, output)
+
+
+def pieces(record: Record, inputs: Sequence[str]) -> list[Record]:
+    """Split a log where an input misses samples that a straight line would get wrong.
+
+    How wrong is read off the input itself: where it is whole, stretches as long as the gap are bridged and compared.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    inputs : sequence of str
+        Its inputs.
+
+    Returns
+    -------
+    list of Record
+        The log itself where nothing spoils it; else its parts of at least `FEWEST` samples and a two-hundredth of it.
+
+    Warns
+    -----
+    LogWarning
+        If it is split.
+    """
+    unknown = np.zeros(len(record), dtype=np.bool_)
+    for name in inputs:
+        unknown |= _unknown(record[name])
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], unknown, [True]]).astype(np.int8)))
+    least = max(FEWEST, len(record) // 200)
+    parts = [record.slice(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= least]
+    if not unknown.any() or not parts:
+        return [record]
+    worst = max(inputs, key=lambda name: int(np.isnan(record[name]).sum()))
+    count = int(np.isnan(record[worst]).sum())
+    said = IdentificationCode.INPUT_SPLIT.note(channel=worst, count=count, total=len(record), pieces=len(parts))
+    warnings.warn(LogWarning(said), stacklevel=3)
+    return parts
+
+
+def _unknown(values: Array) -> BoolArray:
+    """Return where an input is missing and no straight line stands for it: the worst `MOST_GAPS`, and both ends."""
+    missing = np.isnan(values)
+    unknown = np.zeros(values.size, dtype=np.bool_)
+    known = np.flatnonzero(~missing)
+    if not missing.any() or known.size < 2:
+        return unknown
+    unknown[: known[0]], unknown[known[-1] + 1 :] = True, True
+    wide = np.flatnonzero(gaps(values)[1])
+    spoilt = [(_spoilt(values, int(known[i + 1] - known[i] - 1)), i) for i in wide]
+    for much, i in sorted(spoilt, reverse=True)[:MOST_GAPS]:
+        if much > SPOILT:
+            unknown[known[i] + 1 : known[i + 1]] = True
+    return unknown
+
+
+def _spoilt(values: Array, length: int) -> float:
+    """Return the squared errors of a line over a gap, summed, over the input's variance [samples]."""
+    # at random, for evenly spaced stretches may keep step with the input's own clock
+    starts = np.random.default_rng(0).integers(0, max(values.size - length - 1, 1), TRIED)
+    stretches = values[np.minimum(starts[:, None] + np.arange(length + 2), values.size - 1)]
+    stretches = stretches[np.isfinite(stretches).all(axis=1)]
+    spread = float(np.nanvar(values))
+    if not len(stretches) or spread == 0.0:
+        return float(length)
+    share = np.arange(1, length + 1) / (length + 1)
+    lines = stretches[:, :1] + share * (stretches[:, -1:] - stretches[:, :1])
+    return float(np.mean(np.sum((stretches[:, 1:-1] - lines) ** 2, axis=1))) / spread
 
 
 def _on_clock(values: Array, sample_time: float, wanted: float) -> Array:

@@ -1,0 +1,73 @@
+"""A log is split where an input is not known, so that no model answers for what was never put in."""
+
+import numpy as np
+import pytest
+
+from estimation.identification.free_run.from_records import MOST_GAPS, channels_of, pieces
+from estimation.identification.free_run.identify import identify_channels
+from plant.arrays import Array
+from plant.errors import LogWarning
+from plant.log.record import Record
+
+T, N = 0.01, 3000
+
+
+def binary(seed: int = 0) -> Array:
+    return np.repeat(np.random.default_rng(seed).choice([-1.0, 1.0], N // 15), 15)
+
+
+def slow() -> Array:
+    return np.sin(2.0 * np.pi * 0.1 * T * np.arange(N))
+
+
+def answered(u: Array) -> Array:
+    y = np.zeros(N)
+    for k in range(2, N):
+        y[k] = 1.85 * y[k - 1] - 0.87 * y[k - 2] + 0.02 * u[k - 1]
+    return y + 0.01 * np.random.default_rng(1).normal(size=N)
+
+
+def log(u: Array, *lost: slice) -> Record:
+    seen = u.copy()
+    for part in lost:
+        seen[part] = np.nan
+    return Record(T, {"u": seen, "y": answered(u)})
+
+
+def test_a_gap_that_a_line_bridges_splits_nothing() -> None:
+    record = log(slow(), slice(1000, 1005))
+    assert pieces(record, ["u"]) == [record]
+
+
+def test_a_log_is_split_where_a_binary_input_is_missing_and_its_ends_are_left_out() -> None:
+    record = log(binary(), slice(0, 40), slice(1000, 1010), slice(2000, 2010), slice(2990, 3000))
+    with pytest.warns(LogWarning) as said:
+        parts = pieces(record, ["u"])
+    assert [len(part) for part in parts] == [960, 990, 980]
+    assert "the log is taken as 3 experiments" in str(said[0].message)
+    assert all(np.isfinite(part["u"]).all() for part in parts)
+    np.testing.assert_array_equal(parts[1]["y"], record["y"][1010:2000])
+
+
+def test_a_slow_logger_leaves_no_gaps() -> None:
+    seen = binary()
+    seen[np.arange(N) % 3 > 0] = np.nan
+    record = Record(T, {"u": seen, "y": answered(binary())})
+    assert [len(part) for part in pieces(record.slice(0, N - 2), ["u"])] == [N - 2]
+
+
+def test_a_log_falls_into_a_bounded_number_of_parts() -> None:
+    lost = [slice(start, start + 10) for start in range(20, N - 20, 30)]
+    with pytest.warns(LogWarning):
+        parts = pieces(log(binary(), *lost), ["u"])
+    assert 1 < len(parts) <= MOST_GAPS + 1
+
+
+def test_a_model_of_a_log_with_gaps_is_that_of_the_whole_log() -> None:
+    whole = identify_channels(channels_of([log(binary())], ["u"], "y"), structure="output-error", order=2).model
+    with pytest.warns(LogWarning):
+        data = channels_of([log(binary(), slice(1000, 1010), slice(2000, 2060))], ["u"], "y", split=True)
+    found = identify_channels(data, structure="output-error", order=2).model
+    tested = channels_of([log(binary(7))], ["u"], "y")
+    off = [one.simulate(tested.u[0], tested.y[0]) - tested.y[0] for one in (whole, found)]
+    assert np.std(off[1]) == pytest.approx(np.std(off[0]), rel=0.02)
