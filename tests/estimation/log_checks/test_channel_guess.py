@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from estimation.log_checks.channel_guess import ChannelGuess, guess_channels
+from estimation.log_checks.channel_guess import ChannelGuess, _alike, guess_channels
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
@@ -48,3 +48,10 @@ def test_a_unit_that_is_not_given_is_guessed_and_makes_less_sure(record: Record)
 def test_own_names_are_sure(record: Record) -> None:
     found = guess(record, {}, {})
     assert {name for name, one in found.items() if one.guess.sure > 0.9} >= set(NAMES)
+
+
+def test_columns_are_alike_whatever_their_offset_and_unit() -> None:
+    one, other = np.random.default_rng(2).standard_normal((2, 50))
+    wanted = np.corrcoef(one, other)[0, 1]
+    assert _alike(one + 7.0, 3.0 * other - 2.0) == pytest.approx(wanted)
+    assert _alike(np.ones(50), other) == 0.0
