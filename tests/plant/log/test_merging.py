@@ -5,6 +5,7 @@ import pytest
 
 from plant.errors import LogError, LogWarning
 from plant.log.files import read_record
+from plant.log.merging import SAME, _same_time
 
 T = 1e-3
 
@@ -62,3 +63,10 @@ def test_dates_and_seconds_are_not_laid_beside_each_other(tmp_path: Path) -> Non
     motor = logger(tmp_path / "a.csv", "motor_speed_rad_s", time, dates)
     with pytest.raises(LogError, match=r"a\.csv has dates and b\.csv has not"):
         read_record(motor, beside=[logger(tmp_path / "b.csv", "position_m", time)])
+
+
+@pytest.mark.parametrize("begin", [0.0, 1000.0])
+def test_clocks_are_the_same_by_their_step_however_late_they_begin(begin: float) -> None:
+    time = begin + T * np.arange(200)
+    assert _same_time(time, time + 0.5 * SAME * T)
+    assert not _same_time(time, time + 2.0 * SAME * T)
