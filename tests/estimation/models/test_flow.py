@@ -4,7 +4,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimation.models.flow import FLOW_FORM, Delivery, chamber_rates, delivered_flow, flow_rates, relieving
+from estimation.models.flow import (
+    FLOW_FORM,
+    HELD_FLOW_FORM,
+    Delivery,
+    chamber_rates,
+    delivered_flow,
+    flow_rates,
+    relieving,
+)
 from plant.components.oil import ATMOSPHERE
 from plant.eha.model import PARAMETER_NAMES, EhaParameters
 
@@ -89,3 +97,18 @@ def test_a_lead_shifts_the_delivered_flow_in_time() -> None:
 
 def test_the_form_for_a_relieving_log_has_the_valve_among_its_unknowns() -> None:
     assert set(relieving(FLOW_FORM).unknowns) - set(FLOW_FORM.unknowns) == {"relief_pressure", "relief_conductance"}
+
+
+def test_the_form_of_held_volumes_asks_how_far_the_piston_moves_and_not_where_it_is() -> None:
+    state, p, step = (1e6, 9e5), values(), 1e-4
+
+    def rates(begin: float, moved: float) -> tuple[float, ...]:
+        return tuple(
+            float(one) for one in HELD_FLOW_FORM.rates(state, ((50.0, 50.0), (begin, begin + moved), step), p, 0)
+        )
+
+    assert rates(0.03, 2e-6) == pytest.approx(rates(-0.01, 2e-6))
+    first, second = (moving - still for moving, still in zip(rates(0.0, 2e-6), rates(0.0, 0.0), strict=True))
+    displaced = P.piston_area * 2e-6 / step * P.bulk_modulus / P.chamber_volume
+    assert first == pytest.approx(-second)
+    assert abs(first - second) == pytest.approx(displaced, rel=1e-6)
