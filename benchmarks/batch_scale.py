@@ -218,7 +218,7 @@ def main(arguments: list[str]) -> int:
         f"workers and project take {begun:.1f} s CPU to begin, {100.0 * begun / max(each) / kernel:.1f} % of the bare run"
     )
     print(
-        f"overhead over the bare run, that included: {100.0 * overhead:.0f} % (wanted: under {100.0 * WANTED_OVERHEAD:.0f} %)"
+        f"overhead over the bare run, with it: {100.0 * overhead:.0f} % (wanted: under {100.0 * WANTED_OVERHEAD:.0f} %)"
     )
     print(f"cost a case, dearest over cheapest size: {ratio:.2f} (wanted: within {WANTED_RATIO})")
     print(f"memory in the first and last quarter: {early / 1e6:.0f} and {late / 1e6:.0f} MB")
