@@ -214,9 +214,7 @@ def main(arguments: list[str]) -> int:
     at = memory.at
     early, late = (statistics.median(held for _, held in part) for part in (at[: len(at) // 4], at[-len(at) // 4 :]))
     print(f"bare: {1e6 * kernel:.0f} us CPU a case (each of {', '.join(f'{1e6 * one:.0f}' for one in bares)})")
-    print(
-        f"workers and project take {begun:.1f} s CPU to begin, {100.0 * begun / max(each) / kernel:.1f} % of the bare run"
-    )
+    print(f"workers and project begin in {begun:.1f} s CPU, {100.0 * begun / max(each) / kernel:.1f} % of the bare run")
     print(
         f"overhead over the bare run, with it: {100.0 * overhead:.0f} % (wanted: under {100.0 * WANTED_OVERHEAD:.0f} %)"
     )
