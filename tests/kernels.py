@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from plant.compiled.expression import Expression
 from plant.compiled.native.load import load_native
+from plant.compiled.native.recipes import PACKAGES
 from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import bare_text, kernel_text, pasted
 from plant.compiled.source import lines_source
@@ -58,8 +59,9 @@ def functions_of(text: str) -> SimpleNamespace:
 def _as_in_its_file(pasted: ast.FunctionDef) -> str | None:
     """Give a pasted function's statements the lines that they have in its file, which is returned."""
     text = ast.unparse(pasted)
-    for module in list(sys.modules.values()):
-        function = getattr(module, pasted.name, None)
+    for name, module in list(sys.modules.items()):
+        ours = name.partition(".")[0] in PACKAGES  # a library's module may answer to a name with a warning
+        function = vars(module).get(pasted.name) if ours else None
         if not isinstance(function, FunctionType) or function.__module__ != module.__name__ or _bare(function) != text:
             continue
         lines, first = inspect.getsourcelines(function)
@@ -67,8 +69,8 @@ def _as_in_its_file(pasted: ast.FunctionDef) -> str | None:
         assert isinstance(written, ast.FunctionDef)
         if ast.get_docstring(written) is not None:
             written.body = written.body[1:]
-        ours, theirs = ([n for n in ast.walk(tree) if isinstance(n, ast.stmt)] for tree in (pasted, written))
-        for mine, origin in zip(ours, theirs, strict=True):
+        here, there = ([n for n in ast.walk(tree) if isinstance(n, ast.stmt)] for tree in (pasted, written))
+        for mine, origin in zip(here, there, strict=True):
             _onto(mine, origin.lineno + first - 1)
         return inspect.getsourcefile(function)
     return None
