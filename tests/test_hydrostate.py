@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 
 import hydrostate as hs
 from estimation.identification.model.recursion import filtered
+from plant.errors import LogWarning
 
 ROOT = Path(__file__).resolve().parents[1]
 HEAVY = ("numpy", "scipy", "pandas", "matplotlib", "typer")
@@ -155,3 +156,19 @@ def test_a_log_of_anything_is_read_related_and_simulated(tmp_path: Path) -> None
         log.estimate()
     with pytest.raises(hs.HydrostateError, match="channels among coil"):
         log.identify(input="coil (V)")
+
+
+def test_a_model_is_not_judged_across_a_gap_of_its_input(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.normal(size=80), 5)
+    y = 3.0 + filtered([0.0, 0.1], [1.0, -0.9], u) + 0.01 * rng.normal(size=400)
+    for name, gone in (("whole", []), ("holed", range(150, 165))):
+        seen = u.copy()
+        seen[list(gone)] = np.nan
+        pd.DataFrame({"t": 0.1 * np.arange(400), "coil": seen, "gap": y}).to_csv(tmp_path / f"{name}.csv", index=False)
+    model = hs.read(tmp_path / "whole.csv").identify(input="coil", output="gap", order=1, delay=1)
+    with pytest.warns(LogWarning, match="coil is missing in 15"):
+        holed = hs.read(tmp_path / "holed.csv")
+    with pytest.warns(LogWarning, match="2 experiments"):
+        tested = model.validate(holed)
+    assert tested.loc["gap", "fit_percent"] == pytest.approx(model.fit_percent, abs=1.0)

@@ -90,7 +90,7 @@ class Relation(Shown):
         """
         import pandas as pd
 
-        parts = [_channels(one, log.record) for one in self.models]
+        parts = [_channels(one, log.record, split=True) for one in self.models]
         rows = {one.output: vars(one.quality(part.u, part.y)) for one, part in zip(self.models, parts, strict=True)}
         return pd.DataFrame.from_dict(rows, orient="index")
 
@@ -167,10 +167,10 @@ def _shared_states(models: "Sequence[FreeRunModel]", bodies: "Sequence[StateSpac
     return control.StateSpace(*one.with_delays_as_states(), one.sample_time, **names)
 
 
-def _channels(model: "FreeRunModel", record: "Record") -> "Channels":
+def _channels(model: "FreeRunModel", record: "Record", *, split: bool = False) -> "Channels":
     from estimation.identification.free_run.from_records import channels_of
 
-    return channels_of([record], model.inputs, model.output, model.sample_time)
+    return channels_of([record], model.inputs, model.output, model.sample_time, split=split)
 
 
 def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: Mapping[str, Any]) -> Relation:
