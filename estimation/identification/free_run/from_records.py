@@ -23,6 +23,9 @@ SPOILT = 0.05
 MOST_GAPS = 30
 """Gaps of one input at which a log is split at most, the worst ones: each part has a beginning that is estimated."""
 
+LONGEST_ANSWER = 20
+"""Outputs that are left out after a gap of an input, at most: dead times are about as long [samples]."""
+
 TRIED = 400
 """Stretches of an input that are bridged for comparison, at most."""
 
@@ -68,10 +71,14 @@ def channels_of(
         raise HydrostateError(f"input and output must be different channels, got {output!r} for both")
     wanted = max(one.sample_time for one in records) if sample_time is None else sample_time
     u, y = list[Array](), list[Array]()
-    for record in (part for one in records for part in (pieces(one, inputs) if split else [one])):
-        columns = [_on_clock(without_gaps(record[name], name), record.sample_time, wanted) for name in inputs]
-        u.append(np.column_stack(columns))
-        y.append(_on_clock(record[output], record.sample_time, wanted))
+    for record in records:
+        for part in pieces(record, inputs) if split else [record]:
+            columns = [_on_clock(without_gaps(part[name], name), part.sample_time, wanted) for name in inputs]
+            answer = _on_clock(part[output], part.sample_time, wanted)
+            if part.start_time > record.start_time:  # it may still answer, after a dead time, to what is not known
+                answer[: min(LONGEST_ANSWER, answer.size // 20)] = np.nan
+            u.append(np.column_stack(columns))
+            y.append(answer)
     return channels_from(u, y, wanted, inputs, output)
 
 

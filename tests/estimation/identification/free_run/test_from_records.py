@@ -63,6 +63,13 @@ def test_a_log_falls_into_a_bounded_number_of_parts() -> None:
     assert 1 < len(parts) <= MOST_GAPS + 1
 
 
+def test_outputs_next_to_a_gap_are_left_out_for_they_may_answer_what_is_not_known() -> None:
+    with pytest.warns(LogWarning):
+        data = channels_of([log(binary(), slice(1000, 1010))], ["u"], "y", split=True)
+    assert [int(np.isnan(y).sum()) for y in data.y] == [0, 20]
+    assert np.isnan(data.y[1][:20]).all()
+
+
 def test_a_model_of_a_log_with_gaps_is_that_of_the_whole_log() -> None:
     whole = identify_channels(channels_of([log(binary())], ["u"], "y"), structure="output-error", order=2).model
     with pytest.warns(LogWarning):
