@@ -31,6 +31,10 @@ class LogError(HydrostateError):
     """A log file cannot be read or trusted."""
 
 
+class NoMemoryError(LogError, MemoryError):
+    """Reading a log needs more memory than there is; another log, or a column alone, may fit."""
+
+
 class MissingColumnError(LogError):
     """A column that a mapping names is not in the log.
 

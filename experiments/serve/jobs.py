@@ -14,7 +14,7 @@ from pebble import ProcessExpired, ProcessPool
 from experiments.command.terminal import unexpected
 from experiments.serve.settings import MB, Settings
 from experiments.serve.store import DONE, FAILED, INTERRUPTED, Kept, Store
-from experiments.serve.work import Task, Worked, begin_worker, work_on
+from experiments.serve.work import NO_MEMORY, Task, Worked, begin_worker, work_on
 
 MOST_TRIES = 3
 """Servers that may end in the middle of the work on a log before it is given up [count]."""
@@ -161,12 +161,7 @@ class Jobs:
         except TimeoutError:
             worked = self._lost(f"the work on it took longer than {self._settings.seconds:g} s and was ended", log)
         except ProcessExpired as error:
-            most = self._settings.memory // MB
-            worked = self._lost(
-                f"the process that worked on it ended (code {error.exitcode}), perhaps for want of memory: it may use "
-                f"{most} MB",
-                log,
-            )
+            worked = self._lost(_why_expired(error.exitcode, self._settings.memory // MB), log)
         except Exception as error:  # what a worker could not even report
             worked = self._lost(unexpected(error), log)
         try:
@@ -186,6 +181,12 @@ class Jobs:
     def _forget(self, identity: str) -> None:
         for path in (log_file, page_file, phase_file):
             path(self._settings, identity).unlink(missing_ok=True)
+
+
+def _why_expired(code: int, most: int) -> str:
+    if code == NO_MEMORY:
+        return f"the work on it needs more memory than the {most} MB that the server gives to one log"
+    return f"the process that worked on it ended (code {code}), perhaps for want of memory: it may use {most} MB"
 
 
 def log_file(settings: Settings, identity: str) -> Path:

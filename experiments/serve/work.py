@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 READING, WORKING, WRITING = "reading the log", "working it out", "writing the page"
 """Where the work on a log is."""
 
+NO_MEMORY = 77
+"""How a process ends whose log asked for more memory than there is: what it still holds, the next log would want."""
+
 LOOKED_AFTER = 1.0
 """Time between two looks whether the server is still there [s]."""
 
@@ -86,6 +89,7 @@ def begin_worker(server: int, memory: int) -> None:
     """
     for name in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{name}_NUM_THREADS", "1")
+    os.environ["ARROW_DEFAULT_MEMORY_POOL"] = "system"  # the others reserve 1 GiB ahead, which the limit counts
     if sys.platform == "linux":
         import resource
 
@@ -106,7 +110,8 @@ def work_on(task: Task) -> Worked:
     Returns
     -------
     Worked
-        With the outcome ``failed`` where the log cannot be used.
+        With the outcome ``failed`` where the log cannot be used. Where memory is wanting, the process ends with
+        `NO_MEMORY` instead.
     """
     blank: Mapping[str, Any] = {}
     with caught() as said:
@@ -114,10 +119,10 @@ def work_on(task: Task) -> Worked:
             task.phase.write_text(READING, encoding="utf-8")
             blank = _blank(task)
             worked = _inspected(task) if task.verb == "inspect" else _found(task)
+        except MemoryError:
+            os._exit(NO_MEMORY)
         except HydrostateError as error:
             worked = _failed(task, blank, error.message if error.source == str(task.log) else str(error))
-        except MemoryError:
-            worked = _failed(task, blank, "the work on it needs more memory than the server gives to one log")
         except Exception as error:  # whatever a log brings up is told to whoever sent it
             worked = _failed(task, blank, unexpected(error))
     raised = distinct(one.note for one in said)

@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 from plant.arrays import Array
-from plant.errors import HydrostateError, LogError
+from plant.errors import HydrostateError, LogError, NoMemoryError
 from plant.log.columns import Column
 from plant.log.csv import open_csv
 from plant.log.packed import require_regular
@@ -139,4 +139,6 @@ def refusal(error: BaseException, kind: str, path: Path) -> BaseException:
     if isinstance(error, PermissionError):
         return LogError("there is no permission to read it", str(path))
     said = " ".join(str(error).split())[:200] or type(error).__name__
+    if isinstance(error, MemoryError):
+        return NoMemoryError(f"reading it as {kind} needs more memory than there is ({said})", str(path))
     return LogError(f"cannot be read as {kind}: {said}", str(path))

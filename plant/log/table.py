@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from plant.arrays import Array
-from plant.errors import LogError
+from plant.errors import LogError, NoMemoryError
 from plant.log.columns import TRUTH, Column
 from plant.log.headings import Heading
 
@@ -52,6 +52,11 @@ class Table:
         -------
         dict[int, ndarray of shape (n,)]
             Values as logged, by the column's place; a column of text is left out.
+
+        Raises
+        ------
+        NoMemoryError
+            If there is not enough memory for them.
         """
         columns = [Column(place, one.name, f"{TRUTH}{place}") for place, one in enumerate(self.headings)]
         try:
@@ -61,6 +66,8 @@ class Table:
             for column in columns:
                 try:
                     found |= self.read([column])
+                except NoMemoryError:
+                    raise
                 except LogError:
                     continue
         return {column.position: values for column, values in found.items()}

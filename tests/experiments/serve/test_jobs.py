@@ -139,7 +139,7 @@ def test_work_in_a_process_ends_at_its_limits_and_the_next_log_is_worked_on(
     jobs = Jobs(replace(settings, **limits), store)
     try:
         kept = added(store, settings, "greedy")
-        log_file(settings, "greedy").write_bytes(b"a,b\n" + b"1.5,2.5\n" * 6_000_000)
+        log_file(settings, "greedy").write_bytes(b"a,b\n" + b"1.5,2.5\n" * 20_000_000)
         jobs.submit(kept)
         until(lambda: not jobs.waiting)
         greedy = store.get("greedy")
