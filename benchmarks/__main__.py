@@ -32,6 +32,7 @@ NAMES = (
     "diaphragm_motor",
     "diaphragm_faults",
     "diagnosis",
+    "noisy_sensors",
     "open_benchmark",
     "batch_scale",
     "archive",

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.fits.greybox_log import GreyBoxLog, OutputNoise
+from estimation.fits.greybox_log import GreyBoxLog
 from plant.arrays import Array
 from plant.runs import steps_a_sample
 
@@ -98,6 +98,6 @@ def averaged(log: GreyBoxLog, longest_step: float) -> GreyBoxLog:
         measured=np.vstack([np.full(outputs.shape[1], np.nan), outputs]),
         sample_time=sample_time,
         steps=np.full(len(outputs) + 1, steps_a_sample(sample_time, longest_step)),
-        noise=tuple(OutputNoise(noise.variance / block, noise.walk) for noise in log.noise),
+        noise=tuple(noise.scaled(1.0 / block) for noise in log.noise),
         drive_std=tuple(spread / block**0.5 for spread in log.drive_std),
     )

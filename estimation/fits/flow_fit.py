@@ -1,32 +1,35 @@
 """`fit_flow(record, parameters, ...) -> FormFit`: bulk modulus, leakage and flow bias of a log, by the flow form."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from math import ceil
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.fits.averaged import averaged
 from estimation.fits.descent import Point, descend
 from estimation.fits.explain import WORTH, explain, promised
-from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
+from estimation.fits.flow_log import (
+    DRAIN_START,
+    LEAST_LEAKAGE,
+    OPENING_START,
+    flow_log,
+    usual_leakage,
+    without_strays,
+)
+from estimation.fits.form_fit import FAULTS_TRIED, FormFit, weighed, with_structure
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, roughly
-from estimation.fits.greybox_log import GreyBoxLog, greybox_log
+from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, OFFSET, START_LOAD, Hypothesis
 from estimation.fits.wide_problem import flow_bounds
-from estimation.log_checks.bridging import bridged, gaps
-from estimation.log_checks.measurement_noise import measurement_variances
-from estimation.log_checks.outliers import without_outliers
 from estimation.models.flow import (
     FLOW_FORM,
     HELD_FLOW_FORM,
     MASS_FLOW_FORM,
     STIFFNESS,
-    flow_parameters,
     reaches_relief,
     relieving,
 )
@@ -53,16 +56,6 @@ MAKEUP_TRIED = (1e-9, 1e-13)
 LEAD_START = 1e-5
 """First guess of the motor's lead on the straight line between samples [s]."""
 
-OPENING_START = 1e3
-"""First guess of the drop at which a make-up check valve is half open [Pa]."""
-
-DRAIN_START = 0.05
-"""First guess of the pump's case drain, as a share of the healthy leakage [fraction]."""
-
-PRESUMED_STD = 1.0
-"""Standard deviation of the logarithms of the last two about their first guesses, before the log is seen: where the
-make-up valves never open, no log tells a drain from leakage, and any drain would do [dimensionless]."""
-
 SCREENED_SECONDS = 4.0
 """Starts are compared on the beginning of the log: it tells a wrong valley from a right one [s]."""
 
@@ -75,14 +68,8 @@ LARGEST_CHI_SQUARE = 1.2
 LARGEST_AUTOCORRELATION = 0.1
 """Correlation of neighbouring residuals above which the same is said [dimensionless]."""
 
-LEAST_LEAKAGE = 1e-3
-"""Least first guess of a leakage, as a share of the rated pump flow [fraction]; a logarithm cannot start at zero."""
-
-LONG_GAP = 5
-"""Missing speeds in a row after which nothing is concluded from the speeds at the gap's ends [samples]."""
-
-FELT_GAP = 0.1
-"""A gap in speed matters where what it leaves open moves pressure by this share of its noise or more [fraction]."""
+NOISY = (1.44, 0.3)
+"""The same two where noise of position counts: it is known to a fifth, and an encoder's steps are not white."""
 
 MOST_ASKED = 50_000
 """A longer log is not asked what is strange about it: the answer takes minutes [samples]."""
@@ -139,22 +126,24 @@ def fit_flow(
     if lacking:
         raise LogError(f"the flow form needs {' and '.join(FLOW_CHANNELS)}, the record lacks {', '.join(lacking)}")
     if variances is None:
-        record, variances = _cleaned(record)
-    log = _log(record, parameters, uncertainties or {}, variances)
+        record, variances = without_strays(record)
+    log = flow_log(record, parameters, uncertainties or {}, variances)
     starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
     fits = _balanced(log, parameters, starts)
     best, found = min(fits, key=_cost), weighed(fits)
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
+    explains = partial(_explains, noisy=log.passes_on)
     if asked := _asked(log, parameters, swinging, loaded=loaded):
-        strange = explain(log, parameters, _near(swinging, starts), _explains, asked=asked, paired=asked != (DELIVERY,))
+        near = _near(swinging, starts, explains)
+        strange = explain(log, parameters, near, explains, asked=asked, paired=asked != (DELIVERY,))
         one = strange.fit
-        if _explains(one) and one.cost < best.cost - WORTH:
+        if explains(one) and one.cost < best.cost - WORTH:
             bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
             believed = with_structure(strange.values, STRUCTURE)
             return FormFit(believed, bound, one.chi_square[0], (), one.rig_slopes, strange)
     value, std = found["bulk_modulus"]
     believed = with_structure(found, STRUCTURE)
-    return FormFit(believed, std / value, best.chi_square[0], _objections(best), best.rig_slopes)
+    return FormFit(believed, std / value, best.chi_square[0], _objections(best, log.passes_on), best.rig_slopes)
 
 
 def _balanced(
@@ -163,13 +152,19 @@ def _balanced(
     """Return the fits of the balances that count, the first by volume."""
     relieved = reaches_relief(log.measured, parameters.relief_pressure)
     forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
-    search = Search(screened=ceil(SCREENED_SECONDS / log.sample_time))
+    search, afar = Search(screened=ceil(SCREENED_SECONDS / log.sample_time)), log.taken_at(parameters.bulk_modulus)
 
     def sought(form: GreyBoxModel, tried: Sequence[Mapping[str, float]]) -> tuple[Problem, Point, Bounds]:
-        problem = Problem(form, log) if log.gaps.size else FreedProblem.of(form, log)  # what gaps leave open, once
+        problem = Problem(form, afar) if log.gaps.size else FreedProblem.of(form, afar)  # what gaps leave open, once
         guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in tried]
+        bounds = flow_bounds(form, guesses, afar)
+        point = roughly(problem, guesses, search, bounds)
+        if not log.passes_on:
+            return problem, point, bounds
+        problem, modulus = problem.on(log), form.values(point.theta)["bulk_modulus"]
+        guesses = [form.theta({STIFFNESS: 0.0, **start, "bulk_modulus": modulus}) for start in tried]
         bounds = flow_bounds(form, guesses, log)
-        return problem, roughly(problem, guesses, search, bounds), bounds
+        return problem, roughly(problem, [*guesses, point.theta], search, bounds), bounds
 
     first = sought(forms[0], starts)
     near = [{STIFFNESS: 0.0, **first[0].model.values(first[1].theta)}]
@@ -197,15 +192,17 @@ def _asked(log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, 
         return ()
     if loaded:  # a sensor that reads too much looks loaded at rest
         return (START_LOAD, OFFSET)
-    if not _explains(swinging):
+    if not _explains(swinging, log.passes_on):
         return HYPOTHESES
     gain, size = promised(log, parameters, swinging.values, DELIVERY)
     return (DELIVERY,) if gain > WORTH and size > LEAST_DELIVERY else ()
 
 
-def _near(fit: GreyBoxFit, starts: Sequence[Mapping[str, float]]) -> Sequence[Mapping[str, float]]:
+def _near(
+    fit: GreyBoxFit, starts: Sequence[Mapping[str, float]], explains: Callable[[GreyBoxFit], bool]
+) -> Sequence[Mapping[str, float]]:
     """Return where the search for what is strange begins: a fit that explains the log is in no wrong valley."""
-    if _explains(fit):
+    if explains(fit):
         return [fit.values]
     usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
     return [{name: value for name, value in fit.values.items() if name != STIFFNESS}, *usual]
@@ -215,89 +212,12 @@ def _cost(fit: GreyBoxFit) -> float:
     return fit.cost
 
 
-def _explains(fit: GreyBoxFit) -> bool:
-    return not _objections(fit)
-
-
-def _cleaned(record: Record) -> tuple[Record, Mapping[str, float]]:
-    """Return the channels of the flow form without gross outliers, and their variances."""
-    channels = (*FLOW_FORM.drives, *FLOW_FORM.outputs)
-    noise = measurement_variances(record, channels)
-    sound = {name: without_outliers(record[name], noise[name] ** 0.5) for name in channels}
-    record = Record(record.sample_time, sound, start_time=record.start_time)
-    return record, measurement_variances(record, channels)
-
-
-def speed_gaps(record: Record, parameters: EhaParameters, noise: float) -> Array:
-    """Return where missing motor speeds leave the pumped volume open by more than the pressure can overlook.
-
-    Parameters
-    ----------
-    record : Record
-        The log.
-    parameters : EhaParameters
-        The actuator.
-    noise : float
-        Standard deviation of the differential pressure's noise [Pa].
-
-    Returns
-    -------
-    ndarray, shape (gaps, 3)
-        As `GreyBoxLog.gaps`, in pressure [Pa squared].
-    """
-    missing = np.isnan(record["motor_speed_rad_s"])
-    first, after = np.flatnonzero(np.diff(missing, prepend=False, append=False)).reshape(-1, 2).T
-    speed, last, length = bridged(record["motor_speed_rad_s"]), len(missing) - 1, after - first
-    before, further, behind = np.maximum(first - 1, 0), np.maximum(first - 2, 0), np.minimum(after, last)
-    # a straight line is right where the speed goes on as it did before the gap and does after it
-    slopes = 0.5 * (speed[before] - speed[further] + speed[np.minimum(after + 1, last)] - speed[behind])
-    sudden = np.abs(speed[behind] - speed[before] - slopes * (length + 1))
-    sudden = np.where(length < LONG_GAP, sudden, np.maximum(sudden, np.std(speed)))
-    stiffness = parameters.bulk_modulus / parameters.chamber_volume * parameters.pump_displacement
-    open_by = 0.5 * stiffness * sudden * length * record.sample_time
-    open_gaps = np.array([first, behind, open_by**2 / (length + 1)], dtype=np.float64)
-    return np.ascontiguousarray(open_gaps[:, open_by > FELT_GAP * noise].T)
-
-
-def _log(
-    record: Record, parameters: EhaParameters, uncertainties: Mapping[str, float], variances: Mapping[str, float]
-) -> GreyBoxLog:
-    log = greybox_log(
-        FLOW_FORM,
-        record,
-        flow_parameters(parameters),
-        longest_step=LONGEST_STEP,
-        variances=variances,
-        uncertainties=uncertainties,
-    )
-    log = replace(
-        log,
-        # where the piston is within a gap of its position is not known, where it is after it is
-        measured=np.where(_within_gaps(record["position_m"])[:, None], np.nan, log.measured),
-        gaps=speed_gaps(record, parameters, variances["differential_pressure_pa"] ** 0.5),
-        presumed={
-            "case_leakage": (DRAIN_START * _usual_leakage(parameters), PRESUMED_STD),
-            "makeup_opening": (OPENING_START, PRESUMED_STD),
-        },
-    )
-    return averaged(log, LONGEST_STEP)
-
-
-def _within_gaps(position: Array) -> NDArray[np.bool_]:
-    """Return the samples in gaps of the position, and before its first and after its last."""
-    present = np.flatnonzero(np.isfinite(position))
-    apart, wide = gaps(position)
-    within = np.isnan(position)
-    within[present[0] : present[-1]] &= np.repeat(wide, apart.astype(np.int64))
-    return within
-
-
-def _usual_leakage(p: EhaParameters) -> float:
-    return max(p.leakage_coefficient, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed / p.relief_pressure)
+def _explains(fit: GreyBoxFit, noisy: bool) -> bool:
+    return not _objections(fit, noisy)
 
 
 def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
-    leakage = _usual_leakage(p)
+    leakage = usual_leakage(p)
     bias = max(p.flow_bias, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed)
     moduli = sorted({bulk_modulus, p.bulk_modulus})
     return [
@@ -318,10 +238,12 @@ def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
     ]
 
 
-def _objections(fit: GreyBoxFit) -> tuple[Note, ...]:
+def _objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
+    """Return what speaks against a fit, ``noisy`` where the position's noise counts with the slopes."""
     reasons: list[Note] = []
-    if fit.chi_square[0] > LARGEST_CHI_SQUARE:
+    largest, correlated = NOISY if noisy else (LARGEST_CHI_SQUARE, LARGEST_AUTOCORRELATION)
+    if fit.chi_square[0] > largest:
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=fit.chi_square[0] ** 0.5))
-    if abs(fit.autocorrelation[0]) > LARGEST_AUTOCORRELATION:
+    if abs(fit.autocorrelation[0]) > correlated:
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_CORRELATED.note(correlation=fit.autocorrelation[0]))
     return tuple(reasons)

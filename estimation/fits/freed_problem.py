@@ -13,7 +13,7 @@ import numpy as np
 from estimation.fits.descent import Point
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_loops import compile_kernel
-from estimation.fits.greybox_problem import OUTLIER, Problem
+from estimation.fits.greybox_problem import Problem, weighed
 from estimation.fits.side_by_side import LANES, compile_side_by_side
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
@@ -26,9 +26,6 @@ have many small corners: a step of 1e-7 sees the slope between two of them, and 
 
 MOST_SIDE_BY_SIDE = 200_000
 """Longest log whose drives are copied once for each run side by side [samples]: some 30 MB."""
-
-STRAIGHT = 1e-3
-"""Weight in ``J'J`` of a residual that counts linearly, as in the kernel of `Problem` [dimensionless]."""
 
 
 class FreedProblem(Problem):
@@ -91,10 +88,12 @@ class FreedProblem(Problem):
         list of Point
             As of `Problem.at`.
         """
+        if self.log.passes_on:  # each has a variance of its own
+            return [self.at(theta) for theta in thetas]
         rows = np.vstack([self._rows(_nudged(theta), self.log.parameters) for theta in thetas])
-        found = self._residuals(rows, None)
+        found = self._residuals(rows, None, self._variances(thetas[0]))
         parts = np.split(found, len(thetas), axis=-1)
-        return [self._point(at, *_weighed(*_differences(part))) for at, part in zip(thetas, parts, strict=True)]
+        return [self._point(at, *weighed(*_differences(part))) for at, part in zip(thetas, parts, strict=True)]
 
     def residuals_of(self, theta: Array, parameters: Sequence[Array]) -> list[Array]:
         """Return the normalised residuals under several parameters of the rig, side by side.
@@ -111,7 +110,8 @@ class FreedProblem(Problem):
         list of ndarray, shape (outputs, blocks)
             As of `residuals`.
         """
-        found = self._residuals(np.vstack([self._rows(theta[None], row) for row in parameters]), None)
+        rows = np.vstack([self._rows(theta[None], row) for row in parameters])
+        found = self._residuals(rows, None, self._variances(theta))
         return [found[..., i] for i in range(len(parameters))]
 
     def disturbed(self, theta: Array, drives: Iterable[Array]) -> Iterator[Array]:
@@ -133,10 +133,10 @@ class FreedProblem(Problem):
             yield from super().disturbed(theta, drives)
             return
         rows = np.repeat(self._rows(theta[None], self.log.parameters), LANES, axis=0)
-        waiting = iter(drives)
+        waiting, variance = iter(drives), self._variances(theta)
         while some := list(islice(waiting, LANES)):
             filled = [*some, *some[-1:] * (LANES - len(some))]
-            found = self._side_by_side(rows, np.stack(filled, axis=-1))
+            found = self._side_by_side(rows, np.stack(filled, axis=-1), variance)
             yield from (found[..., i] for i in range(len(some)))
 
     def _run(
@@ -146,18 +146,21 @@ class FreedProblem(Problem):
         slopes: Array,
         drives: Array | None = None,
         parameters: Array | None = None,
+        variance: Array | None = None,
     ) -> tuple[float, Array, Array]:
         parameters = self.log.parameters if parameters is None else parameters
+        variance = self._variances(theta) if variance is None else variance
         if not slopes.size and errors.size:
-            errors[...] = self._residuals(self._rows(theta[None], parameters), drives)[..., 0]
+            errors[...] = self._residuals(self._rows(theta[None], parameters), drives, variance)[..., 0]
             return 0.0, np.zeros(0), np.zeros((0, 0))
-        found = self._residuals(self._rows(_nudged(theta), parameters), drives)
+        found = self._residuals(self._rows(_nudged(theta), parameters), drives, variance)
         here, columns = _differences(found)
         if errors.size:
             errors[...] = here
         if slopes.size:
             slopes[...] = columns
-        return _weighed(here, columns)
+            return 0.0, np.zeros(0), np.zeros((0, 0))
+        return weighed(here, columns)
 
     def _rows(self, thetas: Array, parameters: Array) -> Array:
         """Return the parameters at some points, shape (points, parameters)."""
@@ -166,26 +169,26 @@ class FreedProblem(Problem):
             rows[i, self._columns] = list(self.model.values(thetas[i]).values())
         return rows
 
-    def _residuals(self, rows: Array, drives: Array | None) -> Array:
+    def _residuals(self, rows: Array, drives: Array | None, variance: Array) -> Array:
         """Return the normalised residuals under some parameters, shape (outputs, blocks, rows)."""
         # one run is cheaper alone, and what a gap leaves open only its kernel follows
         if len(rows) == 1 or self.log.gaps.size:
-            return np.stack([self._alone(row, drives) for row in rows], axis=-1)
+            return np.stack([self._alone(row, drives, variance) for row in rows], axis=-1)
         filled = np.concatenate([rows, np.repeat(rows[-1:], -len(rows) % LANES, axis=0)])
         shared = (self.log.drives if drives is None else drives)[..., None]
-        found = each(lambda some: self._side_by_side(some, shared), np.split(filled, len(filled) // LANES))
+        found = each(lambda some: self._side_by_side(some, shared, variance), np.split(filled, len(filled) // LANES))
         return np.concatenate(found, axis=-1)[..., : len(rows)]
 
-    def _side_by_side(self, rows: Array, drives: Array) -> Array:
+    def _side_by_side(self, rows: Array, drives: Array, variance: Array) -> Array:
         """Return the normalised residuals of `LANES` runs, shape (outputs, blocks, lanes)."""
         found = self._room(LANES)
         with np.errstate(all="ignore"):  # a try that runs away is stepped back from
-            compile_side_by_side(self._bare)(rows, drives, self.log.measured, *self._course(), found)
+            compile_side_by_side(self._bare)(rows, drives, self.log.measured, *self._course(variance), found)
         return found
 
-    def _alone(self, row: Array, drives: Array | None) -> Array:
+    def _alone(self, row: Array, drives: Array | None, variance: Array) -> Array:
         errors = self._room()
-        super()._run(np.empty(0), errors, np.empty((0, 0, 0)), drives, row)
+        super()._run(np.empty(0), errors, np.empty((0, 0, 0)), drives, row, variance)
         return errors
 
 
@@ -197,12 +200,3 @@ def _nudged(theta: Array) -> Array:
 def _differences(found: Array) -> tuple[Array, Array]:
     """Return the residuals at a point and their slopes, of the residuals there and at its neighbours."""
     return found[..., 0], (found[..., 1:] - found[..., :1]) / NUDGE
-
-
-def _weighed(here: Array, columns: Array) -> tuple[float, Array, Array]:
-    """Return cost, gradient and lower triangle of ``J'J``; what is grossly off counts linearly."""
-    weight = OUTLIER / np.maximum(np.abs(here), OUTLIER)
-    cost = float(np.sum((1.0 - 0.5 * weight) * weight * here**2))
-    slopes = columns.reshape(here.size, -1)
-    bent = slopes * np.where(weight < 1.0, STRAIGHT, 1.0).reshape(-1, 1)
-    return cost, (weight * here).ravel() @ slopes, np.tril(bent.T @ slopes)

@@ -37,6 +37,10 @@ EXPLAINED = 1.2
 DRIVE_DRAWS = 16
 """Realisations of the driving channels' noise; their spread is known to 18 %, of a part that is seldom the larger."""
 
+NOISE_DOUBT = 0.1
+"""Standard deviation of the share of a driving channel's noise that is counted with the slopes: its size is known to
+some percent, and it is white in theory alone [fraction]."""
+
 RIG_NUDGE = 1e-3
 """Relative change of a rig parameter by which the fit's response to it is read off [fraction]."""
 
@@ -211,7 +215,8 @@ def concluded(problem: Problem, point: Point, *, disturbed: bool = True) -> Grey
         def response(shift: Array) -> Array:
             return bread @ (slopes.T @ shift.ravel())
 
-        variance = np.diag(spread) + (_drive_variance(problem, theta, response) if disturbed else 0.0)
+        variance = np.diag(spread) + (NOISE_DOUBT * (bread @ problem.untilted(theta, errors)[felt])) ** 2
+        variance = variance + (_drive_variance(problem, theta, response) if disturbed else 0.0)
         # the window's estimate need not be positive: then nothing is known
         noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))
         if disturbed:

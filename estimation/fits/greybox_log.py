@@ -13,6 +13,9 @@ from plant.log.record import Record
 from plant.runs import steps_a_sample
 from plant.solvers.steps import Parameters, parameter_row
 
+BLOCK = 1e-3
+"""Usual length over which residuals are averaged before they are squared [s]."""
+
 
 @dataclass(frozen=True)
 class OutputNoise:
@@ -25,10 +28,36 @@ class OutputNoise:
     walk : float
         Variance that its random walk gathers [SI squared a second]; white noise of a rate, such as measured speed,
         that the model integrates.
+    passed_on : float
+        Standard deviation of what a driving channel's noise adds at once, over `passed_by` [SI].
+    passed_by : str
+        The unknown, or other parameter, that the driving channel's noise is multiplied by.
     """
 
     variance: float
     walk: float = 0.0
+    passed_on: float = 0.0
+    passed_by: str = ""
+
+    def scaled(self, variance: float, walk: float = 1.0) -> "OutputNoise":
+        """Return the noise times a factor.
+
+        Parameters
+        ----------
+        variance, walk : float
+            Factors on the white noise's variance and on the random walk's [dimensionless].
+
+        Returns
+        -------
+        OutputNoise
+            The other noise.
+        """
+        return replace(
+            self,
+            variance=variance * self.variance,
+            walk=walk * self.walk,
+            passed_on=variance**0.5 * self.passed_on,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +87,8 @@ class GreyBoxLog:
         sample to the next, in units of `GreyBoxModel.jump`; in order of time, none overlapping.
     presumed : Mapping[str, tuple of float]
         What is known of positive unknowns before the log is seen: value [SI] and standard deviation of its logarithm.
+    block : float
+        Length over which residuals are averaged before they are squared [s].
     """
 
     drives: Array
@@ -70,6 +101,7 @@ class GreyBoxLog:
     uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
     gaps: Array = field(default_factory=lambda: np.empty((0, 3)))
     presumed: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
+    block: float = BLOCK
 
     def beginning(self, samples: int) -> "GreyBoxLog":
         """Return the log's first part.
@@ -96,6 +128,30 @@ class GreyBoxLog:
         """
         return replace(self, steps=np.ones_like(self.steps))
 
+    @property
+    def passes_on(self) -> bool:
+        """Whether noise of a driving channel counts with an unknown."""
+        return any(noise.passed_on > 0.0 for noise in self.noise)
+
+    def taken_at(self, value: float) -> "GreyBoxLog":
+        """Return the log with the noise that driving channels pass on as it is where the unknown has a value.
+
+        The variance then depends on nothing that is fitted, and a search from afar finds no valley in which it grows
+        without end.
+
+        Parameters
+        ----------
+        value : float
+            Value of what the driving channels' noise is multiplied by [SI].
+
+        Returns
+        -------
+        GreyBoxLog
+            The same log under noise of its outputs alone.
+        """
+        noise = tuple(OutputNoise(one.variance + (value * one.passed_on) ** 2, one.walk) for one in self.noise)
+        return replace(self, noise=noise)
+
     def softened(self, variance: float, walk: float) -> "GreyBoxLog":
         """Return the log as if its noise were larger, which makes the way to the optimum smoother.
 
@@ -109,7 +165,7 @@ class GreyBoxLog:
         GreyBoxLog
             The same log under that noise.
         """
-        return replace(self, noise=tuple(OutputNoise(n.variance * variance, n.walk * walk) for n in self.noise))
+        return replace(self, noise=tuple(noise.scaled(variance, walk) for noise in self.noise))
 
 
 def greybox_log(

@@ -9,12 +9,13 @@ from estimation.fits.descent import Point
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_loops import Kernel, compile_kernel
 from estimation.models.greybox import GreyBoxModel
+from plant.solvers.steps import parameter_names
 
 OUTLIER = 3.0
 """Residuals beyond this many standard deviations count linearly (Huber 1964) [dimensionless]."""
 
-BLOCK = 1e-3
-"""Length over which residuals are averaged before they are squared [s]."""
+STRAIGHT = 1e-3
+"""Weight in ``J'J`` of a residual that counts linearly, as in the kernel [dimensionless]."""
 
 UPWARD, DOWNWARD = np.log(1e3), 70.0
 """How far the logarithm of an unknown may leave its starts: three decades up; down until it is as good as absent."""
@@ -51,7 +52,7 @@ def search_bounds(
 
 
 class Problem:
-    """The least-squares problem of one log, on whitened means over blocks of about `BLOCK` seconds.
+    """The least-squares problem of one log, on whitened means over the log's blocks.
 
     Averaging keeps what the log says about unknowns that act more slowly, and makes a 10 kHz log as cheap to judge as a
     1 kHz one.
@@ -67,12 +68,19 @@ class Problem:
     ----------
     prior : ndarray, shape (unknowns,)
         One over the variance of each coordinate before the log is seen; zero where nothing is known [dimensionless].
+
+    Notes
+    -----
+    Where a driving channel's noise passes on to an output through an unknown ``b``, the output's variance is ``v + (s
+    b)^2``, and an error in the driving channel is no longer taken for a small ``b``: this is Deming's regression
+    (Fuller 1987, Measurement Error Models, section 1.3). Both parts of the variance are known from the log, so that
+    no logarithm of the variance stands beside the squares.
     """
 
     def __init__(self, model: GreyBoxModel, log: GreyBoxLog, kernel: Kernel | None = None) -> None:
         self.model, self.log = model, log
         self._kernel = kernel or compile_kernel(model)
-        self._block = max(1, round(BLOCK / log.sample_time))
+        self._block = max(1, round(log.block / log.sample_time))
         presumed = [log.presumed.get(name, (1.0, np.inf)) for name in model.unknowns]
         self.presumed = np.array([np.log(value) for value, _ in presumed])
         self.prior = np.array([deviation**-2.0 for _, deviation in presumed])
@@ -105,7 +113,11 @@ class Problem:
         Point
             Cost and normal equations; nothing as long as the log is stored.
         """
-        return self._point(theta, *self._run(theta, np.empty((0, 0)), np.empty((0, 0, 0))))
+        if not self._passing(theta).any():
+            return self._point(theta, *self._run(theta, np.empty((0, 0)), np.empty((0, 0, 0))))
+        errors, slopes = self._room(), self._room(len(theta))
+        self._run(theta, errors, slopes)
+        return self._point(theta, *weighed(errors, self._tilted(theta, errors, slopes)))
 
     def _point(self, theta: Array, cost: float, gradient: Array, gram: Array) -> Point:
         """Return a point whose misfit is given, with what is known beforehand and a full matrix."""
@@ -181,9 +193,9 @@ class Problem:
         ndarray, shape (outputs * blocks, unknowns)
             Zero where a block is missing [dimensionless].
         """
-        slopes = self._room(len(theta))
-        self._run(theta, np.empty((0, 0)), slopes)
-        return slopes.reshape(-1, len(theta))
+        errors, slopes = self._room(), self._room(len(theta))
+        self._run(theta, errors, slopes)
+        return self._tilted(theta, errors, slopes).reshape(-1, len(theta))
 
     def _room(self, *columns: int) -> Array:
         return np.zeros((self.log.measured.shape[1], -(-len(self.log.measured) // self._block), *columns))
@@ -195,6 +207,7 @@ class Problem:
         slopes: Array,
         drives: Array | None = None,
         parameters: Array | None = None,
+        variance: Array | None = None,
     ) -> tuple[float, Array, Array]:
         log = self.log
         with np.errstate(all="ignore"):  # a try that runs away is stepped back from
@@ -203,16 +216,82 @@ class Problem:
                 log.drives if drives is None else drives,
                 log.measured,
                 log.parameters if parameters is None else parameters,
-                *self._course(),
+                *self._course(self._variances(theta) if variance is None else variance),
                 log.gaps,
                 OUTLIER,
                 errors,
                 slopes,
             )
 
-    def _course(self) -> tuple[float, IntArray, int, Array, Array]:
+    def _passing(self, theta: Array) -> Array:
+        """Return the variance that driving channels' noise passes on to each output, in SI."""
+        if not self.log.passes_on:
+            return np.zeros(len(self.log.noise))
+        values = self.model.values(theta)
+        names = parameter_names(self.model.parameters)
+        factors = [
+            values[one.passed_by] if one.passed_by in values else self.log.parameters[names.index(one.passed_by)]
+            for one in self.log.noise
+        ]
+        return np.array([(one.passed_on * by) ** 2 for one, by in zip(self.log.noise, factors, strict=True)])
+
+    def _variances(self, theta: Array) -> Array:
+        return np.array([noise.variance for noise in self.log.noise]) + self._passing(theta)
+
+    def _tilted(self, theta: Array, errors: Array, slopes: Array) -> Array:
+        """Return the derivatives of normalised residuals, those that were taken while the variance was held."""
+        share = self._passing(theta) / self._variances(theta)
+        for i, noise in enumerate(self.log.noise):
+            if noise.passed_by in self.model.unknowns:  # fitted as logarithms
+                slopes[i, :, self.model.unknowns.index(noise.passed_by)] -= share[i] * errors[i]
+        return slopes
+
+    def untilted(self, theta: Array, errors: Array) -> Array:
+        """Return the gradient that would be left at an optimum, were noise of driving channels not counted with slopes.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        errors : ndarray, shape (outputs, blocks)
+            Normalised residuals there [dimensionless].
+
+        Returns
+        -------
+        ndarray, shape (unknowns,)
+            Zero where no channel passes noise on [dimensionless].
+        """
+        out = np.zeros(len(theta))
+        share = self._passing(theta) / self._variances(theta)
+        for i, noise in enumerate(self.log.noise):
+            if noise.passed_by in self.model.unknowns:
+                out[self.model.unknowns.index(noise.passed_by)] += share[i] * float(errors[i] @ errors[i])
+        return out
+
+    def _course(self, variance: Array) -> tuple[float, IntArray, int, Array, Array]:
         """Return sample time, model steps up to each sample, samples a block, and both noises of each output."""
         log = self.log
-        variance = np.array([noise.variance for noise in log.noise])
         walk = np.array([noise.walk * self._block * log.sample_time for noise in log.noise])
         return log.sample_time, log.steps, self._block, variance, walk
+
+
+def weighed(errors: Array, slopes: Array) -> tuple[float, Array, Array]:
+    """Return cost, gradient and lower triangle of ``J'J`` of normalised residuals; what is grossly off counts linearly.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (outputs, blocks)
+        The residuals [dimensionless].
+    slopes : ndarray, shape (outputs, blocks, unknowns)
+        Their derivatives [dimensionless].
+
+    Returns
+    -------
+    tuple of (float, ndarray of shape (unknowns,), ndarray of shape (unknowns, unknowns))
+        As a kernel gives them.
+    """
+    weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)
+    cost = float(np.sum((1.0 - 0.5 * weight) * weight * errors**2))
+    columns = slopes.reshape(errors.size, -1)
+    bent = columns * np.where(weight < 1.0, STRAIGHT, 1.0).reshape(-1, 1)
+    return cost, (weight * errors).ravel() @ columns, np.tril(bent.T @ columns)

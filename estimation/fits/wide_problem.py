@@ -35,6 +35,11 @@ LEAST_PEAK = 1.0
 """Highest differential pressure taken of a log whose sensor is dead: the logarithm of none is no start [Pa]."""
 
 
+MOST_BIASED = 2.0
+"""Factor by which position's noise may have put the first bulk modulus off [dimensionless]. Far above it there is a
+second valley, where all that the log shows is noise that the oil's stiffness makes large."""
+
+
 def widened(log: GreyBoxLog, parameters: EhaParameters, stiffness: float = 0.0) -> GreyBoxLog:
     """Return a log as the wide flow form sees it: with the share of the log as a drive, and what is presumed.
 
@@ -149,6 +154,9 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     relief = (0.0, max(most / (SHARPEST_RELIEF * rig["relief_pressure"]), rig["relief_conductance"]))
     stiffest = ADIABATIC * rig["accumulator_pressure"] / (LEAST_GAS * rig["chamber_volume"])
     limits = {"speed_lead": (0.0, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
+    if log.passes_on:
+        found = [model.values(guess)["bulk_modulus"] for guess in guesses]
+        limits["bulk_modulus"] = (min(found) / MOST_BIASED, MOST_BIASED * max(found))
     return search_bounds(model, guesses, {**LIMITS, **limits})
 
 

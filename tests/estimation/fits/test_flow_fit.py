@@ -5,7 +5,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from estimation.fits.flow_fit import fit_flow, speed_gaps
+from estimation.fits.flow_fit import fit_flow
+from estimation.fits.flow_log import speed_gaps
 from estimation.notes import EstimateCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import circuit_of

@@ -75,3 +75,10 @@ def test_a_slow_sensor_has_the_noise_of_the_samples_that_it_has() -> None:
     steps = np.round(np.linspace(0.0, 1e-3, 2_000) / 1e-6) * 1e-6
     slow[7::10] = steps
     assert position_variance(slow) == position_variance(steps)
+
+
+def test_position_noise_of_about_a_quantum_is_not_taken_for_the_quantum_alone() -> None:
+    rng = np.random.default_rng(3)
+    moved = 0.02 * np.sin(2.0 * np.pi * 5.0 * 1e-3 * np.arange(20_000)) + rng.normal(0.0, 5e-5, 20_000)
+    variance = position_variance(np.round(moved / 5e-5) * 5e-5)
+    assert variance == pytest.approx(5e-5**2 * (1.0 + 1.0 / 12.0), rel=0.1)

@@ -1,0 +1,100 @@
+"""What noise of the encoder does to a fit of the flow form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.fits.flow_fit import fit_flow
+from estimation.fits.flow_log import flow_log, without_strays
+from estimation.fits.freed_problem import FreedProblem
+from estimation.fits.greybox_problem import Problem
+from estimation.models.flow import FLOW_FORM, STIFFNESS
+from faults.conditions import CONDITIONS, parameters_for
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+HEALTHY = EhaParameters()
+NOISY = replace(BENCH, position_noise=3e-5, position_quantum=1e-5)
+"""A sensor of position as many rigs have it, where the reference bench has an encoder of 1 um."""
+
+
+def log(condition: str, seed: int, duration: float = 10.0) -> tuple[Record, float]:
+    rng = np.random.default_rng(seed)
+    p = circuit_of(parameters_for(CONDITIONS[condition]))
+    record = simulate(CIRCUIT, make_drive("steps", duration, 1e-3, p, rng), 1e-3, p, sensors=NOISY, rng=rng)
+    return record, p.bulk_modulus
+
+
+def deviations(record: Record, true: float) -> float:
+    fit = fit_flow(record, HEALTHY, 2e8)
+    value, std = fit.parameters["bulk_modulus"]
+    assert fit.reasons == ()
+    assert fit.explanation is None
+    assert value == pytest.approx(true, rel=0.015)
+    return (value - true) / std
+
+
+@pytest.mark.parametrize("condition", ["normal", "major_leakage"])
+def test_noise_of_position_does_not_pass_for_soft_oil(condition: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    record, true = log(condition, 5)
+    assert abs(deviations(record, true)) < 3.0
+    monkeypatch.setattr("estimation.fits.flow_log.FELT_NOISE", np.inf)  # as if all of it were the pressure sensor's
+    value, std = fit_flow(record, HEALTHY, 2e8).parameters["bulk_modulus"]
+    assert value < true - 5.0 * std
+
+
+def test_noise_of_position_does_not_pass_for_soft_oil_where_speeds_are_missing() -> None:
+    record, true = log("minor_leakage", 6)
+    speed = record["motor_speed_rad_s"].copy()
+    for reversal in np.flatnonzero(np.abs(np.diff(speed)) > 30.0)[::5]:
+        speed[reversal : reversal + 3] = np.nan
+    assert flow_log(*_sound(record.replace(motor_speed_rad_s=speed))).gaps.size
+    assert abs(deviations(record.replace(motor_speed_rad_s=speed), true)) < 3.0
+
+
+def test_noise_of_position_counts_where_it_is_felt_beside_the_pressure_sensor() -> None:
+    record, _ = log("normal", 7, duration=4.0)
+    noisy = flow_log(*_sound(record))
+    assert noisy.passes_on
+    assert noisy.noise[0].passed_on == pytest.approx(
+        HEALTHY.piston_area / HEALTHY.chamber_volume * np.hypot(3e-5, 1e-5 / 12.0**0.5), rel=0.1
+    )
+    rng = np.random.default_rng(8)
+    drive = make_drive("steps", 4.0, 1e-3, HEALTHY, rng)
+    quiet = flow_log(*_sound(simulate(CIRCUIT, drive, 1e-3, circuit_of(HEALTHY), sensors=BENCH, rng=rng)))
+    assert not quiet.passes_on
+    assert quiet.block < noisy.block
+
+
+@pytest.mark.parametrize("kind", [Problem, FreedProblem.of])
+def test_the_slope_of_the_cost_holds_what_the_variance_changes_by(kind: type[Problem]) -> None:
+    record, true = log("normal", 7, duration=4.0)
+    problem = kind(FLOW_FORM, flow_log(*_sound(record)))
+    start = {
+        "bulk_modulus": true,
+        "leakage_coefficient": HEALTHY.leakage_coefficient,
+        "flow_bias": HEALTHY.flow_bias,
+        "makeup_conductance": 1e-9,
+        "makeup_opening": 7e3,
+        "case_leakage": 2.4e-13,
+        "speed_lead": 1e-5,
+        STIFFNESS: 0.0,
+    }
+    theta = problem.model.theta(start)
+    place = problem.model.unknowns.index("bulk_modulus")
+    step = 1e-3 * np.eye(len(theta))[place]
+    slope = (problem.at(theta + step).cost - problem.at(theta - step).cost) / 2e-3
+    gradient = problem.at(theta).gradient[place]
+    assert gradient == pytest.approx(slope, rel=0.01)
+    held = gradient + problem.untilted(theta, problem.residuals(theta))[place]
+    assert abs(held - gradient) > 0.05 * abs(gradient)  # the test can tell
+
+
+def _sound(record: Record) -> tuple[Record, EhaParameters, dict[str, float], dict[str, float]]:
+    sound, variances = without_strays(record)
+    return sound, HEALTHY, {}, dict(variances)
