@@ -37,7 +37,7 @@ EXPLAINED = 1.2
 DRIVE_DRAWS = 16
 """Realisations of the driving channels' noise; their spread is known to 18 %, of a part that is seldom the larger."""
 
-NOISE_DOUBT = 0.1
+NOISE_DOUBT = 0.2
 """Standard deviation of the share of a driving channel's noise that is counted with the slopes: its size is known to
 some percent, and it is white in theory alone [fraction]."""
 
