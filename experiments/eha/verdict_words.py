@@ -21,6 +21,9 @@ MARGINS = ((1.05, "too close to call"), (1.25, "narrow"), (2.0, "clear"), (math.
 """Words for the ratio of the runner-up's score to the best, up to each bound [dimensionless]."""
 
 
+MOST_DECIMALS = 4
+"""Decimals that a severity is given at most [count]."""
+
 NEAREST = "UNKNOWN, in none of the nine conditions; the nearest: "
 """How a verdict begins that something speaks against."""
 
@@ -111,11 +114,15 @@ def amount(one: Mapping[str, Any]) -> str:
     '207.0 MPa (205.0 to 209.0; with the rig 150 to 280)'
     >>> amount({"value": -0.01, "unit": "N", "ci95": [-3.0, 4.0]})
     '0.0 N (-3.0 to 4.0)'
+    >>> amount({"value": 1e-7, "unit": "%", "ci95": [0.0, 2e-7]})
+    'under 0.0001 %'
     """
     if any(number is None or not math.isfinite(number) for number in (one["value"], *one["ci95"])):
         return "not determined"
     scale, unit = shop_unit(one["unit"])
     value, low, high = (scale * float(number) for number in (one["value"], *one["ci95"]))
+    if max(abs(value), abs(low), abs(high)) < 0.5 * 10.0**-MOST_DECIMALS:
+        return f"under {10.0**-MOST_DECIMALS:.{MOST_DECIMALS}f} {unit}"
     said = _interval(low, high)
     total = one.get("ci95_total", [None])
     if None not in total and (wider := _interval(*(scale * end for end in total))) != said:
@@ -130,7 +137,7 @@ def _interval(low: float, high: float) -> str:
 
 def _decimals(low: float, high: float) -> int:
     """Return the decimals that leave two digits of an interval's width."""
-    return min(max(1 - math.floor(math.log10(high - low)), 0), 4) if high > low else 2
+    return min(max(1 - math.floor(math.log10(high - low)), 0), MOST_DECIMALS) if high > low else 2
 
 
 def believed(result: Mapping[str, Any]) -> str:
