@@ -74,6 +74,10 @@ class EstimateCode(Code):
         "neighbouring pressure residuals are correlated by {correlation:.2f}: "
         "the log does something that the flow balance does not know"
     )
+    CHANNEL_LATE = (
+        "{channel} comes {milliseconds:.1f} ms {when} for the flow balance: "
+        "a lag or delay of a sensor or of its filter, which is not corrected for"
+    )
     POSITION_RESIDUALS_LARGE = (
         "the position residuals are {ratio:.2f} times larger than the sensors' noise: "
         "neither structure of friction explains how the piston starts and stops, and bulk modulus may be far off"

@@ -136,6 +136,7 @@ def flow_log(
     log = replace(
         log,
         noise=(replace(log.noise[0], passed_on=passed_on, passed_by="bulk_modulus"),),
+        timed=FLOW_FORM.drives,
         drive_std=(log.drive_std[0], 0.0),  # the residuals hold position's
         # where the piston is within a gap of its position is not known, where it is after it is
         measured=np.where(_within_gaps(record["position_m"])[:, None], np.nan, log.measured),

@@ -41,6 +41,9 @@ NOISE_DOUBT = 0.2
 """Standard deviation of the share of a driving channel's noise that is counted with the slopes: its size is known to
 some percent, and it is white in theory alone [fraction]."""
 
+LATE_NUDGE = 1e-5
+"""Time by which a driving channel is brought forward to see what its timing does [s]."""
+
 RIG_NUDGE = 1e-3
 """Relative change of a rig parameter by which the fit's response to it is read off [fraction]."""
 
@@ -67,6 +70,9 @@ class GreyBoxFit:
         Of neighbouring normalised residuals; 0 where the model explains the log [dimensionless].
     rig_slopes : Mapping[str, Mapping[str, float]]
         By uncertain entry of the rig: by how much each unknown would differ, in SI, per relative change of the entry.
+    late : Mapping[str, tuple of float]
+        By driving channel whose timing is asked: the time by which it seems to come late [s], and what bringing it
+        forward would gain in log-likelihood, to first order [dimensionless].
     """
 
     model: GreyBoxModel
@@ -77,6 +83,7 @@ class GreyBoxFit:
     chi_square: tuple[float, ...]
     autocorrelation: tuple[float, ...]
     rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
+    late: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
 
 
 @dataclass(frozen=True)
@@ -203,7 +210,7 @@ def concluded(problem: Problem, point: Point, *, disturbed: bool = True) -> Grey
     model, theta = problem.model, point.theta
     errors, slopes = problem.residuals(theta), problem.slopes(theta)
     felt = np.flatnonzero(np.einsum("ij,ij->j", slopes, slopes) > LEAST_EFFECT**2)
-    noise, rig = np.full(len(theta), np.inf), dict[str, Array]()
+    noise, rig, late = np.full(len(theta), np.inf), dict[str, Array](), dict[str, tuple[float, float]]()
     used = int(np.count_nonzero(errors))
     if len(felt) and used > len(theta):
         if len(felt) < len(theta):
@@ -221,6 +228,7 @@ def concluded(problem: Problem, point: Point, *, disturbed: bool = True) -> Grey
         noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))
         if disturbed:
             rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in _rig_slopes(problem, theta, response)}
+            late = dict(_lateness(problem, theta, errors.ravel(), lambda shift: shift - slopes @ response(shift)))
     sizes = dict(model.linear)
     values = model.values(theta)
     unit = np.array([sizes.get(name, values[name]) for name in model.unknowns])
@@ -234,6 +242,7 @@ def concluded(problem: Problem, point: Point, *, disturbed: bool = True) -> Grey
         values=values,
         std=dict(zip(model.unknowns, map(float, unit * noise), strict=True)),
         rig_slopes=slopes_si,
+        late=late,
         cost=point.cost,
         chi_square=tuple(map(float, squares / seen)),
         autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),
@@ -264,6 +273,29 @@ def _rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Arra
     known, *shifted = problem.residuals_of(theta, [row, *nudged])
     for name, errors in zip(asked, shifted, strict=True):
         yield name, -response(errors - known) / RIG_NUDGE
+
+
+def _lateness(
+    problem: Problem, theta: Array, errors: Array, left: Callable[[Array], Array]
+) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Yield by how much each driving channel that is asked seems late, and what it is worth (Rao's score statistic).
+
+    ``left`` gives what the unknowns do not take up of a change of the residuals.
+    """
+    log = problem.log
+    reach = max(1, round(0.5 * log.block / log.sample_time))
+    for channel in log.timed:
+        place = problem.model.drives.index(channel)
+        values = log.drives[:, place]
+        padded = np.pad(values, reach, mode="edge")
+        moved = log.drives.copy()
+        moved[:, place] += LATE_NUDGE * (padded[2 * reach :] - padded[: -2 * reach]) / (2 * reach * log.sample_time)
+        shifted = problem.residuals(theta, drives=moved).ravel()
+        free = left((shifted - errors) / LATE_NUDGE)
+        power = float(free @ free)
+        if power > 0.0:
+            along = float(free @ errors)
+            yield channel, (-along / power, 0.5 * along**2 / power)
 
 
 def _spread_out(values: Array, places: NDArray[np.intp], length: int) -> Array:

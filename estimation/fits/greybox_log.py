@@ -89,6 +89,8 @@ class GreyBoxLog:
         What is known of positive unknowns before the log is seen: value [SI] and standard deviation of its logarithm.
     block : float
         Length over which residuals are averaged before they are squared [s].
+    timed : tuple of str
+        Driving channels of which a fit asks whether they come late.
     """
 
     drives: Array
@@ -102,6 +104,7 @@ class GreyBoxLog:
     gaps: Array = field(default_factory=lambda: np.empty((0, 3)))
     presumed: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
     block: float = BLOCK
+    timed: tuple[str, ...] = ()
 
     def beginning(self, samples: int) -> "GreyBoxLog":
         """Return the log's first part.

@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from estimation.fits.flow_fit import fit_flow
 from estimation.fits.flow_log import flow_log, without_strays
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_problem import Problem
 from estimation.models.flow import FLOW_FORM, STIFFNESS
+from estimation.notes import EstimateCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
@@ -69,6 +71,26 @@ def test_noise_of_position_counts_where_it_is_felt_beside_the_pressure_sensor() 
     quiet = flow_log(*_sound(simulate(CIRCUIT, drive, 1e-3, circuit_of(HEALTHY), sensors=BENCH, rng=rng)))
     assert not quiet.passes_on
     assert quiet.block < noisy.block
+
+
+def lagging(values: np.ndarray, lag: float) -> np.ndarray:
+    """Return what a sensor with a first-order lag [s] gives of samples 1 ms apart."""
+    kept = np.exp(-1e-3 / lag)
+    return lfilter([1.0 - kept], [1.0, -kept], values, zi=[kept * values[0]])[0]
+
+
+@pytest.mark.parametrize("condition", ["normal", "minor_friction"])
+def test_a_position_sensor_that_lags_is_named_and_its_number_not_believed(condition: str) -> None:
+    rng = np.random.default_rng(9)
+    p = circuit_of(parameters_for(CONDITIONS[condition]))
+    drive = make_drive("prbs", 10.0, 1e-3, p, rng)
+    record = simulate(CIRCUIT, drive, 1e-3, p, sensors=BENCH, rng=rng)
+    assert fit_flow(record, HEALTHY, 2e8).reasons == ()
+    fit = fit_flow(record.replace(position_m=lagging(record["position_m"], 3e-3)), HEALTHY, 2e8)
+    (said,) = (note for note in fit.reasons if note.code == EstimateCode.CHANNEL_LATE)
+    assert said.data["channel"] == "position_m"
+    assert said.data["when"] == "late"
+    assert said.data["milliseconds"] == pytest.approx(3.0, abs=1.0)
 
 
 @pytest.mark.parametrize("kind", [Problem, FreedProblem.of])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from estimation.fits.greybox_fit import GreyBoxFit, fit_greybox
-from estimation.fits.greybox_log import GreyBoxLog, OutputNoise
-from estimation.fits.greybox_problem import BLOCK, Problem
+from estimation.fits.greybox_log import BLOCK, GreyBoxLog, OutputNoise
+from estimation.fits.greybox_problem import Problem
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.functions import Scalar
 from plant.eha.model import EhaParameters
