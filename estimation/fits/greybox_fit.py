@@ -282,16 +282,17 @@ def _lateness(
 
     ``left`` gives what the unknowns do not take up of a change of the residuals.
     """
-    log = problem.log
+    log, rough = problem.log, problem.on(problem.log.coarsened())
+    if not log.timed:
+        return
     reach = max(1, round(0.5 * log.block / log.sample_time))
-    for channel in log.timed:
-        place = problem.model.drives.index(channel)
-        values = log.drives[:, place]
-        padded = np.pad(values, reach, mode="edge")
-        moved = log.drives.copy()
-        moved[:, place] += LATE_NUDGE * (padded[2 * reach :] - padded[: -2 * reach]) / (2 * reach * log.sample_time)
-        shifted = problem.residuals(theta, drives=moved).ravel()
-        free = left((shifted - errors) / LATE_NUDGE)
+    padded = np.pad(log.drives, ((reach, reach), (0, 0)), mode="edge")
+    ahead = LATE_NUDGE * (padded[2 * reach :] - padded[: -2 * reach]) / (2 * reach * log.sample_time)
+    places = [problem.model.drives.index(channel) for channel in log.timed]
+    forward = [np.where(np.arange(log.drives.shape[1]) == place, ahead, 0.0) for place in places]
+    known, *shifted = rough.disturbed(theta, [log.drives + one for one in (0.0, *forward)])
+    for channel, moved in zip(log.timed, shifted, strict=True):
+        free = left((moved - known).ravel() / LATE_NUDGE)
         power = float(free @ free)
         if power > 0.0:
             along = float(free @ errors)
