@@ -19,6 +19,7 @@ from benchmarks.diagnosis_checks import (
     foreign_checks,
     limit_checks,
     onset_checks,
+    printed,
     speed_checks,
     stuck_checks,
     told,
@@ -61,10 +62,6 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     actuator = Actuator.of(EhaParameters())
     checks: list[Check] = []
-
-    def printed(found: list[Check]) -> list[Check]:
-        print("\n".join(str(check) for check in found), flush=True)
-        return found
 
     for pressure, wanted in ((True, 98.0), (False, 94.0)):
         began = time.process_time()

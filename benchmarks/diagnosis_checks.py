@@ -76,6 +76,12 @@ class Check:
         return f"{'met   ' if self.met else 'SHORT '} {self.what}: {self.value:.4g} ({said} wanted)"
 
 
+def printed(checks: list[Check]) -> list[Check]:
+    """Print checks and return them."""
+    print("\n".join(map(str, checks)), flush=True)
+    return checks
+
+
 def limit_checks(seeds: int, draws: int) -> list[Check]:
     """Compare with the likelihood marginalised over drawn actuators, at a wide spread; one drive of each kind."""
     rights: dict[str, list[tuple[bool, bool]]] = {"with dp": [], "without dp": []}

@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from benchmarks.diagnosis_checks import PAPER, Check
+from benchmarks.diagnosis_checks import PAPER, Check, printed
 from benchmarks.population import TEST, draw_logs
 from benchmarks.scores import calibration_error, share_interval
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
@@ -111,9 +111,3 @@ def odds(seeds: int) -> list[Check]:
             Check("hard logs: taken for unknown, %", 100.0 * unknown / (len(hits) + silent), 0.0, 3.0),
         ]
     )
-
-
-def printed(checks: list[Check]) -> list[Check]:
-    """Print checks and return them."""
-    print("\n".join(map(str, checks)), flush=True)
-    return checks

@@ -282,9 +282,10 @@ def _lateness(
 
     ``left`` gives what the unknowns do not take up of a change of the residuals.
     """
-    log, rough = problem.log, problem.on(problem.log.coarsened())
+    log = problem.log
     if not log.timed:
         return
+    rough = problem.on(log.coarsened())
     reach = max(1, round(0.5 * log.block / log.sample_time))
     padded = np.pad(log.drives, ((reach, reach), (0, 0)), mode="edge")
     ahead = LATE_NUDGE * (padded[2 * reach :] - padded[: -2 * reach]) / (2 * reach * log.sample_time)

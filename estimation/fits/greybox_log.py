@@ -31,7 +31,7 @@ class OutputNoise:
     passed_on : float
         Standard deviation of what a driving channel's noise adds at once, over `passed_by` [SI].
     passed_by : str
-        The unknown, or other parameter, that the driving channel's noise is multiplied by.
+        The unknown that the driving channel's noise is multiplied by, one that is fitted as a logarithm.
     """
 
     variance: float

@@ -9,7 +9,6 @@ from estimation.fits.descent import Point
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_loops import Kernel, compile_kernel
 from estimation.models.greybox import GreyBoxModel
-from plant.solvers.steps import parameter_names
 
 OUTLIER = 3.0
 """Residuals beyond this many standard deviations count linearly (Huber 1964) [dimensionless]."""
@@ -113,7 +112,7 @@ class Problem:
         Point
             Cost and normal equations; nothing as long as the log is stored.
         """
-        if not self._passing(theta).any():
+        if not self.log.passes_on:
             return self._point(theta, *self._run(theta, np.empty((0, 0)), np.empty((0, 0, 0))))
         errors, slopes = self._room(), self._room(len(theta))
         self._run(theta, errors, slopes)
@@ -228,22 +227,23 @@ class Problem:
         if not self.log.passes_on:
             return np.zeros(len(self.log.noise))
         values = self.model.values(theta)
-        names = parameter_names(self.model.parameters)
-        factors = [
-            values[one.passed_by] if one.passed_by in values else self.log.parameters[names.index(one.passed_by)]
-            for one in self.log.noise
-        ]
-        return np.array([(one.passed_on * by) ** 2 for one, by in zip(self.log.noise, factors, strict=True)])
+        return np.array([(one.passed_on * values.get(one.passed_by, 0.0)) ** 2 for one in self.log.noise])
 
     def _variances(self, theta: Array) -> Array:
         return np.array([noise.variance for noise in self.log.noise]) + self._passing(theta)
 
+    def _tilts(self, theta: Array) -> Iterator[tuple[int, int, float]]:
+        """Yield each output whose variance moves with an unknown: its place, the unknown's, the share that moves."""
+        if self.log.passes_on:
+            share = self._passing(theta) / self._variances(theta)
+            for i, noise in enumerate(self.log.noise):
+                if noise.passed_by in self.model.unknowns:  # fitted as logarithms
+                    yield i, self.model.unknowns.index(noise.passed_by), float(share[i])
+
     def _tilted(self, theta: Array, errors: Array, slopes: Array) -> Array:
         """Return the derivatives of normalised residuals, those that were taken while the variance was held."""
-        share = self._passing(theta) / self._variances(theta)
-        for i, noise in enumerate(self.log.noise):
-            if noise.passed_by in self.model.unknowns:  # fitted as logarithms
-                slopes[i, :, self.model.unknowns.index(noise.passed_by)] -= share[i] * errors[i]
+        for i, place, share in self._tilts(theta):
+            slopes[i, :, place] -= share * errors[i]
         return slopes
 
     def untilted(self, theta: Array, errors: Array) -> Array:
@@ -262,10 +262,8 @@ class Problem:
             Zero where no channel passes noise on [dimensionless].
         """
         out = np.zeros(len(theta))
-        share = self._passing(theta) / self._variances(theta)
-        for i, noise in enumerate(self.log.noise):
-            if noise.passed_by in self.model.unknowns:
-                out[self.model.unknowns.index(noise.passed_by)] += share[i] * float(errors[i] @ errors[i])
+        for i, place, share in self._tilts(theta):
+            out[place] += share * float(errors[i] @ errors[i])
         return out
 
     def _course(self, variance: Array) -> tuple[float, IntArray, int, Array, Array]:

@@ -34,7 +34,6 @@ stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
 LEAST_PEAK = 1.0
 """Highest differential pressure taken of a log whose sensor is dead: the logarithm of none is no start [Pa]."""
 
-
 MOST_BIASED = 2.0
 """Factor by which position's noise may have put the first bulk modulus off [dimensionless]. Far above it there is a
 second valley, where all that the log shows is noise that the oil's stiffness makes large."""

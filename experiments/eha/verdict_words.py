@@ -20,7 +20,6 @@ SHOWN = {
 MARGINS = ((1.05, "too close to call"), (1.25, "narrow"), (2.0, "clear"), (math.inf, "wide"))
 """Words for the ratio of the runner-up's score to the best, up to each bound [dimensionless]."""
 
-
 MOST_DECIMALS = 4
 """Decimals that a severity is given at most [count]."""
 
