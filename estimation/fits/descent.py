@@ -22,6 +22,9 @@ RIDGE = 1e-6
 LEAST_GAIN = 1e-3
 """Half the sum of squares that a further step must promise: less moves no unknown by a twentieth of its deviation."""
 
+SHORTEST = 1e-5
+"""A step shorter than this that fails is the last [dimensionless]: the misfit is rougher than its slopes say."""
+
 SHORTENED = 12
 """How often at most a step is shortened that promises a loss."""
 
@@ -155,6 +158,8 @@ def _search(
             break
         tried = yield best.theta + step
         gain, length = (best.cost - tried.cost) / promised, float(np.linalg.norm(step))
+        if gain <= 0.0 and length < SHORTEST:
+            break
         if gain < POOR:
             radius = POOR * length
         elif gain > GOOD:

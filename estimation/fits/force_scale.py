@@ -1,5 +1,6 @@
 """Whether a log without pressure holds the scale of forces, by leaving its optimum and looking for it anew."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,11 +14,21 @@ SCALES = (0.8, 1.25)
 friction and stiffness may grow together and move little that position shows: a search can end anywhere along such a
 valley, and the curvature where it ends does not say so [dimensionless]."""
 
+STIFFENED = (0.93, 1.07)
+"""The same on bulk modulus alone. Where the piston sticks and slips often, the misfit is rough: pits lie a few percent
+apart, and the curvature in one says nothing of the next [dimensionless]."""
+
 RESCALED = 3
 """How often at most an optimum is left for a better one that was found so."""
 
 BETTER = 5.0
-"""Fall of the cost from which another optimum takes the place of the best [dimensionless]."""
+"""Fall of the cost from which a better optimum is left in its turn [dimensionless]."""
+
+ELSEWHERE = 0.005
+"""Relative difference in bulk modulus from which the same [fraction]."""
+
+LARGEST_DISAGREEMENT = 0.05
+"""Relative difference in bulk modulus of two optima that explain a log, above which neither is believed [fraction]."""
 
 GROWING = (
     "bulk_modulus",
@@ -49,6 +60,8 @@ class Way:
         Evaluations of the model on the problem itself.
     bounds : tuple of ndarray, shape (unknowns,)
         Lowest and highest coordinates [dimensionless].
+    explained : float
+        Misfit up to which an optimum explains the log [dimensionless].
     """
 
     near: FreedProblem
@@ -56,10 +69,11 @@ class Way:
     near_enough: float
     finishing: int
     bounds: tuple[Array, Array]
+    explained: float
 
 
-def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[Point]]:
-    """Look for optima with forces on another scale.
+def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[float]]:
+    """Look for optima with stiffness or forces on another scale.
 
     Parameters
     ----------
@@ -72,26 +86,48 @@ def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[
 
     Returns
     -------
-    tuple of Point and list of Point
-        The best optimum, and all others that were found.
+    tuple of Point and list of float
+        The best optimum, and the bulk moduli of all others that explain the log [Pa].
     """
-    others: list[Point] = []
+    found = [best]
     for _ in range(RESCALED):
-        ends = _ended(problem, best, way)
-        lowest = min(ends, key=lambda point: point.cost)
-        if lowest.cost > best.cost - BETTER:
-            return best, [*others, *ends]
-        others, best = [*others, best, *(end for end in ends if end is not lowest)], lowest
-    return best, others
+        found += _ended(problem, best, way)
+        lowest = min(found, key=lambda point: point.cost)
+        moved = abs(np.log(_bulk_modulus(problem, lowest) / _bulk_modulus(problem, best)))
+        over, best = lowest.cost > best.cost - BETTER, lowest
+        moduli = [_bulk_modulus(problem, one) for one in found if one is not best and one.cost < way.explained]
+        if over or moved < ELSEWHERE or disagree([_bulk_modulus(problem, best), *moduli]):
+            break
+    return best, moduli
+
+
+def disagree(moduli: Sequence[float]) -> bool:
+    """Return whether some bulk moduli lie farther apart than may be believed.
+
+    Parameters
+    ----------
+    moduli : sequence of float
+        The bulk moduli [Pa].
+
+    Returns
+    -------
+    bool
+        Whether the largest is over the least by more than `LARGEST_DISAGREEMENT`.
+    """
+    return max(moduli) > (1.0 + LARGEST_DISAGREEMENT) * min(moduli)
+
+
+def _bulk_modulus(problem: FreedProblem, point: Point) -> float:
+    return problem.model.values(point.theta)["bulk_modulus"]
 
 
 def _ended(problem: FreedProblem, best: Point, way: Way) -> list[Point]:
-    """Return the optima downhill from another's, all forces multiplied by each of `SCALES`; searched side by side."""
-    starts: list[Array] = []
+    """Return the optima downhill from another's, stiffness or all forces on another scale; searched side by side."""
+    values = problem.model.values(best.theta)
+    moved = [{"bulk_modulus": values["bulk_modulus"] * factor} for factor in STIFFENED]
     for factor in SCALES:
-        values = dict(problem.model.values(best.theta))
-        values |= {name: values[name] * factor for name in GROWING}
-        values |= {name: values[name] / factor for name in FALLING}
-        starts.append(np.clip(problem.model.theta(values), *way.bounds))
+        growing = {name: values[name] * factor for name in GROWING}
+        moved.append(growing | {name: values[name] / factor for name in FALLING})
+    starts = [np.clip(problem.model.theta({**values, **some}), *way.bounds) for some in moved]
     near = descend_together(way.near.at_each, starts, way.nearing, way.bounds, way.near_enough)
     return descend_together(problem.at_each, [one.theta for one in near], way.finishing, way.bounds)

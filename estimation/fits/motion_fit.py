@@ -10,7 +10,7 @@ from estimation.fits.averaged import block_means, samples_a_block
 from estimation.fits.descent import Point, descend, descend_together
 from estimation.fits.flow_fit import LEAD_START
 from estimation.fits.flow_log import DRAIN_START, LEAST_LEAKAGE
-from estimation.fits.force_scale import Way, rescaled
+from estimation.fits.force_scale import Way, disagree, rescaled
 from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
@@ -62,15 +62,17 @@ SCREENED = 4_000
 SEARCHED = 10_000
 """Samples on which the likelier starts are carried on; a longer log goes on from where they end."""
 
+UNCHANGED = (1.0, 1.0)
+"""Factors that leave the noise as it is [dimensionless]."""
+
 WAYS: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = (
     ((1.0, 1e6), (1.0, 1e3)),
+    (UNCHANGED, UNCHANGED),
     ((1e2, 1e6), (1.0, 1e3)),
-    ((1.0, 1.0), (1.0, 1.0)),
 )
 """Ways down to the optimum: factors on variance and random walk of the residual while starts are screened and while
 they are brought near. With the true, small noise the least misfit of leakage piles up into the position and hides other
-ways down; with a larger walk what counts is increments. Where no start gets down so, with a larger variance too, and
-failing that, straight down."""
+ways down; with a larger walk what counts is increments. Where the piston sticks, straight down is often the shorter."""
 
 SCREENING, NEARING, FINISHING = 10, 12, 25
 """Evaluations of the model in the three stages."""
@@ -79,7 +81,7 @@ NEAR_ENOUGH = 0.01
 """Cost that a further step must promise while a start is only brought near [dimensionless]."""
 
 FINALISTS = 3
-"""Starts that are carried on, until one explains the log."""
+"""Starts that are carried on each way, the likeliest of each way first, until one explains the log."""
 
 EXPLAINED = 1.1
 """Mean squared normalised residual up to which a form explains the log [dimensionless]."""
@@ -88,10 +90,6 @@ STRUCTURE = 0.005
 """Relative standard deviation of bulk modulus from friction being of no known law: on the foreign bench, whose
 presliding is of another make, noise alone explains a tenth to a half of the errors. Judged from that one bench
 [fraction]."""
-
-LARGEST_DISAGREEMENT = 0.05
-"""Relative difference in bulk modulus of two structures of friction that explain the log alike, above which neither
-is believed; the same between optima of one structure with forces on another scale [fraction]."""
 
 ALIKE = 5.0
 """Difference of log-likelihood up to which two structures are said to explain a log alike [dimensionless]."""
@@ -207,18 +205,16 @@ def _searched(form: GreyBoxModel, log: GreyBoxLog, starts: list[dict[str, float]
     part = whole.on(log.beginning(SEARCHED))
     explained = 0.5 * EXPLAINED * len(part.log.measured)
     guesses, bounds = _guesses(whole, starts)
-    best, others = part.at(guesses[0]), list[Point]()
-    for near in _brought_near(part, guesses, bounds):
+    best, others = part.at(guesses[0]), list[float]()
+    for near in _brought_near(part, guesses, bounds, explained):
         best = min(best, descend(part.at, near, FINISHING, bounds), key=lambda point: point.cost)
         if best.cost < explained:
             near = part.on(part.log.softened(*WAYS[0][1]))
-            best, others = rescaled(part, best, Way(near, NEARING, NEAR_ENOUGH, FINISHING, bounds))
+            best, others = rescaled(part, best, Way(near, NEARING, NEAR_ENOUGH, FINISHING, bounds, explained))
             break
     if len(part.log.measured) < len(log.measured):
         best = descend(whole.at, best.theta, FINISHING, bounds)
-    return concluded(whole, best), [
-        part.model.values(other.theta)["bulk_modulus"] for other in others if other.cost < explained
-    ]
+    return concluded(whole, best), others
 
 
 def _guesses(problem: Problem, starts: list[dict[str, float]]) -> tuple[list[Array], tuple[Array, Array]]:
@@ -227,14 +223,24 @@ def _guesses(problem: Problem, starts: list[dict[str, float]]) -> tuple[list[Arr
     return guesses, search_bounds(problem.model, guesses, {"speed_lead": (0.0, 0.5 * problem.log.sample_time)})
 
 
-def _brought_near(whole: FreedProblem, guesses: list[Array], bounds: tuple[Array, Array]) -> Iterator[Array]:
-    """Yield the likelier starts, brought nearer, one way after another."""
-    for first, second in WAYS:
-        screen = whole.on(whole.log.softened(*first).beginning(SCREENED))
-        near = whole.on(whole.log.softened(*second))
-        screened = descend_together(screen.at_each, guesses, SCREENING, bounds, NEAR_ENOUGH)
-        for candidate in sorted(screened, key=lambda point: point.cost)[:FINALISTS]:
-            yield descend(near.at, candidate.theta, NEARING, bounds, NEAR_ENOUGH).theta
+def _brought_near(
+    whole: FreedProblem, guesses: list[Array], bounds: tuple[Array, Array], explained: float
+) -> Iterator[Array]:
+    """Yield the likelier starts, brought nearer: the likeliest of each way, then the next.
+
+    One whose misfit is over what explains the log with the larger noise too is left out.
+    """
+    screened: dict[int, list[Point]] = {}
+    for rank in range(FINALISTS):
+        for way, (first, second) in enumerate(WAYS):
+            if way not in screened:
+                screen = whole.on(whole.log.softened(*first).beginning(SCREENED))
+                points = descend_together(screen.at_each, guesses, SCREENING, bounds, NEAR_ENOUGH)
+                screened[way] = sorted(points, key=lambda point: point.cost)
+            near = whole.on(whole.log.softened(*second))
+            reached = descend(near.at, screened[way][rank].theta, NEARING, bounds, NEAR_ENOUGH)
+            if reached.cost < explained or second == UNCHANGED:
+                yield reached.theta
 
 
 def _compared(
@@ -253,9 +259,9 @@ def _objections(fits: list[GreyBoxFit], best: GreyBoxFit, others: list[float]) -
     if best.chi_square[0] > EXPLAINED:
         reasons.append(EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5))
     values = [fit.values["bulk_modulus"] for fit in fits if fit.cost < best.cost + ALIKE]
-    if max(values) > (1.0 + LARGEST_DISAGREEMENT) * min(values):
+    if disagree(values):
         reasons.append(EstimateCode.FRICTION_LAWS_DISAGREE.note(least_pa=min(values), most_pa=max(values)))
     scales = [*others, best.values["bulk_modulus"]]
-    if max(scales) > (1.0 + LARGEST_DISAGREEMENT) * min(scales):
+    if disagree(scales):
         reasons.append(EstimateCode.FORCES_ON_ANY_SCALE.note(least_pa=min(scales), most_pa=max(scales)))
     return tuple(reasons)
