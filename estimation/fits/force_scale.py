@@ -89,7 +89,7 @@ def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[
     tuple of Point and list of float
         The best optimum, and the bulk moduli of all others that explain the log [Pa].
     """
-    found = [best]
+    found, moduli = [best], list[float]()
     for _ in range(RESCALED):
         found += _ended(problem, best, way)
         lowest = min(found, key=lambda point: point.cost)
