@@ -8,7 +8,7 @@ compiled filter of a rule, alone or in lanes; a new rule needs no kernel of its 
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from estimation.models.model import OPENING, ProcessModel
+from estimation.models.model import OPENING, ProcessModel, StateVariable
 from plant.compiled.elimination import eliminated_jacobian
 from plant.compiled.expression import ZERO, Expression, as_expression, symbol
 from plant.compiled.functions import exp, log, where
@@ -124,9 +124,16 @@ def moved(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]:
     stepped = model.step(physical, drives, parameter_symbols(model.parameters), symbol("h"))
     result: list[Expression] = []
     for z, old, new, state in zip(mean, physical, stepped, model.states, strict=True):
-        scaled = as_expression(new) / state.scale
-        result.append(z if new is old else log(scaled) if state.logarithmic else scaled)
+        result.append(z if new is old else _over_scale(z, old, as_expression(new), state))
     return result
+
+
+def _over_scale(z: Expression, old: Expression, new: Expression, state: StateVariable) -> Expression:
+    """Return a state after a step, in the filter's units; what the step adds is scaled without waiting for the sum."""
+    if state.logarithmic:
+        return log(new / state.scale)
+    added = [term for term in new.arguments if term is not old] if new.operation == "+" else []
+    return z + added[0] / state.scale if len(added) == 1 else new / state.scale
 
 
 def observed(model: ProcessModel, mean: Sequence[Expression], channels: Sequence[str]) -> list[Expression]:

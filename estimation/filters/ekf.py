@@ -44,9 +44,11 @@ def ekf_predict(model: ProcessModel) -> Outputs:
     held = bounded(model, mean)
     # what has not moved is within its bounds: the update before saw to that
     outputs = {f"z{i}": z if z.operation == "symbol" else held[i] for i, z in enumerate(mean)}
+    terms = [sum(slope is not ZERO for slope in row) for row in F]
     for i in range(n):
         for j in range(i, n):
-            spread = total([FP[i][k] * F[j][k] for k in range(n)])
+            few, many = (i, j) if terms[i] < terms[j] else (j, i)
+            spread = total([FP[many][k] * F[few][k] for k in range(n)])
             outputs[f"P{i}_{j}"] = spread + process_noise(model, i) if i == j else spread
     return outputs
 

@@ -189,6 +189,13 @@ def test_names_and_units_stand_in_the_header() -> None:
     assert f"#define EXPORTED_OPERATIONS {sum(counts)} " in header
 
 
+def test_a_step_of_the_acceleration_form_takes_no_operation_that_its_jacobians_zeros_spare() -> None:
+    header = filter_in_c(task("acceleration", "normal", 500), name="exported")["exported.h"]
+    found = re.search(r"EXPORTED_OPERATIONS (\d+)", header)
+    assert found is not None
+    assert int(found[1]) <= 154  # 161 where every entry of F P F' is summed over the column's terms
+
+
 def test_what_cannot_be_exported_is_refused() -> None:
     problem = task("pressure", "normal", 500)
     with pytest.raises(HydrostateError, match=r"a method that can be exported must be one of ekf, .*, got 'particle'"):

@@ -1,0 +1,9 @@
+from estimation.engine.kalman import belief_symbols, moved
+from estimation.models.eha_forms import ACCELERATION_FORM
+
+
+def test_a_state_after_a_step_is_the_state_before_plus_what_the_step_adds_without_a_change_of_units() -> None:
+    mean, _ = belief_symbols(ACCELERATION_FORM)
+    *moving, constant = zip(mean, moved(ACCELERATION_FORM, mean), strict=True)
+    assert all(after.operation == "+" and any(one is before for one in after.arguments) for before, after in moving)
+    assert constant[0] is constant[1]
