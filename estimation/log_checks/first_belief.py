@@ -51,7 +51,7 @@ def first_belief(model: ProcessModel, record: Record, start: float, start_std: f
         BULK_MODULUS: start_std,
     }
     mean = np.array([firsts.get(state.name, 0.0) for state in model.states])
-    return Gaussian(mean, np.diag([spreads[state.name] ** 2 for state in model.states]))
+    return Gaussian(mean, np.diag([spreads[state.name] * spreads[state.name] for state in model.states]))
 
 
 def first_load(record: Record, variances: Mapping[str, float] | None = None) -> float:

@@ -77,8 +77,8 @@ def write_filtered(rows: Rows, ran: Sequence[Waiting], traces: Sequence[Trace]) 
         _, slopes = model.to_si(np.array([trace.mean for trace in traces]))
         stds = np.sqrt([trace.covariance[state, state] for trace in traces]) * slopes[:, state]
         nis = np.array([trace.nis for trace in traces]) / np.array([trace.count for trace in traces])
-        impossible = np.array([trace.log_likelihood for trace in traces]) == -np.inf
-        finite = np.isfinite(values + stds) & ~impossible
+        # no number where an innovation's variance lost its sign, less than all where it overflowed
+        finite = np.isfinite(values + stds + [trace.log_likelihood for trace in traces])
     columns = {
         "outcome": ["ok"] * len(ran),
         "bulk_modulus_pa": values.tolist(),

@@ -53,7 +53,8 @@ def test_as_printed_the_filter_stays_where_its_first_guess_puts_it() -> None:
     record, p = sine("normal", 1.0)
     ends = [published(record, p, guess, PRINTED_FORM).settled(BULK_MODULUS)[0] for guess in GUESSES]
     mended = [published(record, p, guess).settled(BULK_MODULUS)[0] for guess in GUESSES]
-    assert all(abs(end / PUBLISHED - 1.0) > 0.1 for end in ends)
+    # below 1e8 Pa its covariance loses its sign, and rounding decides where it ends
+    assert all(end > 2.0 * PUBLISHED for guess, end in zip(GUESSES, ends, strict=True) if guess >= 1e8)
     assert np.ptp(ends) > PUBLISHED > 20.0 * np.ptp(mended)
 
 
