@@ -178,7 +178,7 @@ class PartStore:
         wanted = list(SCHEMA.names if columns is None else columns)
         read = list(dict.fromkeys([*wanted, "key", "outcome"]))
         try:
-            order = _listed(pq.read_table(BytesIO(self.folder.read(CASES))), "key")
+            order = _listed(_table(self.folder.read(CASES)), "key")
         except (OSError, pa.ArrowException) as error:
             raise HydrostateError(f"store {self.name}: there is no batch study there, or it cannot be read") from error
         place = {key: number for number, key in enumerate(order)}
@@ -197,9 +197,9 @@ class PartStore:
                 continue
 
     def _read(self, name: str, columns: list[str] | None) -> pa.Table:
-        content = BytesIO(self.folder.read(f"{PARTS}/{name}"))
         schema = None if columns is None else SCHEMA  # a part that is older than a column holds nothing in it
-        return pq.read_table(content, columns=columns, schema=schema, page_checksum_verification=True)
+        content = self.folder.read(f"{PARTS}/{name}")
+        return _table(content, columns=columns, schema=schema, page_checksum_verification=True)
 
     def _parts(self) -> list[str]:
         return [name for name in self.folder.files(PARTS) if name.endswith(".parquet")]
@@ -246,6 +246,11 @@ def _placed(table: pa.Table, place: Mapping[str, int]) -> pa.Table:
     places = pa.array([place.get(key) for key in _listed(table, "key")], pa.int64())
     table = table.append_column("place", places).append_column("failed", _failed(table))
     return table.filter(pc.is_valid(table["place"]))
+
+
+def _table(content: bytes, **how: Any) -> pa.Table:
+    # of several threads one may still hold the bytes when the process ends, and Python aborts it (apache/arrow#33975)
+    return pq.read_table(BytesIO(content), use_threads=False, **how)
 
 
 def _listed(table: pa.Table, column: str) -> list[Any]:

@@ -2,9 +2,12 @@ import errno
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
+from pyarrow.parquet import read_table
 
 from experiments.batch.part_store import PartStore, open_store
 from plant.errors import HydrostateError
@@ -37,6 +40,22 @@ def test_rows_come_in_the_studys_order_and_can_be_read_while_it_grows(store: Par
 def _places(reference: pa.Table, rows: pa.Table) -> list[int]:
     keys = reference["key"].to_pylist()
     return [keys.index(key) for key in rows["key"].to_pylist()]
+
+
+def test_a_store_is_read_by_one_thread_for_others_may_outlive_the_process(
+    store: PartStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run_into(store, small_plan())
+    told: list[object] = []
+
+    def reading(*what: Any, **how: Any) -> pa.Table:
+        told.append(how.get("use_threads", True))
+        return read_table(*what, **how)
+
+    monkeypatch.setattr(pq, "read_table", reading)
+    assert len(store.rows()) == 24
+    assert len(told) > len(parts(store))
+    assert not any(told)
 
 
 @pytest.mark.parametrize("damage", ["cut", "flipped", "empty", "rubbish"])
