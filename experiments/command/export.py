@@ -202,7 +202,7 @@ def _filter(
 
     problem = filter_task(record, bench.parameters, form, states=states, tuned=tune)
     if precision == "float" and form != "pressure":
-        note(f"warning: the {form} form needs double: in float its estimates were off by 8 % to more than their size")
+        note(f"warning: the {form} form needs double: in float its estimates were off by 1 % to more than their size")
     called = name if name is not None else f"{form}_{method}"
     about = {"form": form, "method": method, "channels": list(problem.channels), "sample_time_s": problem.sample_time}
     return filter_in_c(problem, method, name=called, precision=precision), about
