@@ -133,4 +133,5 @@ def test_a_phone_shows_what_is_worst_and_a_wide_screen_every_column(page: Any) -
     assert all(in_sight(page, heading) for heading in ("found", "worst", "of the limit", "outlook"))
     assert page.locator(".window").evaluate("one => one.scrollWidth <= one.clientWidth")
     page.set_viewport_size({"width": 1280, "height": 800})
+    page.evaluate("new Promise(drawn => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
     assert all(in_sight(page, heading) for heading in ("worst", "logs left", "last log", "logs"))
