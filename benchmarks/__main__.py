@@ -1,7 +1,10 @@
-"""Run one benchmark by name, or all."""
+"""Run one benchmark by name, or all; `--record` before the name adds the figures to the history."""
 
 import importlib
 import sys
+
+from benchmarks.history import record
+from benchmarks.targets import kept
 
 NAMES = (
     "bulk_modulus",
@@ -53,24 +56,36 @@ OF_COMMITS = ("same_numbers",)
 OF_TESTS = ("mutants",)
 """Those that ask the tests themselves, and take minutes to hours."""
 
-ALL = (*NAMES, *FITS, *WITH_PEERS, *OF_COMMITS, *OF_TESTS)
+OF_RUNS = ("history",)
+"""Those that compare earlier runs of the others."""
+
+ALL = (*NAMES, *FITS, *WITH_PEERS, *OF_COMMITS, *OF_TESTS, *OF_RUNS)
 
 
-def main() -> int:
+def run(name: str, arguments: list[str], *, recorded: bool) -> int:
+    """Run one benchmark; return how many of its targets it missed."""
+    kept.clear()
+    missed = importlib.import_module(f"benchmarks.{name}").main(arguments)
+    if recorded and kept:
+        print(f"{record(' '.join([name, *arguments]), kept)} figures added to the history")
+    return missed
+
+
+def main(words: list[str]) -> int:
     """Run the named benchmark with its own arguments, or every one with its defaults."""
-    if len(sys.argv) > 1:
-        if sys.argv[1] not in ALL:
-            print(
-                f"benchmark must be one of {', '.join(ALL)}, got {sys.argv[1]!r}",
-                file=sys.stderr,
-            )
-            return 2
-        return int(importlib.import_module(f"benchmarks.{sys.argv[1]}").main(sys.argv[2:]) > 0)
+    recorded = words[:1] == ["--record"]
+    name, *arguments = words[recorded:] or [""]
+    if name and name not in ALL:
+        print(f"benchmark must be one of {', '.join(ALL)}, got {name!r}", file=sys.stderr)
+        return 2
+    if name:
+        return int(run(name, arguments, recorded=recorded) > 0)
     misses = 0
-    for name in NAMES:
-        print(f"\n== {name}")
-        misses += importlib.import_module(f"benchmarks.{name}").main([])
+    for one in NAMES:
+        print(f"\n== {one}")
+        misses += run(one, [], recorded=recorded)
     return int(misses > 0)
 
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -15,11 +15,9 @@ import pandas as pd
 
 from benchmarks.diagnosis_checks import (
     PAPER,
-    Check,
     foreign_checks,
     limit_checks,
     onset_checks,
-    printed,
     speed_checks,
     stuck_checks,
     told,
@@ -27,6 +25,7 @@ from benchmarks.diagnosis_checks import (
 )
 from benchmarks.population import TEST, Drawn, draw_logs
 from benchmarks.scores import calibration_error, share_interval
+from benchmarks.targets import Check, printed
 from estimation.finding import Finding
 from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.class_fit import Actuator

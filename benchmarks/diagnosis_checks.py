@@ -4,7 +4,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from benchmarks.population import (
     draw_logs,
     draw_parameters,
 )
+from benchmarks.targets import Check
 from estimation.finding import Finding
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuit_runs import Blocks, blocks_of, coordinates_of, predicted
@@ -55,31 +56,6 @@ def told(found: Finding, true: Mapping[str, float]) -> dict[str, bool]:
     """Return whether each severity that a diagnosis gives an interval covers what it truly is."""
     names = [name for name, one in found.severities.items() if name in true and one.ci95 is not None]
     return {name: found.severities[name].covers(true[name]) for name in names if name != "entrained_air"}
-
-
-@dataclass(frozen=True)
-class Check:
-    """One figure and the range in which it is wanted."""
-
-    what: str
-    value: float
-    least: float
-    most: float
-
-    @property
-    def met(self) -> bool:
-        """Whether it is in the range."""
-        return self.least <= self.value <= self.most
-
-    def __str__(self) -> str:
-        said = f"{self.least:g} to {self.most:g}"
-        return f"{'met   ' if self.met else 'SHORT '} {self.what}: {self.value:.4g} ({said} wanted)"
-
-
-def printed(checks: list[Check]) -> list[Check]:
-    """Print checks and return them."""
-    print("\n".join(map(str, checks)), flush=True)
-    return checks
 
 
 def limit_checks(seeds: int, draws: int) -> list[Check]:

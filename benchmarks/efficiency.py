@@ -24,6 +24,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import beta, chi2
 
+from benchmarks.targets import Check, keep
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.eha.by_filter import GROUPS
 from estimation.eha.result import LARGEST_BOUND
@@ -245,6 +246,9 @@ def main(arguments: list[str]) -> int:
         f"RMSE over the bound {pooled['over_bound']:.3f} pooled, {worst:.3f} in the worst cell, wanted at most {wanted}"
         " in each": judged(worst <= wanted),
     }
+    which = f"{options.estimator}, {'with' if pressure else 'without'} pressure"
+    keep(Check(f"{which}: RMSE over the bound, worst cell", worst, most=wanted))
+    keep(Check(f"{which}: coverage [%]", pooled["coverage"], *WANTED_POOLED))
     print("\npooled")
     print("\n".join(f"  {line}: {verdict}" for line, verdict in verdicts.items()))
     return len(verdicts) - list(verdicts.values()).count("met")

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from benchmarks.peers import cpp_lanes, filterpy_user
 from benchmarks.peers.acceleration_form import coefficients
+from benchmarks.targets import Check, printed
 from estimation.engine.contract import FilterProblem
 from estimation.engine.kernels import LANES, compile_kernel
 from estimation.engine.layout import halves_of, layout
@@ -287,9 +288,6 @@ def main(arguments: list[str]) -> int:
         if value is None:
             print(f"{name:20s} not measured: no compiler, or no --jax", file=sys.stderr)
             continue
-        met = value <= wanted if most else value >= wanted
-        missed += not met
-        print(
-            f"{name:20s}{value:10.2f}  wanted: at {'most' if most else 'least'} {wanted:g}{'' if met else '  MISSED'}"
-        )
+        [check] = printed([Check(name, value, most=wanted) if most else Check(name, value, least=wanted)])
+        missed += not check.met
     return missed

@@ -14,9 +14,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from benchmarks.diagnosis_checks import PAPER, Check, printed
+from benchmarks.diagnosis_checks import PAPER
 from benchmarks.population import TEST, draw_logs
 from benchmarks.scores import calibration_error, share_interval
+from benchmarks.targets import Check, printed
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from faults.diagnosis.diagnose import diagnose_log
 from plant.eha.model import EhaParameters

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.targets import Check, keep
 from estimation.eha.online import Asked, begun, load_filter, save_filter
 from estimation.export.task import EXPORTED_FORMS
 from estimation.filters.online import RULES, OnlineFilter
@@ -63,5 +64,6 @@ def main(arguments: list[str]) -> int:
                 missed, count = missed + (not met), count + 1
                 finite = bool(np.all(np.isfinite(whole.now().values)))
                 print(f"{form:18s}{method:6s}{'to the bit' if met else 'MISSED'}{'' if finite else ' (it diverged)'}")
+    keep(Check("filters that do not continue to the last bit", missed, most=0))
     print(f"{count - missed} of {count} continue to the last bit over {RESTARTS} restarts")
     return missed

@@ -1,22 +1,66 @@
-"""Figures beside their targets, as the plants' benchmarks print them."""
+"""Figures beside their targets: the one printer of all benchmarks, which also keeps them for the history."""
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, isfinite
 from typing import TypeVar
 
 T = TypeVar("T")
 
+
+@dataclass(frozen=True)
+class Check:
+    """One figure and the range in which it is wanted."""
+
+    what: str
+    """What was measured, with its unit."""
+
+    value: float
+
+    least: float = -inf
+
+    most: float = inf
+
+    @property
+    def met(self) -> bool:
+        """Whether the figure is in the range."""
+        return self.least <= self.value <= self.most
+
+    @property
+    def wanted(self) -> str:
+        """The range in words."""
+        if not isfinite(self.least):
+            return f"at most {self.most:g}" if isfinite(self.most) else "no target"
+        return f"{self.least:g} to {self.most:g}" if isfinite(self.most) else f"at least {self.least:g}"
+
+    def __str__(self) -> str:
+        return f"{'met   ' if self.met else 'MISSED'} {self.what}: {self.value:.4g} (wanted: {self.wanted})"
+
+
 misses: list[str] = []
 """What fell short since a benchmark began."""
+
+kept: list[Check] = []
+"""Every figure since the benchmarks began, for the history."""
+
+
+def keep(check: Check) -> Check:
+    """Keep a figure for the history, without printing it."""
+    kept.append(check)
+    return check
+
+
+def printed(checks: list[Check]) -> list[Check]:
+    """Print figures, keep them for the history, and return them."""
+    print("\n".join(str(keep(check)) for check in checks), flush=True)
+    return checks
 
 
 def say(what: str, value: float, bound: float, *, most: bool = True) -> None:
     """Print a figure beside its target, and note it if it falls short."""
-    met = value <= bound if most else value >= bound
-    print(
-        f"{'met   ' if met else 'MISSED'} {what}: {value:.4g} (wanted: {'at most' if most else 'at least'} {bound:g})"
-    )
-    if not met:
+    [check] = printed([Check(what, value, most=bound) if most else Check(what, value, least=bound)])
+    if not check.met:
         misses.append(what)
 
 
