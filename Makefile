@@ -5,12 +5,14 @@ SEED ?= 2024
 WORKERS ?= 2
 ORDER := $(or $(ORDER),$(shell date +%s))
 
-.PHONY: study papers test test-random test-slow coverage lint benchmark peers release docs clean
+.PHONY: study papers test test-random test-slow coverage lint benchmark peers release docs lock clean
 
-# One stamp a kind of install: re-made when the pins or the project's metadata change.
-$(VENV)/.installed: pyproject.toml constraints.txt
+# One stamp a kind of install: re-made when the pins or the project's metadata change. What a user runs is checked
+# against the hashes of locked.txt; tools for development have their versions from constraints.txt alone.
+$(VENV)/.installed: pyproject.toml constraints.txt locked.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Hydrostate needs Python 3.11 or newer, this is " + sys.version)'
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement locked.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable .
 	touch $@
 
@@ -93,9 +95,17 @@ release:
 	build/release/tools/bin/python -m build --outdir dist
 	build/release/tools/bin/python -m twine check --strict dist/*
 	$(PYTHON) -m venv build/release/clean
-	build/release/clean/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt dist/*.whl
+	build/release/clean/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement locked.txt
+	build/release/clean/bin/python -m pip install --quiet --disable-pip-version-check --no-deps dist/*.whl
 	cd build/release && clean/bin/hydrostate study --quick --out study
 	build/release/clean/bin/hydrostate --version
+
+# Hashes of the versions in constraints.txt, for every Python and platform that the project supports.
+lock:
+	$(PYTHON) -m venv build/lock
+	build/lock/bin/python -m pip install --quiet --disable-pip-version-check uv
+	build/lock/bin/uv pip compile pyproject.toml --constraint constraints.txt --generate-hashes --universal \
+		--python-version 3.11 --no-header --no-annotate --quiet --output-file locked.txt
 
 clean:
 	rm -rf $(VENV) .peers results build dist *.egg-info

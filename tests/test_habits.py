@@ -90,3 +90,19 @@ def test_every_form_for_an_issue_asks_for_something_that_is_required(path: Path)
 )
 def test_every_target_that_contributors_are_told_of_is_in_the_makefile(target: str) -> None:
     assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)
+
+
+def test_what_a_user_runs_is_locked_by_hashes_at_the_versions_of_the_constraints() -> None:
+    locked = re.findall(r"^([\w.-]+)==(\S+)((?:.*\\\n)*.*)", (ROOT / "locked.txt").read_text("utf-8"), re.MULTILINE)
+    held = re.findall(r"^([\w.-]+)==(\S+)$", (ROOT / "constraints.txt").read_text("utf-8"), re.MULTILINE)
+    pinned = {normal(name): version for name, version in held}
+    versions = {normal(name): version for name, version, _ in locked}
+    assert all(re.search(r"--hash=sha256:[0-9a-f]{64}", rest) for _, _, rest in locked)
+    assert {name: version for name, version in versions.items() if pinned.get(name, version) != version} == {}
+    wanted = {normal(re.split(r"[><=\[;]", one)[0]) for one in PROJECT["dependencies"]}
+    assert wanted <= versions.keys() & pinned.keys()
+
+
+def normal(name: str) -> str:
+    """Return a package's name as registries compare it."""
+    return re.sub(r"[-_.]+", "-", name.strip()).lower()
