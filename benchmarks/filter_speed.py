@@ -3,8 +3,11 @@
 Every peer runs in the same run, interleaved with ours, CPU time, medians over the rounds. "Lanes" is the verb, from
 separate logs to separate results; "lanes, kernel" finds the logs side by side already, as the C++ kernel and JAX do, so
 their ratios are to it. filterpy is written as its users write it (`benchmarks.peers.filterpy_user`), C++ and JAX as
-an expert would (`ekf_simd.cpp`, `jax_lanes.py`). "Bridge" is filterpy with our compiled model. JAX has one thread and
-runs in the environment that ``--jax`` names (a Python that imports jax), since it is no dependency of this project.
+an expert would (`ekf_simd.cpp`, `jax_lanes.py`); C++ is built in several ways, and the fastest counts. "Bridge" is
+filterpy with our compiled model. JAX has one thread and runs in the environment that ``--jax`` names (a Python that
+imports jax), since it is no dependency of this project. ``--processor avx2`` compiles ours and C++ for a processor that
+has AVX2 and no AVX-512. The arithmetic floor is the time of a step's operations at the rate of fused multiply-adds that
+a core is measured to do in the same run, a fused one counted once; divisions, loads and stores are free in it.
 """
 
 import argparse
@@ -14,6 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from ctypes import CDLL
 from dataclasses import astuple, replace
 from pathlib import Path
 from statistics import median
@@ -35,6 +39,7 @@ from estimation.filters.run import filter_problem
 from estimation.log_checks.first_belief import first_belief
 from estimation.models.eha_forms import ACCELERATION_FORM, FORMS
 from plant.compiled.expression import ordered
+from plant.compiled.native import machine
 from plant.compiled.simplify import FUSED
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -48,6 +53,7 @@ VARIANCES = {"position_m": 1e-12, "velocity_m_s": 1e-6}
 SAMPLE_TIME = 1e-4
 ROUNDS = 7
 WANTED = {
+    "floor, %": 50.0,
     "lanes ns": 13.0,
     "of C++": 1.6,
     "filterpy": 3500.0,
@@ -59,8 +65,8 @@ WANTED = {
 SAME = 1e-4
 """Largest relative difference of states that are taken for equal: the peer's Jacobian is of differences [fraction]."""
 
-FLOPS_A_SECOND = 44.7e9
-"""Peak of one core as measured for the research behind the design; the share of it is an order of magnitude."""
+CPP = "C++ SIMD, "
+"""How the C++ builds begin their names."""
 
 
 def cost(work: Callable[[], object], steps: int) -> float:
@@ -121,11 +127,8 @@ def kernel_work(batch: list[FilterProblem]) -> Callable[[], None]:
     return run
 
 
-def cpp_work(batch: list[FilterProblem]) -> tuple[Callable[[], None], Array] | None:
-    """Return the C++ kernel's work on all filters, and where its last block of means ends up."""
-    library = cpp_lanes.build()
-    if library is None:
-        return None
+def cpp_work(batch: list[FilterProblem], library: CDLL) -> Callable[[], None]:
+    """Return the work of a build of the C++ kernel on all filters."""
     steps, noise, variances, _ = scaled(batch[0])
     blocks = [batch[i : i + LANES] for i in range(0, len(batch), LANES)]
     data: list[tuple[Array, Array]] = []
@@ -141,7 +144,7 @@ def cpp_work(batch: list[FilterProblem]) -> tuple[Callable[[], None], Array] | N
             state[:] = first
             cpp_lanes.run(library, steps, coefficients(EhaParameters()), noise, variances, speed, measured, state)
 
-    return work, state
+    return work
 
 
 def _lanes(arrays: list[Array]) -> Array:
@@ -213,18 +216,19 @@ def filterpy_pressure(problem: FilterProblem) -> tuple[Callable[[], None], Array
     return work, ended
 
 
-def acceleration_table(count: int, samples: int, jax: str | None) -> Iterator[tuple[str, float]]:
+def acceleration_table(count: int, samples: int, jax: str | None, processor: str) -> Iterator[tuple[str, float]]:
     """Yield each engine's median cost on the acceleration form; the first is ours in lanes."""
     batch = problems("acceleration", count, samples)
     short = replace(batch[0], drives=batch[0].drives[:1000], measured=batch[0].measured[:1000])
     long = problems("acceleration", 1, 100_000)[0]
-    kernel, cpp, slow = kernel_work(batch), cpp_work(batch), filterpy_work(short)
+    kernel, slow = kernel_work(batch), filterpy_work(short)
+    cpp = {f"{CPP}{name}": cpp_work(batch, library) for name, library in cpp_lanes.builds(processor).items()}
     rounds: dict[str, list[float]] = {}
     for _ in range(ROUNDS + 1):
         rounds.setdefault("lanes", []).append(cost(lambda: list(filter_batch(batch)), count * samples))
         rounds.setdefault("lanes, kernel", []).append(cost(kernel, -(-count // LANES) * LANES * samples))
-        if cpp is not None:
-            rounds.setdefault("C++ SIMD", []).append(cost(cpp[0], -(-count // LANES) * LANES * samples))
+        for name, work in cpp.items():
+            rounds.setdefault(name, []).append(cost(work, -(-count // LANES) * LANES * samples))
         rounds.setdefault("one filter", []).append(cost(lambda: ekf(long), len(long.measured)))
         rounds.setdefault("filterpy", []).append(cost(slow, 1000))
         if jax is not None:
@@ -253,10 +257,20 @@ def pressure_table(count: int, samples: int) -> Iterator[tuple[str, float]]:
 
 
 def operations() -> int:
-    """Return the floating-point operations of a filter-step of the acceleration form, constants hoisted."""
+    """Return the arithmetic instructions of a filter-step of the acceleration form, constants hoisted."""
     halves = halves_of(EKF, ACCELERATION_FORM, CHANNELS)
     outputs = [*halves.predict.values(), *halves.update.values()]
-    return sum(2 if item.operation in FUSED else item.operation in "+-*/" for item in ordered(outputs))
+    return sum(item.operation in FUSED or item.operation in "+-*/" for item in ordered(outputs))
+
+
+def only_avx2() -> None:
+    """Compile our kernels for a processor that has AVX2 and no AVX-512, into a cache of their own."""
+    llvm = machine.binding()
+    features = llvm.get_host_cpu_features()
+    for name in features:
+        features[name] &= not name.startswith(("avx512", "avx10", "amx", "evex512"))
+    llvm.get_host_cpu_features = lambda: features
+    llvm.get_host_cpu_name = lambda: cpp_lanes.PROCESSORS["avx2"]
 
 
 def main(arguments: list[str]) -> int:
@@ -265,17 +279,23 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--filters", type=int, default=1000)
     parser.add_argument("--samples", type=int, default=20_000)
     parser.add_argument("--jax", help="a Python that imports jax")
+    parser.add_argument("--processor", choices=cpp_lanes.PROCESSORS, default="own")
     options = parser.parse_args(arguments)
-    found = dict(acceleration_table(options.filters, options.samples, options.jax))
+    if options.processor == "avx2":
+        only_avx2()
+    found = dict(acceleration_table(options.filters, options.samples, options.jax, options.processor))
     pressure = dict(pressure_table(options.filters, options.samples))
-    print(f"{'engine':14s}{'acceleration ns':>18s}{'pressure ns':>14s}")
+    print(f"{'engine':24s}{'acceleration ns':>18s}{'pressure ns':>14s}")
     for name in (*found, "bridge"):
-        print(f"{name:14s}{found.get(name, float('nan')):18.1f}{pressure.get(name, float('nan')):14.1f}")
-    floor = 1e9 * operations() / FLOPS_A_SECOND
-    print(f"{operations()} operations a step: floor {floor:.1f} ns, share of it {100.0 * floor / found['lanes']:.0f} %")
+        print(f"{name:24s}{found.get(name, float('nan')):18.1f}{pressure.get(name, float('nan')):14.1f}")
+    peak, cpp = cpp_lanes.peak(options.processor), [cost for name, cost in found.items() if name.startswith(CPP)]
+    floor = None if peak is None else 1e9 * operations() / (peak / 2.0)
+    if floor is not None:
+        print(f"{operations()} arithmetic instructions a step: floor {floor:.1f} ns")
     measured = {
+        "floor, %": None if floor is None else 100.0 * floor / found["lanes, kernel"],
         "lanes ns": found["lanes"],
-        "of C++": found["lanes, kernel"] / found["C++ SIMD"] if "C++ SIMD" in found else None,
+        "of C++": found["lanes, kernel"] / min(cpp) if cpp else None,
         "filterpy": found["filterpy"] / found["lanes"],
         "JAX": found["JAX"] / found["lanes, kernel"] if "JAX" in found else None,
         "one ns": found["one filter"],

@@ -1,7 +1,8 @@
 // The extended Kalman filter of the acceleration form (equations 7.1 to 7.4), written for 32 lanes side by side:
 // one array a quantity, coefficients hoisted, symmetric covariance, scalar updates. States are scaled, so position and
-// velocity have steps of their own. Build: -O3 -march=native.
+// velocity have steps of their own. How it is built: cpp_lanes.py.
 #include <cmath>
+#include <type_traits>
 
 constexpr int L = 32;
 typedef double Lane[L];
@@ -20,12 +21,12 @@ extern "C" void run(long steps, const Coefficients *given, const double *speed, 
         P22[l] = s[11 * L], P23[l] = s[12 * L], P33[l] = s[13 * L], nis0[l] = s[14 * L], nis1[l] = s[15 * L];
     }
     const double T = c.T, Tx = c.Tx, Tv = c.Tv, r0 = c.r[0], r1 = c.r[1];
-    for (long k = 0; k < steps; k++) {
+    // The first sample is only an update: a branch on it inside the loop over lanes would keep g++ from vectors.
+    const auto step = [&](auto moves, long k) __attribute__((always_inline)) {
         const double *w = speed + (k > 0 ? k - 1 : 0) * L, *y0 = measured + 2 * k * L, *y1 = y0 + L;
-        const bool moves = k > 0;
 #pragma GCC ivdep
         for (int l = 0; l < L; l++) {
-            if (moves) {
+            if constexpr (decltype(moves)::value) {
                 double s = v[l] > 0 ? 1.0 : (v[l] < 0 ? -1.0 : 0.0), u = w[l];
                 double flow = std::fabs(u) * c.pumped - c.bias, sided = flow > 0 ? flow : 0.0;
                 double pump = u > 0 ? sided : -sided;
@@ -89,7 +90,11 @@ extern "C" void run(long steps, const Coefficients *given, const double *speed, 
             P13[l] -= k1 * P13[l];
             P11[l] -= k1 * P11[l];
         }
-    }
+    };
+    if (steps > 0)
+        step(std::false_type{}, 0);
+    for (long k = 1; k < steps; k++)
+        step(std::true_type{}, k);
     for (int l = 0; l < L; l++) {
         double *s = state + l;
         s[0] = x[l], s[L] = v[l], s[2 * L] = a[l], s[3 * L] = b[l], s[4 * L] = P00[l], s[5 * L] = P01[l];
