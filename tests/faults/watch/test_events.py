@@ -1,6 +1,8 @@
 import numpy as np
+import pytest
+from scipy.special import chdtri
 
-from faults.watch.events import change_time
+from faults.watch.events import LIKELY, change_time
 
 
 def test_the_change_time_is_the_start_of_the_raised_scores() -> None:
@@ -8,3 +10,21 @@ def test_the_change_time_is_the_start_of_the_raised_scores() -> None:
     found, (least, most) = change_time(scores)
     assert found == 12
     assert least <= 12 <= most
+
+
+def test_the_change_time_is_the_most_likely_one_and_its_interval_holds_what_is_nearly_as_likely() -> None:
+    scores = np.random.default_rng(3).standard_normal(60)
+    scores[:9] += 1.5
+    gains = []
+    for n in range(1, 61):  # twice the log-likelihood that a mean of the last n takes off, where it rose
+        risen = scores[:n] - max(np.mean(scores[:n]), 0.0)
+        gains.append(scores[:n] @ scores[:n] - risen @ risen)
+    found, (least, most) = change_time(scores)
+    assert found == int(np.argmax(gains)) + 1
+    likely = np.flatnonzero(np.array(gains) >= max(gains) - 2.0 * LIKELY) + 1
+    assert (least, most) == (likely[0], likely[-1])
+    assert most > least
+
+
+def test_an_interval_of_95_percent_ends_where_chi_square_says() -> None:
+    assert pytest.approx(0.5 * float(chdtri(1, 0.05)), abs=1e-3) == LIKELY

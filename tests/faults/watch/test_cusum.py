@@ -1,0 +1,75 @@
+"""The CUSUM against Page's own expression, its running moments, and thresholds of censored peaks."""
+
+import math
+
+import numpy as np
+import pytest
+
+from faults.watch.cusum import COUNT, MEAN, PEAK, SUM, VARIANCE, accumulate, standardise, threshold
+
+
+def test_the_sum_is_the_largest_that_any_beginning_gives() -> None:
+    rises = np.random.default_rng(1).standard_normal(300)
+    score, peaks, width = np.zeros(7), np.zeros(400), 0.02
+    sums: list[float] = []
+    for u in rises:
+        accumulate(score, peaks, u, 0.5, width)
+        sums.append(score[SUM])
+    total = np.concatenate([[0.0], np.cumsum(rises - 0.5)])
+    assert sums == pytest.approx(total[1:] - np.minimum.accumulate(total)[1:], abs=1e-12)
+    at_rest = np.flatnonzero(np.array(sums) == 0.0)
+    heights = [max(part) for part in np.split(np.array(sums), at_rest) if part.any()]
+    open_at_the_end = heights.pop() if sums[-1] > 0.0 else 0.0
+    assert score[PEAK] == open_at_the_end
+    assert np.flatnonzero(peaks).tolist() == sorted({int(height / width) for height in heights})
+    assert peaks.sum() == len(heights)
+
+
+def test_a_peak_above_all_levels_counts_in_the_last() -> None:
+    score, peaks = np.zeros(7), np.zeros(10)
+    for u in (9.0, -20.0):
+        accumulate(score, peaks, u, 0.5, 0.02)
+    assert peaks.tolist() == [0.0] * 9 + [1.0]
+
+
+def test_moments_are_those_of_all_so_far_and_then_fade() -> None:
+    values, memory = 3.0 + 2.0 * np.random.default_rng(2).standard_normal(60), 20.0
+    score = np.zeros(7)
+    for n, value in enumerate(values, 1):
+        standardise(score, value - score[MEAN], memory)
+        shares = np.minimum(1.0, 1.0 / np.minimum(np.arange(1, n + 1), memory))
+        weights = shares * np.append(np.cumprod((1.0 - shares[1:])[::-1])[::-1], 1.0)
+        mean = weights @ values[:n]
+        assert score[COUNT] == n
+        assert score[MEAN] == pytest.approx(mean)
+        assert score[VARIANCE] == pytest.approx(weights @ (values[:n] - mean) ** 2, abs=1e-12)
+        if n <= memory:
+            assert score[VARIANCE] == pytest.approx(np.var(values[:n]), abs=1e-12)
+
+
+WIDTH, SCALE = 0.02, 0.7
+
+
+def counted(heights: np.ndarray) -> np.ndarray:
+    return np.bincount((heights / WIDTH).astype(int), minlength=1000).astype(np.float64)
+
+
+def test_alarms_count_as_peaks_of_at_least_the_threshold() -> None:
+    count, alarms = 20_000, 40
+    heights = -SCALE * np.log((np.arange(count) + 0.5) / count)
+    seen = counted(heights[alarms:])  # the highest ended at the threshold, which is all that is known of them
+    level = threshold(seen, float(alarms), WIDTH, float(alarms))
+    assert level == pytest.approx(SCALE * math.log(count / alarms), abs=0.02)
+    blind = threshold(seen, 0.0, WIDTH, float(alarms))
+    assert blind < level - 0.05
+
+
+def test_a_stream_without_peaks_has_no_threshold() -> None:
+    assert threshold(np.zeros(50), 3.0, WIDTH, 0.1) == math.inf
+    assert threshold(np.zeros(50), 0.0, WIDTH, 0.1) == math.inf
+
+
+def test_where_more_may_pass_than_did_the_threshold_is_the_lowest_level_that_counts() -> None:
+    peaks = np.zeros(50)
+    peaks[[10, 30]] = 15.0
+    assert threshold(peaks, 0.0, WIDTH, 100.0) == pytest.approx(10 * WIDTH)
