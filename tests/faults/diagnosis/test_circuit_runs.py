@@ -1,14 +1,17 @@
 """Circuits by coordinates, and a log in blocks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.circuit_runs import BLOCK, blocks_of, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.circuit_runs import BLOCK, Blocks, blocks_of, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.class_fit import Actuator
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
+from plant.eha.steady_state import steady_state
 from plant.errors import LogError
 from plant.log.record import Record
 
@@ -67,3 +70,64 @@ def test_a_circuit_has_the_stops_that_the_log_shows_and_no_others(stroke: float,
     (found,) = predicted(blocks, parameter_rows(actuator.conditions[:1], actuator.circuit, actuator.rated))
     off = (found - blocks.outputs)[blocks.first :]
     assert np.all(np.sqrt(np.mean(off**2, axis=0)) < 0.05 * np.sqrt(np.mean(blocks.outputs**2, axis=0)))
+
+
+def velocity_of(blocks: Blocks, rows: np.ndarray) -> np.ndarray:
+    (found,) = predicted(blocks, rows)
+    return found[:, 0]
+
+
+def healthy_blocks(**more: object) -> tuple[Blocks, np.ndarray]:
+    speed = np.repeat([100.0, 40.0], 400)
+    empty = np.zeros(80)
+    rows = parameter_rows(ACTUATOR.conditions[:1], ACTUATOR.circuit, ACTUATOR.rated)
+    return Blocks(np.append(speed, 40.0), 1e-3, 10, empty, empty, np.ones(2), **more), rows  # type: ignore[arg-type]
+
+
+def test_an_earlier_circuit_runs_up_to_its_sample() -> None:
+    plain, rows = healthy_blocks()
+    place = list(CONDITIONS).index("major_leakage")
+    leaking = parameter_rows(ACTUATOR.conditions[[place]], ACTUATOR.circuit, ACTUATOR.rated)
+    before = velocity_of(plain, leaking)
+    both = velocity_of(replace(plain, earlier=(500, leaking[0])), rows)
+    np.testing.assert_array_equal(both[:48], before[:48])
+    assert both[-10:] == pytest.approx(velocity_of(plain, rows)[-10:], rel=1e-3)
+    assert np.abs(both[-10:] - before[-10:]).min() > 1e-3
+
+
+def test_a_course_of_leakage_is_that_of_warm_oil_all_leakages_up_and_viscous_friction_down() -> None:
+    plain, rows = healthy_blocks()
+    names = list(CircuitParameters.__dataclass_fields__)
+    warm = rows.copy()
+    for name in names:
+        if name.endswith("leakage") or name == "leakage_coefficient":
+            warm[:, names.index(name)] *= 3.0
+    warm[:, names.index("friction_linear")] /= 3.0
+    course = velocity_of(replace(plain, course=np.full(801, 3.0)), rows)
+    assert course == pytest.approx(velocity_of(plain, warm), rel=1e-12)
+    assert course[30] < velocity_of(plain, rows)[30]
+
+
+def test_a_stop_that_the_log_has_shown_holds_the_piston() -> None:
+    plain, rows = healthy_blocks(stop=0.01)
+    gone = np.cumsum(velocity_of(plain, rows)) * 0.01
+    assert gone.max() == pytest.approx(0.01, abs=2e-4)
+    assert gone[-1] == pytest.approx(0.01, abs=2e-4)
+
+
+def test_pressure_is_that_of_the_steady_state() -> None:
+    plain, rows = healthy_blocks()
+    (found,) = predicted(plain, rows)
+    velocity, pressure = steady_state(100.0, circuit_of(EhaParameters()))
+    assert found[39, 0] == pytest.approx(velocity, rel=0.01)
+    assert found[39, 1] == pytest.approx(pressure, rel=0.02)
+
+
+def test_a_block_is_the_mean_of_what_is_there_and_missing_where_most_is() -> None:
+    speed, velocity = SPEED.copy(), np.arange(3000.0)
+    velocity[[1, 2, 3, 4, 5]] = np.nan
+    velocity[[11, 12, 13, 14, 15, 16]] = np.nan
+    blocks = blocks_of(Record(1e-3, {"motor_speed_rad_s": speed, "velocity_m_s": velocity}))
+    assert blocks.velocity[0] == pytest.approx(np.mean([0, 6, 7, 8, 9]))
+    assert np.isnan(blocks.velocity[1])
+    assert blocks.velocity[2] == pytest.approx(24.5)

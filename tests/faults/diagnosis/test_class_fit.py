@@ -9,7 +9,7 @@ import pytest
 from faults.conditions import CONDITIONS
 from faults.diagnosis import class_fit
 from faults.diagnosis.circuit_runs import Blocks, parameter_rows, predicted
-from faults.diagnosis.class_fit import FARTHEST, LASTING, WEAK, Actuator, fit_freely
+from faults.diagnosis.class_fit import FARTHEST, LASTING, WEAK, Actuator, fit_freely, misfit
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
@@ -55,3 +55,11 @@ def test_the_circuit_that_left_a_log_is_found() -> None:
     found = fit_freely(log(), ACTUATOR, next(iter(CONDITIONS)), gained=1e-3)
     assert found.cost < cost(CENTRE)
     assert np.abs(found.coordinates - CENTRE - APART)[:4] == pytest.approx(0.0, abs=0.02)
+
+
+def test_a_model_that_ran_away_is_infinitely_far_off_and_another_as_far_as_its_residuals_are_large() -> None:
+    off = log().outputs + np.array([1e-3, 1e5])
+    assert misfit(log(), np.where(np.arange(len(off))[:, None] == 70, np.inf, off)) == np.inf
+    count = len(off) - log().first
+    twice = misfit(log(), log().outputs + np.array([2e-3, 3e5])) - misfit(log(), off)
+    assert twice == pytest.approx(count * (np.log(2.0) + np.log(3.0)))

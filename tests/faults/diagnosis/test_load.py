@@ -1,7 +1,10 @@
 """A load on the rod is found from the force balance, and the condition under it."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +12,7 @@ import pytest
 from estimation.finding import Finding
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.diagnose import diagnose_log
+from faults.diagnosis.load import first_guesses, under_load
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
@@ -57,6 +61,67 @@ def test_a_single_rod_is_diagnosed_by_its_two_areas() -> None:
     assert found.condition == "minor_leakage"
     modulus = found.quantities["bulk_modulus"].value
     assert modulus == pytest.approx(HEALTHY.bulk_modulus, rel=0.01)
+
+
+ESTIMATE: Any = SimpleNamespace(explanation=None)
+
+
+def loads(guesses: Iterator[EhaParameters]) -> list[float]:
+    return [guess.load_force for guess in guesses]
+
+
+def test_loads_that_hold_the_first_and_the_mean_pressure_are_tried_about_the_rigs_own() -> None:
+    record = Record(1e-3, {"differential_pressure_pa": np.array([1e5, np.nan, 3e5])})
+    area = HEALTHY.piston_area
+    assert loads(first_guesses(record, HEALTHY, ESTIMATE)) == [0.0, pytest.approx(2e5 * area)]
+    begun: Any = SimpleNamespace(explanation=SimpleNamespace(values={"start_pressure": (4e5, 1e3)}))
+    assert loads(first_guesses(record, HEALTHY, begun)) == [
+        pytest.approx(4e5 * area), 0.0, pytest.approx(2e5 * area)
+    ]  # fmt: skip
+    told = replace(HEALTHY, load_force=500.0)
+    assert loads(first_guesses(record, told, begun)) == [500.0, pytest.approx(2e5 * area)]
+
+
+def circuit_under(
+    true: float, tried: list[float], *, gain: float = 1.0, told: bool = True
+) -> Callable[[EhaParameters], Any]:
+    """Return a diagnosis that asks for a share of the load that is missing, and is content within 1 N."""
+
+    def diagnosed(p: EhaParameters) -> Any:
+        tried.append(p.load_force)
+        missing = true - p.load_force
+        bias = AgainstCode.PRESSURE_BIAS.note(bias_pa=gain * missing / p.piston_area)
+        other = AgainstCode.UNEXPLAINED.note(percent=9.0, channel="pressure", limit=6.0)
+        return SimpleNamespace(against=() if abs(missing) < 1.0 else (bias, other) if told else (other,))
+
+    return diagnosed
+
+
+def test_the_load_that_a_bias_asks_for_is_taken_until_nothing_asks() -> None:
+    tried: list[float] = []
+    found, loaded = under_load(circuit_under(800.0, tried), iter([HEALTHY]))
+    assert found.against == ()
+    assert loaded.load_force == pytest.approx(800.0)
+    assert tried == [0.0, pytest.approx(800.0)]
+
+
+def test_where_no_load_is_enough_the_rigs_own_stands() -> None:
+    tried: list[float] = []
+    guesses = [HEALTHY, replace(HEALTHY, load_force=100.0)]
+    found, loaded = under_load(circuit_under(800.0, tried, gain=0.5), iter(guesses))
+    assert loaded is HEALTHY
+    assert found.against
+    assert tried == pytest.approx([0.0, 400.0, 600.0, 100.0, 450.0, 625.0])
+
+
+def test_where_no_bias_is_told_the_next_guess_is_tried() -> None:
+    tried: list[float] = []
+    found, loaded = under_load(
+        circuit_under(800.0, tried, told=False), iter([HEALTHY, replace(HEALTHY, load_force=800.0)])
+    )
+    assert found.against == ()
+    assert loaded.load_force == 800.0
+    assert tried == [0.0, 800.0]
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """A change of condition within a log: when it came, and that the verdict is on what followed."""
 
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -9,11 +10,13 @@ from benchmarks.population import TEST, draw_logs
 from benchmarks.watching import CircuitStream
 from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis import onset
 from faults.diagnosis.circuit_runs import Blocks
 from faults.diagnosis.class_fit import Actuator, PointFit
 from faults.diagnosis.diagnose import Diagnosis, diagnose_clean
-from faults.diagnosis.onset import likeliest_split, part_of
+from faults.diagnosis.onset import MOST_ALARMS, LastPart, last_part, likeliest_split, part_of
 from faults.eha.inject import abrupt
+from faults.watch.events import Alarm, Event, Ready
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -36,6 +39,77 @@ def changed(condition: str, drive: str, *, pressure: bool, start: float = 0.0) -
     path = abrupt(ACTUATOR.circuit, circuit_of(parameters_for(CONDITIONS[condition])), AT)
     log = replace(simulate(CIRCUIT, speed, 1e-3, path, sensors=RIG, rng=rng), start_time=start)
     return diagnosed(log if pressure else log.replace(differential_pressure_pa=None))
+
+
+def short_log(condition: str | None, start: float = 0.0) -> Record:
+    """Return four seconds at 2 ms, in which a fault comes after 2.2 s or none does."""
+    rng = np.random.default_rng(11)
+    speed = make_drive("prbs", 4.0, 2e-3, HEALTHY, rng)
+    after = ACTUATOR.circuit if condition is None else circuit_of(parameters_for(CONDITIONS[condition]))
+    path = abrupt(ACTUATOR.circuit, after, 2.2)
+    return replace(simulate(CIRCUIT, speed, 2e-3, path, sensors=RIG, rng=rng), start_time=start)
+
+
+@pytest.mark.parametrize("pressure", [True, False], ids=["with pressure", "without"])
+@pytest.mark.parametrize("condition", ["major_leakage", "major_friction"])
+def test_a_log_is_judged_from_where_its_condition_changed(condition: str, *, pressure: bool) -> None:
+    record = short_log(condition, start=100.0)
+    found = last_part(record if pressure else record.replace(differential_pressure_pa=None), ACTUATOR)
+    assert found.onset is not None
+    assert found.onset.before == "normal"
+    assert found.onset.since == pytest.approx(102.2, abs=0.02)
+    assert found.onset.ci95[0] < found.onset.since < found.onset.ci95[1]
+    assert found.onset.ci95[1] - found.onset.ci95[0] < 0.1
+    assert found.record.start_time == pytest.approx(found.onset.since)
+    assert len(found.record) == pytest.approx(900, abs=10)
+    assert found.blocks.earlier is not None
+    assert found.blocks.earlier[0] * 2e-3 == pytest.approx(2.2, abs=0.02)
+    assert np.flatnonzero(np.isfinite(found.blocks.velocity))[0] == pytest.approx(220, abs=2)
+    assert list(CONDITIONS)[int(np.argmax(found.fits.scores))] == condition
+
+
+def test_a_log_in_one_condition_is_judged_whole() -> None:
+    record = short_log(None)
+    found = last_part(record, ACTUATOR)
+    assert found.onset is None
+    assert found.record is record
+    assert found.blocks.earlier is None
+    assert np.all(np.isfinite(found.blocks.velocity))
+
+
+def alarm(since: float) -> Alarm:
+    return Alarm(since + 1.0, "flow", since, (since, since), 9.0, 5.0)
+
+
+def test_of_a_long_log_the_stretches_about_the_last_alarms_are_looked_at_until_one_holds_a_change(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    alarms: list[Event] = [Ready(60.0, (5.0, 5.0)), *map(alarm, (503.0, 520.0, 540.0, 570.0, 594.0))]
+    looked: list[tuple[float, float]] = []
+
+    def last_of(window: Record, _: Actuator) -> LastPart:
+        looked.append((window.start_time, window.duration))
+        change = object() if window.start_time == changed else None
+        nothing: Any = None
+        return LastPart(window, window, nothing, nothing, cast("Any", change))
+
+    monkeypatch.setattr(onset, "watch_record", lambda *_, **__: alarms)
+    monkeypatch.setattr(onset, "_last_of", last_of)
+    long = Record(0.02, {"motor_speed_rad_s": np.zeros(5001)}, start_time=500.0)  # of 100 s
+    changed = 525.0
+    assert last_part(long, ACTUATOR).window.start_time == 525.0
+    assert looked == [(579.0, pytest.approx(21.0)), (555.0, 30.0), (525.0, 30.0)]
+    changed = -1.0
+    looked.clear()
+    assert last_part(long, ACTUATOR).record is long
+    assert len(looked) == MOST_ALARMS + 1
+    looked.clear()
+    for short in (long.slice(0, 4500), replace(long, sample_time=0.06)):  # of 90 s, and too slow to be watched
+        assert last_part(short, ACTUATOR).window is short
+    assert len(looked) == 2
+    alarms[1:] = [alarm(503.0)]
+    last_part(long, ACTUATOR)
+    assert looked[2] == (500.0, 30.0)  # no stretch begins before the log
 
 
 @pytest.mark.slow

@@ -204,3 +204,22 @@ def test_a_limit_lies_halfway_from_a_healthy_actuator_to_a_minor_fault() -> None
     ):
         assert limits[name] - healthy[name] == pytest.approx(faulty[name] - limits[name], rel=1e-9), name
     assert limits["bulk_modulus"] == pytest.approx(0.8 * RIG.bulk_modulus)
+
+
+def test_a_velocity_without_a_number_is_not_told() -> None:
+    found = fits(NARROW)
+    known = severities(found, ACTUATOR)
+    for lost in (Quantity(None, "%"), replace(known["velocity_lost"], ci95=None)):
+        said = what_is_not_told(found, {**known, "velocity_lost": lost}, pressure=False)
+        assert [note.code for note in said] == [ClassCode.ONE_SCALE]
+
+
+def test_the_velocity_that_is_lost_is_told_with_its_interval() -> None:
+    found = fits(NARROW)
+    known = severities(found, ACTUATOR)
+    (said,) = (
+        note for note in what_is_not_told(found, known, pressure=False) if note.code is ClassCode.VELOCITY_LOST_TOLD
+    )
+    lost = known["velocity_lost"]
+    assert lost.ci95 is not None
+    assert (said.data["percent"], said.data["low"], said.data["high"]) == (lost.value, *lost.ci95)
