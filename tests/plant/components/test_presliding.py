@@ -52,3 +52,27 @@ def test_the_bristle_never_deflects_past_breakaway(velocity: float, level: Level
 
 def test_without_coulomb_friction_only_the_sliding_part_is_left() -> None:
     assert force(0.1, 0.5, (6e4, 2e3, 0.0)) == pytest.approx(2e3 * 0.1 + 6e4 * 0.01, rel=1e-12)
+
+
+@pytest.mark.parametrize("a2", [0.5, 0.0, -0.5])
+def test_friction_of_order_one_is_the_same_law(a2: float) -> None:
+    a1, a3, velocity = 2.0, 1.5, 0.7
+    settled = 1.0 / (1.0 + max(-a2, 0.0) * velocity / a3)
+    wanted = a3 + a2 * velocity + a1 * velocity**2
+    assert force(velocity, settled, (a1, a2, a3)) == pytest.approx(wanted, rel=1e-12)
+
+
+def test_the_mass_rings_on_its_bristle_with_the_damping_ratio_that_is_asked_for() -> None:
+    a3 = ROWS["none"][2]
+    stiffness, speed = a3 / DISPLACEMENT, 1e-9
+    rate = bristle_rate(speed, 0.0, 0.0, a3, DISPLACEMENT)
+    damping = float(presliding_friction(speed, 0.0, rate, (0.0, 0.0, a3), DISPLACEMENT, MASS, DAMPING)) / speed
+    assert damping == pytest.approx(2.0 * DAMPING * (stiffness * MASS) ** 0.5, rel=1e-6)
+
+
+def test_the_damping_fades_as_the_bristle_slides() -> None:
+    a3, speed = ROWS["none"][2], 0.2
+    rate = 0.1 / DISPLACEMENT
+    damping = 2.0 * DAMPING * (a3 / DISPLACEMENT * MASS) ** 0.5
+    force_of_rate = float(presliding_friction(speed, 0.0, rate, (0.0, 0.0, a3), DISPLACEMENT, MASS, DAMPING))
+    assert force_of_rate == pytest.approx(0.1 * damping / (1.0 + damping * speed / a3), rel=1e-12)

@@ -93,6 +93,7 @@ def test_a_rod_as_thick_as_its_bore_is_refused() -> None:
 
 @pytest.mark.parametrize("sizes", [BORES_MM, RODS_MM], ids=["bores", "rods"])
 def test_standard_diameters_climb_in_the_steps_of_preferred_numbers(sizes: tuple[int, ...]) -> None:
+    assert (sizes[0], sizes[-1]) in ((8, 320), (4, 160))
     steps = [after / before for before, after in pairwise(sizes)]
     assert min(steps) > 10.0 ** (1.0 / 40.0)
     assert max(steps) < 10.0 ** (1.0 / 7.0)
@@ -112,3 +113,10 @@ def test_the_pressures_that_a_duty_needs_balance_its_forces() -> None:
     again = (found.retract_force - PRESS.retract_force) / (PRESS.efficiency * ring) + found.retract_pressure
     assert pressed == pytest.approx(again)
     assert pressed <= PRESS.supply_pressure
+
+
+def test_a_cycle_is_the_stroke_at_either_speed_and_the_pipe_keeps_to_its_speed() -> None:
+    found = cylinder_circuit(PRESS, 0.05, 0.028)
+    assert found.cycle_time == pytest.approx(0.5 / 0.1 + 0.5 / 0.2)
+    assert found.relief_setting == pytest.approx(1.1e7)
+    assert found.cap_flow / (pi / 4.0 * found.pipe_bore**2) == pytest.approx(PRESS.line_speed)
