@@ -112,11 +112,13 @@ class Trend:
         return self.place - self.begin + 1 < FEWEST
 
     @cached_property
+    def _future(self) -> Crossing:
+        return crossing(self.belief, settings(), np.random.default_rng(self.place))
+
+    @property
     def crossing(self) -> Crossing | None:
         """When the limit is reached; None before `FEWEST` logs of the stretch."""
-        if self._short:
-            return None
-        return crossing(self.belief, settings(), np.random.default_rng(self.place))
+        return None if self._short else self._future
 
     @property
     def certain(self) -> bool:
@@ -129,9 +131,7 @@ class Trend:
         mean, std = moments(self.belief, settings())
         if self._short or (not self.certain and mean + 3.0 * std < 1.0):
             return False  # before futures are drawn, which is what takes the time
-        if self.crossing is None:
-            return False
-        return self.crossing.within(0.0) >= SURE or (self.certain and self.crossing.within(AHEAD) >= 0.5)
+        return self._future.within(0.0) >= SURE or (self.certain and self._future.within(AHEAD) >= 0.5)
 
 
 def trends(series: Series) -> Iterator[Trend]:
