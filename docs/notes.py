@@ -63,7 +63,9 @@ def sites(enums: Mapping[str, type[Code]]) -> Iterator[Site]:
     """Find every place in the packages that makes a note, as ``Enum.MEMBER.note(field=...)`` or by a name for it."""
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*.py")):
-            yield from sites_in(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8"), enums)
+            text = path.read_text(encoding="utf-8")
+            if ".note(" in text:
+                yield from sites_in(path.relative_to(ROOT).as_posix(), text, enums)
 
 
 def sites_in(path: str, text: str, enums: Mapping[str, type[Code]]) -> Iterator[Site]:
