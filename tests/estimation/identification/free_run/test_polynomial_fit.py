@@ -1,6 +1,8 @@
 """Polynomial models: their free run, its sensitivities, and which products they are given."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import Form, fit_linear
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.polynomial_fit import Runs, products
+from estimation.identification.free_run.polynomial_kernel import run_free
 from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, is_wild, one_more
 from estimation.identification.free_run.saved import load_models, save_models
 from plant.errors import HydrostateError
@@ -139,3 +142,49 @@ def test_pruning_takes_out_a_product_that_explains_nothing_and_keeps_the_plants_
     both = Runs(own.variables, terms, data).fit(np.insert(own.theta, k, 0.0), 5)
     assert both is not None
     assert np.array_equal(_pruned(both, data).terms, own.terms)
+
+
+WAYS = pytest.mark.parametrize("way", [lambda loop: loop, lambda loop: loop.__wrapped__], ids=["compiled", "Python"])
+SOURCE, LAG = np.array([0, 0, 1]), np.array([1, 2, 1])
+TERMS = np.array([[-1, -1], [0, -1], [1, -1], [2, -1], [0, 1], [0, 2]])
+THETA = np.array([0.05, 0.9, -0.3, 0.4, 0.6, -0.5])
+
+
+def ran(way: Callable[[Any], Any], theta: Array, limit: float, ends: tuple[float, float]) -> tuple[int, Array, Array]:
+    rng = np.random.default_rng(3)
+    u, out, slope = rng.uniform(-1.0, 1.0, (60, 1)), np.zeros(60), np.zeros((60, 2))
+    out[:2] = 0.1, -0.2
+    limits = limit * np.array([[-1.0, 1.0]] * 3)
+    where = way(run_free)(theta, TERMS, SOURCE, LAG, limits, np.array(ends), u, out, slope)
+    return where, out, slope
+
+
+def next_output(theta: Array, limit: float, ends: tuple[float, float], y1: float, y2: float, u1: float) -> float:
+    """Return what follows two outputs and an input: single terms as they are, products of what is held in limits."""
+    h1, h2, hu = np.clip([y1, y2, u1], -limit, limit)
+    return float(np.clip(theta @ [1.0, y1, y2, u1, h1 * h2, h1 * hu], *ends))
+
+
+@WAYS
+@pytest.mark.parametrize("limit", [10.0, 0.3])
+@pytest.mark.parametrize("ends", [(-10.0, 10.0), (-0.2, 0.25)])
+def test_a_free_run_holds_products_and_outputs_in_their_ranges(
+    way: Callable[[Any], Any], limit: float, ends: tuple[float, float]
+) -> None:
+    where, out, slope = ran(way, THETA, limit, ends)
+    u = np.random.default_rng(3).uniform(-1.0, 1.0, 60)
+    assert where == -1
+    for t in range(2, 60):
+        past = out[t - 1], out[t - 2], u[t - 1]
+        assert out[t] == pytest.approx(next_output(THETA, limit, ends, *past))
+        for k in range(2):
+            side = 1e-6 * np.eye(3)[k]
+            up, down = (next_output(THETA, limit, ends, *(np.array(past) + sign * side)) for sign in (1.0, -1.0))
+            assert slope[t, k] == pytest.approx((up - down) / 2e-6, abs=1e-6)
+
+
+@WAYS
+def test_a_run_that_grows_beyond_bounds_tells_where(way: Callable[[Any], Any]) -> None:
+    where, out, _ = ran(way, np.array([0.0, 3.0, 0.0, 0.0, 0.0, 0.0]), 10.0, (-np.inf, np.inf))
+    assert 2 < where < 20
+    assert abs(3.0 * out[where - 1]) >= 1e3

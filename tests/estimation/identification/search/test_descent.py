@@ -5,6 +5,7 @@ from estimation.identification import LinearModel
 from estimation.identification.search import descent
 from estimation.identification.search.criterion import Structure, is_stable, predict, sensitivities
 from estimation.identification.search.descent import descend, normal_equations, solve_damped, stable
+from plant.compiled.native.loops import Loop
 
 
 def test_normal_equations_are_those_of_the_sensitivities() -> None:
@@ -69,3 +70,95 @@ def test_machine_code_computes_what_python_does(monkeypatch: pytest.MonkeyPatch)
     assert found == pytest.approx(wanted, rel=1e-12)
     np.testing.assert_allclose(np.tril(sums[0][0]), np.tril(sums[1][0]), rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(sums[0][1], sums[1][1], rtol=1e-9, atol=1e-12)
+
+
+@pytest.fixture(params=["compiled", "Python"])
+def _either_way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run a test on machine code and on the loops as they are written."""
+    if request.param == "Python":
+        monkeypatch.setattr(Loop, "__call__", lambda loop, *args: loop.__wrapped__(*args))
+
+
+WAYS = pytest.mark.usefixtures("_either_way")
+
+
+@WAYS
+@pytest.mark.parametrize("damping", [0.0, 1e-3, 2.0])
+def test_a_damped_step_solves_marquardts_equations(damping: float) -> None:
+    root = np.random.default_rng(3).standard_normal((6, 4)) * [1e3, 1.0, 1e-4, 1.0]
+    gram, gradient = root.T @ root, np.array([1.0, -2.0, 1e-5, 0.5])
+    step, factor = np.empty(4), np.empty((4, 4))
+    assert solve_damped(np.tril(gram), gradient, damping, step, factor)
+    wanted = np.linalg.solve(gram + damping * np.diag(np.diag(gram)), -gradient)
+    assert step == pytest.approx(wanted, rel=1e-8)
+
+
+@WAYS
+def test_a_value_that_changes_nothing_is_left_alone_and_a_negative_direction_refused() -> None:
+    step, factor = np.empty(2), np.empty((2, 2))
+    assert solve_damped(np.diag([4.0, 0.0]), np.array([2.0, 0.0]), 0.0, step, factor)
+    assert step.tolist() == [-0.5, 0.0]
+    assert not solve_damped(np.array([[1.0, 0.0], [2.0, 1.0]]), np.ones(2), 1e-3, step, factor)
+
+
+SIZES = np.array([1, 1, 1, 1])
+
+
+def first_order(noise: float) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(4)
+    u = np.repeat(rng.choice([-1.0, 1.0], 30), 4)
+    y = predict(Structure(1, 1, 1), np.array([0.3, -0.8, 0.2]), u)
+    return u, y + noise * rng.standard_normal(u.size)
+
+
+@WAYS
+def test_a_descent_ends_at_the_optimum_and_says_so() -> None:
+    u, y = first_order(0.05)
+    ones, bounds = np.ones(u.size), np.array([0, u.size])
+    cost, theta, gram, converged = descend(np.array([0.1, 0.0, 0.0]), SIZES, u, y, ones, bounds, 60, 1e-10)
+    assert converged
+    assert theta == pytest.approx([0.3, -0.8, 0.2], abs=0.1)
+    left = y - predict(Structure(1, 1, 1), theta, u)
+    assert cost == pytest.approx(left @ left)
+    slopes = sensitivities(Structure(1, 1, 1), theta, u)
+    assert np.abs(slopes.T @ left).max() < 1e-4 * np.sqrt(cost * np.diag(slopes.T @ slopes).max())
+    assert gram == pytest.approx(np.tril(slopes.T @ slopes))
+
+
+@WAYS
+def test_a_descent_that_begins_at_the_truth_or_has_no_steps_or_no_numbers_stays_there() -> None:
+    u, y = first_order(0.0)
+    ones, bounds, truth = np.ones(u.size), np.array([0, u.size]), np.array([0.3, -0.8, 0.2])
+    cost, theta, _, converged = descend(truth, SIZES, u, y, ones, bounds, 60, 1e-10)
+    assert converged
+    assert cost <= 1e-25
+    np.testing.assert_array_equal(theta, truth)
+    start = np.array([0.1, 0.0, 0.0])
+    for values, steps in ((y, 0), (np.full(u.size, np.nan), 30)):
+        _, theta, _, converged = descend(start, SIZES, u, values, ones, bounds, steps, 1e-10)
+        assert not converged
+        np.testing.assert_array_equal(theta, start)
+
+
+@WAYS
+@pytest.mark.parametrize("n_s", [0, 1])
+def test_a_descent_without_initial_states_is_that_of_the_response_alone(n_s: int) -> None:
+    u = first_order(0.0)[0]
+    truth = np.array([0.3, -0.8, 0.0])[: 2 + n_s]
+    y = predict(Structure(1, 1, 1), np.array([0.3, -0.8, 0.0]), u)
+    start, sizes = np.array([0.1, -0.5, 0.0])[: 2 + n_s], np.array([1, 1, 1, n_s])
+    _, theta, _, converged = descend(start, sizes, u, y, np.ones(u.size), np.array([0, u.size]), 60, 1e-12)
+    assert converged
+    assert theta == pytest.approx(truth, abs=1e-6)
+
+
+@WAYS
+def test_a_step_beyond_the_circle_is_not_taken() -> None:
+    u = first_order(0.0)[0]
+    y = np.zeros(u.size)
+    for t in range(1, u.size):
+        y[t] = 1.03 * y[t - 1] + 0.3 * u[t - 1]  # what no stable model follows
+    start = np.array([0.3, -0.5, 0.0])
+    cost, theta, _, _ = descend(start, SIZES, u, y, np.ones(u.size), np.array([0, u.size]), 60, 1e-10)
+    assert abs(theta[1]) < 1.0
+    assert cost < np.sum((y - predict(Structure(1, 1, 1), start, u)) ** 2)

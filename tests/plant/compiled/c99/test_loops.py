@@ -1,5 +1,7 @@
+import inspect
 import math
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -129,3 +131,116 @@ def test_a_loop_without_bound_and_a_swap_are_refused() -> None:
         written.entered("endless", [Block("values", (2,), "values")])
     with pytest.raises(NotImplementedError, match="none of what is translated"):
         written.entered("swapped", [Scalar("a"), Scalar("b")])
+
+
+def of_other_shape(values: Array, table: Array) -> None:
+    values[:] = table
+
+
+def of_a_number(values: Array, scale: float) -> None:
+    values[:] = scale
+    scale[:] = values  # type: ignore[index]
+
+
+def true_or_not(values: Array) -> None:
+    values[0] = True
+
+
+def whole_division(values: Array) -> None:
+    values[0] = 3 / 2
+
+
+def unknown_function(values: Array) -> None:
+    values[0] = max(values)
+
+
+def method(values: Array, table: Array) -> None:
+    values[0] = table.sum()
+
+
+def over_a_number(values: Array, scale: float) -> None:
+    for one in scale:  # type: ignore[attr-defined]
+        values[0] = one
+
+
+def over_rows(values: Array, table: Array) -> None:
+    for row in table:
+        values[0] = row
+
+
+def array_in_a_sum(values: Array, table: Array) -> None:
+    values[0] = table + 1.0  # type: ignore[call-overload]
+
+
+def array_as_result(table: Array) -> Array:
+    return table
+
+
+def as_far_as_a_number(values: Array, scale: float) -> None:
+    for i in range(scale):  # type: ignore[arg-type]
+        values[i] = 0.0
+
+
+def number_with_places(values: Array, scale: float) -> None:
+    values[0] = scale[0]  # type: ignore[index]
+
+
+def two_of_a_number(values: Array, scale: float) -> None:
+    a, b = scale  # type: ignore[misc]
+    values[0] = a + b
+
+
+def a_pair_of_unlike(values: Array, table: Array, scale: float) -> None:
+    a, b = scale, table
+    values[0] = a + b
+
+
+def deleted(scale: float) -> None:
+    del scale
+
+
+UNTRANSLATED = (
+    of_other_shape,
+    of_a_number,
+    true_or_not,
+    whole_division,
+    unknown_function,
+    method,
+    over_a_number,
+    over_rows,
+    array_in_a_sum,
+    array_as_result,
+    as_far_as_a_number,
+    number_with_places,
+    two_of_a_number,
+    a_pair_of_unlike,
+    deleted,
+)
+
+
+@pytest.mark.parametrize("function", UNTRANSLATED, ids=lambda one: one.__name__)
+def test_what_c_would_take_for_something_else_is_refused_by_its_line(function: Callable[..., object]) -> None:
+    written = Translation({"f": function}, {}, {}, DOUBLE, "mine")
+    known: dict[str, Thing] = {
+        "values": Block("values", (4,), "values"),
+        "table": Block("table", (2, 3), "table"),
+        "scale": Scalar("scale"),
+    }
+    with pytest.raises(NotImplementedError, match="none of what is translated to C"):
+        written.entered("f", [known[name] for name in inspect.signature(function).parameters])
+
+
+def scaled(values: Array, scale: float) -> float:
+    """Scale a turn, and tell whether it is a number."""
+    if scale == scale:
+        values[0] = math.pi * scale
+    return float(values.shape[0])
+
+
+def test_half_a_turn_a_count_and_what_is_no_number_are_written() -> None:
+    written = Translation({"scaled": scaled}, {}, {}, DOUBLE, "mine")
+    text = written.entered("scaled", [Block("values", (4,), "values"), Scalar("scale")]).text
+    assert "!isnan(scale)" in text
+    assert "3.141592653589793" in text
+    assert "((double)4)" in text
+    assert written.entered("scaled", [Block("other", (4,), "other"), Scalar("by")]).text == text
