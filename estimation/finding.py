@@ -43,16 +43,16 @@ class Outcome(StrEnum):
 
 
 OUTCOMES: Mapping[Outcome, str] = {
-    Outcome.OK: "The result stands, with the interval and the gate's verdict beside it.",
+    Outcome.OK: "The result is given, with its interval and the verdict of the consistency check.",
     Outcome.NOT_OBSERVABLE: (
-        "This drive and these sensors hold too little about bulk modulus: the Cramér-Rao bound is over 3 %. "
+        "With this drive and these sensors, bulk modulus is not observable: the Cramér-Rao bound is over 3 %. "
         "Log differential pressure, or drive with larger, slower steps."
     ),
     Outcome.MISMATCH: (
-        "The log is nothing like what the model does, so no number is given: the residuals are ten times larger than "
-        "expected or more, or the estimate ran into its physical bound. Check units, rig and condition; log pressure."
+        "The model does not describe the log, so no number is given: the residuals are at least ten times as large as "
+        "expected, or the estimate reached its physical limit. Check units, rig file and condition; log pressure."
     ),
-    Outcome.DIVERGED: "The estimate stopped being finite; check units, rig parameters and the form.",
+    Outcome.DIVERGED: "The estimate stopped being finite; check units, rig parameters and the form of the model.",
     Outcome.FAILED: "The log could not be read or used; the message says why.",
 }
 """What each outcome means, as a sentence for a reader."""

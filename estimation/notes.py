@@ -7,17 +7,15 @@ class SensorCode(Code):
     """Notes on the sensors of a log."""
 
     SENSOR_FROZE = (
-        "{channel} repeats {value:.6g} from {begin_s:.3g} s for {length_s:.3g} s while the others move: "
-        "the sensor froze"
+        "{channel} stays at {value:.6g} from {begin_s:.3g} s on for {length_s:.3g} s while other channels move: the "
+        "sensor froze"
     )
-    SENSOR_CONSTANT = "{channel} is {value:g} Pa throughout: the sensor is dead, or not connected"
-    SENSOR_NOISE_ONLY = (
-        "{channel} shows {noise:.3g} Pa of noise and nothing else while the motor turns: the sensor is dead"
-    )
+    SENSOR_CONSTANT = "{channel} is {value:g} Pa throughout: the sensor is dead or not connected"
+    SENSOR_NOISE_ONLY = "{channel} shows nothing but noise ({noise:.3g} Pa) while the motor turns: the sensor is dead"
     SENSOR_CLIPPED = (
-        "{channel} is at the end of its range, {levels} Pa, in {percent:.2g} % of its samples; they are left out"
+        "{channel} is at the end of its range ({levels} Pa) in {percent:.2g} % of its samples; they were left out"
     )
-    OUTLIERS_LEFT_OUT = "{channel} stands out grossly in {count} of {total} samples; they are left out"
+    OUTLIERS_LEFT_OUT = "{channel} has gross outliers in {count} of {total} samples; they were left out"
     SENSORS_DISAGREE = (
         "velocity_m_s and the slope of position_m differ by {difference_m_s:.2g} m/s: one of the two sensors is wrong"
     )
@@ -27,30 +25,30 @@ class ChannelCode(Code):
     """Notes on channels whose sign, unit or name is wrong: the log is another's than it says, and nothing follows."""
 
     CHANNEL_REVERSED = (
-        "{channel} counts the other way: its correlation with what it should follow is {correlation:.2f} beside "
-        "{against}; give the column with a minus before its unit (--columns CHANNEL=NAME:-UNIT)"
+        "{channel} has the wrong sign: compared with {against}, its correlation is {correlation:.2f}; give the column "
+        "with a minus before its unit (--columns CHANNEL=NAME:-UNIT)"
     )
     CHANNELS_SWAPPED = (
-        "{channel} and {other} are swapped: the second one's slope is the first (correlation {correlation:.2f}); "
-        "name the columns (--columns CHANNEL=NAME)"
+        "{channel} and {other} are swapped: the slope of the second is the first (correlation {correlation:.2f}); "
+        "correct the names of the columns (--columns CHANNEL=NAME)"
     )
     CHANNEL_UNIT = (
-        "{channel} reads {factor:.3g} times what {against} asks for, which looks like {slip}; "
-        "give the column's unit (--columns CHANNEL=NAME:UNIT)"
+        "{channel} reads {factor:.3g} times what {against} implies, which looks like {slip}; give the column's unit "
+        "(--columns CHANNEL=NAME:UNIT)"
     )
 
 
 class GuessCode(Code):
     """Why a column of a strange log may be a channel; columns count from 1."""
 
-    CALLED_SO = "it is called so"
+    CALLED_SO = "its name says so"
     DATES = "it holds dates or times of the day"
-    UNIT_FITS = "{unit} is a unit of it"
-    UNIT_GUESSED = "no unit is given, and in {unit} it has the usual size: check it"
+    UNIT_FITS = "{unit} is a unit of this channel"
+    UNIT_GUESSED = "no unit is given; in {unit} its size is usual: check the unit"
     INCREASES = "it increases by {step:.6g} from row to row"
-    HAS_SLOPE = "its slope is column {column} (correlation {correlation:.3f})"
+    HAS_SLOPE = "column {column} is its slope (correlation {correlation:.3f})"
     IS_SLOPE = "it is the slope of column {column} (correlation {correlation:.3f})"
-    FOLLOWS = "it goes with the motion of column {column} (correlation {correlation:.2f})"
+    FOLLOWS = "it follows the motion in column {column} (correlation {correlation:.2f})"
     IS_DIFFERENCE = "it is the difference of columns {one} and {other}"
 
 
@@ -58,124 +56,129 @@ class EstimateCode(Code):
     """Notes on an estimate of bulk modulus: what speaks against it, or what it lacks."""
 
     NOT_DETERMINED = (
-        "the coefficients are not separately determined by this record (a pole cancels a zero, or the order is too "
-        "high): the covariance is a lower bound"
+        "this record does not determine the coefficients separately (a pole cancels a zero, or the order is too high): "
+        "the true uncertainty is larger than the covariance"
     )
-    BOUND_TOO_WIDE = "the Cramér-Rao bound is {percent:.0f} % of the value, over 3 %: not observable"
+    BOUND_TOO_WIDE = (
+        "the Cramér-Rao bound is {percent:.0f} % of the value, more than the 3 % allowed: bulk modulus is not "
+        "observable"
+    )
     KNOWN_AS_THE_RIG = (
-        "{quantity} is known only as well as the rig's {entry}, which makes {percent:.0f} % of its total variance"
+        "{quantity} is known only as well as the rig's {entry}, which causes {percent:.0f} % of its total variance"
     )
-    DIVERGED = "the estimate stopped being finite; check units, rig parameters and the form"
+    DIVERGED = "the estimate stopped being finite; check units, rig parameters and the form of the model"
     PRESSURE_RESIDUALS_LARGE = (
-        "the pressure residuals are {ratio:.1f} times larger than the sensor's noise: "
-        "the log does something that the flow balance does not know"
+        "the pressure residuals are {ratio:.1f} times the sensor's noise: the log contains something that the flow "
+        "balance leaves out"
     )
     PRESSURE_RESIDUALS_CORRELATED = (
-        "neighbouring pressure residuals are correlated by {correlation:.2f}: "
-        "the log does something that the flow balance does not know"
+        "successive pressure residuals have a correlation of {correlation:.2f}: the log contains something that the "
+        "flow balance leaves out"
     )
     CHANNEL_LATE = (
-        "{channel} comes {milliseconds:.1f} ms {when} for the flow balance: "
-        "a lag or delay of a sensor or of its filter, which is not corrected for"
+        "{channel} is {milliseconds:.1f} ms too {when} for the flow balance: a sensor or its filter lags, and this is "
+        "not corrected for"
     )
     POSITION_RESIDUALS_LARGE = (
-        "the position residuals are {ratio:.2f} times larger than the sensors' noise: "
-        "neither structure of friction explains how the piston starts and stops, and bulk modulus may be far off"
+        "the position residuals are {ratio:.2f} times the sensors' noise: neither friction model explains how the "
+        "piston starts and stops, and bulk modulus may be far off"
     )
     FRICTION_LAWS_DISAGREE = (
-        "two structures of friction explain the log alike and put bulk modulus at {least_pa:.3g} and {most_pa:.3g} Pa"
+        "two friction models explain the log equally well, but put bulk modulus at {least_pa:.3g} and at {most_pa:.3g} "
+        "Pa"
     )
     FORCES_ON_ANY_SCALE = (
-        "position alone does not hold the scale of forces: bulk modulus between {least_pa:.3g} and {most_pa:.3g} Pa "
+        "position alone does not fix the scale of the forces: bulk modulus between {least_pa:.3g} and {most_pa:.3g} Pa "
         "explains the log, with friction in proportion"
     )
     INNOVATIONS_LARGE = (
-        "the residuals of {channel} are {ratio:.1f} times larger than the filter expects (NIS {nis:.1f}, "
-        "1 is expected): model and log disagree, and the interval is too narrow"
+        "the residuals of {channel} are {ratio:.1f} times as large as the filter expects (normalised innovation "
+        "squared {nis:.1f}, expected 1): model and log disagree, and the interval is too narrow"
     )
     INNOVATIONS_FOLLOW_DRIVE = (
-        "the residuals of {channel} hold {excess:.3g} times the power of white noise near {frequency_hz:.3g} Hz, where "
-        "the drive is: the model does not answer it as the log does, and the interval is up to {narrow:.2g} times too "
-        "narrow"
-    )
-    INNOVATIONS_BESIDE_DRIVE = (
-        "the residuals of {channel} hold {excess:.3g} times the power of white noise near {frequency_hz:.3g} Hz, "
-        "beside the drive: a friction, a valve or a pick-up that the model does not know, and the interval is up to "
+        "the residuals of {channel} have {excess:.3g} times the power of white noise near {frequency_hz:.3g} Hz, a "
+        "frequency of the drive: the model answers the drive differently from the log, and the interval is up to "
         "{narrow:.2g} times too narrow"
     )
+    INNOVATIONS_BESIDE_DRIVE = (
+        "the residuals of {channel} have {excess:.3g} times the power of white noise near {frequency_hz:.3g} Hz, which "
+        "is not a frequency of the drive: the model leaves out some friction, valve or electrical interference, and "
+        "the interval is up to {narrow:.2g} times too narrow"
+    )
     ESTIMATE_WANDERS = (
-        "{state} moved between stretches of the log {ratio:.0f} times as far as its interval allows: they disagree "
-        "about it, and the interval is too narrow"
+        "estimates of {state} from different parts of the log differ by {ratio:.0f} times what the interval allows: "
+        "the interval is too narrow"
     )
-    NOT_SETTLED = "{state} still moved by {moved:.3g} over the last fifth of the log: it has not settled"
-    AT_PHYSICAL_BOUND = "{state} ended at its physical bound ({value:.3g} {unit})"
+    NOT_SETTLED = (
+        "{state} still changed by {moved:.3g} {unit} over the last fifth of the log: the estimate has not settled"
+    )
+    AT_PHYSICAL_BOUND = "{state} ended at its physical limit ({value:.3g} {unit})"
     PRESSURE_ABSENT = (
-        "without differential_pressure_pa the estimate rests on how the piston starts, stops and rings, so on a "
-        "friction model that is right, which no foreign bench grants; while the piston sticks nothing is left "
-        "(errata E13)"
+        "without differential_pressure_pa the estimate rests on how the piston starts, stops and rings, so it needs a "
+        "correct friction model, which cannot be assumed for an unknown actuator; while the piston sticks, the log "
+        "says nothing about the oil (errata E13)"
     )
-    PRESSURE_UNUSED = (
-        "the acceleration form does not use differential_pressure_pa, and breaks down at reversals (errata E9)"
-    )
+    PRESSURE_UNUSED = "the acceleration form does not use differential_pressure_pa, and fails at reversals (errata E9)"
 
 
 class RigCode(Code):
     """Notes on a rig, its oil or its logger that differ from what the rig file says, and explain the log."""
 
     PRESSURE_LATE = (
-        "differential_pressure_pa comes {late_ms:.2f} +- {half_width_ms:.2f} ms late: lag or delay of its sensor; "
-        "it was brought forward"
+        "differential_pressure_pa is {late_ms:.2f} +- {half_width_ms:.2f} ms late (lag or delay of its sensor); this "
+        "was corrected"
     )
     PRESSURE_OFFSET = (
-        "differential_pressure_pa reads {offset_pa:.4g} +- {half_width_pa:.2g} Pa too much; the offset was taken off"
+        "differential_pressure_pa reads {offset_pa:.4g} +- {half_width_pa:.2g} Pa too much; the offset was subtracted"
     )
     ENCODER_ZERO = (
-        "position_m reads {zero_mm:.1f} +- {half_width_mm:.1f} mm in the middle of the stroke; it was shifted"
+        "position_m reads {zero_mm:.1f} +- {half_width_mm:.1f} mm at mid-stroke; it was shifted to zero there"
     )
     AREA_TO_DISPLACEMENT = (
-        "pump displacement over piston area is {percent:.2f} +- {half_width:.2f} % of what the rig file says: one of "
-        "the two is wrong, and the log does not tell which"
+        "the ratio of pump displacement to piston area is {percent:.2f} +- {half_width:.2f} % of that in the rig file: "
+        "one of the two is wrong, and the log does not tell which"
     )
     PUMP_WORN = (
         "the pump delivers {percent:.1f} +- {half_width:.1f} % of its displacement: it is worn, or displacement or "
         "piston area in the rig file is wrong"
     )
-    VOLUME_DIFFERS = "the chambers hold {percent:.0f} +- {half_width:.0f} % of the volume that the rig file says"
+    VOLUME_DIFFERS = "the chamber volume is {percent:.0f} +- {half_width:.0f} % of that in the rig file"
     STARTS_UNDER_LOAD = (
-        "the log begins under a differential pressure of {pressure_pa:.3g} Pa, a load of {force_n:.3g} N"
+        "the log begins at a differential pressure of {pressure_pa:.3g} Pa, which is a load of {force_n:.3g} N"
     )
     AIR_ENTRAINED = (
-        "the oil holds {percent:.2g} +- {half_width:.2g} % of air at atmospheric pressure; bulk modulus is stated at "
-        "{stated_pa:.3g} Pa absolute, and is {liquid_pa:.3g} Pa without the air"
+        "the oil contains {percent:.2g} +- {half_width:.2g} % of air at atmospheric pressure; bulk modulus is given at "
+        "{stated_pa:.3g} Pa absolute, and would be {liquid_pa:.3g} Pa without the air"
     )
     AIR_ENTERS = (
-        "air gets into the oil after {percent_of_log:.0f} % of the log: {percent:.2g} +- {half_width:.2g} % at "
+        "air enters the oil after {percent_of_log:.0f} % of the log: {percent:.2g} +- {half_width:.2g} % at "
         "atmospheric pressure"
     )
     RELIEF_LOW = (
-        "the relief valve opens at {setting_pa:.3g} +- {half_width_pa:.2g} Pa, the rig file says {rig_pa:.3g} Pa: it "
-        "is set low, or leaks"
+        "the relief valve opens at {setting_pa:.3g} +- {half_width_pa:.2g} Pa instead of the {rig_pa:.3g} Pa in the "
+        "rig file: it is set too low, or leaks"
     )
     LEAKAGE_GROWS = (
-        "leakage grows over the log by a factor of {factor:.2f}, from {first:.3g} to {last:.3g} m^3/(s Pa): more than "
+        "leakage grows by a factor of {factor:.2f} over the log, from {first:.3g} to {last:.3g} m^3/(s Pa): more than "
         "warming oil explains"
     )
     LEAKAGE_DRIFTS = (
-        "leakage changes over the log by a factor of {factor:.2f}, from {first:.3g} to {last:.3g} m^3/(s Pa), as when "
+        "leakage changes by a factor of {factor:.2f} over the log, from {first:.3g} to {last:.3g} m^3/(s Pa), as when "
         "the oil warms or cools; the condition is that at the end"
     )
-    MAKEUP_BLOCKED = "the make-up valve of chamber {side} feeds next to nothing: it is stuck shut"
+    MAKEUP_BLOCKED = "the make-up valve of chamber {side} lets almost no oil in: it is stuck shut"
     PORT_DRAINS = (
         "chamber {side} loses {drain:.3g} m^3/(s Pa) to the inner circuit: its make-up valve leaks or is stuck open"
     )
     OIL_STIFFER = (
-        "bulk modulus is {ratio:.3g} times that of the rig file; the conditions are compared around the measured one"
+        "bulk modulus is {ratio:.3g} times that in the rig file; the conditions were compared at the measured value"
     )
     OIL_SOFTER = (
-        "bulk modulus is {ratio:.2g} of that in the rig file: air in the oil, or a soft hose; the conditions are "
-        "compared around the measured one"
+        "bulk modulus is {ratio:.2g} times that in the rig file: air in the oil, or a soft hose; the conditions were "
+        "compared at the measured value"
     )
     CHECKS_CRACK = (
-        "the make-up valves open {crack_pa:.3g} +- {half_width_pa:.2g} Pa below the rig file's accumulator pressure"
+        "the make-up valves open {crack_pa:.3g} +- {half_width_pa:.2g} Pa below the accumulator pressure in the rig "
+        "file"
     )
-    EXPLAINED_OTHERWISE = "{count} other explanation(s) fit the log about as well; the interval holds them"
+    EXPLAINED_OTHERWISE = "{count} other explanation(s) fit the log about as well; the interval includes them"

@@ -46,13 +46,15 @@ OBJECTS_AT_START = 500_000
 """More objects than imports and one log leave behind; garbage is looked for after so many [objects]."""
 
 EPILOG = """
-Exit codes: 0 all done, not_observable included; 1 some logs failed or diverged, each named on standard error, or an
-internal error; 2 nothing could be done (usage, no log that can be read); 130 interrupted.
+Exit codes: 0 all done, not_observable included; 1 some logs failed or diverged (standard error names each), or an
+internal error; 2 nothing was done (wrong usage, or no log could be read); 130 interrupted.
 
-Outcome of a log: ok; not_observable, drive and sensors hold too little, so no number is given; mismatch, the model does
-not describe the log, so no number is given; diverged, the result stopped being finite; failed, the message says why.
+Outcome of a log: ok; not_observable: drive and sensors do not determine the value, so none is given; mismatch: the
+model does not describe the log, so no value is given; diverged: the result stopped being finite; failed: the message
+says why.
 
-Environment: HYDROSTATE_CACHE is the folder of compiled kernels, HYDROSTATE_DEBUG=1 shows where an internal error arose.
+Environment: HYDROSTATE_CACHE sets the folder of compiled kernels; HYDROSTATE_DEBUG=1 prints the traceback of an
+internal error.
 
 Example: hydrostate simulate --condition minor_leakage --out run.csv, then hydrostate diagnose run.csv
 """
@@ -83,7 +85,7 @@ def root(
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Say what is wrong inside an electro-hydrostatic actuator, from the signals that a bench already logs."""
+    """Find what is wrong inside an electro-hydrostatic actuator, from the signals that a bench already logs."""
     del shown
 
 

@@ -30,18 +30,20 @@ class MotorCode(Code):
     """Notes on an estimate of the diaphragm motor."""
 
     PATTERN_BROKEN = (
-        "the electrodes' pattern is not a healthy pump's (chi-square {chi_square:.3g} a degree of freedom), so its "
-        "maps of flow and pressure do not hold: diagnose it first"
+        "the electrode pattern is not that of a healthy pump (chi-square {chi_square:.3g} per degree of freedom), so "
+        "the maps of flow and pressure do not hold: run diagnose first"
     )
     FASTER_THAN_MAPS = (
         "the rod moves faster than the pump's maps allow (leakage {leakage:.2g} m^3/(s Pa)): ports may be clogged"
     )
-    TOO_UNCERTAIN = "too uncertain to give: {names}; a load of 10 N or more, or a healthy run (--healthy), would help"
-    LOAD_AND_FRICTION = "load counts any friction above the model's"
-    PISTON_LEAKS = "the piston leaks, certain since {since_s:.2f} s"
+    TOO_UNCERTAIN = (
+        "too uncertain for a value: {names}; apply a load of 10 N or more, or give a healthy run (--healthy)"
+    )
+    LOAD_AND_FRICTION = "the load includes any friction above the model's"
+    PISTON_LEAKS = "the piston leaks; this is certain from {since_s:.2f} s on"
     BULK_MODULUS_HIDDEN = (
-        "bulk modulus is not observable here (bound {bound} of it): halved it changes the flow by {halved}, doubled by "
-        "{doubled}, for the diaphragms give 400 times as much"
+        "bulk modulus is not observable here (Cramér-Rao bound {bound} of its value): halving it changes the flow by "
+        "{halved}, doubling it by {doubled}, because the diaphragms yield 400 times as much as the oil"
     )
 
 

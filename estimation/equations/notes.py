@@ -7,45 +7,48 @@ class EquationsCode(Code):
     """Notes on a fit of own equations: what speaks against it, what the logs do not tell, what they hold."""
 
     EQUATIONS_EXPLAIN_NOTHING = (
-        "the equations follow {channel} no better than its mean does (fit {fit:.1f} %): check units, signs and starts"
+        "the equations predict {channel} no better than its mean does (fit {fit:.1f} %): check units, signs and start "
+        "values"
     )
     MISFIT_BEYOND_NOISE = (
-        "the residuals of {channel} are {ratio:.2f} times its noise: the log does something that the equations leave "
-        "out"
+        "the residuals of {channel} are {ratio:.2f} times its noise: the equations leave out something that the log "
+        "contains"
     )
     MISFIT_CORRELATED = (
-        "the residuals of {channel} are correlated by {correlation:.2f} from sample to sample: the sensor's noise is "
-        "coloured, or the equations leave something out"
+        "successive residuals of {channel} have a correlation of {correlation:.2f}: the sensor noise is not white, or "
+        "the equations leave something out"
     )
     MISFIT_FOLLOWS_INPUT = (
-        "{percent:.2g} % of the residuals of {channel} follow from the past of {source}: the equations leave out how "
-        "one acts on the other"
+        "the past of {source} explains {percent:.2g} % of the residuals of {channel}: the equations leave out part of "
+        "how {source} acts on {channel}"
     )
-    PARAMETER_AT_BOUND = "{parameter} ended at its bound {bound:g}: widen it, or the equations are not the log's"
+    PARAMETER_AT_BOUND = (
+        "{parameter} ended at its bound {bound:g}: widen the bound, or the equations do not describe the log"
+    )
     STEPS_TOO_LONG = (
-        "the solution moves by {deviations:.2g} of its standard deviations when its steps are halved, and shorter ones "
-        "than a sample's {steps}th were not tried: log faster, or write the equations less stiff"
+        "halving the integration steps moves the solution by {deviations:.2g} of its standard deviations, and steps "
+        "shorter than 1/{steps} of a sample were not tried: log faster, or make the equations less stiff"
     )
-    NOT_CONVERGED = "the search ended after {evaluations} evaluations before it settled: better starts are wanted"
+    NOT_CONVERGED = "the search stopped after {evaluations} evaluations before it settled: give better start values"
     LIMIT_UNEXPLAINED = (
-        "{channel} stands at its {end} value {value:.6g} in {percent:.2g} % of its samples, and the equations miss it "
-        "there by {ratio:.3g} times the noise: an end stop or a clipped sensor that they leave out"
+        "{channel} stays at its {end} value {value:.6g} in {percent:.2g} % of its samples, and the equations miss it "
+        "there by {ratio:.3g} times the noise: they leave out an end stop or a clipped sensor"
     )
     OUTPUT_AT_LIMIT = (
-        "{channel} stands at its {end} value {value:.6g} in {percent:.2g} % of its samples, and the equations follow "
-        "it there"
+        "{channel} stays at its {end} value {value:.6g} in {percent:.2g} % of its samples, and the equations reproduce "
+        "this"
     )
     INPUT_AT_LIMIT = (
-        "{channel} stands at its {end} value {value:.6g} in {percent:.2g} % of its samples: if it is a command, what "
-        "acts may be less than what was asked for"
+        "{channel} stays at its {end} value {value:.6g} in {percent:.2g} % of its samples: if it is a command, the "
+        "actuator may get less than was commanded"
     )
-    PARAMETERS_NOT_TOLD = "the logs do not tell {names} apart: fix one, or excite what distinguishes them"
-    PARAMETER_NOT_FELT = "the logs do not tell {name}: no output depends on it"
+    PARAMETERS_NOT_TOLD = "the logs cannot separate {names}: fix one of them, or use a drive that tells them apart"
+    PARAMETER_NOT_FELT = "the logs do not determine {name}: no output depends on it"
     PARAMETER_POORLY_TOLD = (
-        "{name} is known to +- {percent:.0f} % only; its error goes most with that of {other} (correlation "
+        "{name} is known only to +- {percent:.0f} %; its error is correlated most with that of {other} (correlation "
         "{correlation:.3f})"
     )
     STARTS_DISAGREE = (
-        "another set of values explains the logs as well ({parameter} = {value:.4g}): narrow the bounds if you can"
+        "another set of values explains the logs equally well ({parameter} = {value:.4g}): narrow the bounds if you can"
     )
-    SAMPLES_MISSING = "{count} of {total} samples of {channel} are missing, and count for nothing"
+    SAMPLES_MISSING = "{count} of {total} samples of {channel} are missing and were not used"

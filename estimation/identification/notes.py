@@ -7,60 +7,59 @@ class IdentificationCode(Code):
     """Notes on an identified model, or on the signals that it was identified from."""
 
     PISTON_RESTS = (
-        "{output!r} rests in {measured:.0%} of the samples in which {input!r} drives it, a second-order model in "
-        "{linear:.0%}: it sticks, and further poles imitate the wait, so order {order} is not the plant's. The fits by "
-        "order are {fits}: give the order, or drive the piston around a mean that keeps it moving"
+        "{output!r} rests in {measured:.0%} of the samples in which {input!r} drives it; a second-order model rests in "
+        "{linear:.0%}. The piston sticks, and extra poles imitate the pause, so order {order} is not that of the "
+        "plant. The fits by order are {fits}: give the order, or drive the piston around a mean speed that keeps it "
+        "moving"
     )
     FEEDBACK = (
         "input {input!r} follows the noise of {output!r} (p = {p_value:.1g}): the data seem to come from a closed loop,"
         " where output error is biased; fit ARMAX or Box-Jenkins"
     )
     VELOCITY_DIFFERENTIATED = (
-        "channel 'velocity_m_s' is absent: it is differentiated from 'position_m' by central differences, which "
-        "amplifies its noise"
+        "channel 'velocity_m_s' is absent: it was computed from 'position_m' by central differences, which amplify "
+        "noise"
     )
-    INPUT_BRIDGED = "input {channel!r} misses {count} of {total} samples: they are bridged by straight lines"
+    INPUT_BRIDGED = "input {channel!r} lacks {count} of {total} samples: they were interpolated linearly"
     INPUT_SPLIT = (
-        "input {channel!r} misses {count} of {total} samples, and no line stands for them: the log is taken as "
-        "{pieces} experiments, each with its own beginning"
+        "input {channel!r} lacks {count} of {total} samples that cannot be interpolated: the log was split into "
+        "{pieces} experiments, each with its own initial state"
     )
     OUTPUT_ALONE_FILTERED = (
-        "only the output is filtered: poles come out 20-30 % off and the gain does not roll off (errata E15); filter "
-        "input and output alike, or neither"
+        "only the output is filtered: the poles come out 20 to 30 % off, and the gain does not roll off (errata E15); "
+        "filter input and output alike, or neither"
     )
     UNSTABLE = (
-        "the identified {structure} model is unstable (a pole of modulus {modulus:.4f}): it predicts one step ahead, "
-        "and does not simulate"
+        "the identified {structure} model is unstable (a pole of modulus {modulus:.4f}): it can predict one step "
+        "ahead, but cannot simulate"
     )
     NEARLY_CANCEL = (
         "the pole {pole} and the zero {zero} nearly cancel ({deviations:.1f} standard deviations apart): intervals "
-        "from the covariance cover too little; use dc_gain_interval, or a lower order"
+        "from the covariance are too narrow; use dc_gain_interval, or a lower order"
     )
     TIME_CONSTANT_BEYOND_RECORD = (
-        "the model of order {order} has a time constant of {time_constant_s:.3g} s and the longest record lasts "
-        "{duration_s:.3g} s: no simpler model was to be had, and its steady gain means nothing"
+        "the model of order {order} has a time constant of {time_constant_s:.3g} s, longer than the longest record "
+        "({duration_s:.3g} s), and no simpler model was found: its steady gain means nothing"
     )
     SLOW_MODELS_PASSED_OVER = (
-        "{count} models with a time constant beyond the record of {duration_s:.3g} s are passed over for a simpler one"
+        "models with a time constant longer than the record of {duration_s:.3g} s: {count}; a simpler one was chosen "
+        "instead"
     )
     INTEGRATES = (
-        "{output!r} integrates its input over the whole record: the model has a pole next to one, so its steady gain "
+        "{output!r} integrates its input over the whole record: the model has a pole close to 1, so its steady gain "
         "means nothing"
     )
     SIMPLER_MODEL_TAKEN = (
-        "in the model of order {order} a pole and a zero nearly cancel, or its gain is not determined; one of order "
-        "{taken} does nearly as well on what was held back, and is taken"
+        "the model of order {order} has a pole and a zero that nearly cancel, or a gain that is not determined; a "
+        "model of order {taken} does nearly as well on held-back data and was chosen"
     )
     INPUT_BEYOND_RANGE = (
-        "input {channel!r} goes from {least:.4g} to {greatest:.4g}, the polynomial model was fitted to {low:.4g} to "
-        "{high:.4g}: in {share:.1%} of the samples its products say nothing, and a linear model (--structure "
-        "output-error) may follow better"
+        "input {channel!r} ranges from {least:.4g} to {greatest:.4g}, but the polynomial model was fitted from "
+        "{low:.4g} to {high:.4g}: do not rely on its products in {share:.1%} of the samples; a linear model "
+        "(--structure output-error) may do better"
     )
     NO_NONLINEARITY = (
-        "neither dead zone nor saturation nor backlash at the input explains {output!r} better on what was held back "
-        "than none: the linear model is taken"
+        "neither dead zone nor saturation nor backlash at the input predicts {output!r} better on held-back data: the "
+        "linear model was chosen"
     )
-    NO_FIT = (
-        "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): nothing that it says "
-        "is to be believed"
-    )
+    NO_FIT = "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): do not rely on it"

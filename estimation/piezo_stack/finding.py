@@ -27,8 +27,8 @@ SMALLEST_FAULT: Mapping[str, float] = {"chamber_leakage": 5e-12, "crossport_leak
 class StackCode(Code):
     """Notes on an estimate of the piezo-stack actuator."""
 
-    CHANNEL_MISSED = "{channel} is missed by {ratio:.3g} times its noise"
-    QUANTITIES_NOT_TOLD = "these sensors do not tell {names}"
+    CHANNEL_MISSED = "the model misses {channel} by {ratio:.3g} times its noise"
+    QUANTITIES_NOT_TOLD = "these sensors do not determine {names}"
 
 
 def stack_finding(

@@ -106,10 +106,10 @@ def sentences(card: Card) -> tuple[str, ...]:
     lost = [name for name, std in card.relative_std.items() if std > OBSERVABLE]
     if lost:
         named = ", ".join(f"{_words(name)} ({percent(card.relative_std[name])})" for name in lost)
-        said.append(f"not observable from this drive and these sensors, worse than {percent(OBSERVABLE)}: {named}")
+        said.append(f"not observable with this drive and these sensors (bound over {percent(OBSERVABLE)}): {named}")
     if card.stuck > 0.5:
         said.append(
-            f"the piston sticks for {percent(card.stuck)} of the time; while it sticks, position and velocity hold "
+            f"the piston sticks for {percent(card.stuck)} of the time; while it sticks, position and velocity say "
             "nothing about bulk modulus (errata E13)"
             + (
                 "; differential pressure does"
@@ -123,7 +123,7 @@ def sentences(card: Card) -> tuple[str, ...]:
         terms = [
             f"{weight:+.2f} {_words(name)}" for name, weight in card.weakest.items() if abs(weight) > 0.2 * largest
         ]
-        said.append(f"known worst, to {percent(card.weakest_std)}: {' '.join(terms)} (of logarithms)")
+        said.append(f"the combination known worst, to {percent(card.weakest_std)}: {' '.join(terms)} (of logarithms)")
     said += _rig_share(card)
     return tuple(said)
 
@@ -149,10 +149,10 @@ def _inseparable(card: Card) -> list[str]:
 def _rig_share(card: Card) -> list[str]:
     if "bulk_modulus" not in card.unknowns:
         return []
-    rule = "bulk modulus enters only as chamber volume over bulk modulus"
+    rule = "only the ratio of chamber volume to bulk modulus matters"
     if not card.uncertainties:
         return [
-            f"{rule}: one percent of error in the volume is one percent in bulk modulus, and the rig file gives the "
+            f"{rule}: an error of 1 % in the volume is an error of 1 % in bulk modulus, and the rig file gives the "
             "volume no uncertainty"
         ]
     given = ", ".join(f"{_words(name)} {percent(std)}" for name, std in card.uncertainties.items())

@@ -159,7 +159,8 @@ def _unsettled(estimate: Estimate, state: str) -> list[Note]:
     allowed = 3.0 * float(std[-1]) + LARGEST_DRIFT * abs(last)
     if abs(last - before) <= allowed:
         return []
-    return [EstimateCode.NOT_SETTLED.note(state=state, moved=last - before)]
+    unit = estimate.model.states[estimate.model.index(state)].unit
+    return [EstimateCode.NOT_SETTLED.note(state=state, moved=last - before, unit=unit)]
 
 
 def _at_a_bound(estimate: Estimate, state: str) -> list[Note]:

@@ -39,29 +39,29 @@ commands = typer.Typer()
 @commands.command(epilog="Example: hydrostate batch fleet-archive --logs 'archive/**/*.csv' --out results/fleet")
 def batch(
     study: Annotated[
-        str, argument("STUDY", "Study file (TOML), or the name of one that is installed: eha-paper, fleet-archive.")
+        str, argument("STUDY", "Study file (TOML), or the name of an installed study: eha-paper, fleet-archive.")
     ],
     out: Annotated[
         str | None, option("STORE", "Folder or URL (s3://...) of the store; results/<study> by default.", "--out", "-o")
     ] = None,
-    dry_run: Annotated[bool, flag("--dry-run", "Say how many cases there are and what they cost.")] = False,
+    dry_run: Annotated[bool, flag("--dry-run", "Print the number of cases and what they cost, and stop.")] = False,
     resume: Annotated[
-        bool, flag("--resume/--no-resume", "Keep the cases that the store has, or run all of them again.")
+        bool, flag("--resume/--no-resume", "Keep the cases that the store has, or run all again.")
     ] = True,
     retry_failed: Annotated[bool, flag("--retry-failed", "Run failed cases again.")] = False,
-    workers: Annotated[
-        int | None, option("N", "Processes, one thread each; the machine's cores by default.", min=1)
+    workers: Annotated[int | None, option("N", "Number of processes; by default the number of cores.", min=1)] = None,
+    cluster: Annotated[
+        str | None, option("ADDRESS", "Scheduler of a Dask cluster to use, such as tcp://host:8786.")
     ] = None,
-    cluster: Annotated[str | None, option("ADDRESS", "Use a Dask cluster: its scheduler, as tcp://host:8786.")] = None,
     max_failures: Annotated[int | None, option("N", "Stop once more than N cases have failed.", min=0)] = None,
-    logs: Annotated[str | None, option("GLOB", "Replaces the glob of the study's logs.")] = None,
+    logs: Annotated[str | None, option("GLOB", "Glob of logs, instead of that in the study file.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Run a study of many cases into a store that survives whatever stops it, and write its report.
+    """Run a study of many cases into a store that survives interruptions, and write its report.
 
-    A case that the store has is not run again: after a crash, or Ctrl-C, the same command goes on where it stopped; of
-    a changed study, only what changed is run. A case that fails is a row with its reason. The last line of standard
-    output is the report's path.
+    Cases that are in the store are not run again: after a crash or Ctrl-C, the same command continues where it stopped;
+    of a changed study, only the changed cases are run. A case that fails becomes a row with its reason. The last line
+    of standard output is the path of the report.
     """
     from experiments.batch.cases import plan_study
     from experiments.batch.part_store import open_store

@@ -20,10 +20,10 @@ def compare(
     seed: Seed = SEED,
     as_json: Json = False,
 ) -> None:
-    """Say what got better and what worse from study A to study B, with 95 % intervals by bootstrap.
+    """Show what got better and what got worse from study A to study B, with 95 % intervals by bootstrap.
 
-    Cases are paired: the same series, and the same done with it. Where each study has one filter (or form, plant, ...)
-    throughout and the two differ in it, that is what is compared. The seed draws the bootstrap.
+    Cases are paired: the same series with the same treatment. If each study uses one filter (or form, plant, ...)
+    throughout and the two studies differ in it, that difference is compared. The seed draws the bootstrap.
     """
     from experiments.batch.compare import compare_studies
     from experiments.batch.part_store import open_store
@@ -58,9 +58,11 @@ def compare(
 @commands.command(epilog="Example: hydrostate report results/eha-paper --out report")
 def report(
     store: Annotated[str, argument("STORE", "Store of a batch study.")],
-    out: Annotated[str | None, option("DIR", "Another folder than the store's own.", "--out", "-o")] = None,
+    out: Annotated[
+        str | None, option("DIR", "Folder of the report; by default that of the store.", "--out", "-o")
+    ] = None,
 ) -> None:
-    """Write the report of a batch study from its store alone, also while the study runs.
+    """Write the report of a batch study from its store, also while the study still runs.
 
     The last line of standard output is the report's path.
     """

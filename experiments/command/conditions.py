@@ -16,17 +16,19 @@ if TYPE_CHECKING:
 
     from rich.console import RenderableType
 
-RigPath: TypeAlias = Annotated[Path, typer.Argument(metavar="PATH", help="File to write; an existing one is kept.")]
+RigPath: TypeAlias = Annotated[
+    Path, typer.Argument(metavar="PATH", help="File to write; an existing file is not overwritten.")
+]
 
 commands = typer.Typer()
-rig_commands = typer.Typer(no_args_is_help=True, help="Files that describe an actuator which is not the paper's.")
+rig_commands = typer.Typer(no_args_is_help=True, help="Write a file that describes your own actuator.")
 
 
 @commands.command(epilog="Example: hydrostate conditions --rig rig.toml")
 def conditions(rig: RigFile = None, out: Out = None, seed: Seed = SEED, as_json: Json = False) -> None:
-    """List the nine conditions of Table 1 with the parameters that make them, in SI.
+    """List the nine conditions of Table 1 and the parameters of each, in SI.
 
-    On a rig that is not the paper's, the changes of Tables 3 and 4 are scaled to its flow and area. The seed changes
+    For a rig that is not the paper's, the changes of Tables 3 and 4 are scaled to its flow and area. The seed changes
     nothing.
     """
     from faults.conditions import CONDITIONS, parameters_for
@@ -67,7 +69,7 @@ def rig_init(
     path: RigPath = Path("rig.toml"),
     plant: Plant = None,
 ) -> None:
-    """Write a commented rig file (TOML, SI) that describes the paper's actuator, to be changed into yours."""
+    """Write a commented rig file (TOML, SI) of the paper's actuator, for you to change into yours."""
     from plant.eha.rig import EHA, rig_template, write_rig_template
 
     kind, _ = load_actuator(plant, None)

@@ -32,7 +32,7 @@ def diagnose(
     context: typer.Context,
     logs: Logs,
     condition: Annotated[
-        str | None, option("NAME", "The condition that you expect; the result says if it agrees.")
+        str | None, option("NAME", "The condition that you expect; the result says whether it agrees.")
     ] = None,
     rig: RigFile = None,
     columns: Columns = None,
@@ -42,17 +42,15 @@ def diagnose(
         bool | None,
         flag(
             "--transfer-functions/--no-transfer-functions",
-            "Show a table of nine transfer functions' errors (identified first for a rig of your own: 20 s), or leave "
-            "out the line on them that the paper's rig gets.",
+            "Print the errors of nine transfer functions (for your own rig they are identified first: 20 s), or leave "
+            "out the line on them that is printed for the paper's rig.",
         ),
     ] = None,
     scores: Annotated[
-        bool, flag("--scores/--no-scores", "Also show every condition's model error in a table.")
+        bool, flag("--scores/--no-scores", "Also print a table with the model error of every condition.")
     ] = False,
-    report: Annotated[Path | None, option("FILE", "Write a page (HTML); of several logs, one each.")] = None,
-    no_pressure: Annotated[
-        bool, flag("--no-pressure", "Use velocity alone, even if differential pressure is logged.")
-    ] = False,
+    report: Annotated[Path | None, option("FILE", "Write a page (HTML); several logs get one page each.")] = None,
+    no_pressure: Annotated[bool, flag("--no-pressure", "Ignore differential pressure even if it is logged.")] = False,
     plant: Plant = None,
     bias_pressure: BiasPressure = None,
     load: Load = None,
@@ -61,11 +59,13 @@ def diagnose(
     seed: Seed = SEED,
     as_json: Json = False,
 ) -> None:
-    """Say what is wrong: which of nine conditions, how probable, how bad, or that it is none of them.
+    """Find what is wrong: which of nine conditions, how probable, how severe; or that none of the nine fits.
 
-    A hydraulic circuit is fitted to each log and compared with the nine conditions of leakage and friction; the
-    errors of nine models and nine filters count too. The probabilities were calibrated on simulated logs. Severities
-    come with 95 % intervals. In the table of scores a model's error is in velocity [m/s], or relative to the signals
-    [dimensionless] where differential pressure counts too. The seed draws the tests behind the transfer functions.
+    The nine conditions are no, minor or major leakage, each with no, minor or major friction. The command fits a
+    hydraulic circuit to each log and compares it with the nine; errors of nine models and nine filters also enter.
+    Probabilities were calibrated on simulated logs. Severities have 95 % intervals; the wider ones ("with rig error")
+    include the uncertainty of the rig file. In the table of --scores, a model error is in velocity [m/s], or
+    relative to the signals [dimensionless] if differential pressure is used. The seed draws the tests behind the
+    transfer functions.
     """
     run_log_verb(context, "diagnose", "diagnosing", locals())

@@ -27,19 +27,20 @@ if TYPE_CHECKING:
     from plant.eha.rig import Rig
     from plant.log.record import Record
 
-commands = typer.Typer(help="Take what works offline to a controller: C99, FMUs.", no_args_is_help=True)
+commands = typer.Typer(help="Export a filter, a plant or a model: C99, FMU, MATLAB.", no_args_is_help=True)
 
-Folder: TypeAlias = Annotated[Path, option("DIR", "Folder that the files are written to.", "--out", "-o")]
+Folder: TypeAlias = Annotated[Path, option("DIR", "Folder for the files.", "--out", "-o")]
 Log: TypeAlias = Annotated[
     Path | None,
     argument(
         "LOG",
-        "A log of the bench: the filter gets its rate, its channels and its sensors' noise. Without one, those of a "
-        "simulated healthy bench at 10 kHz.",
+        "A log of the bench, which gives the filter its sample rate, channels and sensor noise. Without one, those of "
+        "a simulated healthy bench at 10 kHz are used.",
     ),
 ]
 Form: TypeAlias = Annotated[
-    str, option("FORM", "What the filter believes: a form of `estimate` that is filtered, or flow.")
+    str,
+    option("FORM", "Model of the filter: pressure, acceleration, flow, chambers, chambers_by_mass or chambers_held."),
 ]
 Method: TypeAlias = Annotated[
     str, option("METHOD", "ekf, iekf, ukf, ckf, svsf, sif, or imm: nine interacting filters, of leakage and friction.")
@@ -47,13 +48,11 @@ Method: TypeAlias = Annotated[
 PlantName: TypeAlias = Annotated[
     str | None, option("PLANT", "Export the step of a plant instead of a filter: reduced, lumped or circuit.")
 ]
-Tune: TypeAlias = Annotated[bool, flag("--tune", "Tune the filter's noise levels to the log by likelihood.")]
+Tune: TypeAlias = Annotated[bool, flag("--tune", "Tune the filter's noise levels to the log by maximum likelihood.")]
 States: TypeAlias = Annotated[
-    str, option("NAMES", "What the filter estimates beside bulk modulus, comma-separated: parameters' names.")
+    str, option("NAMES", "Parameters to estimate in addition to bulk modulus, comma-separated.")
 ]
-NoPressure: TypeAlias = Annotated[
-    bool, flag("--no-pressure", "Use position and velocity alone, even if pressure is logged.")
-]
+NoPressure: TypeAlias = Annotated[bool, flag("--no-pressure", "Ignore differential pressure even if it is logged.")]
 Step: TypeAlias = Annotated[float | None, option("S", "Time between samples [s].", show_default="the log's, else 1e-4")]
 
 
@@ -70,7 +69,7 @@ def c(
     tune: Tune = False,
     precision: Annotated[str, option("TYPE", "double or float.")] = "double",
     name: Annotated[
-        str | None, option("NAME", "What files, types and functions are called.", show_default="the form and method")
+        str | None, option("NAME", "Name of the files, types and functions.", show_default="the form and method")
     ] = None,
     no_pressure: NoPressure = False,
     sample_time: Step = None,
@@ -80,8 +79,8 @@ def c(
 ) -> None:
     """Write a filter, or a plant's step, as C99: a header, a source, an example and a Makefile.
 
-    The arithmetic is that of the kernels that Python runs, line by line. Nothing is allocated, every loop is bounded,
-    and the header says how many operations a step takes at most.
+    The C code does the same arithmetic as Python, line by line. It allocates nothing, every loop is bounded, and the
+    header states the largest number of operations per step.
     """
     prepare_output(out)
     require_positive("--sample-time", sample_time, "s")
@@ -99,15 +98,15 @@ def c(
 @commands.command(epilog="Example: hydrostate export fmu --plant lumped --sample-time 1e-3 --fmi 3.0 --out plant.fmu")
 def fmu(
     log: Log = None,
-    out: Annotated[Path, option("FILE", "The archive that is written.", "--out", "-o")] = Path("hydrostate.fmu"),
-    fmi: Annotated[str, option("VERSION", "Version of the interface: 2.0 or 3.0.")] = "2.0",
+    out: Annotated[Path, option("FILE", "FMU to write.", "--out", "-o")] = Path("hydrostate.fmu"),
+    fmi: Annotated[str, option("VERSION", "Version of FMI: 2.0 or 3.0.")] = "2.0",
     form: Form = "pressure",
     method: Method = "ekf",
     plant: PlantName = None,
     states: States = "",
     tune: Tune = False,
     name: Annotated[
-        str | None, option("NAME", "The model's identifier, a name of C.", show_default="the form and method")
+        str | None, option("NAME", "Model identifier; must be a valid C name.", show_default="the form and method")
     ] = None,
     no_pressure: NoPressure = False,
     sample_time: Step = None,
@@ -155,9 +154,7 @@ def model(
     out: Folder = Path("controller"),
     to: Kind = "c",
     precision: Annotated[str, option("TYPE", "double or float.")] = "double",
-    name: Annotated[
-        str | None, option("NAME", "What files, types and functions are called.", show_default="model")
-    ] = None,
+    name: Annotated[str | None, option("NAME", "Name of the files, types and functions.", show_default="model")] = None,
     as_json: Json = False,
 ) -> None:
     """Write an identified linear model as C99, a difference equation, or as a MAT file."""

@@ -47,37 +47,40 @@ def filter_stream(
         ),
     ],
     form: Annotated[
-        str, option("FORM", "What the filter believes: a form of `estimate` that is filtered, or flow.")
+        str,
+        option(
+            "FORM", "Model of the filter: pressure, acceleration, flow, chambers, chambers_by_mass or chambers_held."
+        ),
     ] = "pressure",
     method: Annotated[str, option("METHOD", "ekf, iekf, ukf, ckf, svsf or sif.")] = "ekf",
     states: Annotated[
-        str, option("NAMES", "What is estimated beside bulk modulus, comma-separated: parameters' names.")
+        str, option("NAMES", "Parameters to estimate in addition to bulk modulus, comma-separated.")
     ] = "",
     like: Annotated[
         Path | None,
         option(
             "LOG",
-            "A log of the same bench that the noise levels are read off.",
+            "A log of the same bench, from which the noise levels are taken.",
             show_default="the stream's first second",
         ),
     ] = None,
-    tune: Annotated[bool, flag("--tune", "Tune the noise levels by likelihood on what they are read off.")] = False,
+    tune: Annotated[bool, flag("--tune", "Tune the noise levels on that log by maximum likelihood.")] = False,
     every: Annotated[float, option("S", "Time of the stream between two estimates [s].")] = 1.0,
     rig: RigFile = None,
     columns: Columns = None,
     state: Annotated[
-        Path | None, option("FILE", "Keep the filter in this file, and go on from it after a restart.")
+        Path | None, option("FILE", "Save the filter in this file, and continue from it after a restart.")
     ] = None,
     publish: Annotated[
-        str | None, option("mqtt://HOST[:PORT]/TOPIC", "Also publish every line at an MQTT broker.")
+        str | None, option("mqtt://HOST[:PORT]/TOPIC", "Also publish every line to an MQTT broker.")
     ] = None,
 ) -> None:
-    """Say what a filter believes while rows come: bulk modulus and whatever else it estimates, with deviations.
+    """Run a filter on a stream: bulk modulus and its other estimates, with standard deviations, as rows arrive.
 
-    It is the filter that `export c` writes for a controller, with the same numbers. Events: start; estimate, with
-    values, standard deviations, the mean squared innovation of each channel since the last one, and what speaks against
-    it (gate); end. A missing sample changes nothing; a missing drive is held; after more than a second without rows the
-    filter begins again where the actuator is.
+    This is the filter that `export c` writes for a controller, with the same numbers. Events: start; estimate (values,
+    standard deviations, the mean squared innovation of each channel since the last estimate, and what speaks against
+    it: the gate); end. A missing sample is skipped; a missing drive value is held. After more than a second without
+    rows the filter restarts from where the actuator then is.
     """
     require_positive("--every", every, "s")
     sinks: list[Any] = [_say]

@@ -27,32 +27,33 @@ commands = typer.Typer()
 
 @commands.command(epilog="Example: hydrostate fleet archive --pattern '{actuator}_{date}.csv' --out fleet")
 def fleet(
-    place: Annotated[str, argument("FOLDER_OR_STORE", "Folder of logs, or the store of a batch that diagnosed some.")],
+    place: Annotated[str, argument("FOLDER_OR_STORE", "Folder of logs, or the store of a batch study with diagnoses.")],
     out: Annotated[Path, option("DIR", "Folder of the pages.", "--out", "-o")] = Path("fleet"),
     pattern: Annotated[
         str | None, option("PATTERN", "How files are named, such as '{actuator}_{date}.csv'.", "--pattern")
     ] = None,
     names: Annotated[
-        Path | None, option("CSV", "Table with the columns file, actuator, and date if known.", "--names")
+        Path | None, option("CSV", "Table with the columns file, actuator and, if known, date.", "--names")
     ] = None,
     limit: Annotated[
         list[str] | None, option("NAME=VALUE", "Limit of a severity in its unit, such as leakage_flow=2.", "--limit")
     ] = None,
     maintenance: Annotated[
-        Path | None, option("CSV", "Repairs, with the columns actuator and date: trends begin anew.", "--maintenance")
+        Path | None,
+        option("CSV", "Repairs, with the columns actuator and date; a trend restarts at a repair.", "--maintenance"),
     ] = None,
-    pages: Annotated[int, option("N", "Write a page each for the N sickest actuators.", "--pages", min=0)] = 20,
+    pages: Annotated[int, option("N", "Write a page for each of the N worst actuators.", "--pages", min=0)] = 20,
     plant: Plant = None,
     rig: RigFile = None,
     columns: Columns = None,
     workers: Annotated[
-        int | None, option("N", "Processes, one thread each; the machine's cores by default.", "--workers", min=1)
+        int | None, option("N", "Number of processes; by default the number of cores.", "--workers", min=1)
     ] = None,
 ) -> None:
-    """Write the page of a fleet: which actuators are sick, how badly, and where their logs' pages are.
+    """Write the page of a fleet: which actuators are faulty, how badly, with links to the pages of their logs.
 
-    The logs of a folder are diagnosed into a store beside the page; the same command goes on where it stopped. The last
-    line of standard output is the page's path.
+    The command diagnoses the logs of a folder into a store beside the page; run it again to continue where it stopped.
+    The last line of standard output is the path of the page.
     """
     from experiments.batch.part_store import open_store
     from experiments.fleet.actuators import actuator_rows
@@ -70,7 +71,7 @@ def fleet(
     files = [row["file"] for row in table if row["file"]]
     rows = actuator_rows(log_rows(table, _names(files, pattern, names), limits), read_maintenance(maintenance))
     if not rows:
-        raise HydrostateError(f"{place}: must hold logs that were diagnosed (verb diagnose), there are none")
+        raise HydrostateError(f"{place}: must contain logs that were diagnosed (verb diagnose), but there are none")
     base = Path(place) if from_logs else Path()
     links = write_pages(rows, out, pages, _page_writer(base, plant, rig, columns))
     write_whole(out / PAGE, fleet_page(rows, links, Path(place).name), "--out", parents=True)

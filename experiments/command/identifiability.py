@@ -45,7 +45,7 @@ def identifiability(
         str,
         option(
             "LIST",
-            "Sensors beside the drive, by commas: position, velocity, dp; piezo-stack: stack, force, position, "
+            "Sensors besides the drive, comma-separated: position, velocity, dp; piezo-stack: stack, force, position, "
             "pressure. All by default.",
             show_default=False,
         ),
@@ -53,7 +53,7 @@ def identifiability(
     noise: Noise = "bench",
     drive: Drive = "steps",
     seconds: Annotated[float, option("S", "Length of the experiment [s].", show_default="10, piezo-stack 0.1")] = 10.0,
-    rate: Annotated[float, option("HZ", "Samples a second [Hz].", show_default="1000, piezo-stack 20000")] = 1000.0,
+    rate: Annotated[float, option("HZ", "Sample rate [Hz].", show_default="1000, piezo-stack 20000")] = 1000.0,
     ranked: Ranked = False,
     condition: ConditionName = None,
     frequency: Frequency = None,
@@ -65,12 +65,12 @@ def identifiability(
     seed: Seed = SEED,
     as_json: Json = False,
 ) -> None:
-    """Say how well an experiment could know bulk modulus, leakage, flow bias and friction, before it is made.
+    """Predict how well an experiment can determine bulk modulus, leakage, flow bias and friction, before you run it.
 
-    Of other actuators, what their log would tell, each with the least standard deviation that any method could reach.
-    Relative standard deviations (Cramér-Rao bounds of the lumped plant, in percent), what cannot be told apart, and
-    what the rig file's uncertainties add: bulk modulus enters only as chamber volume over bulk modulus. The seed is
-    that of random drives.
+    Prints the least relative standard deviation that any method can reach (the Cramér-Rao bound of the lumped plant, in
+    percent), the parameters that cannot be separated, and what the uncertainties in the rig file add: only the ratio
+    of chamber volume to bulk modulus matters. For other actuators it prints the same for what their logs determine. The
+    seed is that of random drives.
     """
     from experiments.actuators import offered
 

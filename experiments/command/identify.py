@@ -71,22 +71,22 @@ def identify(
         str,
         option(
             "NAME",
-            f"{', '.join([*STRUCTURES, 'narx', 'hammerstein', 'state-space'])}; auto takes the best on data held back. "
-            "With --input and --output: narx is polynomial, hammerstein a dead zone, saturation or backlash before a "
-            "linear model, state-space one model of all outputs, its order the number of states.",
+            f"{', '.join([*STRUCTURES, 'narx', 'hammerstein', 'state-space'])}; auto takes the best on held-back data. "
+            "With --input and --output also: narx (polynomial), hammerstein (dead zone, saturation or backlash before "
+            "a linear model), state-space (one model of all outputs; its order is the number of states).",
         ),
     ] = "output-error",
     order: Annotated[
         str | None,
         option(
             "INT|auto",
-            "Order of the denominator; auto asks BIC. With --input and --output, free runs on blocks held back choose "
-            "it.",
+            "Order of the denominator; auto takes the best by BIC, or with --input and --output the best free run on "
+            "held-back blocks.",
             show_default="2; auto with --input",
         ),
     ] = None,
     numerator: Annotated[
-        int | None, option("INT", "Coefficients of the numerator; one more than the order unless told.", min=1)
+        int | None, option("INT", "Number of numerator coefficients; by default one more than the order.", min=1)
     ] = None,
     delay: Annotated[
         str | None, option("INT|auto", "Dead time [samples of the model].", show_default="0; auto with --input")
@@ -95,43 +95,49 @@ def identify(
         float | None,
         option(
             "S",
-            "Of the model [s], and of a log without time; 1e-3 (Table 6), or the log's. With --input, of logs without "
-            "time alone.",
+            "Sample time of the model [s], and of a log without a time column; by default 1e-3 (Table 6), or the log's "
+            "if that is longer. With --input, only of logs without a time column.",
         ),
     ] = None,
-    resample: Annotated[float | None, option("S", "With --input: sample time of the model [s]; the log's.")] = None,
+    resample: Annotated[
+        float | None, option("S", "With --input: sample time of the model [s]; by default the log's.")
+    ] = None,
     filter_hz: Annotated[
-        float | None, option("HZ", "Zero-phase low-pass of input and output before the fit [Hz]; none if not given.")
+        float | None,
+        option("HZ", "Cut-off of a zero-phase low-pass on input and output before the fit [Hz]; none by default."),
     ] = None,
     inputs: Annotated[
         list[str] | None,
         option(
             "COLUMN",
-            "Input: any column, in whatever unit; repeat it, or separate several by commas.",
+            "Input: any column in any unit; repeat the option, or separate several by commas.",
             "--input",
             show_default="motor_speed_rad_s",
         ),
     ] = None,
     outputs: Annotated[
         list[str] | None,
-        option("COLUMN", "Output, likewise; one model an output.", "--output", show_default="velocity_m_s"),
+        option("COLUMN", "Output, likewise; one model per output.", "--output", show_default="velocity_m_s"),
     ] = None,
     validate: Annotated[
-        list[Path] | None, option("LOG", "With --input: a log that the model is tested on, not fitted to.")
+        list[Path] | None, option("LOG", "With --input: a log to test the model on; it is not used for the fit.")
     ] = None,
     simulate: Annotated[
-        Path | None, option("MODEL", "Simulate this saved model (a file of --out) on the logs, instead of a fit.")
+        Path | None,
+        option("MODEL", "Simulate this saved model (a file from --out) on the logs instead of fitting one."),
     ] = None,
     simulated: Annotated[
         Path | None, option("CSV", "With --input or --simulate: write time, inputs, measured and simulated output.")
     ] = None,
     figure: Annotated[
-        Path | None, option("PNG", "Draw measured beside simulated, the residual, its correlations, the gain.")
+        Path | None, option("PNG", "Draw measured and simulated output, the residual, its correlations, and the gain.")
     ] = None,
     response: Annotated[
         Path | None,
         option(
-            "PNG", "With --input: draw the frequency response; --json has it, a multisine's levels of distortion too."
+            "PNG",
+            "With --input: draw the frequency response; --json also prints it, with the distortion levels of a "
+            "multisine.",
         ),
     ] = None,
     rig: RigFile = None,
@@ -140,15 +146,15 @@ def identify(
     seed: Seed = SEED,
     as_json: Json = False,
 ) -> None:
-    """Identify the discrete transfer function from motor speed [rad/s] to velocity [m/s] of each log, or any relation.
+    """Identify a transfer function: from motor speed [rad/s] to velocity [m/s] of each log, or between any columns.
 
-    With --input and --output any columns are related, whatever they are called and measured in: several logs are then
-    experiments of one model an output, with offset and initial states; order, dead time and structure are chosen by the
-    free run on blocks held back. fit and rms error are always those of the free run.
+    With --input and --output, the model relates any columns, in any unit. Several logs are then experiments on the same
+    plant, each with its own offset and initial state. Free runs on held-back blocks choose order, dead time and
+    structure. Fit and rms error are always those of the free run.
 
-    Without, an output-error fit with covariance; the defaults are the form of Table 6. Differential pressure is not
-    used, so its absence costs nothing. Nothing here is random, so the seed changes nothing. `--out library.json` writes
-    one entry a log at full precision, which `LinearModel.from_dict` reads.
+    Without them, the command makes an output-error fit with covariance; the defaults are the form of Table 6.
+    Differential pressure is not used, so its absence costs nothing. Nothing is random, so the seed changes nothing.
+    `--out library.json` writes one entry per log at full precision; `LinearModel.from_dict` reads it.
     """
     from estimation.identification.from_record import identify_record, record_signals
     from plant.errors import NoChannelError

@@ -81,7 +81,7 @@ def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path
     from estimation.identification.state_space.identify import STATE_SPACE
 
     if not asked.inputs or not asked.outputs:
-        raise HydrostateError("--input and --output are wanted together, a column each at least")
+        raise HydrostateError("--input and --output go together and need at least one column each")
     if twice := set(asked.inputs) & set(asked.outputs):
         raise HydrostateError(f"--input and --output must be different channels, got {min(twice)!r} for both")
     require_known("--structure", asked.structure, (*FREE_STRUCTURES, STATE_SPACE))
@@ -330,8 +330,8 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
             )
             yield f"{result['output']}: {bend['kind'].replace('-', ' ')} at {result['input']}, {values}"
     yield (
-        f"From {', '.join(results[0]['inputs'])}. Fits are of free runs: on the logs fitted, on blocks held back "
-        "from a fit to the others, and on --validate; one step ahead, models and candidates are in --json and --out."
+        f"From {', '.join(results[0]['inputs'])}. Fits are of free runs: on the fitted logs, on blocks held back from "
+        f"the fit, and on --validate. One-step fits, models and candidates are in --json and --out."
     )
 
 

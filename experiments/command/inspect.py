@@ -35,23 +35,22 @@ def inspect(
         list[Path],
         argument(
             "FILE",
-            "Logs in any format that is read: text with any delimiter, Parquet, Feather, MAT; with "
-            "hydrostate[bench] XLSX, TDMS, MDF, HDF5.",
+            "Logs: text with any delimiter, Parquet, Feather, MAT; with hydrostate[bench] XLSX, TDMS, MDF, HDF5.",
         ),
     ],
-    html: Annotated[Path | None, option("HTML", "Also draw every column, on a page.")] = None,
-    write: Annotated[Path | None, option("FILE", "Write a new rig file with the block of columns.")] = None,
+    html: Annotated[Path | None, option("HTML", "Also write a page with a drawing of every column.")] = None,
+    write: Annotated[Path | None, option("FILE", "Write a new rig file that names the columns.")] = None,
     beside: Beside = None,
     sample_time: SampleTime = None,
     plant: Plant = None,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Show what a log holds: columns with unit, range and gaps, its clock, and which column may be which channel.
+    """Show what a log contains: columns with unit, range and gaps, the clock, and the likely channel of each column.
 
-    Names, units and physics are asked: time increases, the slope of position is velocity, pressure goes with the
-    motion. Each guess has a probability and its reasons. The block at the end goes into a rig file; the option does the
-    same for one call. A unit that is guessed is for you to check.
+    The guess uses names, units and physics: time increases, the slope of position is velocity, pressure follows the
+    motion. Each guess has a probability and reasons. Copy the block at the end into a rig file (or use --write), or add
+    the printed options to one command. Check every unit that is marked as guessed.
     """
     kind, rig = load_actuator(plant, None)
 
@@ -146,10 +145,10 @@ def _reads(
         with caught() as said:
             record = read_log(log, {}, columns, kind.required, sample_time=sample_time, beside=beside)
     except HydrostateError as error:
-        return {"reads": False, "message": f"with these columns it is not read: {error.message}"}
+        return {"reads": False, "message": f"with these columns the log cannot be read: {error.message}"}
     notes = "; ".join(dict.fromkeys(str(one.note) for one in said))
     about = f"{record.duration:g} s at {1.0 / record.sample_time:g} Hz, {', '.join(record)}"
-    return {"reads": True, "message": f"with these columns it reads: {about}" + (f"; {notes}" if notes else "")}
+    return {"reads": True, "message": f"with these columns the log reads: {about}" + (f"; {notes}" if notes else "")}
 
 
 def _entries(
@@ -235,11 +234,13 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
             yield _clock_sentence(one)
         yield ""
         yield (
-            visible(block_of(result["columns"])) if result["columns"] else "no column is recognised; name them yourself"
+            visible(block_of(result["columns"]))
+            if result["columns"]
+            else "no column was recognised; name the columns yourself"
         )
         yield ""
         if result["options"]:
-            yield visible(f"or for one call: {result['options']}")
+            yield visible(f"or add to one command: {result['options']}")
         yield visible(str(result["message"]))
 
 

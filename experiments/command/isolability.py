@@ -23,23 +23,23 @@ commands = typer.Typer()
 @commands.command(epilog="Example: hydrostate isolability --sensors position,velocity --drive prbs --seconds 10")
 def isolability(
     sensors: Annotated[
-        str, option("LIST", "Sensors beside motor speed, by commas: position, velocity, dp.")
+        str, option("LIST", "Sensors besides motor speed, comma-separated: position, velocity, dp.")
     ] = "position,velocity,dp",
     noise: Noise = "bench",
     drive: Drive = "steps",
     seconds: Annotated[float, option("S", "Length of the experiment [s].")] = 10.0,
-    rate: Annotated[float, option("HZ", "Samples a second [Hz].")] = 1000.0,
+    rate: Annotated[float, option("HZ", "Sample rate [Hz].")] = 1000.0,
     ranked: Ranked = False,
     rig: RigFile = None,
     out: Out = None,
     seed: Seed = SEED,
     as_json: Json = False,
 ) -> None:
-    """Say which faults an experiment could tell apart, before it is made.
+    """Predict which faults an experiment can tell apart, before you run it.
 
-    By structure: which faults break the same balances for these sensors, whatever their course. By Kullback-Leibler
-    distance a second between the nine conditions under the drive, each a class of actuators. The seed is that of random
-    drives.
+    The first table is structural: which faults break the same balances for these sensors, whatever their time course.
+    The second is the Kullback-Leibler distance per second between the nine conditions under the drive, where each
+    condition is a class of actuators. The seed is that of random drives.
     """
     options = {"sensors": sensors, "noise": noise, "drive": drive, "seconds": seconds, "rate": rate, "ranked": ranked}
     channels = checked_experiment(options)
@@ -99,14 +99,14 @@ def _verdict(distances: "Distances") -> str:
     if not alike:
         return f"all conditions can be told apart; the hardest pair is {first} and {second}"
     return (
-        f"{alike} of {len(apart)} pairs cannot be told apart with fewer than {100.0 * ERROR:g} % wrong, "
-        f"{first} and {second} least of all"
+        f"{alike} of {len(apart)} pairs of conditions cannot be told apart with fewer than {100.0 * ERROR:g} % wrong "
+        f"verdicts; the hardest pair is {first} and {second}"
     )
 
 
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     for result in results:
-        structure = table("fault", "cannot be told from, whatever its course", title=title_of(result, "structure"))
+        structure = table("fault", "cannot be told from, whatever its time course", title=title_of(result, "structure"))
         for fault, rivals in result["not_told_from"].items():
             structure.add_row(fault, "not detectable" if rivals is None else ", ".join(rivals) or "told from all")
         yield structure

@@ -35,55 +35,61 @@ Logs: TypeAlias = Annotated[
     argument(
         "LOG",
         "Logs: CSV, Parquet or MAT, with time_s, motor_speed_rad_s, and position_m or velocity_m_s; "
-        "differential_pressure_pa is optional. Another unit stands in the name (position_mm, motor_speed_rpm). "
-        "`hydrostate inspect` shows what any other file holds, and names its columns.",
+        "differential_pressure_pa is optional. A name may carry another unit (position_mm, motor_speed_rpm). "
+        "For other names or formats, start with `hydrostate inspect`.",
     ),
 ]
 Json: TypeAlias = Annotated[
-    bool, flag("--json", "Print one JSON document, a list with one object a log; notes go to stderr.")
+    bool, flag("--json", "Print one JSON document, a list with one object per log; notes go to stderr.")
 ]
 Out: TypeAlias = Annotated[
     Path | None,
     option(
         "DIR",
-        "Also write results.json and results.csv into this folder; a name ending in .json is one file.",
+        "Also write results.json and results.csv into this folder; with a name that ends in .json, that file alone.",
         "--out",
         "-o",
     ),
 ]
-Seed: TypeAlias = Annotated[int, option("INT", "Seed of all that is random; kept in the results.", min=0)]
+Seed: TypeAlias = Annotated[int, option("INT", "Seed of the random numbers; stored in the results.", min=0)]
 RigFile: TypeAlias = Annotated[
     Path | None,
     option(
         "FILE",
-        "Rig file (TOML): parameters in SI, and what the logs call their columns; see `hydrostate rig init`. "
-        "Without it, the paper's actuator.",
+        "Rig file (TOML): parameters of your actuator in SI, and the names of the columns; `hydrostate rig init` "
+        "writes one. Without it, the paper's actuator is assumed.",
     ),
 ]
 Columns: TypeAlias = Annotated[
     list[str] | None,
     option(
         "CHANNEL=NAME:UNIT",
-        "A column under another name, with its unit if it is not SI: position_m=POS_MM:mm. Repeat it, or "
+        "The name of a channel's column, with its unit if it is not SI: position_m=POS_MM:mm. Repeat the option, or "
         "separate several by commas.",
     ),
 ]
-SampleTime: TypeAlias = Annotated[float | None, option("S", "Time between rows [s] of a log that has no time.")]
+SampleTime: TypeAlias = Annotated[float | None, option("S", "Time between rows [s], for a log without a time column.")]
 Beside: TypeAlias = Annotated[
     list[Path] | None,
-    option("FILE", "Another logger's file of the same test; both are put on one clock. Repeat it for more.", "--with"),
+    option(
+        "FILE",
+        "A second logger's file of the same test, to be merged with the log. Repeat the option for more.",
+        "--with",
+    ),
 ]
-ConditionName: TypeAlias = Annotated[str | None, option("NAME", "A condition by name, see `hydrostate conditions`.")]
+ConditionName: TypeAlias = Annotated[
+    str | None, option("NAME", "Name of a condition; `hydrostate conditions` lists them.")
+]
 
 Plant: TypeAlias = Annotated[
     str | None,
     option(
         "PLANT",
-        "The actuator's kind: eha, the gear-pump actuator; piezo-stack, with drive_voltage_v and what is measured "
-        "of stack_displacement_m, stack_force_n, position_m, chamber_pressure_pa, from rest on; diaphragm-motor, with "
-        "drive_voltage_v, a steady sine, electrode_1_v to electrode_7_v and position_m. Options that name a plant "
-        "apply to it alone.",
-        show_default="that of the rig file, else eha",
+        "Kind of actuator: eha (gear pump); piezo-stack (logs start at rest, with drive_voltage_v and any of "
+        "stack_displacement_m, stack_force_n, position_m, chamber_pressure_pa); diaphragm-motor (logs under a steady "
+        "sine, with drive_voltage_v, electrode_1_v to electrode_7_v, position_m). Options that name a plant work for "
+        "that plant only.",
+        show_default="as in the rig file, else eha",
     ),
 ]
 BiasPressure: TypeAlias = Annotated[
@@ -101,7 +107,7 @@ Frequency: TypeAlias = Annotated[
     float | None,
     option(
         "HZ",
-        "piezo-stack: frequency, up to 450 Hz; diaphragm-motor: up to 1000 Hz.",
+        "piezo-stack: drive frequency, up to 450 Hz; diaphragm-motor: up to 1000 Hz.",
         show_default="275, diaphragm-motor 480",
     ),
 ]
@@ -109,16 +115,16 @@ Voltage: TypeAlias = Annotated[
     float | None,
     option(
         "V",
-        "piezo-stack: peak to peak, on half of it as bias; diaphragm-motor: peak to peak, up to 300 V.",
+        "piezo-stack: peak-to-peak voltage, with half of it as bias; diaphragm-motor: peak to peak, up to 300 V.",
         show_default="140, diaphragm-motor 200",
     ),
 ]
 Healthy: TypeAlias = Annotated[
-    Path | None, option("LOG", "piezo-stack, diaphragm-motor: a run of the healthy actuator to calibrate on.")
+    Path | None, option("LOG", "piezo-stack, diaphragm-motor: a log of the healthy actuator, to calibrate on.")
 ]
-Noise: TypeAlias = Annotated[str, option("NOISE", "Noise of the sensors: bench, rig or paper.")]
+Noise: TypeAlias = Annotated[str, option("NOISE", "Sensor noise: bench, rig or paper.")]
 Drive: TypeAlias = Annotated[str, option("DRIVE", "Drive: sine, prbs, steps, chirp or multisine, at the paper's 4 V.")]
-Ranked: TypeAlias = Annotated[bool, flag("--rank", "Rank all drives, the one that tells most first.")]
+Ranked: TypeAlias = Annotated[bool, flag("--rank", "Rank all drives, the most informative first.")]
 
 PRESSURE = "differential_pressure_pa"
 """The channel that is optional everywhere."""

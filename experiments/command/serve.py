@@ -20,22 +20,22 @@ commands = typer.Typer()
 
 @commands.command(epilog="Example: hydrostate serve bench-7 --watch press=tcp://192.168.0.7:9000")
 def serve(
-    folder: Annotated[Path, argument("FOLDER", "Where everything is kept; it goes on from there.")] = FOLDER,
-    host: Annotated[str, option("HOST", "Where it listens; any other than this machine's own wants a token.")] = (
+    folder: Annotated[Path, argument("FOLDER", "Folder that keeps everything; the server continues from it.")] = FOLDER,
+    host: Annotated[str, option("HOST", "Address to listen on; any but this machine's own needs a token.")] = (
         "127.0.0.1"
     ),
-    port: Annotated[int, option("PORT", "The port; 0 takes a free one.", min=0, max=65535)] = 8765,
+    port: Annotated[int, option("PORT", "Port; 0 takes a free one.", min=0, max=65535)] = 8765,
     token: Annotated[
         str | None,
-        option("TEXT", "What clients must show; made up where one is wanted.", envvar="HYDROSTATE_TOKEN"),
+        option("TEXT", "Token that clients must send; generated if one is needed.", envvar="HYDROSTATE_TOKEN"),
     ] = None,
     watch: Annotated[
         list[str] | None,
         option("NAME=ADDRESS", "A stream to watch, such as press=tcp://HOST:PORT. Repeat it for more."),
     ] = None,
-    false_alarms: Annotated[float, option("RATE", "False alarms an hour of each stream [1/h].")] = 1.0,
+    false_alarms: Annotated[float, option("RATE", "False alarms allowed per hour, for each stream [1/h].")] = 1.0,
     pattern: Annotated[
-        str | None, option("PATTERN", "How logs are named, such as '{actuator}_{date}.csv', for the fleet.")
+        str | None, option("PATTERN", "How logs are named, for the fleet, such as '{actuator}_{date}.csv'.")
     ] = None,
     limit: Annotated[
         list[str] | None, option("NAME=VALUE", "Limit of a severity in its unit, such as leakage_flow=2.")
@@ -43,17 +43,17 @@ def serve(
     plant: Plant = None,
     rig: RigFile = None,
     columns: Columns = None,
-    workers: Annotated[int, option("N", "Logs that are worked on at once.", min=1, max=256)] = 1,
-    seconds: Annotated[float, option("S", "Longest work on a log [s].", min=1.0)] = 300.0,
-    memory: Annotated[int, option("MB", "Most memory for the work on a log [MB].", min=512)] = 3072,
-    largest: Annotated[int, option("MB", "Largest log that is taken [MB].", min=1)] = 256,
-    room: Annotated[int, option("MB", "Most that the folder may take [MB].", min=1)] = 10240,
+    workers: Annotated[int, option("N", "Number of logs to work on at once.", min=1, max=256)] = 1,
+    seconds: Annotated[float, option("S", "Longest time for one log [s].", min=1.0)] = 300.0,
+    memory: Annotated[int, option("MB", "Largest memory for one log [MB].", min=512)] = 3072,
+    largest: Annotated[int, option("MB", "Largest log that is accepted [MB].", min=1)] = 256,
+    room: Annotated[int, option("MB", "Largest size of the folder [MB].", min=1)] = 10240,
 ) -> None:
-    """Serve a page on which logs are dropped, the page of each, the fleet, comparisons and live streams.
+    """Serve web pages: drop logs, read the page of each, see the fleet, compare logs, watch live streams.
 
-    The work on a log is done in a process of its own, which is ended when it takes too long or too much memory. What is
-    finished is kept in FOLDER and outlives any end of the server. Programs ask by HTTP: /openapi.json says how. This
-    verb needs `pip install 'hydrostate[serve]'`.
+    Each log runs in its own process, which is ended if it takes too long or too much memory. Finished results stay in
+    FOLDER, however the server ends. Programs use HTTP; /openapi.json describes it. This verb needs
+    `pip install 'hydrostate[serve]'`.
     """
     try:
         from experiments.serve.server import run_server

@@ -56,10 +56,11 @@ def simulate(
     ] = None,
     condition: ConditionName = None,
     leakage_severity: Annotated[
-        float | None, option("NUMBER", "In place of a condition: 0 none, 1 minor, 2 major, up to 5 [dimensionless].")
+        float | None,
+        option("NUMBER", "Leakage instead of a condition: 0 none, 1 minor, 2 major, up to 5 [dimensionless]."),
     ] = None,
-    friction_severity: Annotated[float | None, option("NUMBER", "Likewise, of friction [dimensionless].")] = None,
-    drive: Annotated[str, option("DRIVE", "sine, prbs, steps, chirp or multisine, of 4 V or up to it.")] = "steps",
+    friction_severity: Annotated[float | None, option("NUMBER", "Friction, likewise [dimensionless].")] = None,
+    drive: Annotated[str, option("DRIVE", "sine, prbs, steps, chirp or multisine, of at most 4 V.")] = "steps",
     duration: Annotated[
         float | None, option("S", "Length of the run [s].", show_default="10, piezo-stack 0.16, diaphragm-motor 0.2")
     ] = None,
@@ -78,24 +79,29 @@ def simulate(
     load: Load = None,
     fault: Annotated[
         str | None,
-        option("NAME", "piezo-stack: a condition, or such as air_doubled; diaphragm-motor: such as valve_4_leak=0.1."),
+        option(
+            "NAME",
+            "piezo-stack: a condition, or for example air_doubled; diaphragm-motor: for example valve_4_leak=0.1.",
+        ),
     ] = None,
     fmu: Annotated[
         Path | None,
         option(
-            "FILE", "In place of a plant of ours: another tool's FMU for co-simulation, with a binary for this machine."
+            "FILE",
+            "Simulate another tool's co-simulation FMU instead of a plant of ours; it needs a binary for this machine.",
         ),
     ] = None,
     columns: Columns = None,
     parameter: Annotated[
-        list[str] | None, option("NAME=VALUE", "Start value of one of the FMU's variables, in its own unit. Repeat it.")
+        list[str] | None, option("NAME=VALUE", "Start value of an FMU variable, in its own unit. Repeat the option.")
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Simulate a run and write it as a log in SI, with what made it: parameters, condition, seed, versions.
+    """Simulate a run and write it as a log in SI, together with its parameters, condition, seed and versions.
 
-    Columns have the project's own names, whatever the rig calls its logs' columns. Of an FMU, --columns names the
-    variables; a condition sets those of its parameters' names. An FMU is a program: run none that you do not trust.
+    The columns have Hydrostate's own names, also if the rig file names others. For an FMU, --columns names the
+    variables, and a condition sets the variables that are named like its parameters. An FMU is a program: do not run
+    one that you do not trust.
     """
     from experiments.actuators import offered
     from plant.log.files import write_record

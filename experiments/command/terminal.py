@@ -245,7 +245,7 @@ def unexpected(error: BaseException) -> str:
         return "the work on it needs more memory than there is"
     said = " ".join(str(error).split())[:200]
     what = type(error).__name__ + (f": {said}" if said else "")
-    return f"an internal error ({what}), please report it; HYDROSTATE_DEBUG=1 shows where it arose"
+    return f"an internal error ({what}), please report it; HYDROSTATE_DEBUG=1 prints the traceback"
 
 
 def guarded(run: Callable[[], object]) -> int:

@@ -51,36 +51,39 @@ def watch(
     false_alarms: Annotated[
         float, option("RATE", "False alarms allowed per hour of healthy, moving operation [1/h].")
     ] = 1.0,
-    learning: Annotated[float, option("S", "Healthy running to learn from before any alarm [s]; at least 60.")] = 120.0,
+    learning: Annotated[
+        float, option("S", "Time of healthy running to learn from before the first alarm [s]; at least 60.")
+    ] = 120.0,
     healthy: Annotated[
-        Path | None, option("FILE", "A healthy log to learn from first; an hour keeps false alarms closest to RATE.")
+        Path | None,
+        option("FILE", "A healthy log to learn from first; one hour of log keeps false alarms closest to RATE."),
     ] = None,
     rig: RigFile = None,
     columns: Columns = None,
-    no_pressure: Annotated[
-        bool, flag("--no-pressure", "Use motion alone, even if differential pressure is logged.")
-    ] = False,
+    no_pressure: Annotated[bool, flag("--no-pressure", "Ignore differential pressure even if it is logged.")] = False,
     heartbeat: Annotated[
-        float | None, option("S", "Also report every S seconds that the watch is alive, whether rows come or not.")
+        float | None, option("S", "Also report every S seconds that the command is running, whether rows come or not.")
     ] = None,
     state: Annotated[
-        Path | None, option("FILE", "Keep what was learnt in this file, and go on from it after a restart.")
+        Path | None, option("FILE", "Save what was learnt in this file, and continue from it after a restart.")
     ] = None,
     publish: Annotated[
-        str | None, option("mqtt://HOST[:PORT]/TOPIC", "Also publish every event at an MQTT broker.")
+        str | None, option("mqtt://HOST[:PORT]/TOPIC", "Also publish every event to an MQTT broker.")
     ] = None,
     metrics: Annotated[
         str | None,
-        option("[HOST:]PORT", "Also answer Prometheus at /metrics; on this machine alone unless a host is named."),
+        option(
+            "[HOST:]PORT", "Also serve Prometheus metrics at /metrics; on this machine only, unless a host is named."
+        ),
     ] = None,
     view: Annotated[bool, flag("--view", "Also draw gauges and the last events on standard error.")] = False,
 ) -> None:
-    """Say when something changes inside the actuator: one JSON object a line, as it happens.
+    """Report a change inside the actuator as it happens: one JSON object per line.
 
-    Events: start; ready, learning is over; alarm, with since_s and its 95 % interval; change, two seconds later, by how
-    much lost flow and pressure changed; alive, if --heartbeat asks for it; end. Each has the time of the stream and the
-    clock's (UTC). It learns how the healthy actuator behaves and follows slow drift, such as warming oil, so it
-    reports sudden changes only; use diagnose for a fault that was there from the start.
+    Events: start; ready (learning is over); alarm, with since_s and its 95 % interval; change (two seconds later: how
+    much lost flow and pressure changed); alive (with --heartbeat); end. Each has the time of the stream and the clock's
+    time (UTC). The command learns how the healthy actuator behaves and follows slow drift, such as warming oil, so it
+    reports sudden changes only. Use diagnose for a fault that was there from the start.
     """
     require_positive("--heartbeat", heartbeat, "s")
     told = Watched(STANDARD_INPUT if log == "-" else log)

@@ -12,9 +12,9 @@ commands = typer.Typer()
 
 @commands.command("diaphragm-motor", epilog="Example: hydrostate diaphragm-motor --out results/diaphragm-motor")
 def diaphragm_motor(out: Folder = Path("results/diaphragm-motor"), seed: Seed = SEED, as_json: Json = False) -> None:
-    """Repeat sections 7.1 to 7.3 of the seven-chamber diaphragm motor's paper; reversal, control, and what fails.
+    """Repeat sections 7.1 to 7.3 of the paper on the seven-chamber diaphragm motor: reversal, control, and what fails.
 
-    Takes some ten seconds. The last line of standard output is the manifest's path.
+    Takes about ten seconds. The last line of standard output is the path of the manifest.
     """
     from experiments.diaphragm_motor.study import DIAPHRAGM_MOTOR
     from experiments.running.study import Seeded

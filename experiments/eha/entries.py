@@ -166,9 +166,9 @@ def _estimate_message(found: "Finding") -> str:
     said = [f"bulk modulus {1e-6 * modulus.value:.2f} MPa, 95 % interval {low:.2f} to {high:.2f} MPa"]
     if modulus.ci95_total is not None:
         low, high = (1e-6 * end for end in modulus.ci95_total)
-        said[0] += f", {low:.0f} to {high:.0f} MPa with what is not known of the rig"
+        said[0] += f", {low:.0f} to {high:.0f} MPa with rig error"
     if not found.gate.passed:
-        said.append(f"not to be relied on: {clauses(str(note) for note in found.gate.reasons)}")
+        said.append(f"do not rely on it: {clauses(str(note) for note in found.gate.reasons)}")
     return clauses(said)
 
 

@@ -94,7 +94,7 @@ def sureness(result: Mapping[str, Any]) -> str:
         reasons = "; ".join(result["reasons"])
         if _outside(result):
             return f"This is none of the nine conditions, so do not rely on the numbers below: {reasons}."
-        return f"Nothing on this page may be relied on: {reasons}."
+        return f"Do not rely on anything on this page: {reasons}."
     return " ".join(one for one in (_how_sure(result), _cost(result), _since(result)) if one)
 
 
@@ -110,17 +110,16 @@ def _cost(result: Mapping[str, Any]) -> str:
     lost = result["severity"].get("velocity_lost", {"value": None})["value"]
     if result["condition"] == "normal" or lost is None or not math.isfinite(lost) or lost < 1.0:
         return ""
-    return f"It is {lost:.0f} % slower than a healthy one at rated speed."
+    return f"The actuator is {lost:.0f} % slower than a healthy one at rated speed."
 
 
 def _since(result: Mapping[str, Any]) -> str:
     if result["since_s"] is not None:
         low, high = result["since_ci95_s"]
         before = result["condition_before"].replace("_", " ")
-        return (
-            f"It has been so since {result['since_s']:.2f} s into the log ({low:.2f} to {high:.2f} s): {before} before."
-        )
-    return "" if result["condition"] == "normal" else "It was so before the log began."
+        since = f"{result['since_s']:.2f} s into the log ({low:.2f} to {high:.2f} s)"
+        return f"The change came {since}; before, it was {before}."
+    return "" if result["condition"] == "normal" else "The fault was there before the log began."
 
 
 def what_to_do(result: Mapping[str, Any]) -> list[str]:

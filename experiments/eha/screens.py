@@ -31,7 +31,7 @@ def estimates_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
         As given to the verb; none matters here.
     """
     del options
-    shown = table("log", "bulk modulus [MPa]", "95 % interval [MPa]", "with the rig's [MPa]", "bound [%]", "verdict")
+    shown = table("log", "bulk modulus [MPa]", "95 % interval [MPa]", "with rig error [MPa]", "bound [%]", "verdict")
     for name, result in zip(short_names(results), results, strict=True):
         shown.add_row(name, *_cells(result))
     yield shown
@@ -39,7 +39,7 @@ def estimates_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
     if len(results) <= MOST_MESSAGES:
         yield from (f"{result['file']}: {result['message']}" for result in doubtful)
     elif doubtful:
-        yield f"{len(doubtful)} of {len(results)} logs gave nothing to be relied on; --json and --out give the reasons"
+        yield f"{len(doubtful)} of {len(results)} logs gave no reliable value; --json and --out give the reasons"
     yield from costs(results)
 
 
@@ -83,7 +83,7 @@ def diagnoses_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
 
 
 def _summary(results: Sequence[Result]) -> "RenderableType":
-    shown = table("log", "condition", "probability [%]", "runner-up", "error of runner-up / best", "believe")
+    shown = table("log", "condition", "probability [%]", "runner-up", "error of runner-up / best", "reliable")
     for name, result in zip(short_names(results), results, strict=True):
         margin, shares = result["margin"], result["probabilities"]
         words = "-" if margin is None or result["condition"] is None else f"{margin:.2f}, {margin_word(margin)}"

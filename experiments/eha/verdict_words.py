@@ -23,7 +23,7 @@ MARGINS = ((1.05, "too close to call"), (1.25, "narrow"), (2.0, "clear"), (math.
 MOST_DECIMALS = 4
 """Decimals that a severity is given at most [count]."""
 
-NEAREST = "UNKNOWN, in none of the nine conditions; the nearest: "
+NEAREST = "UNKNOWN: none of the nine conditions fits; the nearest is "
 """How a verdict begins that something speaks against."""
 
 
@@ -41,7 +41,7 @@ def verdict_lines(result: Mapping[str, Any]) -> list[str]:
         f"{result['file']}: {headline(result)}",
         f"  leakage   {amounts(result, ('leakage_flow', 'velocity_lost'))}",
         f"  friction  {amounts(result, ('added_friction', 'pressure_rise', 'bulk_modulus'))}",
-        f"  believe   {believed(result)}",
+        f"  reliable  {believed(result)}",
         f"  next      {next_step(result)}",
         *([f"  {library}"] if library else []),
     ]
@@ -82,7 +82,7 @@ def since(result: Mapping[str, Any]) -> str:
     if result["since_s"] is not None:
         low, high = result["since_ci95_s"]
         before = _said(result["condition_before"])
-        return f"since {result['since_s']:.2f} s ({low:.2f} to {high:.2f}), {before} until then"
+        return f"since {result['since_s']:.2f} s ({low:.2f} to {high:.2f} s), {before} before"
     return "" if result["condition"] == "normal" else "since before the log began"
 
 
@@ -110,7 +110,7 @@ def amount(one: Mapping[str, Any]) -> str:
     >>> amount({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8]})
     '207.0 MPa (205.0 to 209.0)'
     >>> amount({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8], "ci95_total": [1.5e8, 2.8e8]})
-    '207.0 MPa (205.0 to 209.0; with the rig 150 to 280)'
+    '207.0 MPa (205.0 to 209.0; with rig error 150 to 280)'
     >>> amount({"value": -0.01, "unit": "N", "ci95": [-3.0, 4.0]})
     '0.0 N (-3.0 to 4.0)'
     >>> amount({"value": 1e-7, "unit": "%", "ci95": [0.0, 2e-7]})
@@ -125,7 +125,7 @@ def amount(one: Mapping[str, Any]) -> str:
     said = _interval(low, high)
     total = one.get("ci95_total", [None])
     if None not in total and (wider := _interval(*(scale * end for end in total))) != said:
-        said += f"; with the rig {wider}"
+        said += f"; with rig error {wider}"
     return f"{value:z.{_decimals(low, high)}f} {unit} ({said})"
 
 
@@ -143,7 +143,7 @@ def believed(result: Mapping[str, Any]) -> str:
     """Return whether the verdict may be believed."""
     if result["unknown"]:
         return "no: " + "; ".join(result["reasons"])
-    return "; ".join(["yes: a circuit in one of the nine conditions follows the log", *result["not_told"]])
+    return "; ".join(["yes: a circuit in one of the nine conditions reproduces the log", *result["not_told"]])
 
 
 def next_step(result: Mapping[str, Any]) -> str:
@@ -183,7 +183,7 @@ leakage, has 1.90 mm/s.'
         )
     return (
         f"The library of transfer functions names {in_words(first)} instead: its error in velocity is {shown[first]}, "
-        f"that of {in_words(ours)} {shown[ours]}. The verdict above does not count it."
+        f"that of {in_words(ours)} is {shown[ours]}. The verdict above does not use it."
     )
 
 

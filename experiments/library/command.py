@@ -21,12 +21,12 @@ commands = typer.Typer()
 
 @commands.command(epilog="Example: hydrostate library --out results/library --seed 2024")
 def library(
-    file: Annotated[Path | None, argument("FILE", "A library to show; the one that ships unless given.")] = None,
-    out: Annotated[Path | None, option("DIR", "Build it anew, into this folder.", "--out", "-o")] = None,
+    file: Annotated[Path | None, argument("FILE", "Library to show; by default the one that ships.")] = None,
+    out: Annotated[Path | None, option("DIR", "Build a new library into this folder.", "--out", "-o")] = None,
     seed: Seed = SEED,
     as_json: Json = False,
 ) -> None:
-    """Show the library of nine transfer functions beside Table 6, or build it anew with its report.
+    """Show the library of nine transfer functions next to Table 6, or build a new one with its report.
 
     From motor speed [rad/s] to velocity [m/s] at 1 ms, one a condition, identified on the circuit plant. With `--out`
     the folder gets `library.json`, and a report that compares ARX, ARMAX, output error and Box-Jenkins on all nine,

@@ -24,7 +24,7 @@ COLUMNS = {
         "quantity",
         "value",
         Column("interval", "95 % interval"),
-        Column("total", "with what is not known of the rig"),
+        Column("total", "with rig error"),
         "unit",
     ),
     "probabilities": ("condition", Column("percent", "probability", "%")),

@@ -18,9 +18,9 @@ def study(
     quick: Annotated[bool, flag("--quick", "A smaller study, in under 20 s once kernels are compiled.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Simulate, estimate, identify and diagnose the nine conditions; write a report beside the published results.
+    """Simulate, estimate, identify and diagnose the nine conditions; report the results next to the published ones.
 
-    The last line of standard output is the report's path.
+    The last line of standard output is the path of the report.
     """
     from experiments.nine_conditions.settings import StudySettings, quick_settings
     from experiments.nine_conditions.study import NINE_CONDITIONS

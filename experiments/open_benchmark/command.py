@@ -18,14 +18,16 @@ def make(
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="DIR", help="A folder of each kind goes below it.")
     ] = Path("open-benchmark"),
-    kind: Annotated[list[str] | None, option("KIND", "A kind, may be given several times.", show_default="all")] = None,
+    kind: Annotated[
+        list[str] | None, option("KIND", "Kind of log. Repeat the option for more.", show_default="all")
+    ] = None,
     split: Annotated[str, option("SPLIT", "training, validation or test.")] = "test",
     count: Annotated[int, option("N", "Logs of each kind.")] = 10,
     as_json: Json = False,
 ) -> None:
     """Write logs with truth.csv, and a rig file where the actuator is not the paper's; same options, same bits.
 
-    Physics, sensors and loggers share no model with what estimates and diagnoses here.
+    The simulator shares no model of physics, sensors or loggers with the methods that estimate and diagnose here.
     """
     from experiments.open_benchmark.folders import write_set
     from experiments.open_benchmark.kinds import KINDS, VERSION
@@ -37,7 +39,7 @@ def make(
 
 @commands.command(epilog="Example: hydrostate benchmark kinds")
 def kinds(as_json: Json = False) -> None:
-    """List the kinds of log: what is strange in each, and which verdicts are right."""
+    """List the kinds of log: what is unusual in each, and which verdicts are right."""
     from experiments.open_benchmark.kinds import KINDS
 
     if as_json:
@@ -55,9 +57,9 @@ def baselines(
     test: Annotated[int, option("N", "Logs of each kind to judge.")] = 18,
     as_json: Json = False,
 ) -> None:
-    """Judge ways to name a condition beside `diagnose`: RMSE as published, learners on features and random kernels.
+    """Score other classifiers next to `diagnose`: RMSE as published, learners on features, random kernels.
 
-    Takes some ten minutes. The last line of standard output is the manifest's path.
+    Takes about ten minutes. The last line of standard output is the path of the manifest.
     """
     require_positive("--training", training, "logs")
     require_positive("--test", test, "logs")

@@ -18,10 +18,10 @@ def papers(
     quick: Annotated[bool, flag("--quick", "The same rows from fewer first guesses and shorter runs.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Put every table, figure and claim of the three papers beside ours, with a verdict that one rule gives.
+    """Compare every table, figure and claim of the three papers with our results; one rule gives every verdict.
 
-    The studies behind the rows are kept in a folder beside the page, named as it with `-parts` behind. An interrupted
-    run goes on where it stopped. Takes some minutes; the last line of standard output is the page's path.
+    The studies behind the rows are kept in a folder beside the page, whose name ends in `-parts`. An interrupted run
+    continues where it stopped. Takes a few minutes; the last line of standard output is the path of the page.
     """
     from experiments.papers.parts import PapersSettings, quick_papers
     from experiments.papers.study import papers_study

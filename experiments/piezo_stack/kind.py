@@ -51,7 +51,7 @@ OF_THE_RUN = {"bias_pressure": None, "load": None}
 class StackRunCode(Code):
     """Notes on a simulated run."""
 
-    END_STOP_REACHED = "the rod reaches its end stop within {duration_s:g} s: the flow is that of a rod that stands"
+    END_STOP_REACHED = "the rod reaches its end stop within {duration_s:g} s: the flow is then that of a rod at rest"
 
 
 def _simulated(rig: Rig[Any], options: Options) -> Run:

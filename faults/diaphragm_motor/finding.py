@@ -16,13 +16,13 @@ STANDING = 1e-4
 class MotorFaultCode(Code):
     """Notes on a diagnosis of the diaphragm motor."""
 
-    NO_FAULT_FITS = "unknown: no fault of the catalogue looks like this"
+    NO_FAULT_FITS = "unknown: no fault of the catalogue matches this run"
     NEAREST_MISSES = (
-        "the nearest, {fault}, leaves a chi-square of {chi_square:.3g} for {freedom} degrees of freedom: another motor "
-        "or load, or several faults; calibrate on a healthy run"
+        "the nearest fault, {fault}, leaves a chi-square of {chi_square:.3g} for {freedom} degrees of freedom: another "
+        "motor or load, or several faults; calibrate on a healthy run"
     )
-    ROD_STANDS = "the rod moves at {velocity_mm_s:.2g} mm/s: stalled, or at its end"
-    LOOKS_LIKE = "by the electrodes' fundamentals alone it looks like {faults} too"
+    ROD_STANDS = "the rod moves at {velocity_mm_s:.2g} mm/s: it is stalled, or at its end stop"
+    LOOKS_LIKE = "from the electrodes' fundamentals alone, it could also be {faults}"
     FAULT_FOUND = "{fault}: {meaning}: {severity:.3g}{unit}, 95 % interval {low:.3g} to {high:.3g}{unit}"
 
 

@@ -38,14 +38,15 @@ class StackFaultCode(Code):
     """Notes on a diagnosis of the piezo-stack actuator."""
 
     ANOTHER_ACTUATOR = (
-        "{channel} is missed by {ratio:.3g} times its noise: this is another actuator, calibrate on a healthy run"
+        "the model misses {channel} by {ratio:.3g} times its noise: this is another actuator; calibrate on a healthy "
+        "run"
     )
-    LEAKAGE_AND_FRICTION = "the sensors hold too little to tell leakage from friction: log the stack's displacement"
+    LEAKAGE_AND_FRICTION = "these sensors cannot separate leakage from friction: log the stack's displacement"
     AIR_IN_OIL = "air in the oil: {percent:.2f} %, {ratio:.3g} times the healthy share"
     CHAMBER_LEAKS = "the pump chamber leaks: {leakage:.2g} m^3/(s Pa)"
     STACK_DEPOLARISED = "the stack is depolarised: {percent:.0f} % of its stroke is lost"
-    REED_SOFT = "{reed} reed soft: {ratio:.3g} times"
-    REED_STIFF = "{reed} reed stiff or jammed: {ratio:.3g} times"
+    REED_SOFT = "{reed} reed soft: {ratio:.3g} times the healthy stiffness"
+    REED_STIFF = "{reed} reed stiff or jammed: {ratio:.3g} times the healthy stiffness"
     REED_OPEN = "{reed} reed does not shut: a gap of {gap_um:.0f} um"
 
 

@@ -63,7 +63,7 @@ def test_help_says_what_the_exit_codes_and_outcomes_mean() -> None:
     for meaning in (
         "0 all done",
         "1 some logs failed",
-        "2 nothing could be done",
+        "2 nothing was done",
         "not_observable",
         "HYDROSTATE_DEBUG",
     ):
@@ -151,7 +151,7 @@ def test_an_internal_error_is_a_sentence_and_a_traceback_on_request_only(monkeyp
     assert quiet.exit_code == 1
     assert quiet.stderr.splitlines() == [
         "hydrostate: an internal error (RuntimeError: the mill is broken), please report it; "
-        "HYDROSTATE_DEBUG=1 shows where it arose"
+        "HYDROSTATE_DEBUG=1 prints the traceback"
     ]
     monkeypatch.setenv("HYDROSTATE_DEBUG", "1")
     assert "Traceback (most recent call last)" in invoke("conditions").stderr

@@ -44,8 +44,8 @@ def test_the_papers_sine_without_pressure_tells_no_bulk_modulus(condition: Condi
     assert card.relative_std["bulk_modulus"] > 0.03  # errata E13
     assert card.stuck > 0.5
     said = " ".join(sentences(card))
-    assert "not observable from this drive and these sensors, worse than 3 %: bulk modulus" in said
-    assert "while it sticks, position and velocity hold nothing about bulk modulus (errata E13): log diff" in said
+    assert "not observable with this drive and these sensors (bound over 3 %): bulk modulus" in said
+    assert "while it sticks, position and velocity say nothing about bulk modulus (errata E13): log diff" in said
 
 
 def test_where_nothing_moves_nothing_is_learnt() -> None:

@@ -23,7 +23,7 @@ def test_the_card_is_printed_with_units_and_sentences() -> None:
     shown = invoke("--sensors", "position,velocity", "--drive", "sine").stdout
     assert "least standard deviation [%]" in shown
     assert "effective bulk modulus beta" in shown
-    assert "not observable from this drive and these sensors" in shown
+    assert "not observable with this drive and these sensors" in shown
     assert "errata E13" in shown
 
 

@@ -97,7 +97,7 @@ def test_a_state_space_is_one_model_of_all_outputs(logs: list[Path], tmp_path: P
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--input", "load"), "--input and --output are wanted together"),
+        (("--input", "load"), "--input and --output go together"),
         (("--input", "lod", "--output", "heat"), "did you mean 'load'?"),
         (("--input", "load", "--output", "load"), "must be different channels"),
         (("--input", "load", "--output", "heat", "--structure", "oe"), "--structure must be one of"),

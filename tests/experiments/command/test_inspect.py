@@ -31,9 +31,9 @@ def strange(tmp_path: Path) -> Path:
 def test_the_terminal_shows_columns_guesses_block_and_option(strange: Path) -> None:
     done = invoke(strange)
     assert done.exit_code == 0
-    for part in ("Kolbenweg [mm]", "[columns]", 'position_m = "Kolbenweg [mm]:mm"', "or for one call: --columns"):
+    for part in ("Kolbenweg [mm]", "[columns]", 'position_m = "Kolbenweg [mm]:mm"', "or add to one command: --columns"):
         assert part in done.stdout
-    assert "with these columns it reads: 2.999 s at 1000 Hz" in done.stdout
+    assert "with these columns the log reads: 2.999 s at 1000 Hz" in done.stdout
 
 
 def test_the_rig_file_that_it_writes_reads_the_log(strange: Path, tmp_path: Path) -> None:

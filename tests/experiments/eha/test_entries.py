@@ -66,7 +66,7 @@ def test_an_estimate_has_the_entries_that_it_promises() -> None:
     low, high = entries["bulk_modulus_pa"]["ci95"]
     least, most = entries["bulk_modulus_pa"]["ci95_total"]
     assert least < low < high < most
-    assert f"{1e-6 * least:.0f} to {1e-6 * most:.0f} MPa with what is not known of the rig" in entries["message"]
+    assert f"{1e-6 * least:.0f} to {1e-6 * most:.0f} MPa with rig error" in entries["message"]
 
 
 def test_notes_are_codes_with_data_that_json_takes() -> None:
@@ -160,7 +160,7 @@ def test_what_an_absent_channel_costs_is_a_note_and_said_once_of_all_logs() -> N
 def test_an_entry_of_the_rig_is_named_once_of_all_logs_that_it_limits() -> None:
     found = [estimate_entries(estimate_log(log(condition), Rig())) for condition in ("normal", "major_leakage")]
     (said,) = costs(found)
-    assert said.startswith("2 of 2 logs: bulk_modulus is known only as well as the rig's chamber_volume, which makes ")
+    assert said.startswith("2 of 2 logs: bulk_modulus is known only as well as the rig's chamber_volume, which causes ")
 
 
 def test_nominal_models_that_miss_a_log_are_named_beside_what_the_circuit_says() -> None:

@@ -43,17 +43,17 @@ def test_what_is_not_certain_is_not_called_certain() -> None:
 
 def test_a_fault_says_what_it_costs_and_since_when() -> None:
     assert "28 % slower" in sureness(said_of("minor_leakage"))
-    assert "It was so before the log began." in sureness(said_of("minor_leakage"))
+    assert "The fault was there before the log began." in sureness(said_of("minor_leakage"))
     changed = said_of("minor_leakage", since_s=2.5, since_ci95_s=[2.4, 2.6], condition_before="normal")
-    assert "since 2.50 s into the log (2.40 to 2.60 s): normal before." in sureness(changed)
+    assert "The change came 2.50 s into the log (2.40 to 2.60 s); before, it was normal." in sureness(changed)
     assert "slower" not in sureness(said_of("normal"))
 
 
 def test_an_unknown_log_gets_no_verdict_no_work_and_its_reasons() -> None:
-    result = said_of("minor_leakage", unknown=True, reasons=["motor speed reads 3 rad/s off"])
+    result = said_of("minor_leakage", unknown=True, reasons=["motor speed has an offset of 3 rad/s"])
     assert verdict(result).startswith("No verdict")
     assert what_to_do(result) == ["Log again."]
-    assert "motor speed reads 3 rad/s off" in sureness(result)
+    assert "motor speed has an offset of 3 rad/s" in sureness(result)
 
 
 def test_a_fault_that_is_none_of_the_nine_is_the_verdict_and_its_numbers_are_doubted() -> None:

@@ -51,7 +51,7 @@ def found_as(
 def test_a_change_within_the_log_is_dated_with_its_interval() -> None:
     found = diagnosis_entries(found_as("minor_leakage", Change(3.21, (3.1, 3.3), "normal")))
     assert (found["since_s"], found["since_ci95_s"], found["condition_before"]) == (3.21, [3.1, 3.3], "normal")
-    assert "since 3.21 s (3.10 to 3.30), normal until then" in headline(found)
+    assert "since 3.21 s (3.10 to 3.30 s), normal before" in headline(found)
 
 
 def test_a_fault_without_a_change_was_there_before_the_log_began() -> None:
@@ -63,7 +63,7 @@ def test_a_fault_without_a_change_was_there_before_the_log_began() -> None:
 def test_a_healthy_actuator_is_healthy_since_no_time_unless_it_was_ill() -> None:
     assert since(diagnosis_entries(found_as("normal"))) == ""
     mended = diagnosis_entries(found_as("normal", Change(2.0, (1.9, 2.2), "minor_friction")))
-    assert since(mended).endswith("minor friction until then")
+    assert since(mended).endswith("minor friction before")
     assert "since" not in headline(diagnosis_entries(found_as("normal")))
 
 
@@ -79,7 +79,7 @@ AGAINST = (AgainstCode.SPEED_BIAS.note(bias_rad_s=3.0), AgainstCode.OIL_SOFT.not
 
 def test_a_verdict_that_something_speaks_against_says_so_first_and_why() -> None:
     entries = diagnosis_entries(found_as("minor_leakage", against=AGAINST))
-    assert headline(entries).startswith("UNKNOWN, in none of the nine conditions; the nearest: minor leakage")
+    assert headline(entries).startswith("UNKNOWN: none of the nine conditions fits; the nearest is minor leakage")
     assert believed(entries) == "no: " + "; ".join(map(str, AGAINST))
     assert next_step(entries) == str(AdviceCode.CHECK_RIG.note())
     sound = diagnosis_entries(found_as("minor_leakage"))
@@ -122,7 +122,7 @@ def test_the_library_agrees_or_names_another_and_changes_no_verdict() -> None:
     agrees = diagnosis_entries(with_library(found_as("minor_leakage"), "minor_leakage"))
     differs = diagnosis_entries(with_library(found_as("minor_leakage"), "major_friction"))
     assert "agrees: minor leakage has the smallest error in velocity, 1.00 mm/s" in library_said(agrees)
-    assert "names major friction instead: its error in velocity is 1.00 mm/s, that of minor leakage 2.00 mm/s" in (
+    assert "names major friction instead: its error in velocity is 1.00 mm/s, that of minor leakage is 2.00 mm/s" in (
         library_said(differs)
     )
     for entries in (agrees, differs):

@@ -65,7 +65,9 @@ def test_a_single_stamp_that_is_off_is_mended_with_a_note() -> None:
     (note,) = check(time).notes
     assert note.code == LogCode.TIME_JITTERS
     assert note.data["percent"] == pytest.approx(1.0, rel=1e-6)
-    assert str(note) == "time_s jitters by 1 % of 0.001 s at most, 0.045 % rms; resampled"
+    assert (
+        str(note) == "time_s jitters by at most 1 % of the sample time of 0.001 s (0.045 % rms); the log was resampled"
+    )
 
 
 @pytest.mark.parametrize("share", [0.2, 0.35])
@@ -169,7 +171,9 @@ def test_whole_samples_left_out_become_missing_samples_in_place() -> None:
         (LogCode.SAMPLES_MASKED, "motor_speed_rad_s", 3, 1000),
         (LogCode.SAMPLES_MASKED, "velocity_m_s", 3, 1000),
     ]
-    assert str(checked.notes[0]) == "motor_speed_rad_s is missing in 3 of 1000 samples (0.3 %); they are masked"
+    assert (
+        str(checked.notes[0]) == "motor_speed_rad_s is missing in 3 of 1000 samples (0.3 %); those samples are not used"
+    )
 
 
 def test_more_than_five_percent_left_out_is_refused() -> None:

@@ -113,7 +113,7 @@ def test_an_empty_cell_is_masked_with_a_warning(tmp_path: Path, cell: str) -> No
     (warning,) = [one.message for one in caught]
     assert warning.note == LogCode.SAMPLES_MASKED.note(channel="position_m", count=1, total=100, percent=1.0)
     assert warning.source == str(path)
-    assert str(warning) == f"{path}: position_m is missing in 1 of 100 samples (1 %); they are masked"
+    assert str(warning) == f"{path}: position_m is missing in 1 of 100 samples (1 %); those samples are not used"
     assert np.flatnonzero(np.isnan(record["position_m"])).tolist() == [33]
 
 
@@ -134,7 +134,7 @@ def test_a_copied_row_is_left_out_with_a_warning(tmp_path: Path) -> None:
 
 
 def test_uneven_time_is_resampled_with_a_warning(tmp_path: Path) -> None:
-    with pytest.warns(LogWarning, match=r"time_s jitters by 30 % of 0\.001 s at most"):
+    with pytest.warns(LogWarning, match=r"time_s jitters by at most 30 % of the sample time of 0\.001 s"):
         assert len(read_record(log(tmp_path, rows=changed(50, 0, "0.0503")))) == N
 
 

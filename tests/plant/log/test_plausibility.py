@@ -63,7 +63,7 @@ def test_a_note_says_what_was_seen_and_which_slip_explains_it() -> None:
     assert note.code == LogCode.CHANNEL_LARGE
     assert (note.data["channel"], note.data["limit"]) == ("position_m", 5.0)
     assert note.data["size"] == pytest.approx(12.73, abs=0.01)
-    assert str(note) == "position_m spans 12.7 m, at most 5 is usual; looks like mm read as m"
+    assert str(note) == "position_m spans 12.7 m, but at most 5 m is usual: check the unit (mm read as m?)"
 
 
 @pytest.mark.parametrize("seed", range(12))
