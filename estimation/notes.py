@@ -64,7 +64,8 @@ class EstimateCode(Code):
         "observable"
     )
     KNOWN_AS_THE_RIG = (
-        "{quantity} is known only as well as the rig's {entry}, which causes {percent:.0f} % of its total variance"
+        "the uncertainty of {entry} in the rig file causes {percent:.0f} % of the total variance of {quantity}: a "
+        "better value of {entry} narrows the interval"
     )
     DIVERGED = "the estimate stopped being finite; check units, rig parameters and the form of the model"
     PRESSURE_RESIDUALS_LARGE = (

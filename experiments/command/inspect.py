@@ -10,7 +10,7 @@ import typer
 from experiments.command.json_output import Result, plain, write_whole
 from experiments.command.logs import caught, finish, read_log, run_logs
 from experiments.command.options import Beside, Json, Out, Plant, SampleTime, argument, load_actuator, option
-from experiments.command.terminal import sparkline, table, visible
+from experiments.command.terminal import note, sparkline, table, visible
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -62,6 +62,7 @@ def inspect(
             write_whole(html, inspect_page({"file": str(log), **found}, tables), "--html")
         if write is not None:
             _write_rig(write, found["columns"], kind)
+            note(f"{write}: check units and parameters, then run: hydrostate diagnose {log} --rig {write}")
         return {"outcome": "ok", **found}
 
     if (html is not None or write is not None or beside) and len(logs) > 1:
@@ -174,7 +175,7 @@ def _entries(
                     "plot": sparkline(one.present.tolist(), PLOTTED),
                     "channel": None if guess is None else guess.guess.channel,
                     "probability": None if guess is None else guess.guess.sure,
-                    "why": [] if guess is None else [note.to_dict() for note in guess.why],
+                    "why": [] if guess is None else [one.to_dict() for one in guess.why],
                 }
             )
         time = next((one for one in guesses if one.guess.channel == TIME), None)
@@ -253,7 +254,7 @@ def _shown(one: Mapping[str, Any]) -> "RenderableType":
         low, high = ("", "") if row["range"] is None else (f"{end:.5g}" for end in row["range"])
         low = row["kind"] if row["kind"] != "numbers" else low
         sure = "" if row["probability"] is None else f"{100.0 * row['probability']:.0f}"
-        why = "; ".join(note["text"] for note in row["why"])
+        why = "; ".join(one["text"] for one in row["why"])
         cells = (row["name"][:60], row["unit"] or "", low, high, str(row["missing"] or ""), row["plot"])
         made.add_row(str(row["number"]), *map(visible, cells), row["channel"] or "", sure, visible(why))
     return made

@@ -33,14 +33,15 @@ def verdict_lines(result: Mapping[str, Any]) -> list[str]:
     Returns
     -------
     list[str]
-        What it is, how bad in leakage, in friction and oil, whether to believe it, what to measure next, and what the
+        What it is, how bad in leakage, in friction and oil, whether it is reliable, what to measure next, and what the
         library of transfer functions says where it says anything.
     """
     library = library_said(result)
     return [
         f"{result['file']}: {headline(result)}",
         f"  leakage   {amounts(result, ('leakage_flow', 'velocity_lost'))}",
-        f"  friction  {amounts(result, ('added_friction', 'pressure_rise', 'bulk_modulus'))}",
+        f"  friction  {amounts(result, ('added_friction', 'pressure_rise'))}",
+        f"  oil       {amounts(result, ('bulk_modulus',))}",
         f"  reliable  {believed(result)}",
         f"  next      {next_step(result)}",
         *([f"  {library}"] if library else []),
@@ -77,13 +78,13 @@ def since(result: Mapping[str, Any]) -> str:
     Examples
     --------
     >>> since({"condition": "minor_leakage", "since_s": None})
-    'since before the log began'
+    'present since before the log began'
     """
     if result["since_s"] is not None:
         low, high = result["since_ci95_s"]
         before = _said(result["condition_before"])
         return f"since {result['since_s']:.2f} s ({low:.2f} to {high:.2f} s), {before} before"
-    return "" if result["condition"] == "normal" else "since before the log began"
+    return "" if result["condition"] == "normal" else "present since before the log began"
 
 
 def amounts(result: Mapping[str, Any], names: Sequence[str]) -> str:

@@ -252,17 +252,17 @@ def rig_template(
     Examples
     --------
     >>> print(rig_template().splitlines()[0])
-    # A rig: an actuator's parameters, how well they are known, and what its logs call the channels.
+    # A rig file: an actuator's parameters, how well each is known, and the names of the columns in its logs.
     """
     parameters = parameter_class()
     lines = [
-        "# A rig: an actuator's parameters, how well they are known, and what its logs call the channels.",
+        "# A rig file: an actuator's parameters, how well each is known, and the names of the columns in its logs.",
         "# All values are SI. A parameter that is left out keeps the value shown here.",
         "",
         *(['name = "paper"'] if plant == EHA else [f'name = "{plant}"', f'plant = "{plant}"']),
         *(
             [
-                "# Entries that were measured on the bench; less is doubted of them, see below.",
+                "# Parameters that you measured on the bench; they get the smaller uncertainty that is given below.",
                 "# measured = []",
             ]
             if doubts_of(parameter_class)
@@ -281,7 +281,7 @@ def rig_template(
         *_uncertainty_lines(parameter_class),
         "",
         "[columns]",
-        '# Log columns under other names, with their unit after a colon: channel = "NAME:UNIT".',
+        '# Names of the columns in your logs, with the unit after a colon: channel = "NAME:UNIT".',
     ]
     lines += [f'# {channel} = "{example}"' for channel, example in columns.items()]
     return "\n".join(lines) + "\n"
@@ -290,8 +290,11 @@ def rig_template(
 def _uncertainty_lines(parameter_class: type[Any]) -> list[str]:
     """Return the section of the uncertainties: defaults as comments, each with its reason."""
     doubts = doubts_of(parameter_class)
-    said = "has the default shown here" if doubts else "is taken as known"
-    lines = ["[uncertainty]", f"# Relative standard deviation of an entry: 0.3 is 30 %. What is not named {said}."]
+    said = "has the default shown here" if doubts else "is taken as exact"
+    lines = [
+        "[uncertainty]",
+        f"# Relative standard deviation of a parameter: 0.3 is 30 %. A parameter that is not listed {said}.",
+    ]
     for name, doubt in doubts.items():
         down, up = doubt.usual
         sides = f"{down:g} down, {up:g} up" if down != up else f"{up:g}"

@@ -160,7 +160,7 @@ def test_what_an_absent_channel_costs_is_a_note_and_said_once_of_all_logs() -> N
 def test_an_entry_of_the_rig_is_named_once_of_all_logs_that_it_limits() -> None:
     found = [estimate_entries(estimate_log(log(condition), Rig())) for condition in ("normal", "major_leakage")]
     (said,) = costs(found)
-    assert said.startswith("2 of 2 logs: bulk_modulus is known only as well as the rig's chamber_volume, which causes ")
+    assert said.startswith("2 of 2 logs: the uncertainty of chamber_volume in the rig file causes ")
 
 
 def test_nominal_models_that_miss_a_log_are_named_beside_what_the_circuit_says() -> None:

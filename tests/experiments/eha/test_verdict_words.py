@@ -128,7 +128,7 @@ def test_the_library_agrees_or_names_another_and_changes_no_verdict() -> None:
     for entries in (agrees, differs):
         said = verdict_lines({"file": "run.csv", **entries})
         assert said[-1].strip() == library_said(entries)
-        assert len(said) == 6
+        assert len(said) == 7
         assert {key for key in alone if alone[key] != entries[key]} == {
             "severity",
             "transfer_function_scores",
