@@ -83,5 +83,5 @@ def fit_charts(found: "Finding", stem: str) -> Charts:
         left = np.where(np.arange(len(time)) < blocks.first, np.nan, measured - fitted)
         both = Curve("measured", measured, "blue"), Curve("fitted", fitted, "orange")
         panels.append(Panel(name, unit, both, onset))
-        panels.append(Panel(f"{name}, residual", unit, (Curve("measured less fitted", left, "grey"),), onset))
+        panels.append(Panel(f"{name}, residual", unit, (Curve("measured minus fitted", left, "grey"),), onset))
     return Charts(time, "time [s]", panels, f"{stem}-fit")

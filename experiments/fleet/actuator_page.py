@@ -33,7 +33,7 @@ MOST_LOGS = 30
 FORECASTS = (
     "severity",
     Column("level", "level now, 95 % interval"),
-    Column("growth", "growth a log"),
+    Column("growth", "growth per log"),
     Column("half", "50 % interval to the limit", "logs"),
     Column("most", "90 % interval to the limit", "logs"),
     Column("outlook", "outlook"),
@@ -71,7 +71,7 @@ def actuator_page(row: ActuatorRow, log: str | None) -> str:
 
 
 def _changed(one: Outlook) -> str:
-    return f"{SHOWN[one.name].capitalize()} begins anew with the log of {one.logs[one.trend.begin].named.date}."
+    return f"{SHOWN[one.name].capitalize()} starts again with the log of {one.logs[one.trend.begin].named.date}."
 
 
 def _forecast(one: Outlook) -> dict[str, str]:

@@ -16,7 +16,7 @@ STATES: Mapping[str, str] = {
     "unknown": "no verdict",
     "open": "may be past a limit",
     "within": "within limits",
-    "failed": "not read",
+    "failed": "not readable",
 }
 """States of a log or an actuator, the most urgent first, and what a reader is told."""
 

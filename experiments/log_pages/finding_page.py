@@ -70,8 +70,9 @@ def _title(found: "Finding") -> str:
     if found.named:
         return f"Found: {' or '.join(found.named).replace('_', ' ')}."
     if any(one.value is not None for one in found.quantities.values()):
-        return "The log was estimated." if found.gate.passed else "The log was estimated, but do not rely on it."
-    return "The log tells too little, or does not fit the model: there are no numbers."
+        passed = "which passed the consistency check" if found.gate.passed else "but do not rely on them"
+        return f"Estimated values, {passed}."
+    return "No values: the log contains too little, or the model does not fit it."
 
 
 def _row(name: str, one: "Quantity") -> dict[str, str]:

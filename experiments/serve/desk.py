@@ -85,7 +85,7 @@ class Desk:
             If as many wait as may.
         """
         if self.jobs.waiting + self.room.uploads >= self.settings.waiting:
-            raise RefusedError(429, f"{self.settings.waiting} logs wait to be worked on, come again")
+            raise RefusedError(429, f"{self.settings.waiting} logs are waiting, try again later")
 
     def take_in(self, identity: str, part: Path, name: str, verb: str, size: int) -> Kept:
         """Keep a log that has come, and put it into the queue.
@@ -132,7 +132,7 @@ class Desk:
         """
         log, found = self.known(identity), self.store.result(identity)
         if found is None:
-            raise RefusedError(409, f"the work on {log.name} is not done yet")
+            raise RefusedError(409, f"{log.name} is not finished yet")
         return found
 
     def page(self, identity: str) -> Path:
@@ -145,7 +145,7 @@ class Desk:
         """
         log, path = self.known(identity), page_file(self.settings, identity)
         if log.state == UNFINISHED:
-            raise RefusedError(409, f"the work on {log.name} is not done yet")
+            raise RefusedError(409, f"{log.name} is not finished yet")
         if log.state in (FAILED, INTERRUPTED) or not path.exists():
             raise RefusedError(404, f"{log.name} has no page: {log.message}")
         return path
@@ -217,9 +217,9 @@ class Desk:
         try:
             return await asyncio.wrap_future(self.jobs.view(make, *args))
         except BusyError as error:
-            raise RefusedError(429, "too many pages over several logs are being made, come again") from error
+            raise RefusedError(429, "too many pages over several logs are being made, try again later") from error
         except (TimeoutError, ProcessExpired) as error:
-            raise RefusedError(429, "the page took too long to make, come again") from error
+            raise RefusedError(429, "the page took too long to make, try again later") from error
 
 
 def delete_orphans(settings: Settings, store: Store) -> None:

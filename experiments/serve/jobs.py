@@ -68,7 +68,7 @@ class Jobs:
             if phase_file(self._settings, log.id).exists():
                 self._store.tried(log.id)
                 if log.tries + 1 >= MOST_TRIES:
-                    said = f"interrupted: the server ended {MOST_TRIES} times in the middle of the work on this log"
+                    said = f"interrupted: the server ended {MOST_TRIES} times while it worked on this log"
                     self._store.finish(log.id, INTERRUPTED, {"file": log.name, "outcome": "failed", "message": said})
                     continue
             if not log_file(self._settings, log.id).exists():
@@ -157,9 +157,9 @@ class Jobs:
         try:
             worked: Worked = future.result()
         except CancelledError:
-            worked = self._lost("it was taken back", log)
+            worked = self._lost("it was cancelled", log)
         except TimeoutError:
-            worked = self._lost(f"the work on it took longer than {self._settings.seconds:g} s and was ended", log)
+            worked = self._lost(f"it took longer than {self._settings.seconds:g} s and was stopped", log)
         except ProcessExpired as error:
             worked = self._lost(_why_expired(error.exitcode, self._settings.memory // MB), log)
         except Exception as error:  # what a worker could not even report

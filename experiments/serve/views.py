@@ -67,7 +67,7 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
         {
             "quantity": row["quantity"].replace("_", " "),
             **_in_a_readers_unit(row),
-            "says": "changed" if row["changed"] else "no certain change" if row["interval"] else "not told by both",
+            "says": "changed" if row["changed"] else "no certain change" if row["interval"] else "not in both logs",
         }
         for row in rows
     ]
@@ -100,7 +100,7 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
             Column("first", names[0]),
             Column("second", names[1]),
             "difference",
-            Column("interval", "95 % interval of it"),
+            Column("interval", "95 % interval of the difference"),
             "unit",
             Column("says", "verdict"),
         ),
@@ -192,7 +192,7 @@ def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:
 
 def _title(changed: Sequence[str]) -> str:
     if not changed:
-        return "Nothing differs for certain between the two logs."
+        return "No certain difference between the two logs."
     named = [one.replace("_", " ") for one in changed[:4]]
     said = named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
     return f"{said[:1].upper()}{said[1:]} {'differs' if len(named) == 1 else 'differ'} between the two logs."

@@ -138,7 +138,7 @@
   });
   source.addEventListener("state", (event) => showState(JSON.parse(event.data)));
   source.addEventListener("error", () => {
-    state.textContent = "The server does not answer; the view goes on when it does.";
+    state.textContent = "The server does not answer; the view continues when it does.";
   });
   setInterval(draw, DRAWN);
 })();

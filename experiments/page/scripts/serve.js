@@ -102,7 +102,7 @@
       older.hidden = logs.length >= total;
       comparing.disabled = ticked.size !== 2;
       if (!coming.size) {
-        status.textContent = total ? `${total} logs, ${counts.unfinished ?? 0} not done yet.` : "There is no log yet.";
+        status.textContent = total ? `${total} logs, ${counts.unfinished ?? 0} not finished yet.` : "No log yet.";
       }
     } catch (error) {
       status.textContent = `The server does not answer: ${error.message}`;
@@ -130,7 +130,7 @@
           try {
             said = JSON.parse(request.responseText).detail;
           } catch {
-            said = "the server broke off";
+            said = "the server closed the connection";
           }
         }
         done(said);

@@ -68,7 +68,7 @@ def test_the_report_comes_from_the_store_alone_and_says_what_is_missing(tmp_path
     next((tmp_path / "moved" / "parts").iterdir()).unlink()
     page = Path(write_report(copy, open_folder(tmp_path / "page"))).read_text(encoding="utf-8")
     done = len(copy.rows())
-    assert f"{done} of 24 cases are done; the rest is to come." in page
+    assert f"{done} of 24 cases are done; the others are still to run." in page
     assert not re.search(r'(?:src|href)="(?!#|data:)', page)
     table = pd.read_csv(tmp_path / "page" / "tables" / "bulk_modulus.csv")
     assert table["cases"].sum() == done

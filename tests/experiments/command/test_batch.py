@@ -60,7 +60,7 @@ def test_a_batch_is_run_once_reported_and_compared(study: Path, tmp_path: Path) 
     compared = invoke("compare", store, store, "--out", tmp_path / "compared.html")
     assert compared.exit_code == 0
     assert "no difference shown" in compared.stdout
-    assert "What got better, what worse" in (tmp_path / "compared.html").read_text(encoding="utf-8")
+    assert "What got better, what got worse" in (tmp_path / "compared.html").read_text(encoding="utf-8")
     manifest = json.loads((store / "manifest.json").read_text(encoding="utf-8"))
     assert manifest["seeds"] == [0, 1, 2]
     assert {"config_hash", "versions", "commit", "config"} <= set(manifest)

@@ -42,11 +42,11 @@ def test_a_folder_of_logs_becomes_a_page_with_the_sick_one_first(tmp_path: Path)
     assert "1 of 5 logs could not be read" in said
     page = (tmp_path / "fleet" / "index.html").read_text("utf-8")
     assert "1 of 2 actuators is past a limit." in page
-    assert "Begin with B." in page
+    assert "Start with B." in page
     assert str(tmp_path) not in page
     (own,) = (tmp_path / "fleet" / "pages").iterdir()
     assert f"pages/{own.name}" in page
     assert "(minor leakage)" in own.read_text("utf-8")
     code, _, _ = invoke("fleet", tmp_path / "fleet" / "store", *named, "--out", tmp_path / "again")
     assert code == 1
-    assert "Begin with B." in (tmp_path / "again" / "index.html").read_text("utf-8")
+    assert "Start with B." in (tmp_path / "again" / "index.html").read_text("utf-8")

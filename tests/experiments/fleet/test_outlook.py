@@ -74,7 +74,7 @@ def test_the_page_of_an_actuator_shows_every_severity_with_its_forecast() -> Non
 
 
 def test_a_repair_is_named_on_the_page() -> None:
-    assert "Leakage begins anew with the log of 10." in actuator_page(actuator(GROWING, maintained=(9.5,)), None)
+    assert "Leakage starts again with the log of 10." in actuator_page(actuator(GROWING, maintained=(9.5,)), None)
 
 
 def test_repairs_are_read_from_a_table(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ def page_of(count: int, links: bool = False) -> str:
 def test_the_page_says_how_many_are_sick_and_with_which_to_begin() -> None:
     page = page_of(9)
     assert "<h1>2 of 9 actuators are past a limit.</h1>" in page
-    assert "Begin with P-5, P-1." in page
+    assert "Start with P-5, P-1." in page
 
 
 def test_a_page_has_relative_links_and_no_folder() -> None:

@@ -164,7 +164,7 @@ def test_a_limit_that_the_reader_sets_changes_the_state_and_is_remembered(opened
     page.reload()
     page.wait_for_selector("html.charts-drawn", state="attached")
     assert page.locator(".state").first.inner_text() == "within the limit"
-    page.get_by_role("button", name="Limits as delivered").click()
+    page.get_by_role("button", name="Reset the limits").click()
     assert page.locator(".state").first.inner_text() == "past the limit"
 
 

@@ -49,7 +49,7 @@ def test_the_page_of_two_logs_shows_readers_units_and_no_tag_of_a_name() -> None
     assert "200.0 (198 to 202)" in page
     assert "MPa" in page
     assert "<img src=x>" not in page
-    assert "Nothing differs for certain" in compare_view(first, first)
+    assert "No certain difference" in compare_view(first, first)
 
 
 def test_logs_of_one_name_are_told_apart_and_a_date_that_is_none_leaves_a_log_without_an_actuator() -> None:
