@@ -15,6 +15,7 @@ from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.eha.drives import sine
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, REDUCED, simulate
+from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, drop_samples
 
@@ -105,3 +106,10 @@ def test_both_engines_agree_on_a_linear_model(linear: ProcessModel) -> None:
         for method in (ekf, filterpy_ekf)
     )
     assert_equal(ours, theirs)
+
+
+def test_a_robust_update_is_refused(linear: ProcessModel) -> None:
+    log = Record(1e-3, {"motor_speed_rad_s": np.zeros(5), "position_m": np.zeros(5)})
+    prior = Gaussian(np.zeros(3), np.eye(3))
+    with pytest.raises(HydrostateError, match="filterpy's filter has no robust update, got robust 'huber'"):
+        run_filter(filterpy_ekf, linear, prior, log, EhaParameters(), variances={"position_m": 1.0}, robust="huber")

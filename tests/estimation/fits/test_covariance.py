@@ -68,3 +68,15 @@ def test_an_autocovariance_is_the_windowed_sum_of_products_however_many_lags(lag
     window = 1.0 - np.arange(lags + 1) / (lags + 1.0)
     summed = [np.sum(residual[lag:] * residual[: len(residual) - lag]) / 2981 for lag in range(lags + 1)]
     assert _autocovariance(residual, 2981, lags) == pytest.approx(window * np.array(summed), rel=1e-9, abs=1e-9)
+
+
+def test_a_residual_of_nothing_has_no_colour() -> None:
+    assert automatic_lags(np.zeros(50)) == 0
+
+
+def test_the_span_grows_with_the_correlation_as_andrews_has_it() -> None:
+    count = 40_000
+    noise = np.random.default_rng(2).standard_normal(count)
+    coloured = lfilter([1.0], [1.0, -0.6], noise)
+    wanted = 1.1447 * (4.0 * 0.36 / (1.0 - 0.36) ** 2 * count) ** (1.0 / 3.0)
+    assert automatic_lags(coloured) == pytest.approx(wanted, rel=0.05)

@@ -151,3 +151,50 @@ def test_an_actuator_without_leakage_has_none_to_be_relative_to() -> None:
 
 def test_percentages_have_two_digits_and_never_round_to_certainty() -> None:
     assert [percent(value) for value in (1e-5, 0.0304, 0.994, 1.0)] == ["0.001 %", "3 %", "over 99 %", "100 %"]
+
+
+def card(**changes: object) -> Card:
+    values: dict[str, object] = {
+        "channels": ("position_m",),
+        "unknowns": ("bulk_modulus", "flow_bias"),
+        "relative_std": {"bulk_modulus": 0.11, "flow_bias": 0.02},
+        "known_exactly": {"bulk_modulus": 0.10, "flow_bias": 0.02},
+        "correlation": np.array([[1.0, 0.96], [0.96, 1.0]]),
+        "friction_force": 0.01,
+        "weakest": {"bulk_modulus": 0.98, "flow_bias": 0.19},
+        "weakest_std": 0.2,
+        "stuck": 0.6,
+        "uncertainties": {"chamber_volume": 0.02},
+    }
+    return Card(**(values | changes))  # type: ignore[arg-type]
+
+
+def test_a_card_is_put_in_sentences_with_its_numbers() -> None:
+    lost, sticks, alike, worst, rig = sentences(card())
+    assert lost.endswith("worse than 3 %: bulk modulus (11 %)")
+    assert sticks.startswith("the piston sticks for 60 % of the time")
+    assert sticks.endswith("log differential pressure, or drive with larger, slower steps")
+    assert "flow bias would be known to 0.56 %, not 2 %" in alike
+    assert worst == "known worst, to 20 %: +0.98 bulk modulus (of logarithms)"
+    assert rig.endswith("(chamber volume 2 %) its bound is 11 %, without 10 %")
+    with_pressure = card(channels=("position_m", "differential_pressure_pa"))
+    assert sentences(with_pressure)[1].endswith("differential pressure does")
+
+
+def test_a_card_says_no_more_than_it_knows() -> None:
+    small = {"bulk_modulus": 0.002, "flow_bias": 0.001}
+    quiet = card(relative_std=small, stuck=0.5, weakest_std=0.03, correlation=np.eye(2), uncertainties={})
+    (rule,) = sentences(quiet)
+    assert "the rig file gives the volume no uncertainty" in rule
+    assert sentences(card(relative_std=small, stuck=0.0, weakest_std=0.0)) == sentences(
+        card(relative_std=small, stuck=0.0, weakest_std=0.0, correlation=np.eye(2))
+    )
+    alone = card(
+        unknowns=("flow_bias",), relative_std={"flow_bias": 0.01}, stuck=0.0, correlation=np.eye(1), weakest_std=0.5
+    )
+    assert sentences(alone) == ()
+
+
+def test_a_drive_under_which_the_plant_runs_away_has_no_card() -> None:
+    with np.errstate(all="ignore"), pytest.raises(HydrostateError, match="does not stay finite under this drive"):
+        identifiability_card(RIG, np.full(50, 1e300), 1e-3)

@@ -147,3 +147,30 @@ def test_the_share_that_the_drive_explains_is_without_bias_in_so_few_segments(dr
         push, own = rng.standard_normal((2, SEGMENTS * 250))
         found.append(_explained(driven * push + own, push, 250))
     assert np.mean(found) == pytest.approx(share, abs=0.02)
+
+
+def test_where_nothing_is_driven_a_tenth_of_all_frequencies_counts(linear: ProcessModel) -> None:
+    still = np.zeros(SAMPLES)
+    record = Record(SAMPLE_TIME, {"motor_speed_rad_s": still, "position_m": TIME, "velocity_m_s": TIME})
+
+    def at(frequency: float) -> Whiteness:
+        residuals = white(11)
+        residuals[:, 0] += 0.5 * np.sin(2.0 * np.pi * frequency * TIME)
+        estimate = Estimate(
+            linear, CHANNELS, TIME, np.zeros((SAMPLES, 3)), np.ones((SAMPLES, 3)), None, {}, 0.0,
+            residuals, np.ones(residuals.shape),
+        )  # fmt: skip
+        return whiteness(estimate, record)[0]
+
+    assert at(40.0).exceeded
+    assert not at(60.0).exceeded
+    assert not at(40.0).driven
+    assert at(40.0).with_drive == 0.0
+
+
+def test_innovations_that_are_zero_are_neither_alike_nor_explained(linear: ProcessModel) -> None:
+    residuals = white(12)
+    residuals[:, 0] = 0.0
+    position, velocity = judged(linear, residuals)
+    assert (position.excess, position.autocorrelation, position.crosses, position.with_drive) == (0.0, 0.0, 0.0, 0.0)
+    assert velocity.crosses == 0.0

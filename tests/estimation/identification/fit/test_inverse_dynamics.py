@@ -45,3 +45,12 @@ def test_a_body_that_does_not_move_both_ways_is_refused() -> None:
         fit_rigid_body(np.arange(1_000.0), np.ones(1_000), 1e-3)
     with pytest.raises(HydrostateError, match="of one length"):
         fit_rigid_body(np.arange(1_000.0), np.ones(10), 1e-3)
+
+
+def test_gaps_and_a_filter_beyond_half_the_sample_rate_are_refused() -> None:
+    moving, pushed = np.sin(0.02 * np.arange(1_000.0)), np.ones(1_000)
+    with pytest.raises(HydrostateError, match="position and force must have no gaps"):
+        fit_rigid_body(np.where(np.arange(1_000) == 3, np.nan, moving), pushed, 1e-3)
+    for cutoff in (0.0, 500.0):
+        with pytest.raises(HydrostateError, match="cutoff_hz must lie between 0 and 500 Hz"):
+            fit_rigid_body(moving, pushed, 1e-3, cutoff_hz=cutoff)

@@ -6,7 +6,7 @@ import pytest
 from estimation.identification.free_run.from_records import MOST_GAPS, channels_of, pieces
 from estimation.identification.free_run.identify import identify_channels
 from plant.arrays import Array
-from plant.errors import LogWarning
+from plant.errors import HydrostateError, LogWarning
 from plant.log.record import Record
 
 T, N = 0.01, 3000
@@ -78,3 +78,16 @@ def test_a_model_of_a_log_with_gaps_is_that_of_the_whole_log() -> None:
     tested = channels_of([log(binary(7))], ["u"], "y")
     off = [one.simulate(tested.u[0], tested.y[0]) - tested.y[0] for one in (whole, found)]
     assert np.std(off[1]) == pytest.approx(np.std(off[0]), rel=0.02)
+
+
+def test_one_channel_is_not_both_input_and_output() -> None:
+    with pytest.raises(HydrostateError, match="input and output must be different channels, got 'u' for both"):
+        channels_of([log(binary())], ["u"], "u")
+
+
+def test_an_input_of_which_nothing_or_nothing_but_a_level_is_known_is_not_split() -> None:
+    empty = Record(T, {"u": np.where(np.arange(N) == 5, 1.0, np.nan), "y": answered(binary())})
+    assert pieces(empty, ["u"]) == [empty]
+    level = Record(T, {"u": np.where(np.arange(N) // 10 == 100, np.nan, 3.0), "y": answered(binary())})
+    with pytest.warns(LogWarning):
+        assert [len(one) for one in pieces(level, ["u"])] == [1000, N - 1010]

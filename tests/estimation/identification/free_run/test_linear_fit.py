@@ -1,6 +1,7 @@
 """Output error of several inputs with offset and initial states, and how its order is chosen."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from estimation.identification.free_run.choose_linear import candidate, chosen, 
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import Form, Problem, fit_linear
+from estimation.identification.free_run.other_structures import adopt
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
 from plant.errors import HydrostateError, LogWarning
@@ -189,3 +191,60 @@ def test_a_further_value_costs_two_by_akaike_and_the_logarithm_of_the_samples_by
     gained = data.n_samples * float(np.log(small.fit.cost / large.fit.cost))
     assert small.aic - large.aic == pytest.approx(gained - 2.0 * values)
     assert small.bic - large.bic == pytest.approx(gained - values * float(np.log(data.n_samples)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"sample_time": 0.0}, "sample_time must be positive and finite, got 0.0"),
+        ({"sample_time": np.inf}, "sample_time must be positive and finite, got inf"),
+        ({"u": []}, "as many inputs as outputs are wanted, got 0 and 1"),
+        ({"u": [np.ones((50, 2))]}, r"inputs valve of shape \(50, 1\) are wanted beside 'level', got \(50, 2\)"),
+        ({"u": [np.where(np.arange(50)[:, None] == 7, np.nan, 1.0)]}, "inputs valve must be finite at every sample"),
+        ({"y": [np.where(np.arange(50) == 7, -np.inf, 1.0)]}, "output 'level' must be finite or missing"),
+        ({"u": [np.ones((50, 1))]}, "valve"),
+    ],
+)
+def test_what_is_no_log_of_input_and_output_is_refused(changes: dict[str, Any], said: str) -> None:
+    good = {"u": [steps(50, 1)[:, None]], "y": [steps(50, 2)], "sample_time": 0.1, "inputs": ["valve"]}
+    with pytest.raises(HydrostateError, match=said):
+        channels_from(**{**good, **changes}, output="level")
+
+
+def test_a_model_is_run_with_its_own_inputs_and_as_many_outputs() -> None:
+    model = identify_channels(one_log(200), structure="output-error", order=2, delay=3).model
+    with pytest.raises(HydrostateError, match=r"inputs valve are wanted, shape \(n, 1\), got \(9, 2\)"):
+        model.simulate(np.zeros((9, 2)), None)
+    with pytest.raises(HydrostateError, match=r"input and output must be of one length, got 9 and \(8,\) samples"):
+        model.simulate(np.zeros(9), np.zeros(8))
+    away = model.quality([np.ones((30, 1))], [np.full(30, np.nan)])
+    assert away.fit_percent == -np.inf
+    assert away.rmse == np.inf
+
+
+def two_inputs() -> Channels:
+    u = np.stack([steps(300, 1), steps(300, 2)], axis=1)
+    return channels_from([u], [plant(u[:, 0], 3)], 0.1, ["valve", "pump"], "level")
+
+
+def with_a_gap(log: Channels) -> Channels:
+    return replace(log, y=(np.where(np.arange(log.y[0].size) == 40, np.nan, log.y[0]),))
+
+
+@pytest.mark.parametrize(
+    ("structure", "log", "said"),
+    [
+        ("arx", two_inputs(), "structure arx takes one input, got valve, pump: use output-error"),
+        ("subspace", with_a_gap(one_log(300)), "structure subspace needs every sample of 'level'"),
+        ("instrumental", with_a_gap(one_log(300)), "structure instrumental needs every sample of 'level'"),
+        (
+            "subspace",
+            Channels(("valve",), "level", 0.1, 2 * one_log(300).u, 2 * one_log(300).y),
+            "takes one log, got 2",
+        ),
+    ],
+)
+def test_a_structure_that_cannot_have_a_log_says_so(structure: str, log: Channels, said: str) -> None:
+    by = scaled(log)[1]
+    with pytest.raises(HydrostateError, match=said):
+        adopt(structure, Form(2, (2,), (1,)), log, by)

@@ -142,3 +142,22 @@ def test_the_table_has_one_row_a_model() -> None:
     assert table.loc["normal", "f2"] == 0.6
     assert np.isnan(table.loc["published", "f2"])
     assert np.isnan(table.loc["published", "fit_percent"])
+
+
+def test_noise_models_begin_with_one() -> None:
+    for wrong in ([0.9, 0.1], [], [[1.0]]):
+        with pytest.raises(HydrostateError, match="noise_denominator must be monic"):
+            model(noise_denominator=wrong)
+
+
+def test_only_a_continuous_model_is_made_discrete_and_it_goes_to_control_as_it_is() -> None:
+    with pytest.raises(HydrostateError, match=r"discretised\(\) is for a model in continuous time"):
+        model().discretised()
+    continuous = LinearModel([200.0], [1.0, 8.0, 100.0], 1e-3, "u", "y", continuous=True)
+    for made in (continuous.to_control(), continuous.to_ss()):
+        for frequency in (0.0, 7.0, 40.0):
+            at = 1j * frequency
+            assert complex(made(at)) == pytest.approx(200.0 / (at * at + 8.0 * at + 100.0))
+    one = continuous.discretised()
+    assert one.dc_gain == pytest.approx(2.0)
+    assert np.sort_complex(one.poles) == pytest.approx(np.sort_complex(np.exp(1e-3 * np.roots([1.0, 8.0, 100.0]))))

@@ -6,6 +6,7 @@ import pytest
 from scipy.io import loadmat
 
 from estimation.identification import LinearModel, dc_gain_interval, fit_output_error
+from estimation.identification.model.uncertainty import _deviations
 from estimation.identification.notes import IdentificationCode
 from plant.errors import CovarianceWarning, HydrostateError
 
@@ -120,3 +121,24 @@ def test_a_step_response_settles_at_the_gain(fitted: LinearModel) -> None:
     time, response = fitted.step(1.0)
     assert time[-1] == pytest.approx(1.0)
     assert response[-1] == pytest.approx(fitted.dc_gain, rel=1e-6)
+
+
+def test_without_a_covariance_nothing_cancels_and_no_bandwidth_has_a_deviation() -> None:
+    alike = LinearModel([0.1, -0.09], [1.0, -1.8001, 0.81009], 1e-3, "u", "y")
+    assert alike.cancellations == ()
+    assert alike.bandwidth_hz is not None
+    assert alike.bandwidth_std_hz is None
+
+
+def test_a_zero_on_a_pole_is_no_deviation_away() -> None:
+    assert _deviations(np.zeros(2), np.eye(2)) == 0.0
+    assert _deviations(np.array([3.0, 4.0]), np.diag([4.0, 9.0])) == pytest.approx(
+        5.0 / np.sqrt(0.6**2 * 4.0 + 0.8**2 * 9.0)
+    )
+    assert _deviations(np.array([1.0, 0.0]), np.full((2, 2), np.inf)) == 0.0
+    assert _deviations(np.array([1.0, 0.0]), np.zeros((2, 2))) == np.inf
+
+
+def test_a_pole_that_takes_hours_has_the_lowest_bandwidth_that_is_looked_at() -> None:
+    slow = LinearModel([1e-12], [1.0, -(1.0 - 1e-12)], 1e-3, "u", "y")
+    assert slow.bandwidth_hz == pytest.approx(500.0 * 1e-5)
