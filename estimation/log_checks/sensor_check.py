@@ -115,9 +115,9 @@ def holds(values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 def _longest_hold(values: Array, sample_time: float) -> slice | None:
     """Return the longest hold, if it is long enough to mean something; samples missing in it do not count."""
     present = np.flatnonzero(np.isfinite(values))
-    starts, lengths = holds(values[present])
-    if not len(starts):
+    if not len(present):
         return None
+    starts, lengths = holds(values[present])
     longest = int(np.argmax(lengths))
     first, last = present[starts[longest]], present[starts[longest] + lengths[longest] - 1]
     long = lengths[longest] > FEWEST_HELD and (last - first) * sample_time >= LONGEST_HOLD

@@ -157,3 +157,19 @@ def test_a_piston_slid_if_its_velocity_makes_more_way_than_the_encoder_resolves(
     steps = 1e-5 * np.round(np.linspace(0.0, 40.0, 400))
     record = Record(1e-3, {"position_m": steps, "velocity_m_s": speed + noise})
     assert _slid(record, slice(100, 300)) == found
+
+
+def test_of_sensors_that_are_hardly_there_nothing_is_said() -> None:
+    record = run()
+    few = np.where(np.arange(len(record)) < 5, 1.0, np.nan)
+    for channel in ("position_m", "velocity_m_s", PRESSURE):
+        assert sensor_objections(record.replace(**{channel: few}), RIG_PARAMETERS) == ()
+        assert sensor_objections(record.replace(**{channel: few * np.nan}), RIG_PARAMETERS) == ()
+        assert without_saturated(record.replace(**{channel: few}), RIG_PARAMETERS)[1] == ()
+
+
+def test_a_still_velocity_is_not_accused_by_an_encoder_that_is_not_there() -> None:
+    frozen = with_fault(run(), SensorFault(channel="velocity_m_s", kind="freeze", start=3.0))
+    gone = np.where(frozen.time < 2.9, frozen["position_m"], np.nan)
+    for other in (frozen.replace(position_m=None), frozen.replace(position_m=gone)):
+        assert "velocity_m_s" not in {note.data["channel"] for note in sensor_objections(other, RIG_PARAMETERS)}
