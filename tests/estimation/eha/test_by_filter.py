@@ -1,16 +1,24 @@
 """A filter with noise levels tuned to the log says how far it may be off, at any rate."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from estimation.eha.bulk_modulus import estimate_bulk_modulus
-from estimation.eha.result import BulkModulusEstimate
+from estimation.eha.bulk_modulus import _fitted, estimate_bulk_modulus
+from estimation.eha.by_filter import _verdict
+from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate
+from estimation.finding import Outcome
+from estimation.fits.form_fit import FormFit
+from estimation.notes import EstimateCode
+from estimation.trust.consistency import MISMATCH_NIS
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.simulate import PLANTS, simulate
+from plant.errors import HydrostateError
 from plant.log.record import Record
+from plant.notes import Note
 from plant.sensors.sensors import BENCH
 
 FAULTY = parameters_for(CONDITIONS["minor_leakage_minor_friction"])
@@ -42,3 +50,54 @@ def test_tuning_narrows_the_interval_by_what_the_log_shows_of_the_noise() -> Non
     assert 5.0 * tuned.std < given.std
     assert tuned.value == pytest.approx(TRUTH, abs=4.0 * tuned.std)
     assert given.value == pytest.approx(TRUTH, abs=4.0 * given.std)
+
+
+def outcome_of(fit: FormFit) -> BulkModulusEstimate:
+    return _fitted(fit, "flow", ("position_m",))
+
+
+def form_fit(*, bound: float = 0.01, chi_square: float = 1.0, reasons: tuple[Note, ...] = ()) -> FormFit:
+    return FormFit({"bulk_modulus": (2e8, 1e6), "flow_bias": (1e-6, 1e-8)}, bound, chi_square, reasons)
+
+
+def test_a_fit_that_is_not_like_its_log_or_tells_nothing_gives_no_number() -> None:
+    sound = outcome_of(form_fit())
+    assert (sound.outcome, sound.value, sound.std, sound.gate.passed) == (Outcome.OK, 2e8, 1e6, True)
+    doubted = outcome_of(form_fit(reasons=(EstimateCode.DIVERGED.note(),)))
+    assert (doubted.outcome, doubted.value, doubted.gate.passed) == (Outcome.OK, 2e8, False)
+    unlike = outcome_of(form_fit(chi_square=1.01 * MISMATCH_NIS, bound=9.0))
+    assert (unlike.outcome, unlike.value, unlike.std) == (Outcome.MISMATCH, None, None)
+    vague = outcome_of(form_fit(bound=1.01 * LARGEST_BOUND))
+    assert (vague.outcome, vague.value, vague.gate.passed) == (Outcome.NOT_OBSERVABLE, None, False)
+    assert [note.code for note in vague.gate.reasons] == [EstimateCode.BOUND_TOO_WIDE]
+
+
+REST = Record(1e-3, {name: np.zeros(300) for name in ("motor_speed_rad_s", "position_m", "velocity_m_s")})
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"start": -1.0}, r"the first guess must be 0 Pa or more, its deviation positive, got -1\.0"),
+        ({"start": np.nan}, "the first guess must be 0 Pa or more"),
+        ({"start_std": 0.0}, r"its deviation positive, got .*, 0\.0"),
+        ({"method": "chamber-ekf", "form": "pressure"}, "chamber-ekf believes the flow form, got form 'pressure'"),
+        ({"method": "least-squares", "form": "pressure"}, "the pressure form is filtered, got method 'least-squares'"),
+        ({"method": "ekf", "form": "motion"}, "the motion form is fitted by least squares, got method 'ekf'"),
+        ({"states": ("weight",)}, "a further state must be one of"),
+        ({"form": "flow", "method": "ukf"}, "the flow form is filtered by a bank of ekf"),
+        ({"form": "flow", "states": ("friction",)}, "the flow form is filtered by a bank of ekf"),
+        ({"form": "flow", "tuned": True}, "the flow form is filtered by a bank of ekf"),
+    ],
+)
+def test_what_no_form_can_do_is_refused(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(HydrostateError, match=said):
+        estimate_bulk_modulus(REST.replace(differential_pressure_pa=np.zeros(300)), FAULTY, **options)
+
+
+def test_a_filter_that_diverged_or_cannot_know_gives_no_gate() -> None:
+    nothing: Any = None
+    assert _verdict(nothing, REST, False, 0.01)[0] is Outcome.DIVERGED
+    outcome, gate = _verdict(nothing, REST, True, 1.01 * LARGEST_BOUND)
+    assert outcome is Outcome.NOT_OBSERVABLE
+    assert not gate.passed

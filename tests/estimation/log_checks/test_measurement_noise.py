@@ -82,3 +82,8 @@ def test_position_noise_of_about_a_quantum_is_not_taken_for_the_quantum_alone() 
     moved = 0.02 * np.sin(2.0 * np.pi * 5.0 * 1e-3 * np.arange(20_000)) + rng.normal(0.0, 5e-5, 20_000)
     variance = position_variance(np.round(moved / 5e-5) * 5e-5)
     assert variance == pytest.approx(5e-5**2 * (1.0 + 1.0 / 12.0), rel=0.1)
+
+
+@pytest.mark.parametrize("position", [np.zeros(100), np.full(100, np.nan), np.arange(3.0)])
+def test_a_position_that_does_not_move_or_is_not_there_has_the_smallest_noise(position: np.ndarray) -> None:
+    assert position_variance(position) == SMALLEST_VARIANCE["position_m"]

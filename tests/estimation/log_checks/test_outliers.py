@@ -82,3 +82,8 @@ def test_missing_samples_stay_missing_and_are_not_counted() -> None:
     cleaned, said = without_gross_outliers(record.replace(motor_speed_rad_s=speed), CHANNELS)
     assert said == ()
     np.testing.assert_array_equal(cleaned["motor_speed_rad_s"], speed)
+
+
+def test_of_a_few_samples_none_stands_out() -> None:
+    few = np.array([0.0, 1e9, np.nan, 0.0])
+    np.testing.assert_array_equal(without_outliers(few), few)

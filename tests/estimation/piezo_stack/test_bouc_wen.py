@@ -8,9 +8,10 @@ import pandas as pd
 import pytest
 
 from benchmarks.bouc_wen_oscillator import OscillatorParameters, fit_oscillator, linear_start, simulate_oscillator
-from estimation.piezo_stack.bouc_wen import LOOP, SHAPE, fit_stack_loop, loop_bounds
+from estimation.piezo_stack.bouc_wen import LOOP, SHAPE, _checked_loop, fit_stack_loop, loop_bounds
 from estimation.piezo_stack.bouc_wen_printed import REGIONS, printed_fit
 from estimation.tuning.step_sensitivity import sensitivity_step
+from plant.arrays import Array
 from plant.components.bouc_wen import asymmetric_bouc_wen_rate
 from plant.errors import LogError
 from plant.piezo_stack.hysteresis import slow_stack_step
@@ -150,3 +151,19 @@ def test_the_public_benchmark_is_identified_and_predicted(shared: Path) -> None:
         log = read[name]
         predicted = simulate_oscillator(log["u_N"].to_numpy(), sample_time, found, periodic=name == "test_multisine")
         assert np.sqrt(np.mean((predicted - log["y_m"].to_numpy()) ** 2)) < most
+
+
+@pytest.mark.parametrize(
+    ("voltage", "displacement", "said"),
+    [
+        (np.zeros(9), np.zeros(8), "samples or more of both"),
+        (np.zeros((9, 9)), np.zeros((9, 9)), "samples or more of both"),
+        (np.zeros(3), np.zeros(3), "samples or more of both"),
+        (np.full(500, np.nan), np.zeros(500), "a loop must be finite"),
+        (np.zeros(500), np.full(500, np.inf), "a loop must be finite"),
+        (np.arange(500.0), np.zeros(500), r"a gap of 100\.0 % of its swing"),
+    ],
+)
+def test_what_is_no_loop_is_refused(voltage: Array, displacement: Array, said: str) -> None:
+    with pytest.raises(LogError, match=said):
+        _checked_loop(voltage, displacement)

@@ -150,3 +150,18 @@ def test_a_fault_outside_the_nine_is_worked_on_before_the_rig_file() -> None:
     outside = AgainstCode.OUTSIDE_CONDITIONS.note()
     assert advice_for(staircase([100.0]), SURE, (grows, outside), (), ALL) == (AdviceCode.STOP_LEAKAGE.note(),)
     assert advice_for(staircase([100.0]), SURE, (blocked,), (), ALL) == (AdviceCode.CHECK_MAKEUP.note(side="B"),)
+
+
+@pytest.mark.parametrize(
+    ("fault", "work"),
+    [
+        (RigCode.PUMP_WORN.note(percent=70.0, half_width=1.0), AdviceCode.CHECK_PUMP.note()),
+        (RigCode.RELIEF_LOW.note(setting_pa=2e6, half_width_pa=1e4, rig_pa=3e6), AdviceCode.CHECK_RELIEF.note()),
+        (RigCode.AIR_ENTERS.note(percent=1.0, half_width=0.1, percent_of_log=40.0), AdviceCode.FIND_AIR.note()),
+        (RigCode.PORT_DRAINS.note(side="A", drain=1e-12), AdviceCode.CHECK_MAKEUP.note(side="A")),
+        (RigCode.PRESSURE_OFFSET.note(offset_pa=1e5, half_width_pa=1e3), AdviceCode.CHECK_RIG.note()),
+    ],
+    ids=lambda note: note.code.name,
+)
+def test_each_fault_has_its_own_work(fault: Note, work: Note) -> None:
+    assert advice_for(staircase([100.0]), SURE, (fault,), (), ALL) == (work,)

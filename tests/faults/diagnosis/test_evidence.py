@@ -5,13 +5,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from faults.conditions import CONDITIONS
+from estimation.identification import LinearModel
+from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.calibration import Calibration
 from faults.diagnosis.circuit_runs import COORDINATES, Blocks
 from faults.diagnosis.class_fit import Actuator
-from faults.diagnosis.evidence import FARTHEST, Scoreboard, bounded, friction_left_open
+from faults.diagnosis.class_regions import is_stuck
+from faults.diagnosis.evidence import FARTHEST, Scoreboard, bounded, friction_left_open, weigh
+from faults.diagnosis.rmse import score_transfer_functions
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
+from plant.sensors.sensors import BENCH
 
 ACTUATOR = Actuator.of(EhaParameters())
 NAMES = list(CONDITIONS)
@@ -99,3 +106,33 @@ def test_without_pressure_every_friction_may_hold() -> None:
     found = friction_left_open(scores, blocks(None), ACTUATOR)
     assert len(set(found.tolist())) == 3
     assert np.all(found >= scores)
+
+
+def driven(drive: str, condition: str) -> Record:
+    rng = np.random.default_rng(3)
+    p = circuit_of(parameters_for(CONDITIONS[condition]))
+    return simulate(CIRCUIT, make_drive(drive, 2.0, 2e-3, p, rng), 2e-3, p, sensors=BENCH, rng=rng)
+
+
+def test_a_library_adds_the_evidence_of_its_transfer_functions() -> None:
+    record = driven("prbs", "normal")
+    library = {
+        name: LinearModel([0.0, (1.0 + 0.2 * k) * 6e-6], [1.0, -0.98], 2e-3, "motor_speed_rad_s", "velocity_m_s")
+        for k, name in enumerate(NAMES)
+    }
+    without, found = weigh(record, ACTUATOR), weigh(record, ACTUATOR, library)
+    assert list(without.log_odds) == ["models", "innovations", "parameters"]
+    assert list(found.log_odds) == ["transfer_functions", "models", "innovations", "parameters"]
+    errors = score_transfer_functions(record, library).by_condition
+    assert found.choice("transfer_functions") == min(NAMES, key=lambda name: errors[name])
+    for name, odds in without.log_odds.items():
+        np.testing.assert_array_equal(found.log_odds[name], odds)
+
+
+def test_of_a_stuck_piston_every_evidence_leaves_the_friction_open() -> None:
+    found = weigh(driven("sine", "major_friction"), ACTUATOR)
+    assert is_stuck(found.blocks, ACTUATOR)
+    for odds in found.log_odds.values():
+        for level in ("none", "minor", "major"):
+            alike = [i for i, one in enumerate(CONDITIONS.values()) if one.leakage == level]
+            assert len({float(odds[i]) for i in alike}) < 3

@@ -186,3 +186,7 @@ def test_one_channel_is_scored_in_its_own_unit_and_two_as_shares() -> None:
     sizes = {channel: float(np.sqrt(np.nanmean(log[channel] ** 2))) for channel in both.channels}
     shares = [both.rmse[channel]["normal"] / sizes[channel] for channel in both.channels]
     assert both.by_condition["normal"] == pytest.approx(float(np.sqrt(np.mean(np.square(shares)))))
+
+
+def test_a_model_that_ran_away_errs_without_end() -> None:
+    assert rmse(np.array([1.0, np.nan, 2.0]), np.array([1.0, np.nan, 2.0])) == np.inf

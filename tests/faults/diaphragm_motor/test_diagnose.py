@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.diaphragm_motor.signature import logged_signature
-from faults.diaphragm_motor.diagnose import TOLD_APART, MotorDiagnosis, diagnose_motor, separations
+from faults.diaphragm_motor.diagnose import TOLD_APART, MotorDiagnosis, _calibrated, diagnose_motor, separations
 from faults.diaphragm_motor.faults import HEALTHY, motor_with_fault
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import BENCH_SENSORS, SAMPLE_TIME, motor_drive, simulate_motor
@@ -118,3 +118,13 @@ def test_over_seeds_faults_are_named_on_motors_within_tolerance() -> None:
     share, unknown, *_ = isolate(4, 1.0, calibrated=False)
     assert share >= 0.95
     assert unknown <= 0.05
+
+
+def test_a_healthy_run_is_of_the_same_drive_and_of_a_healthy_motor() -> None:
+    seen = logged_signature(log_of(MOTOR))
+    for swing in (180.0, 220.0):
+        with pytest.raises(LogError, match="the healthy run must be under the log's drive"):
+            _calibrated(seen, logged_signature(log_of(MOTOR, swing=swing)), MOTOR)
+    dead = replace(seen, values=np.where(np.arange(len(seen.values)) % 7 == 3, 0.01, seen.values))
+    with pytest.raises(LogError, match="it is not of a healthy motor"):
+        _calibrated(seen, dead, MOTOR)

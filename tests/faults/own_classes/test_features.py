@@ -6,6 +6,7 @@ import pytest
 
 import hydrostate as hs
 from estimation.arrays import Array
+from faults.own_classes.features import Recipe, channel_features
 from plant.errors import HydrostateError
 
 
@@ -76,3 +77,11 @@ def test_columns_do_not_hang_on_the_other_runs() -> None:
 def test_runs_that_do_not_fit_are_refused(runs: Any, options: dict[str, Any], message: str) -> None:
     with np.errstate(all="ignore"), pytest.raises(HydrostateError, match=message):
         hs.features(runs, **options)
+
+
+def test_features_need_a_run_and_a_clock() -> None:
+    with pytest.raises(HydrostateError, match="features of one run at least are wanted, got none"):
+        channel_features(["p"], [], 1.0, Recipe())
+    for wrong in (0.0, np.nan):
+        with pytest.raises(HydrostateError, match="sample_time must be positive and finite"):
+            channel_features(["p"], [np.ones((1, 64))], wrong, Recipe())

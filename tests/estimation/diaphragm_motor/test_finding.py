@@ -1,0 +1,34 @@
+"""When a number of the diaphragm motor is told, and what speaks against all of them."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from estimation.diaphragm_motor.finding import CLEARLY, MOST_DEVIATION, SIZES, MotorCode, _doubts, _quantity
+
+
+def estimate(value: float, deviation: float, name: str = "crossport_leakage", *, holds: bool = True) -> Any:
+    return SimpleNamespace(values={name: value}, deviations={name: deviation}, pattern_holds=holds, pattern=30.0)
+
+
+def test_a_broken_pattern_comes_before_a_leakage_below_nothing() -> None:
+    (broken,) = _doubts(estimate(-1e-12, 1e-15, holds=False))
+    assert broken == MotorCode.PATTERN_BROKEN.note(chi_square=30.0)
+    (faster,) = _doubts(estimate(-1.01 * CLEARLY * 1e-14, 1e-14))
+    assert faster.code is MotorCode.FASTER_THAN_MAPS
+    for leakage in (-0.99 * CLEARLY * 1e-14, 1e-12):
+        assert _doubts(estimate(leakage, 1e-14)) == ()
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_a_number_is_told_where_its_deviation_is_small_beside_it_or_its_usual_size(name: str) -> None:
+    unit, size = SIZES[name]
+    for value, most in ((0.0, size), (-5.0 * size, 5.0 * size)):
+        known = _quantity(name, estimate(value, 0.99 * MOST_DEVIATION * most, name), told=True)
+        assert (known.value, known.unit) == (value, unit)
+        assert known.ci95 is not None
+        vague = _quantity(name, estimate(value, 1.01 * MOST_DEVIATION * most, name), told=True)
+        assert vague.value is None
+        assert vague.std == pytest.approx(1.01 * MOST_DEVIATION * most)
+    assert _quantity(name, estimate(0.0, 0.0, name), told=False).value is None
