@@ -180,7 +180,7 @@ def read(
     kind = actuator(plant or DEFAULT)
     bench = _rig(rig, kind)
     if not isinstance(path, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance] -- likewise
-        refuse(f"the path of a log is wanted, got {path!r}")
+        refuse(f"the path of a log is needed, got {path!r}")
     if columns is not None and not isinstance(columns, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         refuse(f"columns must be a mapping such as {{'position_m': 'POS_MM:mm'}}, got {columns!r}")
     others = [Path(one) for one in ([beside] if isinstance(beside, str | Path) else beside)]

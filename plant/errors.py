@@ -49,7 +49,7 @@ class MissingColumnError(LogError):
     """
 
     def __init__(self, channel: str, column: str, known: str, source: str | None = None, hint: str = "") -> None:
-        wanted = f"column {column[:80]!r} is wanted for {channel}, the log has {known}"
+        wanted = f"column {column[:80]!r} is needed for {channel}; the log has {known}"
         super().__init__(f"{wanted}; name one of them as {channel}=NAME:UNIT{hint}", source)
         self.channel, self.column, self.known, self.hint = channel, column, known, hint
 

@@ -65,7 +65,7 @@ def simulate_fmu(
     speed, fmpy = checked_series(drive), _package()
     told = _description(path)
     if told.coSimulation is None:
-        raise HydrostateError(f"{path}: an FMU for co-simulation is wanted, this one is for model exchange alone")
+        raise HydrostateError(f"{path}: an FMU for co-simulation is needed, this one is for model exchange alone")
     numbers = [one for one in told.modelVariables if one.causality in ("input", "output", "local")]
     inputs = {one.name for one in numbers if one.causality == "input"}
     names = [one.name for one in numbers if one.type in ("Real", "Float64")]
@@ -121,7 +121,7 @@ def _description(path: Path) -> Any:
     try:
         return fmpy.read_model_description(str(path))
     except Exception as error:  # whatever is wrong with a file of others
-        raise HydrostateError(f"{path}: an FMU is wanted: {error}") from error
+        raise HydrostateError(f"{path}: an FMU is needed: {error}") from error
 
 
 def _package() -> Any:
@@ -155,5 +155,5 @@ def _run(
     except Exception as error:  # the program of others may fail in any way
         raise HydrostateError(f"{path}: the FMU stopped: {error}") from error
     if len(found) != len(speed):
-        raise HydrostateError(f"{path}: {len(speed)} samples are wanted, the FMU gave {len(found)}")
+        raise HydrostateError(f"{path}: {len(speed)} samples are needed, the FMU gave {len(found)}")
     return {name: np.asarray(found[name], np.float64) for name in wanted}

@@ -60,7 +60,7 @@ def read_kept(path: Path, kind: str) -> dict[str, Array]:
     HydrostateError
         If the file cannot be read or is of another kind.
     """
-    wanted = f"a state of {kind.rpartition(' ')[0]} is wanted"
+    wanted = f"a state of {kind.rpartition(' ')[0]} is needed"
     try:
         with np.load(path, allow_pickle=False) as kept:
             values = {name: kept[name] for name in kept.files}

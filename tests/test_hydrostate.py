@@ -75,7 +75,7 @@ def test_a_model_turns_into_python_controls(log: hs.Log) -> None:
 
 MISTAKES: dict[str, tuple[Callable[[hs.Log, Path], object], str]] = {
     "no such file": (lambda log, file: hs.read("none.csv"), "none.csv: there is no such file"),
-    "no path": (lambda log, file: hs.read(3), "the path of a log is wanted, got 3"),  # type: ignore[arg-type]
+    "no path": (lambda log, file: hs.read(3), "the path of a log is needed, got 3"),  # type: ignore[arg-type]
     "no such column": (
         lambda log, file: hs.read(file, columns={"position_m": "X"}),
         "name one of them as position_m=NAME",
@@ -93,7 +93,7 @@ MISTAKES: dict[str, tuple[Callable[[hs.Log, Path], object], str]] = {
     "misspelt plant": (lambda log, file: hs.simulate(plant="pump"), "must be one of reduced, lumped"),
     "misspelt verb": (lambda log, file: log.estimat(), "did you mean 'estimate'"),
     "misspelt name": (lambda log, file: hs.reed, "did you mean 'read'"),
-    "no such channel": (lambda log, file: log["pressure"], "channel 'pressure' is wanted, the record has"),
+    "no such channel": (lambda log, file: log["pressure"], "channel 'pressure' is needed; the record has"),
 }
 
 

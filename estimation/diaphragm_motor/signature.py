@@ -292,7 +292,7 @@ def whole_cycles(samples: int, sample_time: float, frequency: float) -> int:
     whole = int(samples * sample_time * frequency + 1e-6)
     if whole < FEWEST_CYCLES:
         raise LogError(
-            f"{FEWEST_CYCLES} cycles of {frequency:.4g} Hz are wanted after the first {SETTLED:g} s, got {whole}"
+            f"{FEWEST_CYCLES} cycles of {frequency:.4g} Hz are needed after the first {SETTLED:g} s, got {whole}"
         )
     return whole
 
@@ -307,7 +307,7 @@ def require_channels(record: Record) -> None:
     """
     for name in (DRIVE, *ELECTRODES, POSITION):
         if name not in record:
-            raise LogError(f"{name} is wanted, the log has {', '.join(record)}")
+            raise LogError(f"{name} is needed; the log has {', '.join(record)}")
         lost = int(np.sum(~np.isfinite(record[name])))
         if lost:
             raise LogError(f"{name} must be whole, got {lost} missing samples")

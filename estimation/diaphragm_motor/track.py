@@ -115,7 +115,7 @@ def healthy_maps(p: DiaphragmMotorParameters, drive: Drive) -> HealthyMaps:
     points = [point for point in points if point.velocity > _LEAST_SPEED]
     if len(points) <= _DEGREE:
         raise LogError(
-            f"a drive that moves the rod is wanted, got {drive.peak_to_peak:.4g} V peak to peak at "
+            f"a drive that moves the rod is needed, got {drive.peak_to_peak:.4g} V peak to peak at "
             f"{drive.frequency:.4g} Hz"
         )
     amplitude = np.array([abs(point.tones[3]) for point in points])

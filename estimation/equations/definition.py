@@ -56,7 +56,7 @@ class Parameter:
         if not low < high:
             raise HydrostateError(f"bounds must be a least and a larger value, got {low:g} and {high:g}")
         if not low <= self.start <= high:
-            raise HydrostateError(f"a start between its bounds {low:g} and {high:g} is wanted, got {self.start:g}")
+            raise HydrostateError(f"a start between its bounds {low:g} and {high:g} is needed, got {self.start:g}")
         object.__setattr__(self, "bounds", (low, high))
 
     @property

@@ -113,7 +113,7 @@ def fit_equations(
         If a log lacks a channel, has gaps in an input, or holds fewer samples than there are unknowns.
     """
     if not records:
-        raise LogError("a log is wanted to fit the equations to, got none")
+        raise LogError("a log is needed to fit the equations to, got none")
     if not isinstance(starts, int) or starts < 1:  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         raise HydrostateError(f"starts must be a whole number from 1 on, got {starts!r}")
     parts = [part_of(equations, record) for record in records]
@@ -121,7 +121,7 @@ def fit_equations(
     unknowns = len(equations.parameters) + len(parts) * len(equations.free)
     samples = sum(int(np.count_nonzero(np.isfinite(part.measured))) for part in parts)
     if samples <= unknowns:
-        raise LogError(f"more samples than unknowns are wanted, got {samples} for {unknowns}")
+        raise LogError(f"more samples than unknowns are needed, got {samples} for {unknowns}")
     with threadpool_limits(limits=1, user_api="blas"):
         solution = searched(equations, parts, given, robust=robust, starts=starts, seed=seed)
         finding, covariance = concluded(solution, given)

@@ -49,7 +49,7 @@ def part_of(equations: Equations, record: Record) -> Part:
     """
     for name in (*equations.inputs, *equations.outputs):
         if name not in record:
-            raise LogError(f"channel {name!r} is wanted, the log has {', '.join(record)}")
+            raise LogError(f"channel {name!r} is needed; the log has {', '.join(record)}")
     for name in equations.inputs:
         lost = np.flatnonzero(~np.isfinite(record[name]))
         if len(lost):

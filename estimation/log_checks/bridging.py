@@ -48,7 +48,7 @@ def bridged(x: Array) -> Array:
     if known.all():
         return x
     if not known.any():
-        raise HydrostateError("a signal with at least one finite sample is wanted, got none")
+        raise HydrostateError("a signal with at least one finite sample is needed, got none")
     samples = np.arange(x.size)
     return np.interp(samples, samples[known], x[known])
 

@@ -171,10 +171,10 @@ def prepared(
     for name in names:
         require_known("an unknown", name, UNKNOWNS)
     if DRIVE not in record:
-        raise LogError(f"{DRIVE} is wanted, the log has {', '.join(record)}")
+        raise LogError(f"{DRIVE} is needed; the log has {', '.join(record)}")
     used = [name for name in STACK_CHANNELS if name in channels and name in record]
     if not used:
-        raise LogError(f"one of {', '.join(STACK_CHANNELS)} is wanted beside {DRIVE}, the log has {', '.join(record)}")
+        raise LogError(f"one of {', '.join(STACK_CHANNELS)} is needed beside {DRIVE}, the log has {', '.join(record)}")
     for name in (DRIVE, *used):
         if not np.all(np.isfinite(record[name])):
             raise LogError(f"{name} must be whole, got {int(np.sum(~np.isfinite(record[name])))} missing samples")

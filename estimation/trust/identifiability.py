@@ -153,7 +153,7 @@ CARD_FORM = replace(
 
 def _check(what: str, given: Sequence[str], known: Sequence[str]) -> None:
     if not given:
-        raise HydrostateError(f"{what} is wanted: one or more of {', '.join(known)}")
+        raise HydrostateError(f"{what} is needed: one or more of {', '.join(known)}")
     require_each_known(what, given, known)
 
 

@@ -216,7 +216,7 @@ def read_study(path: str | Path) -> Study:
     except OSError as error:
         raise StudyError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise StudyError(f"{path}: a TOML file is wanted: {error}") from error
+        raise StudyError(f"{path}: a TOML file is needed: {error}") from error
     return parse_study(content, str(path))
 
 
@@ -288,7 +288,7 @@ def _sentence(error: Any) -> str:
         case "extra_forbidden":
             return f"{where} is unknown{_nearest(error['loc'])}"
         case "missing":
-            return f"{where} is wanted, and not there"
+            return f"{where} is needed, and not there"
         case "value_error":
             wanted = str(error["msg"]).removeprefix("Value error, ")
             return f"{where or 'the file'} must {'have' if wanted.startswith('at least one [[') else 'be'} {wanted}"

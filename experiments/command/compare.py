@@ -29,7 +29,12 @@ def compare(
     from experiments.batch.part_store import open_store
     from experiments.batch.report import render_comparison
     from experiments.batch.summary import frame_of
+    from plant.errors import HydrostateError
 
+    if log := next((place for place in (first, second) if Path(place).is_file()), None):
+        raise HydrostateError(
+            f"{log} is a file, not the store of a batch study; for two logs, run: hydrostate diagnose {first} {second}"
+        )
     names = [Path(place.rstrip("/")).name for place in (first, second)]
     if names[0] == names[1]:
         names = ["A", "B"]

@@ -166,7 +166,7 @@ def model(
     require_known("--to", to, ("c", "mat"))
     (found, *more) = load_models(saved)
     if more:
-        raise HydrostateError(f"one model is wanted, got {1 + len(more)}", str(saved))
+        raise HydrostateError(f"one model is needed, got {1 + len(more)}", str(saved))
     called = "model" if name is None else name
     files: Mapping[str, str | bytes]
     files = model_in_c(found, name=called, precision=precision) if to == "c" else model_in_mat(found, name=called)

@@ -89,7 +89,7 @@ class Filtering:
         if self.filtered is not None and self.last is not None and self.last > told:
             self._estimate(self.filtered)
         if stream.cut:
-            note(f"{self.source}: warning: the last row is cut short and left out")
+            note(f"{self.source}: warning: the last row is incomplete and was left out")
 
     def end(self, outcome: str, message: str) -> None:
         """Tell that the stream has ended, and how."""
@@ -120,7 +120,7 @@ class Filtering:
         for last, rows, gap in stream.samples(max(1, round(min(self.every, TOGETHER) / stream.sample_time))):
             if gap:
                 if first:
-                    note(f"{self.source}: warning: rows before a gap at {last:g} s were too few to begin from")
+                    note(f"{self.source}: warning: too few rows before a gap at {last:g} s to start the filter")
                 first, after_gap, wanted = [], True, self._wanted(stream)
             first.append(rows)
             if sum(map(len, first)) >= wanted:
@@ -143,7 +143,7 @@ class Filtering:
             self._resume(T, last - (len(rows) - 1) * T)
         if self.filtered is None or gap:
             if gap:
-                note(f"{self.source}: warning: rows are missing before {last:g} s, so the filter begins again")
+                note(f"{self.source}: warning: rows are missing before {last:g} s, so the filter restarts")
             record = Record(T, dict(zip(stream.channels, rows.T, strict=True)))
             try:
                 self.filtered, self._sums = begun(self.asked, record, self.like), None
@@ -164,10 +164,12 @@ class Filtering:
         filtered, last = load_filter(self.state, self.asked)
         T = filtered.problem.sample_time
         if abs(T / sample_time - 1.0) > SAME_RATE:
-            raise LogError(f"{self.state} is of {1.0 / T:g} Hz, the stream has {1.0 / sample_time:g} Hz", self.source)
+            raise LogError(
+                f"{self.state} was saved at {1.0 / T:g} Hz, but the stream has {1.0 / sample_time:g} Hz", self.source
+            )
         missing = round((start - last) / T) - 1
         if not 0 <= missing * T <= LONGEST_GAP:
-            note(f"{self.source}: warning: the stream does not go on at {last:g} s, so the filter begins again")
+            note(f"{self.source}: warning: the stream does not continue at {last:g} s, so the filter restarts")
             return
         wide = len(filtered.problem.model.drives), len(filtered.problem.channels)
         filtered.take(np.full((missing, wide[0]), np.nan), np.full((missing, wide[1]), np.nan))

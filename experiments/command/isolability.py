@@ -125,4 +125,4 @@ def _ranking(results: Sequence[Result]) -> "Iterable[RenderableType]":
     for result in results:
         shown.add_row(result["drive"], " and ".join(result["hardest_pair"]), f"{result['hardest_nats_per_second']:.3g}")
     yield shown
-    yield f"{results[0]['drive']} tells most: {results[0]['message']}"
+    yield f"{results[0]['drive']} is the most informative: {results[0]['message']}"

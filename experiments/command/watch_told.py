@@ -44,7 +44,11 @@ class Told:
         self.watch, self.began = watch, watch.last
         about = {"file": source, "rig": rig, "rate_hz": round(1.0 / watch.sample_time, 6)}
         about |= {"balances": list(watch.balances), "false_alarms_per_hour": false_alarms}
-        said = "learning what is normal" if len(watch.balances) == 2 else f"learning, without {PRESSURE}"
+        said = (
+            "learning the healthy behaviour"
+            if len(watch.balances) == 2
+            else f"learning the healthy behaviour, without {PRESSURE}"
+        )
         self._line("start", self.began, **about, message=said)
         if self._armed:
             self._ready(self.began, watch.thresholds)
@@ -55,7 +59,7 @@ class Told:
 
     def _ready(self, time: float, thresholds: Sequence[float]) -> None:
         named = dict(zip(self.watch.balances, thresholds, strict=True)) if self.watch else {}
-        self._line("ready", time, thresholds=named, message="alarms can come from here on")
+        self._line("ready", time, thresholds=named, message="learning is over, alarms are possible from now on")
 
     def alive(self) -> None:
         """Tell that the watch is alive, how many samples it has taken, and for how long nothing has come."""
@@ -88,7 +92,7 @@ class Told:
                 self._ready(event.time, event.thresholds)
             elif isinstance(event, Alarm):
                 self.alarms += 1
-                said = f"the {event.balance} balance has changed since {event.since:.2f} s"
+                said = f"the {event.balance} balance changed at {event.since:.2f} s"
                 self._line("alarm", event.time, **_alarm(event), message=said)
             else:
                 lost = dict(zip(("before", "after"), event.lost or (None, None), strict=True))
@@ -112,7 +116,7 @@ class Told:
             seconds = self.watch.last - self.began
             message = message or f"{self.alarms} alarms in {seconds:.1f} s"
             if outcome == "ok" and not self._armed:
-                message += "; the stream ended before enough was learnt, so no alarm could come"
+                message += "; the stream ended before learning was over, so no alarm was possible"
         time = None if self.watch is None else self.watch.last
         self._line("end", time, outcome=outcome, alarms=self.alarms, message=message)
 
@@ -138,9 +142,9 @@ def _alarm(alarm: "Alarm") -> dict[str, Any]:
 
 def _reading(event: "Change") -> str:
     if event.lost is None or event.pressure is None:
-        return f"without {PRESSURE} it cannot be said what has changed"
+        return f"without {PRESSURE} the cause of the change is not known"
     before, after = (f"{100.0 * one:.0f} %" for one in event.lost)
     return (
-        f"flow lost: {before} of what the pump delivers before, {after} after; "
-        f"differential pressure at the same velocity {100.0 * event.pressure:+.0f} %"
+        f"flow lost: {before} of the pump's delivery before, {after} after; "
+        f"differential pressure at the same velocity: {100.0 * event.pressure:+.0f} %"
     )

@@ -80,15 +80,15 @@ class Asked:
             record = _read(self.healthy, self)
             if abs(record.sample_time / sample_time - 1.0) > SAME_RATE:
                 raise LogError(
-                    f"{self.healthy}: the healthy log must have the rate of what is watched, {1.0 / sample_time:g} Hz, "
-                    f"got {1.0 / record.sample_time:g} Hz"
+                    f"{self.healthy}: the healthy log must have the sample rate of the stream, {1.0 / sample_time:g} "
+                    f"Hz, got {1.0 / record.sample_time:g} Hz"
                 )
             samples, logged = _samples(record.channels, record.sample_time, str(self.healthy))
             if "motion" not in made.balances and not logged:
-                raise LogError(f"{self.healthy}: the healthy log must have {PRESSURE}, as what is watched has")
+                raise LogError(f"{self.healthy}: the healthy log must have {PRESSURE}, as the stream has")
             alarms = sum(isinstance(event, Alarm) for event in made.take(samples))
             if alarms:
-                note(f"{self.healthy}: warning: {alarms} alarms while this was learnt as healthy")
+                note(f"{self.healthy}: warning: {alarms} alarms in this healthy log")
             made.interrupt()
             made.clock_reads(start)
         return made
@@ -182,7 +182,7 @@ def watch_rows(told: Told, lines: Iterable[str], asked: Asked, source: str, stat
                 travelled += float(np.nansum(channels["velocity_m_s"])) * T
             if gap:
                 watch.interrupt()
-                note(f"{source}: warning: rows are missing before {last:g} s, so what is normal is learnt again")
+                note(f"{source}: warning: rows are missing before {last:g} s, so learning starts again")
             watch.clock_reads(last - (len(rows) - 1) * T)
             told.events(watch.take(samples))
             told.saw(channels, last, gap)
@@ -193,7 +193,7 @@ def watch_rows(told: Told, lines: Iterable[str], asked: Asked, source: str, stat
         if state is not None:
             save_watch(watch, state, travelled)
     if stream.cut:
-        note(f"{source}: warning: the last row is cut short and left out")
+        note(f"{source}: warning: the last row is incomplete and was left out")
 
 
 def _begun(
@@ -209,7 +209,9 @@ def _begun(
 
     remembered, kept_time, travelled = load_state(state)
     if abs(kept_time / sample_time - 1.0) > SAME_RATE:
-        raise LogError(f"{state} is of {1.0 / kept_time:g} Hz, the stream has {1.0 / sample_time:g} Hz", source)
+        raise LogError(
+            f"{state} was saved at {1.0 / kept_time:g} Hz, but the stream has {1.0 / sample_time:g} Hz", source
+        )
     watch = replace(asked, healthy=None).watch(kept_time, pressure, start)
     watch.resume(remembered)
     missing = round((start - watch.last) / kept_time)
@@ -217,7 +219,7 @@ def _begun(
         watch.take(np.full((missing, 3), np.nan))
     else:
         watch.interrupt()
-        note(f"{source}: warning: the stream does not go on at {watch.last:g} s, so what is normal is learnt again")
+        note(f"{source}: warning: the stream does not continue at {watch.last:g} s, so learning starts again")
     return watch, travelled
 
 

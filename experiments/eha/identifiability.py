@@ -263,7 +263,7 @@ def _ranking(results: Sequence[Result]) -> "Iterable[RenderableType]":
         values = [result["overall_percent"], *result["relative_std_percent"].values(), result["stuck_percent"]]
         shown.add_row(result["drive"], *(percent(0.01 * value).removesuffix(" %") for value in values))
     yield shown
-    yield "overall is the geometric mean of the standard deviations; the drive that tells most comes first"
+    yield "overall: geometric mean of the standard deviations; the most informative drive is first"
     yield f"{results[0]['drive']}: {results[0]['message']}" if results[0]["message"] else str(results[0]["drive"])
 
 

@@ -87,7 +87,7 @@ def _foreign(
 
     path = Path(options["fmu"])
     if options["plant"] is not None:
-        raise HydrostateError(f"--plant or --fmu is wanted, got both: {options['plant']} and {path}")
+        raise HydrostateError(f"--plant or --fmu is needed, got both: {options['plant']} and {path}")
     given = start_values(options["parameter"])
     changed = {name: getattr(faulty, name) for name in PARAMETER_NAMES if getattr(faulty, name) != getattr(sound, name)}
     lacking = sorted(set(changed) - fmu_variables(path)) if changed else []
@@ -139,7 +139,7 @@ def start_values(texts: Sequence[str] | None) -> dict[str, float]:
         except ValueError:
             name = ""
         if not name:
-            raise HydrostateError(f"--parameter NAME=VALUE with a number is wanted, got {text!r}")
+            raise HydrostateError(f"--parameter NAME=VALUE with a number is needed, got {text!r}")
     return found
 
 
@@ -150,7 +150,7 @@ def _faulty(rig: EhaParameters, options: Options) -> tuple[EhaParameters, dict[s
         found = find_condition(name or "normal")
         name, leakage, friction = found.name, float(LEVELS.index(found.leakage)), float(LEVELS.index(found.friction))
     elif name is not None:
-        raise HydrostateError("a --condition or severities are wanted, got both")
+        raise HydrostateError("give either --condition or severities, not both")
     leaking, rubbing = leakage or 0.0, friction or 0.0
     made_of = {"condition": name, "leakage_severity": leaking, "friction_severity": rubbing}
     return severity(leaking, rubbing, rig), made_of

@@ -188,7 +188,7 @@ def record_of(log: Any) -> "Record":
         return _of_table(log)
     record = getattr(log, "record", log)
     if not isinstance(record, Record):
-        raise HydrostateError(f"a Log, a Record or a pandas.DataFrame is wanted, got {type(log).__name__}")
+        raise HydrostateError(f"a Log, a Record or a pandas.DataFrame is needed, got {type(log).__name__}")
     return record
 
 
@@ -208,7 +208,7 @@ def _of_table(table: "pd.DataFrame") -> "Record":
         time: np.ndarray[Any, Any] = table.index.to_numpy(dtype=np.float64)
         columns = {str(name): table[name].to_numpy(dtype=np.float64) for name in table.columns}
     except (TypeError, ValueError) as error:
-        raise HydrostateError(f"a table of numbers by time [s] is wanted: {error}") from None
+        raise HydrostateError(f"a table of numbers by time [s] is needed: {error}") from None
     steps = np.diff(time)
     if len(steps) == 0 or not steps[0] > 0.0 or np.abs(steps - steps[0]).max() > 1e-3 * steps[0]:
         raise HydrostateError("the index of a table must be the time [s] on a uniform clock")

@@ -106,7 +106,7 @@ class Log(Shown):
         """
         first, last = (round((at - self.record.start_time) / self.sample_time) for at in (begin, end))
         if not 0 <= first < last:
-            refuse(f"a part of the log is wanted from an earlier to a later time, got {begin:g} s to {end:g} s")
+            refuse(f"a part of the log is needed from an earlier to a later time, got {begin:g} s to {end:g} s")
         return Log(self.record.slice(first, last + 1), self.rig, self.plant)
 
     def estimate(self, **options: Any) -> "Answer":
@@ -173,7 +173,7 @@ class Log(Shown):
         from experiments.log_pages.relation import identified
 
         if not {"input", "output"} <= options.keys():
-            refuse(f"input and output are wanted, channels among {', '.join(self.channels)}")
+            refuse(f"input and output are needed, channels among {', '.join(self.channels)}")
         inputs, outputs = options.pop("input"), options.pop("output")
         return identified([one.record for one in logs], inputs, outputs, options)
 

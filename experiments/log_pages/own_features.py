@@ -83,10 +83,10 @@ def _of_array(
 ) -> _Runs:
     if runs.ndim != 3 or cycle is not None:
         also = "" if cycle is None else " without a cycle, which is for logs"
-        raise HydrostateError(f"an array of shape (runs, channels, samples) is wanted{also}, got shape {runs.shape}")
+        raise HydrostateError(f"an array of shape (runs, channels, samples) is needed{also}, got shape {runs.shape}")
     names = [f"channel {k}" for k in range(runs.shape[1])] if channels is None else list(channels)
     if len(names) != runs.shape[1]:
-        raise HydrostateError(f"a name for each of {runs.shape[1]} channels is wanted, got {len(names)}")
+        raise HydrostateError(f"a name for each of {runs.shape[1]} channels is needed, got {len(names)}")
     return names, list(runs.astype(np.float64)), 1.0 if sample_time is None else sample_time
 
 
@@ -97,7 +97,7 @@ def _of_logs(runs: Any, channels: Sequence[str] | None, sample_time: float | Non
         raise HydrostateError("sample_time is that of an array; logs have their own")
     records: list[Record] = [record_of(one) for one in (runs if isinstance(runs, list | tuple) else [runs])]
     if not records:
-        raise HydrostateError("features of one run at least are wanted, got none")
+        raise HydrostateError("features of one run at least are needed, got none")
     names = list(records[0] if channels is None else channels)
     step, values = records[0].sample_time, list[Any]()
     for place, record in enumerate(records):

@@ -29,7 +29,7 @@ def read_truth(folder: Path) -> pd.DataFrame:
     """
     path = folder / TRUTH
     if not path.is_file():
-        raise HydrostateError(f"{folder}: a folder with {TRUTH} is wanted, as `hydrostate benchmark make` writes it")
+        raise HydrostateError(f"{folder}: a folder with {TRUTH} is needed, as `hydrostate benchmark make` writes it")
     return pd.read_csv(path, keep_default_na=False)
 
 

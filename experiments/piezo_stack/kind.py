@@ -57,7 +57,7 @@ class StackRunCode(Code):
 def _simulated(rig: Rig[Any], options: Options) -> Run:
     require_known("--sensors", options["sensors"], list(STACK_SENSORS))
     if options["condition"] is not None and options["fault"] is not None:
-        raise HydrostateError("a --condition or a --fault is wanted, got both")
+        raise HydrostateError("a --condition or a --fault is needed, got both")
     fault = options["condition"] or options["fault"] or "normal"
     healthy = _at(rig, options).parameters
     frequency, swing, between = (options[name] for name in ("frequency", "voltage", "sample_time"))

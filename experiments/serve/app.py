@@ -36,7 +36,7 @@ StreamName = Annotated[str, Path(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
 
 WHY: Mapping[int, str] = {
     400: "This is no HTTP, or the body broke off.",
-    401: "A token is wanted.",
+    401: "A token is needed.",
     403: "A page of another site asks.",
     404: "There is no such thing.",
     405: "That cannot be done with it.",

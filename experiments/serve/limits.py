@@ -126,7 +126,7 @@ class Guard:
                 return [(b"location", b"/"), (b"set-cookie", cookie.encode())]
         if not (_same(_bearer(headers), self._token) or _same(_cookie(headers), self._token)):
             raise RefusedError(
-                401, "a token is wanted: open the address that the server printed, or send a Bearer token"
+                401, "a token is needed: open the address that the server printed, or send a Bearer token"
             )
         return None
 

@@ -79,7 +79,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         if self.token is None and not is_loopback(self.host):
-            raise HydrostateError(f"--host {self.host} can be reached from other machines, so a token is wanted")
+            raise HydrostateError(f"--host {self.host} can be reached from other machines, so a token is needed")
         if self.token is not None and not (len(self.token) >= LEAST_TOKEN and self.token.isascii()):
             raise HydrostateError(f"a token must have {LEAST_TOKEN} ASCII letters or digits at least")
 

@@ -148,7 +148,7 @@ def blocks_of(record: Record) -> Blocks:
     elif "velocity_m_s" in whole:
         velocity = _mean(whole["velocity_m_s"], block)
     else:
-        raise LogError(f"velocity_m_s or position_m is wanted, the log has {', '.join(record)}")
+        raise LogError(f"velocity_m_s or position_m is needed; the log has {', '.join(record)}")
     pressure = whole.get("differential_pressure_pa")
     if pressure is not None:
         pressure = _mean(pressure, block)

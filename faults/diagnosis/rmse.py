@@ -167,7 +167,7 @@ def measured_velocity(record: Record) -> Array:
     if "velocity_m_s" in record:
         return record["velocity_m_s"]
     if "position_m" not in record:
-        raise LogError(f"velocity_m_s or position_m is wanted, the log has {', '.join(record)}")
+        raise LogError(f"velocity_m_s or position_m is needed; the log has {', '.join(record)}")
     window = max(POSITION_WINDOW, 2.0 * record.sample_time)
     return differentiated(bridged(record["position_m"]), record.sample_time, window)
 

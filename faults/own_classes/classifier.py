@@ -107,7 +107,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
         self.learnt_classes_, places = np.unique(labels, return_inverse=True)
         self.classes_, self._merged = _merged(self.learnt_classes_, self.merge)
         if len(self.classes_) < 2:
-            raise HydrostateError(f"two classes at least are wanted, got one class: {self.classes_[0]}")
+            raise HydrostateError(f"two classes at least are needed, got one class: {self.classes_[0]}")
         self.shrinkage_, self.calibration_, self._far = _held_back(x, places, self._merged, groups)
         self._learnt: Discriminant = learn(x, places, len(self.learnt_classes_), [self.shrinkage_])[0]
         return self
@@ -219,7 +219,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
         x, labels = np.asarray(X, dtype=np.float64), np.asarray(y)
         if x.ndim != 2 or len(x) != len(labels) or not 2 <= blocks <= len(labels):
             raise HydrostateError(
-                f"features of shape (runs, features), as many labels, and blocks from 2 to that are wanted, got "
+                f"features of shape (runs, features), as many labels, and blocks from 2 to that are needed, got "
                 f"features {x.shape}, {len(labels)} labels, {blocks} blocks"
             )
         learnt, places = np.unique(labels, return_inverse=True)

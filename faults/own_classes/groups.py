@@ -79,10 +79,10 @@ def folds(
     else:
         blocks = np.unique(np.asarray(groups), return_inverse=True)[1].astype(np.int64)
     if blocks.shape != places.shape:
-        raise HydrostateError(f"a group for each of {len(places)} runs is wanted, got {blocks.size}")
+        raise HydrostateError(f"a group for each of {len(places)} runs is needed, got {blocks.size}")
     names = np.unique(blocks)
     if len(names) < 2:
-        raise HydrostateError("runs of two groups at least are wanted, got one: it cannot be held back")
+        raise HydrostateError("runs of two groups at least are needed, got one: it cannot be held back")
     if len(names) <= count:
         return [np.flatnonzero(blocks == name) for name in names]
     return _spread(places, blocks, count)

@@ -145,5 +145,5 @@ def changed(row: tuple[float, ...], place: int, value: float) -> tuple[float, ..
     (1.0, 0.8, 1.0)
     """
     if not 1 <= place <= len(row):
-        raise RigError(f"a place from 1 to {len(row)} is wanted, got {place}")
+        raise RigError(f"a place from 1 to {len(row)} is needed, got {place}")
     return (*row[: place - 1], value, *row[place:])

@@ -35,7 +35,7 @@ _EXAMPLES: Mapping[str, str] = {
 
 
 EHA = "eha"
-"""What a rig file calls the gear-pump actuator; one that names no plant is taken for what is wanted."""
+"""What a rig file calls the gear-pump actuator; one that names no plant is taken for what is needed."""
 
 P = TypeVar("P", default=EhaParameters)
 
@@ -84,7 +84,7 @@ class Rig(Generic[P]):
             if not 0.0 <= value < float("inf"):
                 raise RigError(f"uncertainty.{name} must be 0 or more and finite, got {value!r}")
             if name in self.measured:
-                raise RigError(f"uncertainty.{name} and measured both say how well it is known, one is wanted")
+                raise RigError(f"uncertainty.{name} and measured both say how well it is known, give one")
         object.__setattr__(self, "uncertainties", MappingProxyType(dict(self.uncertainties)))
         object.__setattr__(self, "columns", MappingProxyType(check_columns(self.columns)))
 
@@ -176,14 +176,14 @@ def _content(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise RigError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise RigError(f"{path}: a TOML file is wanted: {error}") from error
+        raise RigError(f"{path}: a TOML file is needed: {error}") from error
 
 
 def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> Rig[Any]:
     _known(content, _RigFile.model_fields, "")
     file = _RigFile.model_validate(content)
     if file.plant not in (None, plant):
-        raise RigError(f"a rig of plant {plant!r} is wanted here, got one of {file.plant!r}")
+        raise RigError(f"a rig of plant {plant!r} is needed here, got one of {file.plant!r}")
     _known(file.parameters, _names(parameter_class), "parameters")
     values = _values(
         _unpaired(file.parameters, PAIRS if issubclass(parameter_class, EhaParameters) else {}), parameter_class
@@ -319,7 +319,7 @@ def write_rig_template(path: str | Path, template: str | None = None) -> None:
     """
     path = Path(path)
     if path.exists() or path.is_symlink():
-        raise RigError(f"{path}: there is such a file already, and it is not overwritten")
+        raise RigError(f"{path}: the file exists already and is not overwritten")
     try:
         with replacing(path) as file:
             file.write((rig_template() if template is None else template).encode())

@@ -154,7 +154,7 @@ def archive(model: Described, files: Mapping[str, str], glue: tuple[str, str, st
 def _binary(name: str, files: Mapping[str, str], fmi: str) -> bytes:
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     if compiler is None:
-        raise HydrostateError("a C compiler (cc, gcc or clang) is wanted to build an FMU, found none")
+        raise HydrostateError("a C compiler (cc, gcc or clang) is needed to build an FMU, found none")
     with tempfile.TemporaryDirectory() as folder:
         for file, text in files.items():
             (Path(folder) / file).write_text(text, encoding="utf-8")

@@ -68,7 +68,7 @@ def read_any(path: str | Path, names: Sequence[str] | None = None, *, sample_tim
     time = None if sample_time is not None else _time_column(headings)
     columns = _every(table, headings) if names is None else _wanted(table, headings, names, source)
     if not columns:
-        raise LogError("a column of numbers is wanted, the log has none", source)
+        raise LogError("a column of numbers is needed; the log has none", source)
     clock = None
     if time is not None:
         columns[TIME] = _seconds(table, time)
@@ -127,14 +127,14 @@ def _named(headings: Sequence[Heading], name: str, source: str) -> Column:
     if len(positions) == 1:
         return Column(positions[0], known[positions[0]], name)
     if positions:
-        raise LogError(f"column {name!r} is wanted once, the log has it {len(positions)} times", source)
+        raise LogError(f"column {name!r} is needed once, the log has it {len(positions)} times", source)
     if name in UNITS:
         for column in resolve_columns(headings, None, source):
             if column.channel == name:
                 return column
     near = get_close_matches(name, known, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise LogError(f"column {name!r} is wanted, the log has {listed(known)}{hint}", source)
+    raise LogError(f"column {name!r} is needed; the log has {listed(known)}{hint}", source)
 
 
 def _is_time(heading: Heading) -> bool:

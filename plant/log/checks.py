@@ -92,7 +92,7 @@ def _present(columns: Channels, required: Collection[str], source: str) -> None:
         known = ", ".join(columns) or "none that is known"
         raise NoChannelError(f"column {' and '.join(missing)} is missing, the log has {known}", source)
     if set(columns) <= {TIME}:
-        raise NoChannelError(f"at least one channel is wanted beside {TIME}, the log has none that is known", source)
+        raise NoChannelError(f"at least one channel is needed beside {TIME}, the log has none that is known", source)
 
 
 def _finite(columns: Channels, source: str) -> None:

@@ -271,4 +271,4 @@ def long_enough(columns: Channels, source: str) -> None:
     if len(set(lengths.values())) > 1:
         raise LogError(f"columns must have one length, got {lengths}", source)
     if lengths[TIME] < FEWEST_SAMPLES:
-        raise LogError(f"at least {FEWEST_SAMPLES} samples are wanted, got {lengths[TIME]}", source)
+        raise LogError(f"at least {FEWEST_SAMPLES} samples are needed, got {lengths[TIME]}", source)

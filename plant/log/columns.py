@@ -203,7 +203,7 @@ def _foreign(headings: Sequence[Heading], channel: str, spec: str, source: str) 
         raise MissingColumnError(channel, name, listed(names), source)
     if len(positions) > 1:
         raise LogError(
-            f"column {name[:80]!r} is wanted once for {channel}, the log has it {len(positions)} times", source
+            f"column {name[:80]!r} is needed once for {channel}, the log has it {len(positions)} times", source
         )
     heading = headings[positions[0]]
     unit = heading.unit if unit is None else unit
@@ -291,9 +291,9 @@ def parse_columns(texts: Sequence[str]) -> dict[str, str]:
     for text in texts:
         channel, equals, spec = (part.strip() for part in text.partition("="))
         if not (channel and equals and spec):
-            raise RigError(f"columns are wanted as CHANNEL=NAME:UNIT (position_m=POS_MM:mm), got {text!r}")
+            raise RigError(f"columns must be given as CHANNEL=NAME:UNIT (position_m=POS_MM:mm), got {text!r}")
         if channel in mapping:
-            raise RigError(f"channel {channel!r} is wanted once, got {mapping[channel]!r} and {spec!r}")
+            raise RigError(f"channel {channel!r} is needed once, got {mapping[channel]!r} and {spec!r}")
         mapping[channel] = spec
     return check_columns(mapping)
 

@@ -105,7 +105,7 @@ def _encoding(start: bytes, source: str) -> str:
         for side, name in ((1, "utf-16-le"), (0, "utf-16-be")):
             if zeros[side] > 0.9 * half > 0 and not zeros[1 - side]:
                 return name
-        raise LogError("a text file is wanted for a CSV log, got binary data", source)
+        raise LogError("a text file is needed for a CSV log, got binary data", source)
     try:
         start.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -138,11 +138,11 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
     (';', ',', ['Zeit', 'Weg'])
     """
     if not any(line.strip() for line in lines):
-        raise LogError("a header line is wanted, the file is empty", source)
+        raise LogError("a header line is needed, the file is empty", source)
     head = "\n".join(lines[:5])
     strange = sum(one == "\ufffd" or (ord(one) < 32 and one not in "\t\n\x0c\x0b") for one in head)
     if strange > 0.1 * len(head) or "\0" in head:
-        raise LogError("a text file is wanted for a CSV log, got binary data", source)
+        raise LogError("a text file is needed for a CSV log, got binary data", source)
     block = max((_block(lines, one) for one in DELIMITERS), key=lambda one: one.score)
     if not block.score:
         return _by_header(lines, encoding)

@@ -51,14 +51,14 @@ class CsvStream:
         self._lines = iter(lines)
         header = next((line for line in self._lines if line.strip()), "")
         if not header:
-            raise LogError("a header line is wanted, nothing came", source)
+            raise LogError("a header line is needed, nothing came", source)
         self._delimiter = max(",;\t", key=header.count)
         names = next(csv.reader([header], delimiter=self._delimiter))
         self._width = len(names)
         columns = [one for one in resolve_columns(names, mapping, source) if not one.channel.startswith(TRUTH)]
         time = [one for one in columns if one.channel == TIME]
         if not time:
-            raise LogError(f"a column {TIME} is wanted, or in another unit as time_ms, got {', '.join(names)}", source)
+            raise LogError(f"a column {TIME} is needed, or in another unit as time_ms, got {', '.join(names)}", source)
         self._columns = time + [one for one in columns if one.channel != TIME]
         self.channels = tuple(one.channel for one in self._columns[1:])
         """Channels of the samples, in order."""
@@ -67,7 +67,7 @@ class CsvStream:
         rows = self._rows()
         first = list(islice(rows, FIRST_ROWS))
         if len(first) < 2:
-            raise LogError(f"at least two rows are wanted to know the time between samples, got {len(first)}", source)
+            raise LogError(f"at least two rows are needed to know the time between samples, got {len(first)}", source)
         self.sample_time = median(float(after[0] - before[0]) for before, after in pairwise(first))
         """Time between samples [s]."""
         if not self.sample_time > 0.0:

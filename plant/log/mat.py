@@ -151,6 +151,6 @@ def write_mat(columns: Mapping[str, Array], metadata: str, file: BinaryIO, sourc
 
     for name in columns:
         if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,62}", name) is None:
-            raise LogError(f"a MATLAB field name is wanted (63 letters, digits, _), got {name!r}", source)
+            raise LogError(f"a MATLAB field name is needed (63 letters, digits, _), got {name!r}", source)
     struct = {STRUCT: {**columns, METADATA: metadata}}
     savemat(cast(Any, file), struct, long_field_names=True, oned_as="column", do_compression=True)

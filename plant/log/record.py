@@ -89,7 +89,7 @@ class Record:
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         if name not in self.channels:
-            raise LogError(f"channel {name!r} is wanted, the record has {', '.join(self.channels)}")
+            raise LogError(f"channel {name!r} is needed; the record has {', '.join(self.channels)}")
         return self.channels[name]
 
     def __contains__(self, name: object) -> bool:

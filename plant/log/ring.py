@@ -127,7 +127,7 @@ class RingReader:
         except (OSError, ValueError) as error:
             raise LogError(f"the ring cannot be read: {error}", str(path)) from error
         if len(self._held) < ROWS_AT or self._held[: len(MAGIC)] != MAGIC:
-            raise LogError("a ring is wanted, the file is none", str(path))
+            raise LogError("a ring is needed, the file is none", str(path))
         columns, slots = struct.unpack_from("<II", self._held, COLUMNS_AT)
         (length,) = struct.unpack_from("<I", self._held, LENGTH_AT)
         if not columns or not slots or len(self._held) != ROWS_AT + 8 * columns * slots or length > ROWS_AT - HEADER_AT:

@@ -170,7 +170,7 @@ def _tcp(host: str, port: int, address: str) -> Iterator[str]:
     try:
         connection = socket.create_connection((host, port), PATIENCE)
     except OSError as error:
-        raise LogError(f"nobody answers: {error.strerror or error}", address) from error
+        raise LogError(f"no answer: {error.strerror or error}", address) from error
     connection.settimeout(None)
     with connection, connection.makefile("r", encoding="utf-8", errors="replace", newline="\n") as lines:
         try:

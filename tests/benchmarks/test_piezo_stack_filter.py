@@ -39,5 +39,5 @@ def test_every_state_has_a_size() -> None:
 
 
 def test_a_log_without_its_drive_is_refused() -> None:
-    with pytest.raises(LogError, match="drive_voltage_v is wanted"):
+    with pytest.raises(LogError, match="drive_voltage_v is needed"):
         filter_stack(log_of(HEALTHY, 1, 0.01).replace(drive_voltage_v=None), HEALTHY)

@@ -84,7 +84,7 @@ def test_its_parameters_have_notes_and_a_rig_file_gives_them_back(kind: Actuator
     text = f'plant = "{other.name}"\n'
     path.write_text(text, encoding="utf-8")
     with pytest.raises(
-        HydrostateError, match=f"a rig of plant '{kind.name}' is wanted here, got one of '{other.name}'"
+        HydrostateError, match=f"a rig of plant '{kind.name}' is needed here, got one of '{other.name}'"
     ):
         read_rig(path, kind.parameters, kind.name)
 
@@ -194,4 +194,4 @@ def test_a_rig_file_names_its_kind(tmp_path: Path) -> None:
     assert json.loads(done.stdout)[0]["plant"] == "diaphragm-motor"
     refused = run.invoke(app, ["identify", "--rig", str(rig), str(out)])
     assert refused.exit_code == 2
-    assert "a rig of plant 'eha' is wanted here" in refused.stderr
+    assert "a rig of plant 'eha' is needed here" in refused.stderr

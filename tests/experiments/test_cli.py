@@ -105,7 +105,7 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
         (["estimate", "a.csv", "--start", "nan"], "--start must be positive and finite, got nan Pa"),
         (["estimate", "a.csv", "--start-std", "0"], "--start-std must be positive and finite, got 0 Pa"),
         (["estimate", "a.csv", "--rig", "none.toml"], "none.toml: cannot be read: No such file or directory"),
-        (["estimate", "a.csv", "--columns", "position_m"], "columns are wanted as CHANNEL=NAME:UNIT"),
+        (["estimate", "a.csv", "--columns", "position_m"], "columns must be given as CHANNEL=NAME:UNIT"),
         (
             ["estimate", "a.csv", "--columns", "position_m=X:furlongs/h"],
             "position_m='X:furlongs/h': unit 'furlongs/h' does not",
@@ -124,7 +124,7 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
         (["simulate", "-o", "a.csv", "--leakage-severity", "9"], "leakage severity must be between 0 and 5, got 9.0"),
         (
             ["simulate", "-o", "a.csv", "--leakage-severity", "1", "--condition", "normal"],
-            "a --condition or severities are wanted, got both",
+            "give either --condition or severities, not both",
         ),
         (["conditions", "--seed", "-1"], "Invalid value for '--seed'"),
     ],
@@ -188,7 +188,7 @@ def test_rig_init_writes_a_file_once(tmp_path: Path) -> None:
     path.write_text("# mine")
     again = invoke("rig", "init", path)
     assert again.exit_code == 2
-    assert again.stderr.splitlines() == [f"hydrostate: {path}: there is such a file already, and it is not overwritten"]
+    assert again.stderr.splitlines() == [f"hydrostate: {path}: the file exists already and is not overwritten"]
     assert path.read_text() == "# mine"
 
 
@@ -219,7 +219,7 @@ def test_the_command_runs_as_a_process_with_its_exit_codes(tmp_path: Path) -> No
     assert (fine.returncode, len(json.loads(fine.stdout)), fine.stderr) == (0, 9, "")
     assert refused.returncode == 2
     assert [one["outcome"] for one in json.loads(refused.stdout)] == ["failed"]
-    assert "empty.csv: a header line is wanted, the file is empty" in refused.stderr
+    assert "empty.csv: a header line is needed, the file is empty" in refused.stderr
     assert "Traceback" not in refused.stderr
 
 

@@ -84,7 +84,7 @@ def test_its_parameters_and_the_benchs_sensors_count(fmu: Path) -> None:
 
 def test_what_is_no_plant_is_refused(fmu: Path, tmp_path: Path) -> None:
     (tmp_path / "no.fmu").write_text("none")
-    with pytest.raises(HydrostateError, match="an FMU is wanted"):
+    with pytest.raises(HydrostateError, match="an FMU is needed"):
         simulate_fmu(tmp_path / "no.fmu", DRIVE, T)
     with pytest.raises(HydrostateError, match="has no variable 'stiffness'"):
         simulate_fmu(fmu, DRIVE, T, parameters={"stiffness": 1.0})

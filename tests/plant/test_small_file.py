@@ -16,14 +16,14 @@ def pipe(tmp_path: Path) -> Path:
 
 
 def test_a_pipe_is_not_waited_for(pipe: Path) -> None:
-    with pytest.raises(RigError, match="a regular file is wanted"):
+    with pytest.raises(RigError, match="a regular file is needed"):
         read_rig(pipe)
-    with pytest.raises(StudyError, match="a regular file is wanted"):
+    with pytest.raises(StudyError, match="a regular file is needed"):
         read_study(pipe)
 
 
 def test_a_device_without_end_is_refused() -> None:
-    with pytest.raises(RigError, match="a regular file is wanted"):
+    with pytest.raises(RigError, match="a regular file is needed"):
         read_rig("/dev/zero")
 
 

@@ -64,7 +64,7 @@ def fit_continuous(
         As `fit_output_error`.
     """
     if not 0 <= n_zeros <= n_poles or n_poles < 1:
-        raise HydrostateError(f"0 <= n_zeros <= n_poles and n_poles >= 1 are wanted, got {n_zeros} and {n_poles}")
+        raise HydrostateError(f"0 <= n_zeros <= n_poles and n_poles >= 1 are needed, got {n_zeros} and {n_poles}")
     n_wanted = SAMPLES_PER_PARAMETER * (n_zeros + 2 * n_poles + 2)
     names = (input_name, output_name)
     given = experiments_from(u, y, names, n_excited=2 * n_poles, n_wanted=n_wanted)

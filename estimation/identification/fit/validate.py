@@ -143,5 +143,5 @@ def _together(y: ArrayLike, simulated: ArrayLike) -> tuple[Array, Array]:
         raise HydrostateError(f"measured and simulated output must match, got {measured.shape} and {model.shape}")
     known = np.isfinite(measured)
     if not known.any():
-        raise HydrostateError("at least one measured sample is wanted, got none")
+        raise HydrostateError("at least one measured sample is needed, got none")
     return measured[known], model[known]

@@ -91,11 +91,11 @@ def channels_from(
     if not (np.isfinite(sample_time) and sample_time > 0.0):
         raise HydrostateError(f"sample_time must be positive and finite, got {sample_time!r}")
     if not kept.u or len(kept.u) != len(kept.y):
-        raise HydrostateError(f"as many inputs as outputs are wanted, got {len(kept.u)} and {len(kept.y)}")
+        raise HydrostateError(f"as many inputs as outputs are needed, got {len(kept.u)} and {len(kept.y)}")
     for one_u, one_y in zip(kept.u, kept.y, strict=True):
         if one_u.shape != (one_y.size, len(kept.inputs)):
             raise HydrostateError(
-                f"inputs {', '.join(inputs)} of shape {(one_y.size, len(kept.inputs))} are wanted beside "
+                f"inputs {', '.join(inputs)} of shape {(one_y.size, len(kept.inputs))} are needed beside "
                 f"{output!r}, got {one_u.shape}"
             )
         if not np.isfinite(one_u).all():

@@ -103,7 +103,7 @@ class HammersteinBody:
         """Return the body that `to_dict` wrote."""
         std = [np.inf if one is None else one for one in values["std"]]
         if values["bend"] not in KINDS:
-            raise ValueError(f"a nonlinearity among {', '.join(KINDS)} is wanted, got {values['bend']!r}")
+            raise ValueError(f"a nonlinearity among {', '.join(KINDS)} is needed, got {values['bend']!r}")
         linear = LinearBody.from_dict(values["linear"])
         return cls(str(values["bend"]), np.array(values["values"], dtype=np.float64), np.array(std), linear)
 

@@ -129,7 +129,7 @@ class FreeRunModel:
         inputs = inputs[:, None] if inputs.ndim == 1 else inputs
         if inputs.ndim != 2 or inputs.shape[1] != len(self.inputs):
             raise HydrostateError(
-                f"inputs {', '.join(self.inputs)} are wanted, shape (n, {len(self.inputs)}), got {inputs.shape}"
+                f"inputs {', '.join(self.inputs)} are needed, shape (n, {len(self.inputs)}), got {inputs.shape}"
             )
         by = self.scaling
         outputs = np.full(inputs.shape[0], np.nan) if y is None else np.asarray(y, dtype=np.float64)
@@ -215,7 +215,7 @@ class FreeRunModel:
         """
         if values.get("format") != FORMAT or int(values.get("version", 0)) > VERSION:
             raise HydrostateError(
-                f"a saved model of format {FORMAT!r}, version {VERSION} at most, is wanted, got "
+                f"a saved model of format {FORMAT!r}, version {VERSION} at most, is needed, got "
                 f"{values.get('format')!r}, version {values.get('version')}"
             )
         try:

@@ -42,7 +42,7 @@ def load_models(path: str | Path) -> list[FreeRunModel]:
     except OSError as error:
         raise HydrostateError(f"the model cannot be read: {error.strerror or error}", str(path)) from error
     except ValueError as error:
-        raise HydrostateError(f"a model in JSON is wanted: {error}", str(path)) from error
+        raise HydrostateError(f"a model in JSON is needed: {error}", str(path)) from error
     entries: list[Any] = content if isinstance(content, list) else [content]
     kept = [found for one in entries if isinstance(one, Mapping) and (found := _entry(one)) is not None]
     if not kept:

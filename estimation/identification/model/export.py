@@ -79,7 +79,7 @@ def from_dict(cls: "type[LinearModel]", values: Mapping[str, Any]) -> "LinearMod
         entry for name, entry in _ENTRIES.items() if entry not in values and name not in (*_LATE, *COVARIANCES[1:])
     ]
     if missing:
-        raise HydrostateError(f"entry {missing[0]!r} of a linear model is wanted, got {', '.join(values)}")
+        raise HydrostateError(f"entry {missing[0]!r} of a linear model is needed, got {', '.join(values)}")
     given: dict[str, Any] = {name: values[entry] for name, entry in _ENTRIES.items() if entry in values}
     given |= {name: float("nan") for name, value in given.items() if value is None}
     return cls(**given)

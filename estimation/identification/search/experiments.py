@@ -104,7 +104,7 @@ def experiments_from(u: Signals, y: Signals, names: tuple[str, str], *, n_excite
     input_name, output_name = names
     inputs, outputs = listed(u), listed(y)
     if len(inputs) != len(outputs):
-        raise HydrostateError(f"as many inputs as outputs are wanted, got {len(inputs)} and {len(outputs)}")
+        raise HydrostateError(f"as many inputs as outputs are needed, got {len(inputs)} and {len(outputs)}")
     for one_u, one_y in zip(inputs, outputs, strict=True):
         _require_signals(one_u, one_y, input_name, output_name)
     together = np.concatenate(outputs)

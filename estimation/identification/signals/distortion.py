@@ -137,7 +137,7 @@ def best_linear_approximation(
     inputs, outputs = (np.asarray(one, dtype=np.float64) for one in (u, y))
     if inputs.ndim != 1 or inputs.shape != outputs.shape or not (np.isfinite(inputs) & np.isfinite(outputs)).all():
         raise HydrostateError(
-            f"input and output of one length without gaps are wanted, got shapes {inputs.shape} and {outputs.shape}"
+            f"input and output of one length without gaps are needed, got shapes {inputs.shape} and {outputs.shape}"
         )
     length = find_period(inputs) if period is None else period
     if length is None:
@@ -147,7 +147,7 @@ def best_linear_approximation(
     periods = len(inputs) // length - settling
     if length < 8 or periods < 2:
         raise HydrostateError(
-            f"two periods of 8 samples or more are wanted after {settling}, got {periods} of {length}"
+            f"two periods of 8 samples or more are needed after {settling}, got {periods} of {length}"
         )
     first = len(inputs) - periods * length
     lines = slice(1, (length + 1) // 2)

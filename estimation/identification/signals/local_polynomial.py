@@ -82,13 +82,13 @@ def local_polynomial_response(u: ArrayLike, y: ArrayLike, sample_time: float) ->
     inputs, outputs = (np.asarray(one, dtype=np.float64) for one in (u, y))
     if inputs.ndim != 1 or inputs.shape != outputs.shape or not (np.isfinite(inputs) & np.isfinite(outputs)).all():
         raise HydrostateError(
-            f"input and output of one length without gaps are wanted, got shapes {inputs.shape} and {outputs.shape}"
+            f"input and output of one length without gaps are needed, got shapes {inputs.shape} and {outputs.shape}"
         )
     span = 2 * HALF_WIDTH + 1
     spectra = [np.fft.rfft(one - one.mean())[1 : (len(one) + 1) // 2] / len(one) ** 0.5 for one in (inputs, outputs)]
     count = len(spectra[0])
     if count < span:
-        raise HydrostateError(f"{2 * span + 2} samples or more are wanted, got {len(inputs)}")
+        raise HydrostateError(f"{2 * span + 2} samples or more are needed, got {len(inputs)}")
     begin = np.clip(np.arange(count) - HALF_WIDTH, 0, count - span)
     places = begin[:, None] + np.arange(span)
     distance = (places - np.arange(count)[:, None]) / HALF_WIDTH

@@ -147,9 +147,9 @@ def test_a_drive_that_is_no_steady_sine_is_refused() -> None:
 
 def test_a_log_that_lacks_something_is_refused() -> None:
     log = log_of(MOTOR, 0.2)
-    with pytest.raises(LogError, match="electrode_3_v is wanted"):
+    with pytest.raises(LogError, match="electrode_3_v is needed"):
         logged_signature(log.replace(electrode_3_v=None))
-    with pytest.raises(LogError, match=r"20 cycles of 480 Hz are wanted after the first 0\.1 s, got 9"):
+    with pytest.raises(LogError, match=r"20 cycles of 480 Hz are needed after the first 0\.1 s, got 9"):
         logged_signature(log_of(MOTOR, 0.12))
     with pytest.raises(LogError, match=r"longer than the 0\.1 s"):
         logged_signature(log_of(MOTOR, 0.08))

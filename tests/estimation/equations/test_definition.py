@@ -77,7 +77,7 @@ def test_names_that_do_not_fit_together_are_refused(changes: dict[str, Any], sai
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ((5.0, (0.0, 1.0)), "a start between its bounds 0 and 1 is wanted, got 5"),
+        ((5.0, (0.0, 1.0)), "a start between its bounds 0 and 1 is needed, got 5"),
         ((math.nan,), "a start must be a finite number, got nan"),
         (("1",), "a start must be a finite number, got '1'"),
         ((1.0, (2.0, 1.0)), "bounds must be a least and a larger value, got 2 and 1"),

@@ -226,14 +226,14 @@ def test_a_free_run_on_another_log_begins_where_that_begins(found: EquationsFit,
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (lambda log: log.replace(torque=None), "channel 'torque' is wanted, the log has angle"),
+        (lambda log: log.replace(torque=None), "channel 'torque' is needed; the log has angle"),
         (lambda log: log.replace(torque=np.where(np.arange(SAMPLES) == 5, np.nan, TORQUE)), "the first at 0.1 s"),
         (
             lambda log: log.replace(angle=np.full(SAMPLES, np.nan)),
             "output 'angle' must have two samples or more, got 0",
         ),
         (lambda log: log.replace(angle=np.full(SAMPLES, np.inf)), "output 'angle' must be finite or missing"),
-        (lambda log: log.slice(0, 4), "more samples than unknowns are wanted, got 4 for 5"),
+        (lambda log: log.slice(0, 4), "more samples than unknowns are needed, got 4 for 5"),
     ],
 )
 def test_a_log_that_cannot_be_used_is_refused(swing: Any, spoil: Callable[[Record], Record], said: str) -> None:

@@ -75,9 +75,9 @@ def test_missing_outputs_are_left_out(record: Record) -> None:
 
 
 def test_a_record_without_the_channels_is_refused(record: Record) -> None:
-    with pytest.raises(LogError, match="'motor_speed_rad_s' is wanted"):
+    with pytest.raises(LogError, match="'motor_speed_rad_s' is needed"):
         identify_record(record.replace(motor_speed_rad_s=None))
-    with pytest.raises(LogError, match="'velocity_m_s' is wanted"):
+    with pytest.raises(LogError, match="'velocity_m_s' is needed"):
         identify_record(record.replace(velocity_m_s=None, other=record["velocity_m_s"]))
     with pytest.raises(LogError, match="3 samples of 'position_m'"):
         identify_record(Record(1e-3, {"motor_speed_rad_s": np.ones(2), "position_m": np.ones(2)}))

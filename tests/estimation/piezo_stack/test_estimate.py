@@ -72,7 +72,7 @@ def test_every_unknown_is_a_parameter_and_every_channel_a_sensor() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"drive_voltage_v": None}, "drive_voltage_v is wanted"),
+        ({"drive_voltage_v": None}, "drive_voltage_v is needed"),
         ({"stack_displacement_m": np.append(np.nan, np.zeros(len(DRIVE) - 1))}, "must be whole, got 1 missing"),
     ],
 )

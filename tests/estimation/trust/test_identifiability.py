@@ -132,7 +132,7 @@ def test_the_fit_is_as_sure_as_the_card_says(steps: Card) -> None:
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"channels": []}, "a channel is wanted"),
+        ({"channels": []}, "a channel is needed"),
         ({"channels": ["pressure_a_pa"]}, "a channel must be one of position_m"),
         ({"channels": ["position_m", "position_m"]}, "once, got 'position_m'"),
         ({"unknowns": ["stroke"]}, "an unknown must be one of bulk_modulus, .* got 'stroke'"),

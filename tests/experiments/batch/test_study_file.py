@@ -34,7 +34,7 @@ def changed(**changes: Any) -> dict[str, Any]:
             "runs[0].methods[0].form must be one of acceleration, pressure",
         ),
         (changed(methods=[{"verb": "filter", "form": "pressure"}]), "runs[0].methods[0].method must be one of ekf, "),
-        ({"runs": GOOD["runs"]}, "name is wanted, and not there"),
+        ({"runs": GOOD["runs"]}, "name is needed, and not there"),
         ({"name": "a"}, "the file must have at least one [[runs]] or [[logs]], got none"),
         ({**GOOD, "log": []}, "log is unknown, did you mean 'logs'?"),
     ],
@@ -51,7 +51,7 @@ def test_every_study_that_comes_along_can_be_read() -> None:
 
 def test_a_file_that_is_no_toml_or_not_there_is_named(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text("name = ", encoding="utf-8")
-    for name, said in (("a.toml", "a TOML file is wanted"), ("b.toml", "cannot be read: No such file")):
+    for name, said in (("a.toml", "a TOML file is needed"), ("b.toml", "cannot be read: No such file")):
         with pytest.raises(StudyError, match=said) as caught:
             read_study(tmp_path / name)
         assert str(tmp_path / name) in str(caught.value)

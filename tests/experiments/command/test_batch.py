@@ -83,6 +83,7 @@ def test_cases_that_fail_are_named_and_the_exit_code_says_so(study: Path, tmp_pa
         (("batch", "nothing.toml"), "nothing.toml: cannot be read: No such file"),
         (("report", "nowhere"), "store nowhere: there is no batch study there"),
         (("compare", "nowhere", "nothing"), "store nowhere: there is no batch study there"),
+        (("compare", __file__, "b.csv"), "for two logs, run: hydrostate diagnose"),
         (("batch", "eha-paper", "--logs", "*.csv"), "--logs replaces the logs of a study, and eha-paper has none"),
     ],
 )

@@ -71,7 +71,7 @@ def test_after_a_long_gap_it_begins_again_and_says_so(log: Path, tmp_path: Path)
     run("-", "--state", state, given=header + "".join(rows[:1000]))
     _, told, said = run("-", "--state", state, given=header + "".join(rows[2500:]))
     assert told[0]["message"] == "begun"
-    assert "the stream does not go on at" in said
+    assert "the stream does not continue at" in said
 
 
 def test_noise_of_another_log_is_taken_where_one_is_named(log: Path) -> None:
@@ -95,7 +95,7 @@ def test_a_state_of_another_filter_actuator_or_rate_is_refused(log: Path, tmp_pa
     write_record(Record(2 * T, {name: bench()[name] for name in bench()}), slow)
     assert "is of 1000 Hz, the stream has 500 Hz" in run(slow, "--state", state)[2]
     state.write_text("no state")
-    assert "a state of hydrostate filter is wanted" in run(log, "--state", state)[2]
+    assert "a state of hydrostate filter is needed" in run(log, "--state", state)[2]
 
 
 @pytest.mark.parametrize(

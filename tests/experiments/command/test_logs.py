@@ -35,7 +35,7 @@ def hostile(folder: Path, good: Path) -> dict[str, Path]:
     """Write one file of every kind that must be refused, by a part of the sentence."""
     lines = good.read_text().splitlines()
     files = {
-        "a header line is wanted": b"",
+        "a header line is needed": b"",
         "at least 10 samples": (lines[0] + "\n").encode(),
         "column motor_speed_rad_s is missing": b"time_s,position_m\n" + b"".join(b"%d,1\n" % i for i in range(20)),
         "unit 'parsnip' is unknown": "\n".join(
@@ -50,7 +50,7 @@ def hostile(folder: Path, good: Path) -> dict[str, Path]:
         paths[sentence] = folder / f"hostile{number}.csv"
         paths[sentence].write_bytes(content)
     paths["there is no such file"] = folder / "none.csv"
-    paths["a file is wanted, got a directory"] = folder
+    paths["a file is needed, got a directory"] = folder
     return paths
 
 
@@ -204,7 +204,7 @@ def test_a_rigs_columns_that_a_log_lacks_are_named(good: Path) -> None:
 def test_a_column_asked_for_on_the_command_line_must_be_there(good: Path) -> None:
     done = invoke("estimate", good, "--columns", "position_m=POS_MM:mm", "--json")
     assert done.exit_code == 2
-    assert "column 'POS_MM' is wanted for position_m" in json.loads(done.stdout)[0]["message"]
+    assert "column 'POS_MM' is needed for position_m" in json.loads(done.stdout)[0]["message"]
 
 
 def test_the_command_line_goes_before_the_rig(good: Path) -> None:

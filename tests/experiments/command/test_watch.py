@@ -77,7 +77,7 @@ def test_foreign_columns_and_units_are_read_from_a_stream(log: Path) -> None:
 def test_a_stream_too_short_to_learn_from_says_so(log: Path) -> None:
     code, events, _ = _run("-", given="".join(log.read_text().splitlines(keepends=True)[:3000]))
     assert code == 0
-    assert "before enough was learnt" in events[-1]["message"]
+    assert "before learning was over" in events[-1]["message"]
 
 
 def test_a_broken_row_ends_the_watch_with_a_sentence(log: Path) -> None:

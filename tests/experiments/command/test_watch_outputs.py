@@ -143,7 +143,7 @@ def test_the_view_shows_gauges_values_and_events_and_no_control_character() -> N
     assert re.search(r"motion +still learning", shown)
     assert re.search(r"position_m +0\.25", shown)
     assert re.search(r"velocity_m_s +-", shown)
-    assert "ready: alarms can come from here on" in shown
+    assert "ready: learning is over, alarms are possible from now on" in shown
     assert "\x1b" not in shown
 
 

@@ -48,9 +48,9 @@ def test_a_condition_planted_in_an_fmu_is_found_in_its_log(fmu: Path, tmp_path: 
 @pytest.mark.parametrize(
     ("further", "said"),
     [
-        (("--plant", "lumped"), "--plant or --fmu is wanted, got both"),
+        (("--plant", "lumped"), "--plant or --fmu is needed, got both"),
         (("--parameter", "leak=3"), "the FMU has no variable 'leak'"),
-        (("--parameter", "leak"), "--parameter NAME=VALUE with a number is wanted, got 'leak'"),
+        (("--parameter", "leak"), "--parameter NAME=VALUE with a number is needed, got 'leak'"),
         (("--columns", "position_m=rod:mm"), "rod"),
     ],
 )

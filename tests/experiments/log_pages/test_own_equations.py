@@ -82,8 +82,8 @@ def test_a_free_run_follows_a_log_of_any_kind(found: Any, log: pd.DataFrame) -> 
 @pytest.mark.parametrize(
     ("slip", "said"),
     [
-        (lambda log: oven().fit(3), "a Log, a Record or a pandas.DataFrame is wanted, got int"),
-        (lambda log: oven().fit(), "a log is wanted to fit the equations to, got none"),
+        (lambda log: oven().fit(3), "a Log, a Record or a pandas.DataFrame is needed, got int"),
+        (lambda log: oven().fit(), "a log is needed to fit the equations to, got none"),
         (lambda log: oven().fit(log.reset_index(drop=True).iloc[[0, 1, 3, 7]]), "on a uniform clock"),
         (lambda log: oven().fit(log.assign(room="warm")), "a table of numbers by time"),
         (lambda log: oven(states="warm"), "states must be a mapping of names to units, or a list of names, got 'warm'"),

@@ -52,7 +52,7 @@ def test_position_is_preferred_and_its_absence_borne() -> None:
     velocity = 0.01 * np.sin(np.arange(3000) * 1e-3)
     log = Record(1e-3, {"motor_speed_rad_s": SPEED, "velocity_m_s": velocity})
     assert blocks_of(log).velocity == pytest.approx(velocity[:2990].reshape(-1, 10).mean(axis=1))
-    with pytest.raises(LogError, match="velocity_m_s or position_m is wanted, the log has motor_speed_rad_s"):
+    with pytest.raises(LogError, match="velocity_m_s or position_m is needed; the log has motor_speed_rad_s"):
         blocks_of(log.replace(velocity_m_s=None))
 
 

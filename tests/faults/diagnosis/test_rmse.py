@@ -124,7 +124,7 @@ def test_a_log_in_which_nothing_was_measured_cannot_be_scored() -> None:
 
 def test_a_log_without_motion_is_refused() -> None:
     bare = bench_log("normal", 0).replace(velocity_m_s=None, position_m=None)
-    with pytest.raises(LogError, match="velocity_m_s or position_m is wanted, the log has motor_speed_rad_s"):
+    with pytest.raises(LogError, match="velocity_m_s or position_m is needed; the log has motor_speed_rad_s"):
         score_mathematical(bare, BANK)
 
 

@@ -131,7 +131,7 @@ def test_it_is_cloned_kept_and_scored_as_any_other() -> None:
     [
         ({"unknown": 1.5}, "ab", "unknown must be a share between 0 and 1"),
         ({"merge": 3}, "ab", "merge must be a text, a mapping or a function"),
-        ({"merge": {"a": "c", "b": "c"}}, "ab", "two classes at least are wanted, got one class: c"),
+        ({"merge": {"a": "c", "b": "c"}}, "ab", "two classes at least are needed, got one class: c"),
     ],
 )
 def test_what_cannot_be_learnt_is_refused(arguments: dict[str, Any], labels: str, message: str) -> None:
@@ -148,7 +148,7 @@ def test_a_class_in_one_group_alone_cannot_be_judged() -> None:
 
 @pytest.mark.parametrize(("labels", "blocks"), [(9, 2), (10, 1), (10, 11)])
 def test_labels_and_blocks_that_do_not_fit_are_refused(labels: int, blocks: int) -> None:
-    with pytest.raises(HydrostateError, match="as many labels, and blocks from 2 to that are wanted"):
+    with pytest.raises(HydrostateError, match="as many labels, and blocks from 2 to that are needed"):
         Classifier().judge(np.zeros((10, 2)), np.arange(labels) % 2, blocks=blocks)
 
 

@@ -61,7 +61,7 @@ def test_columns_do_not_hang_on_the_other_runs() -> None:
 @pytest.mark.parametrize(
     ("runs", "options", "message"),
     [
-        (np.zeros((4, 60)), {}, r"shape \(runs, channels, samples\) is wanted"),
+        (np.zeros((4, 60)), {}, r"shape \(runs, channels, samples\) is needed"),
         (np.zeros((4, 2, 60)), {"channels": ["p"]}, "a name for each of 2 channels"),
         (np.zeros((4, 2, 60)), {"cycle": 1.0}, "without a cycle"),
         (np.zeros((4, 2, 6)), {}, "parts must lie between 1 and the samples of the shortest run, 6"),

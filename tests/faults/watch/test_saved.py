@@ -46,7 +46,7 @@ def test_a_watch_of_other_settings_and_a_file_that_is_none_are_refused(tmp_path:
         Watch(P, T, learning=60.0, pressure=False).resume(kept)
     wrong = tmp_path / "state.npz"
     wrong.write_text("no archive")
-    with pytest.raises(HydrostateError, match="a state of hydrostate watch is wanted"):
+    with pytest.raises(HydrostateError, match="a state of hydrostate watch is needed"):
         load_state(wrong)
     np.savez(wrong, format=np.array("another"))
     with pytest.raises(HydrostateError, match="none of this version"):

@@ -218,7 +218,7 @@ def test_impossible_parameters_are_refused(name: str, value: float | tuple[float
 
 
 def test_a_place_that_is_not_there_is_refused() -> None:
-    with pytest.raises(RigError, match="a place from 1 to 8 is wanted, got 9"):
+    with pytest.raises(RigError, match="a place from 1 to 8 is needed, got 9"):
         changed(HEALTHY.valve_leak, 9, 1.0)
 
 

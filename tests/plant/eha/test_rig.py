@@ -107,7 +107,7 @@ def test_every_parameter_refuses_text(tmp_path: Path, field: str) -> None:
         ("measured = [3]", r"measured\.0 must be a valid string, got 3"),
         (
             'measured = ["moving_mass"]\n[uncertainty]\nmoving_mass = 0.1',
-            r"uncertainty\.moving_mass and measured both say how well it is known, one is wanted",
+            r"uncertainty\.moving_mass and measured both say how well it is known, give one",
         ),
         ("[parameters]\npiston_area = -1.0", r"piston_area must be positive, got -1\.0"),
         ("[parameters]\npiston_area = inf", r"piston_area must be a finite number"),
@@ -117,8 +117,8 @@ def test_every_parameter_refuses_text(tmp_path: Path, field: str) -> None:
         ('[columns]\nposition = "P"', r"channel 'position' is unknown, did you mean 'position_m'"),
         ('[columns]\nposition_m = "P:bar"', r"unit 'bar' does not convert to 'm'"),
         ("[columns]\nposition_m = 3", r"columns\.position_m must be a valid string, got 3"),
-        ("[parameters", r"a TOML file is wanted"),
-        ("a = 1\na = 2", r"a TOML file is wanted"),
+        ("[parameters", r"a TOML file is needed"),
+        ("a = 1\na = 2", r"a TOML file is needed"),
     ],
 )
 def test_what_a_rig_cannot_hold_is_refused_with_file_and_field(tmp_path: Path, text: str, message: str) -> None:
@@ -131,7 +131,7 @@ def test_what_a_rig_cannot_hold_is_refused_with_file_and_field(tmp_path: Path, t
 def test_a_rig_that_is_not_there_or_no_text_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RigError, match="cannot be read: No such file"):
         read_rig(tmp_path / "rig.toml")
-    with pytest.raises(RigError, match="cannot be read: a regular file is wanted"):
+    with pytest.raises(RigError, match="cannot be read: a regular file is needed"):
         read_rig(tmp_path)
     (tmp_path / "rig.toml").write_bytes(b"\xff\xfe\x00\x01")
     with pytest.raises(RigError, match="TOML"):

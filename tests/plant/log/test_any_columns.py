@@ -50,7 +50,7 @@ def test_a_known_channel_in_another_unit_is_found_by_its_name(tmp_path: Path) ->
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("valv", "column 'valv' is wanted, the log has 't', 'valve', 'x', 'x'; did you mean 'valve'"), ("x", "2 times")],
+    [("valv", "column 'valv' is needed; the log has 't', 'valve', 'x', 'x'; did you mean 'valve'"), ("x", "2 times")],
 )
 def test_a_column_that_is_not_there_once_is_refused(name: str, said: str, tmp_path: Path) -> None:
     path = written(tmp_path / "a.csv", "t,valve,x,x", RAMP, RAMP, RAMP, RAMP)

@@ -42,15 +42,15 @@ def refused(path: Path, said: str) -> None:
 
 def test_a_pipe_and_a_socket_called_csv_are_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "x.csv")
-    refused(tmp_path / "x.csv", "a file is wanted, got a pipe")
+    refused(tmp_path / "x.csv", "a file is needed, got a pipe")
     place = Path(os.path.relpath(tmp_path / "s.csv")) if len(str(tmp_path)) < 90 else tmp_path / "s.csv"
     with socket.socket(socket.AF_UNIX) as one:
         one.bind(str(place))
-        refused(place, "a file is wanted, got a socket")
+        refused(place, "a file is needed, got a socket")
 
 
 def test_a_device_is_not_read() -> None:
-    refused(Path("/dev/zero"), "a file is wanted, got a device")
+    refused(Path("/dev/zero"), "a file is needed, got a device")
 
 
 PEAK = """

@@ -240,7 +240,7 @@ def test_a_clock_that_slips_by_part_of_a_sample_is_mended_though_a_sample_is_mis
 @pytest.mark.parametrize("count", [0, 1, 9])
 def test_fewer_than_ten_samples_are_refused(count: int) -> None:
     part = {"time_s": TIME, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY}
-    with pytest.raises(LogError, match=f"at least 10 samples are wanted, got {count}"):
+    with pytest.raises(LogError, match=f"at least 10 samples are needed, got {count}"):
         trusted({name: values[:count] for name, values in part.items()}, source="a.csv")
 
 

@@ -86,7 +86,7 @@ def test_a_foreign_name_may_hold_a_colon() -> None:
 @pytest.mark.parametrize(
     ("mapping", "message"),
     [
-        ({"position_m": "POS:mm"}, "column 'POS' is wanted for position_m, the log has 'X', 'X', 'Y'"),
+        ({"position_m": "POS:mm"}, "column 'POS' is needed for position_m; the log has 'X', 'X', 'Y'"),
         ({"position_m": "X:mm"}, "wanted once for position_m, the log has it 2 times"),
         ({"position_m": "Y:bar"}, "column 'Y' cannot become position_m: unit 'bar'"),
         ({"positon_m": "Y"}, "channel 'positon_m' is unknown, did you mean 'position_m'"),

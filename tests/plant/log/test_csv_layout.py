@@ -45,5 +45,5 @@ def test_dates_are_told_from_numbers() -> None:
 
 
 def test_blank_lines_alone_are_refused() -> None:
-    with pytest.raises(LogError, match="a header line is wanted, the file is empty"):
+    with pytest.raises(LogError, match="a header line is needed, the file is empty"):
         layout("", " ")

@@ -84,10 +84,10 @@ def test_a_broken_row_is_named(row: str, said: str) -> None:
 @pytest.mark.parametrize(
     ("lines", "said"),
     [
-        ([], "a header line is wanted"),
-        ([HEADER], "at least two rows are wanted"),
+        ([], "a header line is needed"),
+        ([HEADER], "at least two rows are needed"),
         ([HEADER, "5,1,1\n", "5,1,1\n"], "time_s must increase"),
-        (["motor_speed_rpm,position_mm\n", "1,1\n"], "a column time_s is wanted"),
+        (["motor_speed_rpm,position_mm\n", "1,1\n"], "a column time_s is needed"),
         (["time_furlong,position_mm\n", "1,1\n"], "cannot become time_s"),
     ],
 )

@@ -66,11 +66,11 @@ def test_a_blank_file_is_refused(tmp_path: Path, text: str) -> None:
 @pytest.mark.parametrize("end", ["", "\n", "\r\n"])
 def test_a_header_alone_is_refused(tmp_path: Path, end: str) -> None:
     (tmp_path / "run.csv").write_bytes((HEADER + end).encode())
-    refused(tmp_path / "run.csv", "at least 10 samples are wanted, got 0")
+    refused(tmp_path / "run.csv", "at least 10 samples are needed, got 0")
 
 
 def test_one_sample_is_refused(tmp_path: Path) -> None:
-    refused(log(tmp_path, rows=ROWS[:1]), "at least 10 samples are wanted, got 1")
+    refused(log(tmp_path, rows=ROWS[:1]), "at least 10 samples are needed, got 1")
 
 
 @pytest.mark.parametrize("name", ["time_s", "motor_speed_rad_s", "position_m"])
@@ -181,7 +181,7 @@ def test_two_columns_for_one_channel_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["run.csv", "run.parquet", "run.mat"])
 def test_a_directory_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()
-    refused(tmp_path / name, "a file is wanted, got a directory")
+    refused(tmp_path / name, "a file is needed, got a directory")
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.parquet", "run.mat", "no\0name.csv", "x" * 300 + ".csv"])

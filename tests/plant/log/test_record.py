@@ -121,7 +121,7 @@ def test_a_record_refuses_channels_of_different_lengths() -> None:
 
 
 def test_a_missing_channel_is_named_with_those_that_are_there() -> None:
-    with pytest.raises(LogError, match="'position_m' is wanted, the record has velocity_m_s"):
+    with pytest.raises(LogError, match="'position_m' is needed; the record has velocity_m_s"):
         Record(1e-3, {"velocity_m_s": RAMP})["position_m"]
 
 

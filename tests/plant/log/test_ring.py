@@ -70,7 +70,7 @@ def test_what_is_no_ring_is_refused(tmp_path: Path) -> None:
     struct.pack_into("<I", content, 12, 11)
     (tmp_path / "cut").write_bytes(content)
     (tmp_path / "text").write_text("time_s\n0.0\n" * 1000)
-    for name, said in (("cut", "another size than the file"), ("text", "a ring is wanted"), ("none", "cannot be read")):
+    for name, said in (("cut", "another size than the file"), ("text", "a ring is needed"), ("none", "cannot be read")):
         with pytest.raises(LogError, match=said):
             RingReader(tmp_path / name)
     with pytest.raises(HydrostateError, match=r"a stream must be .* or ring:PATH"):

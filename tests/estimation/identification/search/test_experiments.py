@@ -34,7 +34,7 @@ def test_gaps_are_bridged_for_starts_only() -> None:
 
 def test_one_output_for_each_input_is_wanted() -> None:
     u = np.arange(40.0) % 7
-    with pytest.raises(HydrostateError, match="as many inputs as outputs are wanted, got 2 and 1"):
+    with pytest.raises(HydrostateError, match="as many inputs as outputs are needed, got 2 and 1"):
         experiments_from([u, u], [u], **WANTED)
 
 

@@ -90,7 +90,7 @@ def test_the_period_is_found_and_a_walk_has_none() -> None:
         (lambda: local_polynomial_response(np.zeros(100), np.zeros(90), 1.0), "of one length without gaps"),
         (
             lambda: local_polynomial_response(np.arange(20.0), np.arange(20.0), 1.0),
-            "28 samples or more are wanted, got 20",
+            "28 samples or more are needed, got 20",
         ),
         (lambda: local_polynomial_response(np.zeros(100), np.ones(100), 1.0), "must hold all frequencies"),
         (lambda: best_linear_approximation(np.arange(99.0), np.arange(99.0), 1.0), "does not repeat itself"),
