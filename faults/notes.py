@@ -71,12 +71,15 @@ class AdviceCode(Code):
     MOVE_PISTON = "use steps that move the piston: this log cannot show friction"
     MORE_SPEEDS = (
         "hold two or more motor speeds (hydrostate simulate --drive steps shows how): this log holds {speeds}, too few "
-        "to separate leakage from flow bias"
+        "to separate leakage from flow bias (a constant loss of the pump)"
     )
     LOG_LONGER = (
         "log 10 s or more of steps at several speeds: this log of {duration_s:.3g} s leaves more than one condition "
         "possible"
     )
     CONDITIONS_OPEN = "log again with larger steps: this log leaves more than one condition possible"
-    CLOSER_SPEEDS = "also log slower speeds: with {speeds} speeds, leakage and flow bias still look alike"
+    CLOSER_SPEEDS = (
+        "also log slower speeds: with {speeds} speeds, leakage and flow bias (a constant loss of the pump) still look "
+        "alike"
+    )
     NOTHING = "no further measurement is needed: this log is conclusive"

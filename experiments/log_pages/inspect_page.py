@@ -38,7 +38,7 @@ def inspect_page(result: Mapping[str, Any], tables: "Sequence[TableFacts]") -> s
     rows = [row for one in result["tables"] for row in one["columns"]]
     facts = {
         "result": result,
-        "title": "What the log holds",
+        "title": "What the log contains",
         "message": f"{result['message'][:1].upper()}{result['message'][1:]}.",
         "block": block_of(result["columns"]),
         "most": MOST_COLUMNS,
