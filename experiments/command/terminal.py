@@ -219,7 +219,7 @@ class _KernelNotice(logging.Handler):
             note(f"warning: {record.getMessage()}")
         elif not self.said:
             self.said = True
-            note("compiling kernels, once: this takes some seconds, later runs find them compiled")
+            note("compiling kernels: this takes some seconds, only in the first run")
 
 
 @contextmanager
