@@ -93,7 +93,7 @@ def test_a_state_of_another_filter_actuator_or_rate_is_refused(log: Path, tmp_pa
     assert "of an actuator with other parameters" in run(log, "--state", state, "--rig", rig)[2]
     slow = tmp_path / "slow.csv"
     write_record(Record(2 * T, {name: bench()[name] for name in bench()}), slow)
-    assert "is of 1000 Hz, the stream has 500 Hz" in run(slow, "--state", state)[2]
+    assert "was saved at 1000 Hz, but the stream has 500 Hz" in run(slow, "--state", state)[2]
     state.write_text("no state")
     assert "a state of hydrostate filter is needed" in run(log, "--state", state)[2]
 

@@ -38,11 +38,13 @@ def test_the_terminal_shows_columns_guesses_block_and_option(strange: Path) -> N
 
 def test_the_rig_file_that_it_writes_reads_the_log(strange: Path, tmp_path: Path) -> None:
     rig = tmp_path / "rig.toml"
-    assert invoke(strange, "--write", rig).exit_code == 0
+    written = invoke(strange, "--write", rig)
+    assert written.exit_code == 0
+    assert f"run: hydrostate diagnose {strange} --rig {rig}" in written.stderr
     assert read_rig(rig).columns["motor_speed_rad_s"] == "Drehzahl [U/min]:U/min"
     assert tomllib.loads(rig.read_text())["columns"].keys() >= {"time_s", "position_m"}
     again = invoke(strange, "--write", rig)
-    assert "it is not overwritten" in again.stderr
+    assert "is not overwritten" in again.stderr
 
 
 def test_json_says_how_sure_each_guess_is_and_why(strange: Path) -> None:

@@ -108,7 +108,7 @@ def test_a_healthy_log_of_another_rate_is_refused(log: Path, tmp_path: Path) -> 
     write_record(Record(2 * T, dict(_channels(_record(leak_from=np.inf, seconds=10.0)))), other)
     code, _, error = _run(str(log), "--healthy", str(other))
     assert code == 2
-    assert "the rate of what is watched, 200 Hz, got 100 Hz" in error
+    assert "the sample rate of the stream, 200 Hz, got 100 Hz" in error
 
 
 def _channels(record: Record) -> dict[str, np.ndarray]:
