@@ -15,8 +15,8 @@ class AgainstCode(Code):
         "the ratio of pump flow to piston flow is {percent:+.0f} % off the rig file: motor speed or position reads "
         "wrong, or the rig file is of another actuator"
     )
-    SPEED_BIAS = "motor speed has an offset of {bias_rad_s:+.3g} rad/s"
-    PRESSURE_BIAS = "differential pressure has an offset of {bias_pa:+.3g} Pa"
+    SPEED_BIAS = "motor speed reads wrong by {bias_rad_s:+.3g} rad/s"
+    PRESSURE_BIAS = "differential pressure reads wrong by {bias_pa:+.3g} Pa"
     OIL_SOFT = "the oil's bulk modulus is {share:.2f} times that in the rig file: air in the oil, or a soft hose"
     OIL_STIFF = "the oil's bulk modulus is {share:.2f} times that in the rig file: another oil, or a wrong rig file"
     OUTSIDE_CONDITIONS = "the actuator that fits best is in none of the nine conditions, nor between them"

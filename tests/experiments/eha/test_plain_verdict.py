@@ -50,10 +50,10 @@ def test_a_fault_says_what_it_costs_and_since_when() -> None:
 
 
 def test_an_unknown_log_gets_no_verdict_no_work_and_its_reasons() -> None:
-    result = said_of("minor_leakage", unknown=True, reasons=["motor speed has an offset of 3 rad/s"])
+    result = said_of("minor_leakage", unknown=True, reasons=["motor speed reads wrong by 3 rad/s"])
     assert verdict(result).startswith("No verdict")
     assert what_to_do(result) == ["Log again."]
-    assert "motor speed has an offset of 3 rad/s" in sureness(result)
+    assert "motor speed reads wrong by 3 rad/s" in sureness(result)
 
 
 def test_a_fault_that_is_none_of_the_nine_is_the_verdict_and_its_numbers_are_doubted() -> None:

@@ -40,7 +40,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     texts = {
         "diagnosis": diagnosis_page({**rig, **diagnosis_entries(found)}, found, log),
         "unknown": diagnosis_page(
-            {**rig, **diagnosis_entries(found), "unknown": True, "reasons": ["motor speed has an offset"]},
+            {**rig, **diagnosis_entries(found), "unknown": True, "reasons": ["motor speed reads wrong"]},
             replace(found, unknown=True),
             log,
         ),
