@@ -34,7 +34,7 @@ def test_every_column_of_numbers_is_read_where_none_is_named(tmp_path: Path) -> 
 def test_a_log_without_time_takes_the_sample_time_or_says_that_it_is_assumed(tmp_path: Path) -> None:
     path = written(tmp_path / "a.csv", "u,y", RAMP, RAMP)
     assert read_any(path, sample_time=4.0).sample_time == 4.0
-    with pytest.warns(LogWarning, match="no column of time"):
+    with pytest.warns(LogWarning, match="no time column"):
         assert read_any(path).sample_time == 1.0
 
 

@@ -87,7 +87,7 @@ def test_a_foreign_name_may_hold_a_colon() -> None:
     ("mapping", "message"),
     [
         ({"position_m": "POS:mm"}, "column 'POS' is needed for position_m; the log has 'X', 'X', 'Y'"),
-        ({"position_m": "X:mm"}, "wanted once for position_m, the log has it 2 times"),
+        ({"position_m": "X:mm"}, "needed once for position_m, the log has it 2 times"),
         ({"position_m": "Y:bar"}, "column 'Y' cannot become position_m: unit 'bar'"),
         ({"positon_m": "Y"}, "channel 'positon_m' is unknown, did you mean 'position_m'"),
     ],
@@ -112,7 +112,7 @@ def test_command_line_columns_are_parsed() -> None:
         (["position_m="], "CHANNEL=NAME:UNIT"),
         (["=POS"], "CHANNEL=NAME:UNIT"),
         (["position_m=:mm"], "wants a column"),
-        (["position_m=A", "position_m=B"], "wanted once"),
+        (["position_m=A", "position_m=B"], "needed once"),
         (["position=A"], "did you mean 'position_m'"),
         (["position_m=A:bar"], "does not convert to 'm'"),
         (["position_m=A:"], "unit ''"),
