@@ -150,14 +150,20 @@ Kind: TypeAlias = Annotated[str, option("KIND", "c, or mat for MATLAB.", "--to")
 
 @commands.command(epilog="Example: hydrostate export model speed_to_pressure.json --to c --out controller")
 def model(
-    saved: Annotated[Path, typer.Argument(metavar="MODEL", help="A model that `hydrostate identify --out` saved.")],
+    saved: Annotated[
+        Path, typer.Argument(metavar="MODEL", help="A model from `hydrostate identify --input U --output Y --out`.")
+    ],
     out: Folder = Path("controller"),
     to: Kind = "c",
     precision: Annotated[str, option("TYPE", "double or float.")] = "double",
     name: Annotated[str | None, option("NAME", "Name of the files, types and functions.", show_default="model")] = None,
     as_json: Json = False,
 ) -> None:
-    """Write an identified linear model as C99, a difference equation, or as a MAT file."""
+    """Write an identified linear model as C99 (a difference equation) or as a MAT file.
+
+    In MATLAB, for a model of one input: load model.mat, then tf(numerator, denominator, sample_time_s, 'Variable',
+    'z^-1').
+    """
     from estimation.export.c_model import model_in_c
     from estimation.export.mat_model import model_in_mat
     from estimation.identification.free_run.saved import load_models
