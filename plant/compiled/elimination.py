@@ -9,7 +9,7 @@ Walther 2008, Evaluating Derivatives, section 9).
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from plant.compiled.expression import ONE, ZERO, Expression, local_derivatives, ordered, select
+from plant.compiled.expression import ONE, ZERO, Expression, ordered, select, slopes_of
 
 Edges: TypeAlias = dict[int, dict[int, Expression]]
 """``edges[a][b]``: the derivative by which a hangs on b, or on which b hangs."""
@@ -23,7 +23,7 @@ def eliminated_jacobian(outputs: Sequence[Expression], inputs: Sequence[Expressi
     Parameters
     ----------
     inputs : sequence of Expression
-        Symbols.
+        Symbols, or other nodes: what these are computed from then counts as constant.
 
     Returns
     -------
@@ -45,10 +45,9 @@ def _local_edges(outputs: Sequence[Expression], inputs: Sequence[Expression]) ->
     """Return what hangs on what, for all that hangs on an input; output i is the node -1 - i."""
     operands: Edges = {id(item): {} for item in inputs}
     uses: Edges = {id(item): {} for item in inputs}
-    for item in ordered(outputs):
-        if not item.arguments:
-            continue
-        for argument, slope in zip(item.arguments, local_derivatives(item), strict=True):
+    sources = set(operands)
+    for item in ordered(outputs, by_slopes=True):
+        for argument, slope in () if id(item) in sources else slopes_of(item):
             if id(argument) in uses and slope is not ZERO:
                 _join(operands.setdefault(id(item), {}), id(argument), slope)
                 uses.setdefault(id(item), {})

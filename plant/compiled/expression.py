@@ -21,6 +21,8 @@ class Expression:
         ``symbol``, ``constant``, a comparison, or another operation that `plant.compiled.source` can spell.
     value : float or str
         A constant's value [any unit], or a symbol's name.
+    slopes : tuple of (Expression, Expression)
+        What it hangs on where derivatives are taken, each with its derivative by that; nothing: its arguments.
 
     Raises
     ------
@@ -31,6 +33,7 @@ class Expression:
     operation: str
     arguments: tuple["Expression", ...]
     value: float | str = 0.0
+    slopes: tuple[tuple["Expression", "Expression"], ...] = ()
 
     def __add__(self, other: "Expression | Number") -> "Expression":
         b = as_expression(other)
@@ -119,24 +122,32 @@ class Expression:
         raise TypeError("a model must choose with where(condition, a, b), not with if: its values are symbols here")
 
 
-_NODES: dict[tuple[str, tuple[int, ...], float | str], Expression] = {}
+_NODES: dict[tuple[str, tuple[int, ...], float | str, tuple[int, ...]], Expression] = {}
 
 
-def node(operation: str, *arguments: Expression, value: float | str = 0.0) -> Expression:
+def node(
+    operation: str,
+    *arguments: Expression,
+    value: float | str = 0.0,
+    slopes: tuple[tuple[Expression, Expression], ...] = (),
+) -> Expression:
     """Return the one node for this operation on these arguments.
 
     Parameters
     ----------
     value : float or str
         A constant's value [any unit], or a symbol's name.
+    slopes : tuple of (Expression, Expression)
+        See `Expression`.
 
     Returns
     -------
     Expression
         The node, made on first use.
     """
-    key = (operation, tuple(id(argument) for argument in arguments), value)
-    return _NODES.setdefault(key, Expression(operation, arguments, value))
+    known = tuple(id(one) for pair in slopes for one in pair)
+    key = (operation, tuple(id(argument) for argument in arguments), value, known)
+    return _NODES.setdefault(key, Expression(operation, arguments, value, slopes))
 
 
 def constant(value: float) -> Expression:
@@ -197,13 +208,15 @@ def select(condition: Expression, a: Expression, b: Expression) -> Expression:
     return a if a is b else node("where", condition, a, b)
 
 
-def ordered(outputs: Iterable[Expression]) -> list[Expression]:
+def ordered(outputs: Iterable[Expression], *, by_slopes: bool = False) -> list[Expression]:
     """Return every node that the outputs need, operands before results.
 
     Parameters
     ----------
     outputs : iterable of Expression
         What is wanted in the end.
+    by_slopes : bool
+        Whether a node needs what its derivatives are by, rather than what it is computed from.
 
     Returns
     -------
@@ -220,7 +233,8 @@ def ordered(outputs: Iterable[Expression]) -> list[Expression]:
         elif id(item) not in seen:
             seen.add(id(item))
             stack.append((item, True))
-            stack.extend((argument, False) for argument in reversed(item.arguments) if id(argument) not in seen)
+            below = [one for one, _ in item.slopes] if by_slopes and item.slopes else item.arguments
+            stack.extend((argument, False) for argument in reversed(below) if id(argument) not in seen)
     return order
 
 
@@ -270,6 +284,13 @@ def local_derivatives(item: Expression) -> Sequence[Expression]:
             raise NotImplementedError(f"operation {item.operation!r} has no derivative yet")
 
 
+def slopes_of(item: Expression) -> Sequence[tuple[Expression, Expression]]:
+    """Return what a node's derivatives are by, each with the derivative."""
+    if item.slopes or not item.arguments:
+        return item.slopes
+    return tuple(zip(item.arguments, local_derivatives(item), strict=True))
+
+
 def jacobian(outputs: Sequence[Expression], inputs: Sequence[Expression]) -> list[list[Expression]]:
     """Differentiate every output with respect to every input, with sign() and where() held constant.
 
@@ -283,16 +304,14 @@ def jacobian(outputs: Sequence[Expression], inputs: Sequence[Expression]) -> lis
     list of list of Expression
         ``result[i][j]`` is the derivative of output i by input j; `ZERO` where it vanishes structurally.
     """
-    order = ordered(outputs)
-    locals_of = {id(item): local_derivatives(item) for item in order if item.arguments}
+    order = ordered(outputs, by_slopes=True)
+    locals_of = {id(item): slopes_of(item) for item in order}
     columns: list[dict[int, Expression]] = []
     for variable in inputs:
         tangent: dict[int, Expression] = {id(variable): ONE}
         for item in order:
-            if not item.arguments:
-                continue
             total: Expression = ZERO
-            for argument, local in zip(item.arguments, locals_of[id(item)], strict=True):
+            for argument, local in locals_of[id(item)]:
                 inner = tangent.get(id(argument), ZERO)
                 if inner is not ZERO and local is not ZERO:
                     total = total + _chain(item, local, inner)
@@ -304,7 +323,7 @@ def jacobian(outputs: Sequence[Expression], inputs: Sequence[Expression]) -> lis
 
 def _chain(item: Expression, local: Expression, inner: Expression) -> Expression:
     """Multiply by a local derivative; a choice chooses the tangent rather than multiplying it by 0 or 1."""
-    if item.operation != "where":
+    if item.operation != "where" or item.slopes:
         return local * inner
     condition = item.arguments[0]
     chosen = local.arguments[1] is ONE
