@@ -1,6 +1,6 @@
 """The piston's friction, as a force law and as the implicit step that really sticks."""
 
-from plant.compiled.functions import Scalar, absolute, maximum, sign, sqrt
+from plant.compiled.functions import Scalar, absolute, sqrt, where
 
 
 def quadratic_friction(
@@ -61,5 +61,36 @@ def velocity_under_friction(push: Scalar, resistance: Scalar, quadratic: Scalar,
     >>> round(1e4 * v - 6.589e4 * v * v - 436.0, 9)
     -900.0
     """
-    excess = maximum(absolute(push) - coulomb, 0.0)
-    return sign(push) * 2.0 * excess / (resistance + sqrt(resistance**2 + 4.0 * quadratic * excess))
+    return sliding(push, resistance, quadratic, coulomb)[0]
+
+
+def sliding(push: Scalar, resistance: Scalar, quadratic: Scalar, coulomb: Scalar) -> tuple[Scalar, Scalar]:
+    """Solve what `velocity_under_friction` solves, and say how far the velocity gives way.
+
+    Parameters
+    ----------
+    push : float or Expression
+        Driving force, with the momentum carried in by the step [N].
+    resistance : float or Expression
+        Everything proportional to the new velocity [N s/m], positive.
+    quadratic : float or Expression
+        Quadratic friction a_1 [N s^2/m^2].
+    coulomb : float or Expression
+        Coulomb friction a_3 [N].
+
+    Returns
+    -------
+    tuple of (float or Expression, float or Expression)
+        New velocity [m/s]; and half the force that a change of velocity takes while it slides [N s/m].
+
+    Examples
+    --------
+    >>> v, stiff = sliding(900.0, 1e4, 6.589e4, 436.0)
+    >>> more, _ = sliding(900.0 + 2.0 * stiff * 1e-6, 1e4, 6.589e4, 436.0)
+    >>> round(float(more - v), 12)
+    1e-06
+    """
+    half = 0.5 * resistance
+    excess = where(push > 0.0, push - coulomb, push + coulomb)
+    root = sqrt(half * half + quadratic * absolute(excess))
+    return where(absolute(push) <= coulomb, 0.0, excess / (half + root)), root

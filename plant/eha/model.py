@@ -8,10 +8,11 @@ pressure as a state, so that friction enters undifferentiated and the piston rea
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from plant.compiled.functions import Scalar, absolute, sign, where
-from plant.components.friction import quadratic_friction, velocity_under_friction
+from plant.compiled.hints import following, frozen, late_in, waypoint
+from plant.components.friction import quadratic_friction, sliding
 from plant.components.valves import pumped_flow, relief_flow
 from plant.errors import RigError
 from plant.solvers.steps import GAMMA, parameter_names
@@ -230,7 +231,7 @@ def lumped_step(
     """Advance the lumped model by one L-stable implicit step, with friction as a set-valued law (errata E9).
 
     Each of the two stages of the SDIRK2 scheme is an implicit Euler step, which for these equations is a quadratic
-    in the new velocity and solved in closed form (`velocity_under_friction`). When the first stage ends stuck, the
+    in the new velocity and solved in closed form (`sliding`). When the first stage ends stuck, the
     second starts from rest: friction has absorbed the momentum.
 
     Parameters
@@ -257,40 +258,79 @@ def lumped_step(
     """
     start, end = speeds
     h = GAMMA * step
-    first = _implicit_stage(state, start + GAMMA * (end - start), p, h)
+    x, v, dp = state
+    _, first, pressure = _implicit_stage(state, start + GAMMA * (end - start), p, h)
     ratio = (1.0 - GAMMA) / GAMMA
-    x, v, dp = (y + ratio * (y1 - y) for y, y1 in zip(state, first, strict=True))
-    moving = absolute(first[1]) > 0.0
-    return _implicit_stage((x, where(moving, v, 0.0), dp), end, p, h)
+    momentum_left = where(absolute(first) > 0.0, (1.0 - ratio) * v, 0.0)
+    base = waypoint(x + ratio * (h * first)), waypoint(momentum_left + ratio * first), dp + ratio * (pressure - dp)
+    return _implicit_stage((*base[:2], waypoint(base[2])), end, p, h, first)
+
+
+class _Solved(NamedTuple):
+    """A stage with its valve shut or open; ``held`` and ``filled`` say by how much pressure gives way.
+
+    Without the piston's motion pressure would be ``filled / held``.
+    """
+
+    held: Scalar
+    filled: Scalar
+    velocity: Scalar
+    root: Scalar
 
 
 def _implicit_stage(
-    base: tuple[Scalar, Scalar, Scalar], speed: Scalar, p: EhaValues, h: Scalar
+    base: tuple[Scalar, Scalar, Scalar], speed: Scalar, p: EhaValues, h: Scalar, late: Scalar = None
 ) -> tuple[Scalar, Scalar, Scalar]:
-    """Solve ``y = base + h f(y)`` of the lumped model, with the relief valve shut, then open if the answer says so."""
-    _, _, shut = _stage_with_relief(base, speed, p, h, 0.0, 0.0)
-    opens = absolute(shut) > p.relief_pressure
-    conductance = where(opens, p.relief_conductance, 0.0)
-    return _stage_with_relief(base, speed, p, h, conductance, sign(shut) * conductance * p.relief_pressure)
+    """Solve ``y = base + h f(y)`` of the lumped model, with the relief valve shut, then open if the answer says so.
+
+    ``late`` is what the base is affine in and comes last.
+    """
+    A, L, C = p.piston_area, p.leakage_coefficient, p.relief_conductance
+    pumped = pumped_flow(speed, p.pump_displacement, p.flow_bias)
+    shut = _solved(base, L, pumped, p, h, late)
+    pressure = shut.filled - h * p.bulk_modulus / p.chamber_volume * A * shut.velocity
+    opens = absolute(pressure) > p.relief_pressure * shut.held
+    offset = C * p.relief_pressure
+    relieving = pumped + where(pressure > 0.0, offset, -offset)
+    opened = _solved(base, L + C, relieving, p, h, late)
+    chosen = _Solved(*(where(opens, a, b) for a, b in zip(opened, shut, strict=True)))
+    return _with_slopes(base, chosen, where(opens, L + C, L), where(opens, relieving, pumped), p, h)
 
 
-def _stage_with_relief(
-    base: tuple[Scalar, Scalar, Scalar],
-    speed: Scalar,
-    p: EhaValues,
-    h: Scalar,
-    conductance: Scalar,
-    offset: Scalar,
-) -> tuple[Scalar, Scalar, Scalar]:
-    """Solve the stage with relief flow ``conductance * dp - offset``."""
+def _solved(
+    base: tuple[Scalar, Scalar, Scalar], leaking: Scalar, delivered: Scalar, p: EhaValues, h: Scalar, late: Scalar
+) -> _Solved:
+    """Solve the stage with a flow ``delivered - leaking * dp`` into the chambers.
+
+    The force balance is multiplied by ``held``, so that no division waits for another.
+    """
     x, v, dp = base
     A, M = p.piston_area, p.moving_mass
-    pumped = pumped_flow(speed, p.pump_displacement, p.flow_bias)
-    stiffness = h * p.bulk_modulus / p.chamber_volume
-    held = 1.0 + stiffness * (p.leakage_coefficient + conductance)
-    blocked_pressure = (dp + stiffness * (pumped + offset)) / held
-    pressure_drop = stiffness * A / held
-    push = M / h * v + A * blocked_pressure - load_on_rod(x, p)
-    resistance = M / h + p.friction_linear + A * pressure_drop + h * p.load_stiffness
-    new_v = velocity_under_friction(push, resistance, p.friction_quadratic, p.friction_coulomb)
-    return x + h * new_v, new_v, blocked_pressure - pressure_drop * new_v
+    compliance = h * p.bulk_modulus / p.chamber_volume
+    held = 1.0 + compliance * leaking
+    filled = dp + compliance * delivered
+    push = late_in((M / h * v - load_on_rod(x, p)) * held + A * filled, late)
+    resistance = (M / h + p.friction_linear + h * p.load_stiffness) * held + compliance * A * A
+    return _Solved(held, filled, *sliding(push, resistance, p.friction_quadratic * held, p.friction_coulomb * held))
+
+
+def _with_slopes(
+    base: tuple[Scalar, Scalar, Scalar], solved: _Solved, leaking: Scalar, delivered: Scalar, p: EhaValues, h: Scalar
+) -> tuple[Scalar, Scalar, Scalar]:
+    """Return the stage's state, with derivatives from the balances of force and flow that it solves."""
+    x, v, dp = base
+    A, M, a1, a2, a3 = p.piston_area, p.moving_mass, p.friction_quadratic, p.friction_linear, p.friction_coulomb
+    held, filled, new_v, root = solved
+    compliance = h * p.bulk_modulus / p.chamber_volume
+
+    u, area = frozen(new_v), frozen(A)
+    pressure = frozen((filled - compliance * A * u) / held)
+    flow = (delivered - leaking * dp - A * u) / held
+    stored = compliance * following(flow, (delivered - leaking * pressure - A * u, 1.0))
+    force = M / h * (v - u) + A * pressure - load_on_rod(x + h * u, p) - quadratic_friction(u, sign(u), a1, a2, a3)
+    balance = waypoint(waypoint(0.5 * (frozen(held) * force + area * dp)) + 0.5 * area * stored)
+    new_v = waypoint(following(new_v, (balance, where(absolute(u) <= 0.0, 0.0, 1.0 / root))))
+
+    flow = following(flow, (delivered - leaking * pressure - A * new_v, 1.0))
+    new_dp = following((filled - compliance * A * new_v) / held, (dp + compliance * flow, 1.0 / held))
+    return x + h * new_v, new_v, new_dp

@@ -6,7 +6,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from faults.conditions import FRICTION_TABLE, FrictionLevel
-from plant.components.friction import quadratic_friction, velocity_under_friction
+from plant.components.friction import quadratic_friction, sliding, velocity_under_friction
 
 PUSHES = st.floats(-2e4, 2e4)
 RESISTANCES = st.floats(1e3, 1e7)
@@ -76,3 +76,12 @@ def test_minor_friction_dips_to_488_newton_at_3_millimetres_a_second() -> None:
     force = quadratic_friction(v, 1.0, level.friction_quadratic, level.friction_linear, level.friction_coulomb)
     assert np.min(force) == pytest.approx(488.1, abs=0.05)  # errata E12
     assert v[np.argmin(force)] == pytest.approx(3.2e-3, abs=5e-5)
+
+
+@given(PUSHES, RESISTANCES, QUADRATICS, COULOMBS)
+def test_half_the_force_of_a_change_of_velocity_is_that_of_the_law(
+    push: float, resistance: float, quadratic: float, coulomb: float
+) -> None:
+    v, half = (float(one) for one in sliding(push, resistance, quadratic, coulomb))
+    if v:
+        assert 2.0 * half == pytest.approx(resistance + 2.0 * quadratic * abs(v), rel=1e-12)

@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from faults.conditions import CONDITIONS, Condition, parameters_for
+from plant.compiled.elimination import eliminated_jacobian
+from plant.compiled.expression import symbol
 from plant.eha.model import EhaParameters, lumped_derivative, lumped_step, pressure_rate, reduced_derivative
 from plant.errors import RigError
-from plant.solvers.steps import parameter_row
+from plant.solvers.steps import parameter_names, parameter_row, parameter_symbols
 from plant.solvers.trajectory import compile_trajectory
+from tests.kernels import computed
 
 Array = NDArray[np.float64]
 RIG = EhaParameters()
@@ -253,3 +256,26 @@ def test_the_lumped_step_agrees_with_an_event_driven_solution(condition: Conditi
     assert np.any(got[:, 1] > 0.0)
     relative = np.sqrt(np.mean((got - wanted) ** 2, axis=0) / np.mean(wanted**2, axis=0))
     assert np.all(relative < 1e-4)
+
+
+@pytest.mark.parametrize(
+    "state",
+    [(3e-3, 0.02, 6e5), (-3e-3, -0.025, -6e5), (0.0, 0.0, 1e5), (0.01, 0.04, 4e6), (0.01, 0.0, -4e6)],
+    ids=["slides", "slides back", "sticks", "relieves", "relieves, held fast"],
+)
+def test_the_steps_derivatives_are_those_of_its_values(state: tuple[float, float, float]) -> None:
+    names = parameter_names(EhaParameters)
+    p = replace(RIG, load_stiffness=2e4, friction_coulomb=1e4 if state[1] == 0.0 else 436.0)
+    values = dict(zip((*"xvd", *names), (*state, *parameter_row(p).tolist()), strict=True))
+    inputs = [symbol(name) for name in values]
+    stepped = lumped_step(tuple(inputs[:3]), (90.0, 95.0), parameter_symbols(EhaParameters), STEP)
+    slopes = eliminated_jacobian(stepped, inputs)
+    told = computed({f"{i} {name}": row[k] for i, row in enumerate(slopes) for k, name in enumerate(values)}, **values)
+    outputs = {str(i): value for i, value in enumerate(stepped)}
+    for name in values:
+        d = 1e-6 * max(abs(values[name]), {"x": 1e-2, "v": 1e-2, "d": 1e5}.get(name, 1e-9))
+        if np.isfinite(d):
+            up, down = (computed(outputs, **(values | {name: values[name] + sign * d})) for sign in (1.0, -1.0))
+            for i, size in enumerate((1e-2, 1e-2, 1e6)):
+                seen = (up[str(i)] - down[str(i)]) / (2.0 * d)
+                assert told[f"{i} {name}"] == pytest.approx(seen, rel=2e-5, abs=1e-9 * size / d), (i, name)
