@@ -13,6 +13,7 @@ from estimation.engine.rule import Rule
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import ONE, ZERO, Expression, select, symbol, unary
 from plant.compiled.hoist import hoisted
+from plant.compiled.late_last import late_last
 from plant.compiled.simplify import fused, simplified
 from plant.compiled.source import CALLED, symbols_in
 from plant.errors import HydrostateError
@@ -137,7 +138,8 @@ def score_expressions(outputs: Mapping[str, Expression], channels: Sequence[str]
     Parameters
     ----------
     outputs : Mapping[str, Expression]
-        What an update returned.
+        What an update returned: of each channel the innovation ``e``, its variance ``s`` and, where it is at hand, one
+        over that, ``w``.
 
     Returns
     -------
@@ -148,7 +150,7 @@ def score_expressions(outputs: Mapping[str, Expression], channels: Sequence[str]
     sums: Outputs = {}
     for c in range(len(channels)):
         present, e, s = unary("present", symbol(f"y{c}")), outputs[f"e{c}"], outputs[f"s{c}"]
-        weight = select(present, 1.0 / s, ZERO)
+        weight = select(present, outputs.get(f"w{c}", 1.0 / s), ZERO)
         clean = select(present, e, ZERO)
         sums[f"nis{c}"] = symbol(f"nis{c}") + clean * clean * weight
         sums[f"count{c}"] = symbol(f"count{c}") + select(present, ONE, ZERO)
@@ -168,10 +170,13 @@ def halves_of(rule: Rule, model: ProcessModel, channels: tuple[str, ...], *, sco
     update = rule.update(model, channels)
     if scored:
         update |= score_expressions(update, channels)
+    update = {name: value for name, value in update.items() if name not in {f"w{c}" for c in range(len(channels))}}
     data = {f"{x}{i}" for i in range(len(model.drives)) for x in "ab"} | {f"y{c}" for c in range(len(channels))}
     predict = rule.predict(model)
     varying = {*layout(rule, model, channels).carried, *data, "j"}
     fixed = symbols_in([*predict.values(), *update.values()]) - varying
     before, predict = hoisted(simplified(predict, fixed), varying, "c")
     after, update = hoisted(simplified(update, fixed), varying, "d")
+    predict, times = late_last(predict, dict.fromkeys(belief_names(model.width), 0.0))
+    update, _ = late_last(update, times)
     return Halves(before | after, fused(predict), fused(update))

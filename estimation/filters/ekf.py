@@ -7,6 +7,7 @@ diagonal, so processing one channel at a time equals the joint update and invert
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 from estimation.engine.kalman import (
     Covariance,
@@ -16,6 +17,7 @@ from estimation.engine.kalman import (
     believed,
     bounded,
     entry,
+    moved,
     observed,
     process_noise,
     projected,
@@ -25,6 +27,7 @@ from estimation.engine.kalman import (
 from estimation.engine.robust import inflation
 from estimation.engine.rule import Rule
 from estimation.engine.runner import run_rule
+from estimation.engine.spread import spread, waypoints_of
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import ONE, ZERO, Expression, jacobian, select, symbol, unary
 
@@ -37,20 +40,27 @@ def ekf_predict(model: ProcessModel) -> Outputs:
     dict[str, Expression]
         New value of each mean ``z`` and covariance ``P`` symbol.
     """
-    n = model.width
-    _, P = belief_symbols(model)
-    mean, F = scaled_step(model)
-    FP = [[total([F[i][k] * entry(P, k, j) for k in range(n)]) for j in range(n)] for i in range(n)]
+    prior, P = belief_symbols(model)
+    mean = moved(model, prior)
     held = bounded(model, mean)
     # what has not moved is within its bounds: the update before saw to that
     outputs = {f"z{i}": z if z.operation == "symbol" else held[i] for i, z in enumerate(mean)}
-    terms = [sum(slope is not ZERO for slope in row) for row in F]
-    for i in range(n):
-        for j in range(i, n):
-            few, many = (i, j) if terms[i] < terms[j] else (j, i)
-            spread = total([FP[many][k] * F[few][k] for k in range(n)])
-            outputs[f"P{i}_{j}"] = spread + process_noise(model, i) if i == j else spread
+    after = spread(mean, prior, P) if waypoints_of(mean) else _transformed(scaled_step(model)[1], P)
+    for (i, j), value in after.items():
+        outputs[f"P{i}_{j}"] = value + process_noise(model, i) if i == j else value
     return outputs
+
+
+def _transformed(F: Sequence[Sequence[Expression]], P: Covariance) -> Covariance:
+    """Return the upper triangle of ``F P F'``, each entry summed over the row of the Jacobian with fewer terms."""
+    each = range(len(F))
+    FP = [[total([F[i][k] * entry(P, k, j) for k in each]) for j in each] for i in each]
+    terms = [sum(slope is not ZERO for slope in row) for row in F]
+    after: Covariance = {}
+    for i, j in P:
+        few, many = (i, j) if terms[i] < terms[j] else (j, i)
+        after[i, j] = total([FP[many][k] * F[few][k] for k in each])
+    return after
 
 
 def ekf_update(model: ProcessModel, channels: Sequence[str], robust: str = "none") -> Outputs:
@@ -66,7 +76,8 @@ def ekf_update(model: ProcessModel, channels: Sequence[str], robust: str = "none
     Returns
     -------
     dict[str, Expression]
-        New value of each mean and covariance symbol, innovations ``e`` and their variances ``s``.
+        New value of each mean and covariance symbol, innovations ``e`` and their variances ``s``, and of every second
+        channel ``w``, one over ``s``.
     """
     prior, _ = belief_symbols(model)
     found = linearised_update(model, channels, prior, noise_symbols(channels), robust)
@@ -82,7 +93,7 @@ class Update:
     mean, covariance : list of Expression, dict
         The belief; the mean not yet held to its bounds.
     seen : dict[str, Expression]
-        Innovations ``e`` and their variances ``s``.
+        Innovations ``e`` and their variances ``s``; of every second channel ``w``, one over ``s``.
     noise : list of Expression
         Measurement variances as outliers inflated them [SI squared].
     gains : list of (row, gain, weight, innovation)
@@ -130,17 +141,21 @@ def linearised_update(
         The belief, and what was seen on the way.
     """
     mean, covariance = belief_symbols(model)
-    seen, inflated = Outputs(), list[Expression]()
+    seen, inflated, earlier = Outputs(), list[Expression](), None
     gains: list[tuple[list[Expression], list[Expression], Expression, Expression]] = []
     for c, row in enumerate(jacobian(observed(model, point, channels), point)):
         unit = _unit(row)
         H = [ONE if slope is unit else slope for slope in row]
         present, r = unary("present", symbol(f"y{c}")), noise[c] / unit**2
         residual = symbol(f"y{c}") / unit - _linearised(model, point, mean, channels, c) / unit
-        PH, spread = projected(covariance, H)
-        r = r * inflation(robust, residual * residual / (spread + r))
-        variance = spread + r
-        weight, clean = select(present, 1.0 / variance, ZERO), select(present, residual, ZERO)
+        PH, projection = projected(covariance, H)
+        r = r * inflation(robust, residual * residual / (projection + r))
+        variance = projection + r
+        inverse = 1.0 / variance if earlier is None else _second_inverse(earlier, H, r)
+        if earlier is not None:
+            seen[f"w{c}"] = inverse / unit**2
+        earlier = _Earlier(present, covariance, PH, variance) if earlier is None and robust == "none" else None
+        weight, clean = select(present, inverse, ZERO), select(present, residual, ZERO)
         gain = [value * weight for value in PH]
         covariance = {(i, j): value - gain[i] * PH[j] for (i, j), value in covariance.items()}
         mean = [z + gain[i] * clean for i, z in enumerate(mean)]
@@ -148,6 +163,26 @@ def linearised_update(
         inflated.append(unit**2 * r)
         gains.append((H, gain, weight, clean))
     return Update(mean, covariance, seen, inflated, gains)
+
+
+class _Earlier(NamedTuple):
+    """The first of two channels: whether it was seen, the covariance before it, ``P H'``, and its variance."""
+
+    present: Expression
+    covariance: Covariance
+    PH: Sequence[Expression]
+    variance: Expression
+
+
+def _second_inverse(earlier: _Earlier, H: Sequence[Expression], r: Expression) -> Expression:
+    """Return one over the second channel's variance, which does not wait for one over the first's.
+
+    The variances of two channels in turn have the product ``S00 S11 - S01^2``, of variances before both.
+    """
+    alone = projected(earlier.covariance, H)[1] + r
+    across = total([slope * value for slope, value in zip(H, earlier.PH, strict=True)])
+    joint = earlier.variance * alone - across * across
+    return select(earlier.present, earlier.variance, ONE) / select(earlier.present, joint, alone)
 
 
 def _unit(row: Sequence[Expression]) -> Expression:
