@@ -33,13 +33,19 @@ Array = NDArray[np.float64]
 
 SAMPLES, SAMPLE_TIME, ROUNDS = 100_000, 1e-4, 9
 WANTED = {"agreement": 1e-12, "acceleration": 25.0, "pressure": 60.0}
-OF_GCC = ("-mtune=generic", "-fno-guess-branch-probability", "-fno-if-conversion", "-fno-if-conversion2")
+OF_GCC = (
+    "-fno-math-errno",
+    "-mtune=generic",
+    "-fno-guess-branch-probability",
+    "-fno-if-conversion",
+    "-fno-if-conversion2",
+)
 BUILDS = {
     "gcc": ("gcc", ("-march=native", *OF_GCC, "-fno-tree-slp-vectorize")),
     "gcc, choices": ("gcc", FUSING),
     "gcc, no fma": ("gcc", ()),
     "gcc, contracting": ("gcc", ("-std=gnu17", "-march=native")),
-    "clang": ("clang", ("-march=native", "-fno-slp-vectorize")),
+    "clang": ("clang", ("-march=native", "-fno-math-errno", "-fno-slp-vectorize")),
     "clang, no fma": ("clang", ()),
 }
 """Compilers with their flags beside ``-std=c99 -O2``: as the Makefile has it, with choices that the compiler may make

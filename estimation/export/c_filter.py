@@ -1,7 +1,7 @@
 """A filter, or a bank of interacting ones, as C99 for a controller: from the rule and the model that Python runs.
 
-One header and one source, an example and a Makefile. Nothing is allocated, every loop is bounded, and a step takes the
-same operations whatever the data, or at most as many as the header says.
+One header and one source, an example and a Makefile. Nothing is allocated, every loop is bounded, and a step takes at
+most as many operations as the header says.
 """
 
 from collections import Counter

@@ -50,7 +50,7 @@ class RuleInC:
     carried, rows : tuple of str
         What ``state`` and ``rows`` hold, by name.
     operations : Mapping[str, Counter]
-        What a call of each function takes, the same whatever the data [operations].
+        What a call of each function takes at most [operations].
     """
 
     text: str

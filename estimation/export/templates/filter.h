@@ -5,7 +5,7 @@
  * allocates nothing, recurses nowhere. All loops are bounded. A copy of {{ name }}_filter saves its state: a filter that
  * is restored from it continues to the last bit.
  *
- * A step takes {{ "at most " if bank else "" }}{{ operations | sum(attribute=1) }} operations{{ "" if bank else ", whatever the data" }}:
+ * A step takes at most {{ operations | sum(attribute=1) }} operations:
 {% for kind, count in operations %}
  *   {{ "%7d" | format(count) }} {{ kind }}
 {% endfor %}

@@ -1,12 +1,13 @@
 """Straight lines of a graph as C: the same operations in the same order as in the kernels that Python runs.
 
 Every line is one operation, so no compiler may fuse or reorder what the kernels do not. Choices are conditional
-expressions, so each step costs the same number of operations, whatever the data.
+expressions, or blocks where one side is much work; so a step costs at most the operations that are counted.
 """
 
 from collections import Counter
 from collections.abc import Mapping
 
+from plant.compiled.c99.branches import Block, blocks_of
 from plant.compiled.c99.precision import Precision
 from plant.compiled.expression import Expression, ordered
 from plant.compiled.source import symbols_in
@@ -106,24 +107,68 @@ def c_lines(
         for name in sorted(symbols_in(list(outputs.values())))
         if reads[name] != name
     ]
-    names: dict[int, str] = {}
-    count = 0
-    for item in ordered(outputs.values()):
+    writer = _Writer(list(outputs.values()), precision)
+    return [*lines, *writer.lines, *(f"{writes[name]} = {writer.names[id(value)]};" for name, value in outputs.items())]
+
+
+class _Writer:
+    """Writes nodes one after another: their ``lines``, and by the nodes' ids the ``names`` of what these hold."""
+
+    def __init__(self, outputs: list[Expression], precision: Precision) -> None:
+        order = ordered(outputs)
+        self.names: dict[int, str] = {}
+        self.lines: list[str] = []
+        self._precision, self._count = precision, 0
+        self._blocks = blocks_of(order, outputs)
+        within = {id(one) for block in self._blocks.values() for side in block.sides for one in side}
+        for item in order:
+            if id(item) not in within:
+                self._write(item, "")
+
+    def _write(self, item: Expression, indent: str) -> None:
+        if id(item) in self.names:
+            return
         if item.operation == "symbol":
-            names[id(item)] = str(item.value)
+            self.names[id(item)] = str(item.value)
         elif item.operation == "constant":
-            spelling = precision.literal(float(item.value))
-            names[id(item)] = f"({spelling})" if spelling.startswith("-") else spelling
+            spelling = self._precision.literal(float(item.value))
+            self.names[id(item)] = f"({spelling})" if spelling.startswith("-") else spelling
+        elif id(item) in self._blocks:
+            self._write_block(self._blocks[id(item)], indent)
         else:
-            operands = [names[id(argument)] for argument in item.arguments]
-            names[id(item)], kind = f"t{count}", "int" if item.operation in TRUTHS else precision.name
-            lines.append(f"const {kind} t{count} = {spelt_in_c(item, operands, precision)};")
-            count += 1
-    return lines + [f"{writes[name]} = {names[id(value)]};" for name, value in outputs.items()]
+            for one in item.arguments:
+                self._write(one, indent)
+            operands = [self.names[id(one)] for one in item.arguments]
+            kind = "int" if item.operation in TRUTHS else self._precision.name
+            spelling = spelt_in_c(item, operands, self._precision)
+            self.lines.append(f"{indent}const {kind} {self._named(item)} = {spelling};")
+
+    def _named(self, item: Expression) -> str:
+        self.names[id(item)] = f"t{self._count}"
+        self._count += 1
+        return self.names[id(item)]
+
+    def _write_block(self, block: Block, indent: str) -> None:
+        """Write what both sides need, then the sides."""
+        alone = {id(one) for side in block.sides for one in side}
+        for item in (*block.sides[0], *block.sides[1], *block.choices):
+            for one in item.arguments:
+                if id(one) not in alone:
+                    self._write(one, indent)
+        for choice in block.choices:
+            self.lines.append(f"{indent}{self._precision.name} {self._named(choice)};")
+        for place, opening in ((1, f"if ({self.names[id(block.condition)]} != 0) {{"), (2, "} else {")):
+            self.lines.append(indent + opening)
+            for item in block.sides[place - 1]:
+                self._write(item, indent + "    ")
+            for choice in block.choices:
+                value = self.names[id(choice.arguments[place])]
+                self.lines.append(f"{indent}    {self.names[id(choice)]} = {value};")
+        self.lines.append(f"{indent}}}")
 
 
 def operations_of(outputs: Mapping[str, Expression]) -> Counter[str]:
-    """Return how many operations a graph takes, which is the same whatever the data.
+    """Return how many operations a graph takes at most.
 
     Parameters
     ----------
