@@ -10,6 +10,16 @@
 
 static {{ name }}_filter filter;
 
+/* Count the fields of a line. */
+static int fields(const char *line)
+{
+    int count = 1;
+    for (int i = 0; line[i] != '\0'; ++i) {
+        count += (line[i] == ',') ? 1 : 0;
+    }
+    return count;
+}
+
 /* Read the next field of a line, and move on behind it. */
 static {{ real }} field(char **place)
 {
@@ -33,6 +43,11 @@ int main(void)
         char *place = line;
         if (strpbrk(line, "_") != NULL) { /* names of columns */
             continue;
+        }
+        if (fields(line) < {{ NAME }}_DRIVES + {{ NAME }}_CHANNELS) {
+            fprintf(stderr, "a row needs %d fields with commas between them, got: %s\n",
+                    {{ NAME }}_DRIVES + {{ NAME }}_CHANNELS, line);
+            return EXIT_FAILURE;
         }
         for (int i = 0; i < {{ NAME }}_DRIVES; ++i) {
             drives[i] = field(&place);

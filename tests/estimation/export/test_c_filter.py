@@ -1,5 +1,6 @@
 import ctypes
 import re
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -222,3 +223,10 @@ def test_a_tuned_filter_carries_the_noise_of_its_log() -> None:
     assert not np.allclose(plain.noise, tuned.noise) or not np.allclose(plain.variances, tuned.variances)
     wide = filter_task(record, EhaParameters(), "pressure", states=("leakage_coefficient",))
     assert [state.name for state in wide.model.states][-1] == "leakage_coefficient"
+
+
+def test_the_example_refuses_rows_that_have_no_commas_between_their_fields(tmp_path: Path) -> None:
+    program = compiled(tmp_path, filter_in_c(task("pressure", "normal", 500), name="exported"))
+    done = subprocess.run([str(program)], input="90 0.01 0.02 1e5\n", capture_output=True, text=True, check=False)  # noqa: S603
+    assert done.returncode == 1
+    assert done.stderr.startswith("a row needs 4 fields with commas between them, got: 90 0.01")
