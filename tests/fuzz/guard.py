@@ -8,7 +8,7 @@ from typing import NoReturn
 from plant.errors import HydrostateError
 
 LONGEST = 10.0
-"""Seconds that one input may take."""
+"""Seconds of processor time that one input may take: a busy machine makes no input hang."""
 
 
 class HangError(BaseException):
@@ -21,8 +21,8 @@ def _hang(*_: object) -> NoReturn:
 
 def limited(use: Callable[[], object]) -> str:
     """Use an input; return what is wrong, empty where it was accepted or refused in one sentence."""
-    before = signal.signal(signal.SIGALRM, _hang)
-    signal.setitimer(signal.ITIMER_REAL, LONGEST)
+    before = signal.signal(signal.SIGPROF, _hang)
+    signal.setitimer(signal.ITIMER_PROF, LONGEST)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -36,6 +36,6 @@ def limited(use: Callable[[], object]) -> str:
     except Exception as error:
         return f"{type(error).__name__}: {str(error)[:300]}"
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
     return ""

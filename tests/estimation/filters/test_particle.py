@@ -8,7 +8,7 @@ from scipy.stats import norm
 
 from estimation.engine.contract import FilterProblem
 from estimation.filters.ekf import ekf
-from estimation.filters.particle import particle, particle_filter
+from estimation.filters.particle import gather, particle, particle_filter, predicted, resample, weigh
 from estimation.filters.run import METHODS, filter_problem
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
@@ -136,3 +136,30 @@ def test_what_it_may_not_be_set_to_is_refused(linear: ProcessModel) -> None:
     ):
         with pytest.raises(HydrostateError, match=message):
             particle(replace(task(linear), settings=settings))
+
+
+def test_a_cloud_predicts_weighs_and_gathers_as_weighted_sums_do() -> None:
+    rng = np.random.default_rng(5)
+    cloud, weights = rng.standard_normal((40, 3)), rng.dirichlet(np.ones(40))
+    seen, y, r = cloud[:, 1] - 0.3, 0.4, 0.05
+    middle, s = predicted(weights, seen, r)
+    assert middle == pytest.approx(np.average(seen, weights=weights))
+    assert s == pytest.approx(r + np.cov(seen, aweights=weights, ddof=0))
+    likely, after = weights * norm.pdf(y, seen, r**0.5), weights.copy()
+    assert weigh(after, seen, y, r) == pytest.approx(np.log(likely.sum()))
+    assert after == pytest.approx(likely / likely.sum())
+    mean, covariance = np.empty(3), np.empty((3, 3))
+    gather(cloud, weights, mean, covariance, WIDTH=3)
+    assert mean == pytest.approx(weights @ cloud)
+    assert covariance == pytest.approx(np.cov(cloud.T, aweights=weights, ddof=0))
+
+
+@pytest.mark.parametrize("place", [0.0, 0.3, 0.999])
+def test_particles_are_drawn_as_often_as_they_weigh(place: float) -> None:
+    weights = np.random.default_rng(6).dirichlet(np.ones(25))
+    cloud = np.arange(25.0)[:, None]
+    resample(place, cloud, weights, np.empty_like(cloud))
+    edges = np.cumsum(weights)
+    wanted = np.minimum(np.searchsorted(edges, (place + np.arange(25)) / 25), 24)
+    assert cloud[:, 0].tolist() == wanted.tolist()
+    assert np.abs(np.bincount(wanted, minlength=25) - 25 * weights).max() < 1.0

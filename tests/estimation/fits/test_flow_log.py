@@ -79,7 +79,7 @@ def lagging(values: np.ndarray, lag: float) -> np.ndarray:
     return lfilter([1.0 - kept], [1.0, -kept], values, zi=[kept * values[0]])[0]
 
 
-@pytest.mark.parametrize("condition", ["normal", "minor_friction"])
+@pytest.mark.parametrize("condition", ["normal", pytest.param("minor_friction", marks=pytest.mark.slow)])
 def test_a_position_sensor_that_lags_is_named_and_its_number_not_believed(condition: str) -> None:
     rng = np.random.default_rng(9)
     p = circuit_of(parameters_for(CONDITIONS[condition]))

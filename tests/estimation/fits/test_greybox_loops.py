@@ -1,6 +1,7 @@
 """The misfit's kernel is Python: its text, run as it stands, gives what the machine code gives, to the last bit."""
 
 import ctypes
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -41,3 +42,56 @@ def test_the_same_bits_as_python(model: GreyBoxModel, monkeypatch: pytest.Monkey
     for one, other in zip((*sums, *found), (*expected, *wanted), strict=True):
         np.testing.assert_array_equal(one, other)
     assert np.isfinite(sums[0])
+
+
+KERNEL: Any = SimpleNamespace(JUMPS=2, UNKNOWNS=3)
+
+
+def test_an_open_covariance_goes_through_a_step_by_its_jacobian() -> None:
+    rng = np.random.default_rng(1)
+    point = rng.standard_normal((4, 6))
+    root = rng.standard_normal((2, 2))
+    covariance, F = root @ root.T, point[:2, 4:]
+    wanted = F @ covariance @ F.T
+    greybox_loops.carry(KERNEL, point, covariance, np.empty((2, 2)))
+    assert covariance == pytest.approx(wanted)
+
+
+def test_a_sample_closes_a_gap_as_kalmans_update_does() -> None:
+    rng = np.random.default_rng(2)
+    point, shown = rng.standard_normal((4, 6)), rng.standard_normal(6)
+    root = rng.standard_normal((2, 2))
+    covariance, before, excess, variance = root @ root.T, point.copy(), 0.7, 0.2
+    H = shown[4:]
+    opened, gain = H @ covariance @ H, covariance @ H / (H @ covariance @ H + variance)
+    left = (np.eye(2) - np.outer(gain, H)) @ covariance
+    found = greybox_loops.correct(KERNEL, point, covariance, np.empty(2), shown, excess, variance)
+    assert found == pytest.approx(opened)
+    assert covariance == pytest.approx(left)
+    assert point[:2, 0] == pytest.approx(before[:2, 0] - gain * excess)
+    assert point[:2, 1:4] == pytest.approx(before[:2, 1:4] - np.outer(gain, shown[1:4]))
+    np.testing.assert_array_equal(point[2:], before[2:])
+    np.testing.assert_array_equal(point[:, 4:], before[:, 4:])
+
+
+@pytest.mark.parametrize("size", [2.0, -2.0, 9.0, -9.0])
+def test_a_block_counts_by_its_square_and_beyond_the_limit_by_its_size(size: float) -> None:
+    row, level = np.array([size, 0.5, -1.0]), np.array([0.4, 0.1, 0.2])
+    gain, scale, outlier = 0.25, 0.8, 3.0
+    error, *slopes = scale * (row - level)
+    moved, gradient, gram = level + gain * (row - level), np.zeros(2), np.zeros((2, 2))
+    cost = greybox_loops.absorb(row, level, gain, scale, outlier, gradient, gram)
+    far = abs(error) > outlier
+    assert cost == pytest.approx(outlier * (abs(error) - 0.5 * outlier) if far else 0.5 * error**2)
+    assert gradient == pytest.approx(np.array(slopes) * np.clip(error, -outlier, outlier))
+    assert gram == pytest.approx(np.tril(np.outer(slopes, slopes)) * (greybox_loops.STRAIGHT if far else 1.0))
+    assert level == pytest.approx(moved)
+
+
+def test_what_ran_away_counts_as_much_and_no_more() -> None:
+    for value in (np.nan, 1e300):
+        row, level, gradient, gram = np.array([value, 1.0]), np.zeros(2), np.zeros(1), np.zeros((1, 1))
+        with np.errstate(all="ignore"):
+            greybox_loops.absorb(row, level, 0.0, 1.0, 3.0, gradient, gram)
+        assert row[0] == greybox_loops.RUNAWAY
+        assert gradient[0] == pytest.approx(3.0)

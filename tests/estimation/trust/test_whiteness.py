@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import chi2
 from statsmodels.stats.diagnostic import acorr_ljungbox
 
 from estimation.filters.run import Estimate
@@ -27,11 +28,11 @@ DRIVE = np.sign(np.sin(2.0 * np.pi * FREQUENCY * TIME + 1e-6))
 
 
 def judged(
-    model: ProcessModel, residuals: Array, variance: float = 1.0, position: Array | None = None
+    model: ProcessModel, residuals: Array, variance: float = 1.0, position: Array | None = None, mean: float = 0.0
 ) -> list[Whiteness]:
     moving = np.cumsum(np.ones(SAMPLES)) * np.pi if position is None else position
     record = Record(
-        SAMPLE_TIME, {"motor_speed_rad_s": 100.0 * DRIVE, "position_m": moving, "velocity_m_s": moving**1.01}
+        SAMPLE_TIME, {"motor_speed_rad_s": 100.0 * DRIVE + mean, "position_m": moving, "velocity_m_s": moving**1.01}
     )
     estimate = Estimate(
         model, CHANNELS, TIME, np.zeros((SAMPLES, 3)), np.ones((SAMPLES, 3)), None, {}, 0.0,
@@ -67,6 +68,17 @@ def test_a_line_of_the_drive_is_found_named_and_sized(linear: ProcessModel) -> N
     assert position.excess == pytest.approx(1.0 + 0.2**2 / 4.0 * SAMPLES * 0.8 / 8.0, rel=0.4)
     assert position.with_drive == pytest.approx(0.2**2 / 2.0, rel=0.5)
     assert velocity.with_drive < 0.005
+
+
+def test_the_drives_mean_plays_no_part(linear: ProcessModel) -> None:
+    residuals = white(2)
+    residuals[:, 0] += 0.2 * np.sin(2.0 * np.pi * FREQUENCY * TIME) + 0.1
+    about_zero, about_a_mean = (judged(linear, residuals, mean=mean) for mean in (0.0, 1e3))
+    for one, other in zip(about_zero, about_a_mean, strict=True):
+        assert other.excess == pytest.approx(one.excess)
+        assert other.threshold == pytest.approx(one.threshold)
+        assert (other.driven, other.frequency) == (one.driven, one.frequency)
+        assert other.with_drive == pytest.approx(one.with_drive, abs=1e-6)
 
 
 def test_a_disturbance_beside_the_drive_is_said_to_be_so(linear: ProcessModel) -> None:
@@ -164,6 +176,8 @@ def test_where_nothing_is_driven_a_tenth_of_all_frequencies_counts(linear: Proce
 
     assert at(40.0).exceeded
     assert not at(60.0).exceeded
+    band, channels = 50, 2  # a tenth of 501 frequencies
+    assert at(40.0).threshold == pytest.approx(chi2.isf(1e-3 / (band * channels), 2 * SEGMENTS) / (2 * SEGMENTS))
     assert not at(40.0).driven
     assert at(40.0).with_drive == 0.0
 

@@ -131,3 +131,23 @@ def test_a_block_is_the_mean_of_what_is_there_and_missing_where_most_is() -> Non
     assert blocks.velocity[0] == pytest.approx(np.mean([0, 6, 7, 8, 9]))
     assert np.isnan(blocks.velocity[1])
     assert blocks.velocity[2] == pytest.approx(24.5)
+
+
+@pytest.mark.parametrize("position", [True, False])
+def test_the_noise_of_blocks_is_that_of_the_sensors_over_them(position: bool) -> None:
+    rng, time = np.random.default_rng(2), 1e-3 * np.arange(6001)
+    travelled, moving = 1e-2 * np.sin(3.0 * time), 3e-2 * np.cos(3.0 * time)
+    log = Record(
+        1e-3,
+        {
+            "motor_speed_rad_s": 100.0 * np.cos(3.0 * time),
+            "differential_pressure_pa": 1e6 * np.cos(3.0 * time) + 5e3 * rng.standard_normal(6001),
+            "velocity_m_s": moving + 2e-3 * rng.standard_normal(6001),
+            **({"position_m": travelled + 4e-6 * rng.standard_normal(6001)} if position else {}),
+        },
+    )
+    blocks = blocks_of(log)
+    wanted = 2.0**0.5 * 4e-6 / BLOCK if position else 2e-3 / 10.0**0.5
+    assert blocks.noise == pytest.approx([wanted, 5e3 / 10.0**0.5], rel=0.1)
+    true = 1e-2 * np.diff(np.sin(3.0 * BLOCK * np.arange(len(blocks.velocity) + 1))) / BLOCK
+    assert np.std(blocks.velocity - true) == pytest.approx(wanted, rel=0.1)

@@ -43,7 +43,7 @@ def test_a_log_without_a_load_is_told_of_none() -> None:
     assert [note for note in found.notes if note.code is ClassCode.LOAD_ON_ROD] == []
 
 
-@pytest.mark.parametrize("force", [1200.0, -800.0])
+@pytest.mark.parametrize("force", [-800.0, pytest.param(1200.0, marks=pytest.mark.slow)])
 def test_a_load_is_found_with_the_condition_under_it(force: float) -> None:
     found = diagnose_log(log("minor_leakage", load_force=force), Rig())
     assert found.condition == "minor_leakage"
