@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from plant.errors import LogError
+from plant.errors import LogError, NoChannelError
 from plant.log.checks import Checked, Clock, trusted
 from plant.log.notes import LogCode
 
@@ -273,3 +273,27 @@ def test_the_clock_of_the_writer_is_used_only_where_the_times_agree_with_it() ->
     assert (same.sample_time, same.start_time) == (1e-3, 0.1)
     other = trusted(log, source="a.csv", clock=Clock(2e-3, 0.1))
     assert other.sample_time == pytest.approx(1e-3, rel=1e-9)
+
+
+def test_rows_without_a_time_are_left_out_if_they_are_few() -> None:
+    few = check(with_gaps(TIME, 3, 400, 401))
+    assert few.notes[0] == LogCode.TIME_MISSING.note(channel="time_s", count=3, total=N, percent=0.3)
+    assert few.sample_time == pytest.approx(1e-3)
+    with pytest.raises(LogError, match=r"time_s is missing in 60 of 1000 samples \(6 %\), at most 5 % may be"):
+        check(with_gaps(TIME, *range(60)))
+    short = {"time_s": with_gaps(TIME[:10], 3), "motor_speed_rad_s": SPEED[:10], "velocity_m_s": VELOCITY[:10]}
+    with pytest.raises(LogError, match="time_s is missing in 1 of 10 samples"):
+        trusted(short, source="a.csv")
+
+
+def test_a_clock_alone_and_a_channel_that_is_hardly_there_are_no_log() -> None:
+    with pytest.raises(NoChannelError, match="at least one channel is wanted beside time_s"):
+        trusted({"time_s": TIME}, source="a.csv", required=())
+    hardly = np.where(np.random.default_rng(1).random(N) < 0.5, SPEED, np.nan)
+    with pytest.raises(LogError, match="no channel has 95 % of its samples"):
+        trusted({"time_s": TIME, "motor_speed_rad_s": hardly}, source="a.csv", required=())
+    kept = trusted(
+        {"time_s": TIME, "motor_speed_rad_s": SPEED, "velocity_m_s": VELOCITY, "position_m": hardly * np.nan},
+        source="a.csv",
+    )
+    assert list(kept.channels) == ["motor_speed_rad_s", "velocity_m_s"]

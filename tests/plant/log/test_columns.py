@@ -1,7 +1,7 @@
 import pytest
 
-from plant.errors import LogError, RigError
-from plant.log.columns import parse_columns, resolve_columns
+from plant.errors import HydrostateError, LogError, RigError
+from plant.log.columns import know_channels, parse_columns, resolve_columns
 
 
 def channels(*names: str, **mapping: str) -> dict[str, str]:
@@ -122,3 +122,9 @@ def test_command_line_columns_are_parsed() -> None:
 def test_a_command_line_column_of_another_shape_is_refused(texts: list[str], message: str) -> None:
     with pytest.raises(RigError, match=message):
         parse_columns(texts)
+
+
+@pytest.mark.parametrize("units", [{"travel_mm": "m"}, {"position_m": "mm"}, {"travel": "m"}])
+def test_a_channel_is_known_in_one_unit_which_its_name_ends_in(units: dict[str, str]) -> None:
+    with pytest.raises(HydrostateError, match=r"must end in .* and be known in no other unit"):
+        know_channels(units)

@@ -1,6 +1,7 @@
 """Workbooks and HDF5 files hold more than numbers: what is no log is passed over, what is one keeps its meaning."""
 
 import re
+import zipfile
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 from typing import Any
@@ -113,3 +114,10 @@ def test_hdf5_of_matlab_counts_the_other_way_and_keeps_its_metadata(tmp_path: Pa
         file["text"] = "nothing else"
     with pytest.raises(LogError, match="no vector of numbers"):
         open_hdf5(tmp_path / "none.h5")
+
+
+def test_an_archive_without_a_workbook_is_no_log(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "logs.xlsx", "w") as archive:
+        archive.writestr("log.csv", "time_s,position_m\n0,0\n")
+    with pytest.raises(LogError, match="a zip archive is no log: unpack it first"):
+        open_xlsx(tmp_path / "logs.xlsx")

@@ -281,3 +281,26 @@ def test_a_log_with_foreign_names_is_read_through_a_mapping(shared: Path) -> Non
     assert LogCode.TIME_JITTERS in [one.message.note.code for one in caught]
     assert len(record) == 24841
     assert np.ptp(record["position_m"]) == pytest.approx(0.2464, abs=1e-4)
+
+
+@pytest.mark.parametrize("sample_time", [0.0, -1e-3, np.inf, np.nan])
+def test_a_sample_time_that_is_none_is_refused(sample_time: float, tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("motor_speed_rad_s,position_m\n" + "1.0,0.0\n" * 20)
+    with pytest.raises(LogError, match="sample_time must be positive and finite"):
+        read_record(tmp_path / "log.csv", sample_time=sample_time)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("log.csv", b"", "a header line is wanted, the file is empty"),
+        ("log.csv", b"\xd0\xcf\x11\xe0" + bytes(600), "xls"),
+        ("log.csv", bytes(512) + b"\x89HDF\r\n\x1a\n" + bytes(99), "log.csv"),
+    ],
+    ids=["empty", "old Excel", "HDF5 behind a block"],
+)
+def test_what_a_file_is_its_first_bytes_tell(name: str, content: bytes, said: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(LogError, match=said) as raised:
+        read_record(tmp_path / name)
+    assert "decode" not in str(raised.value)

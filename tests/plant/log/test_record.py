@@ -128,3 +128,14 @@ def test_a_missing_channel_is_named_with_those_that_are_there() -> None:
 def test_writing_a_frame_and_reading_it_with_pandas_keeps_the_columns(tmp_path: Path) -> None:
     moving().to_csv(tmp_path / "log.csv", index=False)
     assert list(Record.from_frame(pd.read_csv(tmp_path / "log.csv"))) == ["motor_speed_rad_s", "velocity_m_s"]
+
+
+def test_a_record_has_a_clock_and_channels_of_one_length() -> None:
+    for wrong in (0.0, np.inf, np.nan):
+        with pytest.raises(LogError, match="sample_time must be positive and finite"):
+            Record(wrong, {"position_m": np.zeros(3)})
+    with pytest.raises(LogError, match="a record needs at least one channel, got none"):
+        Record(1e-3, {})
+    for other in (np.zeros(4), np.zeros((3, 1))):
+        with pytest.raises(LogError, match="one-dimensional and of one length"):
+            Record(1e-3, {"position_m": np.zeros(3), "velocity_m_s": other})

@@ -48,3 +48,8 @@ def test_what_is_no_moment_is_refused_with_its_row(cell: str) -> None:
 
 def test_an_empty_cell_is_missing() -> None:
     assert read("2026-01-01 00:00:00", "")[1] == "NaT"
+
+
+def test_minutes_and_seconds_alone_are_a_time() -> None:
+    stamps = read_stamps(["01:02.5", "01:03.25", "02:00.0"], lambda row, cell: ValueError(f"{row} {cell}"))
+    assert np.diff(stamps).astype("timedelta64[ms]").astype(int).tolist() == [750, 56_750]

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from plant.errors import HydrostateError, LogError
-from plant.log.stream_source import Received, batch, is_stream, stream_lines
+from plant.log.stream_source import Received, batch, broker_of, is_stream, stream_lines
 
 HEADER = "time_s,position_m"
 
@@ -105,3 +105,10 @@ def test_a_message_that_is_no_batch_ends_the_stream_with_an_error(broker: int) -
     publish(broker, "bench/other", ["hello"])
     reader.join(10.0)
     assert "a batch must begin with 'rows NUMBER' and a header, got 'hello'" in str(raised[0])
+
+
+def test_what_is_published_goes_to_one_topic_of_a_broker() -> None:
+    assert broker_of("mqtt://bench:99/press/events") == ("bench", 99, "press/events")
+    for address in ("tcp://bench/press", "mqtt:///press", "mqtt://bench/", "mqtt://bench/a/+/b", "mqtt://bench/a#b"):
+        with pytest.raises(HydrostateError, match=r"a topic to publish on must be mqtt://HOST\[:PORT\]/TOPIC"):
+            broker_of(address)

@@ -151,3 +151,9 @@ def test_sensor_noise_is_that_of_the_sensors() -> None:
 def test_impossible_parameters_are_refused(name: str, value: float) -> None:
     with pytest.raises(RigError, match=f"{name} must"):
         PiezoStackParameters(**{name: value})
+
+
+def test_a_mean_over_less_than_a_cycle_is_refused() -> None:
+    with pytest.raises(DriveError, match=r"half the run must hold a whole cycle of 10.5 Hz, got 0\.05 s"):
+        mean_flow(np.zeros(101), 1e-3, 10.5, 3e-4)
+    assert mean_flow(1e-3 * np.arange(201.0), 1e-3, 10.0, 3e-4) == pytest.approx(3e-4)
