@@ -145,13 +145,16 @@ def blocks_of(record: Record) -> Blocks:
     whole = {name: _pooled(record[name], pooled)[: count * block + 1] for name in record if name in _NEEDED}
     if "position_m" in whole and np.any(np.isfinite(whole["position_m"])):
         velocity = np.diff(bridged(whole["position_m"])[::block]) / (block * sample_time)
-    elif "velocity_m_s" in whole:
+    elif "velocity_m_s" in whole and np.any(np.isfinite(whole["velocity_m_s"])):
         velocity = _mean(whole["velocity_m_s"], block)
     else:
         raise LogError(f"velocity_m_s or position_m is needed; the log has {', '.join(record)}")
     pressure = whole.get("differential_pressure_pa")
     if pressure is not None:
         pressure = _mean(pressure, block)
+        if not np.any(np.isfinite(pressure[round(SETTLING / (block * sample_time)) :])):
+            pressure = None  # a sensor that was out for all of the stretch
+            del whole["differential_pressure_pa"]
     speed = bridged(whole["motor_speed_rad_s"])
     noise = _noise(whole, block, sample_time)
     return Blocks(speed, sample_time, block, velocity, pressure, noise, course=whole.get(LEAKAGE_COURSE))

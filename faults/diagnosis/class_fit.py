@@ -229,6 +229,8 @@ def fit_freely(
     for _ in range(ROUNDS):  # a step that gains nothing is taken a third as long
         if reach == 0.0:
             step, reach = _step(blocks, best, centre, pull), 1.0
+            if not np.all(np.isfinite(step)):  # a circuit of no numbers is run for ever
+                break
         there = _at(blocks, actuator, centre, best.coordinates + reach * step, pull)
         if there.cost < best.cost:
             gain, best, reach = best.cost - there.cost, there, 0.0

@@ -151,3 +151,15 @@ def test_the_noise_of_blocks_is_that_of_the_sensors_over_them(position: bool) ->
     assert blocks.noise == pytest.approx([wanted, 5e3 / 10.0**0.5], rel=0.1)
     true = 1e-2 * np.diff(np.sin(3.0 * BLOCK * np.arange(len(blocks.velocity) + 1))) / BLOCK
     assert np.std(blocks.velocity - true) == pytest.approx(wanted, rel=0.1)
+
+
+def test_a_sensor_that_was_out_for_the_whole_stretch_is_none() -> None:
+    velocity = 0.01 * np.sin(np.arange(3000) * 1e-3)
+    out = np.where(np.arange(3000) < 80, 1e5, np.nan)  # and was on while nothing counted yet
+    log = Record(1e-3, {"motor_speed_rad_s": SPEED, "velocity_m_s": velocity})
+    for lost in (out, np.full(3000, np.nan)):
+        blocks = blocks_of(log.replace(differential_pressure_pa=lost))
+        assert blocks.pressure is None
+        assert blocks.noise.tolist() == blocks_of(log).noise.tolist()
+    with pytest.raises(LogError, match="velocity_m_s or position_m is wanted"):
+        blocks_of(log.replace(velocity_m_s=np.full(3000, np.nan)))

@@ -1,5 +1,6 @@
 """A circuit is fitted to a log by steps down the slope of its log-posterior."""
 
+import warnings
 from dataclasses import replace
 from functools import cache
 
@@ -63,3 +64,10 @@ def test_a_model_that_ran_away_is_infinitely_far_off_and_another_as_far_as_its_r
     count = len(off) - log().first
     twice = misfit(log(), log().outputs + np.array([2e-3, 3e5])) - misfit(log(), off)
     assert twice == pytest.approx(count * (np.log(2.0) + np.log(3.0)))
+
+
+def test_a_log_that_gives_no_slope_ends_the_search_where_it_began() -> None:
+    nothing = replace(log(), pressure=np.full(len(log().velocity), np.nan))
+    with warnings.catch_warnings(action="ignore", category=RuntimeWarning):
+        found = fit_freely(nothing, ACTUATOR, next(iter(CONDITIONS)))
+    np.testing.assert_array_equal(found.coordinates, CENTRE)
