@@ -232,9 +232,9 @@ def _fit(measured: Array, found: Array, *, running: bool) -> tuple[float, float]
     """Return fit [%] and root-mean-square error; a free run that ran away has none."""
     known = np.isfinite(measured) & (np.isfinite(found) | running)
     left = (measured - found)[known]
-    spread = measured[known] - measured[known].mean()
     if left.size == 0 or not np.isfinite(left).all():
         return float("-inf"), float("inf")
+    spread = measured[known] - measured[known].mean()
     power = float(spread @ spread)
     fit = 100.0 * (1.0 - float(np.sqrt(left @ left / power))) if power > 0.0 else float("nan")
     return fit, float(np.sqrt(np.mean(left**2)))
