@@ -76,7 +76,7 @@ def run_controlled(
     lay(kernel, work, 0, initial, kernel.WIDTH)
     share(kernel, work, 6 * block, weights)
     keep(kernel, work, 0, states, 0)
-    begin = end = 0
+    begin = end = lost = 0
     start = reach = place = lift = ramp = curvature = 0.0
     size, taken, row, sample = longest, 1.0, -1, 1
     while True:
@@ -103,10 +103,12 @@ def run_controlled(
             sample += 1
         if left <= 0.0:
             break
-        error = largest(kernel, work, 7 * block)
+        error = largest(kernel, work, 7 * block, lost)
         if not error <= 1.0 and size > shortest:
             size = max(size * (0.5 if error < 64.0 else 0.25), shortest)
             continue
+        if error == np.inf:  # no shorter step brings a run back that has no numbers: the others go on without it
+            lost = unknown(kernel, work, 7 * block)
         start, taken = here, size
         place = reach if size == left else place + size
         accept(work, block)
@@ -236,8 +238,8 @@ def growth(error: float) -> float:
     return 0.9 if error > 0.5 else 1.0
 
 
-def largest(kernel: ControlledKernel, work: Array, place: int) -> float:
-    """Return the largest error of the runs, or one that is not a number.
+def largest(kernel: ControlledKernel, work: Array, place: int, lost: int) -> float:
+    """Return the largest error of the runs, infinite where more runs have none than were lost before.
 
     Parameters
     ----------
@@ -245,6 +247,8 @@ def largest(kernel: ControlledKernel, work: Array, place: int) -> float:
         All numbers.
     place : int
         Where the errors stand.
+    lost : int
+        How many runs have no numbers any more.
 
     Returns
     -------
@@ -253,8 +257,26 @@ def largest(kernel: ControlledKernel, work: Array, place: int) -> float:
     """
     error = 0.0
     for lane in range(kernel.LANES):
-        error = error if error >= work[place + lane] else work[place + lane]
-    return error
+        if work[place + lane] > error:
+            error = work[place + lane]
+    return error if unknown(kernel, work, place) <= lost else np.inf
+
+
+def unknown(kernel: ControlledKernel, work: Array, place: int) -> int:
+    """Return how many runs have an error that is not a number.
+
+    Parameters
+    ----------
+    work : ndarray, shape (numbers,)
+        All numbers.
+    place : int
+        Where the errors stand.
+    """
+    count = 0
+    for lane in range(kernel.LANES):
+        if work[place + lane] != work[place + lane]:
+            count += 1
+    return count
 
 
 def accept(work: Array, block: int) -> None:
@@ -296,5 +318,5 @@ def keep(kernel: ControlledKernel, work: Array, place: int, states: Array, sampl
                 states[sample, i, lane] = work[place + kernel.LANES * i + lane]
 
 
-INNER = (lay, share, same, within, along, growth, largest, accept, keep)
+INNER = (lay, share, same, within, along, growth, unknown, largest, accept, keep)
 """Parts of the loop and of `smooth`, compiled as if they stood there."""

@@ -161,5 +161,5 @@ def test_a_sensor_that_was_out_for_the_whole_stretch_is_none() -> None:
         blocks = blocks_of(log.replace(differential_pressure_pa=lost))
         assert blocks.pressure is None
         assert blocks.noise.tolist() == blocks_of(log).noise.tolist()
-    with pytest.raises(LogError, match="velocity_m_s or position_m is wanted"):
+    with pytest.raises(LogError, match="velocity_m_s or position_m is needed"):
         blocks_of(log.replace(velocity_m_s=np.full(3000, np.nan)))

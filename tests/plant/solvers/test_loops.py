@@ -108,6 +108,21 @@ def test_steps_of_controlled_error(lanes: int, kept: int, rows: int, monkeypatch
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.parametrize("lost", [(0,), (3,), (7,), (2, 5), tuple(range(8))])
+def test_a_run_without_numbers_ends_and_leaves_those_beside_it_as_they_are(lost: tuple[int, ...]) -> None:
+    run = compile_adaptive("damper", rates, 2, Damper, 8)
+    control = T, np.array([1e3, 1e2]), 1e-3, 20.0, 1e-9  # so short that a run which stays there never ends
+    wanted, found = np.empty((len(DRIVE), 2, 8)), np.empty((len(DRIVE), 2, 8))
+    run(STARTS, DRIVE, ROWS[None], *control, wanted)
+    parameters = ROWS[None].copy()
+    parameters[:, list(lost), 1] = np.nan
+    run(STARTS, DRIVE, parameters, *control, found)
+    others = [lane for lane in range(8) if lane not in lost]
+    apart = np.abs(found - wanted)[..., others] * control[1][:, None]  # in errors that a step may have
+    assert not np.any(apart > 10.0)
+    assert np.all(np.isnan(found[1:][..., list(lost)]))
+
+
 def test_a_drive_is_smooth_as_far_as_one_parabola_follows_it() -> None:
     line = np.concatenate([np.arange(10.0), np.full(5, 9.0)])
     rows = np.zeros((1, 1, 1))
