@@ -2,65 +2,26 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from math import ceil
-from typing import TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
-from estimation.fits.descent import Point, descend
 from estimation.fits.explain import WORTH, explain, promised
-from estimation.fits.flow_log import (
-    DRAIN_START,
-    LEAST_LEAKAGE,
-    OPENING_START,
-    flow_log,
-    usual_leakage,
-    without_strays,
-)
-from estimation.fits.form_fit import FAULTS_TRIED, FormFit, weighed, with_structure
-from estimation.fits.freed_problem import FreedProblem
-from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, roughly
+from estimation.fits.flow_log import flow_log, without_strays
+from estimation.fits.flow_search import MAKEUP_TRIED, balanced, flow_starts
+from estimation.fits.form_fit import FormFit, weighed, with_structure
+from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
-from estimation.fits.greybox_problem import Problem
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, OFFSET, START_LOAD, Hypothesis
-from estimation.fits.wide_problem import flow_bounds
-from estimation.models.flow import (
-    FLOW_FORM,
-    HELD_FLOW_FORM,
-    MASS_FLOW_FORM,
-    STIFFNESS,
-    reaches_relief,
-    relieving,
-)
-from estimation.models.greybox import GreyBoxModel
+from estimation.models.flow import HELD_FLOW_FORM, STIFFNESS
 from estimation.notes import EstimateCode
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
 from plant.log.record import Record
 from plant.notes import Note
-from plant.spare_processors import each
-
-Array = NDArray[np.float64]
-Bounds: TypeAlias = tuple[Array, Array]
 
 FLOW_CHANNELS = ("position_m", "differential_pressure_pa")
 """Channels that the flow form needs beside motor speed."""
 
 REPORTED = ("leakage_coefficient", "flow_bias")
 """What is worth telling of the parameters found along with bulk modulus."""
-
-MAKEUP_TRIED = (1e-9, 1e-13)
-"""Make-up conductances of the starts [m^3/(s Pa)]: a circuit with make-up valves, and one without."""
-
-LEAD_START = 1e-5
-"""First guess of the motor's lead on the straight line between samples [s]."""
-
-SCREENED_SECONDS = 4.0
-"""Starts are compared on the beginning of the log: it tells a wrong valley from a right one [s]."""
-
-FINISHING = 15
-"""Evaluations with short model steps: what is not there by then is a conductance that vanishes, a little at a time."""
 
 LARGEST_CHI_SQUARE = 1.2
 """Mean squared normalised residual above which the model is said to leave something out [dimensionless]."""
@@ -85,9 +46,6 @@ MOST_ASKED = 50_000
 STRUCTURE = 5e-4
 """Relative standard deviation of bulk modulus from what the balance leaves out. Judged on 18 plain logs of the open
 benchmark's validation split, where z is 1.14 rms without it and 0.95 with it [fraction]."""
-
-UNLIKELY = 36.0
-"""Difference of log-likelihood from which a form of the balance counts for nothing beside the other [dimensionless]."""
 
 
 def fit_flow(
@@ -136,8 +94,8 @@ def fit_flow(
     if variances is None:
         record, variances = without_strays(record)
     log = flow_log(record, parameters, uncertainties or {}, variances)
-    starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
-    fits = _balanced(log, parameters, starts)
+    starts = flow_starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
+    fits = balanced(log, parameters, starts)
     best, found = min(fits, key=_cost), weighed(fits)
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
     explains = partial(_explains, noisy=log.passes_on)
@@ -152,43 +110,6 @@ def fit_flow(
     value, std = found["bulk_modulus"]
     believed = with_structure(found, STRUCTURE)
     return FormFit(believed, std / value, best.chi_square[0], _objections(best, log.passes_on), best.rig_slopes)
-
-
-def _balanced(
-    log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]
-) -> Sequence[GreyBoxFit]:
-    """Return the fits of the balances that count, the first by volume."""
-    relieved = reaches_relief(log.measured, parameters.relief_pressure)
-    forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
-    search, afar = Search(screened=ceil(SCREENED_SECONDS / log.sample_time)), log.taken_at(parameters.bulk_modulus)
-
-    def sought(form: GreyBoxModel, tried: Sequence[Mapping[str, float]]) -> tuple[Problem, Point, Bounds]:
-        problem = Problem(form, afar) if log.gaps.size else FreedProblem.of(form, afar)  # what gaps leave open, once
-        guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in tried]
-        bounds = flow_bounds(form, guesses, afar)
-        point = roughly(problem, guesses, search, bounds)
-        if not log.passes_on:
-            return problem, point, bounds
-        problem, modulus = problem.on(log), form.values(point.theta)["bulk_modulus"]
-        guesses = [form.theta({STIFFNESS: 0.0, **start, "bulk_modulus": modulus}) for start in tried]
-        bounds = flow_bounds(form, guesses, log)
-        return problem, roughly(problem, [*guesses, point.theta], search, bounds), bounds
-
-    first = sought(forms[0], starts)
-    near = [{STIFFNESS: 0.0, **first[0].model.values(first[1].theta)}]
-    rough = [first, *each(lambda form: sought(form, near), forms[1:])]
-    least = min(point.cost for _, point, _ in rough)
-    likely = [  # twice what counts: long model steps have errors
-        one for one in rough if one is first or one[1].cost < least + 2.0 * UNLIKELY
-    ]
-
-    def finished(one: tuple[Problem, Point, Bounds]) -> tuple[Problem, Point]:
-        problem, point, bounds = one
-        return problem, descend(problem.at, point.theta, FINISHING, bounds)
-
-    done = each(finished, likely)
-    least = min(point.cost for _, point in done)
-    return each(lambda one: concluded(*one, disturbed=one[1].cost < least + UNLIKELY), done)
 
 
 def _asked(log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, loaded: bool) -> tuple[Hypothesis, ...]:
@@ -222,28 +143,6 @@ def _cost(fit: GreyBoxFit) -> float:
 
 def _explains(fit: GreyBoxFit, noisy: bool) -> bool:
     return not _objections(fit, noisy)
-
-
-def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
-    leakage = usual_leakage(p)
-    bias = max(p.flow_bias, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed)
-    moduli = sorted({bulk_modulus, p.bulk_modulus})
-    return [
-        {
-            "bulk_modulus": modulus,
-            "leakage_coefficient": worse * leakage,
-            "flow_bias": biased * bias,
-            "makeup_conductance": makeup,
-            "makeup_opening": OPENING_START,
-            "case_leakage": DRAIN_START * leakage,
-            "speed_lead": LEAD_START,
-            "relief_pressure": p.relief_pressure,
-            "relief_conductance": p.relief_conductance,
-        }
-        for worse, biased in FAULTS_TRIED
-        for makeup in MAKEUP_TRIED
-        for modulus in moduli
-    ]
 
 
 def _objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:

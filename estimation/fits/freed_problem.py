@@ -13,7 +13,7 @@ import numpy as np
 from estimation.fits.descent import Point
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_loops import compile_kernel
-from estimation.fits.greybox_problem import Problem, weighed
+from estimation.fits.greybox_problem import OUTLIER, Problem, weighed
 from estimation.fits.side_by_side import LANES, compile_side_by_side
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
@@ -94,6 +94,25 @@ class FreedProblem(Problem):
         found = self._residuals(rows, None, self._variances(thetas[0]))
         parts = np.split(found, len(thetas), axis=-1)
         return [self._point(at, *weighed(*_differences(part))) for at, part in zip(thetas, parts, strict=True)]
+
+    def costs(self, thetas: Sequence[Array]) -> Array:
+        """Return the cost at several points, without slopes: `LANES` points take as long as one with its slopes.
+
+        Parameters
+        ----------
+        thetas : sequence of ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+
+        Returns
+        -------
+        ndarray, shape (points,)
+            As of `Problem.at` [dimensionless]; noise of driving channels counts as at the first point.
+        """
+        points = np.array(thetas)
+        errors = self._residuals(self._rows(points, self.log.parameters), None, self._variances(points[0]))
+        weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)
+        misfit = np.einsum("ijk,ijk->k", (1.0 - 0.5 * weight) * weight * errors, errors)
+        return misfit + 0.5 * (points - self.presumed) ** 2 @ self.prior
 
     def residuals_of(self, theta: Array, parameters: Sequence[Array]) -> list[Array]:
         """Return the normalised residuals under several parameters of the rig, side by side.

@@ -181,9 +181,27 @@ def roughly(problem: Problem, guesses: Sequence[Array], search: Search, bounds: 
         while length < len(log.measured):  # on ever longer beginnings, so that the whole takes few steps
             guess, length = descended(guess, length, search.evaluations).theta, LENGTHENED * length
         points.append(descended(guess, len(log.measured), search.evaluations))
-        if 2.0 * points[-1].cost < EXPLAINED * np.count_nonzero(whole.residuals(points[-1].theta)):
+        if explained(whole, points[-1]):
             break
     return min(points, key=_cost)
+
+
+def explained(problem: Problem, point: Point) -> bool:
+    """Return whether a point of the search leaves so little of a log that no better one is looked for.
+
+    Parameters
+    ----------
+    problem : Problem
+        Model and log.
+    point : Point
+        A point of its search.
+
+    Returns
+    -------
+    bool
+        Whether the mean squared residual is below `EXPLAINED`.
+    """
+    return 2.0 * point.cost < EXPLAINED * problem.blocks
 
 
 def _cost(point: Point) -> float:

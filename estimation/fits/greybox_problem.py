@@ -1,6 +1,7 @@
 """The least-squares problem that a grey-box model and a log make."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -83,6 +84,12 @@ class Problem:
         presumed = [log.presumed.get(name, (1.0, np.inf)) for name in model.unknowns]
         self.presumed = np.array([np.log(value) for value, _ in presumed])
         self.prior = np.array([deviation**-2.0 for _, deviation in presumed])
+
+    @cached_property
+    def blocks(self) -> int:
+        """How many blocks hold a sample, of all outputs together [count]."""
+        begins = np.arange(0, len(self.log.measured), self._block)
+        return int(np.count_nonzero(np.logical_or.reduceat(np.isfinite(self.log.measured), begins, axis=0)))
 
     def on(self, log: GreyBoxLog) -> "Problem":
         """Return the same problem of another log.

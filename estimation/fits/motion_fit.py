@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from estimation.fits.averaged import block_means, samples_a_block
 from estimation.fits.descent import Point, descend, descend_together
-from estimation.fits.flow_fit import LEAD_START
 from estimation.fits.flow_log import DRAIN_START, LEAST_LEAKAGE
+from estimation.fits.flow_search import LEAD_START
 from estimation.fits.force_scale import Way, disagree, rescaled
 from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
 from estimation.fits.freed_problem import FreedProblem

@@ -1,0 +1,191 @@
+"""`balanced(log, ...)`: fits of the flow form, balanced by volume, by mass, and by volume in held chambers.
+
+The likeliest of many coarse guesses is followed first, for a run without slopes is cheap. Where it leads to a point
+that explains the log, nothing else is searched; else searches begin at leakages and flow biases of all conditions.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+from math import ceil
+from typing import TypeAlias
+
+import numpy as np
+
+from estimation.fits.descent import Point, descend
+from estimation.fits.flow_log import DRAIN_START, LEAST_LEAKAGE, OPENING_START, usual_leakage
+from estimation.fits.form_fit import FAULTS_TRIED
+from estimation.fits.freed_problem import FreedProblem
+from estimation.fits.greybox_fit import NEAR_ENOUGH, GreyBoxFit, Search, concluded, explained, roughly
+from estimation.fits.greybox_log import GreyBoxLog
+from estimation.fits.greybox_problem import Problem
+from estimation.fits.wide_problem import flow_bounds
+from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS, reaches_relief, relieving
+from estimation.models.greybox import GreyBoxModel
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+from plant.spare_processors import each
+
+Values: TypeAlias = Mapping[str, float]
+
+MAKEUP_TRIED = (1e-9, 1e-13)
+"""Make-up conductances of the starts [m^3/(s Pa)]: a circuit with make-up valves, and one without."""
+
+LEAD_START = 1e-5
+"""First guess of the motor's lead on the straight line between samples [s]."""
+
+GUESSED = ((1.0, 2.5, 5.0, 8.0, 12.5), (1.0, 3.5, 6.0), (0.7, 1.0, 1.3))
+"""Leakage and flow bias as multiples of the healthy actuator's, and bulk modulus as one of the first guess, in the
+guesses of which the likeliest is followed [dimensionless]: from the healthy actuator to the worst of Table 3."""
+
+SCREENED_SECONDS = 4.0
+"""Starts are compared on the beginning of the log: it tells a wrong valley from a right one [s]."""
+
+FINISHING = 15
+"""Evaluations with short model steps: what is not there by then is a conductance that vanishes, a little at a time."""
+
+UNLIKELY = 36.0
+"""Difference of log-likelihood from which a form of the balance counts for nothing beside the other [dimensionless]."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Rough:
+    """Where one balance fits best with long model steps, and the bounds of its search."""
+
+    problem: Problem
+    point: Point
+    bounds: tuple[Array, Array]
+
+    @property
+    def values(self) -> Values:
+        return {STIFFNESS: 0.0, **self.problem.model.values(self.point.theta)}
+
+
+def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
+    """Return where searches for the flow form's unknowns begin.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+    bulk_modulus : float
+        First guess of effective bulk modulus [Pa].
+
+    Returns
+    -------
+    list of dict
+        Values of the unknowns [SI]; those of the healthy actuator at the first guess come first.
+    """
+    leakage = usual_leakage(p)
+    bias = max(p.flow_bias, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed)
+    moduli = sorted({bulk_modulus, p.bulk_modulus})
+    return [
+        {
+            "bulk_modulus": modulus,
+            "leakage_coefficient": worse * leakage,
+            "flow_bias": biased * bias,
+            "makeup_conductance": makeup,
+            "makeup_opening": OPENING_START,
+            "case_leakage": DRAIN_START * leakage,
+            "speed_lead": LEAD_START,
+            "relief_pressure": p.relief_pressure,
+            "relief_conductance": p.relief_conductance,
+        }
+        for worse, biased in FAULTS_TRIED
+        for makeup in MAKEUP_TRIED
+        for modulus in moduli
+    ]
+
+
+def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Values]) -> Sequence[GreyBoxFit]:
+    """Return the fits of the balances that count, the first by volume.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    starts : sequence of Mapping[str, float]
+        Where searches begin, see `flow_starts` [SI].
+
+    Returns
+    -------
+    sequence of GreyBoxFit
+        One at least.
+    """
+    rough = _rough(log, parameters, starts)
+    least = min(one.point.cost for one in rough)
+    likely = [  # twice what counts: long model steps have errors
+        one for one in rough if one is rough[0] or one.point.cost < least + 2.0 * UNLIKELY
+    ]
+
+    def finished(one: _Rough) -> Point:
+        return descend(one.problem.at, one.point.theta, FINISHING, one.bounds)
+
+    done = [(one.problem, point) for one, point in zip(likely, each(finished, likely), strict=True)]
+    least = min(point.cost for _, point in done)
+    return each(lambda one: concluded(*one, disturbed=one[1].cost < least + UNLIKELY), done)
+
+
+def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Values]) -> list[_Rough]:
+    """Return where the balances fit best with long model steps, each searched from where the first one ended."""
+    relieved = reaches_relief(log.measured, parameters.relief_pressure)
+    forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
+    afar = log.taken_at(parameters.bulk_modulus)
+    if not log.gaps.size:
+        first = _searched(forms[0], log, afar, [_guess(forms[0], afar, starts)], alone=True)
+        others = each(partial(_searched, log=log, afar=afar, starts=[first.values], alone=True), forms[1:])
+        if _explains(first) or _explains(others[0]):
+            return [first, *others]
+        starts = [*starts, first.values]
+    first = _searched(forms[0], log, afar, starts)
+    return [first, *each(partial(_searched, log=log, afar=afar, starts=[first.values]), forms[1:])]
+
+
+def _explains(one: _Rough) -> bool:
+    return explained(one.problem, one.point)
+
+
+def _guess(form: GreyBoxModel, log: GreyBoxLog, starts: Sequence[Values]) -> Values:
+    """Return where the likeliest of many guesses about the first start leads on the beginning of a log."""
+    search = _search(log)
+    problem = FreedProblem.of(form, log.beginning(search.screened).coarsened())
+    around = {STIFFNESS: 0.0, **starts[0]}
+    guesses = [
+        problem.model.theta(
+            {
+                **around,
+                "leakage_coefficient": worse * around["leakage_coefficient"],
+                "flow_bias": biased * around["flow_bias"],
+                "bulk_modulus": stiffer * around["bulk_modulus"],
+            }
+        )
+        for worse, biased, stiffer in product(*GUESSED)
+    ]
+    likeliest = guesses[int(np.argmin(problem.costs(guesses)))]
+    bounds = flow_bounds(form, guesses, log)
+    return problem.model.values(descend(problem.at, likeliest, search.evaluations, bounds, NEAR_ENOUGH).theta)
+
+
+def _search(log: GreyBoxLog) -> Search:
+    return Search(screened=ceil(SCREENED_SECONDS / log.sample_time))
+
+
+def _searched(
+    form: GreyBoxModel, log: GreyBoxLog, afar: GreyBoxLog, starts: Sequence[Values], *, alone: bool = False
+) -> _Rough:
+    """Return the best that is found from starts, at first with noise of position as it is at the rig's bulk modulus."""
+    search = _search(log)
+    problem = Problem(form, afar) if log.gaps.size else FreedProblem.of(form, afar)  # what gaps leave open, once
+    guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in starts]
+    bounds = flow_bounds(form, guesses, afar)
+    point = roughly(problem, guesses, search, bounds)
+    if not log.passes_on:
+        return _Rough(problem, point, bounds)
+    problem, modulus = problem.on(log), form.values(point.theta)["bulk_modulus"]
+    guesses = [form.theta({STIFFNESS: 0.0, **start, "bulk_modulus": modulus}) for start in starts]
+    bounds = flow_bounds(form, guesses, log)
+    again = [point.theta] if alone else [*guesses, point.theta]
+    return _Rough(problem, roughly(problem, again, search, bounds), bounds)
