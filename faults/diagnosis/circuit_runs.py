@@ -52,6 +52,9 @@ TOLERANCE, DRIVE_TOLERANCE = 1e-4, 2e-3
 """Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_run`: far below what is
 compared."""
 
+OIL = (4, 5)
+"""Places of the oil in chambers A and B among the circuit's states."""
+
 _CONTROL = cast("ErrorControl", CIRCUIT.control)
 
 _COLUMN = {field.name: i for i, field in enumerate(fields(CircuitParameters))}
@@ -185,7 +188,7 @@ def _mean(values: Array, block: int, spare: int = 1) -> Array:
     What a clipped sensor left out is not like what it kept: the mean of a small rest would lie off.
     """
     count = (len(values) - spare) // block
-    parts = values[: count * block].reshape(count, block)
+    parts = values[: count * block].reshape(count, block, *values.shape[1:])
     there = np.isfinite(parts)
     if np.all(there):
         return parts.mean(axis=1)
@@ -284,7 +287,7 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
         tolerance=TOLERANCE,
         drive_tolerance=DRIVE_TOLERANCE,
     )
-    return np.array([_outputs(blocks, states, rows[:, i]) for i, states in enumerate(runs)])
+    return _outputs(blocks, np.moveaxis(runs, 0, 2), rows)  # as they lie in memory
 
 
 def _drift(course: Array) -> Array:
@@ -315,14 +318,15 @@ def _between_stops(blocks: Blocks, rows: Array) -> Array:
     return rows
 
 
-def _outputs(blocks: Blocks, states: Array, row: Array) -> Array:
-    velocity = np.diff(states[:: blocks.block, 2]) / (blocks.block * blocks.sample_time)
+def _outputs(blocks: Blocks, states: Array, rows: Array) -> Array:
+    """Return what is compared, of states of shape (samples, states, m) and rows of shape (1 or samples, m, parameters)."""
+    position = states[:, 2]
+    velocity = np.diff(position[:: blocks.block], axis=0) / (blocks.block * blocks.sample_time)
     if blocks.pressure is None:
-        return velocity[:, None]
-    p = circuit_values(row)
-    volumes = chamber_volumes(states[:, 2], p)
+        return np.ascontiguousarray(velocity.T)[..., None]
+    p = circuit_values(rows)
     high, low = (
-        oil_pressure(oil, volume, p.bulk_modulus, p.air_fraction, p.vapour_pressure)
-        for oil, volume in zip(states[:, 4:6].T, volumes, strict=True)
+        oil_pressure(states[:, at], volume, p.bulk_modulus, p.air_fraction, p.vapour_pressure)
+        for at, volume in zip(OIL, chamber_volumes(position, p), strict=True)
     )
-    return np.column_stack([velocity, _mean(high - low, blocks.block)])
+    return np.stack([velocity.T, _mean(high - low, blocks.block).T], axis=-1)

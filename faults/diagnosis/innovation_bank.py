@@ -8,10 +8,11 @@ from estimation.filters.batch import filter_batch
 from estimation.filters.run import filter_problem
 from estimation.log_checks.first_belief import first_belief
 from estimation.models.eha_forms import PRESSURE_FORM
-from faults.conditions import CONDITIONS, parameters_for
+from faults.eha.bank import mathematical_bank
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
+from plant.solvers.steps import parameter_row
 
 STEP = 2e-3
 """Longest step of the filters [s]: their implicit step is stable at any, and what they tell apart is slower."""
@@ -42,6 +43,11 @@ def innovation_scores(record: Record, rig: EhaParameters) -> Array:
     model = replace(PRESSURE_FORM, longest_step=STEP)
     slow = record.slice(0, None, max(1, round(STEP / record.sample_time)))
     prior = first_belief(model, slow, rig.bulk_modulus, SPREAD * rig.bulk_modulus)
-    problems = [filter_problem(model, prior, slow, parameters_for(condition, rig)) for condition in CONDITIONS.values()]
+    first, *others = mathematical_bank(rig).values()
+    begun = replace(filter_problem(model, prior, slow, first), every=len(slow))  # nobody asks for the track
+    if begun.model is model:  # else what gaps in the drive leave open is another in each condition
+        problems = [begun, *(replace(begun, parameters=parameter_row(one, model.parameters)) for one in others)]
+    else:
+        problems = [begun, *(replace(filter_problem(model, prior, slow, one), every=len(slow)) for one in others)]
     found = np.array([trace.log_likelihood for trace in filter_batch(problems)])
     return np.where(np.isfinite(found), found, -np.inf)

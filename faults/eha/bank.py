@@ -2,13 +2,13 @@
 
 import warnings
 from collections.abc import Mapping
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
 
 from estimation.identification.model.linear_model import LinearModel
 from estimation.log_checks.bridging import bridged
-from estimation.models.eha_forms import PRESSURE_FORM
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.arrays import Array
 from plant.eha.drives import make_drive
@@ -16,11 +16,16 @@ from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, LUMPED, Plant, simulate
 from plant.errors import CovarianceWarning
 from plant.log.record import Record
+from plant.runs import steps_a_sample
 from plant.sensors.sensors import BENCH, Sensors
 from plant.solvers.adaptive import LANES
 from plant.solvers.fixed_step_kernel import compile_fixed_step
 from plant.solvers.steps import parameter_row
 from plant.solvers.trajectory import compile_trajectory
+
+STEP = 2.5e-4
+"""Longest step of the lumped models on a log [s]. With 0.1 ms no error of a nominal model differs by more than two
+parts in 10,000."""
 
 IDENTIFICATION_TIME = 0.001
 """Sample time of the transfer functions [s]: inferred for Table 6 (errata E14)."""
@@ -32,8 +37,9 @@ LIBRARY_DURATION = 60.0
 """Length of each test behind a library that is kept [s]."""
 
 
+@lru_cache(maxsize=16)
 def mathematical_bank(rig: EhaParameters) -> Mapping[str, EhaParameters]:
-    """Return the actuator's parameters in each of the nine conditions.
+    """Return the actuator's parameters in each of the nine conditions, kept for the next log.
 
     Parameters
     ----------
@@ -59,7 +65,7 @@ def predict_run(record: Record, parameters: EhaParameters) -> Mapping[str, Array
     run = compile_trajectory(LUMPED.name, LUMPED.step, len(LUMPED.states), LUMPED.parameter_class)
     rows = parameter_row(parameters)[None]
     speed = bridged(record["motor_speed_rad_s"])
-    substeps = PRESSURE_FORM.substeps(record.sample_time)
+    substeps = steps_a_sample(record.sample_time, STEP)
     states = run(np.zeros(len(LUMPED.states)), speed, rows, record.sample_time, substeps)
     return LUMPED.channels(states, rows)
 
@@ -95,7 +101,7 @@ def _side_by_side(record: Record, rows: Array) -> Array:
     width, speed = len(LUMPED.states), bridged(record["motor_speed_rad_s"])
     run = compile_fixed_step(LUMPED.name, LUMPED.step, width, LUMPED.parameter_class, LANES)
     drives, states = np.repeat(speed[:, None], LANES, axis=1), np.empty((len(speed), width, LANES))
-    run(np.zeros((width, LANES)), drives, rows, record.sample_time, PRESSURE_FORM.substeps(record.sample_time), states)
+    run(np.zeros((width, LANES)), drives, rows, record.sample_time, steps_a_sample(record.sample_time, STEP), states)
     return states
 
 

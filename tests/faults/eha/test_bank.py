@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.rmse import score_mathematical
+from faults.eha import bank
 from faults.eha.bank import (
     IDENTIFICATION_TIME,
     identification_run,
@@ -16,9 +18,9 @@ from faults.eha.bank import (
 )
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
-from plant.eha.simulate import LUMPED, simulate
+from plant.eha.simulate import CIRCUIT, LUMPED, simulate
 from plant.log.record import Record
-from plant.sensors.sensors import IDEAL, drop_samples
+from plant.sensors.sensors import BENCH, IDEAL, drop_samples
 
 RIG = EhaParameters()
 
@@ -30,9 +32,22 @@ def run_of(parameters: EhaParameters) -> Record:
 
 def test_the_mathematical_bank_is_the_nine_conditions_of_the_rig() -> None:
     other = replace(RIG, piston_area=3.04e-3)
-    bank = mathematical_bank(other)
-    assert list(bank) == list(CONDITIONS)
-    assert all(bank[name] == parameters_for(condition, other) for name, condition in CONDITIONS.items())
+    found = mathematical_bank(other)
+    assert list(found) == list(CONDITIONS)
+    assert all(found[name] == parameters_for(condition, other) for name, condition in CONDITIONS.items())
+
+
+def test_the_bank_is_kept_for_the_next_log_of_the_rig() -> None:
+    assert mathematical_bank(RIG) is mathematical_bank(EhaParameters())
+
+
+def test_shorter_steps_change_no_error_of_a_model_by_more_than_its_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
+    p = parameters_for(CONDITIONS["minor_friction"])
+    drive = make_drive("prbs", 4.0, 1e-3, p, np.random.default_rng(3))
+    record = simulate(CIRCUIT, drive, 1e-3, p, sensors=BENCH, rng=np.random.default_rng(4))
+    usual = score_mathematical(record, mathematical_bank(RIG)).by_condition
+    monkeypatch.setattr(bank, "STEP", 1e-4)
+    assert usual == pytest.approx(score_mathematical(record, mathematical_bank(RIG)).by_condition, rel=3e-4)
 
 
 def test_a_prediction_is_the_simulated_run() -> None:
@@ -52,11 +67,11 @@ def test_a_prediction_reads_the_drive_alone_and_bridges_its_gaps() -> None:
 
 
 def test_predictions_side_by_side_are_those_of_each_model_alone() -> None:
-    record, bank = run_of(RIG), mathematical_bank(RIG)
-    found = predict_runs(record, bank)
-    assert list(found) == list(bank)
+    record, models = run_of(RIG), mathematical_bank(RIG)
+    found = predict_runs(record, models)
+    assert list(found) == list(models)
     for name, channels in found.items():
-        for channel, values in predict_run(record, bank[name]).items():
+        for channel, values in predict_run(record, models[name]).items():
             np.testing.assert_allclose(channels[channel], values, atol=1e-9 * np.max(np.abs(values)))
 
 
