@@ -169,7 +169,7 @@ def explain(
 
 
 def promised(
-    log: GreyBoxLog, parameters: EhaParameters, plain: Mapping[str, float], one: Hypothesis
+    log: GreyBoxLog, parameters: EhaParameters, plain: Mapping[str, float], one: Hypothesis, *, by_mass: bool = False
 ) -> tuple[float, float]:
     """Return what a hypothesis promises beside the plain fit, to first order.
 
@@ -183,6 +183,8 @@ def promised(
         What the plain form found [SI].
     one : Hypothesis
         What is asked.
+    by_mass : bool
+        Whether the plain fit balances mass: promises are of where it stands.
 
     Returns
     -------
@@ -190,7 +192,15 @@ def promised(
         Gain in log-likelihood, Rao's score statistic over two [dimensionless], and how far what is freed first would
         move in its fitted coordinate: for a logarithm a relative change [dimensionless].
     """
-    return _promises(widened(log, parameters, plain.get(STIFFNESS, 0.0)), (), plain, (one,))[0]
+    wide = widened(log, parameters, plain.get(STIFFNESS, 0.0))
+    return _promises(_balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, (one,))[0]
+
+
+def _balanced_by(log: GreyBoxLog, mass: float) -> GreyBoxLog:
+    """Return a log whose wide form balances mass (1), or volume (0)."""
+    parameters = log.parameters.copy()
+    parameters[parameter_names(WideFlowParameters).index("by_mass")] = mass
+    return replace(log, parameters=parameters)
 
 
 def _promising(
@@ -281,12 +291,10 @@ def _descended(log: GreyBoxLog, tried: _Tried, start: Array, evaluations: int) -
 
 def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
     """Return a set of hypotheses fitted to the end, balanced by volume or by mass, whichever is likelier."""
-    row, by_mass = delayed(log, tried.delay), parameter_names(WideFlowParameters).index("by_mass")
+    row = delayed(log, tried.delay)
     done: list[tuple[_Tried, GreyBoxLog]] = []
     for share in (0.0, 1.0):
-        parameters = row.parameters.copy()
-        parameters[by_mass] = share
-        own = replace(row, parameters=parameters)
+        own = _balanced_by(row, share)
         begun = done[-1][0] if done else tried
         done.append((_descended(own, begun, begun.point.theta, FINISHING), own))
     best, own = min(done, key=lambda one: one[0].cost)

@@ -10,7 +10,7 @@ from estimation.fits.form_fit import FormFit, weighed, with_structure
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, OFFSET, START_LOAD, Hypothesis
-from estimation.models.flow import HELD_FLOW_FORM, STIFFNESS
+from estimation.models.flow import HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
 from estimation.notes import EstimateCode
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
@@ -123,7 +123,8 @@ def _asked(log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, 
         return (START_LOAD, OFFSET)
     if not _explains(swinging, log.passes_on):
         return HYPOTHESES
-    gain, size = promised(log, parameters, swinging.values, DELIVERY)
+    by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
+    gain, size = promised(log, parameters, swinging.values, DELIVERY, by_mass=by_mass)
     return (DELIVERY,) if gain > WORTH and size > LEAST_DELIVERY else ()
 
 

@@ -4,8 +4,9 @@ The variance of an estimate has three parts, told apart: noise of the outputs, n
 well the rig's own parameters are known. The last two are read off the fit's linear response to them.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,9 @@ EXPLAINED = 1.2
 
 DRIVE_DRAWS = 16
 """Realisations of the driving channels' noise; their spread is known to 18 %, of a part that is seldom the larger."""
+
+SAMPLES_KEPT = 50_000
+"""Longest log whose draws are kept for the next one [samples]: 13 MB."""
 
 NOISE_DOUBT = 0.2
 """Standard deviation of the share of a driving channel's noise that is counted with the slopes: its size is known to
@@ -226,7 +230,7 @@ def concluded(problem: Problem, point: Point, *, disturbed: bool = True) -> Grey
         The fit.
     """
     model, theta = problem.model, point.theta
-    errors, slopes = problem.residuals(theta), problem.slopes(theta)
+    errors, slopes = problem.linearised(theta)
     felt = np.flatnonzero(np.einsum("ij,ij->j", slopes, slopes) > LEAST_EFFECT**2)
     noise, rig, late = np.full(len(theta), np.inf), dict[str, Array](), dict[str, tuple[float, float]]()
     used = int(np.count_nonzero(errors))
@@ -274,9 +278,23 @@ def _drive_variance(problem: Problem, theta: Array, response: Callable[[Array], 
         return 0.0
     rough = problem.on(log.coarsened())
     undisturbed = rough.residuals(theta)
-    rng, spread = np.random.default_rng(0), np.array(log.drive_std)  # the same draws for every log: it can be repeated
-    draws = (log.drives + spread * rng.standard_normal(log.drives.shape) for _ in range(DRIVE_DRAWS))
+    spread = np.array(log.drive_std)
+    draws = (log.drives + spread * noise for noise in _normal_draws(*log.drives.shape))
     return sum(response(errors - undisturbed) ** 2 for errors in rough.disturbed(theta, draws)) / DRIVE_DRAWS
+
+
+def _normal_draws(samples: int, channels: int) -> Iterable[Array]:
+    """Return `DRIVE_DRAWS` draws of white noise, the same for every log: a fit can be repeated."""
+    if samples <= SAMPLES_KEPT:
+        return _kept_draws(samples, channels)
+    rng = np.random.default_rng(0)
+    return (rng.standard_normal((samples, channels)) for _ in range(DRIVE_DRAWS))
+
+
+@lru_cache(maxsize=1)
+def _kept_draws(samples: int, channels: int) -> Array:
+    """Return the draws, kept for the other forms of the balance and for the next log of that length."""
+    return np.random.default_rng(0).standard_normal((DRIVE_DRAWS, samples, channels))
 
 
 def _rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Array]) -> Iterator[tuple[str, Array]]:

@@ -199,9 +199,24 @@ class Problem:
         ndarray, shape (outputs * blocks, unknowns)
             Zero where a block is missing [dimensionless].
         """
+        return self.linearised(theta)[1]
+
+    def linearised(self, theta: Array) -> tuple[Array, Array]:
+        """Return the normalised residuals and their derivatives, from one run.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+
+        Returns
+        -------
+        tuple of ndarray, shapes (outputs, blocks) and (outputs * blocks, unknowns)
+            As of `residuals` and `slopes`.
+        """
         errors, slopes = self._room(), self._room(len(theta))
         self._run(theta, errors, slopes)
-        return self._tilted(theta, errors, slopes).reshape(-1, len(theta))
+        return errors, self._tilted(theta, errors, slopes).reshape(-1, len(theta))
 
     def _room(self, *columns: int) -> Array:
         return np.zeros((self.log.measured.shape[1], -(-len(self.log.measured) // self._block), *columns))

@@ -319,7 +319,7 @@ def _between_stops(blocks: Blocks, rows: Array) -> Array:
 
 
 def _outputs(blocks: Blocks, states: Array, rows: Array) -> Array:
-    """Return what is compared, of states of shape (samples, states, m) and rows of shape (1 or samples, m, parameters)."""
+    """Return what is compared, of states, shape (samples, states, m), and rows, shape (1 or samples, m, parameters)."""
     position = states[:, 2]
     velocity = np.diff(position[:: blocks.block], axis=0) / (blocks.block * blocks.sample_time)
     if blocks.pressure is None:

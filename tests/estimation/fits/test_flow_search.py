@@ -1,0 +1,84 @@
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from estimation.fits import flow_search
+from estimation.fits.explain import promised
+from estimation.fits.flow_log import flow_log
+from estimation.fits.flow_search import balanced, flow_starts
+from estimation.fits.greybox_fit import GreyBoxFit, roughly
+from estimation.fits.greybox_log import GreyBoxLog
+from estimation.fits.hypotheses import DELIVERY
+from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.models.flow import MASS_FLOW_FORM
+from faults.conditions import CONDITIONS, parameters_for
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+HEALTHY = EhaParameters()
+STARTS = flow_starts(HEALTHY, HEALTHY.bulk_modulus)
+
+
+def recorded(condition: str, duration: float = 2.0, sample_time: float = 1e-3) -> Record:
+    p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(21)
+    drive = make_drive("steps", duration, sample_time, p, rng)
+    return simulate(CIRCUIT, drive, sample_time, p, sensors=BENCH, rng=rng)
+
+
+def seen(record: Record) -> GreyBoxLog:
+    channels = "motor_speed_rad_s", "position_m", "differential_pressure_pa"
+    return flow_log(record, HEALTHY, {}, measurement_variances(record, channels))
+
+
+@pytest.fixture
+def tried(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many starts each search had."""
+    counts: list[int] = []
+
+    def counted(problem: object, guesses: Sequence[object], *others: object) -> object:
+        counts.append(len(guesses))
+        return roughly(problem, guesses, *others)  # pyright: ignore[reportArgumentType] -- as it came
+
+    monkeypatch.setattr(flow_search, "roughly", counted)
+    return counts
+
+
+@pytest.mark.parametrize("condition", ["normal", "major_leakage", "minor_leakage_major_friction"])
+def test_a_log_that_the_likeliest_guess_explains_is_fitted_as_by_a_search_from_every_start(
+    condition: str, tried: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = seen(recorded(condition))
+    quick = balanced(log, HEALTHY, STARTS)
+    assert max(tried) == 1
+    monkeypatch.setattr(flow_search, "_explains", lambda _: False)
+    whole = balanced(log, HEALTHY, STARTS)
+    assert max(tried) > len(STARTS)
+    assert len(quick) == len(whole)
+    for one, other in zip(quick, whole, strict=True):
+        assert one.cost == pytest.approx(other.cost, abs=2e-3)
+        std = other.std["bulk_modulus"]
+        assert one.values["bulk_modulus"] == pytest.approx(other.values["bulk_modulus"], abs=0.05 * std)
+        assert one.std["bulk_modulus"] == pytest.approx(std, rel=0.01)
+
+
+def test_a_log_that_no_guess_explains_is_searched_from_every_start(tried: list[int]) -> None:
+    record = recorded("normal")
+    drift = np.linspace(0.0, 3e5, len(record))
+    balanced(seen(record.replace(differential_pressure_pa=record["differential_pressure_pa"] + drift)), HEALTHY, STARTS)
+    assert max(tried) > len(STARTS)
+
+
+def by_mass(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:
+    (one,) = (fit for fit in fits if fit.model.rates is MASS_FLOW_FORM.rates)
+    return one
+
+
+def test_what_a_hypothesis_promises_is_asked_where_the_plain_fit_stands() -> None:
+    log = seen(recorded("minor_friction", 10.0, 2e-3))
+    plain = by_mass(balanced(log, HEALTHY, STARTS)).values
+    assert promised(log, HEALTHY, plain, DELIVERY, by_mass=True)[0] < 10.0
+    assert promised(log, HEALTHY, plain, DELIVERY, by_mass=False)[0] > 100.0
