@@ -61,6 +61,7 @@ def descend(
     bounds: tuple[Array, Array],
     least_gain: float = LEAST_GAIN,
     radius: float = FIRST_RADIUS,
+    wanted: float = np.inf,
 ) -> Point:
     """Return the least cost downhill from a start: Gauss-Newton steps within a trust region and bounds.
 
@@ -81,6 +82,9 @@ def descend(
         Cost that a further step must promise [dimensionless].
     radius : float
         Length of the longest first step [dimensionless].
+    wanted : float
+        Cost above which the result is of no use [dimensionless]: a search ends where all steps that are left would not
+        bring it down to that, gaining each what the last one did or the next one promises.
 
     Returns
     -------
@@ -98,7 +102,7 @@ def descend(
     [1.0, 1.0]
     """
     return descend_together(
-        lambda thetas: [at(one) for one in thetas], [start], evaluations, bounds, least_gain, radius
+        lambda thetas: [at(one) for one in thetas], [start], evaluations, bounds, least_gain, radius, wanted
     )[0]
 
 
@@ -109,6 +113,7 @@ def descend_together(
     bounds: tuple[Array, Array],
     least_gain: float = LEAST_GAIN,
     radius: float = FIRST_RADIUS,
+    wanted: float = np.inf,
 ) -> list[Point]:
     """Return the least cost downhill from each of several starts, all a step at a time; see `descend`.
 
@@ -126,13 +131,15 @@ def descend_together(
         Cost that a further step must promise [dimensionless].
     radius : float
         Length of the longest first step [dimensionless].
+    wanted : float
+        See `descend` [dimensionless].
 
     Returns
     -------
     list of Point
         The best point from each start.
     """
-    searches = [_search(start, evaluations, bounds, least_gain, radius) for start in starts]
+    searches = [_search(start, evaluations, bounds, least_gain, radius, wanted) for start in starts]
     asked = {i: next(search) for i, search in enumerate(searches)}
     ended: dict[int, Point] = {}
     while asked:
@@ -147,14 +154,15 @@ def descend_together(
 
 
 def _search(
-    start: Array, evaluations: int, bounds: tuple[Array, Array], least_gain: float, radius: float
+    start: Array, evaluations: int, bounds: tuple[Array, Array], least_gain: float, radius: float, wanted: float
 ) -> Generator[Array, Point, Point]:
     """Yield where the cost is to be evaluated, and return the best point."""
     best = yield np.clip(start, *bounds)
-    for _ in range(evaluations - 1):
+    gained = np.inf  # by the last step; unknown before the first, and after one that broke its promise
+    for left in range(evaluations - 1, 0, -1):
         curvature = best.gram + np.diag(np.abs(best.gradient) / REACH)
         step, promised, radius = _downhill(best, curvature, radius, bounds)
-        if promised < least_gain:
+        if promised < least_gain or best.cost - left * max(promised, gained) > wanted:
             break
         tried = yield best.theta + step
         gain, length = (best.cost - tried.cost) / promised, float(np.linalg.norm(step))
@@ -164,6 +172,7 @@ def _search(
             radius = POOR * length
         elif gain > GOOD:
             radius = max(radius, 2.0 * length)
+        gained = best.cost - tried.cost if gain > POOR else np.inf
         if gain > 0.0:
             best = tried
     return best

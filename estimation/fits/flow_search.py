@@ -6,7 +6,6 @@ that explains the log, nothing else is searched; else searches begin at leakages
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import product
 from math import ceil
 from typing import TypeAlias
@@ -47,6 +46,9 @@ FINISHING = 15
 
 UNLIKELY = 36.0
 """Difference of log-likelihood from which a form of the balance counts for nothing beside the other [dimensionless]."""
+
+RIVAL = 2.0 * UNLIKELY
+"""The same between searches with long model steps, which have errors [dimensionless]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,9 +119,7 @@ def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Values
     """
     rough = _rough(log, parameters, starts)
     least = min(one.point.cost for one in rough)
-    likely = [  # twice what counts: long model steps have errors
-        one for one in rough if one is rough[0] or one.point.cost < least + 2.0 * UNLIKELY
-    ]
+    likely = [one for one in rough if one is rough[0] or one.point.cost < least + RIVAL]
 
     def finished(one: _Rough) -> Point:
         return descend(one.problem.at, one.point.theta, FINISHING, one.bounds)
@@ -136,12 +136,23 @@ def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Values])
     afar = log.taken_at(parameters.bulk_modulus)
     if not log.gaps.size:
         first = _searched(forms[0], log, afar, [_guess(forms[0], afar, starts)], alone=True)
-        others = each(partial(_searched, log=log, afar=afar, starts=[first.values], alone=True), forms[1:])
+        others = _others(forms[1:], log, afar, first, alone=True)
         if _explains(first) or _explains(others[0]):
             return [first, *others]
         starts = [*starts, first.values]
     first = _searched(forms[0], log, afar, starts)
-    return [first, *each(partial(_searched, log=log, afar=afar, starts=[first.values]), forms[1:])]
+    return [first, *_others(forms[1:], log, afar, first)]
+
+
+def _others(
+    forms: Sequence[GreyBoxModel], log: GreyBoxLog, afar: GreyBoxLog, first: _Rough, *, alone: bool = False
+) -> list[_Rough]:
+    """Return where other forms lead from where the first one ended, as far as they may count beside it."""
+    wanted = first.point.cost + RIVAL
+    return each(
+        lambda form: _searched(form, log, afar, [first.values], alone=alone, wanted=wanted),
+        forms,
+    )
 
 
 def _explains(one: _Rough) -> bool:
@@ -174,18 +185,25 @@ def _search(log: GreyBoxLog) -> Search:
 
 
 def _searched(
-    form: GreyBoxModel, log: GreyBoxLog, afar: GreyBoxLog, starts: Sequence[Values], *, alone: bool = False
+    form: GreyBoxModel,
+    log: GreyBoxLog,
+    afar: GreyBoxLog,
+    starts: Sequence[Values],
+    *,
+    alone: bool = False,
+    wanted: float = np.inf,
 ) -> _Rough:
     """Return the best that is found from starts, at first with noise of position as it is at the rig's bulk modulus."""
     search = _search(log)
     problem = Problem(form, afar) if log.gaps.size else FreedProblem.of(form, afar)  # what gaps leave open, once
     guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in starts]
     bounds = flow_bounds(form, guesses, afar)
-    point = roughly(problem, guesses, search, bounds)
     if not log.passes_on:
+        point = roughly(problem, guesses, search, bounds, wanted)
         return _Rough(problem, point, bounds)
+    point = roughly(problem, guesses, search, bounds)
     problem, modulus = problem.on(log), form.values(point.theta)["bulk_modulus"]
     guesses = [form.theta({STIFFNESS: 0.0, **start, "bulk_modulus": modulus}) for start in starts]
     bounds = flow_bounds(form, guesses, log)
     again = [point.theta] if alone else [*guesses, point.theta]
-    return _Rough(problem, roughly(problem, again, search, bounds), bounds)
+    return _Rough(problem, roughly(problem, again, search, bounds, wanted), bounds)

@@ -150,7 +150,13 @@ def fit_greybox(
     return concluded(problem, descend(problem.at, near.theta, search.evaluations, bounds))
 
 
-def roughly(problem: Problem, guesses: Sequence[Array], search: Search, bounds: tuple[Array, Array]) -> Point:
+def roughly(
+    problem: Problem,
+    guesses: Sequence[Array],
+    search: Search,
+    bounds: tuple[Array, Array],
+    wanted: float = np.inf,
+) -> Point:
     """Return the least cost that is found from several starts, with one model step a sample.
 
     Parameters
@@ -163,6 +169,8 @@ def roughly(problem: Problem, guesses: Sequence[Array], search: Search, bounds: 
         How they are brought to the optimum.
     bounds : tuple of ndarray, shape (unknowns,)
         Lowest and highest coordinates [dimensionless].
+    wanted : float
+        Cost above which the result is of no use [dimensionless], see `estimation.fits.descent.descend`.
 
     Returns
     -------
@@ -173,8 +181,9 @@ def roughly(problem: Problem, guesses: Sequence[Array], search: Search, bounds: 
     whole = problem.on(log)
 
     def descended(guess: Array, samples: int, evaluations: int) -> Point:
-        part = problem.on(log.beginning(samples)) if samples < len(log.measured) else whole
-        return descend(part.at, guess, evaluations, bounds, NEAR_ENOUGH)
+        if samples < len(log.measured):
+            return descend(problem.on(log.beginning(samples)).at, guess, evaluations, bounds, NEAR_ENOUGH)
+        return descend(whole.at, guess, evaluations, bounds, NEAR_ENOUGH, wanted=wanted)
 
     if len(guesses) > 1:
         screened = each(lambda guess: descended(guess, search.screened, search.screening), guesses)

@@ -47,3 +47,24 @@ def test_searches_together_end_where_each_ends_alone() -> None:
         np.testing.assert_array_equal(found.theta, descend(bowl, start, 60, (-FAR, FAR), 1e-12).theta)
     assert evaluated[0] == len(starts)  # the search that begins at the optimum leaves the others alone
     assert evaluated[-1] < len(starts)
+
+
+def test_a_search_whose_end_is_of_no_use_is_given_up_and_any_other_is_not() -> None:
+    tried: list[np.ndarray] = []
+
+    def bent(x: np.ndarray) -> Point:
+        """A valley (Rosenbrock's) down which many steps lead, with a floor of 5."""
+        tried.append(x)
+        slopes = np.array([[1.0, 0.0], [-20.0 * x[0], 10.0]])
+        errors = np.array([x[0] - 1.0, 10.0 * (x[1] - x[0] ** 2)])
+        return Point(x, 5.0 + 0.5 * float(errors @ errors), slopes.T @ errors, slopes.T @ slopes)
+
+    far, start = np.full(2, 10.0), np.array([-1.2, 1.0])
+    found = descend(bent, start, 40, (-far, far), 1e-9, 0.5)
+    needed = len(tried)
+    tried.clear()
+    assert descend(bent, start, 40, (-far, far), 1e-9, 0.5, wanted=5.1).cost == found.cost
+    assert len(tried) == needed
+    tried.clear()
+    descend(bent, start, 40, (-far, far), 1e-9, 0.5, wanted=-20.0)
+    assert len(tried) < needed
