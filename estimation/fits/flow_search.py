@@ -38,6 +38,9 @@ GUESSED = ((1.0, 2.5, 5.0, 8.0, 12.5), (1.0, 3.5, 6.0), (0.7, 1.0, 1.3))
 """Leakage and flow bias as multiples of the healthy actuator's, and bulk modulus as one of the first guess, in the
 guesses of which the likeliest is followed [dimensionless]: from the healthy actuator to the worst of Table 3."""
 
+GUESSED_WITHIN = 0.3
+"""First radius of a search from the likeliest guess [dimensionless]: half the distance between guesses of leakage."""
+
 SCREENED_SECONDS = 4.0
 """Starts are compared on the beginning of the log: it tells a wrong valley from a right one [s]."""
 
@@ -177,7 +180,8 @@ def _guess(form: GreyBoxModel, log: GreyBoxLog, starts: Sequence[Values]) -> Val
     ]
     likeliest = guesses[int(np.argmin(problem.costs(guesses)))]
     bounds = flow_bounds(form, guesses, log)
-    return problem.model.values(descend(problem.at, likeliest, search.evaluations, bounds, NEAR_ENOUGH).theta)
+    found = descend(problem.at, likeliest, search.evaluations, bounds, NEAR_ENOUGH, GUESSED_WITHIN)
+    return problem.model.values(found.theta)
 
 
 def _search(log: GreyBoxLog) -> Search:

@@ -99,8 +99,8 @@ def residuals_side_by_side(
                     for lane in range(lanes):
                         work[bases + i * lanes + lane] = drives[k - 1, i, 0]
                         work[rises + i * lanes + lane] = rise
-            for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
-                for j in range(steps):
+            for j in range(steps):
+                for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
                     kernel.step_at(slots + first, float(j))
         for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
             kernel.show_at(slots + first, 0.0)

@@ -12,7 +12,7 @@ from estimation.fits.greybox_log import greybox_log
 from estimation.fits.greybox_loops import RUNAWAY
 from estimation.fits.greybox_problem import OUTLIER, Problem
 from estimation.fits.hypotheses import HYPOTHESES
-from estimation.fits.side_by_side import LANES, compile_side_by_side
+from estimation.fits.side_by_side import LANES, MANY, compile_side_by_side
 from estimation.fits.side_by_side_loops import residuals_side_by_side
 from estimation.fits.wide_problem import freed, usual_values, widened
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, flow_parameters
@@ -86,7 +86,7 @@ def test_the_normal_equations_are_those_of_residuals_one_by_one(problem: FreedPr
 def test_a_run_that_escapes_keeps_a_finite_residual_and_leaves_its_neighbours_alone(problem: FreedProblem) -> None:
     mad = problem.log.parameters.copy()
     mad[parameter_names(WideFlowParameters).index("chamber_volume")] = np.nan
-    run = compile_side_by_side(WIDE_FLOW_FORM)
+    run = compile_side_by_side(WIDE_FLOW_FORM, LANES)
     log, rows = problem.log, np.repeat(problem.log.parameters[None], LANES, axis=0)
     rows[3] = mad
     errors = np.zeros((1, len(log.measured), LANES))
@@ -124,6 +124,36 @@ def test_finite_differences_give_the_normal_equations_of_exact_derivatives(
     np.testing.assert_allclose(near.gram / scale, exact.gram / scale, atol=1e-4)
 
 
+def test_costs_without_slopes_are_those_with_them(problem: FreedProblem) -> None:
+    thetas = [*points(problem, 3)]
+    assert problem.costs(thetas) == pytest.approx([problem.at(theta).cost for theta in thetas], rel=1e-9)
+
+
+@pytest.mark.parametrize("count", [LANES - 1, LANES + 3, MANY + 2])
+def test_any_number_of_points_is_run(problem: FreedProblem, count: int) -> None:
+    thetas = [*points(problem, count)]
+    together = problem.costs(thetas)
+    assert len(together) == count
+    for place in (0, count - 1):
+        assert together[place] == pytest.approx(problem.at(thetas[place]).cost, rel=1e-9)
+
+
+def test_what_was_run_at_one_of_the_last_two_points_is_not_run_again(
+    problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, (first, second, third) = problem.on(problem.log), points(problem, 3)
+    fresh = [problem.on(problem.log).linearised(theta) for theta in (first, second)]
+    for theta in (third, first, second):
+        own.at(theta)
+    monkeypatch.setattr(own, "_side_by_side", lambda *_: pytest.fail("this point was run"))
+    for theta, (errors, slopes) in zip((first, second), fresh, strict=True):
+        found = own.linearised(theta)
+        np.testing.assert_array_equal(found[0], errors)
+        np.testing.assert_array_equal(found[1], slopes)
+    with pytest.raises(pytest.fail.Exception, match="this point was run"):
+        own.at(third)
+
+
 def test_residuals_under_several_rigs_are_those_of_each(problem: FreedProblem) -> None:
     (theta,) = points(problem, 1)
     wider = problem.log.parameters.copy()
@@ -144,7 +174,7 @@ def test_the_loop_run_as_python_gives_what_its_kernel_gives(
     measured = problem.log.measured[200 : 200 + n].copy()
     measured[4:6] = np.nan
     given = measured, 1e-3, np.array([0, *[2] * (n - 3), 3, 3]), 2, np.array([1e7]), np.array([1e6])
-    text = text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(FLOW_FORM))
+    text = text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(FLOW_FORM, LANES))
     file = functions_of(text)
     plain = SimpleNamespace(**vars(file))
     plain.VECTOR = 1
@@ -152,5 +182,5 @@ def test_the_loop_run_as_python_gives_what_its_kernel_gives(
         setattr(plain, f"{name}_at", on_memory(file, getattr(file, name)))
     found, wanted = (np.full((1, n // 2, LANES), np.nan) for _ in range(2))
     residuals_side_by_side(plain, rows, drives, *given, found)
-    compile_side_by_side(FLOW_FORM)(rows, drives, *given, wanted)
+    compile_side_by_side(FLOW_FORM, LANES)(rows, drives, *given, wanted)
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9)
