@@ -15,15 +15,15 @@ import numpy as np
 from estimation.eha.explained import LEAKAGE_COURSE
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
+from estimation.log_checks.sensor_check import PRESSURE
 from plant.arrays import Array
-from plant.components.oil import oil_pressure
-from plant.eha.circuit import CircuitValues, chamber_volumes
 from plant.eha.circuit_parameters import CircuitParameters, circuit_values, longest_stroke
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT
 from plant.errors import LogError
 from plant.log.record import Record
 from plant.solvers.adaptive import ErrorControl, controlled_run
+from plant.solvers.block_means import block_means
 from plant.solvers.steps import parameter_row
 
 COORDINATES = ("leakage", "bias", "friction_rest", "friction_quadratic", "friction_rated", "bulk_modulus", "presliding")
@@ -52,12 +52,6 @@ AT_STOP = 0.02
 TOLERANCE, DRIVE_TOLERANCE = 1e-4, 2e-3
 """Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_run`: far below what is
 compared."""
-
-OIL = (4, 5)
-"""Places of the oil in chambers A and B among the circuit's states."""
-
-PART = 500
-"""Samples whose pressures are worked out at a time: those of eight circuits stay in the processor's cache."""
 
 _CONTROL = cast("ErrorControl", CIRCUIT.control)
 
@@ -192,7 +186,7 @@ def _mean(values: Array, block: int, spare: int = 1) -> Array:
     What a clipped sensor left out is not like what it kept: the mean of a small rest would lie off.
     """
     count = (len(values) - spare) // block
-    parts = values[: count * block].reshape(count, block, *values.shape[1:])
+    parts = values[: count * block].reshape(count, block)
     there = np.isfinite(parts)
     if np.all(there):
         return parts.mean(axis=1)
@@ -333,18 +327,5 @@ def _outputs(blocks: Blocks, states: Array, rows: Array) -> Array:
     velocity = np.diff(states[:: blocks.block, 2], axis=0) / (blocks.block * blocks.sample_time)
     if blocks.pressure is None:
         return np.ascontiguousarray(velocity.T)[..., None]
-    pressure, step = np.empty_like(velocity), max(1, PART // blocks.block)
-    for first in range(0, len(velocity), step):
-        part = slice(first * blocks.block, (first + step) * blocks.block)
-        some = circuit_values(rows if len(rows) == 1 else rows[part])
-        pressure[first : first + step] = _mean(_differential(states[:-1][part], some), blocks.block, spare=0)
+    pressure = block_means(CIRCUIT.observe, PRESSURE, states[:-1], rows, blocks.block, CIRCUIT.parameter_class)
     return np.stack([velocity.T, pressure.T], axis=-1)
-
-
-def _differential(states: Array, p: CircuitValues) -> Array:
-    """Return differential pressure [Pa] of states, shape (samples, states, m)."""
-    high, low = (
-        oil_pressure(states[:, at], volume, p.bulk_modulus, p.air_fraction, p.vapour_pressure)
-        for at, volume in zip(OIL, chamber_volumes(states[:, 2], p), strict=True)
-    )
-    return high - low

@@ -1,0 +1,87 @@
+"""Means over blocks of a channel that a plant shows, of several runs side by side, in one pass over their states."""
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from plant.arrays import Array
+from plant.compiled.expression import as_expression, symbol
+from plant.compiled.functions import Scalar
+from plant.compiled.hoist import hoisted
+from plant.compiled.native.load import load_native
+from plant.compiled.native.machine import native_width
+from plant.compiled.native.signature import signature_of
+from plant.compiled.paste import kernel_text, pasted
+from plant.compiled.simplify import fused, simplified
+from plant.compiled.source import lines_source, operations_source
+from plant.solvers.block_means_loop import average_blocks
+from plant.solvers.fixed_step_loops import lay
+from plant.solvers.steps import Parameters, parameter_names, parameter_symbols
+
+LANES = 8
+"""Runs side by side, as many as a vector register of 512 bits holds."""
+
+Observe: TypeAlias = Callable[[Any, Any], Mapping[str, Scalar]]
+"""``observe(state, parameters)``: what a bench could measure, by channel."""
+
+
+def block_means(
+    observe: Observe, channel: str, states: Array, parameters: Array, block: int, parameter_class: type[Parameters]
+) -> Array:
+    """Return the means over whole blocks of a channel that runs show.
+
+    Parameters
+    ----------
+    observe : callable
+        ``observe(state, parameters)``, written for symbols.
+    channel : str
+        One of what it shows.
+    states : ndarray, shape (n, states, runs)
+        States at the samples [SI].
+    parameters : ndarray, shape (1 or n, runs, parameters)
+        Parameter rows, each of which holds at its sample.
+    block : int
+        Samples a block.
+    parameter_class : type
+        What the parameter rows hold, field by field.
+
+    Returns
+    -------
+    ndarray, shape (n // block, runs)
+        The means [the channel's unit]; what is left at the end is dropped.
+    """
+    runs = states.shape[2]
+    means = np.empty((len(states) // block, runs))
+    run = _compile(observe, channel, states.shape[1], parameter_class)
+    for first in range(0, runs, LANES):
+        some = range(first, min(first + LANES, runs))
+        rows = np.ascontiguousarray(parameters[:, [*some, *[first] * (LANES - len(some))]])
+        run(states[..., some.start : some.stop], rows, block, means[:, some.start : some.stop])
+    return means
+
+
+@cache
+def _compile(observe: Observe, channel: str, width: int, parameter_class: type[Parameters]) -> Callable[..., None]:
+    made_of = observe, channel, width, parameter_class, native_width()
+    takes = signature_of(average_blocks, lanes=LANES, states=width)
+    name = f"{channel}_means_{LANES}"
+    return load_native(name, lambda: _text(*made_of[:4]), {"average_blocks": takes}, made_of).average_blocks
+
+
+def _text(observe: Observe, channel: str, width: int, parameter_class: type[Parameters]) -> str:
+    """Write the kernel."""
+    names, states = parameter_names(parameter_class), [f"x{i}" for i in range(width)]
+    seen = observe(tuple(symbol(one) for one in states), parameter_symbols(parameter_class))[channel]
+    fixed, shown = hoisted(simplified({"y0": as_expression(seen)}, set(names)), set(states), "c")
+    every = [*states, "y0", *names, *fixed]
+    vector = min(LANES, native_width())
+    lines = {"settle": lines_source("settle", fixed), "show": lines_source("show", fused(shown))}
+    sizes = {"LANES": LANES, "VECTOR": vector, "WIDTH": width, "COLUMNS": len(names), "NUMBERS": LANES * len(every)}
+    return kernel_text(
+        f"means over blocks of {channel}, {LANES} runs side by side",
+        operations_source(lines, {one: LANES * i for i, one in enumerate(every)}, vector),
+        pasted(lay, constants=sizes, inlined=True),
+        pasted(average_blocks),
+    )

@@ -1,0 +1,58 @@
+"""The loop that averages what runs side by side show, as a plain function: `plant.solvers.block_means` pastes it."""
+
+from typing import Protocol
+
+import numpy as np
+
+from plant.arrays import Array
+from plant.solvers.fixed_step_loops import Operation, SideBySide, lay
+
+
+class ShowingKernel(SideBySide, Protocol):
+    """What the kernel of block means has.
+
+    In memory stand, `LANES` numbers each, the states, what is shown of them, the parameters, and what `settle_at` makes
+    of those.
+
+    Attributes
+    ----------
+    show_at : callable
+        What is shown of the states.
+    """
+
+    show_at: Operation
+
+
+def average_blocks(kernel: ShowingKernel, states: Array, parameters: Array, block: int, means: Array) -> None:
+    """Fill in the means over blocks of what runs side by side show.
+
+    Parameters
+    ----------
+    states : ndarray, shape (n, states, up to lanes)
+        States at the samples [SI].
+    parameters : ndarray, shape (1 or n, lanes, parameters)
+        Parameter rows, each of which holds at its sample.
+    block : int
+        Samples a block.
+    means : ndarray, shape (blocks, up to lanes)
+        Room for the means.
+    """
+    room = np.zeros(kernel.NUMBERS + 8)
+    work = room[-room.ctypes.data % 64 // 8 :]  # a vector across two cache lines takes twice as long
+    slots, shown, row = work.ctypes.data, kernel.WIDTH * kernel.LANES, -1
+    for b in range(means.shape[0]):
+        for lane in range(means.shape[1]):
+            means[b, lane] = 0.0
+        for k in range(b * block, (b + 1) * block):
+            if row < 0 or parameters.shape[0] > 1:
+                row = min(k, parameters.shape[0] - 1)
+                lay(kernel, work, shown + kernel.LANES, parameters[row].T, kernel.COLUMNS)
+                for first in range(0, 8 * kernel.LANES, 8 * kernel.VECTOR):
+                    kernel.settle_at(slots + first, 0.0)
+            for i in range(kernel.WIDTH):
+                for lane in range(means.shape[1]):
+                    work[i * kernel.LANES + lane] = states[k, i, lane]
+            for first in range(0, 8 * kernel.LANES, 8 * kernel.VECTOR):
+                kernel.show_at(slots + first, 0.0)
+            for lane in range(means.shape[1]):
+                means[b, lane] += work[shown + lane] / block
