@@ -143,7 +143,10 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
     strange = sum(one == "\ufffd" or (ord(one) < 32 and one not in "\t\n\x0c\x0b") for one in head)
     if strange > 0.1 * len(head) or "\0" in head:
         raise LogError("a text file is needed for a CSV log, got binary data", source)
-    block = max((_block(lines, one) for one in DELIMITERS), key=lambda one: one.score)
+    absent = [one for one in DELIMITERS if one != BLANKS and not any(one in line for line in lines)]
+    # those that no line holds leave the same single cells: the first of them stands for all
+    tried = [one for one in DELIMITERS if one not in absent[1:]]
+    block = max((_block(lines, one) for one in tried), key=lambda one: one.score)
     if not block.score:
         return _by_header(lines, encoding)
     return block.layout(lines, encoding)
@@ -181,8 +184,8 @@ class _Block:
             first -= 1
         closed = all(not row[-1] for _, row in self.rows)
         names, units = _names_and_units(_above(lines[:first], self.delimiter, width, closed=closed), width)
-        points = Counter(sign for _, row in self.rows for cell in row if _NUMBER.fullmatch(cell) for sign in cell)
-        comma = points[","] > 0 and points["."] == 0 and self.delimiter != BLANKS
+        numbers = "".join(cell for _, row in self.rows for cell in row if _NUMBER.fullmatch(cell))
+        comma = "," in numbers and "." not in numbers and self.delimiter != BLANKS
         stamped = frozenset(
             place
             for place, one in enumerate(self.numeric)
@@ -213,23 +216,24 @@ def _is_value(cell: str) -> bool:
 
 def _block(lines: Sequence[str], delimiter: str) -> _Block:
     """Return the rows of data if cells are apart by a delimiter: most columns of most rows are numbers."""
-    rows = [
+    split = [
         (place, tuple(cell.strip() for cell in cells_of(line, delimiter)))
         for place, line in enumerate(lines)
         if line.strip()
     ]
-    rows = [(place, row) for place, row in rows if len(row) <= _WIDEST and any(map(_is_value, row))]
-    widths = Counter(len(row) for _, row in rows)
+    judged = [(place, row, tuple(map(_is_value, row))) for place, row in split if len(row) <= _WIDEST]
+    judged = [one for one in judged if any(one[2])]
+    widths = Counter(len(row) for _, row, _ in judged)
     if not widths:
         return _Block(delimiter)
     width = max(widths, key=lambda one: (widths[one], one))
-    rows = [(place, row) for place, row in rows if len(row) == width]
-    numeric = tuple(2 * sum(_is_value(row[column]) for _, row in rows) > len(rows) for column in range(width))
+    judged = [one for one in judged if len(one[1]) == width]
+    numeric = tuple(2 * sum(column) > len(judged) for column in zip(*(values for _, _, values in judged), strict=True))
     count = sum(numeric)
     whole = [
         (place, row)
-        for place, row in rows
-        if 2 * sum(one and (_is_value(cell) or not cell) for one, cell in zip(numeric, row, strict=True)) > count
+        for place, row, values in judged
+        if 2 * sum(one and (value or not cell) for one, value, cell in zip(numeric, values, row, strict=True)) > count
     ]
     return _Block(delimiter, tuple(whole), numeric) if whole else _Block(delimiter)
 
