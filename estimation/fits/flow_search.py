@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import ceil
-from typing import TypeAlias
 
 import numpy as np
 
@@ -25,8 +24,6 @@ from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.spare_processors import each
-
-Values: TypeAlias = Mapping[str, float]
 
 MAKEUP_TRIED = (1e-9, 1e-13)
 """Make-up conductances of the starts [m^3/(s Pa)]: a circuit with make-up valves, and one without."""
@@ -63,7 +60,7 @@ class _Rough:
     bounds: tuple[Array, Array]
 
     @property
-    def values(self) -> Values:
+    def values(self) -> Mapping[str, float]:
         return {STIFFNESS: 0.0, **self.problem.model.values(self.point.theta)}
 
 
@@ -103,7 +100,7 @@ def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]
     ]
 
 
-def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Values]) -> Sequence[GreyBoxFit]:
+def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]) -> Sequence[GreyBoxFit]:
     """Return the fits of the balances that count, the first by volume.
 
     Parameters
@@ -132,7 +129,7 @@ def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Values
     return each(lambda one: concluded(*one, disturbed=one[1].cost < least + UNLIKELY), done)
 
 
-def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Values]) -> list[_Rough]:
+def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]) -> list[_Rough]:
     """Return where the balances fit best with long model steps, each searched from where the first one ended."""
     relieved = reaches_relief(log.measured, parameters.relief_pressure)
     forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
@@ -152,17 +149,14 @@ def _others(
 ) -> list[_Rough]:
     """Return where other forms lead from where the first one ended, as far as they may count beside it."""
     wanted = first.point.cost + RIVAL
-    return each(
-        lambda form: _searched(form, log, afar, [first.values], alone=alone, wanted=wanted),
-        forms,
-    )
+    return each(lambda form: _searched(form, log, afar, [first.values], alone=alone, wanted=wanted), forms)
 
 
 def _explains(one: _Rough) -> bool:
     return explained(one.problem, one.point)
 
 
-def _guess(form: GreyBoxModel, log: GreyBoxLog, starts: Sequence[Values]) -> Values:
+def _guess(form: GreyBoxModel, log: GreyBoxLog, starts: Sequence[Mapping[str, float]]) -> Mapping[str, float]:
     """Return where the likeliest of many guesses about the first start leads on the beginning of a log."""
     search = _search(log)
     problem = FreedProblem.of(form, log.beginning(search.screened).coarsened())
@@ -192,7 +186,7 @@ def _searched(
     form: GreyBoxModel,
     log: GreyBoxLog,
     afar: GreyBoxLog,
-    starts: Sequence[Values],
+    starts: Sequence[Mapping[str, float]],
     *,
     alone: bool = False,
     wanted: float = np.inf,

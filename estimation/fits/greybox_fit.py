@@ -151,11 +151,7 @@ def fit_greybox(
 
 
 def roughly(
-    problem: Problem,
-    guesses: Sequence[Array],
-    search: Search,
-    bounds: tuple[Array, Array],
-    wanted: float = np.inf,
+    problem: Problem, guesses: Sequence[Array], search: Search, bounds: tuple[Array, Array], wanted: float = np.inf
 ) -> Point:
     """Return the least cost that is found from several starts, with one model step a sample.
 
