@@ -9,12 +9,13 @@ that, the time of the pages apart; ``--raw-logs 12000`` measures it whole, on di
 import argparse
 import json
 import re
+import resource
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -102,12 +103,25 @@ def write_logs(folder: Path, course: Array, most: int) -> int:
     return len(places)
 
 
-def fleet_of(place: Path, out: Path, *options: str) -> tuple[float, list[str]]:
-    """Return how long the shipped command took [s], and its actuators from the top."""
+class Taken(NamedTuple):
+    """What the shipped command took: wall time, and processor time of all its processes [s]."""
+
+    wall: float
+    used: float
+
+
+def _used() -> float:
+    """Return the processor time of processes that were begun here and have ended [s]."""
+    all_so_far = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return all_so_far.ru_utime + all_so_far.ru_stime
+
+
+def fleet_of(place: Path, out: Path, *options: str) -> tuple[Taken, list[str]]:
+    """Return what the shipped command took, and its actuators from the top."""
     command = [sys.executable, "-m", "experiments.cli", "fleet", str(place), "--pattern", PATTERN, "--out", str(out)]
-    begin = time.perf_counter()
+    begin, before = time.perf_counter(), _used()
     subprocess.run([*command, *options], check=True, capture_output=True)  # noqa: S603 -- our own command
-    taken = time.perf_counter() - begin
+    taken = Taken(time.perf_counter() - begin, _used() - before)
     (data,) = re.findall(r'class="rows">(.*?)</script>', (out / "index.html").read_text("utf-8"), re.DOTALL)
     return taken, [row[0] for row in json.loads(data)["rows"]]
 
@@ -132,14 +146,17 @@ def main(arguments: list[str]) -> int:
         write_store(folder / "store", course)
         fleet_of(folder / "store", folder / "warm")
         taken, order = fleet_of(folder / "store", folder / "pages")
-        say("page from the store, pages of the 20 sickest included [s]", taken, PAGE_IN)
+        say("page from the store, pages of the 20 sickest included [s]", taken.wall, PAGE_IN)
         say("sound actuators among the top rows, from the store", wrong_rows(order), 0)
         count = write_logs(folder / "logs", course, options.raw_logs)
         taken, order = fleet_of(folder / "logs", folder / "from-logs")
         pages, _ = fleet_of(folder / "logs", folder / "from-logs")
-        whole = pages + (taken - pages) * course.size / count
-        print(f"{count} raw logs: {taken:.0f} s, {(taken - pages) / count:.3f} s a log and {pages:.0f} s for the pages")
+        whole, used = (b + (a - b) * course.size / count for a, b in zip(taken, pages, strict=True))
+        wall, processor = ((a - b) / count for a, b in zip(taken, pages, strict=True))
+        print(f"{count} raw logs: {taken.wall:.0f} s, {pages.wall:.0f} s of it for the pages")
+        print(f"a log: {wall:.3f} s, {processor:.3f} s of processor time")
         said = "measured" if count == course.size else "reckoned from these"
         say(f"all {course.size} raw logs, {said} [s]", whole, WHOLE_IN)
+        print(f"their processor time on two processors that have nothing else to do: {used / 2.0:.0f} s")
         say("sound actuators among the top rows, from raw logs", wrong_rows(order), 0)
     return len(misses)
