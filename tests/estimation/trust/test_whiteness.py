@@ -133,6 +133,12 @@ def test_what_never_moves_cannot_be_judged(linear: ProcessModel) -> None:
     assert judged(linear, residuals, position=np.zeros(SAMPLES))[0].excess == 0.0
 
 
+@pytest.mark.parametrize(("repeats", "coarse"), [(2, False), (4, True)])
+def test_a_channel_that_repeats_itself_once_in_a_thousand_samples_is_quantised(repeats: int, coarse: bool) -> None:
+    values = np.cumsum(np.where(np.arange(3000) < repeats, 0.0, 0.5))
+    assert quantum(values) == (0.5 if coarse else 0.0)
+
+
 def test_noise_has_no_quantum() -> None:
     assert quantum(np.random.default_rng(0).standard_normal(1000)) == 0.0
 

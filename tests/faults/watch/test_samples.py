@@ -21,3 +21,10 @@ def test_velocity_stands_in_for_position_and_two_pressures_for_their_difference(
 def test_a_log_without_motion_is_refused() -> None:
     with pytest.raises(LogError, match="position_m or velocity_m_s"):
         watched_samples({"motor_speed_rad_s": np.zeros(3)}, 1e-3)
+
+
+def test_without_pressures_there_is_none_and_position_is_taken_as_it_is() -> None:
+    channels = {"motor_speed_rad_s": np.ones(3), "position_m": np.arange(3.0), "pressure_a_pa": np.full(3, 5.0)}
+    samples, pressure = watched_samples(channels, 0.5)
+    assert not pressure
+    np.testing.assert_array_equal(samples, np.column_stack([np.ones(3), np.arange(3.0), np.zeros(3)]))
