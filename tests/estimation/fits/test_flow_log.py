@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from estimation.fits.flow_fit import fit_flow
-from estimation.fits.flow_log import flow_log, without_strays
+from estimation.fits.flow_log import _swept_share, flow_log, without_strays
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_problem import Problem
 from estimation.models.flow import FLOW_FORM, STIFFNESS
@@ -15,7 +15,7 @@ from estimation.notes import EstimateCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
-from plant.eha.model import EhaParameters
+from plant.eha.model import EhaParameters, piston_areas
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
@@ -120,3 +120,17 @@ def test_the_slope_of_the_cost_holds_what_the_variance_changes_by(kind: type[Pro
 def _sound(record: Record) -> tuple[Record, EhaParameters, dict[str, float], dict[str, float]]:
     sound, variances = without_strays(record)
     return sound, HEALTHY, {}, dict(variances)
+
+
+@pytest.mark.parametrize("difference", [0.0, 0.2])
+def test_what_position_squeezes_is_the_slope_of_the_chambers_logarithms(difference: float) -> None:
+    p = replace(HEALTHY, area_difference=difference)
+    area_1, area_2 = piston_areas(p)
+    position, step = 0.01 * np.sin(0.1 * np.arange(200)), 1e-7
+
+    def squeezed(x: np.ndarray) -> np.ndarray:
+        volume = 2.0 * p.chamber_volume
+        return np.log(volume + area_1 * x) - np.log(volume - area_2 * x)
+
+    slope = (squeezed(position + step) - squeezed(position - step)) / (2.0 * step)
+    assert _swept_share(position, p) == pytest.approx(np.sqrt(np.mean(slope**2)), rel=1e-5)

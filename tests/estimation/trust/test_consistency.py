@@ -1,6 +1,7 @@
 """A filter that is right is called so, and one that is fooled is told apart, with a reason."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ from estimation.models.eha_forms import BULK_MODULUS, FORMS, PRESSURE_FORM
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
 from estimation.notes import ChannelCode, EstimateCode
-from estimation.trust.consistency import consistency_gate, mean_chi_square_bounds, nees, wander
+from estimation.trust.consistency import consistency_gate, describes, mean_chi_square_bounds, nees, wander
+from estimation.trust.whiteness import SETTLING
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -250,3 +252,26 @@ def test_a_constant_that_moves_as_its_variance_shrinks_wanders_once(linear: Proc
     (wandered,) = (note for note in reasons if note.code == EstimateCode.ESTIMATE_WANDERS)
     assert wandered.data["state"] == "velocity_m_s"
     assert wandered.data["ratio"] ** 2 == pytest.approx(wander(estimate, "velocity_m_s"))
+
+
+def constant(model: ProcessModel, mean: Array, nis: float = 1.0) -> Estimate:
+    """An estimate of position whose variance falls evenly to half of what it was."""
+    shown, variance = np.column_stack([mean, mean, mean]), np.linspace(4.0, 2.0, len(mean))
+    return Estimate(
+        model, ("position_m",), np.arange(float(len(mean))), shown, np.column_stack([variance] * 3), PRIOR,
+        {"position_m": nis, "velocity_m_s": 1.0}, 0.0, np.empty((0, 1)), np.empty((0, 1)),
+    )  # fmt: skip
+
+
+def test_what_moves_before_a_filter_has_settled_is_no_wandering(linear: ProcessModel) -> None:
+    settled = round(SETTLING * 1000)
+    before, after = (np.where(np.arange(1001) < place, 3.0, 0.0) for place in (settled, settled + 1))
+    assert wander(constant(linear, before), "position_m") == 0.0
+    assert wander(constant(linear, after), "position_m") == pytest.approx(9.0 / (0.8 * 2.0))
+
+
+def test_a_model_describes_a_log_unless_it_misses_by_ten_deviations_or_ends_at_a_bound(linear: ProcessModel) -> None:
+    first = replace(linear.states[0], lower=-1.0, upper=1.0)
+    bounded = replace(linear, states=(first, *linear.states[1:]))
+    for value, nis, described in ((0.5, 99.0, True), (0.5, 101.0, False), (1.0, 1.0, False), (-1.0, 1.0, False)):
+        assert describes(constant(bounded, np.full(1001, value), nis), "position_m") is described

@@ -5,6 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.special import chdtri
 
 from benchmarks.population import TEST, draw_logs
 from benchmarks.watching import CircuitStream
@@ -180,3 +181,7 @@ def test_a_part_keeps_the_drive_and_misses_the_rest() -> None:
     part = part_of(blocks, 5, 12)
     assert np.flatnonzero(np.isfinite(part.velocity)).tolist() == list(range(5, 12))
     assert part.speed is blocks.speed
+
+
+def test_the_interval_of_the_time_is_that_of_95_percent() -> None:
+    assert pytest.approx(0.5 * float(chdtri(1, 0.05)), abs=1e-3) == onset.LIKELY
