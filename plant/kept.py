@@ -21,7 +21,7 @@ def write_kept(path: Path, kind: str, values: Mapping[str, Any]) -> None:
     path : Path
         Where to.
     kind : str
-        What wrote it, with the number of its format: ``hydrostate watch 1``.
+        What wrote it, with the number of its format: ``hydrostate watch 2``.
     values : Mapping[str, ndarray], each of its own shape
         Numbers or texts by name [any unit].
 

@@ -44,11 +44,8 @@ class Told:
         self.watch, self.began = watch, watch.last
         about = {"file": source, "rig": rig, "rate_hz": round(1.0 / watch.sample_time, 6)}
         about |= {"balances": list(watch.balances), "false_alarms_per_hour": false_alarms}
-        said = (
-            "learning the healthy behaviour"
-            if len(watch.balances) == 2
-            else f"learning the healthy behaviour, without {PRESSURE}"
-        )
+        said = "learning the healthy behaviour"
+        said += f", without {PRESSURE}" if "motion" in watch.balances else ""
         self._line("start", self.began, **about, message=said)
         if self._armed:
             self._ready(self.began, watch.thresholds)
@@ -92,8 +89,7 @@ class Told:
                 self._ready(event.time, event.thresholds)
             elif isinstance(event, Alarm):
                 self.alarms += 1
-                said = f"the {event.balance} balance changed at {event.since:.2f} s"
-                self._line("alarm", event.time, **_alarm(event), message=said)
+                self._line("alarm", event.time, **_alarm(event), message=_changed(event))
             else:
                 lost = dict(zip(("before", "after"), event.lost or (None, None), strict=True))
                 about = {
@@ -138,6 +134,14 @@ def _alarm(alarm: "Alarm") -> dict[str, Any]:
         "score": alarm.score,
         "threshold": alarm.threshold,
     }
+
+
+def _changed(event: "Alarm") -> str:
+    from faults.watch.events import SLOW
+
+    if event.balance == SLOW:
+        return f"leakage has grown more than warm oil explains, since about {event.since:.0f} s"
+    return f"the {event.balance} balance changed at {event.since:.2f} s"
 
 
 def _reading(event: "Change") -> str:

@@ -16,7 +16,7 @@ from faults.diagnosis.circuit_runs import LONGEST, Blocks, blocks_of, parameter_
 from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, least_scales, misfit, nominal_runs
 from faults.diagnosis.class_regions import ClassFits, fit_classes, lasting_misfit
 from faults.diagnosis.end_stop import stopped
-from faults.watch.events import Alarm
+from faults.watch.events import SLOW, Alarm
 from faults.watch.watch import LEAST_LEARNING, SLOWEST, watch_record
 from plant.arrays import Array
 from plant.log.record import Record
@@ -108,7 +108,8 @@ def _about_alarms(record: Record, actuator: Actuator) -> Iterator[Record]:
     if record.duration <= LONGEST + LEAST_LEARNING or record.sample_time > SLOWEST:
         return
     events = watch_record(record, actuator.circuit, learning=LEAST_LEARNING)
-    changes = [event.since - record.start_time for event in events if isinstance(event, Alarm)]
+    sudden = (event for event in events if isinstance(event, Alarm) and event.balance != SLOW)
+    changes = [event.since - record.start_time for event in sudden]
     for since in changes[: -MOST_ALARMS - 1 : -1]:
         first = round(max(since - 0.5 * LONGEST, 0.0) / record.sample_time)
         yield record.slice(first, first + round(LONGEST / record.sample_time) + 1)

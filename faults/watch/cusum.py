@@ -1,16 +1,16 @@
 """The CUSUM of Page (Biometrika 41, 1954, page 100) on a balance's log NIS, and the threshold for a rate of alarms.
 
-The logarithm of a block's NIS is standardised by its running mean and variance. `faults.watch.watch` says why the
-threshold follows from the peaks of the sum's excursions.
+The logarithm of a block's NIS is standardised by what is usual for its excitation (`faults.watch.excitation`).
+`faults.watch.watch` says why the threshold follows from the peaks of the sum's excursions.
 """
 
 import math
 
 from plant.arrays import Array
 
-MEAN, VARIANCE, COUNT, SUM, PEAK, THRESHOLD, SQUARES = range(7)
-"""Places in a balance's score: running mean and variance of its log NIS and blocks in them; the CUSUM, the peak of its
-excursion and its threshold [standard deviations]; squared innovations of the block under way."""
+SUM, PEAK, THRESHOLD, SQUARES = range(4)
+"""Places in a balance's score: the CUSUM, the peak of its excursion and its threshold [standard deviations]; squared
+innovations of the block under way."""
 
 
 def accumulate(score: Array, peaks: Array, u: float, allowance: float, width: float) -> None:
@@ -21,14 +21,6 @@ def accumulate(score: Array, peaks: Array, u: float, allowance: float, width: fl
     elif score[PEAK] > 0.0:
         peaks[min(int(score[PEAK] / width), peaks.shape[0] - 1)] += 1.0
         score[PEAK] = 0.0
-
-
-def standardise(score: Array, away: float, memory: float) -> None:
-    """Move the running mean and variance by how far a block's log NIS lay from the mean."""
-    score[COUNT] += 1.0
-    share = 1.0 / min(score[COUNT], memory)
-    score[MEAN] += share * away
-    score[VARIANCE] += share * (away * away * (1.0 - share) - score[VARIANCE])
 
 
 def threshold(peaks: Array, alarms: float, width: float, expected: float) -> float:

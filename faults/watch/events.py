@@ -6,6 +6,9 @@ import numpy as np
 
 from plant.arrays import Array
 
+SLOW = "loss"
+"""What an alarm calls a loss of flow that has grown, beside the balances."""
+
 LIKELY = 1.92
 """Drop of the log-likelihood at the ends of a 95 % interval: half the quantile of chi-square with one degree."""
 
@@ -19,7 +22,7 @@ class Ready:
     time : float
         When [s].
     thresholds : tuple of float
-        Of the balances; a CUSUM has the unit of a score [dimensionless].
+        Of the balances, and of what is lost; a CUSUM has the unit of a score [dimensionless].
     """
 
     time: float
@@ -28,14 +31,14 @@ class Ready:
 
 @dataclass(frozen=True)
 class Alarm:
-    """A balance no longer holds.
+    """A balance no longer holds, or more is lost than warming oil explains.
 
     Parameters
     ----------
     time : float
         When it was raised [s].
     balance : str
-        ``flow``, ``force`` or ``motion``.
+        ``flow``, ``force``, ``motion`` or ``loss``.
     since : float
         When the change most likely came [s].
     interval : tuple of float

@@ -1,98 +1,42 @@
 """The compiled watch: samples to intervals, intervals to blocks, and what each block says.
 
 Samples are averaged over *intervals* of some milliseconds, from which `faults.watch.balances` learns. The squared
-innovations of a *block* of intervals are its NIS, which feeds the CUSUM of `faults.watch.cusum`.
+innovations of a *block* of intervals are its NIS, which feeds the CUSUM of `faults.watch.cusum`. Beside them
+`faults.watch.loss` judges what is lost, by *spans* of blocks.
 """
 
 import math
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
-from faults.watch import balances, cusum
+from faults.watch import balances, cusum, excitation, loss
 from faults.watch.balances import FEATURES, count_gains, learn, regress, shift, solve
-from faults.watch.cusum import MEAN, PEAK, SQUARES, SUM, THRESHOLD, VARIANCE, accumulate, standardise, threshold
+from faults.watch.cusum import PEAK, SQUARES, SUM, THRESHOLD, accumulate, threshold
+from faults.watch.excitation import OCTAVES, excitation_octave, standardise
+from faults.watch.loss import (
+    BLOCKS,
+    DELAYS,
+    LEAST_LEARNT,
+    SPAN,
+    SPANS,
+    WANTED,
+    count_lag,
+    count_work,
+    drive_is_alike,
+    judge_loss,
+    learn_loss_again,
+    measure_lag,
+    measure_work,
+)
+from faults.watch.memory import Memory, WatchSetting, WatchSizes
 from plant.arrays import Array
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import kernel_text, pasted
 
-
-class Memory(NamedTuple):
-    """What a watch remembers, a row a balance; scores are dimensionless, gains in shares of the ratings.
-
-    Parameters
-    ----------
-    partial : ndarray, shape (7,)
-        The interval under way.
-    clock : ndarray, shape (4,)
-        Blocks so far: all, usable, where learning began anew, and those whose scores counted.
-    lags : ndarray, shape (8,)
-        The last intervals.
-    information : ndarray, shape (balances, features, features)
-        Of the balances' normal equations.
-    moment, found : ndarray, shape (balances, features)
-        Their right-hand sides, and the coefficients that follow.
-    score : ndarray, shape (balances, 7)
-        As `faults.watch.cusum` has it.
-    peaks : ndarray, shape (balances, levels)
-        How often excursions of the CUSUM peaked at a level, and alarms.
-    scores : ndarray, shape (balances, recent)
-        Of the last blocks.
-    gains : ndarray, shape (recent, gains)
-        Of the last blocks.
-    """
-
-    partial: Array
-    clock: Array
-    lags: Array
-    information: Array
-    moment: Array
-    found: Array
-    score: Array
-    peaks: Array
-    scores: Array
-    gains: Array
-
-
-class WatchSetting(NamedTuple):
-    """What a watch goes by.
-
-    Parameters
-    ----------
-    fade : float
-        By what a balance fades in an interval [fraction].
-    score_memory : float
-        Over how many blocks scores are remembered [count].
-    false_alarms : float
-        Alarms in a block of a healthy stream [count].
-    rated_speed, rated_step, relief : float
-        What speed, the piston's way in a sample and pressure are relative to [rad/s, m, Pa].
-    """
-
-    fade: float
-    score_memory: float
-    false_alarms: float
-    rated_speed: float
-    rated_step: float
-    relief: float
-
-
-class WatchSizes(NamedTuple):
-    """Samples an interval; blocks to settle, to learn, and until scores count again [count]."""
-
-    samples: int
-    settle: int
-    learning: int
-    resume: int
-
-
-ALLOWANCE = 0.5
-"""What a block's score must exceed for the CUSUM to rise [standard deviations]."""
-
-LARGEST_SCORE = 8.0
-"""Cap of a block's score [standard deviations]: no single block decides."""
+ALLOWANCE = 1.0
+"""What a block's score must exceed for the CUSUM to rise [standard deviations]: more than oil's drift moves it by."""
 
 LEVEL = 0.02
 """Distance of the levels at which peaks are counted [standard deviations]."""
@@ -103,17 +47,9 @@ MOVING = 0.05
 INTERVALS = 10
 """Intervals a block."""
 
-RECENT = 512
-"""Blocks whose scores and gains are remembered for the change estimate."""
-
-LEVELS = 4096
-"""Levels at which the peaks of the CUSUM are counted."""
-
-PARTIAL, CLOCK, SCORE = 7, 4, 7
-"""Lengths of the kernel's arrays: the interval under way, the clock, and a balance's score."""
-
-NOTHING, READY = -1, 100
-"""What a block may say, beside which balance raises an alarm: nothing, and that the thresholds have been learnt."""
+NOTHING, READY, LOSS = -1, 100, 101
+"""What a block may say, beside which balance raises an alarm: nothing, that the thresholds have been learnt, and that
+more is lost."""
 
 REFRESHED = 200
 """Blocks from one look at the thresholds to the next."""
@@ -134,7 +70,7 @@ def advance(rows: Array, first: int, setting: WatchSetting, sizes: WatchSizes, m
     tuple of int
         The sample after the last one taken, and what a block has said.
     """
-    partial, clock, lags, information, moment, found, score, _, _, gains = memory
+    partial, clock, lags, information, moment, found, score, _, _, gains, _, work, speeds, lag, lost, _, _ = memory
     fade, _, _, rated_speed, rated_step, relief = setting
     samples, _, _, _ = sizes
     features, target, factor = np.empty((2, FEATURES)), np.empty(score.shape[0]), np.empty((FEATURES, FEATURES))
@@ -155,10 +91,15 @@ def advance(rows: Array, first: int, setting: WatchSetting, sizes: WatchSizes, m
             regress(w, v, p, lags, features, target)
             if partial[4] > 3.0 and abs(w) + abs(lags[2]) + abs(v) > MOVING:
                 partial[5] += 1.0
+                partial[7] += (w - lags[2]) ** 2
                 for c in range(score.shape[0]):
                     error = learn(c, features, target, fade, information, moment, found)
                     score[c, SQUARES] += error * error
                 count_gains(w, v, p, int(clock[0]) % gains.shape[0], gains)
+                if score.shape[0] == 2:
+                    count_work(w, v, p, work)
+            if score.shape[0] == 1:
+                count_lag(w, v, partial[4] > DELAYS + 1.0 and abs(w) > MOVING, speeds, lag, lost)
             shift(w, v, p, lags)
         partial[6] += 1.0
         if partial[6] < INTERVALS:
@@ -171,11 +112,13 @@ def advance(rows: Array, first: int, setting: WatchSetting, sizes: WatchSizes, m
 
 def end_block(setting: WatchSetting, sizes: WatchSizes, memory: Memory, factor: Array) -> int:
     """Judge a whole block; return what it says."""
-    partial, clock, _, information, moment, found, score, peaks, scores, gains = memory
+    partial, clock, _, information, moment, found, score, peaks, scores, gains, usual, _, _, _, _, known, _ = memory
     _, settle, learning, resume = sizes
     _, score_memory, false_alarms, _, _, _ = setting
-    usable, recent = partial[5], scores.shape[1]
-    partial[5] = partial[6] = 0.0
+    usable, recent, octave = partial[5], scores.shape[1], excitation_octave(partial[7])
+    excited = octave * OCTAVES + int(partial[8])
+    partial[5] = partial[6] = partial[7] = 0.0
+    partial[8] = octave
     place = int(clock[0]) % recent
     clock[0] += 1.0
     gains[int(clock[0]) % recent, :] = 0.0
@@ -190,7 +133,13 @@ def end_block(setting: WatchSetting, sizes: WatchSizes, memory: Memory, factor: 
         value = math.log(score[c, SQUARES] / usable + 1e-30)
         score[c, SQUARES] = 0.0
         solve(information[c], moment[c], found[c], factor)
-        scores[c, place] = judge(value, since, score_memory, settle, resume, score[c], peaks[c])
+        if since > settle:
+            u = standardise(value, score_memory, since > 2.0 * settle, usual[c, excited])
+            scores[c, place] = u
+            if since > resume:
+                accumulate(score[c], peaks[c], u, ALLOWANCE, LEVEL)
+        else:
+            scores[c, place] = 0.0
         if (
             score[c, SUM] > score[c, THRESHOLD]
             and clock[1] > learning
@@ -205,47 +154,64 @@ def end_block(setting: WatchSetting, sizes: WatchSizes, memory: Memory, factor: 
             score[c, THRESHOLD] = threshold(peaks[c, :-1], peaks[c, peaks.shape[1] - 1], LEVEL, expected)
         if clock[1] == learning:
             score[:, SUM : PEAK + 1] = 0.0
+            known[WANTED] = max(known[SPANS], LEAST_LEARNT)
             return READY
     if news >= 0:
         peaks[news, peaks.shape[1] - 1] += 1.0
-    return news
+        return news
+    known[BLOCKS] += 1.0
+    return LOSS if known[BLOCKS] >= SPAN and end_span(memory) else NOTHING
 
 
-def judge(
-    value: float, since: float, score_memory: float, settle: int, resume: int, score: Array, peaks: Array
-) -> float:
-    """Return a block's standardised score, 0 while it is learnt what is usual; add it to the CUSUM."""
-    if since <= settle:
-        return 0.0
-    away, u = value - score[MEAN], 0.0
-    if since > 2.0 * settle:
-        u = min(away / math.sqrt(score[VARIANCE] + 1e-12), LARGEST_SCORE)
-        if since > resume:
-            accumulate(score, peaks, u, ALLOWANCE, LEVEL)
-    standardise(score, away, score_memory)
-    return u
+def end_span(memory: Memory) -> bool:
+    """Judge what was lost in a whole span; return whether it is more than warming oil explains."""
+    _, clock, _, _, _, _, score, _, _, _, _, work, _, lag, lost, known, levels = memory
+    told = np.empty(6)
+    if score.shape[0] == 2:
+        measure_work(work, told)
+    else:
+        measure_lag(lag, lost, told)
+    drop_span(memory)
+    return told[3] > 0.0 and drive_is_alike(told, known) and judge_loss(told, clock[0], known, levels)
+
+
+def drop_span(memory: Memory) -> None:
+    """Begin a span anew."""
+    _, _, _, _, _, _, _, _, _, _, _, work, _, lag, lost, known, _ = memory
+    known[BLOCKS] = 0.0
+    work[:] = 0.0
+    lag[:] = 0.0
+    lost[:] = 0.0
 
 
 def begin_again(memory: Memory) -> None:
     """Forget most of what the balances were, after an alarm: they are learnt again, what the peaks said is kept."""
-    _, clock, _, information, moment, _, score, _, _, _ = memory
+    _, clock, _, information, moment, _, score, _, _, _, usual, _, _, _, _, _, _ = memory
     clock[2] = clock[1]
     information *= 0.01
     moment *= 0.01
-    score[:, : PEAK + 1] = 0.0
+    score[:, SUM : PEAK + 1] = 0.0
     score[:, SQUARES] = 0.0
+    usual[:] = 0.0
+    drop_span(memory)
 
 
 @cache
 def watch_kernel() -> NativeKernel:
     """Return the compiled kernel: `advance`, `begin_again` and `threshold`."""
-    named = ("MEAN", "VARIANCE", "COUNT", "SUM", "PEAK", "THRESHOLD", "SQUARES")
-    constants = {name: getattr(cusum, name) for name in named}
-    constants |= {"FEATURES": FEATURES, "BENT": balances.BENT}
-    constants |= {"NOTHING": NOTHING, "READY": READY, "REFRESHED": REFRESHED, "INTERVALS": INTERVALS}
-    constants |= {"ALLOWANCE": ALLOWANCE, "LARGEST_SCORE": LARGEST_SCORE, "LEVEL": LEVEL, "MOVING": MOVING}
-    parts = (regress, shift, learn, count_gains, solve, accumulate, standardise, judge, end_block)
+    constants = {
+        name: value
+        for module in (balances, cusum, excitation, loss)
+        for name, value in vars(module).items()
+        if name.isupper() and isinstance(value, int | float)
+    }
+    constants |= {"NOTHING": NOTHING, "READY": READY, "LOSS": LOSS, "REFRESHED": REFRESHED, "INTERVALS": INTERVALS}
+    constants |= {"ALLOWANCE": ALLOWANCE, "LEVEL": LEVEL, "MOVING": MOVING}
+    of_balances = (regress, shift, learn, count_gains, solve, accumulate, excitation_octave, standardise)
+    of_loss = (count_work, count_lag, measure_work, measure_lag, learn_loss_again, drive_is_alike, judge_loss)
+    parts = (*of_balances, *of_loss, drop_span, end_span, end_block)
     small = pasted(*parts, constants=constants, inlined=True)
-    large = pasted(threshold, advance, begin_again)
+    entries = threshold, advance, begin_again
+    large = pasted(*entries)
     text = kernel_text("the watch over flow and force balances", small, large)
-    return load_native("watch", text, {one.__name__: signature_of(one) for one in (advance, begin_again, threshold)})
+    return load_native("watch", text, {one.__name__: signature_of(one) for one in entries})

@@ -2,7 +2,8 @@
 
 With differential pressure there are two balances: flow (what the pump delivers and the piston sweeps, equation 5.8) and
 force (pressure and what friction and mass take, equation 5.9). Without it one of motion remains. Each raises an alarm
-when the CUSUM of its log NIS passes a threshold.
+when the CUSUM of its log NIS passes a threshold. They follow slow drift, so beside them a slow one asks whether more
+is lost than warming oil explains (`faults.watch.loss`). All share one rate of false alarms.
 
 The threshold follows from the rate: the CUSUM of a healthy stream rises from zero and returns, and the peaks of these
 excursions have an exponential tail whatever the dependence from block to block (Cramér and Lundberg; Asmussen, Applied
@@ -16,22 +17,24 @@ from math import exp, isfinite
 
 import numpy as np
 
-from faults.watch.balances import FEATURES, GAINS
 from faults.watch.cusum import SUM, THRESHOLD
-from faults.watch.events import Alarm, Change, Event, Ready, change_time
-from faults.watch.kernel import (
-    CLOCK,
-    INTERVALS,
-    LEVELS,
-    PARTIAL,
-    READY,
-    RECENT,
-    SCORE,
-    Memory,
-    WatchSetting,
-    WatchSizes,
-    watch_kernel,
+from faults.watch.events import SLOW, Alarm, Change, Event, Ready, change_time
+from faults.watch.growth import growth_time
+from faults.watch.kernel import INTERVALS, LOSS, READY, watch_kernel
+from faults.watch.loss import (
+    LAST,
+    LAST_RESISTANCE,
+    LIMIT,
+    RESISTANCE,
+    RISEN,
+    SEEN,
+    SHARE,
+    SPAN,
+    WANTED,
+    learn_loss_again,
+    loss_threshold,
 )
+from faults.watch.memory import KEPT_SPANS, RECENT, WatchSetting, WatchSizes, empty_memory
 from faults.watch.samples import watched_samples
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -47,8 +50,8 @@ SLOWEST = 0.05
 MEMORY = 30.0
 """Fading memory of the balances [s]."""
 
-SCORE_MEMORY = 60.0
-"""Fading memory of the score's mean and deviation [s]."""
+SCORE_MEMORY = 15.0
+"""Fading memory of the score's mean and deviation, of blocks that were excited alike [s]."""
 
 SETTLE = 10.0
 """What the balances learn from before their innovations count, and then before their deviation does [s]."""
@@ -67,6 +70,9 @@ BUILD_UP = 3
 
 BALANCES = ("flow", "force")
 """The balances with differential pressure."""
+
+SLOW_SHARE = 0.05
+"""Share of the false alarms that is left to slow growth [fraction]: oil that is not at its thinnest uses none of it."""
 
 
 class Watch:
@@ -107,7 +113,8 @@ class Watch:
             raise HydrostateError(f"false alarms must be over 0 and at most 60 an hour, got {false_alarms:g}")
         if not (isfinite(learning) and learning >= LEAST_LEARNING):
             raise HydrostateError(f"learning must take at least {LEAST_LEARNING:g} s, got {learning:g} s")
-        self.balances = BALANCES if pressure else ("motion",)
+        balances = BALANCES if pressure else ("motion",)
+        self.pressure, self.balances = pressure, (*balances, SLOW)
         self.sample_time, self.start = sample_time, start
         samples = max(1, round(INTERVAL / sample_time))
         self.block = samples * INTERVALS
@@ -116,18 +123,13 @@ class Watch:
         rated_velocity = parameters.pump_displacement * parameters.rated_speed / parameters.piston_area
         scales = parameters.rated_speed, rated_velocity * sample_time, parameters.relief_pressure
         fade = exp(-samples * sample_time / MEMORY)
-        self._setting = WatchSetting(fade, SCORE_MEMORY / duration, false_alarms * duration / 3600.0, *scales)
+        allowed = false_alarms * duration / 3600.0
+        self._setting = WatchSetting(fade, SCORE_MEMORY / duration, (1.0 - SLOW_SHARE) * allowed, *scales)
         settle = round(SETTLE / duration)
         self._sizes = WatchSizes(samples, settle, round(learning / duration), 3 * settle)
-        wide = len(self.balances)
-        balance = (FEATURES, FEATURES), (FEATURES,), (FEATURES,)
-        of_each = [np.zeros((wide, *shape)) for shape in (*balance, (SCORE,), (LEVELS + 1,), (RECENT,))]
-        self._memory = Memory._make(
-            (np.zeros(PARTIAL), np.zeros(CLOCK), np.zeros(8), *of_each, np.zeros((RECENT, GAINS)))
-        )
-        self._partial, self._clock, *_, self._score, _, self._scores, self._gains = self._memory
-        self._partial[3] = np.nan
-        self._score[:, THRESHOLD] = np.inf
+        self._memory = empty_memory(len(balances), loss_threshold(SLOW_SHARE * SPAN * allowed))
+        self._partial, self._clock = self._memory.partial, self._memory.clock
+        self._score, self._known = self._memory.score, self._memory.known
         self._open: tuple[Alarm, int, int] | None = None
 
     @property
@@ -143,12 +145,13 @@ class Watch:
     @property
     def thresholds(self) -> tuple[float, ...]:
         """Thresholds of the balances [dimensionless]; infinite while they are learnt."""
-        return tuple(float(value) for value in self._score[:, THRESHOLD])
+        slow = self._known[LIMIT] if self._known[WANTED] < np.inf else np.inf
+        return tuple(float(value) for value in (*self._score[:, THRESHOLD], slow))
 
     @property
     def scores(self) -> tuple[float, ...]:
         """The CUSUM of each balance [dimensionless]: an alarm is raised where one passes its threshold."""
-        return tuple(float(value) for value in self._score[:, SUM])
+        return tuple(float(value) for value in (*self._score[:, SUM], self._known[RISEN]))
 
     def take(self, samples: Array) -> list[Event]:
         """Take samples, one or many: what comes of them does not depend on how they are cut.
@@ -175,6 +178,8 @@ class Watch:
             place, news = kernel.advance(rows[:stop], place, self._setting, self._sizes, self._memory)
             if news == READY:
                 events.append(Ready(self.time, self.thresholds))
+            elif news == LOSS:
+                events += self._lost()
             elif news >= 0:
                 events.append(self._raise(news))
             if self._open is not None and self._clock[0] >= self._open[2]:
@@ -207,7 +212,7 @@ class Watch:
             Copies, by name.
         """
         kept = {f"memory_{i}": one.copy() for i, one in enumerate(self._memory)}
-        kept["asked"] = np.array([self.sample_time, len(self.balances), *self._setting, *self._sizes])
+        kept["asked"] = np.array([self.sample_time, self.pressure, *self._setting, *self._sizes])
         kept["start"] = np.array([self.start])
         kept["open"] = np.empty(0)
         if self._open is not None:
@@ -265,10 +270,22 @@ class Watch:
         watch_kernel().begin_again(self._memory)
         return alarm
 
+    def _lost(self) -> list[Event]:
+        """Return the alarm of what is lost slowly, with what has changed since the usual loss was learnt."""
+        known, seen = self._known, int(self._known[SEEN])
+        kept = np.arange(max(0, seen - KEPT_SPANS), seen) % KEPT_SPANS
+        levels, ends = self._memory.levels[kept].T
+        since, interval = growth_time(levels, self.start + ends * self.block * self.sample_time)
+        alarm = Alarm(self.time, SLOW, since, interval, float(known[RISEN]), float(known[LIMIT]))
+        lost = (float(known[SHARE]), float(known[LAST])) if self.pressure else None
+        resisted = float(known[LAST_RESISTANCE] / known[RESISTANCE] - 1.0) if self.pressure else None
+        learn_loss_again(known)
+        return [alarm, Change(self.time, alarm, lost, resisted)]
+
     def _recent_scores(self, which: int) -> Array:
         """Return the last scores, the newest first, those of blocks at rest left out as zero."""
         now, usable = int(self._clock[0]), min(int(self._clock[1] - self._clock[2]), RECENT // 2)
-        return np.nan_to_num(self._scores[which, (now - 1 - np.arange(usable)) % RECENT])
+        return np.nan_to_num(self._memory.scores[which, (now - 1 - np.arange(usable)) % RECENT])
 
     def _told(self) -> list[Event]:
         if self._open is None:
@@ -276,9 +293,10 @@ class Watch:
         alarm, changed, now = self._open
         self._open = None
         span = RECENT - 1 - (now - changed)
-        before = self._gains[np.arange(changed - min(span, changed), changed) % RECENT].sum(axis=0)
-        after = self._gains[np.arange(changed + 1, now) % RECENT].sum(axis=0)
-        if len(self.balances) < len(BALANCES) or min(before[1], before[3], after[1], after[3]) <= 0.0:
+        gains = self._memory.gains
+        before = gains[np.arange(changed - min(span, changed), changed) % RECENT].sum(axis=0)
+        after = gains[np.arange(changed + 1, now) % RECENT].sum(axis=0)
+        if not self.pressure or min(before[1], before[3], after[1], after[3]) <= 0.0:
             return [Change(self.time, alarm, None, None)]
         lost = float(before[0] / before[1]), float(after[0] / after[1])
         resisted = float(after[2] / after[3] / (before[2] / before[3]) - 1.0)

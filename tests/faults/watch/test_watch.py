@@ -113,6 +113,37 @@ def test_the_threshold_is_higher_the_less_has_been_learnt() -> None:
     assert levels[400] > levels[40000] + 0.2
 
 
+def _slowly(most: float, seed: int = 7) -> np.ndarray:
+    """Return ten minutes of an actuator that loses a tenth of its speed, and from the third to the tenth ever more."""
+    rng, step = np.random.default_rng(seed), 5e-3
+    count = round(600.0 / step)
+    speed = P.rated_speed * np.repeat(rng.choice((-1.0, 1.0), count // 10 + 1), 10)[:count]
+    lost = 0.1 + (most - 0.1) * np.clip((step * np.arange(count) - 180.0) / 420.0, 0.0, 1.0)
+    velocity = (1.0 - lost) * P.pump_displacement * speed / P.piston_area
+    pressure = 5e5 * np.sign(velocity) + 5e3 * rng.standard_normal(count)
+    position = np.cumsum(velocity) * step + 1e-6 * rng.standard_normal(count)
+    return np.column_stack([speed + 0.05 * rng.standard_normal(count), position, pressure])
+
+
+@pytest.mark.parametrize("pressure", [True, False])
+def test_leakage_that_grows_over_minutes_is_found_and_dated_and_warming_oil_is_not(pressure: bool) -> None:
+    watch = Watch(P, 5e-3, pressure=pressure, learning=60.0)
+    events = watch.take(_slowly(0.4))
+    alarms = [event for event in events if isinstance(event, Alarm) and event.balance == "loss"]
+    assert 180.0 < alarms[0].time < 480.0
+    assert alarms[0].since == pytest.approx(180.0, abs=40.0)
+    change = next(event for event in events if isinstance(event, Change) and event.alarm == alarms[0])
+    if pressure:
+        assert change.lost is not None
+        assert change.lost[0] == pytest.approx(0.1, abs=0.02)
+        assert change.lost[1] > 2.0 * change.lost[0]
+        assert change.pressure == pytest.approx(0.0, abs=0.5)
+    else:
+        assert (change.lost, change.pressure) == (None, None)
+    warming = Watch(P, 5e-3, pressure=pressure, learning=60.0).take(_slowly(0.17))
+    assert not [event for event in warming if isinstance(event, Alarm) and event.balance == "loss"]
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [

@@ -1,0 +1,59 @@
+"""How hard a drive excites a block: scores are compared with those of blocks that were excited alike.
+
+What a balance leaves depends on the drive: after a reversal it leaves more than in steady motion. Blocks fall into
+classes by how much speed changed in them and in the block before, in octaves. Each class has a usual log NIS of its
+own, so the drive's pattern raises no score, and a drive that has not been seen before is learnt before it is judged.
+"""
+
+import math
+
+from plant.arrays import Array
+
+OCTAVES = 13
+"""Octaves of excitation, the first and last open."""
+
+STILL = 1e-3
+"""Excitation below which a block counts as steady: a change of speed by 3 % of rated speed, squared [dimensionless]."""
+
+MEAN, VARIANCE, COUNT = range(3)
+"""Places in what is usual for a class: mean and variance of its log NIS, and its blocks up to the memory."""
+
+LARGEST_SCORE = 8.0
+"""Cap of a block's score [standard deviations]: no single block decides."""
+
+LEAST_BLOCKS = 20.0
+"""Blocks of a class before its scores count [count]."""
+
+
+def excitation_octave(change: float) -> int:
+    """Return the octave of a block's summed squared changes of speed, which are relative to rated speed."""
+    return min(max(int(math.log(change / STILL + 1.0) / math.log(2.0)), 0), OCTAVES - 1)
+
+
+def standardise(value: float, memory: float, judged: bool, usual: Array) -> float:
+    """Return how far a log NIS lies above the usual of its class, and let it move the usual.
+
+    Parameters
+    ----------
+    value : float
+        Logarithm of a block's NIS [dimensionless].
+    memory : float
+        Blocks of a class that are remembered [count].
+    judged : bool
+        Whether it counts; 0 is returned otherwise, and while too few blocks of the class are known.
+    usual : ndarray, shape (3,)
+        Mean, variance and count of the class.
+
+    Returns
+    -------
+    float
+        The score [standard deviations].
+    """
+    away, score = value - usual[MEAN], 0.0
+    if judged and usual[COUNT] >= LEAST_BLOCKS:
+        score = min(away / math.sqrt(usual[VARIANCE] + 1e-12), LARGEST_SCORE)
+    usual[COUNT] = min(usual[COUNT] + 1.0, memory)
+    share = 1.0 / usual[COUNT]
+    usual[MEAN] += share * away
+    usual[VARIANCE] += share * (away * away * (1.0 - share) - usual[VARIANCE])
+    return score

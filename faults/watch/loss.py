@@ -1,0 +1,232 @@
+"""Slow growth of leakage: the share of the pumped flow that is lost, span by span, beside what warming oil explains.
+
+The balances of `faults.watch.balances` forget within half a minute, so what grows more slowly is learnt and not seen.
+A *span* of some seconds measures what is lost. With pressure it is a share of the pump's work, and oil that is only
+squeezed gives back what it took. Without pressure it is the part of the speed that the piston never follows, from a
+regression in which its lag has coefficients of its own.
+
+Thinner oil leaks more, but at most in inverse proportion to its viscosity (`OIL`); what is lost beyond that is a leak.
+A load or a speed that changes is none: over pumped flow lost flow rises with load, over pressure it does not; over
+pumped flow it rises at less speed, over time it does not. So the smaller of the two shares counts. Without pressure
+that is not enough, since the lag depends on the drive: there only spans of a drive like the one learnt count.
+"""
+
+import math
+
+import numpy as np
+
+from faults.watch.balances import BENT, solve
+from plant.arrays import Array
+
+DELAYS = 16
+"""Intervals over which the piston's lag behind the motor is regressed."""
+
+WORK = 5
+"""Sums of a span with pressure: of q p, the size of w p, p p, p v and v v."""
+
+OIL = 2.0
+"""By what thinner oil may raise what is lost [fraction]: an oil of VG 46 thins by half in 23 K (judged)."""
+
+LEAST_LOSS = 0.05
+"""What counts as lost at the least [fraction]: a rig's sizes may be wrong by that much (judged)."""
+
+LEAST_TOLD = 0.02
+"""Share of the speed that its last changes must leave open [fraction], so that lost speed and lag are told apart."""
+
+ALIKE = 1.25
+"""By what factor a span's drive may differ from the one learnt, without pressure [fraction] (judged)."""
+
+SPAN = 200
+"""Blocks of motion in a span."""
+
+LEARNT = 12.0
+"""Spans from which the usual loss is learnt again after an alarm [count]."""
+
+LEAST_LEARNT = 3.0
+"""Spans that it takes at the least [count]."""
+
+ALLOWED = 0.5
+"""What a span's score must exceed for the CUSUM to rise [standard deviations]."""
+
+LARGEST = 4.0
+"""Cap of a span's score [standard deviations]: no two spans decide."""
+
+NARROWEST = 0.1
+"""Standard deviation of a span at the least, as a share of what oil may raise [fraction] (judged)."""
+
+SPREAD_MEMORY = 360.0
+"""Spans from which the standard deviation is known [count]."""
+
+OVERSHOOT = 1.166
+"""By how much a CUSUM overshoots, twice (Siegmund, Sequential Analysis, 1985, chapter X.2) [standard deviations]."""
+
+BLOCKS, SPANS, WANTED, SHARE, RATIO, RESISTANCE, FAST, LIVELY, OTHERS = range(9)
+"""Places in what is known of the loss: blocks in the span; spans in what is usual, and how many it wants; the usual
+share, ratio of the two shares, pressure at a velocity, and how fast and lively the drive is; spans in a row of another
+drive."""
+
+SPREAD, KNOWN, LAST, LAST_RESISTANCE, RISEN, LIMIT, SEEN = range(9, 16)
+"""More of them: variance of a span, and spans that it is from; the last level, and the last pressure at a velocity; the
+CUSUM and its threshold [standard deviations]; spans so far."""
+
+
+def count_work(w: float, v: float, p: float, work: Array) -> None:
+    """Add an interval to the span's sums."""
+    work[0] += (w - v) * p
+    work[1] += abs(w * p)
+    work[2] += p * p
+    work[3] += p * v
+    work[4] += v * v
+
+
+def count_lag(w: float, v: float, full: bool, speeds: Array, lag: Array, lost: Array) -> None:
+    """Add an interval to the normal equations of lost speed, once the last speeds are known.
+
+    Parameters
+    ----------
+    w, v : float
+        Speed and velocity, relative to the rated ones [dimensionless].
+    full : bool
+        Whether the last speeds follow on each other.
+    speeds : ndarray, shape (2, delays + 2)
+        The last speeds, and the regressors: speed, its last changes, its direction.
+    lag : ndarray, shape (delays + 2, delays + 2)
+        Information of the regressors.
+    lost : ndarray, shape (delays + 2,)
+        Their moment with lost speed.
+    """
+    later = w
+    for i in range(DELAYS + 1):
+        earlier = speeds[0, i]
+        speeds[0, i] = later
+        later = earlier
+    if not full:
+        return
+    speeds[1, 0] = w
+    speeds[1, DELAYS + 1] = w / (abs(w) + BENT)
+    for i in range(DELAYS):
+        speeds[1, i + 1] = speeds[0, i] - speeds[0, i + 1]
+    for i in range(DELAYS + 2):
+        lost[i] += speeds[1, i] * (w - v)
+        for j in range(i + 1):
+            lag[i, j] += speeds[1, i] * speeds[1, j]
+
+
+def measure_work(work: Array, told: Array) -> None:
+    """Set what a span with pressure tells: shares lost of the pump's work and of pressure; nothing at rest.
+
+    Parameters
+    ----------
+    work : ndarray, shape (5,)
+        Sums of the span.
+    told : ndarray, shape (6,)
+        Two shares lost, the ratio that makes them one, pressure at a velocity (0 for a span that tells nothing), and
+        how fast and how lively the drive is, which do not matter here [dimensionless].
+    """
+    told[3], told[4], told[5] = 0.0, 1.0, 1.0
+    if min(work[1], work[2], work[4]) > 0.0:
+        told[0], told[1] = work[0] / work[1], work[0] / work[2]
+        told[2], told[3] = work[2] / work[1], work[3] / work[4]
+
+
+def measure_lag(lag: Array, lost: Array, told: Array) -> None:
+    """Set what a span without pressure tells: shares lost of speed and of its direction, as `measure_work` does.
+
+    It tells nothing where the drive's changes say all about its speed, as a sine's do: the lag may be anything then.
+    """
+    last = DELAYS + 1
+    told[3] = 0.0
+    if min(lag[0, 0], lag[last, last]) <= 0.0:
+        return
+    found, factor, first = np.empty(last), np.empty((last, last)), np.zeros(last)
+    first[0] = 1.0
+    solve(lag[:last, :last], first, found, factor)
+    told[3] = 1.0 if found[0] * lag[0, 0] * LEAST_TOLD < 1.0 else 0.0
+    solve(lag[:last, :last], lost[:last], found, factor)
+    told[0], told[4], told[5] = found[0], lag[0, 0] / lag[last, last], lag[1, 1] / lag[0, 0]
+    solve(lag[1:, 1:], lost[1:], found, factor)
+    told[1], told[2] = found[last - 1], lag[last, 0] / lag[0, 0]
+
+
+def drive_is_alike(told: Array, loss: Array) -> bool:
+    """Return whether a span's drive is like the one learnt; one that stays another is learnt instead."""
+    if loss[SPANS] < loss[WANTED]:
+        return True
+    fast, lively = told[4] / loss[FAST], told[5] / loss[LIVELY]
+    if max(fast, lively) <= ALIKE and min(fast, lively) >= 1.0 / ALIKE:
+        loss[OTHERS] = 0.0
+        return True
+    loss[OTHERS] += 1.0
+    if loss[OTHERS] >= LEARNT:
+        learn_loss_again(loss)
+    return False
+
+
+def judge_loss(told: Array, now: float, loss: Array, levels: Array) -> bool:
+    """Take what a span has measured; return whether more is lost than warming oil explains.
+
+    Parameters
+    ----------
+    told : ndarray, shape (6,)
+        As `measure_work` sets it.
+    now : float
+        Blocks so far [count].
+    loss : ndarray, shape (16,)
+        What is known.
+    levels : ndarray, shape (spans, 2)
+        Level and end [blocks] of the last spans.
+    """
+    if loss[SPANS] < loss[WANTED]:
+        loss[SPANS] += 1.0
+        loss[SHARE] += (told[0] - loss[SHARE]) / loss[SPANS]
+        loss[RATIO] += (told[2] - loss[RATIO]) / loss[SPANS]
+        loss[RESISTANCE] += (told[3] - loss[RESISTANCE]) / loss[SPANS]
+        loss[FAST] += (told[4] - loss[FAST]) / loss[SPANS]
+        loss[LIVELY] += (told[5] - loss[LIVELY]) / loss[SPANS]
+    level = min(told[0], loss[RATIO] * told[1])
+    if loss[SEEN] > 0.0:
+        apart = 0.5 * (level - loss[LAST]) ** 2
+        if loss[KNOWN] >= LEAST_LEARNT:
+            apart = min(apart, 9.0 * loss[SPREAD])
+        loss[KNOWN] = min(loss[KNOWN] + 1.0, SPREAD_MEMORY)
+        loss[SPREAD] += (apart - loss[SPREAD]) / loss[KNOWN]
+    place = int(loss[SEEN]) % levels.shape[0]
+    levels[place, 0], levels[place, 1] = level, now
+    loss[LAST], loss[LAST_RESISTANCE] = level, told[3]
+    loss[SEEN] += 1.0
+    if loss[SPANS] < loss[WANTED]:
+        return False
+    allowed = (OIL - 1.0) * max(loss[SHARE], LEAST_LOSS)
+    deviation = max(math.sqrt(loss[SPREAD]) * (1.0 + 2.0 / math.sqrt(loss[KNOWN] + 1.0)), NARROWEST * allowed)
+    loss[RISEN] = max(0.0, loss[RISEN] + min((level - loss[SHARE] - allowed) / deviation, LARGEST) - ALLOWED)
+    return loss[RISEN] > loss[LIMIT]
+
+
+def learn_loss_again(loss: Array) -> None:
+    """Forget the usual loss: what has been told is usual from here on."""
+    loss[SPANS] = loss[RISEN] = loss[OTHERS] = 0.0
+    loss[WANTED] = LEARNT
+
+
+def loss_threshold(expected: float) -> float:
+    """Return the threshold that the CUSUM of white Gaussian scores passes at a rate (Siegmund's approximation).
+
+    Parameters
+    ----------
+    expected : float
+        How often it may be passed in a span [count].
+
+    Returns
+    -------
+    float
+        The threshold [standard deviations], with oil as thin as `OIL` allows: cooler oil passes it less often.
+
+    Examples
+    --------
+    >>> round(loss_threshold(1e-4), 2)
+    7.36
+    """
+    reach = 1.0
+    for _ in range(50):
+        reach = math.log(2.0 * ALLOWED**2 / expected + 2.0 * ALLOWED * reach + 1.0) / (2.0 * ALLOWED)
+    return max(reach - OVERSHOOT, 1.0)

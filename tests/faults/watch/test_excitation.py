@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+
+from faults.watch.excitation import (
+    COUNT,
+    LARGEST_SCORE,
+    LEAST_BLOCKS,
+    MEAN,
+    OCTAVES,
+    STILL,
+    VARIANCE,
+    excitation_octave,
+    standardise,
+)
+
+
+def test_steady_motion_is_the_first_octave_and_reversals_are_higher() -> None:
+    assert excitation_octave(0.0) == 0
+    assert excitation_octave(0.9 * STILL) == 0
+    assert excitation_octave(4.0) == 11
+    assert excitation_octave(2.0) == 10
+    assert excitation_octave(1e9) == OCTAVES - 1
+
+
+def test_scores_of_a_class_have_mean_zero_and_deviation_one() -> None:
+    rng, usual = np.random.default_rng(0), np.zeros(3)
+    scores = [standardise(-6.0 + 0.3 * rng.standard_normal(), 300.0, True, usual) for _ in range(5000)]
+    assert np.mean(scores[500:]) == pytest.approx(0.0, abs=0.05)
+    assert np.std(scores[500:]) == pytest.approx(1.0, abs=0.05)
+    assert usual[MEAN] == pytest.approx(-6.0, abs=0.1)
+    assert usual[VARIANCE] == pytest.approx(0.09, rel=0.3)
+
+
+def test_a_class_is_learnt_before_it_is_judged_and_no_block_decides() -> None:
+    usual = np.zeros(3)
+    values = [0.0, 0.1] * int(LEAST_BLOCKS)
+    scores = [standardise(value, 300.0, True, usual) for value in values]
+    assert not any(scores[: int(LEAST_BLOCKS)])
+    assert any(scores[int(LEAST_BLOCKS) :])
+    assert standardise(50.0, 300.0, True, usual) == LARGEST_SCORE
+    assert standardise(50.0, 300.0, False, usual) == 0.0
+    assert usual[COUNT] == len(values) + 2

@@ -1,0 +1,26 @@
+import numpy as np
+import pytest
+
+from faults.watch.growth import growth_time
+
+ENDS = 10.0 * np.arange(1, 201)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_slope_is_dated_where_it_begins(seed: int) -> None:
+    noise = 0.002 * np.random.default_rng(seed).standard_normal(len(ENDS))
+    since, (low, high) = growth_time(0.07 + 1e-4 * np.maximum(ENDS - 1000.0, 0.0) + noise, ENDS)
+    assert since == pytest.approx(1000.0, abs=60.0)
+    assert low <= since <= high
+    assert high - low < 200.0
+
+
+def test_a_jump_is_dated_to_its_span() -> None:
+    noise = 0.002 * np.random.default_rng(9).standard_normal(len(ENDS))
+    since, interval = growth_time(np.where(ENDS > 1950.0, 0.3, 0.07) + noise, ENDS)
+    assert since == 1950.0
+    assert interval == (1940.0, 1960.0)
+
+
+def test_too_few_levels_are_dated_no_closer_than_they_reach() -> None:
+    assert growth_time(np.array([0.1, 0.4]), np.array([10.0, 20.0])) == (10.0, (10.0, 20.0))

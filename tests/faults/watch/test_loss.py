@@ -1,0 +1,163 @@
+import numpy as np
+import pytest
+
+from faults.watch.loss import (
+    ALIKE,
+    DELAYS,
+    KNOWN,
+    LARGEST,
+    LEARNT,
+    LIMIT,
+    OTHERS,
+    SEEN,
+    SHARE,
+    SPANS,
+    WANTED,
+    count_lag,
+    count_work,
+    drive_is_alike,
+    judge_loss,
+    learn_loss_again,
+    loss_threshold,
+    measure_lag,
+    measure_work,
+)
+
+USUAL, SPANS_LEARNT = 0.08, 12
+
+
+def learnt(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Return what is known of a circuit that loses 8 %, with 0.2 % of noise a span."""
+    loss, levels = np.zeros(SEEN + 1), np.zeros((512, 2))
+    loss[WANTED], loss[LIMIT] = SPANS_LEARNT, loss_threshold(1e-4)
+    for now in range(SPANS_LEARNT):
+        assert not judge_loss(span(USUAL + 0.002 * rng.standard_normal()), float(now), loss, levels)
+    return loss, levels
+
+
+def span(share: float, other: float | None = None) -> np.ndarray:
+    return np.array([share, share if other is None else other, 1.0, 1.0, 1.0, 1.0])
+
+
+def first_alarm(shares: np.ndarray, others: np.ndarray | None = None) -> int | None:
+    rng = np.random.default_rng(1)
+    loss, levels = learnt(rng)
+    for k, share in enumerate(shares):
+        noise = 0.002 * rng.standard_normal()
+        told = span(share + noise, None if others is None else others[k] + noise)
+        if judge_loss(told, float(SPANS_LEARNT + k), loss, levels):
+            return k
+    return None
+
+
+def test_oil_that_thins_by_almost_half_raises_no_alarm_in_a_day() -> None:
+    warming = USUAL * (1.0 + 0.95 * (1.0 - np.exp(-np.arange(8640) / 90.0)))
+    assert first_alarm(warming) is None
+
+
+def test_a_leak_that_grows_as_slowly_is_found_once_it_has_doubled_what_is_lost() -> None:
+    found = first_alarm(USUAL * (1.0 + np.arange(360) / 90.0))
+    assert found is not None
+    assert 90 < found < 112
+
+
+def test_one_span_and_two_decide_nothing() -> None:
+    assert first_alarm(np.array([1.0, 1.0, *[USUAL] * 300])) is None
+    assert first_alarm(np.full(5, 1.0)) == np.ceil(loss_threshold(1e-4) / (LARGEST - 0.5)) - 1
+
+
+def test_what_is_lost_more_over_one_of_the_two_alone_is_no_leak() -> None:
+    high, usual = np.full(300, 4.0 * USUAL), np.full(300, USUAL)
+    assert first_alarm(high, usual) is None
+    assert first_alarm(usual, high) is None
+    assert first_alarm(high, high) is not None
+
+
+def test_after_an_alarm_the_loss_of_then_is_usual() -> None:
+    loss, levels = learnt(np.random.default_rng(2))
+    learn_loss_again(loss)
+    assert not any(judge_loss(span(0.4), float(now), loss, levels) for now in range(200))
+    assert loss[SHARE] == pytest.approx(0.4)
+    assert loss[SPANS] == LEARNT
+
+
+def test_a_jump_does_not_widen_the_known_spread_for_good() -> None:
+    loss, levels = learnt(np.random.default_rng(3))
+    loss[KNOWN] = 100.0
+    before = loss.copy()
+    judge_loss(span(0.5), 50.0, loss, levels)
+    assert loss[SEEN] == before[SEEN] + 1.0
+    assert loss[KNOWN] == 101.0
+    assert loss[9] < 1.1 * before[9]
+
+
+def test_the_threshold_is_passed_at_the_rate_asked_for() -> None:
+    rng, expected = np.random.default_rng(4), 0.01
+    limit, sums, passed, spans = loss_threshold(expected), np.zeros(2000), 0, 1500
+    for _ in range(spans):
+        sums = np.maximum(0.0, sums + rng.standard_normal(2000) - 0.5)
+        passed += int((sums > limit).sum())
+        sums[sums > limit] = 0.0
+    assert passed / (2000 * spans) == pytest.approx(expected, rel=0.1)
+
+
+def test_oil_that_is_squeezed_is_not_lost() -> None:
+    work, told = np.zeros(5), np.zeros(6)
+    phase = 2.0 * np.pi * np.arange(2000) / 100.0
+    for w, p, rate in zip(np.sin(phase), np.sin(phase + 0.6), np.cos(phase + 0.6), strict=True):
+        count_work(w, w - 0.1 * p - 0.3 * rate, p, work)
+    measure_work(work, told)
+    assert told[1] == pytest.approx(0.1, rel=1e-6)
+    assert told[2] * told[1] == pytest.approx(told[0], rel=1e-9)
+
+
+def test_rest_tells_nothing() -> None:
+    told = np.ones(6)
+    measure_work(np.zeros(5), told)
+    assert told[3] == 0.0
+    told[3] = 1.0
+    measure_lag(np.zeros((DELAYS + 2, DELAYS + 2)), np.zeros(DELAYS + 2), told)
+    assert told[3] == 0.0
+
+
+def lagging(speed: np.ndarray, lost: float) -> np.ndarray:
+    """Return what a span tells of a piston that loses a share of its speed and follows with a lag."""
+    speeds, lag, moment, told = (
+        np.zeros((2, DELAYS + 2)),
+        np.zeros((DELAYS + 2, DELAYS + 2)),
+        np.zeros(DELAYS + 2),
+        None,
+    )
+    velocity = 0.0
+    for k, w in enumerate(speed):
+        velocity += 0.5 * ((1.0 - lost) * w - velocity)
+        count_lag(w, velocity, k > DELAYS, speeds, lag, moment)
+    told = np.zeros(6)
+    measure_lag(lag, moment, told)
+    return told
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.05, 0.3])
+def test_lost_speed_is_told_from_lag(lost: float) -> None:
+    reversals = np.repeat(np.random.default_rng(5).choice((-1.0, 1.0), 200), 10)
+    told = lagging(reversals, lost)
+    assert told[3] == 1.0
+    assert told[0] == pytest.approx(lost, abs=1e-3)
+    assert told[2] * told[1] == pytest.approx(lost, abs=1e-3)
+
+
+def test_a_sine_does_not_tell_lost_speed_from_lag() -> None:
+    assert lagging(np.sin(2.0 * np.pi * np.arange(2000) / 200.0), 0.2)[3] == 0.0
+
+
+def test_another_drive_is_left_out_and_learnt_when_it_stays() -> None:
+    loss, _ = learnt(np.random.default_rng(6))
+    other = span(0.5)
+    other[5] = 1.1 * ALIKE
+    assert drive_is_alike(span(0.5), loss)
+    assert not drive_is_alike(other, loss)
+    assert drive_is_alike(span(0.5), loss)
+    assert loss[OTHERS] == 0.0
+    assert not any(drive_is_alike(other, loss) for _ in range(int(LEARNT)))
+    assert loss[SPANS] == 0.0
+    assert drive_is_alike(other, loss)
