@@ -29,6 +29,7 @@ NAMES = (
     "frequency_response",
     "circuit",
     "detection",
+    "slow_growth",
     "forecast",
     "real_rig",
     "piezo_stack",

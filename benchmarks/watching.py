@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.running.random_streams import stream
-from faults.conditions import find_condition, parameters_for
+from faults.conditions import find_condition, parameters_for, severity
 from faults.watch.events import Alarm
 from faults.watch.watch import Watch
 from plant.eha.circuit_parameters import CircuitParameters
@@ -86,11 +86,17 @@ class CircuitStream:
         Seed of drive, temperatures and sensor noise.
     condition : str
         Condition in which it begins.
+
+    Attributes
+    ----------
+    growth : float
+        By what the severity of leakage grows, up to minor, which is 1; from ``condition`` "normal" alone [1/s].
     """
 
     def __init__(self, seed: int, condition: str = "normal") -> None:
         self._rng = stream(seed, "watching")
         self.condition = condition
+        self.growth = self.grown = 0.0
         self.warmer, self._target, self._time, self._command = 0.0, 0.0, 0.0, 0.0
         self._state: Array | None = None
 
@@ -109,12 +115,11 @@ class CircuitStream:
         """
         if not 0.0 < seconds <= PIECE:
             raise HydrostateError(f"a piece must be over 0 and at most {PIECE:g} s, got {seconds:g} s")
-        base = parameters_for(find_condition(self.condition), CircuitParameters())
-        if not isinstance(base, CircuitParameters):
-            raise HydrostateError("the circuit must stay a circuit in every condition")
+        base = self._circuit()
         before = parameter_row(at_oil_temperature(base, self.warmer))
         self._warm(seconds)
-        after = parameter_row(at_oil_temperature(base, self.warmer))
+        self.grown = min(1.0, self.grown + self.growth * seconds)
+        after = parameter_row(at_oil_temperature(self._circuit(), self.warmer))
         count = round(seconds / SAMPLE_TIME)
         share = np.arange(count + 1)[:, None] / count
         rows = before * (1.0 - share) + after * share
@@ -140,6 +145,14 @@ class CircuitStream:
             Their source.
         """
         self._rng = rng
+
+    def _circuit(self) -> CircuitParameters:
+        healthy = CircuitParameters()
+        condition = find_condition(self.condition)
+        base = severity(self.grown, 0.0, healthy) if self.grown > 0.0 else parameters_for(condition, healthy)
+        if not isinstance(base, CircuitParameters):
+            raise HydrostateError("the circuit must stay a circuit in every condition")
+        return base
 
     def _warm(self, seconds: float) -> None:
         if self._time % DUTY < seconds:
