@@ -65,8 +65,8 @@ LEAST_LEARNING = 60.0
 AFTER = 2.0
 """Running after an alarm from which the change of the gains is told [s]."""
 
-BUILD_UP = 3
-"""Blocks before the first one that shows a change in which it may have come: some drive must make it felt."""
+BUILD_UP = 6
+"""Blocks before the first one that shows a change in which it may have come: some reversal must make it felt."""
 
 BALANCES = ("flow", "force")
 """The balances with differential pressure."""
