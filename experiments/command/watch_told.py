@@ -140,7 +140,7 @@ def _changed(event: "Alarm") -> str:
     from faults.watch.events import SLOW
 
     if event.balance == SLOW:
-        return f"leakage has grown more than warm oil explains, since about {event.since:.0f} s"
+        return f"lost flow has grown more than warm oil explains, since about {event.since:.0f} s"
     return f"the {event.balance} balance changed at {event.since:.2f} s"
 
 

@@ -209,8 +209,7 @@ def watch_kernel() -> NativeKernel:
     constants |= {"ALLOWANCE": ALLOWANCE, "LEVEL": LEVEL, "MOVING": MOVING}
     of_balances = (regress, shift, learn, count_gains, solve, accumulate, excitation_octave, standardise)
     of_loss = (count_work, count_lag, measure_work, measure_lag, learn_loss_again, drive_is_alike, judge_loss)
-    parts = (*of_balances, *of_loss, drop_span, end_span, end_block)
-    small = pasted(*parts, constants=constants, inlined=True)
+    small = pasted(*of_balances, *of_loss, drop_span, end_span, end_block, constants=constants, inlined=True)
     entries = threshold, advance, begin_again
     large = pasted(*entries)
     text = kernel_text("the watch over flow and force balances", small, large)

@@ -121,7 +121,7 @@ def empty_memory(balances: int, loss_threshold: float) -> Memory:
     balances : int
         Count of the balances.
     loss_threshold : float
-        That of what is lost [standard deviations].
+        That of what is lost, in standard deviations [dimensionless].
     """
     lagged = DELAYS + 2
     balance = (FEATURES, FEATURES), (FEATURES,), (FEATURES,), (SCORE,), (LEVELS + 1,), (RECENT,)
