@@ -8,6 +8,15 @@ from plant.arrays import Array
 FEWEST = 4
 """Levels that it takes to say so."""
 
+MOST_ALIKE = 0.95
+"""Correlation of neighbouring levels at the most [fraction]: from so few it is not known better."""
+
+OIL_MOVES = 0.1
+"""By how much of the time of a rise the oil's drift beside it moves its beginning at the most [fraction] (judged)."""
+
+WIDER = 2
+"""Spans by which the interval is wider at both ends: the first ones of a rise hold little of it."""
+
 
 def growth_time(levels: Array, ends: Array) -> tuple[float, tuple[float, float]]:
     """Return since when levels have risen, by least squares over a steady level that turns into a slope or jumps.
@@ -22,23 +31,30 @@ def growth_time(levels: Array, ends: Array) -> tuple[float, tuple[float, float]]
     Returns
     -------
     tuple
-        When the rise began [s], and a 95 % interval of that [s], a span wider at both ends, and as if what the levels
-        leave were white.
+        When the rise began [s], and a 95 % interval of that [s]: wider where what the levels leave is correlated, as
+        oil's drift is.
 
     Examples
     --------
     >>> growth_time(np.array([1.0, 1.1, 0.9, 1.0, 1.0, 2.0, 3.1, 3.9]), 10.0 * np.arange(1, 9))
-    (50.0, (40.0, 60.0))
+    (50.0, (27.0, 73.0))
     """
     if len(levels) < FEWEST:
         return float(ends[0]), (float(ends[0]), float(ends[-1]))
     slopes = np.maximum(ends[None, :] - ends[:-2, None], 0.0)
-    jumps = (slopes > 0.0).astype(np.float64)
-    missed = np.minimum(_missed(slopes, levels), _missed(jumps, levels))
+    shapes = np.concatenate([slopes, (slopes > 0.0).astype(np.float64)])
+    missed = _missed(shapes, levels).reshape(2, -1)
+    best = shapes[missed.argmin()] - shapes[missed.argmin()].mean()
+    left = levels - levels.mean() - best * float(best @ levels) / float(best @ best)
+    missed = missed.min(axis=0)
     variance = max(float(missed.min()) / (len(levels) - FEWEST + 1), 1e-30)
-    likely = np.flatnonzero(missed <= missed.min() + 2.0 * LIKELY * variance)
-    first, last = max(int(likely[0]) - 1, 0), int(likely[-1]) + 1
-    return float(ends[missed.argmin()]), (float(ends[first]), float(ends[last]))
+    alike = min(max(float(left[1:] @ left[:-1]) / max(float(left @ left), 1e-30), 0.0), MOST_ALIKE)
+    apart = 2.0 * LIKELY * variance * (1.0 + alike) / (1.0 - alike)
+    likely = np.flatnonzero(missed <= missed.min() + apart)
+    first, last = max(int(likely[0]) - WIDER, 0), min(int(likely[-1]) + WIDER, len(ends) - 1)
+    since = float(ends[missed.argmin()])
+    moved = OIL_MOVES * (float(ends[-1]) - since)
+    return since, (float(ends[first]) - moved, min(float(ends[last]) + moved, float(ends[-1])))
 
 
 def _missed(shapes: Array, levels: Array) -> Array:

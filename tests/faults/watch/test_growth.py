@@ -11,15 +11,23 @@ def test_a_slope_is_dated_where_it_begins(seed: int) -> None:
     noise = 0.002 * np.random.default_rng(seed).standard_normal(len(ENDS))
     since, (low, high) = growth_time(0.07 + 1e-4 * np.maximum(ENDS - 1000.0, 0.0) + noise, ENDS)
     assert since == pytest.approx(1000.0, abs=60.0)
-    assert low <= since <= high
-    assert high - low < 200.0
+    assert low <= 1000.0 <= high
+    assert high - low < 400.0
 
 
 def test_a_jump_is_dated_to_its_span() -> None:
     noise = 0.002 * np.random.default_rng(9).standard_normal(len(ENDS))
     since, interval = growth_time(np.where(ENDS > 1950.0, 0.3, 0.07) + noise, ENDS)
     assert since == 1950.0
-    assert interval == (1940.0, 1960.0)
+    assert interval == pytest.approx((1930.0 - 5.0, 1970.0 + 5.0))
+
+
+def test_the_interval_is_wider_beside_oil_that_drifts() -> None:
+    rise = 0.07 + 1e-4 * np.maximum(ENDS - 1000.0, 0.0)
+    white = 0.002 * np.random.default_rng(3).standard_normal(len(ENDS))
+    drift = 0.002 * np.sin(ENDS / 60.0) * np.sqrt(2.0)
+    widths = [high - low for _, (low, high) in (growth_time(rise + one, ENDS) for one in (white, drift))]
+    assert widths[1] > 1.2 * widths[0]
 
 
 def test_too_few_levels_are_dated_no_closer_than_they_reach() -> None:
