@@ -1,16 +1,16 @@
-"""The CUSUM against Page's own expression, its running moments, and thresholds of censored peaks."""
+"""The CUSUM against Page's own expression, and thresholds of censored peaks."""
 
 import math
 
 import numpy as np
 import pytest
 
-from faults.watch.cusum import COUNT, MEAN, PEAK, SUM, VARIANCE, accumulate, standardise, threshold
+from faults.watch.cusum import PEAK, SUM, accumulate, threshold
 
 
 def test_the_sum_is_the_largest_that_any_beginning_gives() -> None:
     rises = np.random.default_rng(1).standard_normal(300)
-    score, peaks, width = np.zeros(7), np.zeros(400), 0.02
+    score, peaks, width = np.zeros(4), np.zeros(400), 0.02
     sums: list[float] = []
     for u in rises:
         accumulate(score, peaks, u, 0.5, width)
@@ -26,25 +26,10 @@ def test_the_sum_is_the_largest_that_any_beginning_gives() -> None:
 
 
 def test_a_peak_above_all_levels_counts_in_the_last() -> None:
-    score, peaks = np.zeros(7), np.zeros(10)
+    score, peaks = np.zeros(4), np.zeros(10)
     for u in (9.0, -20.0):
         accumulate(score, peaks, u, 0.5, 0.02)
     assert peaks.tolist() == [0.0] * 9 + [1.0]
-
-
-def test_moments_are_those_of_all_so_far_and_then_fade() -> None:
-    values, memory = 3.0 + 2.0 * np.random.default_rng(2).standard_normal(60), 20.0
-    score = np.zeros(7)
-    for n, value in enumerate(values, 1):
-        standardise(score, value - score[MEAN], memory)
-        shares = np.minimum(1.0, 1.0 / np.minimum(np.arange(1, n + 1), memory))
-        weights = shares * np.append(np.cumprod((1.0 - shares[1:])[::-1])[::-1], 1.0)
-        mean = weights @ values[:n]
-        assert score[COUNT] == n
-        assert score[MEAN] == pytest.approx(mean)
-        assert score[VARIANCE] == pytest.approx(weights @ (values[:n] - mean) ** 2, abs=1e-12)
-        if n <= memory:
-            assert score[VARIANCE] == pytest.approx(np.var(values[:n]), abs=1e-12)
 
 
 WIDTH, SCALE = 0.02, 0.7

@@ -40,3 +40,18 @@ def test_a_class_is_learnt_before_it_is_judged_and_no_block_decides() -> None:
     assert standardise(50.0, 300.0, True, usual) == LARGEST_SCORE
     assert standardise(50.0, 300.0, False, usual) == 0.0
     assert usual[COUNT] == len(values) + 2
+
+
+def test_moments_are_those_of_all_so_far_and_then_fade() -> None:
+    values, memory = 3.0 + 2.0 * np.random.default_rng(2).standard_normal(60), 20.0
+    usual = np.zeros(3)
+    for n, value in enumerate(values, 1):
+        standardise(value, memory, False, usual)
+        shares = np.minimum(1.0, 1.0 / np.minimum(np.arange(1, n + 1), memory))
+        weights = shares * np.append(np.cumprod((1.0 - shares[1:])[::-1])[::-1], 1.0)
+        mean = weights @ values[:n]
+        assert usual[COUNT] == min(n, memory)
+        assert usual[MEAN] == pytest.approx(mean)
+        assert usual[VARIANCE] == pytest.approx(weights @ (values[:n] - mean) ** 2, abs=1e-12)
+        if n <= memory:
+            assert usual[VARIANCE] == pytest.approx(np.var(values[:n]), abs=1e-12)
