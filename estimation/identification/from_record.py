@@ -9,8 +9,8 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.choose import STRUCTURES, choose_model
 from estimation.identification.design.sticking import rest_shares, rests
+from estimation.identification.fit.feedback import FEEDBACK_SAMPLES, feedback_note
 from estimation.identification.fit.fitted import CovarianceKind
-from estimation.identification.fit.residual_tests import DEFAULT_LAGS, feedback_test
 from estimation.identification.free_run.from_records import without_gaps
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.notes import IdentificationCode
@@ -19,11 +19,8 @@ from estimation.identification.structure_names import StructureName
 from plant.errors import LogError, LogWarning
 from plant.log.record import Record
 
-FEEDBACK = 1e-6
-"""p-value below which data are said to come from a closed loop; a linear model's errors must not look like one."""
-
-FEEDBACK_SAMPLES, RESTING_SAMPLES = 20_000, 100_000
-"""Samples that are asked for feedback, and for rests, from the beginning."""
+RESTING_SAMPLES = 100_000
+"""Samples that are asked for rests, from the beginning."""
 
 
 def identify_record(
@@ -167,12 +164,11 @@ def _warn_of_rest(model: LinearModel, fit_percents: Mapping[Any, float], u: Arra
 
 def _warn_of_feedback(model: LinearModel, u: Array, y: Array) -> None:
     part = slice(0, FEEDBACK_SAMPLES)
-    if not model.is_stable or u[part].size < 8 * DEFAULT_LAGS:
+    if not model.is_stable:
         return
     residual = y[part] - model.simulate(u[part], initial=model.initial_state)
-    found = feedback_test(residual, u[part])
-    if found.p_value < FEEDBACK:
-        said = IdentificationCode.FEEDBACK.note(input=model.input_name, output=model.output_name, p_value=found.p_value)
+    said = feedback_note(residual, u[part], (model.input_name, model.output_name))
+    if said is not None:
         warnings.warn(LogWarning(said), stacklevel=3)
 
 

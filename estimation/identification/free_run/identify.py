@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from estimation.identification.fit.feedback import feedback_note
 from estimation.identification.free_run.bodies import LinearBody, PolynomialBody
+from estimation.identification.free_run.candidate_rows import hammerstein_row, linear_row, polynomial_row
 from estimation.identification.free_run.choose_hammerstein import (
     HammersteinCandidate,
     chosen_hammerstein,
@@ -31,7 +33,12 @@ from plant.notes import Note
 FREE_STRUCTURES = ("output-error", "narx", "hammerstein", "auto", *ADOPTED)
 """Structures between any channels; auto chooses between the first three."""
 
-WARNED = (IdentificationCode.TIME_CONSTANT_BEYOND_RECORD, IdentificationCode.NO_FIT, IdentificationCode.INTEGRATES)
+WARNED = (
+    IdentificationCode.TIME_CONSTANT_BEYOND_RECORD,
+    IdentificationCode.NO_FIT,
+    IdentificationCode.INTEGRATES,
+    IdentificationCode.FEEDBACK,
+)
 """Notes that are raised as warnings too; the others say only what was passed over."""
 
 HIGHEST = 6
@@ -138,7 +145,7 @@ def _identified(
     delays = None if delay is None else (delay,) * len(data.inputs)
     linear = linear_candidates(part, list(orders), delays, n_numerator)
     best, notes = _believable(linear, part, by)
-    rows = [_row(one) for one in linear]
+    rows = [linear_row(one) for one in linear]
     sound = not best.doubt
     if structure in ADOPTED:
         return _adopted(structure, best, data, by, rows)
@@ -153,7 +160,7 @@ def _identified(
     body, held_back, named = LinearBody.of(best.fit), best.held_back, "output-error"
     if structure != "output-error":
         polynomial = polynomial_candidates(linear if sound else [best], part)
-        rows += [_polynomial_row(one) for one in polynomial]
+        rows += [polynomial_row(one) for one in polynomial]
         better = min(polynomial, key=lambda one: one.held_back, default=None)
         if better is None and structure == "narx":
             raise HydrostateError(f"no polynomial model of {data.output!r} runs free without growing beyond bounds")
@@ -170,11 +177,22 @@ def _identified(
         transfer = linear_model(fit, whole, by) if len(data.inputs) == 1 else None
     model = FreeRunModel(data.inputs, data.output, data.sample_time, named, by, body, transfer)
     quality = model.quality(data.u, data.y)
+    notes = [*notes, *_fed_back(model, data)]
     empty = isinstance(body, LinearBody) and best.doubt == "no_fit"
     if empty or not quality.fit_percent > 0.0 or not held_back < 1.0:
         notes = [*notes, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
         sound = False
     return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(rows), tuple(notes), bool(sound))
+
+
+def _fed_back(model: FreeRunModel, data: Channels) -> list[Note]:
+    """Return a note where the input of a linear model follows the output's noise, by the longest log."""
+    if len(data.inputs) != 1 or not isinstance(model.body, LinearBody):
+        return []
+    k = int(np.argmax([y.size for y in data.y]))
+    u, y = data.u[k], data.y[k]
+    said = feedback_note(y - model.simulate(u, y), u[:, 0], (data.inputs[0], data.output))
+    return [] if said is None else [said]
 
 
 def _worthwhile_bend(
@@ -184,7 +202,7 @@ def _worthwhile_bend(
     if len(whole.inputs) > 1:
         raise HydrostateError(f"structure hammerstein takes one input, got {', '.join(whole.inputs)}: use narx")
     found = hammerstein_candidates(linear, section(whole, MOST_CHOSEN))
-    rows += [_hammerstein_row(one) for one in found]
+    rows += [hammerstein_row(one) for one in found]
     if not found:
         return None
     taken = chosen_hammerstein(found)
@@ -296,41 +314,3 @@ def section(data: Channels, most: int) -> Channels:
         u=tuple(np.ascontiguousarray(u[part]) for u, part in zip(data.u, parts, strict=True)),
         y=tuple(y[part] for y, part in zip(data.y, parts, strict=True)),
     )
-
-
-def _row(one: Candidate) -> dict[str, Any]:
-    form = one.form
-    return {
-        "structure": "output-error",
-        "order": form.order,
-        "numerator": list(form.sizes),
-        "delay": list(form.delays),
-        "held_back_percent": 100.0 * (1.0 - one.held_back),
-        "bic": one.bic,
-        "aic": one.aic,
-        "doubt": one.doubt or None,
-    }
-
-
-def _hammerstein_row(one: HammersteinCandidate) -> dict[str, Any]:
-    form = one.fit.linear.form
-    return {
-        "structure": "hammerstein",
-        "nonlinearity": one.fit.kind,
-        "order": form.order,
-        "numerator": list(form.sizes),
-        "delay": list(form.delays),
-        "held_back_percent": 100.0 * (1.0 - one.held_back),
-        "bic": one.bic,
-    }
-
-
-def _polynomial_row(one: PolynomialCandidate) -> dict[str, Any]:
-    terms = one.fit.terms
-    return {
-        "structure": "narx",
-        "order": one.fit.variables.n_start,
-        "terms": int(np.count_nonzero(terms[:, 1] >= 0)),
-        "held_back_percent": 100.0 * (1.0 - one.held_back),
-        "bic": one.bic,
-    }

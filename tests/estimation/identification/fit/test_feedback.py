@@ -3,6 +3,8 @@ import pytest
 
 from estimation.identification import LinearModel, fit_output_error, identify_record
 from estimation.identification.fit.residual_tests import feedback_test
+from estimation.identification.free_run.data import channels_from
+from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.notes import IdentificationCode
 from plant.errors import HydrostateError, LogWarning
 from plant.log.record import Record
@@ -43,6 +45,16 @@ def test_a_log_from_a_closed_loop_warns() -> None:
     (note,) = [one.message.note for one in caught if one.message.note.code == IdentificationCode.FEEDBACK]
     assert (note.data["input"], note.data["output"]) == ("motor_speed_rad_s", "velocity_m_s")
     assert note.data["p_value"] < 1e-3
+
+
+def test_a_closed_loop_is_noticed_between_any_columns_and_an_open_one_is_not() -> None:
+    u, y = closed_loop(np.random.default_rng(2), 1_000, 0.8)
+    with pytest.warns(LogWarning, match="closed loop"):
+        found = identify_channels(channels_from([u], [y], 1e-3, ["u"], "y"), order=1, delay=1)
+    assert [one.code for one in found.notes] == [IdentificationCode.FEEDBACK]
+    assert found.sound
+    u, y = closed_loop(np.random.default_rng(2), 1_000, 0.0)
+    assert identify_channels(channels_from([u], [y], 1e-3, ["u"], "y"), order=1, delay=1).notes == ()
 
 
 def test_a_short_residual_is_refused(plant_30hz: LinearModel) -> None:
