@@ -14,7 +14,11 @@ class IdentificationCode(Code):
     )
     FEEDBACK = (
         "input {input!r} follows the noise of {output!r} (p = {p_value:.1g}): the data seem to come from a closed loop,"
-        " where output error is biased; fit ARMAX or Box-Jenkins"
+        " where output error is biased; fit ARMAX or Box-Jenkins, or name the column that drives the loop (--reference)"
+    )
+    TWO_STAGES = (
+        "input {input!r} is taken as what {reference} explains of it, {share:.0%} of its power: the rest may be noise "
+        "that a closed loop fed back. Fits are from that part"
     )
     VELOCITY_DIFFERENTIATED = (
         "channel 'velocity_m_s' is absent: it was computed from 'position_m' by central differences, which amplify "

@@ -119,6 +119,10 @@ def identify(
         list[str] | None,
         option("COLUMN", "Output, likewise; one model per output.", "--output", show_default="velocity_m_s"),
     ] = None,
+    references: Annotated[
+        list[str] | None,
+        option("COLUMN", "With --input, of a closed loop: what drives it, such as its set-point.", "--reference"),
+    ] = None,
     validate: Annotated[
         list[Path] | None, option("LOG", "With --input: a log to test the model on; it is not used for the fit.")
     ] = None,
@@ -159,11 +163,13 @@ def identify(
     from estimation.identification.from_record import identify_record, record_signals
     from plant.errors import NoChannelError
 
-    any_columns = (inputs is not None or outputs is not None or simulate is not None) and rig is None and not columns
+    related = any(one is not None for one in (inputs, outputs, references, simulate))
+    any_columns = related and rig is None and not columns
     if any_columns or structure in ("narx", "hammerstein", "state-space"):
         asked = Asked(
             names(inputs),
             names(outputs),
+            names(references),
             structure=structure,
             order=_given("--order", order, 1),
             delay=_given("--delay", delay, 0),

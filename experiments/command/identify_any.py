@@ -36,6 +36,7 @@ class Asked:
 
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    references: tuple[str, ...] = ()
     structure: str = "output-error"
     order: int | None = None
     delay: int | None = None
@@ -94,8 +95,8 @@ def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path
     def work(name: Path) -> Result:
         output = str(name)
         if not read:
-            wanted = (*asked.inputs, *asked.outputs)
-            read.append([_record(log, wanted, asked.sample_time) for log in logs])
+            wanted, references = (*asked.inputs, *asked.outputs), asked.references
+            read.append([_record(log, (*wanted, *references), asked.sample_time) for log in logs])
             read.append([_record(log, wanted, asked.sample_time) for log in asked.validate])
         together = asked.structure == STATE_SPACE or (asked.structure == "auto" and len(asked.outputs) > 1)
         if together and not shared:
@@ -117,12 +118,12 @@ def _record(log: Path, wanted: Sequence[str], sample_time: float | None) -> "Rec
 
 def _together(records: "Sequence[Record]", asked: Asked, outputs: Sequence[str]) -> "dict[str, Identified]":
     """Return what is identified of some outputs, by their names."""
-    from estimation.identification.free_run.from_records import channels_of
-    from estimation.identification.state_space.identify import identify_outputs
+    from estimation.identification.two_stage import identify_columns
 
-    data = [channels_of(records, asked.inputs, output, asked.resampled, split=True) for output in outputs]
-    form = {"order": asked.order, "delay": asked.delay, "n_numerator": asked.numerator}
-    return dict(zip(outputs, identify_outputs(data, structure=asked.structure, **form), strict=True))
+    form = {"order": asked.order, "delay": asked.delay, "n_numerator": asked.numerator, "structure": asked.structure}
+    clock, references = asked.resampled, asked.references
+    found, _ = identify_columns(records, asked.inputs, outputs, references=references, sample_time=clock, options=form)
+    return dict(zip(outputs, found, strict=True))
 
 
 def _answer(
@@ -343,8 +344,7 @@ def _with_interval(one: Mapping[str, Any]) -> str:
 
 def _simulated_screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     shown = table("log", "output", "fit [%]", "rms error", "one step [%]")
-    for result in results:
-        for one in result["outputs"]:
-            numbers = (f"{one['fit_percent']:.2f}", f"{one['rmse']:.4g}", f"{one['one_step_percent']:.2f}")
-            shown.add_row(str(result["file"]), one["output"], *numbers)
+    for log, one in ((str(result["file"]), one) for result in results for one in result["outputs"]):
+        numbers = (f"{one['fit_percent']:.2f}", f"{one['rmse']:.4g}", f"{one['one_step_percent']:.2f}")
+        shown.add_row(log, one["output"], *numbers)
     yield shown

@@ -20,7 +20,7 @@ ANY = "anything"
 """Kind of a log whose columns are not those of an actuator: its channels can be related, and nothing be diagnosed."""
 
 
-FREE_OPTIONS = ("input", "output", "structure", "order", "delay", "n_numerator", "sample_time")
+FREE_OPTIONS = ("input", "output", "structure", "order", "delay", "n_numerator", "sample_time", "reference")
 """Options of `Log.identify` between any channels."""
 
 
@@ -149,7 +149,8 @@ class Log(Shown):
         **options
             With ``input`` and ``output``, names or lists of them: ``structure`` ("output-error", "narx", "hammerstein",
             "state-space", "auto"), ``order``, ``delay``, ``n_numerator``, ``sample_time`` [s]; what is not given the
-            data choose. Without, or with an option that only it has: as
+            data choose. ``reference``: columns that drive a closed loop from outside. Without, or with an option that
+            only it has: as
             `estimation.identification.from_record.identify_record` takes them, ``n_denominator=3``.
 
         Returns

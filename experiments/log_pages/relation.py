@@ -183,18 +183,18 @@ def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: 
     inputs, outputs : str or sequence of str
         Channels.
     options : Mapping[str, Any]
-        As `identify_outputs` takes them, and ``sample_time`` of the model [s].
+        As `identify_outputs` takes them, ``sample_time`` of the model [s], and ``reference``: what drives a loop.
     """
-    from estimation.identification.free_run.from_records import channels_of
-    from estimation.identification.state_space.identify import identify_outputs
+    from estimation.identification.two_stage import identify_columns
     from experiments.command.identify_any import entries
 
     asked = dict(options)
-    sample_time = asked.pop("sample_time", None)
-    sources = [inputs] if isinstance(inputs, str) else list(inputs)
-    data = [
-        channels_of(records, sources, output, sample_time, split=True)
-        for output in ([outputs] if isinstance(outputs, str) else list(outputs))
+    columns = [
+        [given] if isinstance(given, str) else list(given) for given in (inputs, outputs, asked.pop("reference", ()))
     ]
-    found = identify_outputs(data, **asked)
+    sources, targets, references = columns
+    sample_time = asked.pop("sample_time", None)
+    found, data = identify_columns(
+        records, sources, targets, references=references, sample_time=sample_time, options=asked
+    )
     return Relation([one.model for one in found], [entries(one) for one in found], data)

@@ -70,6 +70,17 @@ def test_one_input_gives_a_transfer_function_with_its_uncertainty(logs: list[Pat
     assert "heat" in run(logs[0], "--input", "load", "--output", "heat", "--order", 1).stdout
 
 
+def test_a_reference_is_what_a_loop_is_identified_from(logs: list[Path]) -> None:
+    form = ("--input", "flow", "--output", "heat", "--order", 1, "--delay", 1)
+    ran = run(logs[0], *form, "--reference", "Valve [%],load", "--json")
+    (one,) = json.loads(ran.stdout)
+    told = [(note["code"], note["data"]["reference"]) for note in one["notes"] if "reference" in note["data"]]
+    assert told == [("two_stages", "Valve [%], load")]
+    refused = run(logs[0], *form, "--reference", "heat")
+    assert refused.exit_code == 2
+    assert "neither input nor output" in refused.output
+
+
 def test_a_state_space_is_one_model_of_all_outputs(logs: list[Path], tmp_path: Path) -> None:
     saved = tmp_path / "model.json"
     channels = ("--input", "Valve [%],load", "--output", "flow,heat", "--structure", "state-space", "--order", 3)
