@@ -19,7 +19,8 @@ def state_space_run(A, B, C, D, u, y):
         x = A @ x + B @ u[t]
         free[t] = (C @ power)[0]
         power = A @ power
-    start = np.linalg.lstsq(free, y - driven, rcond=None)[0]
+    known = np.isfinite(y)
+    start = np.linalg.lstsq(free[known], (y - driven)[known], rcond=None)[0]
     return driven + free @ start
 
 
