@@ -129,6 +129,10 @@ class RigCode(Code):
         "differential_pressure_pa is {late_ms:.2f} +- {half_width_ms:.2f} ms late (lag or delay of its sensor); this "
         "was corrected"
     )
+    INPUT_LATE = (
+        "{channel} comes {late_ms:.2f} +- {half_width_ms:.2f} ms late: lag or delay of its sensor or of its filter; "
+        "it was brought forward"
+    )
     PRESSURE_OFFSET = (
         "differential_pressure_pa reads {offset_pa:.4g} +- {half_width_pa:.2g} Pa too much; the offset was subtracted"
     )

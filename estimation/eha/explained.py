@@ -27,6 +27,11 @@ as it warms by some 25 K (ISO 3448 VG 46 between 40 and 65 degrees Celsius, abou
 LEAST_GROWN = 1e-3
 """Least leakage over its value halfway [dimensionless]: a parabola may cross zero beyond what it was fitted to."""
 
+SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
+
+LAGS: Mapping[str, str] = {PRESSURE: "pressure_lag", SPEED: "speed_lag", POSITION: "position_lag"}
+"""The lag of each channel that may come late, beside its delay."""
+
 LEAKAGE_COURSE = "leakage_course"
 """Channel of a log that was set right: leakage over what it is when the log ends [dimensionless]."""
 
@@ -67,8 +72,34 @@ def _half_width(found: Explanation, name: str) -> float:
 
 
 def _late(found: Explanation, _: EhaParameters) -> Note:
-    late = found.delay + found.values["pressure_lag"][0]
-    return RigCode.PRESSURE_LATE.note(late_ms=1e3 * late, half_width_ms=1e3 * _half_width(found, "pressure_lag"))
+    width = 1e3 * _half_width(found, LAGS[PRESSURE])
+    return RigCode.PRESSURE_LATE.note(late_ms=1e3 * lateness(found, PRESSURE), half_width_ms=width)
+
+
+def _input_late(channel: str) -> Callable[[Explanation, EhaParameters], Note]:
+    def note(found: Explanation, _: EhaParameters) -> Note:
+        width = 1e3 * _half_width(found, LAGS[channel])
+        return RigCode.INPUT_LATE.note(channel=channel, late_ms=1e3 * lateness(found, channel), half_width_ms=width)
+
+    return note
+
+
+def lateness(found: Explanation, channel: str) -> float:
+    """Return by how much a channel comes late, lag and delay together.
+
+    Parameters
+    ----------
+    found : Explanation
+        What explains the log.
+    channel : str
+        One of `LAGS`.
+
+    Returns
+    -------
+    float
+        Time [s].
+    """
+    return found.delays.get(channel, 0.0) + found.values.get(LAGS[channel], (0.0, 0.0))[0]
 
 
 def _offset(found: Explanation, _: EhaParameters) -> Note:
@@ -148,6 +179,8 @@ def _drains(side: str) -> Callable[[Explanation, EhaParameters], Note]:
 
 _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "pressure_late": _late,
+    "speed_late": _input_late(SPEED),
+    "position_late": _input_late(POSITION),
     "pressure_offset": _offset,
     "encoder_zero": _zero,
     "delivery": _delivery,
@@ -184,13 +217,27 @@ def set_right(log: CleanLog, found: Explanation) -> CleanLog:
     record, changed = log.record, dict[str, Array]()
     if zero := value.get("position_zero", 0.0):
         changed["position_m"] = record["position_m"] - zero
-    late, offset = found.delay + value.get("pressure_lag", 0.0), value.get("pressure_offset", 0.0)
+    late, offset = lateness(found, PRESSURE), value.get("pressure_offset", 0.0)
     if "leakage_growth" in value:
         grown = _grown(found, np.arange(len(record)) / len(record))
         changed[LEAKAGE_COURSE] = grown / grown[-1]
     if late or offset:
         changed[PRESSURE] = _brought_forward(record, PRESSURE, late) - offset
+    if behind := lateness(found, SPEED):
+        changed[SPEED] = _brought_forward(record, SPEED, behind)
+    if behind := lateness(found, POSITION):
+        moved = _brought_forward(record.replace(**changed), POSITION, behind)
+        changed |= {POSITION: moved, **_with_position(record, moved, behind)}
     return replace(log, record=record.replace(**changed))
+
+
+def _with_position(record: Record, moved: Array, behind: float) -> Mapping[str, Array]:
+    """Return the velocity brought forward with the position, where both come from one late encoder; else nothing."""
+    if VELOCITY not in record:
+        return {}
+    slope, forward = np.gradient(moved) / record.sample_time, _brought_forward(record, VELOCITY, behind)
+    apart = [float(np.nanmean((one - slope) ** 2)) for one in (record[VELOCITY], forward)]
+    return {VELOCITY: forward} if apart[1] < apart[0] else {}
 
 
 def _brought_forward(record: Record, channel: str, late: float) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 
 from estimation.fits.descent import Point, descend
 from estimation.fits.form_fit import weighed
+from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
@@ -69,8 +70,8 @@ class Explanation:
         The hypotheses that were accepted together.
     values : Mapping[str, tuple of float]
         Value and standard deviation by parameter, in SI.
-    delay : float
-        Time by which pressure comes late beside its lag [s].
+    delays : Mapping[str, float]
+        Times by which channels come late beside their lags [s].
     fit : GreyBoxFit
         The fit under them.
     rivals : int
@@ -81,7 +82,7 @@ class Explanation:
 
     names: tuple[str, ...]
     values: Mapping[str, tuple[float, float]]
-    delay: float
+    delays: Mapping[str, float]
     fit: GreyBoxFit
     rivals: int
     stated_pressure: float
@@ -94,7 +95,7 @@ class _Tried:
     together: tuple[Hypothesis, ...]
     point: Point
     values: Mapping[str, float]
-    delay: float
+    delays: Mapping[str, float]
     finished: GreyBoxFit | None = None
 
     @property
@@ -149,13 +150,13 @@ def explain(
         finished = _ranked([*finished, *_likeliest(wide, [_screened(wide, (one,), starts) for one in others])])
     first = finished[0]
     if paired and not accepted(first.fit):
-        late = delayed(wide, first.delay)
+        late = delayed(wide, first.delays)
         others = [one for one in HYPOTHESES if one not in first.together]
         likely, others = _promising(late, first.together, first.values, others)
         tried = [*likely, *(one for one in others if one.far)]
         pairs = _likeliest(late, [_screened(late, (*first.together, one), [first.values]) for one in tried])
         better = (one for one in pairs if one.cost < first.cost - WORTH)
-        finished = _ranked([first, *(replace(one, delay=first.delay + one.delay) for one in better)])
+        finished = _ranked([first, *(replace(one, delays={**first.delays, **one.delays}) for one in better)])
     best = finished[0]
     rivals = [one for one in finished[1:] if one.cost < best.cost + ALIKE]
     found = weighed([best.fit, *(one.fit for one in rivals)])
@@ -165,7 +166,7 @@ def explain(
         value, std = values["leakage_coefficient"]
         values["leakage_coefficient"] = ended * value, ended * std
     names = tuple(one.name for one in best.together)
-    return Explanation(names, values, best.delay, best.fit, len(rivals), usual_pressure(log, parameters))
+    return Explanation(names, values, best.delays, best.fit, len(rivals), usual_pressure(log, parameters))
 
 
 def promised(
@@ -217,9 +218,11 @@ def _promises(
     log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], asked: Sequence[Hypothesis]
 ) -> list[tuple[float, float]]:
     """Return what each hypothesis promises beside those that are taken, as `promised` does, from one evaluation."""
-    problem = freed(log, (*together, *asked))
+    problem = freed(log, (*together, *(replace(one, instead=()) for one in asked)))
     point = problem.at(problem.model.theta({**usual_values(log), **found}))
-    own = freed(log, together).model.unknowns
+    # an unknown at its bound promises what only the hypothesis in its place can keep
+    held = {name for one in asked for name in one.instead}
+    own = [name for name in freed(log, together).model.unknowns if name not in held]
 
     def step(names: Sequence[str]) -> tuple[float, Array]:
         places = [problem.model.unknowns.index(name) for name in names]
@@ -245,28 +248,30 @@ def _screened(
 ) -> Iterator[_Tried]:
     """Yield the best from each start after a few steps, with one model step a sample."""
     absent = usual_values(log)
-    problems = [(delay, freed(delayed(log, delay).coarsened(), together)) for delay in together[-1].delays]
+    asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
+    problems = [(delays, freed(delayed(log, delays).coarsened(), together)) for delays in asked]
     for start in starts:
         tried: list[_Tried] = []
-        for (delay, problem), own in product(problems, own_starts(log, together[-1])):
+        for (delays, problem), own in product(problems, own_starts(log, together[-1])):
             guess = problem.model.theta({**absent, **start, **own})
             point = descend(problem.at, guess, SCREENING, flow_bounds(problem.model, [guess], log), radius=NEAR)
-            tried.append(_Tried(together, point, problem.model.values(point.theta), delay))
+            tried.append(_Tried(together, point, problem.model.values(point.theta), delays))
         yield min(tried, key=lambda one: one.cost)
 
 
 def _settled(log: GreyBoxLog, tried: _Tried) -> _Tried:
     """Return a set of hypotheses brought to its optimum, with one model step a sample."""
-    early = delayed(log, tried.delay).coarsened()
+    early = delayed(log, tried.delays).coarsened()
     best = _descended(early, tried, tried.point.theta, SETTLING)
     if (revived := _revived(log, best)) is not None:
         best = min(best, _descended(early, best, revived, SETTLING), key=lambda one: one.cost)
     if len(tried.together[-1].delays) == 1:
         return best
+    channel = tried.together[-1].late
     for step in (FINEST_DELAY, -FINEST_DELAY):
-        while best.delay + step >= 0.0:
-            moved = replace(best, delay=best.delay + step)
-            moved = _descended(delayed(log, moved.delay).coarsened(), moved, best.point.theta, SETTLING)
+        while (delay := best.delays.get(channel, 0.0) + step) >= 0.0:
+            moved = replace(best, delays={channel: delay})
+            moved = _descended(delayed(log, moved.delays).coarsened(), moved, best.point.theta, SETTLING)
             if moved.cost >= best.cost:
                 break
             best = moved
@@ -282,23 +287,27 @@ def _revived(log: GreyBoxLog, tried: _Tried) -> Array | None:
     return freed(log, tried.together).model.theta({**tried.values, **gone})
 
 
-def _descended(log: GreyBoxLog, tried: _Tried, start: Array, evaluations: int) -> _Tried:
-    problem = freed(log, tried.together)
+def _descended(log: GreyBoxLog, tried: _Tried, start: Array, evaluations: int, *more: str) -> _Tried:
+    problem = freed(log, tried.together, *more)
     bounds = flow_bounds(problem.model, [start], log)
     point = descend(problem.at, start, evaluations, bounds, radius=NEAR)
     return replace(tried, point=point, values=problem.model.values(point.theta))
 
 
 def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
-    """Return a set of hypotheses fitted to the end, balanced by volume or by mass, whichever is likelier."""
-    row = delayed(log, tried.delay)
-    done: list[tuple[_Tried, GreyBoxLog]] = []
-    for share in (0.0, 1.0):
+    """Return a set of hypotheses fitted to the end, balanced by volume or by mass, whichever is likelier.
+
+    Balanced by mass, the inner circuit yields as it does in the plain form.
+    """
+    row = delayed(log, tried.delays)
+    done: list[tuple[_Tried, FreedProblem]] = []
+    for share, more in ((0.0, ()), (1.0, (STIFFNESS,))):
         own = _balanced_by(row, share)
-        begun = done[-1][0] if done else tried
-        done.append((_descended(own, begun, begun.point.theta, FINISHING), own))
-    best, own = min(done, key=lambda one: one[0].cost)
-    return replace(best, finished=concluded(freed(own, best.together), best.point))
+        problem, begun = freed(own, tried.together, *more), done[-1][0] if done else tried
+        start = problem.model.theta({**usual_values(own), **begun.values})
+        done.append((_descended(own, begun, start, FINISHING, *more), problem))
+    best, problem = min(done, key=lambda one: one[0].cost)
+    return replace(best, finished=concluded(problem, best.point))
 
 
 def _likeliest(log: GreyBoxLog, tried: Sequence[Iterable[_Tried]]) -> list[_Tried]:

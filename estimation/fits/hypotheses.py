@@ -20,9 +20,13 @@ class Hypothesis:
     starts : tuple of Mapping[str, float]
         First guesses [SI]; parameters that are not named start where they are absent.
     delays : tuple of float
-        Times by which the pressure may come late beside its lag [s].
+        Times by which a channel may come late beside its lag [s].
+    late : str
+        That channel.
     shares_of_peak : tuple of float
         Relief settings that the fit begins with, over the log's highest differential pressure [fraction].
+    instead : tuple of str
+        Unknowns of the plain form that are not told apart from it, and are held.
     far : bool
         Whether what it adds is so far from its absence that the slope there says nothing of it.
     """
@@ -31,7 +35,9 @@ class Hypothesis:
     free: tuple[str, ...]
     starts: tuple[Mapping[str, float], ...] = ({},)
     delays: tuple[float, ...] = (0.0,)
+    late: str = "differential_pressure_pa"
     shares_of_peak: tuple[float, ...] = ()
+    instead: tuple[str, ...] = ()
     far: bool = False
 
 
@@ -42,8 +48,20 @@ START_LOAD = Hypothesis("start_load", ("start_pressure", "start_level"))
 
 OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
 
+LATE_TRIED = (0.0, 2e-3, 5e-3, 9e-3)
+"""Delays with which the search for a late channel begins [s]."""
+
 HYPOTHESES = (
-    Hypothesis("pressure_late", ("pressure_lag",), ({"pressure_lag": 1e-3},), (0.0, 2e-3, 5e-3, 9e-3)),
+    Hypothesis("pressure_late", ("pressure_lag",), ({"pressure_lag": 1e-3},), LATE_TRIED),
+    Hypothesis(
+        "speed_late",
+        ("speed_lag",),
+        ({"speed_lag": 1e-3},),
+        LATE_TRIED,
+        "motor_speed_rad_s",
+        instead=("speed_lead",),
+    ),
+    Hypothesis("position_late", ("position_lag",), ({"position_lag": 1e-3},), LATE_TRIED, "position_m"),
     OFFSET,
     Hypothesis("encoder_zero", ("position_zero",), ({"position_zero": -0.06}, {"position_zero": 0.06})),
     DELIVERY,
@@ -73,6 +91,8 @@ HYPOTHESES = (
 LIMITS: Mapping[str, tuple[float, float]] = {
     "makeup_opening": (1e2, 1e6),
     "pressure_lag": (0.0, 0.05),
+    "speed_lag": (0.0, 0.05),
+    "position_lag": (0.0, 0.05),
     "pressure_offset": (-1e7, 1e7),
     "position_zero": (-1.0, 1.0),
     "start_pressure": (-1e7, 1e7),

@@ -31,6 +31,8 @@ LEAST_GAS = 1.0
 """Least gas of the inner circuit's accumulator, in chamber volumes; judged. With less its pressure would follow every
 stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
 
+POSITION = "position_m"
+
 LEAST_PEAK = 1.0
 """Highest differential pressure taken of a log whose sensor is dead: the logarithm of none is no start [Pa]."""
 
@@ -40,7 +42,7 @@ second valley, where all that the log shows is noise that the oil's stiffness ma
 
 
 def widened(log: GreyBoxLog, parameters: EhaParameters, stiffness: float = 0.0) -> GreyBoxLog:
-    """Return a log as the wide flow form sees it: with the share of the log as a drive, and what is presumed.
+    """Return a log as the wide flow form sees it: with the share of the log and the rate of position as drives.
 
     Parameters
     ----------
@@ -54,14 +56,15 @@ def widened(log: GreyBoxLog, parameters: EhaParameters, stiffness: float = 0.0) 
     Returns
     -------
     GreyBoxLog
-        The log.
+        The log, with what is presumed.
     """
     samples = len(log.drives)
+    rate = np.gradient(log.drives[:, FLOW_FORM.drives.index(POSITION)]) / log.sample_time
     known = {one.name: getattr(parameters, one.name) for one in fields(parameters)}
     return replace(
         log,
-        drives=np.column_stack([log.drives, np.arange(samples) / samples]),
-        drive_std=(*log.drive_std, 0.0),
+        drives=np.column_stack([log.drives, np.arange(samples) / samples, rate]),
+        drive_std=(*log.drive_std, 0.0, 0.0),
         parameters=parameter_row(
             WideFlowParameters(
                 **known, stated_pressure=usual_pressure(log, parameters), accumulator_stiffness=stiffness
@@ -89,7 +92,7 @@ def usual_pressure(log: GreyBoxLog, parameters: EhaParameters) -> float:
     return parameters.accumulator_pressure + float(np.sqrt(np.nanmean(log.measured**2)))
 
 
-def freed(log: GreyBoxLog, together: Sequence[Hypothesis]) -> FreedProblem:
+def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedProblem:
     """Return the least-squares problem of a log under hypotheses.
 
     Parameters
@@ -98,16 +101,22 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis]) -> FreedProblem:
         The log, widened.
     together : sequence of Hypothesis
         What is freed beside the plain form's unknowns.
+    *more : str
+        Parameters that are freed in any case.
 
     Returns
     -------
     FreedProblem
-        The problem; relief is free where the log reaches its setting.
+        The problem; relief is free where the log reaches its setting. A channel whose lag is free is not asked about.
     """
-    extra = [name for one in together for name in one.free]
+    extra = [*(name for one in together for name in one.free), *more]
     relieved = reaches_relief(log.measured, usual_values(log)["relief_pressure"])
     plain = relieving(FLOW_FORM) if relieved else FLOW_FORM
-    return FreedProblem(WIDE_FLOW_FORM, log, tuple(dict.fromkeys((*plain.unknowns, *extra))), LINEAR)
+    held = {name for one in together for name in one.instead}
+    known = [name for name in plain.unknowns if name not in held]
+    late = {one.late for one in together}
+    log = replace(log, timed=tuple(channel for channel in log.timed if channel not in late))
+    return FreedProblem(WIDE_FLOW_FORM, log, tuple(dict.fromkeys((*known, *extra))), LINEAR)
 
 
 def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]]:
@@ -175,24 +184,33 @@ def usual_values(log: GreyBoxLog) -> dict[str, float]:
     return dict(zip(parameter_names(WideFlowParameters), log.parameters.tolist(), strict=True))
 
 
-def delayed(log: GreyBoxLog, delay: float) -> GreyBoxLog:
-    """Return a log whose outputs are brought forward by a time.
+def delayed(log: GreyBoxLog, delays: Mapping[str, float]) -> GreyBoxLog:
+    """Return a log whose channels are brought forward.
 
     Parameters
     ----------
     log : GreyBoxLog
-        The log.
-    delay : float
-        How late its outputs come [s].
+        The log, widened.
+    delays : Mapping[str, float]
+        How late channels come [s]; what is no drive is the output.
 
     Returns
     -------
     GreyBoxLog
         The log, its last outputs missing.
     """
-    samples = round(delay / log.sample_time)
-    if samples == 0:
-        return log
-    measured = np.full_like(log.measured, np.nan)
-    measured[:-samples] = log.measured[samples:]
-    return replace(log, measured=measured)
+    measured, drives = log.measured, log.drives
+    for channel, delay in delays.items():
+        samples = round(delay / log.sample_time)
+        if samples == 0:
+            continue
+        late = slice(-samples, None)
+        if channel in FLOW_FORM.drives:
+            names = (channel, "position_rate") if channel == POSITION else (channel,)
+            columns = [WIDE_FLOW_FORM.drives.index(name) for name in names]
+            drives, measured = drives.copy(), measured.copy()
+            drives[:-samples, columns] = log.drives[samples:, columns]
+            measured[late] = np.nan
+        else:
+            measured = np.vstack([measured[samples:], np.full_like(measured[late], np.nan)])
+    return replace(log, measured=measured, drives=drives)

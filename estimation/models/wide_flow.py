@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
-from estimation.models.flow import FlowParameters, delivered_flow, leaked_flow, port_flows
+from estimation.models.flow import STIFFNESS, FlowParameters, delivered_flow, leaked_flow, port_flows
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.functions import Scalar, maximum, minimum, where
 from plant.components.check_valve import make_up_flow
@@ -35,6 +35,8 @@ class WideFlowParameters(FlowParameters):
     """The flow form's parameters, and those of what a strange rig, oil or logger may add; absent by default."""
 
     pressure_lag: float = si(0.0, "s", "first-order lag of the pressure sensor", "fitted")
+    speed_lag: float = si(0.0, "s", "first-order lag of the motor's speed sensor", "fitted")
+    position_lag: float = si(0.0, "s", "first-order lag of the encoder or of its filter", "fitted")
     pressure_offset: float = si(0.0, "Pa", "offset of the differential pressure", "fitted")
     position_zero: float = si(0.0, "m", "encoder's reading in the middle position", "fitted")
     start_pressure: float = si(0.0, "Pa", "differential pressure before the first sample", "fitted")
@@ -69,10 +71,11 @@ def _stiffness(pressure: Scalar, elapsed: Scalar, p: SimpleNamespace) -> Scalar:
 
 
 def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
-    speeds, (x, next_x), (begun, next_begun), step = drives
+    speeds, (read, next_read), (begun, next_begun), (rate, next_rate), step = drives
     p1, p2, behind, supply = state
+    x, next_x = read + p.position_lag * rate, next_read + p.position_lag * next_rate
     velocity, position = (next_x - x) / step, x + share * (next_x - x) - p.position_zero
-    pumped = delivered_flow(speeds, p, step, share)
+    pumped = delivered_flow(speeds, _ahead(p), step, share)
     area_1, area_2 = piston_areas(p)
     volume_1, volume_2 = chamber_volumes(position, p)
     dp = p1 - p2
@@ -92,6 +95,11 @@ def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Sc
     # how far the sensor is behind stays small where its lag is short, which a stiff step resolves
     lagging = rise - fall - (behind + p.pressure_offset) / (p.pressure_lag + SHORTEST_LAG)
     return rise, fall, lagging, -p.accumulator_stiffness * (into_1 + into_2)
+
+
+def _ahead(p: SimpleNamespace) -> SimpleNamespace:
+    """Return the parameters with the speed's lag in its lead: what a lag hides is its length times the slope."""
+    return SimpleNamespace(**{**vars(p), "speed_lead": p.speed_lead + p.speed_lag})
 
 
 def grown_leakage(elapsed: Scalar, growth: Scalar, bend: Scalar) -> Scalar:
@@ -125,7 +133,7 @@ def _shown(state: tuple[Scalar, ...]) -> tuple[Scalar]:
 
 WIDE_FLOW_FORM = GreyBoxModel(
     name="wide_flow",
-    drives=("motor_speed_rad_s", "position_m", "elapsed"),
+    drives=("motor_speed_rad_s", "position_m", "elapsed", "position_rate"),
     outputs=("differential_pressure_pa",),
     unknowns=(),
     initial=_at_rest,
@@ -139,6 +147,8 @@ WIDE_FLOW_FORM = GreyBoxModel(
 LINEAR = {
     "speed_lead": 1e-5,
     "pressure_lag": 1e-3,
+    "speed_lag": 1e-3,
+    "position_lag": 1e-3,
     "pressure_offset": 1e4,
     "position_zero": 1e-2,
     "start_pressure": 1e5,
@@ -148,5 +158,6 @@ LINEAR = {
     "leakage_growth": 1.0,
     "leakage_bend": 1.0,
     "crack_pressure": 1e4,
+    STIFFNESS: 1e8,
 }
 """Parameters that may be zero or negative, each with a typical size [SI]."""

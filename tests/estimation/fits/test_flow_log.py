@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from estimation.eha.explained import lateness
 from estimation.fits.flow_fit import fit_flow
 from estimation.fits.flow_log import _swept_share, flow_log, without_strays
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_problem import Problem
 from estimation.models.flow import FLOW_FORM, STIFFNESS
-from estimation.notes import EstimateCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
@@ -80,17 +80,20 @@ def lagging(values: np.ndarray, lag: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("condition", ["normal", pytest.param("minor_friction", marks=pytest.mark.slow)])
-def test_a_position_sensor_that_lags_is_named_and_its_number_not_believed(condition: str) -> None:
+def test_a_position_sensor_that_lags_is_named_and_its_number_is_right(condition: str) -> None:
     rng = np.random.default_rng(9)
     p = circuit_of(parameters_for(CONDITIONS[condition]))
     drive = make_drive("prbs", 10.0, 1e-3, p, rng)
     record = simulate(CIRCUIT, drive, 1e-3, p, sensors=BENCH, rng=rng)
     assert fit_flow(record, HEALTHY, 2e8).reasons == ()
     fit = fit_flow(record.replace(position_m=lagging(record["position_m"], 3e-3)), HEALTHY, 2e8)
-    (said,) = (note for note in fit.reasons if note.code == EstimateCode.CHANNEL_LATE)
-    assert said.data["channel"] == "position_m"
-    assert said.data["when"] == "late"
-    assert said.data["milliseconds"] == pytest.approx(3.0, abs=1.0)
+    assert fit.reasons == ()
+    assert fit.explanation is not None
+    assert fit.explanation.names == ("position_late",)
+    kept = np.exp(-1.0 / 3.0)  # in steps of 1 ms this is late by so many of them where signals are slow
+    assert lateness(fit.explanation, "position_m") == pytest.approx(1e-3 * kept / (1.0 - kept), abs=1e-4)
+    value, std = fit.parameters["bulk_modulus"]
+    assert value == pytest.approx(HEALTHY.bulk_modulus, abs=3.0 * std)
 
 
 @pytest.mark.parametrize("kind", [Problem, FreedProblem.of])

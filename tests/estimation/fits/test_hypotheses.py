@@ -82,6 +82,32 @@ def test_a_lag_and_a_delay_are_known_by_their_sum() -> None:
     assert note.data["late_ms"] == pytest.approx(5.0, abs=0.6)
 
 
+@pytest.mark.parametrize(("channel", "name"), [("motor_speed_rad_s", "speed_late"), ("position_m", "position_late")])
+def test_a_late_speed_or_position_is_named_with_its_delay_and_brought_forward(channel: str, name: str) -> None:
+    record = log()
+    behind = np.concatenate([np.full(3, record[channel][0]), record[channel][:-3]])
+    given = record.replace(**{channel: behind})
+    found = explained(given)
+    assert found.names == (name,)
+    (note,) = notes_of(found, HEALTHY)
+    assert note.code is RigCode.INPUT_LATE
+    assert note.data["channel"] == channel
+    assert note.data["late_ms"] == pytest.approx(3.0, abs=0.2)
+    mended = set_right(clean_log(given, HEALTHY), found).record[channel]
+    there = np.isfinite(mended)
+    assert np.std((mended - record[channel])[there]) < 0.2 * np.std((behind - record[channel])[there])
+
+
+def test_a_velocity_from_a_late_encoder_comes_forward_with_it_and_one_of_its_own_stays() -> None:
+    record = log()
+    behind = {name: np.concatenate([np.zeros(5), record[name][:-5]]) for name in ("position_m", "velocity_m_s")}
+    found = explained(record.replace(**behind))
+    both = set_right(clean_log(record.replace(**behind), HEALTHY), found).record["velocity_m_s"]
+    alone = clean_log(record.replace(position_m=behind["position_m"]), HEALTHY)
+    assert np.nanstd(both - record["velocity_m_s"]) < 0.3 * np.std(behind["velocity_m_s"] - record["velocity_m_s"])
+    assert np.array_equal(set_right(alone, found).record["velocity_m_s"], alone.record["velocity_m_s"])
+
+
 def test_a_pressure_offset_of_one_bar_is_named_and_taken_off() -> None:
     record = log()
     off = record.replace(**{PRESSURE: record[PRESSURE] + 1e5})
@@ -131,7 +157,7 @@ def test_a_log_that_begins_under_load_says_so() -> None:
 def test_absent_additions_leave_the_plain_form() -> None:
     absent = WideFlowParameters()
     assert WIDE_FLOW_FORM.initial(absent)[0] == HEALTHY.accumulator_pressure
-    now, drives = (3e5, 2e5, 0.0, 2.8e5), ((50.0, 50.0), (0.01, 0.0101), (0.9, 0.9), 1e-3)
+    now, drives = (3e5, 2e5, 0.0, 2.8e5), ((50.0, 50.0), (0.01, 0.0101), (0.9, 0.9), (0.1, 0.1), 1e-3)
     grown = WIDE_FLOW_FORM.rates(now, drives, replace(absent, leakage_growth=1.0), 0.0)
     plain = WIDE_FLOW_FORM.rates(now, drives, absent, 0.0)
     assert grown[0] < plain[0]
