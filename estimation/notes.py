@@ -147,6 +147,10 @@ class RigCode(Code):
         "the pump delivers {percent:.1f} +- {half_width:.1f} % of its displacement: it is worn, or displacement or "
         "piston area in the rig file is wrong"
     )
+    WEAR_NOT_EXCLUDED = (
+        "pump wear is not excluded: a pump that delivers up to {percent:.0f} % less would look like leakage at the "
+        "speeds of this log, and bulk modulus would be lower by as much"
+    )
     VOLUME_DIFFERS = "the chamber volume is {percent:.0f} +- {half_width:.0f} % of that in the rig file"
     STARTS_UNDER_LOAD = (
         "the log begins at a differential pressure of {pressure_pa:.3g} Pa, which is a load of {force_n:.3g} N"

@@ -346,4 +346,5 @@ def _fitted(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEs
         nis={channels[-1]: fit.chi_square},
         others={name: found for name, found in fit.parameters.items() if known and name in REPORTED},
         explanation=fit.explanation,
+        remarks=fit.remarks,
     )

@@ -110,7 +110,7 @@ def _others(found: BulkModulusEstimate) -> dict[str, Quantity]:
 
 
 def explained(found: BulkModulusEstimate, parameters: EhaParameters) -> tuple[Note, ...]:
-    """Return what is strange about rig, oil or logger and explains a log.
+    """Return what is strange about rig, oil or logger and explains a log, and what the log leaves open of the rig.
 
     Parameters
     ----------
@@ -124,7 +124,8 @@ def explained(found: BulkModulusEstimate, parameters: EhaParameters) -> tuple[No
     tuple of Note
         None for a plain log.
     """
-    return () if found.explanation is None else notes_of(found.explanation, parameters)
+    strange = () if found.explanation is None else notes_of(found.explanation, parameters)
+    return (*strange, *found.remarks)
 
 
 def absences(found: BulkModulusEstimate) -> tuple[Note, ...]:

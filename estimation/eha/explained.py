@@ -9,7 +9,7 @@ from estimation.finding import NORMAL_95
 from estimation.fits.explain import Explanation
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.sensor_check import PRESSURE
-from estimation.models.wide_flow import grown_leakage
+from estimation.models.wide_flow import GROWTH, grown_leakage
 from estimation.notes import RigCode
 from plant.arrays import Array
 from plant.components.oil import ATMOSPHERE
@@ -156,8 +156,7 @@ def _growth(found: Explanation, _: EhaParameters) -> Note:
 
 def _grown(found: Explanation, elapsed: Array) -> Array:
     """Return leakage over its value halfway, at shares of the log."""
-    growth, bend = (found.values[name][0] for name in ("leakage_growth", "leakage_bend"))
-    return np.maximum(grown_leakage(elapsed, growth, bend), LEAST_GROWN)
+    return np.maximum(grown_leakage(elapsed, *(found.values.get(name, (0.0, 0.0))[0] for name in GROWTH)), LEAST_GROWN)
 
 
 def _blocked(found: Explanation, _: EhaParameters) -> Note:
@@ -190,6 +189,7 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "air_midway": _air,
     "relief_low": _relief,
     "leakage_growth": _growth,
+    "leakage_rise": _growth,
     "makeup_blocked": _blocked,
     "checks_crack": _crack,
     "port_a_drains": _drains("a"),
@@ -218,7 +218,7 @@ def set_right(log: CleanLog, found: Explanation) -> CleanLog:
     if zero := value.get("position_zero", 0.0):
         changed["position_m"] = record["position_m"] - zero
     late, offset = lateness(found, PRESSURE), value.get("pressure_offset", 0.0)
-    if "leakage_growth" in value:
+    if any(name in value for name in GROWTH):
         grown = _grown(found, np.arange(len(record)) / len(record))
         changed[LEAKAGE_COURSE] = grown / grown[-1]
     if late or offset:

@@ -53,6 +53,8 @@ class BulkModulusEstimate:
         Noise levels, where they were tuned to the log.
     explanation : Explanation or None
         What is strange about rig, oil or logger, where that explains the log.
+    remarks : tuple of Note
+        What the log leaves open, and is nothing against the estimate.
     method : str
         How it was estimated: ``least-squares``, a filter of `estimation.filters.run.METHODS`, or a method of
         `estimation.eha.named.NAMED`.
@@ -73,6 +75,7 @@ class BulkModulusEstimate:
     spreads: Mapping[str, Spread] = field(default_factory=lambda: MappingProxyType({}))
     tuning: Tuning | None = None
     explanation: Explanation | None = None
+    remarks: tuple[Note, ...] = ()
     method: str = "least-squares"
 
     @property

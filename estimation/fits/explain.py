@@ -7,7 +7,7 @@ of, then under the others, then under pairs with the likeliest; what is freed wi
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from estimation.fits.wide_problem import (
     widened,
 )
 from estimation.models.flow import STIFFNESS
-from estimation.models.wide_flow import WideFlowParameters, grown_leakage
+from estimation.models.wide_flow import GROWTH, WideFlowParameters, grown_leakage
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.solvers.steps import parameter_names
@@ -161,17 +161,36 @@ def explain(
     rivals = [one for one in finished[1:] if one.cost < best.cost + ALIKE]
     found = weighed([best.fit, *(one.fit for one in rivals)])
     values = {name: (value, best.fit.std[name]) for name, value in best.fit.values.items()} | dict(found)
-    if "leakage_growth" in values:  # what is told of a leakage is what it is at the end
-        ended = float(grown_leakage(1.0, values["leakage_growth"][0], values["leakage_bend"][0]))
+    if any(name in values for name in GROWTH):  # what is told of a leakage is what it is at the end
+        ended = float(grown_leakage(1.0, *(values.get(name, (0.0, 0.0))[0] for name in GROWTH)))
         value, std = values["leakage_coefficient"]
         values["leakage_coefficient"] = ended * value, ended * std
     names = tuple(one.name for one in best.together)
     return Explanation(names, values, best.delays, best.fit, len(rivals), usual_pressure(log, parameters))
 
 
+class Promise(NamedTuple):
+    """What a hypothesis promises beside a fit, to first order.
+
+    Parameters
+    ----------
+    gain : float
+        In log-likelihood, Rao's score statistic over two [dimensionless].
+    size : float
+        How far what is freed first would move in its fitted coordinate: for a logarithm a relative change
+        [dimensionless].
+    deviation : float
+        How well that coordinate would then be known, what is presumed of it included [dimensionless].
+    """
+
+    gain: float
+    size: float
+    deviation: float
+
+
 def promised(
     log: GreyBoxLog, parameters: EhaParameters, plain: Mapping[str, float], one: Hypothesis, *, by_mass: bool = False
-) -> tuple[float, float]:
+) -> Promise:
     """Return what a hypothesis promises beside the plain fit, to first order.
 
     Parameters
@@ -189,9 +208,8 @@ def promised(
 
     Returns
     -------
-    tuple of float
-        Gain in log-likelihood, Rao's score statistic over two [dimensionless], and how far what is freed first would
-        move in its fitted coordinate: for a logarithm a relative change [dimensionless].
+    Promise
+        Its promise.
     """
     wide = widened(log, parameters, plain.get(STIFFNESS, 0.0))
     return _promises(_balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, (one,))[0]
@@ -209,14 +227,14 @@ def _promising(
 ) -> tuple[list[Hypothesis], list[Hypothesis]]:
     """Return the hypotheses that promise most beside those that are taken, best first; and the others."""
     promises = _promises(log.coarsened(), together, found, asked)
-    order = sorted(range(len(asked)), key=lambda i: -promises[i][0])
+    order = sorted(range(len(asked)), key=lambda i: -promises[i].gain)
     likely = [asked[i] for i in order if not asked[i].far][:LIKELIEST]
     return likely, [one for one in asked if one not in likely]
 
 
 def _promises(
     log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], asked: Sequence[Hypothesis]
-) -> list[tuple[float, float]]:
+) -> list[Promise]:
     """Return what each hypothesis promises beside those that are taken, as `promised` does, from one evaluation."""
     problem = freed(log, (*together, *(replace(one, instead=()) for one in asked)))
     point = problem.at(problem.model.theta({**usual_values(log), **found}))
@@ -224,18 +242,20 @@ def _promises(
     held = {name for one in asked for name in one.instead}
     own = [name for name in freed(log, together).model.unknowns if name not in held]
 
-    def step(names: Sequence[str]) -> tuple[float, Array]:
+    def step(names: Sequence[str]) -> tuple[float, Array, Array]:
         places = [problem.model.unknowns.index(name) for name in names]
         gradient = point.gradient[places]
-        moved: Array = np.linalg.lstsq(point.gram[np.ix_(places, places)], gradient, rcond=None)[0].astype(np.float64)
-        return 0.5 * float(gradient @ moved), moved
+        known = np.linalg.pinv(point.gram[np.ix_(places, places)])
+        moved: Array = known @ gradient
+        return 0.5 * float(gradient @ moved), moved, np.diag(known)
 
     before = step(own)[0]
-    promises: list[tuple[float, float]] = []
+    promises: list[Promise] = []
     for one in asked:
         names = list(dict.fromkeys((*own, *one.free)))
-        gain, moved = step(names)
-        promises.append((gain - before, float(abs(moved[names.index(one.free[0])]))))
+        gain, moved, variances = step(names)
+        place = names.index(one.free[0])
+        promises.append(Promise(gain - before, float(abs(moved[place])), float(variances[place]) ** 0.5))
     return promises
 
 

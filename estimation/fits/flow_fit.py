@@ -11,7 +11,7 @@ from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, OFFSET, START_LOAD, Hypothesis
 from estimation.models.flow import HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
-from estimation.notes import EstimateCode
+from estimation.notes import EstimateCode, RigCode
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
 from plant.log.record import Record
@@ -37,8 +37,16 @@ LATE_WORTH, LEAST_LATE = 20.0, 2e-4
 logs of 18 kinds of strange rigs, and on 18 of a foreign bench, the gain of a right explanation is 6 at most, and that
 of a position that lags by 3 ms is 390 to 2800."""
 
+MOST_LATE = 2e-2
+"""Time from which nothing is said of it [s]: no sensor, filter or bus is so late, and what a slope tells of a shift
+holds for one that is short beside what moves."""
+
 LATE_SHARE = 0.25
 """Share of what a log leaves unexplained that this must take up to be named beside it [fraction]."""
+
+OPEN_DELIVERY = 0.1
+"""Standard deviation of the logarithm of the pump's delivery from which a worn pump is not excluded
+[dimensionless]: one that delivers 80 % lies within two of it."""
 
 MOST_ASKED = 50_000
 """A longer log is not asked what is strange about it: the answer takes minutes [samples]."""
@@ -99,7 +107,8 @@ def fit_flow(
     best, found = min(fits, key=_cost), weighed(fits)
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
     explains = partial(_explains, noisy=log.passes_on)
-    if asked := _asked(log, parameters, swinging, loaded=loaded):
+    asked, remarks = _asked(log, parameters, swinging, loaded=loaded)
+    if asked:
         near = _near(swinging, starts, explains)
         strange = explain(log, parameters, near, explains, asked=asked, paired=asked != (DELIVERY,))
         one = strange.fit
@@ -109,23 +118,29 @@ def fit_flow(
             return FormFit(believed, bound, one.chi_square[0], (), one.rig_slopes, strange)
     value, std = found["bulk_modulus"]
     believed = with_structure(found, STRUCTURE)
-    return FormFit(believed, std / value, best.chi_square[0], _objections(best, log.passes_on), best.rig_slopes)
+    reasons = _objections(best, log.passes_on)
+    return FormFit(believed, std / value, best.chi_square[0], reasons, best.rig_slopes, remarks=remarks)
 
 
-def _asked(log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, loaded: bool) -> tuple[Hypothesis, ...]:
-    """Return what a log is asked beside the plain form, given its likelier fit with volumes that swing.
+def _asked(
+    log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, loaded: bool
+) -> tuple[tuple[Hypothesis, ...], tuple[Note, ...]]:
+    """Return what a log is asked beside the plain form, given its likelier fit with volumes that swing; and a remark.
 
     Held volumes may explain a log whose encoder was homed elsewhere: it is asked all the same.
     """
     if len(log.drives) > MOST_ASKED:
-        return ()
+        return (), ()
     if loaded:  # a sensor that reads too much looks loaded at rest
-        return (START_LOAD, OFFSET)
+        return (START_LOAD, OFFSET), ()
     if not _explains(swinging, log.passes_on):
-        return HYPOTHESES
+        return HYPOTHESES, ()
     by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
-    gain, size = promised(log, parameters, swinging.values, DELIVERY, by_mass=by_mass)
-    return (DELIVERY,) if gain > WORTH and size > LEAST_DELIVERY else ()
+    delivery = promised(log, parameters, swinging.values, DELIVERY, by_mass=by_mass)
+    if delivery.gain > WORTH and delivery.size > LEAST_DELIVERY:
+        return (DELIVERY,), ()
+    open_by = delivery.deviation
+    return (), (RigCode.WEAR_NOT_EXCLUDED.note(percent=200.0 * open_by),) if open_by > OPEN_DELIVERY else ()
 
 
 def _near(
@@ -156,7 +171,7 @@ def _objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_CORRELATED.note(correlation=fit.autocorrelation[0]))
     channel, (late, gain) = max(fit.late.items(), key=lambda one: one[1][1], default=("", (0.0, 0.0)))
     wanted = LATE_SHARE * fit.cost * (1.0 - 1.0 / fit.chi_square[0]) if reasons else 0.0
-    if abs(late) > LEAST_LATE and gain > max(LATE_WORTH, wanted):
+    if LEAST_LATE < abs(late) < MOST_LATE and gain > max(LATE_WORTH, wanted):
         when = "late" if late > 0.0 else "early"
         reasons.insert(0, EstimateCode.CHANNEL_LATE.note(channel=channel, milliseconds=1e3 * abs(late), when=when))
     return tuple(reasons)

@@ -41,6 +41,8 @@ class FormFit:
         By uncertain entry of the rig: by how much each parameter would differ, in SI, per relative change of the entry.
     explanation : Explanation or None
         What was added to the form to explain the log; None where nothing had to be.
+    remarks : tuple of Note
+        What the log leaves open, and is nothing against the fit.
     """
 
     parameters: Mapping[str, tuple[float, float]]
@@ -49,6 +51,7 @@ class FormFit:
     reasons: tuple[Note, ...]
     rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
     explanation: "Explanation | None" = None
+    remarks: tuple[Note, ...] = ()
 
 
 def with_structure(found: Mapping[str, tuple[float, float]], structure: float) -> dict[str, tuple[float, float]]:

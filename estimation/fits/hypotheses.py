@@ -76,6 +76,7 @@ HYPOTHESES = (
     ),
     Hypothesis("relief_low", ("relief_pressure", "relief_conductance"), shares_of_peak=(0.6, 0.85), far=True),
     Hypothesis("leakage_growth", ("leakage_growth", "leakage_bend")),
+    Hypothesis("leakage_rise", ("leakage_rise",)),
     Hypothesis(
         "makeup_blocked",
         ("makeup_share_b",),
@@ -102,6 +103,7 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "leakage_growth": (-2.0, 2.0),
     "crack_pressure": (-1e5, 2e5),
     "leakage_bend": (-4.0, 4.0),
+    "leakage_rise": (-6.0, 6.0),
 }
 """Least and largest values where physics gives them [SI]. A make-up valve that opens within a smaller drop has a corner
 that no step of the integrator and no sensor resolves."""

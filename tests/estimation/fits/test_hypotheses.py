@@ -12,8 +12,9 @@ from estimation.fits.explain import Explanation
 from estimation.fits.flow_fit import fit_flow
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.first_belief import first_load
-from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters
+from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters, grown_leakage
 from estimation.notes import RigCode
+from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
@@ -152,6 +153,21 @@ def test_a_log_that_begins_under_load_says_so() -> None:
     begun = record.slice(1500, len(record))
     found = explained(begun)
     assert "start_load" in found.names
+
+
+def test_wear_of_the_pump_is_not_excluded_by_a_log_at_one_speed() -> None:
+    leaky = parameters_for(CONDITIONS["major_leakage"])
+    one_speed = 100.0 * np.where(np.arange(2000) // 50 % 2, -1.0, 1.0)
+    record = simulate(CIRCUIT, one_speed, 1e-3, leaky, sensors=BENCH, rng=np.random.default_rng(3))
+    told = [note.code for note in estimate_log(record, Rig(HEALTHY)).notes]
+    assert RigCode.WEAR_NOT_EXCLUDED in told
+    assert RigCode.WEAR_NOT_EXCLUDED not in [note.code for note in estimate_log(log("steps"), Rig(HEALTHY)).notes]
+
+
+def test_leakage_may_rise_by_a_share_in_each_minute() -> None:
+    elapsed = np.linspace(0.0, 1.0, 11)
+    risen = grown_leakage(elapsed, 0.0, 0.0, np.log(12.5))
+    assert risen == pytest.approx(12.5 ** (elapsed - 0.5), rel=3e-3)
 
 
 def test_absent_additions_leave_the_plain_form() -> None:
