@@ -15,6 +15,7 @@ class SensorCode(Code):
     SENSOR_CLIPPED = (
         "{channel} is at the end of its range ({levels} Pa) in {percent:.2g} % of its samples; they were left out"
     )
+    HUM = "{channel} contains a hum of {amplitude_pa:.3g} Pa at {frequency_hz:.4g} Hz; it was removed"
     OUTLIERS_LEFT_OUT = "{channel} has gross outliers in {count} of {total} samples; they were left out"
     SENSORS_DISAGREE = (
         "velocity_m_s and the slope of position_m differ by {difference_m_s:.2g} m/s: one of the two sensors is wrong"
@@ -130,8 +131,8 @@ class RigCode(Code):
         "was corrected"
     )
     INPUT_LATE = (
-        "{channel} comes {late_ms:.2f} +- {half_width_ms:.2f} ms late: lag or delay of its sensor or of its filter; "
-        "it was brought forward"
+        "{channel} is {late_ms:.2f} +- {half_width_ms:.2f} ms late (lag or delay of its sensor or filter); this was "
+        "corrected"
     )
     PRESSURE_OFFSET = (
         "differential_pressure_pa reads {offset_pa:.4g} +- {half_width_pa:.2g} Pa too much; the offset was subtracted"

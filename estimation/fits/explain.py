@@ -245,7 +245,8 @@ def _promises(
     def step(names: Sequence[str]) -> tuple[float, Array, Array]:
         places = [problem.model.unknowns.index(name) for name in names]
         gradient = point.gradient[places]
-        known = np.linalg.pinv(point.gram[np.ix_(places, places)])
+        gram = point.gram[np.ix_(places, places)]
+        known = np.asarray(np.linalg.pinv(gram, rcond=len(places) * np.finfo(float).eps), dtype=np.float64)
         moved: Array = known @ gradient
         return 0.5 * float(gradient @ moved), moved, np.diag(known)
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from estimation.log_checks.channel_physics import channel_mistakes
+from estimation.log_checks.hum import without_hum
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.outliers import without_gross_outliers
 from estimation.log_checks.sensor_check import PRESSURE, PRESSURES, sensor_objections, without_saturated
@@ -22,7 +23,7 @@ class CleanLog:
     Parameters
     ----------
     record : Record
-        The log, without gross outliers and clipped pressures.
+        The log, without gross outliers, clipped pressures and hum.
     variances : Mapping[str, float]
         Measurement variance of each of its channels [SI squared].
     left_out : tuple of Note
@@ -74,9 +75,10 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     clipped: tuple[Note, ...] = ()
     if PRESSURE in sound:
         sound, clipped = without_saturated(sound, parameters)
+    sound, hum = without_hum(sound)
     known = [name for name in dict.fromkeys((*CLEANED, *PRESSURES)) if name in sound]
     objections = sensor_objections(sound, parameters)
     dead = any(note.data["channel"] == PRESSURE for note in objections)
     mistakes = channel_mistakes(sound.replace(**{PRESSURE: None}) if dead else sound, parameters)
     objections = () if mistakes else objections  # a sensor cannot be judged by channels of another meaning
-    return CleanLog(sound, measurement_variances(sound, known), (*outliers, *clipped), objections, mistakes)
+    return CleanLog(sound, measurement_variances(sound, known), (*outliers, *clipped, *hum), objections, mistakes)

@@ -1,0 +1,126 @@
+"""Hum: tones of the mains that a cable picks up into a pressure channel, taken off before anything is fitted.
+
+A tone is told by its line in the spectrum. One that motor speed or position has as well is motion, and stays.
+"""
+
+import numpy as np
+
+from estimation.fits.convolution import smooth_length
+from estimation.log_checks.bridging import bridged
+from estimation.log_checks.sensor_check import PRESSURE
+from estimation.notes import SensorCode
+from plant.arrays import Array
+from plant.log.record import Record
+from plant.notes import Note
+
+MOVING = ("motor_speed_rad_s", "position_m")
+"""Channels whose lines are motion."""
+
+LOWEST = 40.0
+"""Frequency under which no hum is looked for [Hz]: the mains have 50 or 60 Hz, and what the piston does is slower."""
+
+HIGHEST = 0.4
+"""Frequency times sample time over which none is looked for [dimensionless]: corners of a drive alternate there."""
+
+STANDS_OUT, SHARED = 1e3, 0.1
+"""Power of a hum's line over the usual one near it, and the share of that ratio which a line of motion at the same
+frequency may have [dimensionless]. Noise alone reaches 20, a piston's motion 200, a hum of 0.1 bar 5,000."""
+
+ALONE, AROUND, WIDTH = 0.05, 30.0, 1.0
+"""Share of a hum's line that others may have [dimensionless], within this distance of it and beyond its own width
+[Hz]: a drive that repeats itself has a row of lines, of which none is hum."""
+
+NEARBY = 100
+"""Lines of which the usual power is taken [count]."""
+
+MOST_TONES = 8
+"""Tones that are taken off at most: the mains and its harmonics."""
+
+STRETCH = 25.0
+"""Periods over which a tone keeps amplitude and phase [periods]: the mains wander by some hundredths of a hertz."""
+
+
+def without_hum(record: Record) -> tuple[Record, tuple[Note, ...]]:
+    """Return a log whose differential pressure holds no hum.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+
+    Returns
+    -------
+    tuple of (Record, tuple of Note)
+        The log, and a note for each tone that was taken off.
+    """
+    if PRESSURE not in record or not np.any(np.isfinite(record[PRESSURE])):
+        return record, ()
+    motion = [_lines(record[name]) for name in MOVING if name in record and np.any(np.isfinite(record[name]))]
+    pressure, notes = record[PRESSURE], list[Note]()
+    for _ in range(MOST_TONES):
+        lines = _lines(pressure)
+        frequencies = np.arange(len(lines)) / (2 * (len(lines) - 1) * record.sample_time)
+        moved = np.max(motion, axis=0, initial=0.0) if motion else np.zeros(len(lines))
+        within = (frequencies > LOWEST) & (frequencies < HIGHEST / record.sample_time)
+        hums = np.where(within & (moved < SHARED * lines), lines, 0.0)
+        place = int(np.argmax(hums))
+        if hums[place] < STANDS_OUT or not _alone(frequencies, lines, place):
+            break
+        frequency = _between(frequencies, lines, place)
+        tone = _tone(pressure, frequency * record.sample_time)
+        pressure = pressure - tone
+        amplitude = float(np.sqrt(2.0 * np.mean(tone**2)))
+        notes.append(SensorCode.HUM.note(channel=PRESSURE, amplitude_pa=amplitude, frequency_hz=frequency))
+    return (record.replace(**{PRESSURE: pressure}), tuple(notes)) if notes else (record, ())
+
+
+def _lines(values: Array) -> Array:
+    """Return the power of each line of a channel's second differences over what is usual near it."""
+    bends = np.diff(bridged(values), n=2)
+    length = smooth_length(len(bends), (2, 3, 5))
+    length += length % 2
+    power = np.abs(np.fft.rfft(bends * np.hanning(len(bends)), length)) ** 2
+    parts = np.array_split(power, max(1, len(power) // NEARBY))
+    usual = np.concatenate([np.full(len(part), np.median(part)) for part in parts])
+    return power / np.maximum(usual, np.finfo(float).tiny)
+
+
+def _alone(frequencies: Array, lines: Array, place: int) -> bool:
+    """Return whether a line has no others near it, and is no harmonic of what the drive repeats."""
+    apart = np.abs(frequencies - frequencies[place])
+    others = lines[(apart > WIDTH) & (apart < AROUND)]
+    slow = np.where((frequencies > 0.0) & (frequencies < LOWEST), lines, 0.0)
+    driven = int(np.argmax(slow))
+    if slow[driven] > STANDS_OUT:
+        off = frequencies[place] % frequencies[driven]
+        if min(off, frequencies[driven] - off) < WIDTH:
+            return False
+    return bool(np.max(others, initial=0.0) < ALONE * lines[place])
+
+
+def _between(frequencies: Array, lines: Array, place: int) -> float:
+    """Return the frequency of a line that stands between two of the spectrum [Hz], by a parabola through logarithms."""
+    if not 0 < place < len(lines) - 1:
+        return float(frequencies[place])
+    before, here, after = np.log(np.maximum(lines[place - 1 : place + 2], np.finfo(float).tiny))
+    bend = before - 2.0 * here + after
+    off = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+    return float(frequencies[place] + off * (frequencies[1] - frequencies[0]))
+
+
+def _tone(values: Array, per_sample: float) -> Array:
+    """Return the tone of a frequency [1/samples] in a channel, fitted in stretches of their own."""
+    phase = 2.0 * np.pi * per_sample * np.arange(len(values))
+    waves: Array = np.column_stack([np.cos(phase), np.sin(phase)]).astype(np.float64)
+    parts = np.array_split(np.arange(len(values)), max(1, round(len(values) * per_sample / STRETCH)))
+    return np.concatenate([_fitted(waves[part], values[part]) for part in parts])
+
+
+def _fitted(waves: Array, values: Array) -> Array:
+    """Return the least-squares fit by columns; second differences are compared, in which motion is small."""
+    bends = np.diff(values, n=2)
+    there = np.isfinite(bends)
+    if np.count_nonzero(there) <= waves.shape[1]:
+        return np.zeros(len(values))
+    found = np.linalg.lstsq(np.diff(waves, n=2, axis=0)[there], bends[there], rcond=None)[0]
+    return np.asarray(waves @ found, dtype=np.float64)

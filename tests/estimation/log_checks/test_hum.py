@@ -1,0 +1,74 @@
+"""Tones that a cable picks up are taken off a pressure channel; what moves stays."""
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.hum import without_hum
+from estimation.notes import SensorCode
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+PRESSURE = "differential_pressure_pa"
+
+
+def log(drive: str) -> Record:
+    rng = np.random.default_rng(4)
+    signal = make_drive(drive, 4.0, 1e-3, EhaParameters(), rng)
+    return simulate(CIRCUIT, signal, 1e-3, EhaParameters(), sensors=BENCH, rng=rng)
+
+
+def humming(record: Record, amplitude: float, frequency: float) -> Record:
+    time = record.sample_time * np.arange(len(record))
+    return record.replace(**{PRESSURE: record[PRESSURE] + amplitude * np.sin(2.0 * np.pi * frequency * time + 1.0)})
+
+
+@pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "chirp", "sine"])
+def test_nothing_is_taken_off_a_log_without_hum(drive: str) -> None:
+    record = log(drive)
+    assert without_hum(record) == (record, ())
+
+
+@pytest.mark.parametrize("frequency", [49.97, 60.0, 150.0])
+def test_a_hum_is_named_with_amplitude_and_frequency_and_taken_off(frequency: float) -> None:
+    record = log("steps")
+    given = humming(record, 2.5e4, frequency)
+    missing = given[PRESSURE].copy()
+    missing[1000:1040] = np.nan
+    mended, (note,) = without_hum(given.replace(**{PRESSURE: missing}))
+    assert note.code is SensorCode.HUM
+    assert note.data["frequency_hz"] == pytest.approx(frequency, abs=0.1)
+    assert note.data["amplitude_pa"] == pytest.approx(2.5e4, rel=0.05)
+    left = mended[PRESSURE] - record[PRESSURE]
+    assert np.array_equal(np.isnan(left), np.isnan(missing))
+    assert np.nanstd(left) < 0.05 * 2.5e4
+
+
+def test_the_mains_and_two_harmonics_are_three_tones() -> None:
+    record = humming(humming(humming(log("steps"), 3e4, 50.0), 1e4, 100.0), 2e4, 150.0)
+    assert [round(note.data["frequency_hz"]) for note in without_hum(record)[1]] == [50, 150, 100]
+
+
+def test_a_tone_that_position_has_as_well_is_motion_and_stays() -> None:
+    record = humming(log("steps"), 2.5e4, 50.0)
+    time = record.sample_time * np.arange(len(record))
+    shaken = record.replace(position_m=record["position_m"] + 1e-4 * np.sin(2.0 * np.pi * 50.0 * time))
+    assert without_hum(shaken)[1] == ()
+
+
+def test_a_harmonic_of_a_drive_that_repeats_itself_is_no_hum() -> None:
+    record = log("steps")
+    driven = humming(humming(record, 1e6, 10.0), 2.5e4, 50.0)
+    assert without_hum(driven)[1] == ()
+
+
+def test_a_line_of_every_other_sample_is_no_hum() -> None:
+    slow = log("steps").slice(step=5)
+    assert without_hum(humming(slow, 2.5e4, 0.48 / slow.sample_time))[1] == ()
+
+
+def test_a_log_without_pressure_is_left_as_it_is() -> None:
+    record = log("steps").replace(**{PRESSURE: None})
+    assert without_hum(record) == (record, ())
