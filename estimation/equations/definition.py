@@ -40,7 +40,7 @@ class Parameter:
     0.1
     >>> Parameter(5.0, (0.0, 1.0))
     Traceback (most recent call last):
-    plant.errors.HydrostateError: a start between its bounds 0 and 1 is wanted, got 5
+    plant.errors.HydrostateError: a start between its bounds 0 and 1 is needed, got 5
     """
 
     start: float

@@ -224,7 +224,7 @@ def loss_threshold(expected: float) -> float:
     Examples
     --------
     >>> round(loss_threshold(1e-4), 2)
-    7.36
+    7.35
     """
     reach = 1.0
     for _ in range(50):

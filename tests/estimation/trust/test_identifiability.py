@@ -171,11 +171,11 @@ def card(**changes: object) -> Card:
 
 def test_a_card_is_put_in_sentences_with_its_numbers() -> None:
     lost, sticks, alike, worst, rig = sentences(card())
-    assert lost.endswith("worse than 3 %: bulk modulus (11 %)")
+    assert lost.endswith("(bound over 3 %): bulk modulus (11 %)")
     assert sticks.startswith("the piston sticks for 60 % of the time")
     assert sticks.endswith("log differential pressure, or drive with larger, slower steps")
     assert "flow bias would be known to 0.56 %, not 2 %" in alike
-    assert worst == "known worst, to 20 %: +0.98 bulk modulus (of logarithms)"
+    assert worst == "the combination known worst, to 20 %: +0.98 bulk modulus (of logarithms)"
     assert rig.endswith("(chamber volume 2 %) its bound is 11 %, without 10 %")
     with_pressure = card(channels=("position_m", "differential_pressure_pa"))
     assert sentences(with_pressure)[1].endswith("differential pressure does")

@@ -80,7 +80,7 @@ def test_runs_that_do_not_fit_are_refused(runs: Any, options: dict[str, Any], me
 
 
 def test_features_need_a_run_and_a_clock() -> None:
-    with pytest.raises(HydrostateError, match="features of one run at least are wanted, got none"):
+    with pytest.raises(HydrostateError, match="features of one run at least are needed, got none"):
         channel_features(["p"], [], 1.0, Recipe())
     for wrong in (0.0, np.nan):
         with pytest.raises(HydrostateError, match="sample_time must be positive and finite"):

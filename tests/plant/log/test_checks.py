@@ -287,7 +287,7 @@ def test_rows_without_a_time_are_left_out_if_they_are_few() -> None:
 
 
 def test_a_clock_alone_and_a_channel_that_is_hardly_there_are_no_log() -> None:
-    with pytest.raises(NoChannelError, match="at least one channel is wanted beside time_s"):
+    with pytest.raises(NoChannelError, match="at least one channel is needed beside time_s"):
         trusted({"time_s": TIME}, source="a.csv", required=())
     hardly = np.where(np.random.default_rng(1).random(N) < 0.5, SPEED, np.nan)
     with pytest.raises(LogError, match="no channel has 95 % of its samples"):

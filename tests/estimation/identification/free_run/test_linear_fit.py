@@ -198,8 +198,8 @@ def test_a_further_value_costs_two_by_akaike_and_the_logarithm_of_the_samples_by
     [
         ({"sample_time": 0.0}, "sample_time must be positive and finite, got 0.0"),
         ({"sample_time": np.inf}, "sample_time must be positive and finite, got inf"),
-        ({"u": []}, "as many inputs as outputs are wanted, got 0 and 1"),
-        ({"u": [np.ones((50, 2))]}, r"inputs valve of shape \(50, 1\) are wanted beside 'level', got \(50, 2\)"),
+        ({"u": []}, "as many inputs as outputs are needed, got 0 and 1"),
+        ({"u": [np.ones((50, 2))]}, r"inputs valve of shape \(50, 1\) are needed beside 'level', got \(50, 2\)"),
         ({"u": [np.where(np.arange(50)[:, None] == 7, np.nan, 1.0)]}, "inputs valve must be finite at every sample"),
         ({"y": [np.where(np.arange(50) == 7, -np.inf, 1.0)]}, "output 'level' must be finite or missing"),
         ({"u": [np.ones((50, 1))]}, "valve"),
@@ -213,7 +213,7 @@ def test_what_is_no_log_of_input_and_output_is_refused(changes: dict[str, Any], 
 
 def test_a_model_is_run_with_its_own_inputs_and_as_many_outputs() -> None:
     model = identify_channels(one_log(200), structure="output-error", order=2, delay=3).model
-    with pytest.raises(HydrostateError, match=r"inputs valve are wanted, shape \(n, 1\), got \(9, 2\)"):
+    with pytest.raises(HydrostateError, match=r"inputs valve are needed, shape \(n, 1\), got \(9, 2\)"):
         model.simulate(np.zeros((9, 2)), None)
     with pytest.raises(HydrostateError, match=r"input and output must be of one length, got 9 and \(8,\) samples"):
         model.simulate(np.zeros(9), np.zeros(8))
