@@ -132,8 +132,8 @@ def test_a_log_that_is_chosen_is_sent_worked_on_and_listed_and_two_are_compared(
 
 def test_the_live_view_shows_gauges_and_what_the_watch_tells(opened: Any) -> None:
     page = opened("live")
-    assert page.locator(".gauges li").count() == 6
-    assert page.locator(".histories canvas").count() == 5
+    assert page.locator(".gauges li").count() == 7
+    assert page.locator(".histories canvas").count() == 6
     assert page.locator(".alarms tbody tr").first.is_visible()
     rows = int(page.locator(".gauges strong").last.inner_text())
     for _ in range(50):
