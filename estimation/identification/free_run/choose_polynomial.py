@@ -8,7 +8,7 @@ import numpy as np
 from estimation.identification.free_run.choose_linear import BLOCKS, Candidate, block_error, pooled
 from estimation.identification.free_run.data import Channels, blocks
 from estimation.identification.free_run.linear_fit import fit_linear
-from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, STEPS, PolynomialFit, Runs
+from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs
 from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, is_wild, one_more, without_term
 
 MOST_TERMS = 20
@@ -22,9 +22,6 @@ CLEARLY = 0.01
 
 HIGHEST_BASE = 4
 """Order of the linear model that products are added to."""
-
-ASTRAY = 0.9
-"""Share of its cost on a part of the data that the products of all data must save to take its place; judged."""
 
 BASES, SCREENED, KEPT = 6, 3, 2
 """Linear models that products are added to, how many products they are given first, and how many models go on."""
@@ -100,14 +97,13 @@ class _Growth:
             return False
         pool = candidate_terms(self.path[0].variables)
         while len(self.errors) <= most and len(self.errors) - 1 - int(np.argmin(self.errors)) < PATIENCE:
-            grown = [
+            self.fits = [
                 None if fit is None else one_more(fit, pool, part) or fit
                 for fit, part in zip(self.fits, self.parts, strict=True)
             ]
             more = one_more(self.path[-1], pool, self.data)
             if more is None:
                 break
-            self.fits = [rescued(fit, more, part) for fit, part in zip(grown, self.parts, strict=True)]
             self.path.append(more)
             wild = is_wild(more, self.data)
             self.block_errors.append((float("inf"),) * len(self.masks) if wild else self._held_back())
@@ -132,32 +128,6 @@ class _Growth:
                 return (float("inf"),) * len(self.masks)
             errors.append(block_error(ran[0] - target, np.concatenate(mask) & np.isfinite(target)))
         return tuple(errors)
-
-
-def rescued(fit: PolynomialFit | None, whole: PolynomialFit, part: Channels) -> PolynomialFit | None:
-    """Return a fit to a part of the data, with the products of all data where its own growth has gone astray.
-
-    Growth is greedy and descends to a local minimum. A block is not to speak against a model because of a fit that is
-    clearly worse than another one of the same size on the very data that it was fitted to.
-
-    Parameters
-    ----------
-    fit : PolynomialFit or None
-        Grown on the part; None where nothing runs free there.
-    whole : PolynomialFit
-        Of all data.
-    part : Channels
-        Scaled; outputs held back are NaN.
-
-    Returns
-    -------
-    PolynomialFit or None
-        Of the part.
-    """
-    variables = whole.variables if fit is None else fit.variables
-    other = Runs(variables, whole.terms, part).fit(whole.theta, STEPS)
-    astray = fit is None or (other is not None and other.cost < ASTRAY * fit.cost)
-    return other if astray else fit
 
 
 def _pruned(fit: PolynomialFit, data: Channels) -> PolynomialFit:
