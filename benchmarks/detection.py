@@ -12,6 +12,7 @@ from time import process_time
 import numpy as np
 
 from benchmarks.scores import alarm_rate, median_delay
+from benchmarks.targets import Check, keep
 from benchmarks.watching import PIECE, SAMPLE_TIME, CircuitStream, detect_fault, false_alarms, learnt
 from faults.watch.events import Alarm
 from faults.watch.watch import LEARNING, Watch
@@ -34,7 +35,7 @@ def delays(seeds: int) -> int:
         middle, (low, high) = median_delay([one.delay for one in found])
         covered = np.mean([one.covered for one in found])
         missed = sum(one.delay == float("inf") for one in found)
-        right = middle <= LONGEST_DELAY
+        right = keep(Check(f"{condition}: median delay [s]", middle, most=LONGEST_DELAY)).met
         misses += not right
         print(
             f"{condition}: median delay {middle:.3f} s (95 % {low:.3f} to {high:.3f}, target {LONGEST_DELAY:g}), "
@@ -49,7 +50,7 @@ def alarms(hours: float) -> int:
     running, watch = learnt(SEED + 1, LEARNING_HOURS)
     count = len(false_alarms(running, watch, hours))
     rate, (low, high) = alarm_rate(count, hours)
-    right = FEWEST <= rate <= MOST
+    right = keep(Check("false alarms an hour, set to one", rate, FEWEST, MOST)).met
     print(
         f"set to 1 false alarm an hour, {LEARNING_HOURS:g} h learnt: {count} in {hours:g} h, {rate:.2f} an hour "
         f"(95 % {low:.2f} to {high:.2f}, target {FEWEST:.2f} to {MOST:.2f}): {'met' if right else 'MISSED'}"

@@ -13,6 +13,7 @@ from statistics import median
 
 from scipy.stats import poisson
 
+from benchmarks.targets import Check, keep
 from benchmarks.watching import PIECE, SAMPLE_TIME, CircuitStream
 from experiments.running.random_streams import stream
 from faults.watch.events import SLOW, Alarm
@@ -74,10 +75,10 @@ def growing(running: CircuitStream, watches: dict[bool, Watch], minutes: int, se
     return {logged: told.get(logged, Told()) for logged in watches}
 
 
-def healthy(count: int, rate: float, hours: float, balances: dict[str, int]) -> int:
+def healthy(count: int, rate: float, hours: float, balances: dict[str, int], which: str) -> int:
     """Print false alarms beside the band that holds 95 % of counts at the rate; return whether they are outside."""
     low, high = (int(end) for end in poisson.interval(0.95, rate * hours))
-    right = low <= count <= high
+    right = keep(Check(f"{which}: false alarms in {hours:g} h", count, low, high)).met
     said = ", ".join(f"{name} {times}" for name, times in balances.items() if times) or "none"
     print(f"{count} in {hours:g} h (95 % band {low} to {high}; {said}): {'met' if right else 'MISSED'}")
     return int(not right)
@@ -113,9 +114,10 @@ def main(arguments: list[str]) -> int:
                     found[minutes, logged].append(told)
     misses = 0
     for (logged, name), alarms in raised.items():
-        print(f"set to {name}, {'with' if logged else 'without'} pressure: ", end="")
+        which = f"set to {name}, {'with' if logged else 'without'} pressure"
+        print(f"{which}: ", end="")
         balances = {one: sum(alarm.balance == one for alarm in alarms) for one in watches[logged, name].balances}
-        misses += healthy(len(alarms), RATES[name], options.hours, balances)
+        misses += healthy(len(alarms), RATES[name], options.hours, balances, which)
     for (minutes, logged), told in found.items():
         if told:
             misses += _delays(minutes, logged, told)
@@ -125,8 +127,10 @@ def main(arguments: list[str]) -> int:
 def _delays(minutes: int, logged: bool, told: list[Told]) -> int:
     delays = sorted(one.delay for one in told)
     missed = sum(one.delay == float("inf") for one in told)
+    which = f"minor in {minutes} min, {'with' if logged else 'without'} pressure"
+    keep(Check(f"{which}: not found, of {len(told)}", missed, most=0))
     print(
-        f"minor in {minutes} min, {'with' if logged else 'without'} pressure, one false alarm a day: found in "
+        f"{which}, one false alarm a day: found in "
         f"{len(told) - missed} of {len(told)}, delay {delays[0]:.0f} s at the least, {median(delays):.0f} s median, "
         f"{delays[-1]:.0f} s at most; a balance was sooner in {sum(one.sooner for one in told)}; beginning in its "
         f"interval {sum(one.covered for one in told)}: {'MISSED' if missed else 'met'}"
