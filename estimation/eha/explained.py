@@ -7,6 +7,7 @@ import numpy as np
 
 from estimation.finding import NORMAL_95
 from estimation.fits.explain import Explanation
+from estimation.log_checks.bridging import POSITION
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.sensor_check import PRESSURE
 from estimation.models.wide_flow import GROWTH, grown_leakage
@@ -27,7 +28,7 @@ as it warms by some 25 K (ISO 3448 VG 46 between 40 and 65 degrees Celsius, abou
 LEAST_GROWN = 1e-3
 """Least leakage over its value halfway [dimensionless]: a parabola may cross zero beyond what it was fitted to."""
 
-SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
+SPEED, VELOCITY = "motor_speed_rad_s", "velocity_m_s"
 
 LAGS: Mapping[str, str] = {PRESSURE: "pressure_lag", SPEED: "speed_lag", POSITION: "position_lag"}
 """The lag of each channel that may come late, beside its delay."""
@@ -216,7 +217,7 @@ def set_right(log: CleanLog, found: Explanation) -> CleanLog:
     value = {name: pair[0] for name, pair in found.values.items()}
     record, changed = log.record, dict[str, Array]()
     if zero := value.get("position_zero", 0.0):
-        changed["position_m"] = record["position_m"] - zero
+        changed[POSITION] = record[POSITION] - zero
     late, offset = lateness(found, PRESSURE), value.get("pressure_offset", 0.0)
     if any(name in value for name in GROWTH):
         grown = _grown(found, np.arange(len(record)) / len(record))
