@@ -44,7 +44,7 @@ int main(void)
         if (strpbrk(line, "_") != NULL) { /* names of columns */
             continue;
         }
-        if (fields(line) < {{ NAME }}_DRIVES + {{ NAME }}_CHANNELS) {
+        if (fields(line) != {{ NAME }}_DRIVES + {{ NAME }}_CHANNELS) {
             fprintf(stderr, "a row needs %d fields with commas between them, got: %s\n",
                     {{ NAME }}_DRIVES + {{ NAME }}_CHANNELS, line);
             return EXIT_FAILURE;

@@ -230,3 +230,11 @@ def test_the_example_refuses_rows_that_have_no_commas_between_their_fields(tmp_p
     done = subprocess.run([str(program)], input="90 0.01 0.02 1e5\n", capture_output=True, text=True, check=False)  # noqa: S603
     assert done.returncode == 1
     assert done.stderr.startswith("a row needs 4 fields with commas between them, got: 90 0.01")
+
+
+def test_the_example_refuses_a_log_whose_first_column_is_time(tmp_path: Path) -> None:
+    program = compiled(tmp_path, filter_in_c(task("pressure", "normal", 500), name="exported"))
+    rows = "time_s,motor_speed_rad_s,position_m,velocity_m_s,differential_pressure_pa\n0,90,0.01,0.02,1e5\n"
+    done = subprocess.run([str(program)], input=rows, capture_output=True, text=True, check=False)  # noqa: S603
+    assert done.returncode == 1
+    assert done.stderr.startswith("a row needs 4 fields with commas between them, got: 0,90,0.01")
