@@ -1,10 +1,18 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from estimation.fits import motion_fit
+from estimation.fits.form_fit import FormFit
+from estimation.fits.freed_problem import FreedProblem
+from estimation.fits.greybox_fit import GreyBoxFit
+from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.motion_fit import fit_motion
+from estimation.log_checks.measurement_noise import measurement_variances, position_variance
+from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS
 from estimation.notes import EstimateCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
@@ -22,6 +30,76 @@ def bench(shared: Path, name: str) -> tuple[Record, float]:
     truth = pd.read_csv(shared / "bench" / "truth.csv").set_index("file")
     record = read_record(shared / "bench" / name).replace(differential_pressure_pa=None)
     return record, float(truth.loc[name, "bulk_modulus_pa"])
+
+
+def short_log(seconds: float, seed: int = 1, sample_time: float = 1e-3) -> Record:
+    """The healthy actuator, on steps, without pressure."""
+    speed = make_drive("steps", seconds, sample_time, HEALTHY, np.random.default_rng(seed))
+    rng = np.random.default_rng(seed + 100)
+    run = simulate(PLANTS["lumped"], speed, sample_time, HEALTHY, sensors=BENCH, rng=rng)
+    return run.replace(differential_pressure_pa=None)
+
+
+def seen(record: Record, speed_variance: float = 1e-4) -> GreyBoxLog:
+    return motion_fit._log(record, HEALTHY, {}, speed_variance)
+
+
+@pytest.fixture(scope="module")
+def healthy() -> FormFit:
+    """What two seconds of a healthy actuator say, from a first guess of twice the value."""
+    return fit_motion(short_log(2.0), HEALTHY, 2.0 * HEALTHY.bulk_modulus, {"piston_area": 0.01})
+
+
+def test_two_seconds_without_pressure_give_the_bulk_modulus(healthy: FormFit) -> None:
+    value, std = healthy.parameters["bulk_modulus"]
+    assert value == pytest.approx(HEALTHY.bulk_modulus, abs=3.0 * std)
+    assert 0.005 < std / value < 0.03
+    assert healthy.reasons == ()
+    assert healthy.chi_square < motion_fit.EXPLAINED
+
+
+def test_the_deviation_holds_noise_and_what_the_friction_law_may_be_wrong_by(healthy: FormFit) -> None:
+    value, std = healthy.parameters["bulk_modulus"]
+    assert std / value == pytest.approx(np.hypot(healthy.bound, motion_fit.STRUCTURE), rel=0.05)
+
+
+def test_what_a_doubtful_piston_area_does_to_bulk_modulus_is_told(healthy: FormFit) -> None:
+    assert set(healthy.rig_slopes) == {"piston_area"}
+    assert abs(healthy.rig_slopes["piston_area"]["bulk_modulus"]) > 1e-3 * HEALTHY.bulk_modulus
+
+
+def test_a_shaken_position_is_not_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motion_fit, "FINALISTS", 1)
+    record = short_log(0.5)
+    shaken = record["position_m"] + 2e-5 * np.sin(0.2 * np.arange(len(record["position_m"])))
+    fit = fit_motion(record.replace(position_m=shaken), HEALTHY, HEALTHY.bulk_modulus)
+    (large,) = (note for note in fit.reasons if note.code == EstimateCode.POSITION_RESIDUALS_LARGE)
+    assert large.data["ratio"] == pytest.approx(fit.chi_square**0.5)
+    assert large.data["ratio"] > 10.0
+
+
+def test_a_long_log_is_searched_on_its_beginning_and_ends_on_the_whole(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    log, starts = seen(short_log(1.0)), motion_fit._starts(HEALTHY, HEALTHY.bulk_modulus)
+    monkeypatch.setattr(motion_fit, "FINALISTS", 1)
+    monkeypatch.setattr(motion_fit, "SEARCHED", 500)
+    beginning, _ = motion_fit._searched(MOTION_FORMS[0], log.beginning(500), starts)
+    fit, _ = motion_fit._searched(MOTION_FORMS[0], log, starts)
+    whole = FreedProblem(MOTION_FORMS[0], log, UNKNOWNS, LINEAR)
+    assert fit.cost == whole.at(fit.theta).cost
+    assert fit.cost < 0.9 * whole.at(beginning.theta).cost
+
+
+@pytest.mark.parametrize(("explained", "brought"), [(np.inf, 9), (0.0, 3)])
+def test_starts_that_larger_noise_does_not_explain_are_left_out(explained: float, brought: int) -> None:
+    whole = FreedProblem(MOTION_FORMS[0], seen(short_log(0.2)), UNKNOWNS, LINEAR)
+    guesses, bounds = motion_fit._guesses(whole, motion_fit._starts(HEALTHY, HEALTHY.bulk_modulus))
+    near = list(motion_fit._brought_near(whole, guesses, bounds, explained))
+    assert len(near) == brought
+    assert all(np.all((bounds[0] <= theta) & (theta <= bounds[1])) for theta in near)
+    best = min(whole.at(theta).cost for theta in near)
+    assert best < min(whole.at(guess).cost for guess in guesses)
 
 
 @pytest.mark.slow
@@ -69,3 +147,109 @@ def test_a_log_without_position_is_refused_with_what_it_lacks() -> None:
     record = Record(1e-3, {"motor_speed_rad_s": np.zeros(50), "velocity_m_s": np.zeros(50)})
     with pytest.raises(LogError, match="needs position_m"):
         fit_motion(record, HEALTHY, 2e8)
+
+
+def test_without_a_variance_the_noise_of_motor_speed_is_read_off_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    record, walks = short_log(0.3), list[float]()
+
+    def searched(_: object, log: GreyBoxLog, starts: list[dict[str, float]]) -> tuple[GreyBoxFit, list[float]]:
+        walks.append(log.noise[0].walk)
+        guesses.append(starts[0]["bulk_modulus"])
+        return found(2e8), []
+
+    guesses: list[float] = []
+    monkeypatch.setattr(motion_fit, "_searched", searched)
+    monkeypatch.setattr(motion_fit, "_compared", lambda *given: (given[2], []))
+    read = measurement_variances(record, ("motor_speed_rad_s",))
+    for variances in (None, read, {"motor_speed_rad_s": 4.0 * read["motor_speed_rad_s"]}):
+        fit_motion(record, HEALTHY, 0.0, variances=variances)
+    assert np.array(walks) / walks[0] == pytest.approx([1.0, 1.0, 4.0])
+    assert guesses == pytest.approx([1e-2 * HEALTHY.bulk_modulus] * 3)  # a first guess of nothing starts no search
+
+
+def test_fast_logs_are_averaged_to_a_millisecond() -> None:
+    record = short_log(0.3, sample_time=2.5e-4)
+    log = seen(record, speed_variance=4.0)
+    assert log.sample_time == pytest.approx(1e-3)
+    blocks = len(record["position_m"]) // 4
+    means = record["position_m"][: 4 * blocks].reshape(-1, 4).mean(axis=1)
+    assert log.measured[:, 0] == pytest.approx(means - means[0])
+    assert log.noise[0].variance == pytest.approx(position_variance(record["position_m"]) / 4)
+    assert log.noise[0].walk == pytest.approx((HEALTHY.pump_displacement / HEALTHY.piston_area) ** 2 * 4.0 * 2.5e-4)
+
+
+def test_the_end_of_a_very_long_log_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motion_fit, "MOST_SAMPLES", 100)
+    assert seen(short_log(0.3)).drives.shape == (100, 2)
+
+
+def test_steps_are_short_where_the_piston_turns_and_where_the_pump_is_set_off() -> None:
+    t = 1e-3 * np.arange(400)
+    speed = np.where(t > 0.2, 50.0, 0.0)  # set off at sample 201
+    position = 1e-2 * np.abs(t - 0.1)  # turns at sample 100
+    steps = motion_fit._steps(np.column_stack([speed, position]), 1e-3)
+    assert set(steps) == {4, 16}
+    fine = np.flatnonzero(steps[5:-5] == 16) + 5  # smoothing bends the ends
+    assert list(fine) == [99, 100, 101, 201]
+
+
+def test_first_guesses_spread_over_the_faults_and_none_is_zero() -> None:
+    bare = replace(
+        HEALTHY,
+        leakage_coefficient=0.0,
+        flow_bias=0.0,
+        friction_quadratic=0.0,
+        friction_coulomb=0.0,
+        makeup_conductance=0.0,
+    )
+    starts = motion_fit._starts(bare, 1e8)
+    positive = [start[name] for start in starts for name in UNKNOWNS if name != "friction_linear"]
+    assert min(positive) > 0.0
+    assert starts[0]["friction_coulomb"] == HEALTHY.friction_coulomb
+    assert starts[0]["makeup_conductance"] == HEALTHY.makeup_conductance
+    leaks = sorted({start["leakage_coefficient"] / starts[0]["leakage_coefficient"] for start in starts})
+    assert leaks == pytest.approx([1.0, 5.0, 12.5])
+    own = motion_fit._starts(replace(HEALTHY, leakage_coefficient=3e-11), 1e8)
+    assert own[0]["leakage_coefficient"] == 3e-11
+    linear = sorted({start["friction_linear"] / own[0]["friction_linear"] for start in own})
+    assert linear == pytest.approx([-3.5, 1.0, 8.7])
+
+
+def found(bulk_modulus: float, cost: float = 50.0, chi_square: float = 1.0) -> GreyBoxFit:
+    values = {"bulk_modulus": bulk_modulus}
+    return GreyBoxFit(MOTION_FORMS[0], np.zeros(1), values, {"bulk_modulus": 1e6}, cost, (chi_square,), (0.0,))
+
+
+def test_friction_laws_that_explain_a_log_alike_and_disagree_are_objected_to() -> None:
+    fits = [found(2.0e8), found(2.3e8, 50.0 + 0.9 * motion_fit.ALIKE)]
+    (note,) = motion_fit._objections(fits, fits[0], [])
+    assert note.code == EstimateCode.FRICTION_LAWS_DISAGREE
+    assert note.data == {"least_pa": 2.0e8, "most_pa": 2.3e8}
+    worse = found(2.3e8, 50.0 + 1.1 * motion_fit.ALIKE)
+    assert motion_fit._objections([fits[0], worse], fits[0], []) == ()
+
+
+def test_another_optimum_far_from_the_best_is_objected_to() -> None:
+    best = found(2.0e8)
+    (note,) = motion_fit._objections([best], best, [1.8e8, 2.01e8])
+    assert note.code == EstimateCode.FORCES_ON_ANY_SCALE
+    assert note.data == {"least_pa": 1.8e8, "most_pa": 2.01e8}
+    assert motion_fit._objections([best], best, [1.98e8, 2.01e8]) == ()
+
+
+def test_the_second_law_is_searched_by_itself_only_where_the_first_explains_nothing(
+    monkeypatch: pytest.MonkeyPatch, healthy: FormFit
+) -> None:
+    log, starts = seen(short_log(0.3)), motion_fit._starts(HEALTHY, HEALTHY.bulk_modulus)
+    anew = found(1e8), [9e7]
+    monkeypatch.setattr(motion_fit, "_searched", lambda *_: anew)
+    first = FreedProblem(MOTION_FORMS[0], log, UNKNOWNS, LINEAR)
+    theta = first.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
+    near = replace(found(2e8), theta=theta)
+    fit, others = motion_fit._compared(MOTION_FORMS[1], log, near, starts)
+    assert others == []
+    second = FreedProblem(MOTION_FORMS[1], log, UNKNOWNS, LINEAR)
+    assert fit.cost < second.at(theta).cost
+    assert fit.cost == second.at(fit.theta).cost
+    unlike = replace(near, chi_square=(1.01 * motion_fit.EXPLAINED,))
+    assert motion_fit._compared(MOTION_FORMS[1], log, unlike, starts) is anew
