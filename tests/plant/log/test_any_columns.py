@@ -56,3 +56,33 @@ def test_a_column_that_is_not_there_once_is_refused(name: str, said: str, tmp_pa
     path = written(tmp_path / "a.csv", "t,valve,x,x", RAMP, RAMP, RAMP, RAMP)
     with pytest.raises(LogError, match=said):
         read_any(path, [name])
+
+
+def test_a_log_without_a_column_of_numbers_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t,note\n" + "".join(f"{k},text\n" for k in range(15)))
+    with pytest.raises(LogError, match="a column of numbers is needed; the log has none"):
+        read_any(path)
+
+
+def test_dates_are_a_clock_and_no_column_of_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = [f"2026-03-01 12:00:{k:02d},2026-03-01 13:00:{k:02d},{k}\n" for k in range(15)]
+    path.write_text("time,other,y\n" + "".join(rows))
+    record = read_any(path, ["y"])
+    assert record.sample_time == pytest.approx(1.0)
+    with pytest.raises(LogError, match="column 'other' must hold numbers"):
+        read_any(path, ["other"])
+
+
+def test_what_was_mended_is_told(tmp_path: Path) -> None:
+    time = RAMP.copy()
+    time[7] += 0.02
+    with pytest.warns(LogWarning, match="time"):
+        read_any(written(tmp_path / "a.csv", "t,u", time, RAMP), ["u"])
+
+
+def test_a_known_channel_that_is_not_there_in_any_unit_is_named(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv", "t,motor_speed_rpm", RAMP, RAMP)
+    with pytest.raises(LogError, match="column 'position_m' is needed; the log has 't', 'motor_speed_rpm'"):
+        read_any(path, ["position_m"])

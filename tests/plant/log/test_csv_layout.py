@@ -1,7 +1,10 @@
+from pathlib import Path
+
 import pytest
 
 from plant.errors import LogError
-from plant.log.csv_layout import Layout, layout_of_lines
+from plant.log import csv_layout
+from plant.log.csv_layout import Layout, layout_of, layout_of_lines
 
 
 def layout(*lines: str) -> Layout:
@@ -47,3 +50,35 @@ def test_dates_are_told_from_numbers() -> None:
 def test_blank_lines_alone_are_refused() -> None:
     with pytest.raises(LogError, match="a header line is needed, the file is empty"):
         layout("", " ")
+
+
+def test_wide_letters_without_a_mark_are_known_by_their_zeros(tmp_path: Path) -> None:
+    text = "t,x\n" + "".join(f"{k},{k}\n" for k in range(20))
+    for encoding in ("utf-16-le", "utf-16-be"):
+        path = tmp_path / encoding
+        path.write_bytes(text.encode(encoding))
+        made = layout_of(path)
+        assert (made.encoding, names(made)) == (encoding, ["t", "x"])
+    (tmp_path / "binary").write_bytes(bytes(range(64)) * 4)
+    with pytest.raises(LogError, match="a text file is needed for a CSV log, got binary data"):
+        layout_of(tmp_path / "binary")
+
+
+def test_the_last_line_that_was_looked_at_is_cut_and_does_not_count(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t,x\n0.0,1.0\n0.1,2.0\n")
+    whole = layout_of(path)
+    monkeypatch.setattr(csv_layout, "LOOKED_AT", 16)  # within the second row
+    assert layout_of(path) == whole
+
+
+def test_a_block_above_a_blank_line_is_not_the_header() -> None:
+    made = layout("bench,3", "rate,1000", "", "t,x", "", *(f"0.{k},{k}.0" for k in range(6)))
+    assert names(made) == ["t", "x"]
+
+
+def test_the_row_of_units_may_stand_below_another() -> None:
+    made = layout("t,x", "time,way", "s,mm", "0.0,1.0", "0.1,2.0")
+    assert [one.unit for one in made.headings] == ["s", "mm"]

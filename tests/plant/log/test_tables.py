@@ -1,0 +1,105 @@
+"""The tables of one log: which gives a channel, and which clock its rows have."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+from plant.errors import LogError, MissingColumnError
+from plant.log.table import Table, table_of
+from plant.log.tables import gathered, resolve_tables
+
+TIME = 0.01 * np.arange(50)
+NOON = np.datetime64("2026-03-01T12:00:00", "ns")
+
+
+def table(label: str, more: Mapping[str, Any] | None = None, **columns: Any) -> Table:
+    return table_of("log", columns, label=label, **(more or {}))
+
+
+def of(*tables: Table, mapping: Mapping[str, str] | None = None, sample_time: float | None = None) -> Mapping[str, Any]:
+    found = gathered(tables, mapping, (), "log", sample_time)
+    return {**found.columns, "began": found.began}
+
+
+def test_a_table_that_gives_no_channel_is_left_out() -> None:
+    motor = table("motor", time_s=TIME, motor_speed_rad_s=TIME)
+    chosen = resolve_tables([motor, table("room", time_s=TIME, humidity=TIME)], {}, "log")
+    assert [one.label for one, _ in chosen] == ["motor"]
+
+
+def test_a_column_that_no_table_has_is_named_with_those_that_are_there() -> None:
+    tables = [table("motor", time_s=TIME, motor_speed_rad_s=TIME), table("rod", time_s=TIME, way=TIME)]
+    with pytest.raises(MissingColumnError, match=r"'stroke'") as error:
+        resolve_tables(tables, {"position_m": "stroke:mm"}, "log")
+    assert "way" in str(error.value)
+
+
+def test_a_channel_that_two_groups_have_is_refused_until_the_group_is_said() -> None:
+    tables = [table("left", time_s=TIME, position_m=TIME), table("right", time_s=TIME, position_m=2.0 * TIME)]
+    with pytest.raises(LogError, match=r"'left' and 'right' both give position_m, wanted one"):
+        of(*tables)
+    np.testing.assert_allclose(of(*tables, mapping={"position_m": "right/position_m"})["position_m"], 2.0 * TIME)
+
+
+def test_dates_in_the_place_of_numbers_are_refused() -> None:
+    dated = table("rod", time_s=TIME, position_m=NOON + (1e9 * TIME).astype("timedelta64[ns]"))
+    with pytest.raises(LogError, match="column 'position_m' must hold numbers, got dates"):
+        of(dated)
+
+
+def test_rows_without_a_time_take_that_of_the_only_table_as_long() -> None:
+    motor = table("motor", time_s=3.0 + TIME, motor_speed_rad_s=TIME)
+    found = of(motor, table("rod", position_m=2.0 * TIME))
+    np.testing.assert_allclose(found["position_m"], 2.0 * TIME)
+    np.testing.assert_allclose(np.diff(found["time_s"]), 0.01)
+
+
+def test_rows_that_no_other_table_counts_need_a_time() -> None:
+    motor = table("motor", time_s=TIME, motor_speed_rad_s=TIME)
+    with pytest.raises(LogError, match="time_s"):
+        of(motor, table("rod", position_m=TIME[:30]))
+    found = of(motor, table("rod", position_m=TIME[:30]), sample_time=0.01)
+    np.testing.assert_allclose(found["position_m"][:30], TIME[:30], atol=1e-12)
+
+
+def test_a_step_and_a_beginning_are_a_time() -> None:
+    found = of(table("rod", {"step": 0.02, "began": NOON}, position_m=TIME))
+    assert found["began"] == "2026-03-01T12:00:00.000000Z"
+    np.testing.assert_allclose(found["time_s"], 0.02 * np.arange(50))
+
+
+def test_a_sample_time_is_a_time_where_a_log_has_none() -> None:
+    found = of(table("rod", position_m=TIME), sample_time=0.5)
+    np.testing.assert_allclose(found["time_s"], 0.5 * np.arange(50))
+    with pytest.raises(LogError, match="time_s"):
+        of(table("rod", position_m=TIME))
+
+
+def test_dates_count_from_the_first_that_is_there() -> None:
+    stamps = NOON + np.rint(1e9 * TIME).astype("timedelta64[ns]")
+    stamps[0] = stamps[7] = np.datetime64("NaT")
+    found = of(table("rod", time_s=stamps, position_m=TIME))
+    assert found["began"] == "2026-03-01T12:00:00.010000Z"
+    assert np.flatnonzero(np.isnan(found["time_s"])).tolist() == [0, 7]
+    np.testing.assert_allclose(found["time_s"][1:7], TIME[:6], atol=1e-9)
+
+
+def test_dates_of_which_none_is_there_are_no_beginning() -> None:
+    found = of(table("rod", time_s=np.full(50, np.datetime64("NaT", "ns")), position_m=TIME))
+    assert found["began"] is None
+    assert np.isnan(found["time_s"]).all()
+
+
+def test_a_mapping_to_a_group_that_has_no_such_column_is_refused_and_one_of_another_unit_too() -> None:
+    tables = [table("left", time_s=TIME, position_m=TIME), table("right", time_s=TIME, way=2.0 * TIME)]
+    with pytest.raises(MissingColumnError, match="'right/stroke'"):
+        of(*tables, mapping={"position_m": "right/stroke"})
+    with pytest.raises(LogError, match="bar"):
+        of(*tables, mapping={"velocity_m_s": "right/way:bar"})
+
+
+def test_a_channel_that_is_required_is_asked_for_by_name() -> None:
+    with pytest.raises(LogError, match="motor_speed_rad_s"):
+        gathered([table("rod", time_s=TIME, position_m=TIME)], {}, ("motor_speed_rad_s",), "log")
