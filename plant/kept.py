@@ -62,7 +62,7 @@ def read_kept(path: Path, kind: str) -> dict[str, Array]:
     """
     wanted = f"a state of {kind.rpartition(' ')[0]} is needed"
     try:
-        with np.load(path, allow_pickle=False) as kept:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:  # NumPy leaves open what is damaged
             values = {name: kept[name] for name in kept.files}
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise HydrostateError(f"{path}: {wanted}: {error}") from error

@@ -1,7 +1,10 @@
+from dataclasses import make_dataclass
+from typing import Annotated
+
 import pytest
 
 from plant.errors import RigError
-from plant.units import LITRE_PER_MINUTE, RPM, conversion_to, require_number
+from plant.units import LITRE_PER_MINUTE, RPM, SI, conversion_to, notes, require_number
 
 
 @pytest.mark.parametrize(
@@ -49,3 +52,9 @@ def test_a_speed_of_a_shaft_is_no_frequency() -> None:
 def test_a_parameter_of_no_actuators_size_is_refused(value: float) -> None:
     with pytest.raises(RigError, match=r"piston_area must be from 1e-40 to 1e\+40 in size"):
         require_number("piston_area", value)
+
+
+def test_a_parameter_without_a_unit_is_refused_by_name() -> None:
+    made = make_dataclass("Own", [("mass", Annotated[float, SI("kg", "of the piston", "own")]), ("length", float)])
+    with pytest.raises(TypeError, match=r"Own\.length must carry an SI note, got <class 'float'>"):
+        notes(made)

@@ -115,6 +115,8 @@ def view(scope: Scope, value: Held, items: Sequence[Held]) -> Held:
             offset = scope.whole("add", offset, scope.whole("mul", counted(scope, value, axis, item), stride))
             packed = packed and not sliced
             continue
+        if not isinstance(item.kind, Slice):
+            raise KernelError(f"an index is a whole number or a slice, got {item.kind.name}")
         begin, end = _ends(scope, value.lengths[axis], item)
         packed = packed and not (sliced and item is not WHOLE_AXIS and item.parts != ("", ""))
         sliced = True

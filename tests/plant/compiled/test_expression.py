@@ -17,7 +17,7 @@ from plant.compiled.expression import (
     ordered,
     symbol,
 )
-from plant.compiled.functions import absolute, arctan, cos, exp, maximum, minimum, sign, sin, sqrt, tanh, where
+from plant.compiled.functions import absolute, arctan, cos, exp, log, maximum, minimum, sign, sin, sqrt, tanh, where
 
 X, Y = symbol("x"), symbol("y")
 
@@ -173,3 +173,8 @@ def test_powers_are_products() -> None:
 def test_an_operation_without_a_derivative_is_refused_rather_than_taken_for_constant() -> None:
     with pytest.raises(NotImplementedError, match="'erf' has no derivative"):
         jacobian([node("erf", X)], [X])
+
+
+def test_a_logarithm_has_the_slope_of_one_over_its_argument() -> None:
+    ((slope,),) = jacobian([log(X)], [X])
+    assert slope is ONE / X

@@ -36,3 +36,11 @@ def test_points_that_turn_back_are_refused() -> None:
         ThrottleA((0.0, 10.0), (1e-12, 2e-12), (1e-6, 2e-6))
     with pytest.raises(RigError, match="at least two points"):
         ThrottleB((10.0,), (1e-6,))
+
+
+@pytest.mark.parametrize("volts", [-0.1, 10.1, float("nan")])
+def test_a_voltage_that_a_throttle_does_not_take_is_refused(volts: float) -> None:
+    with pytest.raises(RigError, match=r"throttle [AB] takes 0 to 10 V, got"):
+        A.at(volts)
+    with pytest.raises(RigError, match=rf"throttle B takes 0 to 10 V, got {volts!r} V"):
+        B.at(volts)

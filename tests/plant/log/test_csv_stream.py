@@ -94,3 +94,16 @@ def test_a_broken_row_is_named(row: str, said: str) -> None:
 def test_a_stream_without_a_beginning_is_refused(lines: list[str], said: str) -> None:
     with pytest.raises(LogError, match=said):
         _taken(lines)
+
+
+def test_a_long_gap_right_after_a_piece_is_told_with_the_next() -> None:
+    pieces = _taken([HEADER, *_rows(10), *_rows(5, 90_000)], most=10)
+    assert [(len(piece), gap) for _, piece, gap in pieces] == [(10, False), (5, True)]
+
+
+def test_blank_lines_and_quoted_cells_are_read() -> None:
+    lines = [HEADER, *(f'{k},"{60 * k}",{k}\n' for k in range(12))]
+    lines.insert(6, " \n")
+    (time, samples, _), *more = _taken(lines, most=20)
+    assert (time, more) == (pytest.approx(0.011), [])
+    np.testing.assert_allclose(samples[:, 0], 2.0 * np.pi * np.arange(12))

@@ -304,3 +304,14 @@ def test_what_a_file_is_its_first_bytes_tell(name: str, content: bytes, said: st
     with pytest.raises(LogError, match=said) as raised:
         read_record(tmp_path / name)
     assert "decode" not in str(raised.value)
+
+
+def test_blanks_between_columns_are_read_and_a_short_row_is_refused(tmp_path: Path) -> None:
+    rows = [f"{1e-3 * k:.3f}   {2 * k}  {k}" for k in range(20)]
+    path = tmp_path / "blanks.txt"
+    path.write_text("\n".join(["time_s   motor_speed_rpm  position_mm", *rows]) + "\n")
+    record = read_record(path)
+    np.testing.assert_allclose(record["position_m"], 1e-3 * np.arange(20))
+    path.write_text("\n".join(["time_s   motor_speed_rpm  position_mm", *rows[:15], "0.015  3", *rows[16:]]) + "\n")
+    with pytest.raises(LogError, match="row 16"):
+        read_record(path)

@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
+from plant.errors import LogError
+from plant.log.columns import TRUTH
 from plant.log.notes import LogCode
-from plant.log.plausibility import implausible
+from plant.log.plausibility import implausible, require_measurable
 
 T = 1e-3
 TIME = T * np.arange(4000)
@@ -96,3 +98,17 @@ def test_missing_samples_do_not_hide_a_slip() -> None:
     (note,) = implausible(T, {**LOG, "position_m": position})
     assert note.code == LogCode.POSITION_AND_VELOCITY_UNITS
     assert note.data["ratio"] == pytest.approx(250.0, rel=0.02)
+
+
+def test_a_pump_alone_says_nothing_of_units() -> None:
+    assert implausible(T, {"motor_speed_rad_s": SPEED}) == []
+
+
+def test_what_a_sensor_cannot_give_is_refused_and_what_is_missing_or_true_is_not() -> None:
+    require_measurable({"position_m": np.full(3, np.nan), f"{TRUTH}x": np.array([1e300]), "force_n": np.zeros(2)}, "a")
+    for size, said in (
+        (1e16, r"reaches 1e\+16, no sensor gives more than"),
+        (1e-31, "reaches only 1e-31, no sensor gives less"),
+    ):
+        with pytest.raises(LogError, match=f"a.csv: position_m {said}"):
+            require_measurable({"force_n": np.ones(2), "position_m": np.array([0.0, -size])}, "a.csv")

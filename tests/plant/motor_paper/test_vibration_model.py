@@ -103,3 +103,13 @@ def test_its_stiffnesses_are_those_of_compliant_volumes_felt_by_the_piston() -> 
     p, area = VibrationParameters(), 3.7934e-4  # F = A p and x = C p / A
     assert p.diaphragm_stiffness == pytest.approx(area**2 / 1.174e-13, rel=1e-3)
     assert p.fluid_stiffness == pytest.approx(area**2 / (4e-13 + 1e-5 / 1e9), rel=1e-3)
+
+
+def test_without_fractional_damping_the_model_keeps_its_states() -> None:
+    plain = replace(MODEL, fractional_damping=0.0)
+    matrices = mechanical_matrices(plain)
+    assert with_fractional_damping(matrices, plain) is matrices
+    assert state_space(plain).nstates == 4
+    damped = replace(MODEL, fractional_damping=1.0, fractional_order=0.5)
+    assert state_space(damped).nstates > 4
+    assert state_space(damped, signs="printed").nstates == 4

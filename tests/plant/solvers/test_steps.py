@@ -1,7 +1,7 @@
 """The schemes converge at their order, and agree with each other and with scipy's LSODA."""
 
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, make_dataclass
 
 import numpy as np
 import pytest
@@ -15,7 +15,8 @@ from benchmarks.peers.stiff_solvers import reference_trajectory
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.eha.model import PARAMETER_NAMES, EhaParameters, lumped_step, reduced_derivative
 from plant.eha.simulate import LUMPED, REDUCED
-from plant.solvers.steps import parameter_row, parameter_symbols, rk4_step, ros2_step, solve_linear
+from plant.errors import HydrostateError
+from plant.solvers.steps import parameter_names, parameter_row, parameter_symbols, rk4_step, ros2_step, solve_linear
 from plant.solvers.trajectory import Trajectory, compile_trajectory
 
 Array = NDArray[np.float64]
@@ -167,3 +168,10 @@ def test_parameters_stand_in_the_row_as_in_the_dataclass() -> None:
 def test_a_step_of_ros2_needs_symbols_because_it_differentiates() -> None:
     with pytest.raises(AttributeError):
         ros2_step(reduced_derivative)((0.0, 0.01, 0.0), (1.0, 1.0), EhaParameters(), 1e-4)
+
+
+@pytest.mark.parametrize("name", ["h", "x1", "theta12", "u_rise"])
+def test_a_parameter_may_not_be_called_as_kernels_call_their_own_numbers(name: str) -> None:
+    made = make_dataclass("Own", [("mass", float), (name, float)], frozen=True)
+    with pytest.raises(HydrostateError, match=f"Own must not call a parameter '{name}': use a longer name"):
+        parameter_names(made)

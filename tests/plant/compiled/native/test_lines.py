@@ -69,3 +69,37 @@ def wild(x: Any) -> Mapping[str, Any]:
 def test_what_is_no_line_is_refused() -> None:
     with pytest.raises(KernelError, match="is none of the operations that are compiled"):
         stepped(pasted(wild), "wild", {"x": X}, "a", 1)
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        ("y = x + 1.0", "lines returns nothing"),
+        ("while x > 0.0:\n        x = x - 1.0", "is none of the lines that are compiled"),
+        ("y, z = ratios(x, x)\n    return {'a': y}", "a tuple is wanted, got x"),
+        ("return {'a': gamma(x)}", "gamma is none of the operations that are compiled"),
+    ],
+)
+def test_lines_of_another_shape_are_refused_in_words(body: str, told: str) -> None:
+    with pytest.raises(KernelError, match=told):
+        stepped(f"def lines(x):\n    {body}", "lines", {"x": X}, "a", 1)
+
+
+@pytest.mark.parametrize("width", [1, 8])
+def test_what_has_no_place_is_not_stored(width: int) -> None:
+    found = stepped("def lines(x):\n    return {'a': x + 1.0, 'other': 2.0 * x}", "lines", {"x": X}, "a", width)
+    assert found.keys() == {"a"}
+    assert found["a"].tolist() == (X + 1.0).tolist()
+
+
+def turned(places: Any, offset: int, rows: Any) -> None:
+    transpose(places.ctypes.data, offset, 64, rows.ctypes.data, 64)  # type: ignore[name-defined]  # noqa: F821
+
+
+def test_numbers_from_eight_places_become_eight_rows() -> None:
+    logs = np.arange(8.0 * 24).reshape(8, 24)
+    places = logs.ctypes.data + logs.strides[0] * np.arange(8)
+    rows = np.zeros((8, 8))
+    takes = {"turned": signature("places : ndarray of int, shape (8,)\noffset : int\nrows : ndarray, shape (8, 8)")}
+    load_native("turned", kernel_text("turned", pasted(turned)), takes).turned(places, 8 * 8, rows)
+    np.testing.assert_array_equal(rows, logs[:, 8:16].T)

@@ -1,0 +1,28 @@
+"""A state comes back as it was kept; a file of another kind or a damaged one is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from plant.errors import HydrostateError
+from plant.kept import read_kept, write_kept
+
+
+def test_a_state_comes_back_and_is_not_taken_for_another_kind(tmp_path: Path) -> None:
+    path = tmp_path / "watch.state"
+    write_kept(path, "watch 1", {"mean": np.arange(3.0)})
+    found = read_kept(path, "watch 1")
+    assert list(found) == ["mean"]
+    np.testing.assert_array_equal(found["mean"], np.arange(3.0))
+    with pytest.raises(HydrostateError, match=r"watch\.state: a state of watch is needed, the file is none of this"):
+        read_kept(path, "watch 2")
+
+
+def test_what_is_no_state_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "watch.state"
+    for content in (None, b"", b"PK\x03\x04 and no more", b"text"):
+        if content is not None:
+            path.write_bytes(content)
+        with pytest.raises(HydrostateError, match=r"watch\.state: a state of watch is needed: "):
+            read_kept(path, "watch 1")

@@ -1,0 +1,19 @@
+"""A package's names are imported when they are asked for, and a name that it lacks is an attribute error."""
+
+from pathlib import Path
+
+import pytest
+
+from plant.lazy import lazily
+
+
+def test_names_are_those_of_the_imports_and_no_others(tmp_path: Path) -> None:
+    file = tmp_path / "face.py"
+    text = "from math import pi as number\nfrom math import tau as tau\nfrom math import e\n"
+    file.write_text(f"from typing import TYPE_CHECKING\n{text}")
+    found = lazily("face", str(file))
+    assert found("__all__") == ["number", "tau"]
+    assert 2.0 * found("number") == found("tau")
+    for name in ("e", "nowhere"):
+        with pytest.raises(AttributeError, match=f"module 'face' has no attribute '{name}'"):
+            found(name)
