@@ -81,6 +81,8 @@ def covariance_of(problem: Problem, theta: Array) -> Covariance:
 
     Parameters
     ----------
+    problem : Problem
+        With more samples than unknowns.
     theta : ndarray, shape (unknowns,)
         The solution [dimensionless].
     """
@@ -97,16 +99,14 @@ def covariance_of(problem: Problem, theta: Array) -> Covariance:
     kept = felt[np.sort(order)]
     used = int(np.count_nonzero(np.concatenate([~np.isnan(part.measured).ravel() for part in problem.parts])))
     std, correlation = np.full(len(theta), np.inf), np.full((len(theta), len(theta)), np.nan)
-    if used > len(kept):
-        spread_of = least_squares_covariance(
-            slopes[:, kept], errors, used, automatic_lags(errors), np.zeros(len(kept))
-        )[1]
-        variance = np.diag(spread_of)
-        known = np.sqrt(np.where(variance > 0.0, variance, np.inf))
-        std[kept] = known
-        correlation[np.ix_(kept, kept)] = spread_of / np.outer(known, known)
-        std[touched] = np.inf
-        correlation[touched] = correlation[:, touched] = np.nan
+    lags = automatic_lags(errors)
+    spread_of = least_squares_covariance(slopes[:, kept], errors, used, lags, np.zeros(len(kept)))[1]
+    variance = np.diag(spread_of)
+    known = np.sqrt(np.where(variance > 0.0, variance, np.inf))
+    std[kept] = known
+    correlation[np.ix_(kept, kept)] = spread_of / np.outer(known, known)
+    std[touched] = np.inf
+    correlation[touched] = correlation[:, touched] = np.nan
     condition = float(values[0] / values[-1]) if values[-1] > 0.0 and not len(touched) else np.inf
     return Covariance(std, correlation, condition, tuple(dict.fromkeys(groups)))
 

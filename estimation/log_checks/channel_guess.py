@@ -162,9 +162,9 @@ def _by_motion(points: dict[str, dict[int, float]], means: Mapping[int, Array], 
     sure = {place: found for place, found in followers.items() if found and abs(found[0][0]) > SURE}
     for place, found in sure.items():
         first, second = found[0], found[1] if len(found) > 1 else None
-        if _add(points, POSITION, place, SLOPE):
-            note = GuessCode.HAS_SLOPE.note(column=first[1] + 1, correlation=first[0])
-            why.setdefault((POSITION, place), []).append(note)
+        points[POSITION][place] += SLOPE
+        slope = GuessCode.HAS_SLOPE.note(column=first[1] + 1, correlation=first[0])
+        why.setdefault((POSITION, place), []).append(slope)
         worth = SLOPE if second is not None else RUNNER_UP
         if _add(points, VELOCITY, first[1], worth):
             note = GuessCode.IS_SLOPE.note(column=place + 1, correlation=first[0])
@@ -183,12 +183,13 @@ def _by_pressure(points: dict[str, dict[int, float]], means: Mapping[int, Array]
         for one in pressed:
             for other in pressed:
                 if len({place, one, other}) == 3 and one < other and _is_difference(means, place, one, other):
-                    _add(points, PRESSURE, place, DIFFERENCE)
+                    points[PRESSURE][place] += DIFFERENCE
                     note = GuessCode.IS_DIFFERENCE.note(one=one + 1, other=other + 1)
                     why.setdefault((PRESSURE, place), []).append(note)
         if pump in means and pump is not None and place != pump:
             correlation = _alike(means[place], means[pump])
-            if abs(correlation) > WEAKLY and _add(points, PRESSURE, place, TREND):
+            if abs(correlation) > WEAKLY:
+                points[PRESSURE][place] += TREND
                 note = GuessCode.FOLLOWS.note(column=pump + 1, correlation=correlation)
                 why.setdefault((PRESSURE, place), []).append(note)
 

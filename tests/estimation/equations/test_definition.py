@@ -11,6 +11,7 @@ import pytest
 
 from estimation.equations.definition import Equations, Parameter
 from estimation.equations.kernel import traceable
+from estimation.equations.trace import Named
 from plant.errors import HydrostateError
 
 NAMES: dict[str, Any] = {
@@ -93,3 +94,20 @@ def test_a_parameter_with_a_positive_bound_is_searched_by_its_logarithm() -> Non
     assert Parameter(1.0, (0.1, 10.0)).logarithmic
     assert not Parameter(1.0, (0.0, 10.0)).logarithmic
     assert Parameter(0.0, (-1.0, 1.0)).size == pytest.approx(0.2)
+
+
+def test_an_attribute_that_is_none_is_told_as_python_tells_it() -> None:
+    with pytest.raises(HydrostateError, match=r"derivative .* fails: module 'numpy' has no attribute 'sine'"):
+        traceable(Equations(lambda s, i, p: (s.speed, np.sine(s.angle)), **NAMES))
+
+
+def test_equations_need_a_function() -> None:
+    with pytest.raises(HydrostateError, match="derivative must be a function of state, inputs and parameters, got 3"):
+        Equations(3, **NAMES)  # type: ignore[arg-type]
+
+
+def test_what_python_asks_of_every_object_is_no_parameter() -> None:
+    named = Named({"weight": 1.0})
+    assert not hasattr(named, "__array__")
+    with pytest.raises(HydrostateError, match="did you mean 'weight'"):
+        named.wait  # noqa: B018  it is read

@@ -55,3 +55,92 @@ def test_columns_are_alike_whatever_their_offset_and_unit() -> None:
     wanted = np.corrcoef(one, other)[0, 1]
     assert _alike(one + 7.0, 3.0 * other - 2.0) == pytest.approx(wanted)
     assert _alike(np.ones(50), other) == 0.0
+
+
+T = 0.01 * np.arange(3000)
+SWING = np.sin(2.0 * T) + 0.4 * np.sin(0.7 * T)
+
+
+def guesses(**columns: np.ndarray) -> dict[str, ChannelGuess]:
+    """Guess channels of columns by name; double underscores open the bracket of a unit."""
+    headings = [Heading(name.replace("__", " [").replace("_per_", "/") + "]" * ("__" in name)) for name in columns]
+    return {one.guess.channel: one for one in guess_channels(headings, dict(enumerate(columns.values())), HEALTHY)}
+
+
+def told(one: ChannelGuess) -> list[str]:
+    return [str(note.code) for note in one.why]
+
+
+def test_a_column_that_rises_steadily_in_another_unit_is_no_clock() -> None:
+    found = guesses(A=T, Position__mm=100.0 + T)
+    assert found["time_s"].guess.name == "A"
+    assert "increases" in told(found["time_s"])
+    assert "increases" not in told(found["position_m"])
+
+
+def test_the_slope_of_position_is_velocity_and_what_follows_it_less_well_is_the_pump() -> None:
+    speed = SWING + 0.5 * np.sin(5.0 * T)
+    found = guesses(t__s=T, way__mm=np.cumsum(SWING), A=SWING, B=speed)
+    assert (found["velocity_m_s"].guess.name, found["motor_speed_rad_s"].guess.name) == ("A", "B")
+    assert "has_slope" in told(found["position_m"])
+    assert "is_slope" in told(found["velocity_m_s"])
+    assert "follows" in told(found["motor_speed_rad_s"])
+
+
+def test_a_pressure_that_has_the_slope_of_position_is_neither_velocity_nor_the_pump() -> None:
+    found = guesses(t__s=T, way__mm=np.cumsum(SWING), load__bar=SWING)
+    assert "velocity_m_s" not in found
+    assert "has_slope" in told(found["position_m"])
+
+
+def test_a_pressure_that_is_the_difference_of_two_is_the_differential_one() -> None:
+    rng = np.random.default_rng(1)
+    left, right = 40.0 + np.cumsum(rng.normal(size=3000)), 40.0 + np.cumsum(rng.normal(size=3000))
+    found = guesses(t__s=T, P1__bar=left, P2__bar=right, P3__bar=left - right)
+    assert found["differential_pressure_pa"].guess.name == "P3 [bar]"
+    assert "is_difference" in told(found["differential_pressure_pa"])
+    alike = guesses(t__s=T, P1__bar=left, P2__bar=2.0 * left, P3__bar=left - right)
+    assert all("is_difference" not in told(one) for one in alike.values())
+
+
+def test_a_pressure_that_goes_with_the_pump_says_so_and_one_that_does_not_says_nothing() -> None:
+    found = guesses(t__s=T, rpm=SWING, p__bar=SWING + 0.5 * np.sin(9.0 * T))
+    assert "follows" in told(found["differential_pressure_pa"])
+    found = guesses(t__s=T, rpm=SWING, p__bar=np.sin(9.0 * T))
+    assert "follows" not in told(found["differential_pressure_pa"])
+
+
+@pytest.mark.parametrize(
+    "dull",
+    [np.zeros(3000), np.full(3000, 5.0), np.full(3000, 1e250), np.where(T < 0.1, T, np.nan)],
+    ids=["zero", "constant", "huge", "hardly there"],
+)
+def test_a_column_in_which_nothing_happens_tells_nothing(dull: np.ndarray) -> None:
+    found = guesses(t__s=T, way__mm=np.cumsum(SWING), A=SWING, B=dull)
+    assert found["velocity_m_s"].guess.name == "A"
+    assert "motor_speed_rad_s" not in found
+
+
+def test_dates_are_the_time_because_they_are_dates() -> None:
+    stamps = np.datetime64("2026-03-01", "ns") + (1e9 * T).astype("timedelta64[ns]")
+    (found,) = guess_channels([Heading("when", stamped=True)], {0: stamps}, HEALTHY)
+    assert (found.guess.channel, told(found)) == ("time_s", ["dates"])
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "unit"),
+    [
+        ("Druckdifferenz", 25.0, "bar"),
+        ("Druckdifferenz", 2.5e6, "Pa"),
+        ("Motordrehzahl", 150.0, "rad/s"),
+        ("Motordrehzahl", 1.5 * HEALTHY.motor_speed_limit * 60.0 / (2.0 * np.pi), "rpm"),
+        ("Geschwindigkeit", 300.0, "mm/s"),
+        ("Geschwindigkeit", float("nan"), "m/s"),
+    ],
+)
+def test_the_unit_is_the_first_in_which_a_channel_has_a_usual_size(name: str, size: float, unit: str) -> None:
+    (found,) = (
+        one for one in guesses(t__s=T, **{name: size * SWING / np.abs(SWING).max()}).values() if one.guess.name == name
+    )
+    assert found.guess.unit == unit
+    assert "unit_guessed" in told(found)

@@ -1,0 +1,171 @@
+"""What speaks against a fit of own equations, and what only should be known."""
+
+# ruff: noqa: ARG005 - every function is given the same three things
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.equations.conclude import concluded
+from estimation.equations.definition import Equations, Parameter
+from estimation.equations.fit import EquationsFit, _started, fit_equations, simulated
+from estimation.equations.problem import Problem, part_of
+from estimation.equations.search import EVALUATIONS, MOST_STEPS, SETTLED
+from plant.errors import HydrostateError, LogError
+from plant.log.record import Record
+
+TIME = 0.05 * np.arange(300)
+NOISE = 0.01 * np.random.default_rng(3).standard_normal(300)
+PUSH = np.clip(2.0 * np.sin(TIME), -1.0, 1.0)
+
+
+def lag(state: Any, inputs: Any, p: Any) -> Any:
+    return (p.gain * p.gain * inputs.push - state.way,)
+
+
+def limited(state: Any, inputs: Any, p: Any) -> Any:  # noqa: ARG001  all are given the same three things
+    return (np.clip(state.way, -0.5, 0.5),)
+
+
+def equations(derivative: Any = lag, **changes: Any) -> Equations:
+    names: dict[str, Any] = {"states": {"way": "m"}, "inputs": {"push": "N"}, "outputs": {"way": "m"}}
+    parameters = {"gain": Parameter(0.8, (-3.0, 3.0))}
+    return Equations(derivative, **{**names, "parameters": parameters, "initial": {"way": 0.0}, **changes})
+
+
+def response(push: Any) -> Any:
+    """What a lag with a gain of one makes of an input, linear between samples: exact."""
+    way, fall = np.zeros(len(push)), np.exp(-0.05)
+    for k in range(1, len(push)):
+        rise = (push[k] - push[k - 1]) / 0.05
+        way[k] = push[k] - rise + (way[k - 1] - push[k - 1] + rise) * fall
+    return way
+
+
+WAY = response(PUSH)
+
+
+def log(way: Any = WAY, push: Any = PUSH) -> Record:
+    return Record(0.05, {"push": push, "way": way + NOISE})
+
+
+@pytest.fixture(scope="module")
+def found() -> EquationsFit:
+    return fit_equations(equations(), [log()])
+
+
+def codes(notes: Any) -> set[str]:
+    return {str(note.code) for note in notes}
+
+
+def test_an_input_at_its_limit_should_be_known_and_speaks_against_nothing(found: EquationsFit) -> None:
+    assert found.finding.gate.passed
+    ends = {note.data["end"]: note.data["value"] for note in found.finding.notes if note.code == "input_at_limit"}
+    assert ends == {"least": -1.0, "largest": 1.0}
+
+
+def test_an_output_at_a_limit_that_the_equations_have_should_be_known() -> None:
+    fit = fit_equations(equations(observe=limited), [log(np.clip(WAY, -0.5, 0.5))])
+    assert fit.finding.gate.passed
+    ends = {note.data["end"]: note.data["value"] for note in fit.finding.notes if note.code == "output_at_limit"}
+    assert ends == {"least": pytest.approx(-0.5, abs=0.02), "largest": pytest.approx(0.5, abs=0.02)}
+
+
+def test_an_input_that_stands_still_is_no_reason_for_a_misfit() -> None:
+    push = np.ones(300)
+    slow = equations(lambda s, i, p: (p.gain * (i.push - s.way),), parameters={"gain": Parameter(0.5, (0.01, 10.0))})
+    drifting = response(push) + 0.3 * np.sin(2.0 * TIME)
+    reasons = codes(fit_equations(slow, [log(drifting, push)]).finding.gate.reasons)
+    assert "misfit_correlated" in reasons
+    assert "misfit_follows_input" not in reasons
+
+
+def test_two_starts_that_explain_the_log_alike_and_lie_apart_are_told() -> None:
+    fit = fit_equations(equations(), [log()], starts=6, seed=1)
+    assert abs(fit.values["gain"]) == pytest.approx(1.0, abs=0.01)
+    (other,) = (note for note in fit.finding.notes if note.code == "starts_disagree")
+    assert other.data["parameter"] == "gain"
+    assert other.data["value"] == pytest.approx(-fit.values["gain"], abs=1e-3)
+
+
+def test_steps_that_are_too_long_and_a_search_that_did_not_settle_speak_against_a_fit(found: EquationsFit) -> None:
+    given = np.array([np.nan])
+    doubted = replace(found.solution, moved=1.01 * SETTLED, evaluations=EVALUATIONS)
+    reasons = {str(note.code): note.data for note in concluded(doubted, given)[0].gate.reasons}
+    assert reasons == {
+        "steps_too_long": {"deviations": 1.01 * SETTLED, "steps": 2 * MOST_STEPS},
+        "not_converged": {"evaluations": EVALUATIONS},
+    }
+    assert concluded(replace(found.solution, moved=0.99 * SETTLED), given)[0].gate.passed
+
+
+def test_equations_need_a_log() -> None:
+    with pytest.raises(LogError, match="a log is needed to fit the equations to, got none"):
+        fit_equations(equations(), [])
+
+
+def test_a_free_initial_state_begins_its_search_where_it_is_told_to() -> None:
+    free = equations(initial={"way": Parameter(0.3, (0.0, 1.0))})
+    problem = Problem(free, (part_of(free, log()),), "rk4", 1, np.array([0.01]))
+    assert [one.start for one in problem.unknowns] == [0.8, 0.3]
+    assert problem.values(problem.bounds[1])[1] == pytest.approx(1.0)
+    fit = fit_equations(free, [log(1.0 * WAY + 0.2 * np.exp(-TIME))])
+    assert fit.finding.quantities["initial way"].covers(0.2)
+
+
+@pytest.mark.parametrize("size", [1e4, 400.0], ids=["beyond all numbers", "squares beyond all numbers"])
+def test_a_point_from_which_the_equations_run_away_costs_infinitely_much(size: float) -> None:
+    growing = equations(
+        lambda s, i, p: (p.rate * s.way + i.push,),
+        parameters={"rate": Parameter(1.0, (0.0, 1e9))},
+        initial={"way": 1.0},
+    )
+    problem = Problem(growing, (part_of(growing, log()),), "rk4", 1, np.array([0.01]))
+    assert np.isfinite(problem.at(problem.coordinates(np.array([0.5]))).cost)
+    point = problem.at(problem.coordinates(np.array([size])))
+    assert point.cost == np.inf
+    assert not point.gradient.any()
+
+
+def test_equations_that_run_away_from_every_start_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("estimation.equations.search.stepped", lambda problem, _: problem)
+    growing = equations(
+        lambda s, i, p: (p.rate * s.way + i.push,),
+        parameters={"rate": Parameter(1e4, (9e3, 1e5))},
+        initial={"way": 1.0},
+    )
+    with pytest.raises(HydrostateError, match="the equations run away from every start"):
+        fit_equations(growing, [log()], starts=3)
+
+
+def test_steps_are_halved_until_the_solution_no_longer_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("estimation.equations.search.STEPPED_WELL", 1e3)  # the first look finds all steps short enough
+    swinging = equations(
+        lambda s, i, p: (s.pace, 40.0 * (i.push - s.way) - p.damping * s.pace),
+        states={"way": "m", "pace": "m/s"},
+        parameters={"damping": Parameter(2.0, (0.1, 10.0))},
+        initial={"way": 0.0, "pace": 0.0},
+    )
+    way = simulated(swinging, log(), {"damping": 1.5}, {})["way"]
+    fit = fit_equations(swinging, [Record(0.05, {"push": PUSH, "way": way + 1e-3 * NOISE})])
+    assert fit.solution.problem.substeps > 1
+    assert fit.solution.moved <= SETTLED
+    assert fit.finding.quantities["damping"].covers(1.5)
+
+
+def test_noise_that_does_not_settle_ends_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("estimation.equations.search.ROUNDS", 1)
+    fit = fit_equations(equations(), [log()])
+    assert fit.noise["way"] == pytest.approx(0.01, rel=0.2)
+
+
+def test_initial_states_are_sought_in_ten_steps_at_most() -> None:
+    flat = equations(
+        lambda s, i, p: (0.0 * p.gain * i.push + 0.0 * s.way,), observe=lambda s, i, p: (s.way**3,), initial={}
+    )
+    record = Record(0.05, {"push": PUSH, "way": np.zeros(300)})
+    problem = Problem(flat, (part_of(flat, record),), "rk4", 1, np.array([1.0]))
+    theta = _started(problem, problem.coordinates(np.array([0.8, 1.0])), [1])
+    assert problem.values(theta)[1] == pytest.approx((2.0 / 3.0) ** 10)
