@@ -19,7 +19,8 @@ from plant.log.record import Record
 from tests.kernels import functions_of, on_memory, text_of
 
 
-def test_one_filter(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("kept", [True, False])
+def test_one_filter(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, kept: bool) -> None:
     rng = np.random.default_rng(4)
     names = ("position_m", "velocity_m_s")
     seen = {name: np.where(rng.random(20) < 0.2, np.nan, rng.normal(size=20)) for name in names}
@@ -27,7 +28,7 @@ def test_one_filter(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> No
     prior = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1e65, 1e-3, 1.0]))  # a product that goes into the logarithm
     variances = {"position_m": 1e-2, "velocity_m_s": 0.1}
     problem = filter_problem(linear, prior, record, EhaParameters(), variances=variances)
-    problem = replace(problem, keep_innovations=True, every=3)
+    problem = replace(problem, keep_innovations=kept, every=3)
     compiled = ekf(problem)
 
     def in_python(*what: Any) -> SimpleNamespace:
@@ -43,3 +44,37 @@ def test_one_filter(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> No
     plain = ekf(problem)
     for field in compiled._fields:
         np.testing.assert_array_equal(getattr(plain, field), getattr(compiled, field), err_msg=field)
+
+
+def test_samples_of_separate_logs_are_laid_side_by_side() -> None:
+    count, width, begin = 16, 2, 3
+    logs = np.random.default_rng(6).normal(size=(count, 20, width))
+    places = logs.ctypes.data + logs.strides[0] * np.arange(count)
+
+    def transpose(at: int, offset: int, ahead: int, target: int, stride: int) -> None:  # noqa: ARG001
+        for lane in range(lanes.ROWS):
+            source = ctypes.c_int64.from_address(at + 8 * lane).value + offset
+            for row in range(lanes.ROWS):
+                ctypes.memmove(target + row * stride + 8 * lane, source + 8 * row, 8)
+
+    rows = np.zeros((lanes.ROWS * width, count))
+    kernel: Any = SimpleNamespace(LINE=8 * count, transpose=transpose)
+    lanes.lay_side_by_side(kernel, places, begin, width, rows.ctypes.data)
+    np.testing.assert_array_equal(rows.T, logs[:, begin : begin + lanes.ROWS].reshape(count, -1))
+
+
+@pytest.mark.parametrize("samples", [lanes.ROWS, 2 * lanes.ROWS, 2 * lanes.ROWS + 4])
+def test_every_sample_of_separate_logs_is_filtered_once(samples: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    filtered, laid = list[int](), list[int]()
+
+    def steps(_: Any, work: Any, drive: int, sample: int, at: int, new: int, end: int, *rest: Any) -> None:  # noqa: ARG001
+        assert laid[-2:] == [at, at]
+        filtered.extend(range(at + new, at + end))
+
+    monkeypatch.setattr(lanes, "steps", steps)
+    monkeypatch.setattr(lanes, "lay_side_by_side", lambda _, places, begin, *rest: laid.append(begin))  # noqa: ARG005
+    kernel: Any = SimpleNamespace(LINE=64, DRIVES=1, CHANNELS=2)
+    nothing: Any = None
+    lanes.run(kernel, np.zeros(1), nothing, nothing, np.zeros(1), samples, 1, 1, nothing)
+    assert filtered == list(range(samples))
+    assert max(laid) + lanes.ROWS == samples

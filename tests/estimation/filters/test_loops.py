@@ -8,12 +8,12 @@ import pytest
 
 from estimation.engine.contract import FilterProblem, Trace
 from estimation.filters import imm, imm_loops, iterated_smoother, particle, smoother, smoother_loops, trajectory_loops
+from estimation.filters.ekf import EKF
 from estimation.filters.run import filter_problem
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
-from tests.estimation.filters.banks import Mode, MultipleModelEstimate, run_imm
 from tests.kernels import functions_of, text_of
 
 PRIOR = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1e-4, 1e-3, 1.0]))
@@ -26,11 +26,14 @@ def record(samples: int = 40) -> Record:
     return Record(1e-3, {"motor_speed_rad_s": rng.normal(size=samples), **seen})
 
 
-def task(model: ProcessModel) -> FilterProblem:
+EVERY = pytest.mark.parametrize(("every", "kept"), [(1, True), (3, False)])
+
+
+def task(model: ProcessModel, every: int, *, kept: bool) -> FilterProblem:
     variances = {"position_m": 1e-2, "velocity_m_s": 0.1}
     bounds = (replace(model.states[0], upper=0.12), *model.states[1:])
     problem = filter_problem(replace(model, states=bounds), PRIOR, record(), EhaParameters(), variances=variances)
-    return replace(problem, keep_innovations=True)
+    return replace(problem, every=every, keep_innovations=kept)
 
 
 def assert_same(plain: Trace, compiled: Trace) -> None:
@@ -38,8 +41,9 @@ def assert_same(plain: Trace, compiled: Trace) -> None:
         np.testing.assert_array_equal(getattr(plain, field), getattr(compiled, field), err_msg=field)
 
 
-def test_the_smoother(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = task(linear)
+@EVERY
+def test_the_smoother(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, every: int, kept: bool) -> None:
+    problem = task(linear, every, kept=kept)
     compiled = smoother.smoother(problem)
     given = problem.model, problem.channels, "none"
     compile_it = smoother_loops.compile_smoother.__wrapped__
@@ -48,8 +52,9 @@ def test_the_smoother(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> 
     assert_same(smoother.smoother(problem), compiled)
 
 
-def test_the_iterated_smoother(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = replace(task(linear), robust="huber")
+@EVERY
+def test_the_iterated_smoother(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, every: int, kept: bool) -> None:
+    problem = replace(task(linear, every, kept=kept), robust="huber")
     compiled = iterated_smoother.iterated_smoother(problem)
     given = problem.model, problem.channels, "huber"
     compile_it = trajectory_loops.compile_trajectory.__wrapped__
@@ -58,28 +63,53 @@ def test_the_iterated_smoother(linear: ProcessModel, monkeypatch: pytest.MonkeyP
     assert_same(iterated_smoother.iterated_smoother(problem), compiled)
 
 
-def bank(model: ProcessModel) -> MultipleModelEstimate:
-    modes = [Mode(name, model, EhaParameters(), noise={"force_n": q}) for name, q in (("calm", 1e-2), ("rough", 1e4))]
-    return run_imm(modes, PRIOR, record(), dwell_time=0.01, keep_innovations=True)
+@pytest.mark.parametrize("mean", [0.13, np.nan])
+def test_a_trajectory_that_begins_out_of_bounds_is_lost(
+    linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, mean: float
+) -> None:
+    problem = task(linear, 1, kept=True)
+    problem = replace(problem, mean=np.array([mean / 0.1, 1.0, 1.0]) * problem.mean)
+    compiled = iterated_smoother.iterated_smoother(problem)
+    compile_it = trajectory_loops.compile_trajectory.__wrapped__
+    text = text_of(monkeypatch, trajectory_loops, lambda: compile_it(problem.model, problem.channels, "none"))
+    monkeypatch.setattr(iterated_smoother, "compile_trajectory", lambda *_: functions_of(text))
+    for trace in (compiled, iterated_smoother.iterated_smoother(problem)):
+        assert np.isnan(trace.log_likelihood)
+        for part in (trace.mean, trace.covariance, trace.track, trace.residuals, trace.residual_variances):
+            assert np.isnan(part).all()
 
 
-def test_the_bank_of_interacting_models(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    compiled, compile_imm = bank(linear), imm_loops.compile_imm
+def bank(model: ProcessModel, every: int, *, kept: bool) -> tuple[Trace, np.ndarray]:
+    variances = {"position_m": 1e-2, "velocity_m_s": 0.1}
+    problems = [
+        filter_problem(model, PRIOR, record(), EhaParameters(), variances=variances, noise={"force_n": q})
+        for q in (1e-2, 1e4)
+    ]
+    modes = [(EKF, replace(one, every=every, keep_innovations=kept)) for one in problems]
+    return imm.interacting(modes, imm.log_transitions([0.01, 0.01], 1e-3), np.log([0.5, 0.5]))
+
+
+@EVERY
+def test_the_bank_of_interacting_models(
+    linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, every: int, kept: bool
+) -> None:
+    (compiled, history), compile_imm = bank(linear, every, kept=kept), imm_loops.compile_imm
 
     def in_python(*what: Any) -> imm_loops.ImmKernel:
         text = text_of(monkeypatch, imm_loops, lambda: compile_imm.__wrapped__(*what))
         return replace(compile_imm(*what), run=functions_of(text).run)
 
     monkeypatch.setattr(imm, "compile_imm", in_python)
-    plain = bank(linear)
-    np.testing.assert_array_equal(plain.log_probability, compiled.log_probability)
-    assert plain.estimate.log_likelihood == compiled.estimate.log_likelihood
-    for name in ("mean", "variance", "residuals", "residual_variances"):
-        np.testing.assert_array_equal(getattr(plain.estimate, name), getattr(compiled.estimate, name), err_msg=name)
+    plain, plain_history = bank(linear, every, kept=kept)
+    np.testing.assert_array_equal(plain_history, history)
+    assert_same(plain, compiled)
+    assert len(plain.track) == len(range(0, 40, every))
 
 
-def test_the_particle_filter(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = task(linear)
+@EVERY
+def test_the_particle_filter(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, every: int, kept: bool) -> None:
+    problem = task(linear, every, kept=kept)
+    problem = replace(problem, noise=problem.noise * [1.0, 0.0, 1.0])  # a state without noise of its own
     compiled = particle.particle_filter(problem, 20, np.random.default_rng(1))
     compile_it = particle.compile_particles.__wrapped__
     run = functions_of(text_of(monkeypatch, particle, lambda: compile_it(problem.model, problem.channels))).run
