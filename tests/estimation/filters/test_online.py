@@ -72,3 +72,13 @@ def test_what_cannot_be_filtered_is_refused() -> None:
     with pytest.raises(HydrostateError, match="can only continue one of the same form"):
         filtered.resume(OnlineFilter(task("acceleration", "normal", 100)).remembered())
     assert set(RULES) == {"ekf", "iekf", "ukf", "ckf", "svsf", "sif"}
+
+
+def test_no_samples_change_nothing() -> None:
+    problem = task("pressure", "normal", 100)
+    filtered = OnlineFilter(problem, "ekf")
+    pieces(filtered, 0, 50)
+    before = filtered.now().values.copy()
+    filtered.take(problem.drives[:0], problem.measured[:0])
+    assert filtered.taken == 50
+    np.testing.assert_array_equal(filtered.now().values, before)

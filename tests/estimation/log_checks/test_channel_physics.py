@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import product
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -155,3 +156,27 @@ def test_nothing_else_is_concluded_from_a_log_with_a_mistake(*, pressure: bool) 
         assert not found.probabilities
     assert found.unknown
     assert [note.code for note in found.advice] == [AdviceCode.MEND_COLUMNS]
+
+
+def test_a_position_that_hardly_moves_is_judged_by_its_noise_and_an_absent_one_not_at_all() -> None:
+    rng = np.random.default_rng(1)
+    noise = 1e-6 * rng.standard_normal(2000)
+    for size, resolved in ((0.1 * channel_physics.RESOLVED, False), (10.0 * channel_physics.RESOLVED, True)):
+        moved = 1e-6 * size * np.sin(1e-3 * np.pi * np.arange(2000))
+        log = Record(1e-3, {POSITION: moved + noise})
+        blocks: Any = SimpleNamespace(position=moved)
+        assert channel_physics._resolved(log, blocks) is resolved
+    absent: Any = SimpleNamespace(position=None)
+    assert not channel_physics._resolved(Record(1e-3, {SPEED: noise}), absent)
+
+
+def test_a_balance_that_explains_little_of_the_flow_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[FlowBalance | None] = []
+    poor = FlowBalance(*([0.5] * len(FlowBalance._fields)))
+    monkeypatch.setattr(channel_physics, "_reversed", lambda *given: seen.append(given[-1]) or ())
+    for explained in (0.99 * channel_physics.EXPLAINED, 1.01 * channel_physics.EXPLAINED):
+        balance = poor._replace(explained=explained)
+        monkeypatch.setattr(channel_physics, "flow_balance", lambda *_, balance=balance: balance)
+        channel_mistakes(run(), HEALTHY)
+    assert seen[0] is None
+    assert seen[1] is not None

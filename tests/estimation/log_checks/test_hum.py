@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from estimation.log_checks import hum
 from estimation.log_checks.hum import without_hum
 from estimation.notes import SensorCode
 from plant.eha.drives import make_drive
@@ -72,3 +73,30 @@ def test_a_line_of_every_other_sample_is_no_hum() -> None:
 def test_a_log_without_pressure_is_left_as_it_is() -> None:
     record = log("steps").replace(**{PRESSURE: None})
     assert without_hum(record) == (record, ())
+
+
+def test_a_hum_beside_the_harmonics_of_a_drive_is_taken_off() -> None:
+    driven = humming(humming(log("steps"), 1e6, 10.0), 2.5e4, 53.0)
+    (note,) = without_hum(driven)[1]
+    assert note.data["frequency_hz"] == pytest.approx(53.0, abs=0.1)
+
+
+def test_no_more_tones_are_taken_off_than_a_mains_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hum, "MOST_TONES", 1)
+    record = humming(humming(log("steps"), 3e4, 50.0), 1e4, 150.0)
+    assert [round(note.data["frequency_hz"]) for note in without_hum(record)[1]] == [50]
+
+
+def test_a_line_at_the_end_of_the_spectrum_is_where_it_is() -> None:
+    frequencies = np.arange(5.0)
+    lines = np.array([9.0, 1.0, 2.0, 8.0, 4.0])
+    assert [hum._between(frequencies, lines, place) for place in (0, 4)] == [0.0, 4.0]
+    assert 3.0 < hum._between(frequencies, lines, 3) < 3.5
+
+
+def test_a_stretch_in_which_the_pressure_is_missing_has_no_tone() -> None:
+    waves = np.column_stack([np.cos(np.arange(20.0)), np.sin(np.arange(20.0))])
+    values = 3.0 * waves[:, 0]
+    np.testing.assert_allclose(hum._fitted(waves, values), values)
+    values[3:] = np.nan
+    assert not hum._fitted(waves, values).any()

@@ -1,8 +1,13 @@
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from estimation.identification import LinearModel, fit_output_error, identify_record
-from estimation.identification.fit.residual_tests import feedback_test
+from estimation.identification import LinearModel, fit_output_error, from_record, identify_record
+from estimation.identification.fit.feedback import feedback_note
+from estimation.identification.fit.residual_tests import DEFAULT_LAGS, feedback_test
+from estimation.identification.free_run import other_structures
 from estimation.identification.free_run.data import channels_from
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.notes import IdentificationCode
@@ -60,3 +65,26 @@ def test_a_closed_loop_is_noticed_between_any_columns_and_an_open_one_is_not() -
 def test_a_short_residual_is_refused(plant_30hz: LinearModel) -> None:
     with pytest.raises(HydrostateError, match="200 samples or more"):
         feedback_test(plant_30hz.simulate(np.ones(50)), np.ones(50))
+
+
+def test_a_log_too_short_for_the_test_says_nothing() -> None:
+    u, y = closed_loop(np.random.default_rng(1), 4_000, 0.8)
+    model = fit_output_error(u, y, 1e-3, n_numerator=1, n_denominator=1, delay=1)
+    residual, short = y - model.simulate(u), 8 * DEFAULT_LAGS - 1
+    assert feedback_note(residual, u, ("u", "y")) is not None
+    assert feedback_note(residual[:short], u[:short], ("u", "y")) is None
+
+
+def test_an_unstable_model_is_not_simulated_to_look_for_feedback(recwarn: pytest.WarningsRecorder) -> None:
+    unstable: Any = SimpleNamespace(is_stable=False)
+    from_record._warn_of_feedback(unstable, np.zeros(10), np.zeros(10))
+    assert len(recwarn) == 0
+
+
+def test_an_adopted_model_that_is_unstable_does_not_run_free() -> None:
+    unstable: Any = SimpleNamespace(is_stable=False, structure="arx")
+    data: Any = SimpleNamespace(output="speed")
+    with pytest.raises(
+        HydrostateError, match="the arx model of 'speed' is unstable and does not run free: use"
+    ):
+        other_structures._body(unstable, data, data)

@@ -1,12 +1,16 @@
 """A nonlinearity at a model's input is found, with intervals in the input's unit, and saved with the model."""
 
 import json
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from benchmarks.bent_inputs import PLANTED, Planted, logged
+from estimation.identification.free_run import choose_hammerstein
 from estimation.identification.free_run.bends import KINDS, play
+from estimation.identification.free_run.choose_hammerstein import ORDERS, _bases, hammerstein_candidates
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.hammerstein_body import HammersteinBody
 from estimation.identification.free_run.hammerstein_fit import HammersteinProblem, fit_hammerstein
@@ -120,3 +124,44 @@ def test_auto_takes_a_bend_where_it_is_better_than_every_other_on_blocks_held_ba
     assert found.model.body.bend == planted.kind
     rest = [row["held_back_percent"] for row in found.candidates if row["structure"] != "hammerstein"]
     assert found.held_back_percent > max(rest)
+
+
+def test_a_saved_model_of_an_unknown_kind_is_refused() -> None:
+    with pytest.raises(ValueError, match=f"a nonlinearity among {', '.join(KINDS)} is needed, got 'bent'"):
+        HammersteinBody.from_dict({"bend": "bent", "std": [None, 0.1], "values": [0.0, 1.0], "linear": {}})
+
+
+def candidate(order: int, held_back: float, delay: int = 1, doubt: str = "", f: float = -0.5) -> Any:
+    fit = SimpleNamespace(f=np.array([1.0, f]))
+    return SimpleNamespace(
+        form=SimpleNamespace(order=order, delays=(delay,)), held_back=held_back, doubt=doubt, fit=fit
+    )
+
+
+def test_bends_are_tried_behind_the_best_linear_model_of_each_order_and_dead_time() -> None:
+    best, late = candidate(1, 0.2), candidate(1, 0.3, delay=0)
+    linear = [candidate(1, 0.25), best, candidate(1, 0.4), late, candidate(ORDERS + 1, 0.1)]
+    assert _bases(linear) == [best, late]
+
+
+def test_a_denominator_with_an_unbelievable_time_constant_is_no_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[list[float]] = []
+
+    def fit(kind: str, form: Any, data: Channels, denominators: list[np.ndarray]) -> None:  # noqa: ARG001
+        given.append([float(one[1]) for one in denominators])
+
+    monkeypatch.setattr(choose_hammerstein, "fit_hammerstein", fit)
+    slow = candidate(1, 0.2, doubt="time_constant", f=-1.0)
+    data = scaled(logged(PLANTED[0], 1))[0]
+    assert hammerstein_candidates([slow, candidate(1, 0.3), candidate(2, 0.4, f=-0.9)], data) == []
+    assert given == [[-0.5], [-0.9]] * len(KINDS)
+    given.clear()
+    hammerstein_candidates([slow], data)
+    assert given == [[-1.0]] * len(KINDS)  # it alone is better than none
+
+
+def test_where_no_bend_can_be_fitted_the_model_is_linear(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("estimation.identification.free_run.identify.hammerstein_candidates", lambda *_: [])
+    found = identified(logged(PLANTED[0], 1))
+    assert found.model.structure == "output-error"
+    assert "no_nonlinearity" in {str(note.code) for note in found.notes}

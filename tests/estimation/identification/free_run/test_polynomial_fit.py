@@ -1,13 +1,17 @@
 """Polynomial models: their free run, its sensitivities, and which products they are given."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from estimation.arrays import Array
+from estimation.identification.free_run import identify
+from estimation.identification.free_run.bodies import PolynomialBody
 from estimation.identification.free_run.choose_polynomial import _pruned
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.identify import identify_channels
@@ -15,7 +19,15 @@ from estimation.identification.free_run.linear_fit import Form, fit_linear
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.polynomial_fit import Runs, products
 from estimation.identification.free_run.polynomial_kernel import run_free
-from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, is_wild, one_more
+from estimation.identification.free_run.polynomial_terms import (
+    MOST_CANDIDATES,
+    STEPS,
+    TRIED,
+    begun,
+    candidate_terms,
+    is_wild,
+    one_more,
+)
 from estimation.identification.free_run.saved import load_models, save_models
 from plant.errors import HydrostateError
 
@@ -188,3 +200,72 @@ def test_a_run_that_grows_beyond_bounds_tells_where(way: Callable[[Any], Any]) -
     where, out, _ = ran(way, np.array([0.0, 3.0, 0.0, 0.0, 0.0, 0.0]), 10.0, (-np.inf, np.inf))
     assert 2 < where < 20
     assert abs(3.0 * out[where - 1]) >= 1e3
+
+
+def test_of_many_signals_only_cubes_of_one_source_are_tried() -> None:
+    data, _ = scaled(log())
+    few = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    many = begun(fit_linear(Form(7, (7,), (1,)), data), data)
+    assert few is not None
+    assert many is not None
+    sources = many.variables.source
+    cubes = [term for term in candidate_terms(many.variables) if term.min() >= 0]
+    assert len(candidate_terms(many.variables)) <= MOST_CANDIDATES
+    assert cubes
+    assert all(len({int(sources[v]) for v in term}) == 1 for term in cubes)
+    assert any(len({int(few.variables.source[v]) for v in term}) == 2 for term in candidate_terms(few.variables))
+
+
+def test_a_fit_that_runs_away_is_wild_takes_no_product_and_predicts_nothing() -> None:
+    data, _ = scaled(log())
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    away = replace(start, theta=5.0 * start.theta)
+    runs = Runs(away.variables, away.terms, data)
+    assert runs.run(away.theta) is None
+    assert runs.fit(away.theta, 10) is None
+    assert one_more(away, candidate_terms(away.variables), data) is None
+    assert is_wild(away, data)
+    body = PolynomialBody.of(away)
+    assert np.isnan(body.run(data.u[0], data.y[0])).all()
+
+
+def test_no_product_is_added_where_none_explains_anything_or_none_runs_free(monkeypatch: pytest.MonkeyPatch) -> None:
+    data, _ = scaled(log())
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    pool = candidate_terms(start.variables)
+    explained = replace(start, cost=1e9 * start.cost)
+    assert one_more(explained, pool, data) is None
+    tried: list[tuple[int, int]] = []
+    monkeypatch.setattr(Runs, "fit", lambda _, theta, steps: tried.append((theta.size, steps)))
+    assert one_more(start, pool, data) is None
+    assert tried == [(start.theta.size + 1, STEPS)] * TRIED
+
+
+def test_a_plant_that_no_polynomial_model_follows_freely_is_refused_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(identify, "polynomial_candidates", lambda *_: [])
+    with pytest.raises(HydrostateError, match="no polynomial model of 'deflection' runs free without growing beyond"):
+        identify_channels(log(), structure="narx", order=2, delay=1)
+    assert identify_channels(log(), structure="auto", order=2, delay=1).model.structure != "narx"
+
+
+def test_of_long_logs_the_liveliest_part_of_each_is_taken() -> None:
+    quiet, u = np.zeros((1000, 1)), np.zeros((3000, 1))
+    u[1200:1500, 0] = np.sin(np.arange(300.0))
+    data = channels_from([u, quiet], [np.arange(3000.0), np.arange(1000.0)], 1.0, ["u"], "y")
+    assert identify.section(data, 4000) is data
+    part = identify.section(data, 400)
+    assert [len(one) for one in part.y] == [300, 100]
+    first = int(part.y[0][0])
+    np.testing.assert_array_equal(part.u[0], u[first : first + 300])
+    assert first in np.linspace(0, 2700, 11).astype(int)
+    assert np.var(part.u[0]) > 0.5 * np.var(u[1200:1500])
+
+
+def test_a_model_is_found_in_what_the_command_wrote_around_it(tmp_path: Path) -> None:
+    model = identify_channels(log(300), structure="output-error", order=2, delay=1).model
+    entries = [{"rows": []}, {"model": "none"}, {"model": model.to_dict()}]
+    (tmp_path / "found.json").write_text(json.dumps(entries))
+    (again,) = load_models(tmp_path / "found.json")
+    assert again.to_dict() == model.to_dict()

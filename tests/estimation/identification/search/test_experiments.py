@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from estimation.identification import LinearModel, fit_output_error
-from estimation.identification.search.experiments import experiments_from
+from estimation.identification.search.experiments import _excited, experiments_from
 from plant.errors import HydrostateError
 
 WANTED = {"names": ("u", "y"), "n_excited": 2, "n_wanted": 10}
@@ -56,3 +56,9 @@ def test_a_weak_effect_that_is_there_is_not_refused() -> None:
     u, noise = np.random.default_rng(5).standard_normal((2, 2_000))
     fitted = fit_output_error(u, 0.25 * u + noise, 1e-3, n_numerator=1, n_denominator=1)
     assert fitted.dc_gain == pytest.approx(0.25, abs=4.0 * fitted.dc_gain_std)
+
+
+def test_a_log_shorter_than_what_it_should_excite_excites_nothing() -> None:
+    u = np.random.default_rng(1).normal(size=9)
+    assert [_excited(u, wanted) for wanted in (4, 5)] == [4, 0]
+    assert _excited(np.sin(np.arange(50.0)), 4) == 2

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from estimation.identification.notes import IdentificationCode
-from estimation.identification.signals.preprocess import detrend, resample, zero_phase_filter
+from estimation.identification.signals.preprocess import FEWEST_SAMPLES, detrend, resample, zero_phase_filter
 from plant.errors import HydrostateError, LogWarning
 
 TIME = 1e-3 * np.arange(4_000)
@@ -97,3 +97,10 @@ def test_missing_samples_stay_missing() -> None:
 def test_impossible_sample_times_are_refused(old: float, new: float) -> None:
     with pytest.raises(HydrostateError, match="sample_time must be positive"):
         resample(TIME, old, new)
+
+
+def test_too_few_samples_are_not_resampled() -> None:
+    few = np.arange(FEWEST_SAMPLES - 1.0)
+    with pytest.raises(HydrostateError, match=f"resampling needs {FEWEST_SAMPLES} samples or more, got {few.size}"):
+        resample(few, 1e-3, 2e-3)
+    np.testing.assert_array_equal(resample(few, 1e-3, 1e-3), few)

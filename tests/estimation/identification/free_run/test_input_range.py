@@ -1,0 +1,53 @@
+"""A polynomial model says where it is asked about inputs that it never saw."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.identification.free_run.bodies import PolynomialBody
+from estimation.identification.free_run.data import Channels, channels_from
+from estimation.identification.free_run.identify import identify_channels
+from estimation.identification.free_run.input_range import inputs_beyond
+from estimation.identification.free_run.model import FreeRunModel
+from tests.estimation.identification.free_run.test_polynomial_fit import duffing, log
+
+
+@pytest.fixture(scope="module")
+def model() -> FreeRunModel:
+    return identify_channels(log(), structure="narx", order=2, delay=1).model
+
+
+def driven(factor: float) -> Channels:
+    u, y = duffing(400, 1)
+    return channels_from([factor * u[:, None]], [y], 0.01, ["force"], "deflection")
+
+
+def test_inputs_within_the_range_are_no_matter(model: FreeRunModel) -> None:
+    assert inputs_beyond(model, driven(1.0)) == []
+    assert inputs_beyond(model, driven(0.5)) == []
+
+
+def test_an_input_that_leaves_the_range_is_named_with_how_far_and_how_often(model: FreeRunModel) -> None:
+    u = driven(2.0).u[0][:, 0]
+    (note,) = inputs_beyond(model, driven(2.0))
+    assert note.code == "input_beyond_range"
+    assert note.data["channel"] == "force"
+    assert (note.data["least"], note.data["greatest"]) == (u.min(), u.max())
+    low, high = 0.5 * u.min(), 0.5 * u.max()
+    assert (note.data["low"], note.data["high"]) == (pytest.approx(low), pytest.approx(high))
+    far = 0.1 * (high - low)
+    assert note.data["share"] == pytest.approx(np.mean((u < low - far) | (u > high + far)))
+
+
+def test_a_model_whose_products_hold_no_input_and_a_linear_one_have_no_range(model: FreeRunModel) -> None:
+    assert isinstance(model.body, PolynomialBody)
+    variables = replace(model.body.variables, source=np.zeros_like(model.body.variables.source))
+    own = replace(model, body=replace(model.body, variables=variables))
+    assert inputs_beyond(own, driven(9.0)) == []
+    linear = identify_channels(log(), structure="output-error", order=2, delay=1).model
+    assert inputs_beyond(linear, driven(9.0)) == []
+    assert np.isfinite([linear.level, linear.offset]).all()
+    assert np.isnan([model.level, model.offset]).all()
+    rest = linear.simulate(np.zeros(2000))
+    assert rest[-1] == pytest.approx(linear.offset, abs=1e-9)

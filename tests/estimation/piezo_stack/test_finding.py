@@ -1,0 +1,78 @@
+"""When a number of the piezo-stack actuator is told, and what speaks against all of them."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.finding import Outcome
+from estimation.piezo_stack import finding
+from estimation.piezo_stack.estimate import StackEstimate, stack_bounds
+from estimation.piezo_stack.finding import (
+    MOST_DEVIATION,
+    MOST_MISFIT,
+    SMALLEST_FAULT,
+    stack_finding,
+    stack_prospect,
+    stack_quantities,
+)
+from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, UNKNOWNS
+from plant.log.record import Record
+from plant.piezo_stack.parameters import PiezoStackParameters
+from plant.piezo_stack.run import sine_drive
+
+HEALTHY = PiezoStackParameters()
+SIZES = {"coulomb_friction": SMALLEST_FAULT["coulomb_friction"], "air_fraction": HEALTHY.air_fraction}
+
+
+def estimate(share: float, ratio: float = 1.0) -> StackEstimate:
+    """Deviations that are so much of the largest at which a number is told, residuals over noise."""
+    deviations = {name: share * MOST_DEVIATION * size for name, size in SIZES.items()}
+    misfit = {"stack_displacement_m": 1.0, "position_m": ratio}
+    return StackEstimate(dict(SIZES), deviations, np.eye(2), misfit, 10, HEALTHY)
+
+
+def found(monkeypatch: pytest.MonkeyPatch, one: StackEstimate) -> Any:
+    monkeypatch.setattr(finding, "estimate_stack", lambda *_, **__: one)
+    return stack_finding(Record(1e-4, {"drive_voltage_v": np.zeros(3)}), HEALTHY)
+
+
+def test_a_number_is_told_where_its_deviation_is_small_beside_the_healthy_value_or_a_small_fault() -> None:
+    known, vague = (stack_quantities(estimate(share), HEALTHY) for share in (0.99, 1.01))
+    assert {name: one.value for name, one in known.items()} == SIZES
+    assert all(one.ci95 is not None and one.unit == UNKNOWNS[name].unit for name, one in known.items())
+    assert all(one.value is None and one.ci95 is None and one.std is not None for one in vague.values())
+
+
+def test_a_channel_that_the_model_misses_takes_every_number_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    said = found(monkeypatch, estimate(0.5, 1.01 * MOST_MISFIT))
+    (reason,) = said.gate.reasons
+    assert (str(reason.code), dict(reason.data)) == (
+        "channel_missed",
+        {"channel": "position_m", "ratio": 1.01 * MOST_MISFIT},
+    )
+    assert said.outcome is Outcome.MISMATCH
+    assert all(one.value is None and one.std is not None for one in said.quantities.values())
+    assert found(monkeypatch, estimate(0.5, 0.99 * MOST_MISFIT)).gate.passed
+
+
+def test_what_the_sensors_do_not_determine_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    half = estimate(0.5)
+    half = replace(half, deviations={**half.deviations, "air_fraction": 1.0})
+    said = found(monkeypatch, half)
+    assert [dict(note.data) for note in said.not_told] == [{"names": "air_fraction"}]
+    assert said.outcome is Outcome.OK
+    assert found(monkeypatch, estimate(2.0)).outcome is Outcome.NOT_OBSERVABLE
+    assert found(monkeypatch, estimate(0.5)).not_told == ()
+
+
+def test_a_run_that_is_planned_tells_the_least_deviations() -> None:
+    drive = sine_drive(275.0, 140.0, 0.01, 1e-4)
+    said = stack_prospect(HEALTHY, drive, 1e-4, channels=("stack_displacement_m",))
+    bounds = stack_bounds(HEALTHY, drive, 1e-4, channels=("stack_displacement_m",))
+    assert set(said.quantities) == set(DEFAULT_UNKNOWNS)
+    assert said.quantities["air_fraction"].value == HEALTHY.air_fraction
+    for name, one in said.quantities.items():
+        size = 1.0 if UNKNOWNS[name].scale else one.value
+        assert one.std == pytest.approx(bounds[name] * size)
