@@ -84,7 +84,5 @@ def test_an_unstable_model_is_not_simulated_to_look_for_feedback(recwarn: pytest
 def test_an_adopted_model_that_is_unstable_does_not_run_free() -> None:
     unstable: Any = SimpleNamespace(is_stable=False, structure="arx")
     data: Any = SimpleNamespace(output="speed")
-    with pytest.raises(
-        HydrostateError, match="the arx model of 'speed' is unstable and does not run free: use"
-    ):
+    with pytest.raises(HydrostateError, match="the arx model of 'speed' is unstable and does not run free: use"):
         other_structures._body(unstable, data, data)
