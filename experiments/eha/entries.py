@@ -121,7 +121,7 @@ def diagnosis_entries(found: "Finding") -> dict[str, Any]:
         **_notes(found),
     }
     if found.condition is None:
-        return {**entries, "message": clauses(str(note) for note in found.notes if note.code in NO_CLASS)}
+        return {**entries, "message": _no_class_message(found)}
     if not judged and found.outcome is Outcome.MISMATCH:
         return {**entries, "message": clauses(str(note) for note in found.against)}
     if not judged:
@@ -152,6 +152,14 @@ def _notes(found: "Finding") -> dict[str, Any]:
         "notes": [note.to_dict() for note in found.all_notes],
         "warnings": [str(note) for note in found.notes if note.code not in COSTS | NO_CLASS],
     }
+
+
+def _no_class_message(found: "Finding") -> str:
+    """Say why a log is in no class: a sensor that is accused comes first, since no other drive mends it."""
+    from estimation.notes import SensorCode
+
+    accused = [note for note in found.gate.reasons if isinstance(note.code, SensorCode)]
+    return clauses(str(note) for note in (*accused, *(one for one in found.notes if one.code in NO_CLASS)))
 
 
 def _estimate_message(found: "Finding") -> str:

@@ -169,3 +169,12 @@ def test_nominal_models_that_miss_a_log_are_named_beside_what_the_circuit_says()
     assert found.unknown
     (none_fits,) = (note for note in found.against if note.code == AgainstCode.NONE_FITS)
     assert none_fits.data["percent"] > 50.0
+
+
+def test_a_log_in_no_class_names_the_frozen_sensor_first() -> None:
+    found = diagnose_log(at_rest(), Rig())
+    froze = SensorCode.SENSOR_FROZE.note(channel=PRESSURE, value=4e5, begin_s=1.0, length_s=3.0)
+    entries = diagnosis_entries(replace(found, gate=replace(found.gate, passed=False, reasons=(froze,))))
+    assert entries["condition"] is None
+    assert entries["message"] == f"{froze}; {diagnosis_entries(found)['message']}"
+    assert "no class: " in diagnosis_entries(found)["message"]
