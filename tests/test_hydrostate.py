@@ -52,6 +52,7 @@ def test_estimate_and_diagnosis_are_one_answer(log: hs.Log, verdict: hs.Answer) 
     assert found.bulk_modulus.covers(log.rig.parameters.bulk_modulus)
     assert verdict.condition == "minor_leakage"
     assert verdict.probabilities["minor_leakage"] > 0.9
+    assert [note.to_dict() for note in verdict.all_notes] == verdict.to_dict()["notes"] != []
 
 
 def test_an_answer_turns_into_what_a_program_needs(verdict: hs.Answer) -> None:

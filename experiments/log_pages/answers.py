@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from estimation.finding import Finding, Quantity
     from estimation.identification.model.linear_model import LinearModel
+    from plant.notes import Note
 
 
 _FIVE = "{:.5g}".format
@@ -86,6 +87,11 @@ class Answer(Shown):
     def believed(self) -> bool:
         """Whether the numbers can be believed."""
         return self.finding.gate.passed
+
+    @property
+    def all_notes(self) -> "tuple[Note, ...]":
+        """Every remark, each once, as a code with data and a sentence."""
+        return self.finding.all_notes
 
     def __str__(self) -> str:
         from experiments.command.terminal import rendered
