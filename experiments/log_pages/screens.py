@@ -1,6 +1,7 @@
 """What a terminal shows of findings, whatever the actuator."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from math import ceil, floor, isfinite, log10
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.json_output import Result
@@ -23,10 +24,29 @@ def quantities_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "
     del options
     for result in results:
         about = result.get("file", result["plant"])
-        shown = table("quantity", "value", "95 % interval", "unit", title=about)
-        for name, entry in result["quantities"].items():
-            words = "-" if entry["ci95"] is None else f"{entry['ci95'][0]:.4g} to {entry['ci95'][1]:.4g}"
-            value = "-" if entry["value"] is None else f"{entry['value']:.4g}"
-            shown.add_row(name.replace("_", " "), value, words, entry["unit"])
+        entries = result["quantities"]
+        total = any(entry.get("ci95_total") for entry in entries.values())
+        shown = table("quantity", "value", "95 % interval", *(["with rig error"] if total else []), "unit", title=about)
+        for name, entry in entries.items():
+            ends, whole = entry["ci95"], entry.get("ci95_total")
+            value = "-" if entry["value"] is None else f"{entry['value']:.{_digits(ends)}g}"
+            said = [_ends(ends), *([_ends(whole)] if total else [])]
+            shown.add_row(name.replace("_", " "), value, *said, entry["unit"])
         yield shown
         yield f"{about}: {result['outcome'].replace('_', ' ')}: {result['message']}"
+
+
+def _digits(ends: Sequence[float] | None) -> int:
+    """Return the digits that show an interval's width to two; at least four, and the whole of a number below 1e6."""
+    largest = 0.0 if ends is None else max(map(abs, ends))
+    if ends is None or not isfinite(largest) or not ends[1] > ends[0]:
+        return 4
+    whole = min(floor(log10(largest)) + 1, 6)
+    return min(max(4, whole, ceil(log10(largest / (ends[1] - ends[0]))) + 2), 12)
+
+
+def _ends(ends: Sequence[float] | None) -> str:
+    if ends is None:
+        return "-"
+    digits = _digits(ends)
+    return f"{ends[0]:.{digits}g} to {ends[1]:.{digits}g}"

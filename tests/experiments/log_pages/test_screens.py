@@ -1,0 +1,47 @@
+"""What a terminal shows of quantities: digits enough to tell the ends of an interval apart."""
+
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from experiments.log_pages.screens import quantities_shown
+
+
+def shown(**entry: Any) -> str:
+    result = {
+        "file": "run.csv",
+        "plant": "a",
+        "quantities": {"spring_stiffness": {"unit": "N/m", **entry}},
+        "outcome": "ok",
+        "message": "said",
+    }
+    console = Console(width=200)
+    with console.capture() as caught:
+        for one in quantities_shown([result], {}):
+            console.print(one)
+    return caught.get()
+
+
+@pytest.mark.parametrize(
+    ("value", "ends", "words"),
+    [
+        (1e4, [9999.3, 10000.7], ["10000", "9999.3 to 10000.7"]),
+        (2e-12, [1.5e-12, 2.5e-12], ["2e-12", "1.5e-12 to 2.5e-12"]),
+        (-5.0, [-5.00002, -4.99998], ["-5", "-5.00002 to -4.99998"]),
+        (3.0, [3.0, 3.0], ["3", "3 to 3"]),
+        (None, None, ["-"]),
+    ],
+)
+def test_the_ends_of_an_interval_are_told_apart(
+    value: float | None, ends: list[float] | None, words: list[str]
+) -> None:
+    found = shown(value=value, ci95=ends)
+    assert all(word in found.replace("  ", " ") for word in words)
+    assert "with rig error" not in found
+
+
+def test_the_interval_with_rig_error_stands_beside_the_other() -> None:
+    found = shown(value=1e4, ci95=[9999.3, 10000.7], ci95_total=[9000.0, 11000.0])
+    assert "with rig error" in found
+    assert "9000 to 11000" in found
