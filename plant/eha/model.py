@@ -41,7 +41,9 @@ class EhaParameters:
 
     pump_displacement: float = si(5.57e-7, "m^3/rad", "pump displacement D_p", "Table 2, errata E1")
     piston_area: float = si(1.52e-3, "m^2", "effective piston area A", "Table 2")
-    chamber_volume: float = si(1.08e-3, "m^3", "mean chamber volume V_0", "Table 2, errata E2")
+    chamber_volume: float = si(
+        1.08e-3, "m^3", "V_0: half the oil of one chamber in mid-stroke, with port and hose", "Table 2, errata E2"
+    )
     moving_mass: float = si(7.376, "kg", "moving mass M", "section 5")
     bulk_modulus: float = si(2.07e8, "Pa", "effective bulk modulus beta", "section 7, errata E2, E20")
     leakage_coefficient: float = si(4.784e-12, "m^3/(s Pa)", "lumped leakage L_t", "Table 3, errata E5", zero=True)

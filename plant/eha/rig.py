@@ -257,7 +257,8 @@ def rig_template(
     parameters = parameter_class()
     lines = [
         "# A rig file: an actuator's parameters, how well each is known, and the names of the columns in its logs.",
-        "# All values are SI. A parameter that is left out keeps the value shown here.",
+        "# All values are SI, and those of the healthy actuator.",
+        "# A parameter that is left out keeps the value shown here.",
         "",
         *(['name = "paper"'] if plant == EHA else [f'name = "{plant}"', f'plant = "{plant}"']),
         *(
