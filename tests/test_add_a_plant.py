@@ -139,3 +139,11 @@ def test_the_contracts_hold_for_it(copy: Path) -> None:
     )
     assert done.returncode == 0, done.stdout[-3000:]
     assert " passed" in done.stdout
+
+
+@pytest.mark.slow
+def test_its_imports_are_in_order_and_its_types_are_strict(copy: Path) -> None:
+    given = list(files())
+    for tool in (["ruff", "check"], ["pyright"]):
+        done = run(copy, *tool, *given)
+        assert done.returncode == 0, done.stdout
