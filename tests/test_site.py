@@ -46,6 +46,18 @@ def test_every_link_leads_to_a_page_and_a_heading_that_are_there(page: Path) -> 
         assert not parts.fragment or parts.fragment in anchors(target), link
 
 
+def test_every_test_that_a_page_names_is_there() -> None:
+    tests = sorted((ROOT / "tests").rglob("test_*.py"))
+    defined = {name for file in tests for name in re.findall(r"^def (test_\w+)", file.read_text("utf-8"), re.MULTILINE)}
+    named = {(page, name) for page in PAGES for name in re.findall(r"`([^`\n]*)`", page.read_text("utf-8"))}
+    functions = {(page, name) for page, name in named if re.fullmatch(r"test_\w+", name)}
+    paths = {(page, name) for page, name in named if re.fullmatch(r"tests/[\w/.]+", name)}
+    assert functions
+    assert paths
+    assert not [one for one in functions if one[1] not in defined]
+    assert not [one for one in paths if not (ROOT / one[1]).exists()]
+
+
 def test_the_site_holds_every_page_once() -> None:
     text = (DOCS / "index.md").read_text("utf-8")
     held = [

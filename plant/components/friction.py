@@ -8,6 +8,8 @@ def quadratic_friction(
 ) -> Scalar:
     """Return the friction force of a sliding piston, equation 5.10.
 
+    The law stands in four other forms too, `sliding` first; ``docs/friction-law.md`` lists them.
+
     Parameters
     ----------
     velocity : float or Expression
