@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import stdtrit
 
 from estimation.arrays import Array, BoolArray, IntArray
-from estimation.identification.signals.local_polynomial import FrequencyResponse
+from estimation.identification.signals.local_polynomial import ComplexArray, FrequencyResponse
 from plant.errors import HydrostateError
 
 REPEATS = 1e-4
@@ -17,6 +18,20 @@ EXCITED = 1e-3
 
 NEIGHBOURS = 15
 """Detection lines whose mean power tells the distortion of an excited line."""
+
+PARTS = 8
+"""Of half a period, whose powers of distortion tell how much a level scatters from one multisine to another.
+
+High powers of a signal have heavy tails: of few long parts the means are more nearly normal."""
+
+BESIDE, CURVED = 4, 2
+"""Excited lines on either side over which a response is a polynomial, and its degree."""
+
+ALIKE = 2.0
+"""Distortion on excited lines over that on silent ones, from which the response is not such a polynomial [fraction]."""
+
+NEAR = 1.0
+"""How near to its mean over multisines a level is wanted [dB]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +52,8 @@ class Distortion:
         Lines that are driven; odd multiples of the lowest frequency.
     noise, power : ndarray, shape (k,)
         Variance of the noise in the mean over periods, and power of that mean [output unit squared].
+    stray : ndarray of complex, shape (k,)
+        Output on silent lines, and what a smooth response leaves on excited ones [output unit].
     """
 
     response: FrequencyResponse
@@ -47,6 +64,7 @@ class Distortion:
     odd: BoolArray
     noise: Array
     power: Array
+    stray: ComplexArray
 
     def level(self, *, odd: bool) -> float:
         """Return the mean power of distortion a line, by what stands on lines that are not driven, noise taken off.
@@ -63,6 +81,79 @@ class Distortion:
         """
         silent = _silent(self.excited, self.odd == odd)
         return float(np.mean(self.power[silent] - self.noise[silent])) if silent.any() else float("nan")
+
+    def level_interval(self, *, odd: bool, probability: float = 0.95) -> tuple[float, float]:
+        """Return an interval for the mean of a level over multisines of the same lines with other phases.
+
+        A period is a short stretch of a random signal: high powers of it rise and fall from multisine to multisine by
+        more than lines that are independent would tell. How much is read off the distortion's power in parts of the
+        period.
+
+        Parameters
+        ----------
+        odd : bool
+            Of odd distortion; of even otherwise.
+        probability : float
+            With which it holds the mean [probability].
+
+        Returns
+        -------
+        tuple of float
+            Ends [output unit squared]; NaN where they cannot be told.
+        """
+        level, reach = self.level(odd=odd), self._reach(odd, probability)
+        if not np.isfinite(reach):
+            return float("nan"), float("nan")
+        if not level > 0.0:
+            return 0.0, max(level + reach, 0.0)
+        with np.errstate(over="ignore"):
+            factor = float(np.exp(reach / level))
+        return level / factor, level * factor
+
+    def period_wanted(self, *, odd: bool) -> int | None:
+        """Return the period at which 95 % of multisines would tell a level within `NEAR`; None where it is not known.
+
+        Parameters
+        ----------
+        odd : bool
+            Of odd distortion; of even otherwise.
+
+        Returns
+        -------
+        int or None
+            Samples, at the same sample time and band.
+        """
+        level, reach = self.level(odd=odd), self._reach(odd, 0.95)
+        if not (level > 0.0 and np.isfinite(reach)):
+            return None
+        return int(np.ceil(self.period * (10.0 / np.log(10.0) * reach / level / NEAR) ** 2))
+
+    def _reach(self, odd: bool, probability: float) -> float:
+        return float(stdtrit(PARTS - 1, 0.5 + 0.5 * probability)) * self._spread(odd)
+
+    def _spread(self, odd: bool) -> float:
+        """Return the standard deviation of a level from multisine to multisine; NaN where it is not known."""
+        kind = self.odd == odd
+        silent = _silent(self.excited, kind)
+        if not self.power[silent].sum() > 0.0 or self.period // 2 < 8 * PARTS:
+            return float("nan")
+        driven, lines = self.excited & kind, silent.copy()
+        power, count = self.power[silent], int(silent.sum())
+        if driven.any():
+            # the other kind of distortion would stand on excited lines, too, if even lines were driven
+            own = float(np.mean(np.abs(self.stray[driven]) ** 2))
+            if not own <= ALIKE * float(power.mean()) or (self.excited & ~kind).any():
+                return float("nan")
+            lines |= driven
+        spectrum = np.zeros(self.period // 2 + 1, dtype=np.complex128)
+        spectrum[1 + np.flatnonzero(lines)] = self.stray[lines]
+        # odd lines change their sign after half a period, even ones repeat themselves
+        signal = np.fft.irfft(spectrum, self.period)[: self.period // 2]
+        parts = np.array([float(np.mean(one**2)) for one in np.array_split(signal, PARTS)])
+        share = float(np.var(parts, ddof=1)) / PARTS / float(parts.mean()) ** 2
+        # lines of one multisine are complex normal: their powers scatter by as much as they are
+        lost = float(np.sum(power**2)) / 2.0 / float(power.sum()) ** 2 * (1.0 - count / int(lines.sum()))
+        return float(power.mean()) * float(np.sqrt(share + lost))
 
 
 def find_period(u: ArrayLike) -> int | None:
@@ -164,7 +255,9 @@ def best_linear_approximation(
     variance = np.where(np.isnan(stray), noise[at], np.maximum(stray, noise[at])) / np.abs(inside[at]) ** 2
     freedom = periods - 1 if np.isnan(stray).all() else NEIGHBOURS
     response = FrequencyResponse(frequency[at], mean[at] / inside[at], variance, freedom)
-    return Distortion(response, length, periods, frequency, excited, odd, noise, power)
+    left = mean.copy()
+    left[at] = _left(mean[at], inside[at])
+    return Distortion(response, length, periods, frequency, excited, odd, noise, power, left)
 
 
 def _stray(excited: BoolArray, odd: BoolArray, power: Array, at: IntArray) -> Array:
@@ -179,3 +272,20 @@ def _stray(excited: BoolArray, odd: BoolArray, power: Array, at: IntArray) -> Ar
         begin = np.clip(np.searchsorted(silent, at[mine]) - NEIGHBOURS // 2, 0, len(silent) - NEIGHBOURS)
         found[mine] = (sums[begin + NEIGHBOURS] - sums[begin]) / NEIGHBOURS
     return found
+
+
+def _left(output: ComplexArray, inside: ComplexArray) -> ComplexArray:
+    """Return what a polynomial over neighbouring excited lines leaves; NaN where they are too few."""
+    n, span = len(output), 2 * BESIDE + 1
+    if n < span:
+        return np.full(n, np.nan, dtype=np.complex128)
+    begin = np.clip(np.arange(n) - BESIDE, 0, n - span)
+    places = begin[:, None] + np.arange(span)
+    distance = (places - np.arange(n)[:, None]) / BESIDE
+    columns = distance[:, :, None] ** np.arange(CURVED + 1) * inside[places][:, :, None]
+    basis = np.linalg.qr(columns)[0]
+    target = output[places][:, :, None]
+    left = (target - basis @ (basis.conj().transpose(0, 2, 1) @ target))[:, :, 0]
+    own = np.arange(n) - begin
+    leverage = np.sum(np.abs(basis[np.arange(n), own]) ** 2, axis=1)
+    return left[np.arange(n), own] / np.sqrt(1.0 - leverage)

@@ -13,6 +13,12 @@ from plant.errors import HydrostateError
 SETTLING, FEWEST_PERIODS = 1, 2
 """Periods that are left out at the beginning, and periods wanted behind them."""
 
+TOLD = (
+    *("period_samples", "periods", "noise_power", "odd_power", "even_power"),
+    *("odd_power_interval", "even_power_interval", "odd_period_for_1_db", "even_period_for_1_db"),
+)
+"""What only a multisine tells, by the names of the JSON contract."""
+
 
 @dataclass(frozen=True, eq=False)
 class MeasuredResponse:
@@ -39,11 +45,15 @@ class MeasuredResponse:
             "real": one.response.real.tolist(),
             "imag": one.response.imag.tolist(),
             "radius95": one.radius().tolist(),
-            **dict.fromkeys(("period_samples", "periods", "noise_power", "odd_power", "even_power")),
+            **dict.fromkeys(TOLD),
         }
         if told is not None:
             levels = {name: told.level(odd=name == "odd_power") for name in ("odd_power", "even_power")}
             found |= {name: level if np.isfinite(level) else None for name, level in levels.items()}
+            for name in ("odd", "even"):
+                ends = told.level_interval(odd=name == "odd")
+                found[f"{name}_power_interval"] = list(ends) if np.isfinite(ends).all() else None
+                found[f"{name}_period_for_1_db"] = told.period_wanted(odd=name == "odd")
             found |= {"period_samples": told.period, "periods": told.periods, "noise_power": float(told.noise.mean())}
         return found
 

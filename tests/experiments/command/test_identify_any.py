@@ -159,6 +159,9 @@ def test_a_frequency_response_is_drawn_and_printed_with_its_levels(tmp_path: Pat
         if name == "multisine":
             assert (told["period_samples"], told["periods"]) == (1024, 3)
             assert told["odd_power"] > 100.0 * abs(told["even_power"])
+            low, high = told["odd_power_interval"]
+            assert low < told["odd_power"] < high
+            assert told["odd_period_for_1_db"] > 1024
             assert told["noise_power"] == pytest.approx(1e-4 / 1024 / 3, rel=0.2)
 
 

@@ -111,3 +111,41 @@ def test_the_method_is_what_the_input_allows(log: tuple[np.ndarray, np.ndarray])
     assert (told.method, told.to_dict()["periods"]) == ("local-polynomial", None)
     with pytest.raises(HydrostateError, match="needs every sample of the output, got 1 that are missing"):
         measured_response(v, np.where(np.arange(500) == 3, np.nan, v), 0.1)
+
+
+def test_a_level_comes_with_how_far_it_scatters_from_multisine_to_multisine(
+    log: tuple[np.ndarray, np.ndarray],  # type: ignore[type-arg]
+) -> None:
+    every: list[tuple[float, float, float]] = []
+    for seed in range(30):
+        rng = np.random.default_rng([11, seed])
+        u = np.tile(multisine(odd_lines(rng), rng), 3)
+        told = best_linear_approximation(u, bent(u, DAMPED) + 0.02 * rng.normal(size=len(u)), 1.0)
+        every.append((told.level(odd=True), *told.level_interval(odd=True)))
+    level, low, high = np.array(every).T
+    mean = level.mean()
+    assert np.all((low < level) & (level < high))
+    assert 0.8 <= np.mean((low <= mean) & (mean <= high)) <= 1.0
+    # neither so wide that it says nothing, nor as narrow as lines that were independent would have it
+    scatter = np.std(np.log(level))
+    assert 1.2 * scatter < np.median(np.log(high / low)) / 2.0 < 4.0 * scatter
+    told = best_linear_approximation(*log, 1.0)
+    wanted = told.period_wanted(odd=True)
+    assert wanted is not None
+    assert wanted > PERIOD
+
+
+def test_what_a_level_scatters_by_is_not_guessed_where_the_lines_do_not_tell_it() -> None:
+    rng = np.random.default_rng(2)
+    every = multisine(np.arange(1, 3200), rng)
+    u = np.tile(every, 3)
+    told = best_linear_approximation(u, bent(u, DAMPED), 1.0)
+    assert np.isnan(told.level_interval(odd=True)).all()
+    assert told.period_wanted(odd=True) is None
+    found = measured_response(u, bent(u, DAMPED), 1.0).to_dict()
+    assert found["odd_power_interval"] is None
+    # far apart lines on a sharp resonance: what a smooth response leaves there is no distortion
+    lines = 64 * np.arange(1, 50, 2) - 1
+    u = np.tile(multisine(lines, rng), 3)
+    coarse = best_linear_approximation(u, filtered([0.0, 0.1], [1.0, -1.9, 0.99], u), 1.0)
+    assert np.isnan(coarse.level_interval(odd=True)).all()
