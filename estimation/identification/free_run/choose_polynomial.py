@@ -1,15 +1,21 @@
-"""How many products a polynomial model is given: grown on blocks side by side, ended where held-back runs get worse."""
+"""Which polynomial model is offered: products grown one by one, or all of a few lags kept small by a penalty.
 
-from collections.abc import Sequence
+How many products are grown is told by blocks that are held back: each has a growth of its own, which never saw it. What
+is offered must run well there, and its fits to different blocks must agree where the same inputs come in another order.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from estimation.identification.free_run.choose_linear import BLOCKS, Candidate, block_error, pooled
 from estimation.identification.free_run.data import Channels, blocks
-from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.dense_polynomial import Asked, Judged, forms_tried, judged_recipes
+from estimation.identification.free_run.linear_fit import Form, fit_linear
+from estimation.identification.free_run.other_orders import disagreement, is_wild
 from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs
-from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, is_wild, one_more, without_term
+from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, one_more, without_term
 
 MOST_TERMS = 20
 """Products beside the linear terms."""
@@ -26,6 +32,9 @@ HIGHEST_BASE = 4
 BASES, SCREENED, KEPT = 6, 3, 2
 """Linear models that products are added to, how many products they are given first, and how many models go on."""
 
+COMPARED = 20
+"""Models of every product, best on what was held back, that are fitted to all data and tried in other orders."""
+
 
 @dataclass(frozen=True, eq=False)
 class PolynomialCandidate:
@@ -33,22 +42,37 @@ class PolynomialCandidate:
 
     Parameters
     ----------
+    fit : PolynomialFit
+        Of all data that structures are compared on.
+    refit : callable
+        Fits the same to other data of as many logs; None where that runs away.
     held_back : float
         Root-mean-square free-run error of the blocks held back, over the output's deviation [dimensionless].
     block_errors : tuple of float
         The same of each block; NaN where one holds nothing [dimensionless].
+    spread : float
+        How far fits without one block each run from it on inputs in other orders [dimensionless].
     bic : float
         Information criterion of the free run [dimensionless].
     """
 
     fit: PolynomialFit
+    refit: Callable[[Channels], PolynomialFit | None]
     held_back: float
     block_errors: tuple[float, ...]
+    spread: float
     bic: float
 
+    @property
+    def price(self) -> float:
+        """What models are compared by: error on what was held back, and doubt elsewhere [dimensionless]."""
+        return float(np.hypot(self.held_back, self.spread))
 
-def polynomial_candidates(linear: Sequence[Candidate], data: Channels) -> list[PolynomialCandidate]:
-    """Return polynomial models that begin at several linear ones; those that do best after a few products go on.
+
+def polynomial_candidates(
+    linear: Sequence[Candidate], data: Channels, asked: Asked | None = None
+) -> list[PolynomialCandidate]:
+    """Return polynomial models: grown from linear ones, and of every product.
 
     Parameters
     ----------
@@ -56,13 +80,43 @@ def polynomial_candidates(linear: Sequence[Candidate], data: Channels) -> list[P
         Judged on blocks of the same data.
     data : Channels
         Scaled.
+    asked : Asked, optional
+        Sizes that the data do not choose.
     """
+    delays = min(linear, key=lambda one: one.held_back).form.delays
+    return [*_grown(linear, data), *_dense(data, forms_tried(delays, asked or Asked()))]
+
+
+def _grown(linear: Sequence[Candidate], data: Channels) -> list[PolynomialCandidate]:
     growths = [_Growth(base, whole, data) for base in _bases(linear) if (whole := begun(base.fit, data)) is not None]
     screened = [growth for growth in growths if growth.advance(SCREENED)]
     best = sorted(screened, key=lambda one: min(one.errors))[:KEPT]
     for growth in best:
         growth.advance(MOST_TERMS)
     return [growth.finished() for growth in best]
+
+
+def _dense(data: Channels, forms: Sequence[Form]) -> list[PolynomialCandidate]:
+    """Return the models of every product that do best on what was held back, but for those that leave their range."""
+    parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
+    found: list[PolynomialCandidate] = []
+    for one in sorted(judged_recipes(data, parts, forms), key=lambda one: one.held_back)[:COMPARED]:
+        fit = one.recipe.fit(data)
+        if fit is not None and not is_wild(fit, data):
+            found.append(_candidate(fit, one.recipe.fit, one, data))
+    return found
+
+
+def _candidate(
+    fit: PolynomialFit, refit: Callable[[Channels], PolynomialFit | None], judged: Judged, data: Channels
+) -> PolynomialCandidate:
+    spread = disagreement(judged.fits, fit, data)
+    return PolynomialCandidate(fit, refit, judged.held_back, judged.block_errors, spread, _bic(fit, data))
+
+
+def _bic(fit: PolynomialFit, data: Channels) -> float:
+    n, p = data.n_samples, fit.theta.size
+    return n * float(np.log(max(fit.cost, 1e-300) / n)) + p * float(np.log(n))
 
 
 def _bases(linear: Sequence[Candidate]) -> list[Candidate]:
@@ -85,6 +139,7 @@ class _Growth:
         self.parts = [data.without(mask) for mask in self.masks]
         self.fits = [begun(fit_linear(base.form, part, [base.fit.f]), part) for part in self.parts]
         self.block_errors = [self._held_back()]
+        self.history = [list(self.fits)]
 
     @property
     def errors(self) -> list[float]:
@@ -105,6 +160,7 @@ class _Growth:
             if more is None:
                 break
             self.path.append(more)
+            self.history.append(list(self.fits))
             wild = is_wild(more, self.data)
             self.block_errors.append((float("inf"),) * len(self.masks) if wild else self._held_back())
         return True
@@ -116,9 +172,10 @@ class _Growth:
         count = next(k for k, error in enumerate(errors) if error <= (1.0 + CLEARLY) * least)
         fit = _pruned(self.path[count], self.data)
         fit = Runs(fit.variables, fit.terms, self.data).fit(fit.theta, FINAL_STEPS) or fit
-        n, p = self.data.n_samples, fit.theta.size
-        bic = n * float(np.log(fit.cost / n)) + p * float(np.log(n))
-        return PolynomialCandidate(fit, errors[count], self.block_errors[count], bic)
+        parts = [part for part in self.history[count] if part is not None]
+        spread = disagreement(parts, fit, self.data)
+        bic = _bic(fit, self.data)
+        return PolynomialCandidate(fit, _settled(fit), errors[count], self.block_errors[count], spread, bic)
 
     def _held_back(self) -> tuple[float, ...]:
         target, errors = np.concatenate(self.data.y), list[float]()
@@ -128,6 +185,16 @@ class _Growth:
                 return (float("inf"),) * len(self.masks)
             errors.append(block_error(ran[0] - target, np.concatenate(mask) & np.isfinite(target)))
         return tuple(errors)
+
+
+def _settled(fit: PolynomialFit) -> Callable[[Channels], PolynomialFit | None]:
+    """Return how the products of a fit are fitted to other data."""
+
+    def refit(data: Channels) -> PolynomialFit | None:
+        runs = Runs(fit.variables, fit.terms, data)
+        return runs.fit(np.concatenate([fit.coefficients, runs.start_values()]), FINAL_STEPS)
+
+    return refit
 
 
 def _pruned(fit: PolynomialFit, data: Channels) -> PolynomialFit:

@@ -19,12 +19,12 @@ from estimation.identification.free_run.choose_hammerstein import (
 from estimation.identification.free_run.choose_linear import Candidate, chosen, linear_candidates
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate, polynomial_candidates
 from estimation.identification.free_run.data import Channels, Scaling, scaled
+from estimation.identification.free_run.dense_polynomial import Asked
 from estimation.identification.free_run.hammerstein_body import HammersteinBody
 from estimation.identification.free_run.hammerstein_fit import deviations, refitted
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
-from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, Runs
 from estimation.identification.free_run.transfer_function import linear_model
 from estimation.identification.notes import IdentificationCode
 from plant.errors import HydrostateError, LogWarning, require_known
@@ -159,13 +159,13 @@ def _identified(
         structure = "output-error"
     body, held_back, named = LinearBody.of(best.fit), best.held_back, "output-error"
     if structure != "output-error":
-        polynomial = polynomial_candidates(linear if sound else [best], part)
+        polynomial = polynomial_candidates(linear if sound else [best], part, Asked(order, delay, n_numerator))
         rows += [polynomial_row(one) for one in polynomial]
-        better = min(polynomial, key=lambda one: one.held_back, default=None)
+        better = min(polynomial, key=lambda one: (one.price, one.held_back), default=None)
         if better is None and structure == "narx":
             raise HydrostateError(f"no polynomial model of {data.output!r} runs free without growing beyond bounds")
         taken = better is not None and (structure == "narx" or not sound or _clearly_better(better, best))
-        if bend is not None and not (taken and better is not None and better.held_back < bend.held_back):
+        if bend is not None and not (taken and better is not None and better.price < bend.held_back):
             return _bent(bend, data, whole, rows)
         if taken and better is not None:
             body, held_back, named = _refitted(better, whole), better.held_back, "narx"
@@ -275,7 +275,7 @@ def _clearly_better(nonlinear: PolynomialCandidate, linear: Candidate) -> bool:
         if not (np.isnan(one) or np.isnan(other))
     ]
     won = sum(one < other for one, other in pairs)
-    return nonlinear.held_back < (1.0 - CLEAR_MARGIN) * linear.held_back and 2 * won >= len(pairs)
+    return nonlinear.price < (1.0 - CLEAR_MARGIN) * linear.held_back and 2 * won >= len(pairs)
 
 
 def _undetermined(candidate: Candidate, data: Channels, by: Scaling) -> bool:
@@ -286,10 +286,7 @@ def _undetermined(candidate: Candidate, data: Channels, by: Scaling) -> bool:
 
 def _refitted(found: PolynomialCandidate, whole: Channels) -> PolynomialBody:
     """Return a polynomial body fitted to all data, or to as much as is practical."""
-    data, fit = section(whole, MOST_FITTED), found.fit
-    runs = Runs(fit.variables, fit.terms, data)
-    settled = runs.fit(np.concatenate([fit.coefficients, runs.start_values()]), FINAL_STEPS)
-    return PolynomialBody.of(settled or fit)
+    return PolynomialBody.of(found.refit(section(whole, MOST_FITTED)) or found.fit)
 
 
 def section(data: Channels, most: int) -> Channels:

@@ -208,15 +208,19 @@ class Runs:
             rows.append(direct)
         return np.concatenate(rows)
 
-    def fit(self, theta: Array, steps: int) -> PolynomialFit | None:
+    def fit(self, theta: Array, steps: int, penalty: float = 0.0) -> PolynomialFit | None:
         """Return the minimum of the squared free-run error that is reached from given values, if they run at all.
 
         Parameters
         ----------
         theta : ndarray, shape (p,)
             All values.
+        penalty : float
+            Weight of the squared coefficients of products beside the mean squared error [dimensionless].
         """
         target = self.target[self.used]
+        weight = np.zeros(theta.size)
+        weight[: self.terms.shape[0]] = penalty * target.size * (self.terms[:, 1] >= 0)
         huge = (np.inf, np.eye(theta.size), np.zeros(theta.size))
 
         def at(values: Array) -> tuple[float, Array, Array]:
@@ -227,15 +231,15 @@ class Runs:
             left = ran[0][self.used] - target
             gram = jacobian.T @ jacobian
             # first values of a log whose outputs are held back have no effect
-            gram[np.diag_indices_from(gram)] += 1e-12 * max(float(np.diag(gram).max()), 1.0)
+            gram[np.diag_indices_from(gram)] += 1e-12 * max(float(np.diag(gram).max()), 1.0) + weight
             if not np.isfinite(gram).all():
                 return huge
-            return float(left @ left), gram, jacobian.T @ left
+            return float(left @ left + weight @ values**2), gram, jacobian.T @ left + weight * values
 
         if not np.isfinite(at(theta)[0]):
             return None
         cost, best = levenberg(at, theta, lambda _: True, tolerance=TOLERANCE, most_steps=steps)
-        return PolynomialFit(self.variables, self.terms, best, cost)
+        return PolynomialFit(self.variables, self.terms, best, cost - float(weight @ best**2))
 
 
 def first_values(y: Array, count: int) -> Array:

@@ -5,7 +5,6 @@ residual, beside all that the model can do already (orthogonal least squares, Ch
 sensitivities of the free run instead of regressors of the one-step error). After each, all values are fitted anew.
 """
 
-from dataclasses import replace
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -14,7 +13,6 @@ from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_fit import LinearFit
 from estimation.identification.free_run.polynomial_fit import (
-    FARTHEST,
     FINAL_STEPS,
     STEPS,
     PolynomialFit,
@@ -22,12 +20,6 @@ from estimation.identification.free_run.polynomial_fit import (
     Variables,
     variables_of,
 )
-
-WILD = 0.003
-"""Share of samples that a model may be held there where its inputs come in another order; beyond, it is wild."""
-
-REORDERED, PIECES = 10, (8, 25)
-"""Other orders of the inputs that a model is tried on, and pieces that they are cut into, by turns."""
 
 MOST_CANDIDATES = 250
 """Products that are compared."""
@@ -96,29 +88,6 @@ def without_term(fit: PolynomialFit, index: int, data: Channels) -> PolynomialFi
     """Return the fit without one of its terms, the others fitted anew."""
     terms = np.delete(fit.terms, index, axis=0)
     return Runs(fit.variables, terms, data).fit(np.delete(fit.theta, index), STEPS)
-
-
-def is_wild(fit: PolynomialFit, data: Channels) -> bool:
-    """Return whether a model keeps leaving the range of its output where the same inputs come in another order.
-
-    Parameters
-    ----------
-    data : Channels
-        Scaled.
-    """
-    low, high = fit.variables.around(FARTHEST)
-    rng, held, total = np.random.default_rng(0), 0, 0
-    for k in range(REORDERED):
-        inputs, count = list[Array](), PIECES[k % len(PIECES)]
-        for u in data.u:
-            pieces = np.array_split(u, count)
-            turned = [pieces[p][::-1] if rng.random() < 0.5 else pieces[p] for p in rng.permutation(count)]
-            inputs.append(np.ascontiguousarray(np.concatenate(turned)))
-        ran = Runs(fit.variables, fit.terms, replace(data, u=tuple(inputs))).run(fit.theta)
-        if ran is None:
-            return True
-        held, total = held + int(np.count_nonzero((ran[0] <= low) | (ran[0] >= high))), total + ran[0].size
-    return held > WILD * total
 
 
 def _gains(own: Array, every: Array, residual: Array) -> Array:

@@ -17,6 +17,7 @@ from estimation.identification.free_run.data import Channels, channels_from, sca
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import Form, fit_linear
 from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.other_orders import is_wild
 from estimation.identification.free_run.polynomial_fit import Runs, products
 from estimation.identification.free_run.polynomial_kernel import run_free
 from estimation.identification.free_run.polynomial_terms import (
@@ -25,7 +26,6 @@ from estimation.identification.free_run.polynomial_terms import (
     TRIED,
     begun,
     candidate_terms,
-    is_wild,
     one_more,
 )
 from estimation.identification.free_run.saved import load_models, save_models

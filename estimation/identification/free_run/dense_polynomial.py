@@ -1,0 +1,243 @@
+"""Polynomial models of every product of a few lags, kept small by a penalty instead of a choice of products.
+
+A greedy growth depends on its first products and differs from block to block. Here nothing is chosen but the size and
+the penalty: one least squares of the one-step error, then, of the sizes that do best, a descent of the free run.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+
+import numpy as np
+
+from estimation.arrays import Array, IntArray
+from estimation.identification.free_run.choose_linear import block_error, pooled
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.linear_fit import Form, LinearFit
+from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, Variables, products, variables_of
+
+SIZES = ((1, 2), (2, 2), (3, 2), (3, 3))
+"""Lags of the output and of each input."""
+
+MOST_TERMS = 120
+"""Of a model; larger sizes are left out."""
+
+ONE_STEP = (1e-3, 1e-4, 1e-5, 1e-8)
+"""Penalties of the one-step least squares, on terms of unit deviation [dimensionless]."""
+
+BEGUN = 1e-4
+"""Of them, the one that the free run begins at."""
+
+FREE_RUN = (1e-1, 1e-2, 1e-3)
+"""Penalties of the free run; each descent begins where that before it has ended [dimensionless]."""
+
+STEPS = 15
+"""Evaluations of each descent: what takes more is not well determined."""
+
+DESCENDED = 4
+"""Sizes of which the free run is descended."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Sizes that are given and not chosen by the data; None where they are.
+
+    Parameters
+    ----------
+    order, n_numerator : int or None
+        Lags of the output and of each input.
+    delay : int or None
+        Dead time of every input [samples].
+    """
+
+    order: int | None = None
+    delay: int | None = None
+    n_numerator: int | None = None
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How a model of every product is fitted.
+
+    Parameters
+    ----------
+    form : Form
+        Lags.
+    degree : int
+        Of the products at most.
+    one_step : float
+        Penalty of the one-step least squares [dimensionless].
+    free_run : tuple of float
+        Those of the free run, one descent each; none where it is not descended [dimensionless].
+    """
+
+    form: Form
+    degree: int
+    one_step: float
+    free_run: tuple[float, ...] = ()
+
+    def fit(self, data: Channels, begun: PolynomialFit | None = None) -> PolynomialFit | None:
+        """Return the model of given data; None where it runs away or there are too few samples.
+
+        Parameters
+        ----------
+        data : Channels
+            Scaled; outputs held back are NaN.
+        begun : PolynomialFit, optional
+            What the same recipe without its last penalty gives on these data, if that is known.
+        """
+        if begun is not None:
+            return Runs(begun.variables, begun.terms, data).fit(begun.theta, STEPS, self.free_run[-1]) or begun
+        empty = LinearFit(self.form, np.zeros(self.form.n_values), 0.0)
+        variables = variables_of(empty, data)[0]
+        terms = every_term(variables.lag.size, self.degree)
+        coefficients = _one_step(variables, terms, data, self.one_step)
+        if coefficients is None:
+            return None
+        runs = Runs(variables, terms, data)
+        theta = np.concatenate([coefficients, runs.start_values()])
+        ran = runs.run(theta)
+        if ran is None:
+            return None
+        fit = PolynomialFit(variables, terms, theta, float(np.sum((ran[0] - runs.target)[runs.used] ** 2)))
+        for penalty in self.free_run:
+            fit = runs.fit(fit.theta, STEPS, penalty) or fit
+        return fit
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A recipe with its fits to all blocks but one, and their errors there.
+
+    Parameters
+    ----------
+    fits : tuple of PolynomialFit
+        One a block.
+    block_errors : tuple of float
+        Of the free run on the block that each left out [dimensionless].
+    """
+
+    recipe: Recipe
+    fits: tuple[PolynomialFit, ...]
+    block_errors: tuple[float, ...]
+
+    @property
+    def held_back(self) -> float:
+        """Root mean square over the blocks [dimensionless]."""
+        return pooled(self.block_errors)
+
+
+def every_term(n_variables: int, degree: int) -> IntArray:
+    """Return the constant, every variable and every product up to a degree of three, shape (k, 3).
+
+    Parameters
+    ----------
+    n_variables : int
+        Lagged signals.
+    degree : int
+        Two or three.
+
+    Examples
+    --------
+    >>> every_term(1, 3).tolist()
+    [[-1, -1, -1], [0, -1, -1], [0, 0, -1], [0, 0, 0]]
+    """
+    rows = [
+        (*one, *(-1,) * (3 - size))
+        for size in range(degree + 1)
+        for one in combinations_with_replacement(range(n_variables), size)
+    ]
+    return np.array(rows, dtype=np.int64)
+
+
+def forms_tried(delays: tuple[int, ...], asked: Asked) -> list[Form]:
+    """Return sizes of models of every product.
+
+    Parameters
+    ----------
+    delays : tuple of int
+        Dead time of each input that is tried beside none and one sample [samples].
+    asked : Asked
+        What is given and not chosen.
+
+    Examples
+    --------
+    >>> [one.sizes for one in forms_tried((1, 1), Asked(order=2, delay=1))]
+    [(2, 2)]
+    """
+    m, order = len(delays), asked.order
+    sizes = [one for one in SIZES if one[0] == order] or [(order, order)] if order is not None else SIZES
+    late = [(0,) * m, (1,) * m, delays] if asked.delay is None else [(asked.delay,) * m]
+    found = [Form(n, (asked.n_numerator or size,) * m, one) for n, size in sizes for one in late]
+    return list(dict.fromkeys(found))
+
+
+def judged_recipes(data: Channels, parts: Sequence[Channels], forms: Sequence[Form]) -> list[Judged]:
+    """Return models of every product, each judged on blocks that its fits left out.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    parts : sequence of Channels
+        The same without one block each.
+    forms : sequence of Form
+        Lags that are tried, with products of degree two and three.
+
+    Returns
+    -------
+    list of Judged
+        Only those that run; none where every size has too many terms.
+    """
+    found: list[Judged] = []
+    best: dict[tuple[Form, int], float] = {}
+    sizes = [(form, degree) for form in forms for degree in (2, 3)]
+    for form, degree in sizes:
+        if len(every_term(form.order + form.n_b, degree)) > MOST_TERMS:
+            continue
+        tried = [one for penalty in ONE_STEP if (one := _judged(Recipe(form, degree, penalty), data, parts))]
+        found += tried
+        best[form, degree] = min((one.held_back for one in tried), default=float("inf"))
+    for form, degree in sorted(best, key=lambda size: best[size])[:DESCENDED]:
+        one: Judged | None = None
+        for k in range(len(FREE_RUN)):
+            one = _judged(Recipe(form, degree, BEGUN, FREE_RUN[: k + 1]), data, parts, one)
+            if one is None:
+                break
+            found.append(one)
+    return found
+
+
+def _judged(recipe: Recipe, data: Channels, parts: Sequence[Channels], before: Judged | None = None) -> Judged | None:
+    """Return a recipe's fits to all blocks but one, begun at those before; None where one of them runs away."""
+    target, fits, errors = np.concatenate(data.y), list[PolynomialFit](), list[float]()
+    for index, part in enumerate(parts):
+        fit = recipe.fit(part, None if before is None else before.fits[index])
+        ran = None if fit is None else Runs(fit.variables, fit.terms, data).run(fit.theta)
+        if fit is None or ran is None:
+            return None
+        fits.append(fit)
+        errors.append(block_error(ran[0] - target, np.isnan(np.concatenate(part.y)) & np.isfinite(target)))
+    return Judged(recipe, tuple(fits), tuple(errors))
+
+
+def _one_step(variables: Variables, terms: IntArray, data: Channels, penalty: float) -> Array | None:
+    """Return coefficients of the least squares of the one-step error; None where there are too few samples."""
+    count = terms.shape[0]
+    gram, right, n = np.zeros((count, count)), np.zeros(count), 0
+    for u, y in zip(data.u, data.y, strict=True):
+        known = np.isfinite(y)
+        used = known.copy()
+        used[: max(int(variables.lag.max()), 1)] = False
+        for lag in range(1, variables.n_start + 1):
+            used[lag:] &= known[:-lag]
+        rows = products(variables, terms, u, np.where(known, y, 0.0))[used]
+        gram, right, n = gram + rows.T @ rows, right + rows.T @ y[used], n + rows.shape[0]
+    if n < count:
+        return None
+    size = np.sqrt(np.diag(gram) / n)
+    size[size == 0.0] = 1.0
+    # linear terms are free but for what keeps equations solvable
+    weight = np.where(terms[:, 1] >= 0, penalty, 1e-6 * penalty) + 1e-12
+    unit = gram / np.outer(size, size) + n * np.diag(weight)
+    return np.linalg.solve(unit, right / size) / size

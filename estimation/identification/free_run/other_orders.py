@@ -1,0 +1,88 @@
+"""What polynomial models do where the same inputs come in another order: whether they keep within bounds, and agree."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.polynomial_fit import FARTHEST, PolynomialFit, Runs
+
+WILD = 0.003
+"""Share of samples that a model may be held there where its inputs come in another order; beyond, it is wild."""
+
+REORDERED, PIECES = 10, (8, 25)
+"""Other orders of the inputs that a model is tried on, and pieces that they are cut into, by turns."""
+
+
+def reordered(data: Channels) -> Iterator[Channels]:
+    """Yield the same channels with pieces of the inputs in other orders, some of them backwards.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+
+    Yields
+    ------
+    Channels
+        Outputs are those of the order that was measured.
+    """
+    rng = np.random.default_rng(0)
+    for k in range(REORDERED):
+        inputs, count = list[Array](), PIECES[k % len(PIECES)]
+        for u in data.u:
+            pieces = np.array_split(u, count)
+            turned = [pieces[p][::-1] if rng.random() < 0.5 else pieces[p] for p in rng.permutation(count)]
+            inputs.append(np.ascontiguousarray(np.concatenate(turned)))
+        yield replace(data, u=tuple(inputs))
+
+
+def is_wild(fit: PolynomialFit, data: Channels) -> bool:
+    """Return whether a model keeps leaving the range of its output where the same inputs come in another order.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    """
+    low, high = fit.variables.around(FARTHEST)
+    held, total = 0, 0
+    for other in reordered(data):
+        ran = Runs(fit.variables, fit.terms, other).run(fit.theta)
+        if ran is None:
+            return True
+        held, total = held + int(np.count_nonzero((ran[0] <= low) | (ran[0] >= high))), total + ran[0].size
+    return held > WILD * total
+
+
+def disagreement(fits: Sequence[PolynomialFit], whole: PolynomialFit, data: Channels) -> float:
+    """Return how far fits that left out a block each run from that of all data, on the same inputs in other orders.
+
+    No output is measured there, so it tells nothing of what all of them miss alike; but what a block more or less
+    changes on new inputs is not known.
+
+    Parameters
+    ----------
+    fits : sequence of PolynomialFit
+        One a block.
+    whole : PolynomialFit
+        Of all data.
+    data : Channels
+        Scaled.
+
+    Returns
+    -------
+    float
+        Root mean square, over the output's deviation; infinite where one runs away [dimensionless].
+    """
+    squares = list[float]()
+    for other in reordered(data):
+        own = Runs(whole.variables, whole.terms, other).run(whole.theta)
+        for fit in fits:
+            ran = Runs(fit.variables, fit.terms, other).run(fit.theta)
+            if own is None or ran is None:
+                return float("inf")
+            squares.append(float(np.mean((ran[0] - own[0]) ** 2)))
+    return float(np.sqrt(np.mean(squares)))

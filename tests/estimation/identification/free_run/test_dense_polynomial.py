@@ -1,0 +1,123 @@
+"""Models of every product: their least squares, their penalty, and how they are judged."""
+
+import numpy as np
+import pytest
+
+from estimation.arrays import Array
+from estimation.identification.free_run.choose_linear import BLOCKS, linear_candidates
+from estimation.identification.free_run.choose_polynomial import polynomial_candidates
+from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
+from estimation.identification.free_run.dense_polynomial import Asked, Recipe, every_term, forms_tried, judged_recipes
+from estimation.identification.free_run.identify import identify_channels
+from estimation.identification.free_run.linear_fit import Form
+from estimation.identification.free_run.other_orders import disagreement, reordered
+
+
+def bilinear(n: int, seed: int, noise: float) -> tuple[Array, Array]:
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.normal(size=n // 4 + 1), 4)[:n]
+    y = np.zeros(n)
+    for t in range(1, n):
+        y[t] = 0.8 * y[t - 1] + 0.2 * u[t - 1] - 0.1 * np.clip(u[t - 1], -2.0, 2.0) * y[t - 1]
+    return u, y + noise * rng.normal(size=n)
+
+
+def log(n: int = 400, seed: int = 1, noise: float = 0.01) -> Channels:
+    u, y = bilinear(n, seed, noise)
+    return scaled(channels_from([u[:, None]], [y], 1.0, ["u"], "y"))[0]
+
+
+RECIPE = Recipe(Form(1, (1,), (1,)), 2, 1e-8)
+
+
+def test_a_plant_of_products_is_found_by_one_least_squares_where_there_is_no_noise() -> None:
+    u = np.random.default_rng(1).uniform(-1.0, 1.0, 200)
+    y = np.zeros(200)
+    for t in range(1, 200):
+        y[t] = 0.5 * y[t - 1] + u[t - 1] - 0.3 * u[t - 1] * y[t - 1]
+    data = channels_from([u[:, None]], [y], 1.0, ["u"], "y")
+    fit = RECIPE.fit(data)
+    assert fit is not None
+    told = {tuple(int(v) for v in term if v >= 0): value for term, value in zip(fit.terms, fit.theta, strict=False)}
+    assert told[0,] == pytest.approx(0.5, abs=1e-5)
+    assert told[1,] == pytest.approx(1.0, abs=1e-5)
+    assert told[0, 1] == pytest.approx(-0.3, abs=1e-5)
+    assert told[0, 0] == pytest.approx(0.0, abs=1e-5)
+
+
+def test_a_block_that_is_held_back_changes_nothing_of_its_fit() -> None:
+    data = log()
+    mask = blocks(data, BLOCKS)[1]
+    spoilt = Channels(data.inputs, data.output, 1.0, data.u, (np.where(mask[0], 50.0, data.y[0]),))
+    for recipe in (RECIPE, Recipe(Form(2, (2,), (0,)), 2, 1e-4, (1e-2,))):
+        one, other = recipe.fit(data.without(mask)), recipe.fit(spoilt.without(mask))
+        assert one is not None
+        assert other is not None
+        assert np.array_equal(one.theta, other.theta)
+
+
+def test_a_penalty_makes_products_smaller_and_leaves_more_error() -> None:
+    data = log(noise=0.2)
+    sizes, costs = list[float](), list[float]()
+    for penalty in (1e-6, 1e-1, 1e1):
+        fit = Recipe(Form(2, (2,), (0,)), 2, 1e-8, (penalty,)).fit(data)
+        assert fit is not None
+        sizes.append(float(np.sum(fit.coefficients[fit.terms[:, 1] >= 0] ** 2)))
+        costs.append(fit.cost)
+    assert sizes[0] > sizes[1] > sizes[2]
+    assert costs[0] < costs[1] < costs[2]
+
+
+def test_too_few_samples_give_no_model() -> None:
+    data = log(60)
+    assert Recipe(Form(3, (3,), (0,)), 3, 1e-4).fit(data) is None
+    parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
+    assert judged_recipes(data, parts, [Form(3, (30,), (0,))]) == []
+
+
+def test_sizes_that_are_asked_for_are_kept() -> None:
+    assert {form.order for form in forms_tried((5,), Asked())} == {1, 2, 3}
+    assert {form.delays for form in forms_tried((5,), Asked())} == {(0,), (1,), (5,)}
+    assert forms_tried((5, 1), Asked(order=4, delay=2)) == [Form(4, (4, 4), (2, 2))]
+    assert forms_tried((5,), Asked(order=2, delay=2, n_numerator=7)) == [Form(2, (7,), (2,))]
+
+
+def test_every_product_stands_once() -> None:
+    terms = every_term(4, 3)
+    assert len(terms) == 1 + 4 + 10 + 20
+    assert len({tuple(term) for term in terms.tolist()}) == len(terms)
+
+
+def test_other_orders_hold_the_same_inputs() -> None:
+    data = log()
+    others = list(reordered(data))
+    assert all(sorted(one.u[0][:, 0]) == sorted(data.u[0][:, 0]) for one in others)
+    assert not any(np.array_equal(one.u[0], data.u[0]) for one in others)
+
+
+def test_fits_agree_where_the_data_tell_them_and_not_where_they_do_not() -> None:
+    found: list[float] = []
+    for n, noise in ((800, 0.01), (150, 0.3)):
+        data, recipe = log(n, noise=noise), Recipe(Form(2, (2,), (0,)), 3, 1e-5)
+        fits = [recipe.fit(data.without(mask)) for mask in blocks(data, BLOCKS)]
+        whole = recipe.fit(data)
+        assert whole is not None
+        found.append(disagreement([fit for fit in fits if fit is not None], whole, data))
+    assert found[0] < 0.05 < 0.1 < found[1]
+
+
+def test_doubt_counts_beside_the_error_on_what_was_held_back() -> None:
+    data = log()
+    every = polynomial_candidates(linear_candidates(data, [1], (1,)), data, Asked(order=1, delay=1, n_numerator=1))
+    assert len(every) > 2
+    for one in every:
+        assert one.price == pytest.approx(np.hypot(one.held_back, one.spread))
+        assert one.price > one.held_back
+
+
+def test_a_plant_of_products_runs_well_on_another_log() -> None:
+    u, y = bilinear(400, 1, 0.02)
+    asked = {"order": 1, "delay": 1, "n_numerator": 1}
+    model = identify_channels(channels_from([u[:, None]], [y], 1.0, ["u"], "y"), structure="narx", **asked).model
+    u, y = bilinear(400, 9, 0.0)
+    assert model.quality([u[:, None]], [y]).fit_percent > 95.0
