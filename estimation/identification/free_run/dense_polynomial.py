@@ -137,6 +137,11 @@ def every_term(n_variables: int, degree: int) -> IntArray:
     degree : int
         Two or three.
 
+    Returns
+    -------
+    ndarray of int, shape (k, 3)
+        Variables that each term multiplies; -1 stands for 1.
+
     Examples
     --------
     >>> every_term(1, 3).tolist()
