@@ -184,6 +184,8 @@ class FlowBalance(NamedTuple):
         Its standard deviation [dimensionless].
     explained : float
         Share of the pumped flow's variance that is explained [fraction].
+    moving : float
+        The piston's own flow over the pumped flow, both about their means, root mean square [fraction].
     """
 
     swept: float
@@ -191,6 +193,15 @@ class FlowBalance(NamedTuple):
     compressed: float
     compressed_std: float
     explained: float
+    moving: float
+
+    @property
+    def contradicts_rig(self) -> float:
+        """What the piston's flow would have to differ by, over what the balance leaves unexplained [dimensionless].
+
+        A piston that hardly moves under a pump that leaks it all lets motion stand for whatever the balance leaves out.
+        """
+        return abs(self.swept - 1.0) * self.moving / max(1.0 - self.explained, 1e-12) ** 0.5
 
 
 def flow_balance(blocks: ChannelBlocks, p: EhaParameters) -> FlowBalance | None:
@@ -227,4 +238,5 @@ def flow_balance(blocks: ChannelBlocks, p: EhaParameters) -> FlowBalance | None:
     variance = left * (1.0 + lasting) / (1.0 - lasting)  # as many blocks fewer as neighbours repeat each other
     value, std = found / sizes, np.sqrt(variance * np.diag(inverse)) / sizes
     told = [float(one[k]) for k in (0, 1) for one in (value, std)]
-    return FlowBalance(told[0], told[1], told[2], told[3], 1.0 - left / float(np.var(flow)))
+    moving = p.piston_area * float(np.std(piston)) / float(np.std(flow))
+    return FlowBalance(told[0], told[1], told[2], told[3], 1.0 - left / float(np.var(flow)), moving)

@@ -66,6 +66,10 @@ EXPLAINED, KNOWN, TOLD = 0.9, 0.1, 4.0
 """Share of the flow that a balance must explain, relative deviation at which its factor counts, and deviations from
 zero at which a sign does."""
 
+REFUTED = 2.0
+"""Times what a balance leaves unexplained by which the piston's flow must differ from the rig's before a slip of units
+is seen in it [dimensionless]."""
+
 RESOLVED = 1e3
 """Deviations of its noise that a position in a wrong unit spans; a stuck piston spans fewer [dimensionless]."""
 
@@ -185,7 +189,7 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
     far = gone > FARTHEST
     turn = length = None
     believed = False, False
-    if balance is not None and 0.0 < balance.swept_std < KNOWN * balance.swept:
+    if balance is not None and 0.0 < balance.swept_std < KNOWN * balance.swept and balance.contradicts_rig > REFUTED:
         times = 1.0 / balance.swept
         far = far and times > 1.0
         turn, length = (_near(times, slips, 1.0 / MOST, 1.0 / (LOST if far else LEAST)) for slips in (TURNS, LENGTHS))

@@ -17,6 +17,7 @@ from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from estimation.log_checks.sensor_check import PRESSURE
 from plant.arrays import Array
+from plant.eha.circuit import under_pressure
 from plant.eha.circuit_parameters import CircuitParameters, circuit_values, longest_stroke
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT
@@ -45,6 +46,9 @@ LONGEST = 30.0
 
 RATE = 1e-3
 """Sample time to which faster logs are averaged [s]."""
+
+LEAST_BEGUN = 0.1
+"""Share of a log's pressure, root mean square, from which what it begins with is more than noise [fraction]."""
 
 AT_STOP = 0.02
 """A log shows a stop if its piston turned this near to one, as a share of half the stroke [fraction]."""
@@ -82,6 +86,9 @@ class Blocks:
         Leakage over what it is when the log ends [dimensionless]; None where it does not change.
     stop : float or None
         How far from where the log begins the piston ran into a stop [m]; None where only the rig knows of stops.
+    begun : tuple of float, or None
+        Differential pressure [Pa] and velocity [m/s] with which the log begins; None where it begins at rest, or does
+        not tell.
     """
 
     speed: Array
@@ -93,6 +100,7 @@ class Blocks:
     earlier: tuple[int, Array] | None = None
     course: Array | None = None
     stop: float | None = None
+    begun: tuple[float, float] | None = None
 
     @property
     def outputs(self) -> Array:
@@ -150,15 +158,22 @@ def blocks_of(record: Record) -> Blocks:
         velocity = _mean(whole["velocity_m_s"], block)
     else:
         raise LogError(f"velocity_m_s or position_m is needed; the log has {', '.join(record)}")
-    pressure = whole.get("differential_pressure_pa")
+    pressure, begun = whole.get("differential_pressure_pa"), None
     if pressure is not None:
+        begun = _begun(pressure, velocity)
         pressure = _mean(pressure, block)
         if not np.any(np.isfinite(pressure[round(SETTLING / (block * sample_time)) :])):
-            pressure = None  # a sensor that was out for all of the stretch
+            pressure = begun = None  # a sensor that was out for all of the stretch
             del whole["differential_pressure_pa"]
     speed = bridged(whole["motor_speed_rad_s"])
     noise = _noise(whole, block, sample_time)
-    return Blocks(speed, sample_time, block, velocity, pressure, noise, course=whole.get(LEAKAGE_COURSE))
+    return Blocks(speed, sample_time, block, velocity, pressure, noise, course=whole.get(LEAKAGE_COURSE), begun=begun)
+
+
+def _begun(pressure: Array, velocity: Array) -> tuple[float, float] | None:
+    """Return pressure and velocity at the start of a log that does not begin at rest."""
+    first, size = float(pressure[0]), float(np.sqrt(np.nanmean(pressure**2))) if np.any(np.isfinite(pressure)) else 0.0
+    return (first, float(np.nan_to_num(velocity[0]))) if abs(first) > LEAST_BEGUN * size else None
 
 
 def _noise(whole: Mapping[str, Array], block: int, sample_time: float) -> Array:
@@ -279,7 +294,7 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
     if blocks.course is not None:
         rows = rows * _drift(blocks.course)[:, None, :]
     rows = _between_stops(blocks, rows)
-    starts = np.array([CIRCUIT.start(row) for row in rows[0]])
+    starts = np.array([_start(blocks, row) for row in rows[0]])
     runs = controlled_run(
         CIRCUIT.name,
         _CONTROL,
@@ -292,6 +307,13 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
         drive_tolerance=DRIVE_TOLERANCE,
     )
     return _outputs(blocks, np.moveaxis(runs, 0, 2), rows)  # as they lie in memory
+
+
+def _start(blocks: Blocks, row: Array) -> Array:
+    """Return the state in which a circuit begins: at rest, or as the log does."""
+    if blocks.begun is None:
+        return CIRCUIT.start(row)
+    return np.array(under_pressure(*blocks.begun, circuit_values(row)), dtype=np.float64)
 
 
 def _drift(course: Array) -> Array:

@@ -116,7 +116,9 @@ def test_a_mistake_is_named(
 def test_a_piston_too_far_for_its_pump_tells_the_unit_where_the_balance_takes_motion_for_leakage(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    misled = FlowBalance(swept=0.0457, swept_std=0.0035, compressed=0.083, compressed_std=0.004, explained=0.998)
+    misled = FlowBalance(
+        swept=0.0457, swept_std=0.0035, compressed=0.083, compressed_std=0.004, explained=0.998, moving=0.9
+    )
     monkeypatch.setattr(channel_physics, "flow_balance", lambda *_: misled)
     (said,) = channel_mistakes(scaled(SPEED, 1.0 / RPM)(run("normal", "prbs")), HEALTHY)
     assert (said.code, said.data["channel"]) == (ChannelCode.CHANNEL_UNIT, SPEED)
@@ -180,3 +182,17 @@ def test_a_balance_that_explains_little_of_the_flow_is_not_believed(monkeypatch:
         channel_mistakes(run(), HEALTHY)
     assert seen[0] is None
     assert seen[1] is not None
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.3, True), (0.006, False)])
+def test_a_piston_that_hardly_moves_is_no_proof_of_a_unit(share: float, *, told: bool) -> None:
+    """What a balance leaves unexplained of a leaky actuator looks like ten times the motion that there is."""
+    rng = np.random.default_rng(2)
+    held = np.repeat(rng.choice([-1.0, 1.0], 6000), 20) * np.repeat(rng.uniform(20.0, 120.0, 6000), 20)
+    flow = HEALTHY.pump_displacement * held
+    moved = share * flow * np.abs(held) / 120.0
+    velocity = moved / (RPM * HEALTHY.piston_area)
+    leaked = (flow - moved) / 6e-11
+    record = Record(1e-3, {SPEED: held, VELOCITY: velocity, PRESSURE: leaked + 1e4 * rng.standard_normal(len(flow))})
+    codes = [note.code for note in channel_mistakes(record, HEALTHY)]
+    assert codes == ([ChannelCode.CHANNEL_UNIT] if told else [])

@@ -14,6 +14,7 @@ from plant.eha.simulate import CIRCUIT, simulate
 from plant.eha.steady_state import steady_state
 from plant.errors import LogError
 from plant.log.record import Record
+from plant.sensors.sensors import BENCH
 
 ACTUATOR = Actuator.of(EhaParameters())
 SPEED = 100.0 * np.sign(np.sin(np.arange(3000) * 2e-3))
@@ -70,6 +71,27 @@ def test_a_circuit_has_the_stops_that_the_log_shows_and_no_others(stroke: float,
     (found,) = predicted(blocks, parameter_rows(actuator.conditions[:1], actuator.circuit, actuator.rated))
     off = (found - blocks.outputs)[blocks.first :]
     assert np.all(np.sqrt(np.mean(off**2, axis=0)) < 0.05 * np.sqrt(np.mean(blocks.outputs**2, axis=0)))
+
+
+def test_a_circuit_begins_as_its_log_does_where_that_begins_under_pressure() -> None:
+    p = parameters_for(CONDITIONS["major_friction"])
+    run = simulate(CIRCUIT, np.repeat([100.0, -20.0, 0.0, 15.0], 400), 1e-3, p)
+    blocks = blocks_of(run.slice(500, len(run)))
+    rows = parameter_rows(coordinates_of(circuit_of(p), ACTUATOR.rated)[None], ACTUATOR.circuit, ACTUATOR.rated)
+    assert blocks.begun is not None
+    assert blocks.pressure is not None
+    size = np.sqrt(np.mean(blocks.pressure**2))
+    left, at_rest = (
+        np.sqrt(np.mean((predicted(one, rows)[0, one.first :, 1] - blocks.pressure[one.first :]) ** 2)) / size
+        for one in (blocks, replace(blocks, begun=None))
+    )
+    assert left < 0.03
+    assert at_rest > 0.3
+
+
+def test_a_log_that_begins_at_rest_begins_at_rest() -> None:
+    log = simulate(CIRCUIT, SPEED, 1e-3, EhaParameters(), sensors=BENCH, rng=np.random.default_rng(1))
+    assert blocks_of(log).begun is None
 
 
 def velocity_of(blocks: Blocks, rows: np.ndarray) -> np.ndarray:

@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from faults.eha.physical import throttled
 from plant.components.oil import effective_bulk_modulus
-from plant.eha.circuit import CircuitState, Pressures, at_rest, circuit_derivative, circuit_flows, circuit_pressures
+from plant.eha.circuit import (
+    CircuitState,
+    Pressures,
+    at_rest,
+    circuit_derivative,
+    circuit_flows,
+    circuit_pressures,
+    observe_circuit,
+    under_pressure,
+)
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.drives import make_drive
 from plant.eha.simulate import CIRCUIT, LUMPED, simulate
@@ -214,3 +223,12 @@ def test_pressures_stay_above_the_vapours_and_finite_under_any_throttles_air_and
         assert np.max(record[name]) < 2.0 * p.relief_pressure
     assert np.max(np.abs(record["position_m"])) < 0.5 * p.stroke + 2e-3
     assert np.max(np.abs(record["velocity_m_s"])) < 2.0
+
+
+@pytest.mark.parametrize("pressure", [-8e5, 0.0, 3e5, 2e6])
+def test_a_circuit_under_pressure_shows_it_with_the_lower_chamber_at_the_accumulators(pressure: float) -> None:
+    p = PAPER
+    shown = observe_circuit(under_pressure(pressure, 0.01, p), p)
+    assert shown["differential_pressure_pa"] == pytest.approx(pressure, abs=1.0)
+    assert min(shown["pressure_a_pa"], shown["pressure_b_pa"]) == pytest.approx(p.accumulator_pressure, rel=1e-9)
+    assert shown["velocity_m_s"] == 0.01
