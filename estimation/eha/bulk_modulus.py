@@ -18,7 +18,7 @@ from estimation.fits.form_fit import FormFit
 from estimation.fits.motion_fit import MOTION_CHANNELS, fit_motion
 from estimation.log_checks.channel_physics import FARTHEST, POSITION, RPM, TURNS
 from estimation.log_checks.clean import CleanLog, clean_log
-from estimation.log_checks.first_belief import START_STD, first_belief, first_load
+from estimation.log_checks.first_belief import START_STD, begins_in_motion, first_belief, first_load
 from estimation.log_checks.sensor_check import PRESSURE, PRESSURES
 from estimation.models.eha_forms import FORMS
 from estimation.notes import ChannelCode
@@ -243,7 +243,8 @@ def _fit(
         return FITTED[form][0](log.record, parameters, guess, {}, log.variances)
     doubted = {name: max(one) for name, one in spreads.items()}
     loaded = not chosen and first_load(log.record, log.variances) != 0.0
-    fit = fit_flow(log.record, parameters, guess, doubted, log.variances, loaded=loaded)
+    moving = begins_in_motion(log.record)
+    fit = fit_flow(log.record, parameters, guess, doubted, log.variances, loaded=loaded, moving=moving)
     explained = fit.explanation is not None and fit.bound <= LARGEST_BOUND
     return fit if explained or not loaded else None  # a filter needs no state at rest
 

@@ -47,7 +47,7 @@ FINALISTS, CARRIED, NEARLY = 3, 2, 3.0
 FINEST_DELAY = 1e-3
 """Step in which a delay is sought [s]; what is left of it goes into the lag."""
 
-MAY_VANISH, VANISHED = ("leakage_coefficient", "flow_bias"), 1e-2
+MAY_VANISH, VANISHED = ("leakage_coefficient", "flow_bias", "makeup_conductance"), 1e-2
 """What a search may take for nothing by mistake, and the share of the rig's value below which it has."""
 
 CLOSE = 60.0
@@ -96,7 +96,8 @@ class _Tried:
     point: Point
     values: Mapping[str, float]
     delays: Mapping[str, float]
-    finished: GreyBoxFit | None = None
+    fits: tuple[GreyBoxFit, ...] = ()
+    """Once it is finished: the likelier balance first, by volume or by mass, then the other one if it counts."""
 
     @property
     def cost(self) -> float:
@@ -104,9 +105,9 @@ class _Tried:
 
     @property
     def fit(self) -> GreyBoxFit:
-        if self.finished is None:
+        if not self.fits:
             raise ValueError("only finished fits are compared")
-        return self.finished
+        return self.fits[0]
 
 
 Accepted: TypeAlias = Callable[[GreyBoxFit], bool]
@@ -159,7 +160,7 @@ def explain(
         finished = _ranked([first, *(replace(one, delays={**first.delays, **one.delays}) for one in better)])
     best = finished[0]
     rivals = [one for one in finished[1:] if one.cost < best.cost + ALIKE]
-    found = weighed([best.fit, *(one.fit for one in rivals)])
+    found = weighed([fit for one in (best, *rivals) for fit in one.fits])
     values = {name: (value, best.fit.std[name]) for name, value in best.fit.values.items()} | dict(found)
     if any(name in values for name in GROWTH):  # what is told of a leakage is what it is at the end
         ended = float(grown_leakage(1.0, *(values.get(name, (0.0, 0.0))[0] for name in GROWTH)))
@@ -316,9 +317,10 @@ def _descended(log: GreyBoxLog, tried: _Tried, start: Array, evaluations: int, *
 
 
 def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
-    """Return a set of hypotheses fitted to the end, balanced by volume or by mass, whichever is likelier.
+    """Return a set of hypotheses fitted to the end, balanced by volume and by mass.
 
-    Balanced by mass, the inner circuit yields as it does in the plain form.
+    Balanced by mass, the inner circuit yields as it does in the plain form. A log that does not tell the two apart is
+    believed neither alone: they may differ by three deviations.
     """
     row = delayed(log, tried.delays)
     done: list[tuple[_Tried, FreedProblem]] = []
@@ -327,8 +329,10 @@ def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
         problem, begun = freed(own, tried.together, *more), done[-1][0] if done else tried
         start = problem.model.theta({**usual_values(own), **begun.values})
         done.append((_descended(own, begun, start, FINISHING, *more), problem))
-    best, problem = min(done, key=lambda one: one[0].cost)
-    return replace(best, finished=concluded(problem, best.point))
+    done.sort(key=lambda one: one[0].cost)
+    best = done[0][0]
+    count = [one for one in done if one[0].cost < best.cost + ALIKE]
+    return replace(best, fits=tuple(concluded(problem, one.point) for one, problem in count))
 
 
 def _likeliest(log: GreyBoxLog, tried: Sequence[Iterable[_Tried]]) -> list[_Tried]:

@@ -9,7 +9,7 @@ from estimation.fits.flow_search import MAKEUP_TRIED, balanced, flow_starts
 from estimation.fits.form_fit import FormFit, weighed, with_structure
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
-from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAST_DELIVERY, OFFSET, START_LOAD, Hypothesis
+from estimation.fits.hypotheses import BEGUN, DELIVERY, HYPOTHESES, LEAST_DELIVERY, OFFSET, Hypothesis
 from estimation.models.flow import HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
 from estimation.notes import EstimateCode, RigCode
 from plant.eha.model import EhaParameters
@@ -65,6 +65,7 @@ def fit_flow(
     variances: Mapping[str, float] | None = None,
     *,
     loaded: bool = False,
+    moving: bool = False,
 ) -> FormFit:
     """Fit the flow form to a log, balanced by volume, by mass, and by volume in held chambers, and weigh the three.
 
@@ -86,6 +87,8 @@ def fit_flow(
         done here if not given.
     loaded : bool
         Whether the log begins under load, and not at rest.
+    moving : bool
+        Whether the motor turns when it begins: both chambers may then stand at any pressure.
 
     Returns
     -------
@@ -108,9 +111,9 @@ def fit_flow(
     best, found = min(fits, key=_cost), weighed(fits)
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
     explains = partial(_explains, noisy=log.passes_on)
-    asked, remarks = _asked(log, parameters, swinging, loaded=loaded)
+    asked, remarks = _asked(log, parameters, swinging, loaded=loaded, moving=moving)
     if asked:
-        near = _near(swinging, starts, explains)
+        near = _near(swinging, starts, explains, everywhere=loaded or moving)
         strange = explain(log, parameters, near, explains, asked=asked, paired=asked != (DELIVERY,))
         one = strange.fit
         if explains(one) and one.cost < best.cost - WORTH:
@@ -124,7 +127,7 @@ def fit_flow(
 
 
 def _asked(
-    log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, loaded: bool
+    log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, loaded: bool, moving: bool
 ) -> tuple[tuple[Hypothesis, ...], tuple[Note, ...]]:
     """Return what a log is asked beside the plain form, given its likelier fit with volumes that swing; and a remark.
 
@@ -133,22 +136,31 @@ def _asked(
     if len(log.drives) > MOST_ASKED:
         return (), ()
     if loaded:  # a sensor that reads too much looks loaded at rest
-        return (START_LOAD, OFFSET), ()
+        return (BEGUN, OFFSET), ()
     if not _explains(swinging, log.passes_on):
-        return HYPOTHESES, ()
+        return (BEGUN,) if moving else HYPOTHESES, ()
     by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
     delivery = promised(log, parameters, swinging.values, DELIVERY, by_mass=by_mass)
     if delivery.gain > WORTH and delivery.size > LEAST_DELIVERY:
         return (DELIVERY,), ()
     open_by = delivery.deviation
-    return (), (RigCode.WEAR_NOT_EXCLUDED.note(percent=200.0 * open_by),) if open_by > OPEN_DELIVERY else ()
+    return (BEGUN,) if moving else (), (
+        RigCode.WEAR_NOT_EXCLUDED.note(percent=200.0 * open_by),
+    ) if open_by > OPEN_DELIVERY else ()
 
 
 def _near(
-    fit: GreyBoxFit, starts: Sequence[Mapping[str, float]], explains: Callable[[GreyBoxFit], bool]
+    fit: GreyBoxFit,
+    starts: Sequence[Mapping[str, float]],
+    explains: Callable[[GreyBoxFit], bool],
+    *,
+    everywhere: bool,
 ) -> Sequence[Mapping[str, float]]:
-    """Return where the search for what is strange begins: a fit that explains the log is in no wrong valley."""
-    if explains(fit):
+    """Return where the search for what is strange begins: a fit that explains the log is in no wrong valley.
+
+    But one that begins at rest where the log does not may be, so the search then begins ``everywhere``.
+    """
+    if explains(fit) and not everywhere:
         return [fit.values]
     usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
     return [{name: value for name, value in fit.values.items() if name != STIFFNESS}, *usual]

@@ -4,7 +4,7 @@ A log that the plain flow form explains is not asked. `estimation.fits.explain` 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,8 @@ class Hypothesis:
         Unknowns of the plain form that are not told apart from it, and are held.
     far : bool
         Whether what it adds is so far from its absence that the slope there says nothing of it.
+    from_first_sample : bool
+        Whether the search begins with the differential pressure that the log begins with, and with several levels.
     """
 
     name: str
@@ -39,12 +41,16 @@ class Hypothesis:
     shares_of_peak: tuple[float, ...] = ()
     instead: tuple[str, ...] = ()
     far: bool = False
+    from_first_sample: bool = False
 
 
 DELIVERY = Hypothesis("delivery", ("pump_displacement",))
 """Asked of every log: a pump that delivers less may pass for leakage, with bulk modulus a fifth too low."""
 
 START_LOAD = Hypothesis("start_load", ("start_pressure", "start_level"))
+
+BEGUN = replace(START_LOAD, from_first_sample=True)
+"""The same of a log that begins under load or in motion."""
 
 OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
 

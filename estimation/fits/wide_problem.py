@@ -31,10 +31,13 @@ LEAST_GAS = 1.0
 """Least gas of the inner circuit's accumulator, in chamber volumes; judged. With less its pressure would follow every
 stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
 
-POSITION = "position_m"
+POSITION, START_PRESSURE, START_LEVEL = "position_m", "start_pressure", "start_level"
 
 LEAST_PEAK = 1.0
 """Highest differential pressure taken of a log whose sensor is dead: the logarithm of none is no start [Pa]."""
+
+LEVELS_TRIED = (0.0, 0.3)
+"""Levels over the accumulator's pressure with which both sides may begin, as shares of the most [fraction]."""
 
 MOST_BIASED = 2.0
 """Factor by which position's noise may have put the first bulk modulus off [dimensionless]. Far above it there is a
@@ -134,6 +137,10 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
     sequence of Mapping[str, float]
         First guesses [SI].
     """
+    if one.from_first_sample:
+        seen = log.measured[np.isfinite(log.measured[:, 0]), 0]
+        begun = float(seen[0]) if len(seen) else 0.0
+        return [{START_PRESSURE: begun, START_LEVEL: share * _shut_in(log)} for share in LEVELS_TRIED]
     if not one.shares_of_peak:
         return one.starts
     peak = max(float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)
@@ -162,10 +169,16 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     relief = (0.0, max(most / (SHARPEST_RELIEF * rig["relief_pressure"]), rig["relief_conductance"]))
     stiffest = ADIABATIC * rig["accumulator_pressure"] / (LEAST_GAS * rig["chamber_volume"])
     limits = {"speed_lead": (0.0, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
+    limits[START_LEVEL] = (-rig["accumulator_pressure"], _shut_in(log))
     if log.passes_on:
         found = [model.values(guess)["bulk_modulus"] for guess in guesses]
         limits["bulk_modulus"] = (min(found) / MOST_BIASED, MOST_BIASED * max(found))
     return search_bounds(model, guesses, {**LIMITS, **limits})
+
+
+def _shut_in(log: GreyBoxLog) -> float:
+    """Return the most that a loaded chamber passes to the other one while no make-up flows: half of what loaded it."""
+    return max(0.5 * float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)
 
 
 def usual_values(log: GreyBoxLog) -> dict[str, float]:

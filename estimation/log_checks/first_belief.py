@@ -18,6 +18,9 @@ START_STD = 3e8
 """Standard deviation of the first guess [Pa]: convergence is driven by it (errata E10)."""
 
 
+TURNING = 0.2
+"""Share of a log's motor speed, root mean square, from which the motor turns [fraction]."""
+
 AT_REST = 3e4
 """Differential pressure of an actuator that is taken to be at rest, at most, beside five deviations of noise [Pa]."""
 
@@ -77,6 +80,24 @@ def first_load(record: Record, variances: Mapping[str, float] | None = None) -> 
     channel = "differential_pressure_pa"
     first, noise = _first(record, channel), (variances or measurement_variances(record, (channel,)))[channel] ** 0.5
     return first if abs(first) > AT_REST + 5.0 * noise else 0.0
+
+
+def begins_in_motion(record: Record) -> bool:
+    """Return whether the motor turns when a log begins: then its chambers need not stand at the accumulator's pressure.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+
+    Returns
+    -------
+    bool
+        Whether the first motor speed is more than `TURNING` of the log's, by root mean square.
+    """
+    speed = record["motor_speed_rad_s"] if "motor_speed_rad_s" in record else np.zeros(1)
+    seen = speed[np.isfinite(speed)]
+    return bool(len(seen)) and abs(float(seen[0])) > TURNING * float(np.sqrt(np.mean(seen**2)))
 
 
 def _first(record: Record, channel: str) -> float:

@@ -12,7 +12,7 @@ from estimation.eha.explained import notes_of, rig_set_right, set_right
 from estimation.fits.explain import Explanation
 from estimation.fits.flow_fit import fit_flow
 from estimation.log_checks.clean import clean_log
-from estimation.log_checks.first_belief import first_load
+from estimation.log_checks.first_belief import begins_in_motion, first_load
 from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters, grown_leakage
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
@@ -158,6 +158,32 @@ def test_a_log_that_begins_under_load_says_so() -> None:
     begun = record.slice(1500, len(record))
     found = explained(begun)
     assert "start_load" in found.names
+
+
+def test_a_log_cut_out_of_a_run_where_pressure_crosses_zero_is_fitted_from_sides_shut_in_high() -> None:
+    """Both chambers stand far above the accumulator then, which no make-up would explain as well at first sight."""
+    p = replace(HEALTHY, leakage_coefficient=2.5e-11)
+    run = simulate(CIRCUIT, np.repeat([120.0, -120.0, 60.0, -90.0] * 3, 250), 1e-3, p, sensors=BENCH,
+                   rng=np.random.default_rng(4))  # fmt: skip
+    crossing = 760 + int(np.argmin(np.abs(run[PRESSURE][760:800])))
+    begun = run.slice(crossing, len(run))
+    assert first_load(begun) == 0.0
+    assert begins_in_motion(begun)
+    found = estimate_log(begun, Rig(HEALTHY))
+    (low, high), value = found.quantities["bulk_modulus"].ci95, found.quantities["bulk_modulus"].value
+    assert found.gate.passed
+    assert low <= HEALTHY.bulk_modulus <= high
+    assert value == pytest.approx(HEALTHY.bulk_modulus, rel=5e-3)
+
+
+def test_where_volume_and_mass_explain_alike_what_they_disagree_on_is_in_the_deviation() -> None:
+    clean = clean_log(log("multisine", 4.0).slice(1500, 4000), HEALTHY)
+    fit = fit_flow(clean.record, HEALTHY, HEALTHY.bulk_modulus, {}, clean.variances, loaded=True)
+    assert fit.explanation is not None
+    alone = fit.explanation.fit
+    value, std = fit.explanation.values["bulk_modulus"]
+    assert std > alone.std["bulk_modulus"]
+    assert value != alone.values["bulk_modulus"]
 
 
 def test_wear_of_the_pump_is_not_excluded_by_a_log_at_one_speed() -> None:
