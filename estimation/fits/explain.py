@@ -144,7 +144,7 @@ def explain(
     Explanation
         The likeliest; whether it explains the log is for the gate to say.
     """
-    wide = widened(log, parameters, starts[0].get(STIFFNESS, 0.0))
+    wide = widened(log, parameters, starts[0])
     likely, others = _promising(wide, (), starts[0], asked)
     finished = _likeliest(wide, [_screened(wide, (one,), starts) for one in likely])
     if others and not accepted(finished[0].fit):
@@ -212,7 +212,7 @@ def promised(
     Promise
         Its promise.
     """
-    wide = widened(log, parameters, plain.get(STIFFNESS, 0.0))
+    wide = widened(log, parameters, plain)
     return _promises(_balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, (one,))[0]
 
 

@@ -13,7 +13,9 @@ from estimation.fits.greybox_log import GreyBoxLog, greybox_log
 from estimation.log_checks.bridging import bridged, gaps
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from estimation.log_checks.outliers import without_outliers
-from estimation.models.flow import FLOW_FORM, flow_parameters
+from estimation.models.completed_flow import CRACKS
+from estimation.models.flow import FLOW_FORM
+from estimation.models.flow_parameters import flow_parameters
 from plant.eha.model import EhaParameters, piston_areas
 from plant.log.record import Record
 
@@ -144,6 +146,7 @@ def flow_log(
         presumed={
             "case_leakage": (DRAIN_START * usual_leakage(parameters), PRESUMED_STD),
             "makeup_opening": (OPENING_START, PRESUMED_STD),
+            **dict.fromkeys(CRACKS, (0.0, 1.0)),
         },
     )
     log = averaged(log, LONGEST_STEP)

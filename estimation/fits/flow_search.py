@@ -19,7 +19,15 @@ from estimation.fits.greybox_fit import NEAR_ENOUGH, GreyBoxFit, Search, conclud
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem
 from estimation.fits.wide_problem import flow_bounds
-from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS, reaches_relief, relieving
+from estimation.models.completed_flow import completed
+from estimation.models.flow import (
+    FLOW_FORM,
+    HELD_FLOW_FORM,
+    MASS_FLOW_FORM,
+    STIFFNESS,
+    reaches_relief,
+    relieving,
+)
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -121,12 +129,33 @@ def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mappin
     least = min(one.point.cost for one in rough)
     likely = [one for one in rough if one is rough[0] or one.point.cost < least + RIVAL]
 
-    def finished(one: _Rough) -> Point:
-        return descend(one.problem.at, one.point.theta, FINISHING, one.bounds)
+    def finished(one: _Rough) -> tuple[Problem, Point]:
+        problem, theta, bounds = _completed(one, log) if _plain(one) else (one.problem, one.point.theta, one.bounds)
+        return problem, descend(problem.at, theta, FINISHING, bounds)
 
-    done = [(one.problem, point) for one, point in zip(likely, each(finished, likely), strict=True)]
+    done = each(finished, likely)
     least = min(point.cost for _, point in done)
     return each(lambda one: concluded(*one, disturbed=one[1].cost < least + UNLIKELY), done)
+
+
+def _plain(one: _Rough) -> bool:
+    """Return whether a form explains a log so far that the last digits matter.
+
+    Elsewhere valves that crack would take up what is strange and hide it: an encoder that was homed at the end stop,
+    or a worn pump. Held chambers are the lumped plant's, which has no such valves.
+    """
+    held = one.problem.model.rates is HELD_FLOW_FORM.rates
+    return not held and not one.problem.log.gaps.size and explained(one.problem, one.point)
+
+
+def _completed(one: _Rough, log: GreyBoxLog) -> tuple[Problem, Array, tuple[Array, Array]]:
+    """Return the problem with what matters to the last digits alone, where its search begins, and its bounds."""
+    problem = FreedProblem.of(completed(one.problem.model), one.problem.log)
+    theta = np.append(one.point.theta, np.zeros(len(problem.model.unknowns) - len(one.point.theta)))
+    lowest, highest = flow_bounds(problem.model, [theta], log)
+    known = len(one.point.theta)
+    lowest[:known], highest[:known] = one.bounds
+    return problem, theta, (lowest, highest)
 
 
 def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]) -> list[_Rough]:

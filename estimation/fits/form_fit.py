@@ -73,17 +73,23 @@ def with_structure(found: Mapping[str, tuple[float, float]], structure: float) -
     return {**found, "bulk_modulus": (value, float(np.hypot(std, structure * value)))}
 
 
-def weighed(fits: Sequence[GreyBoxFit]) -> Mapping[str, tuple[float, float]]:
+def weighed(
+    fits: Sequence[GreyBoxFit], temper: float = TEMPER, beforehand: Sequence[float] | None = None
+) -> Mapping[str, tuple[float, float]]:
     """Return values and deviations over several models of one log, each weighed by its likelihood.
 
     A model that explains the log less well counts by a power of ``exp(-chi^2/2)``, see `TEMPER`; where two explain it
     alike, what they disagree on goes into the deviation (Hoeting et al. 1999, Statistical Science 14, equations 3 and
-    4, with equal priors).
+    4).
 
     Parameters
     ----------
     fits : sequence of GreyBoxFit
         Of the same log, with the same unknowns.
+    temper : float
+        What a difference of log-likelihood is divided by [dimensionless].
+    beforehand : sequence of float, optional
+        Their weights before the log is seen [dimensionless]; equal ones if not given.
 
     Returns
     -------
@@ -91,7 +97,8 @@ def weighed(fits: Sequence[GreyBoxFit]) -> Mapping[str, tuple[float, float]]:
         Value and deviation by parameter [SI].
     """
     costs = np.array([fit.cost for fit in fits])
-    weights = np.exp(-np.minimum((costs - np.min(costs)) / TEMPER, 700.0))
+    weights = np.exp(-np.minimum((costs - np.min(costs)) / temper, 700.0))
+    weights *= 1.0 if beforehand is None else np.array(beforehand)
     weights /= np.sum(weights)
     best = fits[int(np.argmin(costs))]
     found: dict[str, tuple[float, float]] = {}

@@ -86,7 +86,7 @@ class GreyBoxLog:
         First and last sample on which a gap in the drives acts, and the variance that it adds to the state from one
         sample to the next, in units of `GreyBoxModel.jump`; in order of time, none overlapping.
     presumed : Mapping[str, tuple of float]
-        What is known of positive unknowns before the log is seen: value [SI] and standard deviation of its logarithm.
+        What is known of unknowns before the log is seen: value [SI] and standard deviation of its coordinate.
     block : float
         Length over which residuals are averaged before they are squared [s].
     timed : tuple of str

@@ -81,8 +81,9 @@ class Problem:
         self.model, self.log = model, log
         self._kernel = kernel or compile_kernel(model)
         self._block = max(1, round(log.block / log.sample_time))
-        presumed = [log.presumed.get(name, (1.0, np.inf)) for name in model.unknowns]
-        self.presumed = np.array([np.log(value) for value, _ in presumed])
+        sizes = dict(model.linear)
+        presumed = [log.presumed.get(name, (sizes.get(name, 1.0), np.inf)) for name in model.unknowns]
+        self.presumed = model.theta({name: value for name, (value, _) in zip(model.unknowns, presumed, strict=True)})
         self.prior = np.array([deviation**-2.0 for _, deviation in presumed])
 
     @cached_property

@@ -108,6 +108,8 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "air_onset": (0.0, 1.0),
     "leakage_growth": (-2.0, 2.0),
     "crack_pressure": (-1e5, 2e5),
+    "crack_a": (-2e4, 2e4),
+    "crack_b": (-2e4, 2e4),
     "leakage_bend": (-4.0, 4.0),
     "leakage_rise": (-6.0, 6.0),
 }

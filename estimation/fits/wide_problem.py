@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import search_bounds
 from estimation.fits.hypotheses import LIMITS, PRESUMED, Hypothesis
+from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.wide_flow import LINEAR, WIDE_FLOW_FORM, WideFlowParameters
@@ -44,7 +46,9 @@ MOST_BIASED = 2.0
 second valley, where all that the log shows is noise that the oil's stiffness makes large."""
 
 
-def widened(log: GreyBoxLog, parameters: EhaParameters, stiffness: float = 0.0) -> GreyBoxLog:
+def widened(
+    log: GreyBoxLog, parameters: EhaParameters, found: Mapping[str, float] = MappingProxyType({})
+) -> GreyBoxLog:
     """Return a log as the wide flow form sees it: with the share of the log and the rate of position as drives.
 
     Parameters
@@ -53,8 +57,8 @@ def widened(log: GreyBoxLog, parameters: EhaParameters, stiffness: float = 0.0) 
         The log, as the plain flow form sees it.
     parameters : EhaParameters
         The actuator.
-    stiffness : float
-        `STIFFNESS` of the inner circuit [Pa/m^3]; held, as it would take up what is strange.
+    found : Mapping[str, float], optional
+        What the plain form found; of it `STIFFNESS` and `CRACKS` are held, as they would take up what is strange [SI].
 
     Returns
     -------
@@ -70,7 +74,9 @@ def widened(log: GreyBoxLog, parameters: EhaParameters, stiffness: float = 0.0) 
         drive_std=(*log.drive_std, 0.0, 0.0),
         parameters=parameter_row(
             WideFlowParameters(
-                **known, stated_pressure=usual_pressure(log, parameters), accumulator_stiffness=stiffness
+                **known,
+                **{name: found.get(name, 0.0) for name in (STIFFNESS, *CRACKS)},
+                stated_pressure=usual_pressure(log, parameters),
             )
         ),
         presumed={**log.presumed, **{name: (known[name], std) for name, std in PRESUMED.items()}},

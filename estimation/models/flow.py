@@ -5,52 +5,21 @@ the piston sweeps. Differential pressure is then a balance of two chambers with 
 appear at all.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from estimation.arrays import Array
+from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.functions import Scalar, absolute, maximum, sign, where
 from plant.components.check_valve import make_up_flow
 from plant.components.oil import ATMOSPHERE
 from plant.components.valves import pumped_flow
 from plant.eha.circuit import chamber_volumes
-from plant.eha.model import EhaParameters, piston_areas
-from plant.units import si
-
-
-@dataclass(frozen=True, kw_only=True)
-class FlowParameters(EhaParameters):
-    """The actuator's parameters, and those that the flow form adds."""
-
-    makeup_opening: float = si(1e3, "Pa", "drop at which a make-up valve is half open", "fitted")
-    case_leakage: float = si(0.0, "m^3/(s Pa)", "drain of a port to the inner circuit", "fitted")
-    speed_lead: float = si(0.0, "s", "lead of the motor on the line between samples", "fitted")
-    accumulator_stiffness: float = si(
-        0.0, "Pa/m^3", "rise of the inner circuit's pressure per volume pushed back into it", "fitted"
-    )
-
-    def __post_init__(self) -> None:
-        """Take any finite number: a fit keeps to its own bounds."""
-
-
-def flow_parameters(p: EhaParameters) -> FlowParameters:
-    """Return an actuator's parameters as the flow form takes them.
-
-    Parameters
-    ----------
-    p : EhaParameters
-        The actuator.
-
-    Returns
-    -------
-    FlowParameters
-        With the defaults of what the form adds.
-    """
-    return FlowParameters(**{one.name: getattr(p, one.name) for one in fields(EhaParameters)})
+from plant.eha.model import piston_areas
 
 
 class Delivery(NamedTuple):
@@ -99,7 +68,12 @@ def delivered_flow(speeds: tuple[Scalar, Scalar], p: SimpleNamespace, step: Scal
 
 
 def chamber_rates(
-    pressures: tuple[Scalar, Scalar], delivery: Delivery, p: SimpleNamespace, *, by_mass: bool
+    pressures: tuple[Scalar, Scalar],
+    delivery: Delivery,
+    p: SimpleNamespace,
+    *,
+    by_mass: bool,
+    cracks: tuple[Scalar, Scalar] = (0.0, 0.0),
 ) -> tuple[Scalar, Scalar]:
     """Return how fast the chamber pressures change (equations 5.1 to 5.4 with errata E2, E8 and E17).
 
@@ -121,6 +95,8 @@ def chamber_rates(
         drop at which a check valve is half open [Pa].
     by_mass : bool
         Whether flows are balanced by mass rather than by volume.
+    cracks : tuple of float or Expression
+        Drops at which the make-up valves leave their seats [Pa].
 
     Returns
     -------
@@ -133,7 +109,7 @@ def chamber_rates(
     area_1, area_2 = piston_areas(p)
     volume_1, volume_2 = chamber_volumes(position, p)
     dp = p1 - p2
-    into_1, into_2 = inner_flows(pressures, p)
+    into_1, into_2 = inner_flows(pressures, p, cracks)
     at_1, at_2 = port_flows(pumped, leaked_flow(dp, p.leakage_coefficient, p), dp, dp / beta if by_mass else 0.0)
     stiffness_1 = beta - (p1 - ATMOSPHERE) if by_mass else beta
     stiffness_2 = beta - (p2 - ATMOSPHERE) if by_mass else beta
@@ -143,7 +119,9 @@ def chamber_rates(
     )
 
 
-def inner_flows(pressures: tuple[Scalar, Scalar], p: SimpleNamespace) -> tuple[Scalar, Scalar]:
+def inner_flows(
+    pressures: tuple[Scalar, Scalar], p: SimpleNamespace, cracks: tuple[Scalar, Scalar] = (0.0, 0.0)
+) -> tuple[Scalar, Scalar]:
     """Return what the inner circuit feeds into each chamber through its make-up valve, less the drain.
 
     Parameters
@@ -152,6 +130,8 @@ def inner_flows(pressures: tuple[Scalar, Scalar], p: SimpleNamespace) -> tuple[S
         Absolute, of both chambers [Pa].
     p : namespace
         As `chamber_rates` needs them.
+    cracks : tuple of float or Expression
+        Drops at which the make-up valves leave their seats [Pa].
 
     Returns
     -------
@@ -160,9 +140,9 @@ def inner_flows(pressures: tuple[Scalar, Scalar], p: SimpleNamespace) -> tuple[S
     """
     supply = p.accumulator_pressure
     into_1, into_2 = (
-        make_up_flow(chamber, other, supply, p.makeup_conductance, p.makeup_opening, p.pilot_share)
+        make_up_flow(chamber, other, supply - crack, p.makeup_conductance, p.makeup_opening, p.pilot_share)
         - p.case_leakage * (chamber - supply)
-        for chamber, other in (pressures, pressures[::-1])
+        for chamber, other, crack in zip(pressures, pressures[::-1], cracks, strict=True)
     )
     return into_1, into_2
 
@@ -236,31 +216,38 @@ def flow_rates(
     """
     speeds, (x, next_x), step = drives
     delivery = Delivery(delivered_flow(speeds, p, step, share), (next_x - x) / step, x + share * (next_x - x))
-    return chamber_rates(state, delivery, p, by_mass=by_mass)
+    return chamber_rates(state, delivery, p, by_mass=by_mass, cracks=(p.crack_a, p.crack_b))
+
+
+def fed_rates(
+    state: tuple[Scalar, Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar, *, by_mass: bool
+) -> tuple[Scalar, Scalar, Scalar]:
+    """Return the rates of both chambers and of the inner circuit that feeds them [Pa/s]; as `flow_rates`."""
+    p1, p2, supply = state
+    fed = SimpleNamespace(**{**vars(p), "accumulator_pressure": supply})
+    into_1, into_2 = inner_flows((p1, p2), fed, (p.crack_a, p.crack_b))
+    pushed_back = -p.accumulator_stiffness * (into_1 + into_2)
+    return *flow_rates((p1, p2), drives, fed, share, by_mass=by_mass), pushed_back
 
 
 def _by_mass(
     state: tuple[Scalar, Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar
 ) -> tuple[Scalar, Scalar, Scalar]:
-    p1, p2, supply = state
-    fed = SimpleNamespace(**{**vars(p), "accumulator_pressure": supply})
-    into_1, into_2 = inner_flows((p1, p2), fed)
-    pushed_back = -p.accumulator_stiffness * (into_1 + into_2)
-    return *flow_rates((p1, p2), drives, fed, share, by_mass=True), pushed_back
+    return fed_rates(state, drives, p, share, by_mass=True)
 
 
 def _held(state: tuple[Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, Scalar]:
     speeds, (x, next_x), step = drives
-    return chamber_rates(
-        state, Delivery(delivered_flow(speeds, p, step, share), (next_x - x) / step, 0.0), p, by_mass=False
-    )
+    delivery = Delivery(delivered_flow(speeds, p, step, share), (next_x - x) / step, 0.0)
+    return chamber_rates(state, delivery, p, by_mass=False, cracks=(p.crack_a, p.crack_b))
 
 
 def _at_rest(p: SimpleNamespace) -> tuple[Scalar, Scalar]:
     return p.accumulator_pressure, p.accumulator_pressure
 
 
-def _all_at_rest(p: SimpleNamespace) -> tuple[Scalar, Scalar, Scalar]:
+def all_at_rest(p: SimpleNamespace) -> tuple[Scalar, Scalar, Scalar]:
+    """Return the pressures of both chambers and the inner circuit at rest [Pa]."""
     return p.accumulator_pressure, p.accumulator_pressure, p.accumulator_pressure
 
 
@@ -298,7 +285,7 @@ MASS_FLOW_FORM = replace(
     FLOW_FORM,
     name="flow_mass",
     unknowns=(*FLOW_FORM.unknowns, STIFFNESS),
-    initial=_all_at_rest,
+    initial=all_at_rest,
     rates=_by_mass,
     linear=(*FLOW_FORM.linear, (STIFFNESS, 1e8)),
     jump=(0.5, -0.5, 0.0),

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
-from estimation.models.flow import STIFFNESS, FlowParameters, delivered_flow, leaked_flow, port_flows
+from estimation.models.flow import STIFFNESS, delivered_flow, leaked_flow, port_flows
+from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.functions import Scalar, maximum, minimum, where
 from plant.components.check_valve import make_up_flow
@@ -89,8 +90,8 @@ def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Sc
     leaked = leaked_flow(dp, p.leakage_coefficient * grown, p)
     opening, pilot, conductance = p.makeup_opening, p.pilot_share, p.makeup_conductance
     cracking = supply - p.crack_pressure
-    fed_1 = make_up_flow(p1, p2, cracking, conductance, opening, pilot)
-    fed_2 = make_up_flow(p2, p1, cracking, p.makeup_share_b * conductance, opening, pilot)
+    fed_1 = make_up_flow(p1, p2, cracking - p.crack_a, conductance, opening, pilot)
+    fed_2 = make_up_flow(p2, p1, cracking - p.crack_b, p.makeup_share_b * conductance, opening, pilot)
     drain = p.case_leakage * grown
     into_1 = fed_1 - p.drain_share_a * drain * (p1 - supply)
     into_2 = fed_2 - p.drain_share_b * drain * (p2 - supply)

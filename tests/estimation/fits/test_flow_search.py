@@ -12,6 +12,9 @@ from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.flow import MASS_FLOW_FORM
+from experiments.open_benchmark.logger import PLAIN, Logger
+from experiments.open_benchmark.machine import Machine
+from experiments.open_benchmark.run import run
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -82,3 +85,17 @@ def test_what_a_hypothesis_promises_is_asked_where_the_plain_fit_stands() -> Non
     plain = by_mass(balanced(log, HEALTHY, STARTS)).values
     assert promised(log, HEALTHY, plain, DELIVERY, by_mass=True)[0] < 10.0
     assert promised(log, HEALTHY, plain, DELIVERY, by_mass=False)[0] > 100.0
+
+
+def test_make_up_valves_that_crack_apart_are_fitted_and_do_not_bias_bulk_modulus() -> None:
+    machine = Machine(crack_a=3e3, crack_b=0.0, ripple=0.0)
+    rng = np.random.default_rng(3)
+    course = np.zeros((6000, 5))
+    course[:, 0] = np.repeat(rng.choice((-1.0, 1.0), 60) * rng.uniform(60.0, 125.0, 60), 100)
+    course[:, [1, 2, 4]] = 1.0
+    log = Logger().log(run(machine, course), rng)
+    record = Record(1e-3, {name: log[name].to_numpy() for name in PLAIN})
+    fit = by_mass(balanced(seen(record), HEALTHY, STARTS))
+    assert fit.values["crack_a"] - fit.values["crack_b"] == pytest.approx(3e3, abs=1e3)
+    assert abs(fit.values["bulk_modulus"] - machine.bulk_modulus) < 2.0 * fit.std["bulk_modulus"]
+    assert fit.std["bulk_modulus"] < 2e-3 * machine.bulk_modulus

@@ -11,6 +11,7 @@ import pytest
 from estimation.fits import greybox_loops
 from estimation.fits.greybox_loops import compile_kernel
 from estimation.models.flow import FLOW_FORM, MASS_FLOW_FORM
+from estimation.models.flow_parameters import flow_parameters
 from estimation.models.greybox import GreyBoxModel
 from plant.eha.model import EhaParameters
 from plant.solvers.steps import parameter_row
@@ -35,7 +36,15 @@ def test_the_same_bits_as_python(model: GreyBoxModel, asked: bool, monkeypatch: 
     measured[rng.random(samples) < 0.2] = measured[20:24] = np.nan  # a whole block among them
     theta = np.array([*np.log([2e8, 1e-12, 1e-6, 1e-9, 1e4, 1e-13]), 0.3, *[2.0] * (len(model.unknowns) - 7)])
     gaps = np.array([[10.0, 14.0, 1e9], [30.0, 31.0, 1e8]])
-    given = (theta, drives, measured, parameter_row(EhaParameters()), 1e-3, rng.integers(1, 3, samples), block)
+    given = (
+        theta,
+        drives,
+        measured,
+        parameter_row(flow_parameters(EhaParameters())),
+        1e-3,
+        rng.integers(1, 3, samples),
+        block,
+    )
     given = (*given, np.array([2.5e7]), np.array([1e3]), gaps, 3.0)
     blocks = -(-samples // block)
     shapes = ((1, blocks), (1, blocks, theta.size)) if asked else ((0, 0), (0, 0, theta.size))

@@ -15,7 +15,8 @@ from estimation.fits.hypotheses import HYPOTHESES
 from estimation.fits.side_by_side import LANES, MANY, compile_side_by_side
 from estimation.fits.side_by_side_loops import residuals_side_by_side
 from estimation.fits.wide_problem import freed, usual_values, widened
-from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, flow_parameters
+from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM
+from estimation.models.flow_parameters import flow_parameters
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters
 from plant.eha.drives import make_drive

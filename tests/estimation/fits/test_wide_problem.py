@@ -6,7 +6,8 @@ import pytest
 from estimation.fits.greybox_log import greybox_log
 from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
 from estimation.fits.wide_problem import freed, own_starts, widened
-from estimation.models.flow import FLOW_FORM, flow_parameters
+from estimation.models.flow import FLOW_FORM
+from estimation.models.flow_parameters import flow_parameters
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 

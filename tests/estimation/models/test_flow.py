@@ -4,9 +4,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from estimation.models.completed_flow import completed
 from estimation.models.flow import (
     FLOW_FORM,
     HELD_FLOW_FORM,
+    MASS_FLOW_FORM,
     Delivery,
     chamber_rates,
     delivered_flow,
@@ -20,7 +22,7 @@ P = EhaParameters()
 
 
 def values(**changes: float) -> SimpleNamespace:
-    beside = {"speed_lead": 0.0, "case_leakage": 0.0, "makeup_opening": 1.0}
+    beside = {"speed_lead": 0.0, "case_leakage": 0.0, "makeup_opening": 1.0, "crack_a": 0.0, "crack_b": 0.0}
     return SimpleNamespace(**{name: getattr(P, name) for name in PARAMETER_NAMES} | beside | changes)
 
 
@@ -54,6 +56,25 @@ def test_make_up_holds_the_low_chamber_near_the_inner_circuit() -> None:
     _, without = settle(values(makeup_conductance=0.0, leakage_coefficient=2.5e-11), 60.0, 2.0)
     assert with_makeup > 0.9 * P.accumulator_pressure
     assert without < 0.0
+
+
+def test_a_make_up_valve_that_cracks_holds_its_chamber_lower_by_that() -> None:
+    leaking = {"makeup_conductance": 1e-8, "leakage_coefficient": 2.5e-11}
+    _, seated = settle(values(**leaking), 60.0, 2.0)
+    _, cracking = settle(values(**leaking, crack_b=2e3), 60.0, 2.0)
+    _, other = settle(values(**leaking, crack_a=2e3), 60.0, 2.0)
+    assert seated - cracking == pytest.approx(2e3, rel=0.01)
+    assert other == pytest.approx(seated, abs=1.0)
+
+
+def test_an_accumulator_without_gas_to_spare_gives_way_by_volume_as_by_mass() -> None:
+    state, drives = (3e5, 2e5, 2.6e5), ((60.0, 60.0), (0.0, 1e-4), 1e-3)
+    p = values(accumulator_stiffness=1e8, case_leakage=1e-13)
+    by_volume = completed(FLOW_FORM).rates(state, drives, p, 0.0)
+    by_mass = MASS_FLOW_FORM.rates(state, drives, p, 0.0)
+    assert by_volume[2] == by_mass[2] != 0.0
+    fed = values(accumulator_pressure=2.6e5, case_leakage=1e-13)
+    assert by_volume[:2] == FLOW_FORM.rates(state[:2], drives, fed, 0.0)
 
 
 def test_two_chambers_without_make_up_are_the_lumped_capacitance() -> None:
