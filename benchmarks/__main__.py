@@ -18,6 +18,7 @@ NAMES = (
     "many_filters",
     "robustness",
     "efficiency",
+    "coverage",
     "convergence",
     "chamber_filter",
     "identification",
