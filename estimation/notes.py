@@ -16,6 +16,10 @@ class SensorCode(Code):
         "{channel} is at the end of its range ({levels} Pa) in {percent:.2g} % of its samples; they were left out"
     )
     HUM = "{channel} contains a hum of {amplitude_pa:.3g} Pa at {frequency_hz:.4g} Hz; it was removed"
+    HELD = (
+        "{channel} has a new sample every {milliseconds:.3g} ms only and is repeated for {rows} rows; the repeated "
+        "values were left out"
+    )
     OUTLIERS_LEFT_OUT = "{channel} has gross outliers in {count} of {total} samples; they were left out"
     SENSORS_DISAGREE = (
         "velocity_m_s and the slope of position_m differ by {difference_m_s:.2g} m/s: one of the two sensors is wrong"
@@ -93,6 +97,10 @@ class EstimateCode(Code):
         "position alone does not fix the scale of the forces: bulk modulus between {least_pa:.3g} and {most_pa:.3g} Pa "
         "explains the log, with friction in proportion"
     )
+    WEAKLY_HELD = (
+        "position alone holds bulk modulus weakly: noise leaves {noise_percent:.2g} % of it open, and a misfit too "
+        "small to show may move it by {percent:.0f} %"
+    )
     INNOVATIONS_LARGE = (
         "the residuals of {channel} are {ratio:.1f} times as large as the filter expects (normalised innovation "
         "squared {nis:.1f}, expected 1): model and log disagree, and the interval is too narrow"
@@ -136,6 +144,10 @@ class RigCode(Code):
     )
     PRESSURE_OFFSET = (
         "differential_pressure_pa reads {offset_pa:.4g} +- {half_width_pa:.2g} Pa too much; the offset was subtracted"
+    )
+    PRESSURE_DRIFTS = (
+        "the offset of differential_pressure_pa drifts by {drift_pa:.4g} +- {half_width_pa:.2g} Pa over the log; the "
+        "drift was subtracted"
     )
     ENCODER_ZERO = (
         "position_m reads {zero_mm:.1f} +- {half_width_mm:.1f} mm at mid-stroke; it was shifted to zero there"

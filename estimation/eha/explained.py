@@ -108,6 +108,11 @@ def _offset(found: Explanation, _: EhaParameters) -> Note:
     return RigCode.PRESSURE_OFFSET.note(offset_pa=value, half_width_pa=_half_width(found, "pressure_offset"))
 
 
+def _drift(found: Explanation, _: EhaParameters) -> Note:
+    value = found.values["pressure_drift"][0]
+    return RigCode.PRESSURE_DRIFTS.note(drift_pa=value, half_width_pa=_half_width(found, "pressure_drift"))
+
+
 def _zero(found: Explanation, _: EhaParameters) -> Note:
     value = found.values["position_zero"][0]
     return RigCode.ENCODER_ZERO.note(zero_mm=1e3 * value, half_width_mm=1e3 * _half_width(found, "position_zero"))
@@ -182,6 +187,7 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "speed_late": _input_late(SPEED),
     "position_late": _input_late(POSITION),
     "pressure_offset": _offset,
+    "pressure_drift": _drift,
     "encoder_zero": _zero,
     "delivery": _delivery,
     "volume": _volume,
@@ -218,11 +224,13 @@ def set_right(log: CleanLog, found: Explanation) -> CleanLog:
     record, changed = log.record, dict[str, Array]()
     if zero := value.get("position_zero", 0.0):
         changed[POSITION] = record[POSITION] - zero
-    late, offset = lateness(found, PRESSURE), value.get("pressure_offset", 0.0)
+    elapsed = np.arange(len(record)) / len(record)
+    late, drift = lateness(found, PRESSURE), value.get("pressure_drift", 0.0)
+    offset = value.get("pressure_offset", 0.0) + drift * elapsed
     if any(name in value for name in GROWTH):
-        grown = _grown(found, np.arange(len(record)) / len(record))
+        grown = _grown(found, elapsed)
         changed[LEAKAGE_COURSE] = grown / grown[-1]
-    if late or offset:
+    if late or np.any(offset):
         changed[PRESSURE] = _brought_forward(record, PRESSURE, late) - offset
     if behind := lateness(found, SPEED):
         changed[SPEED] = _brought_forward(record, SPEED, behind)

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from estimation.log_checks.channel_physics import channel_mistakes
+from estimation.log_checks.held import without_held
 from estimation.log_checks.hum import without_hum
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.outliers import without_gross_outliers
@@ -23,7 +24,7 @@ class CleanLog:
     Parameters
     ----------
     record : Record
-        The log, without gross outliers, clipped pressures and hum.
+        The log, without repeated samples, gross outliers, clipped pressures and hum.
     variances : Mapping[str, float]
         Measurement variance of each of its channels [SI squared].
     left_out : tuple of Note
@@ -71,7 +72,8 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     CleanLog
         The log to fit, and what was found.
     """
-    sound, outliers = without_gross_outliers(record, CLEANED)
+    sampled, held = without_held(record)
+    sound, outliers = without_gross_outliers(sampled, CLEANED)
     clipped: tuple[Note, ...] = ()
     if PRESSURE in sound:
         sound, clipped = without_saturated(sound, parameters)
@@ -81,4 +83,6 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     dead = any(note.data["channel"] == PRESSURE for note in objections)
     mistakes = channel_mistakes(sound.replace(**{PRESSURE: None}) if dead else sound, parameters)
     objections = () if mistakes else objections  # a sensor cannot be judged by channels of another meaning
-    return CleanLog(sound, measurement_variances(sound, known), (*outliers, *clipped, *hum), objections, mistakes)
+    return CleanLog(
+        sound, measurement_variances(sound, known), (*held, *outliers, *clipped, *hum), objections, mistakes
+    )

@@ -43,6 +43,7 @@ class WideFlowParameters(FlowParameters):
     speed_lag: float = si(0.0, "s", "first-order lag of the motor's speed sensor", "fitted")
     position_lag: float = si(0.0, "s", "first-order lag of the encoder or of its filter", "fitted")
     pressure_offset: float = si(0.0, "Pa", "offset of the differential pressure", "fitted")
+    pressure_drift: float = si(0.0, "Pa", "what that offset gains over the log, evenly", "fitted")
     position_zero: float = si(0.0, "m", "encoder's reading in the middle position", "fitted")
     start_pressure: float = si(0.0, "Pa", "differential pressure before the first sample", "fitted")
     start_level: float = si(
@@ -99,7 +100,8 @@ def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Sc
     rise = _stiffness(p1, elapsed, p) * (at_1 - area_1 * velocity + into_1) / volume_1
     fall = _stiffness(p2, elapsed, p) * (area_2 * velocity - at_2 + into_2) / volume_2
     # how far the sensor is behind stays small where its lag is short, which a stiff step resolves
-    lagging = rise - fall - (behind + p.pressure_offset) / (p.pressure_lag + SHORTEST_LAG)
+    offset = p.pressure_offset + p.pressure_drift * elapsed
+    lagging = rise - fall - (behind + offset) / (p.pressure_lag + SHORTEST_LAG)
     return rise, fall, lagging, -p.accumulator_stiffness * (into_1 + into_2)
 
 
@@ -164,6 +166,7 @@ LINEAR = {
     "speed_lag": 1e-3,
     "position_lag": 1e-3,
     "pressure_offset": 1e4,
+    "pressure_drift": 1e4,
     "position_zero": 1e-2,
     "start_pressure": 1e5,
     "start_level": 1e4,

@@ -124,6 +124,18 @@ def test_a_pressure_offset_of_one_bar_is_named_and_taken_off() -> None:
     assert np.mean(mended - record[PRESSURE]) == pytest.approx(0.0, abs=2e3)
 
 
+def test_an_offset_that_drifts_is_named_and_taken_off() -> None:
+    record = log()
+    drifting = record.replace(**{PRESSURE: record[PRESSURE] + np.linspace(0.0, -1e5, len(record))})
+    found = explained(drifting)
+    assert found.names == ("pressure_drift",)
+    (note,) = notes_of(found, HEALTHY)
+    assert note.code is RigCode.PRESSURE_DRIFTS
+    assert note.data["drift_pa"] == pytest.approx(-1e5, rel=0.02)
+    mended = set_right(clean_log(drifting, HEALTHY), found).record[PRESSURE]
+    assert np.std(mended - record[PRESSURE]) < 2e3
+
+
 def test_a_pressure_that_reads_too_much_at_rest_is_an_offset_and_no_load_at_the_start() -> None:
     record = log()
     found = estimate_log(record.replace(**{PRESSURE: record[PRESSURE] + 1e5}), Rig(HEALTHY))

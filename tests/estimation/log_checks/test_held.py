@@ -1,0 +1,70 @@
+"""Values that a logger only repeated are left out; a channel that rests or is coarse keeps all of its own."""
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.clean import clean_log
+from estimation.log_checks.held import held_rows, without_held
+from estimation.notes import SensorCode
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH, IDEAL, Sensors
+
+PRESSURE, POSITION = "differential_pressure_pa", "position_m"
+
+
+def log(drive: str, sensors: Sensors = BENCH) -> Record:
+    rng = np.random.default_rng(4)
+    signal = make_drive(drive, 4.0, 1e-3, EhaParameters(), rng)
+    return simulate(CIRCUIT, signal, 1e-3, EhaParameters(), sensors=sensors, rng=rng)
+
+
+def held(values: np.ndarray, rows: float) -> np.ndarray:
+    """Return values that come every so many rows, on a clock of their own where that is no whole number."""
+    at = np.arange(len(values))
+    return values[(np.floor(at / rows) * rows).astype(int)]
+
+
+@pytest.mark.parametrize("sensors", [BENCH, IDEAL])
+@pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "chirp", "sine"])
+def test_nothing_is_left_out_of_a_log_that_is_sampled_in_every_row(drive: str, sensors: Sensors) -> None:
+    record = log(drive, sensors)
+    assert without_held(record) == (record, ())
+
+
+@pytest.mark.parametrize("quantum", [1e-6, 1e-5, 1e-4])
+def test_a_coarse_encoder_is_not_held(quantum: float) -> None:
+    record = log("sine")
+    assert held_rows(quantum * np.round(record[POSITION] / quantum)) == 1
+
+
+@pytest.mark.parametrize("rows", [2, 3, 5, 10, 10.0 / 3.0])
+@pytest.mark.parametrize("channel", [PRESSURE, POSITION])
+def test_a_held_channel_is_named_and_its_own_samples_stay(channel: str, rows: float) -> None:
+    record = log("multisine")
+    given = held(record[channel], rows)
+    found, (note,) = without_held(record.replace(**{channel: given}))
+    there = np.isfinite(found[channel])
+    assert note.code is SensorCode.HELD
+    assert note.data["channel"] == channel
+    assert note.data["rows"] == int(rows)
+    moved = np.append(True, np.diff(given) != 0.0)  # a sample that is what the last one was tells nothing
+    assert np.array_equal(there, moved)
+    assert np.array_equal(found[channel][there], given[there])
+
+
+def test_a_motor_that_is_driven_in_steps_is_not_held() -> None:
+    record = log("steps")
+    stairs = held(100.0 * np.sin(3e-3 * np.arange(len(record))), 10)
+    assert "motor_speed_rad_s" not in [
+        n.data["channel"] for n in without_held(record.replace(motor_speed_rad_s=stairs))[1]
+    ]
+
+
+def test_a_clean_log_says_what_was_held() -> None:
+    record = log("multisine")
+    clean = clean_log(record.replace(**{PRESSURE: held(record[PRESSURE], 7)}), EhaParameters())
+    assert [note.code for note in clean.left_out] == [SensorCode.HELD]
+    assert np.mean(np.isfinite(clean.record[PRESSURE])) == pytest.approx(1.0 / 7.0, rel=0.1)
