@@ -21,6 +21,7 @@ NOT_THE_LOGS = {
     EstimateCode.POSITION_RESIDUALS_LARGE,
     EstimateCode.FRICTION_LAWS_DISAGREE,
     EstimateCode.FORCES_ON_ANY_SCALE,
+    EstimateCode.WEAKLY_HELD,
 }
 """Reasons of a gate that speak against bulk modulus alone: the log holds too little of it, or it hangs on how the
 piston starts and stops, which decides no condition."""

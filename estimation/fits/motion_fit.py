@@ -1,25 +1,34 @@
 """`fit_motion(record, parameters, ...) -> FormFit`: bulk modulus, leakage and friction of a log without pressure."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.fits.averaged import block_means, samples_a_block
-from estimation.fits.descent import Point, descend, descend_together
+from estimation.fits.descent import descend
 from estimation.fits.flow_log import DRAIN_START, LEAST_LEAKAGE
 from estimation.fits.flow_search import LEAD_START
 from estimation.fits.force_scale import Way, disagree, rescaled
 from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
-from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_log import GreyBoxLog, OutputNoise
-from estimation.fits.greybox_problem import Problem, search_bounds
+from estimation.fits.motion_search import (
+    EXPLAINED,
+    FINISHING,
+    NEAR_ENOUGH,
+    NEARING,
+    WAYS,
+    Ended,
+    MotionSearch,
+    cost_of,
+    explained,
+    likeliest,
+)
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
-from estimation.models.greybox import GreyBoxModel
-from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS, MotionParameters
+from estimation.models.motion import MOTION_FORMS, MotionParameters
 from estimation.notes import EstimateCode
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -56,40 +65,17 @@ SHORTEST_SAMPLE = 1e-3
 MOST_SAMPLES = 30_000
 """A longer log is fitted on its beginning: the fit's interval is under a percent long before."""
 
-SCREENED = 4_000
-"""Samples on which starts are screened."""
-
-SEARCHED = 10_000
-"""Samples on which the likelier starts are carried on; a longer log goes on from where they end."""
-
-UNCHANGED = (1.0, 1.0)
-"""Factors that leave the noise as it is [dimensionless]."""
-
-WAYS: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = (
-    ((1.0, 1e6), (1.0, 1e3)),
-    (UNCHANGED, UNCHANGED),
-    ((1e2, 1e6), (1.0, 1e3)),
-)
-"""Ways down to the optimum: factors on variance and random walk of the residual while starts are screened and while
-they are brought near. With the true, small noise the least misfit of leakage piles up into the position and hides other
-ways down; with a larger walk what counts is increments. Where the piston sticks, straight down is often the shorter."""
-
-SCREENING, NEARING, FINISHING = 10, 12, 25
-"""Evaluations of the model in the three stages."""
-
-NEAR_ENOUGH = 0.01
-"""Cost that a further step must promise while a start is only brought near [dimensionless]."""
-
-FINALISTS = 3
-"""Starts that are carried on each way, the likeliest of each way first, until one explains the log."""
-
-EXPLAINED = 1.1
-"""Mean squared normalised residual up to which a form explains the log [dimensionless]."""
-
 STRUCTURE = 0.005
 """Relative standard deviation of bulk modulus from friction being of no known law: on the foreign bench, whose
 presliding is of another make, noise alone explains a tenth to a half of the errors. Judged from that one bench
 [fraction]."""
+
+MOST_MOVED = 0.03
+"""Share of bulk modulus by which a misfit that does not show may move it, above which it is not believed [fraction]: as
+much as noise may (`estimation.eha.result.LARGEST_BOUND`)."""
+
+UNLIKELY = 72.0
+"""Difference of log-likelihood from which a structure counts for nothing beside the other [dimensionless]."""
 
 ALIKE = 5.0
 """Difference of log-likelihood up to which two structures are said to explain a log alike [dimensionless]."""
@@ -132,16 +118,47 @@ def fit_motion(
     noise = (variances or measurement_variances(record, ("motor_speed_rad_s",)))["motor_speed_rad_s"]
     log = _log(record, parameters, uncertainties or {}, noise)
     starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
-    first, others = _searched(MOTION_FORMS[0], log, starts)
-    second, more = _compared(MOTION_FORMS[1], log, first, starts)
-    fits, others = [first, second], [*others, *more]
+    ended = likeliest([MotionSearch.of(form, log, starts) for form in MOTION_FORMS])
+    fits, others = _fitted(ended)
     best = min(fits, key=lambda fit: fit.cost)
     found = weighed(fits)
     value, std = found["bulk_modulus"]
     apart = max((abs(float(np.log(other / value))) for other in others), default=0.0)
-    believed = with_structure(found, float(np.hypot(STRUCTURE, apart)))
-    bound = float(np.hypot(std / value, apart))
-    return FormFit(believed, bound, best.chi_square[0], _objections(fits, best, others), best.rig_slopes)
+    bound, moved = float(np.hypot(std / value, apart)), unseen(best, len(log.measured)) * std / value
+    believed = with_structure(found, float(np.linalg.norm([STRUCTURE, apart, moved])))
+    reasons = _objections(fits, best, others)
+    if not reasons and moved > MOST_MOVED:
+        reasons = (EstimateCode.WEAKLY_HELD.note(percent=100.0 * moved, noise_percent=100.0 * std / value),)
+    return FormFit(believed, bound, best.chi_square[0], reasons, best.rig_slopes)
+
+
+def unseen(fit: GreyBoxFit, samples: int) -> float:
+    """Return by how many deviations a misfit that no test of the residuals shows may move what is fitted.
+
+    The sum of n squared residuals has a standard deviation of ``sqrt(2 n)``. A misfit of that size does not show, and
+    one that looks like the change of an unknown moves it by the root of that, in deviations. What a log holds firmly
+    is not moved far by so many; what it holds weakly is.
+
+    Parameters
+    ----------
+    fit : GreyBoxFit
+        The fit.
+    samples : int
+        How many residuals it has.
+
+    Returns
+    -------
+    float
+        12 for 10,000 residuals that are explained [dimensionless].
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> round(unseen(SimpleNamespace(chi_square=(1.0,)), 20_000), 1)
+    14.2
+    """
+    shown = float(np.clip(fit.chi_square[0], 1.0, EXPLAINED) - 1.0) * samples
+    return float(np.sqrt(1.0 + shown + np.sqrt(2.0 * samples)))
 
 
 def _log(record: Record, p: EhaParameters, uncertainties: Mapping[str, float], speed_variance: float) -> GreyBoxLog:
@@ -199,59 +216,22 @@ def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
     ]
 
 
-def _searched(form: GreyBoxModel, log: GreyBoxLog, starts: list[dict[str, float]]) -> tuple[GreyBoxFit, list[float]]:
-    """Return the best of several starts, and other bulk moduli that explain the log; stop at a start that does."""
-    whole = FreedProblem(form, log, UNKNOWNS, LINEAR)
-    part = whole.on(log.beginning(SEARCHED))
-    explained = 0.5 * EXPLAINED * len(part.log.measured)
-    guesses, bounds = _guesses(whole, starts)
-    best, others = part.at(guesses[0]), list[float]()
-    for near in _brought_near(part, guesses, bounds, explained):
-        best = min(best, descend(part.at, near, FINISHING, bounds), key=lambda point: point.cost)
-        if best.cost < explained:
-            near = part.on(part.log.softened(*WAYS[0][1]))
-            best, others = rescaled(part, best, Way(near, NEARING, NEAR_ENOUGH, FINISHING, bounds, explained))
-            break
-    if len(part.log.measured) < len(log.measured):
-        best = descend(whole.at, best.theta, FINISHING, bounds)
-    return concluded(whole, best), others
-
-
-def _guesses(problem: Problem, starts: list[dict[str, float]]) -> tuple[list[Array], tuple[Array, Array]]:
-    """Return the starts in fitted coordinates, and how far a search from them may go."""
-    guesses = [problem.model.theta(start) for start in starts]
-    return guesses, search_bounds(problem.model, guesses, {"speed_lead": (0.0, 0.5 * problem.log.sample_time)})
-
-
-def _brought_near(
-    whole: FreedProblem, guesses: list[Array], bounds: tuple[Array, Array], explained: float
-) -> Iterator[Array]:
-    """Yield the likelier starts, brought nearer: the likeliest of each way, then the next.
-
-    One whose misfit is over what explains the log with the larger noise too is left out.
-    """
-    screened: dict[int, list[Point]] = {}
-    for rank in range(FINALISTS):
-        for way, (first, second) in enumerate(WAYS):
-            if way not in screened:
-                screen = whole.on(whole.log.softened(*first).beginning(SCREENED))
-                points = descend_together(screen.at_each, guesses, SCREENING, bounds, NEAR_ENOUGH)
-                screened[way] = sorted(points, key=lambda point: point.cost)
-            near = whole.on(whole.log.softened(*second))
-            reached = descend(near.at, screened[way][rank].theta, NEARING, bounds, NEAR_ENOUGH)
-            if reached.cost < explained or second == UNCHANGED:
-                yield reached.theta
-
-
-def _compared(
-    form: GreyBoxModel, log: GreyBoxLog, other: GreyBoxFit, starts: list[dict[str, float]]
-) -> tuple[GreyBoxFit, list[float]]:
-    """Return the fit of the other structure: from where the first ended, or by itself where that explains nothing."""
-    if other.chi_square[0] > EXPLAINED:
-        return _searched(form, log, starts)
-    whole = FreedProblem(form, log, UNKNOWNS, LINEAR)
-    _, bounds = _guesses(whole, starts)
-    return concluded(whole, descend(whole.at, other.theta, NEARING, bounds)), []
+def _fitted(ended: list[Ended]) -> tuple[list[GreyBoxFit], list[float]]:
+    """Return the fits of both structures to the whole log, and other bulk moduli that explain it."""
+    first, second = sorted(ended, key=lambda one: (not one.explains, one.point.cost))
+    search, best, others = first.search, first.point, list[float]()
+    if first.explains:
+        near = search.part.on(search.part.log.softened(*WAYS[0][1]))
+        way = Way(near, NEARING, NEAR_ENOUGH, FINISHING, search.bounds, explained(search.part))
+        best, others = rescaled(search.part, best, way)
+    whole = search.whole
+    wanted = np.inf if first.explains else explained(whole)
+    best = descend(whole.at, best.theta, FINISHING, search.bounds, wanted=wanted)
+    rival = second.search
+    begun = min((rival.whole.at(theta) for theta in (best.theta, second.point.theta)), key=cost_of)
+    wanted = best.cost + UNLIKELY if best.cost < explained(whole) else explained(whole)
+    other = descend(rival.whole.at, begun.theta, NEARING, rival.bounds, wanted=wanted)
+    return [concluded(whole, best), concluded(rival.whole, other)], others
 
 
 def _objections(fits: list[GreyBoxFit], best: GreyBoxFit, others: list[float]) -> tuple[Note, ...]:
