@@ -32,6 +32,14 @@ class Sensor:
         What is logged of nothing [unit of the channel].
     lag, delay : float
         Of first order, and pure [s].
+    corner : float
+        Of a low-pass of second order, a Butterworth's; 0 passes all [Hz].
+    hold : int
+        Rows of the logger over which it repeats its last sample [samples].
+    drift : float
+        What the offset gains from the first row to the last, evenly [unit of the channel].
+    play : float
+        How far the quantity moves after it turns round before the sensor follows [unit of the channel].
     """
 
     noise: float = 0.0
@@ -40,6 +48,10 @@ class Sensor:
     offset: float = 0.0
     lag: float = 0.0
     delay: float = 0.0
+    corner: float = 0.0
+    hold: int = 1
+    drift: float = 0.0
+    play: float = 0.0
 
     def read(self, time: Array, fine: Array, values: Array, rng: np.random.Generator) -> Array:
         """Return what is logged.
@@ -58,10 +70,15 @@ class Sensor:
         ndarray, shape (n,)
             [unit of the channel].
         """
-        sensed = _lagged(values, self.lag / RECORD) if self.lag > 0.0 else values
+        sensed = _followed(values, self.play) if self.play > 0.0 else values
+        sensed = _lagged(sensed, self.lag / RECORD) if self.lag > 0.0 else sensed
+        sensed = _passed(sensed, self.corner * RECORD) if self.corner > 0.0 else sensed
         sampled = np.interp(time - self.delay, fine, sensed)
-        logged = self.gain * sampled + self.offset + self.noise * rng.standard_normal(len(time))
-        return self.quantum * np.round(logged / self.quantum) if self.quantum > 0.0 else logged
+        offset = self.offset + self.drift * np.linspace(0.0, 1.0, len(time))
+        logged = self.gain * sampled + offset + self.noise * rng.standard_normal(len(time))
+        logged = self.quantum * np.round(logged / self.quantum) if self.quantum > 0.0 else logged
+        rows = np.arange(len(time))
+        return logged[rows - rows % self.hold]
 
 
 def _lagged(values: Array, records: float) -> Array:
@@ -70,6 +87,23 @@ def _lagged(values: Array, records: float) -> Array:
 
     pole = np.exp(-1.0 / records)
     return np.asarray(lfilter([1.0 - pole], [1.0, -pole], values - values[0])) + values[0]
+
+
+def _passed(values: Array, corner: float) -> Array:
+    """Return values behind a Butterworth low-pass of second order, its corner in units of 1/`RECORD`."""
+    from scipy.signal import butter, lfilter
+
+    over, under = butter(2, 2.0 * corner)
+    return np.asarray(lfilter(over, under, values - values[0])) + values[0]
+
+
+def _followed(values: Array, play: float) -> Array:
+    """Return what follows values with play, which starts in the middle of it."""
+    out, at = np.empty_like(values), float(values[0])
+    for k, value in enumerate(values.tolist()):
+        at = min(max(at, value - 0.5 * play), value + 0.5 * play)
+        out[k] = at
+    return out
 
 
 def _sensors() -> Mapping[str, Sensor]:

@@ -92,6 +92,11 @@ RIGS = (
     Kind("rig_mass_wrong", "0.5 to 2.5 of the rig file's moving mass", _factor(0.5, 2.5, "mass")),
     Kind("rig_displacement_wrong", "0.93 to 1.07 of the rig file's displacement", _factor(0.93, 1.07, "displacement")),
     Kind(
+        "pump_ripples",
+        "the teeth of the pump are 5 to 15 % in its flow",
+        lambda setup, rng: setup.with_machine(ripple=rng.uniform(0.05, 0.15)),
+    ),
+    Kind(
         "single_rod",
         "single rod, area ratio 0.7, pilot-operated checks; rig file: mean area, mean volume",
         _single_rod,

@@ -12,7 +12,8 @@ from experiments.open_benchmark.drives import DRIVES
 from experiments.open_benchmark.folders import truth_of, write_set
 from experiments.open_benchmark.kinds import KINDS, SPLITS, STRIDE, VERSION, make, seed_of
 from experiments.open_benchmark.loaders import read_arrays, read_logs, read_truth
-from experiments.open_benchmark.logger import DIFFERENCE, SPEED
+from experiments.open_benchmark.logger import DIFFERENCE, SPEED, Sensor
+from experiments.open_benchmark.run import RECORD
 from faults.conditions import CONDITIONS
 from plant.errors import HydrostateError
 
@@ -129,6 +130,23 @@ def test_sensors_do_what_their_kind_says() -> None:
     late = make("pressure_5_ms_late", "test", 0)
     true = (late.states[:, 4] - late.states[:, 5])[::10]
     assert np.std(late.log[DIFFERENCE].to_numpy()[5:] - true[:-5]) == pytest.approx(5e3, rel=0.1)
+
+
+def test_a_sensor_holds_drifts_follows_with_play_and_passes_slow_waves_alone() -> None:
+    time, rng = 1e-3 * np.arange(2000), np.random.default_rng(1)
+    fine = RECORD * np.arange(20_000)
+
+    def read(frequency: float, **changes: float) -> np.ndarray:
+        return Sensor(**changes).read(time, fine, np.sin(2.0 * np.pi * frequency * fine), rng)
+
+    true = np.sin(2.0 * np.pi * time)
+    assert np.array_equal(read(1.0, hold=4), read(1.0)[np.arange(2000) // 4 * 4])
+    assert read(1.0, drift=2.0) - true == pytest.approx(np.linspace(0.0, 2.0, 2000), abs=1e-9)
+    behind = read(1.0, play=0.2)
+    assert np.max(behind) == pytest.approx(0.9, abs=1e-3)
+    assert np.max(np.abs(behind - true)) == pytest.approx(0.1, abs=1e-3)
+    assert np.std(read(30.0, corner=30.0)[1000:]) == pytest.approx(0.5, rel=0.02)
+    assert np.std(read(1.0, corner=30.0) - true) == pytest.approx(np.std(np.gradient(true, time)) * 7.5e-3, rel=0.02)
 
 
 @pytest.mark.usefixtures("_short")
