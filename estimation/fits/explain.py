@@ -7,16 +7,18 @@ of, then under the others, then under pairs with the likeliest; what is freed wi
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from estimation.fits.descent import Point, descend
+from estimation.fits.flow_search import SCREENED_SECONDS
 from estimation.fits.form_fit import weighed
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_log import GreyBoxLog
-from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
+from estimation.fits.hypotheses import HYPOTHESES, LATEST, Hypothesis
+from estimation.fits.promises import balanced_by, promising
 from estimation.fits.wide_problem import (
     delayed,
     flow_bounds,
@@ -27,19 +29,15 @@ from estimation.fits.wide_problem import (
     widened,
 )
 from estimation.models.flow import STIFFNESS
-from estimation.models.wide_flow import GROWTH, WideFlowParameters, grown_leakage
+from estimation.models.wide_flow import GROWTH, grown_leakage
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
-from plant.solvers.steps import parameter_names
 
 SCREENING, SETTLING, FINISHING = 7, 40, 12
 """Evaluations of the model for a start, for one that is carried on, and for the last, with short model steps."""
 
 NEAR = 2.0
 """First radius of a search [dimensionless]: it begins where the plain form ended, or a simpler hypothesis."""
-
-LIKELIEST = 4
-"""Hypotheses that are tried first, of which the slopes of the fit so far promise most."""
 
 FINALISTS, CARRIED, NEARLY = 3, 2, 3.0
 """Hypotheses that are carried on, starts of each, and up to which share of the best start's cost the second is."""
@@ -49,6 +47,9 @@ FINEST_DELAY = 1e-3
 
 MAY_VANISH, VANISHED = ("leakage_coefficient", "flow_bias", "makeup_conductance"), 1e-2
 """What a search may take for nothing by mistake, and the share of the rig's value below which it has."""
+
+NEARLY_AS_GOOD = 1.1
+"""The same over a finished one's cost, for long model steps have errors [dimensionless]."""
 
 CLOSE = 60.0
 """Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""
@@ -145,17 +146,18 @@ def explain(
         The likeliest; whether it explains the log is for the gate to say.
     """
     wide = widened(log, parameters, starts[0])
-    likely, others = _promising(wide, (), starts[0], asked)
+    likely, others = promising(wide, (), starts[0], asked)
     finished = _likeliest(wide, [_screened(wide, (one,), starts) for one in likely])
     if others and not accepted(finished[0].fit):
-        finished = _ranked([*finished, *_likeliest(wide, [_screened(wide, (one,), starts) for one in others])])
+        more = _likeliest(wide, [_screened(wide, (one,), starts) for one in others], finished[0].cost)
+        finished = _ranked([*finished, *more])
     first = finished[0]
     if paired and not accepted(first.fit):
         late = delayed(wide, first.delays)
         others = [one for one in HYPOTHESES if one not in first.together]
-        likely, others = _promising(late, first.together, first.values, others)
+        likely, others = promising(late, first.together, first.values, others)
         tried = [*likely, *(one for one in others if one.far)]
-        pairs = _likeliest(late, [_screened(late, (*first.together, one), [first.values]) for one in tried])
+        pairs = _likeliest(late, [_screened(late, (*first.together, one), [first.values]) for one in tried], first.cost)
         better = (one for one in pairs if one.cost < first.cost - WORTH)
         finished = _ranked([first, *(replace(one, delays={**first.delays, **one.delays}) for one in better)])
     best = finished[0]
@@ -170,97 +172,6 @@ def explain(
     return Explanation(names, values, best.delays, best.fit, len(rivals), usual_pressure(log, parameters))
 
 
-class Promise(NamedTuple):
-    """What a hypothesis promises beside a fit, to first order.
-
-    Parameters
-    ----------
-    gain : float
-        In log-likelihood, Rao's score statistic over two [dimensionless].
-    size : float
-        How far what is freed first would move in its fitted coordinate: for a logarithm a relative change
-        [dimensionless].
-    deviation : float
-        How well that coordinate would then be known, what is presumed of it included [dimensionless].
-    """
-
-    gain: float
-    size: float
-    deviation: float
-
-
-def promised(
-    log: GreyBoxLog, parameters: EhaParameters, plain: Mapping[str, float], one: Hypothesis, *, by_mass: bool = False
-) -> Promise:
-    """Return what a hypothesis promises beside the plain fit, to first order.
-
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log, as the plain flow form sees it.
-    parameters : EhaParameters
-        The actuator.
-    plain : Mapping[str, float]
-        What the plain form found [SI].
-    one : Hypothesis
-        What is asked.
-    by_mass : bool
-        Whether the plain fit balances mass: promises are of where it stands.
-
-    Returns
-    -------
-    Promise
-        Its promise.
-    """
-    wide = widened(log, parameters, plain)
-    return _promises(_balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, (one,))[0]
-
-
-def _balanced_by(log: GreyBoxLog, mass: float) -> GreyBoxLog:
-    """Return a log whose wide form balances mass (1), or volume (0)."""
-    parameters = log.parameters.copy()
-    parameters[parameter_names(WideFlowParameters).index("by_mass")] = mass
-    return replace(log, parameters=parameters)
-
-
-def _promising(
-    log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], asked: Sequence[Hypothesis]
-) -> tuple[list[Hypothesis], list[Hypothesis]]:
-    """Return the hypotheses that promise most beside those that are taken, best first; and the others."""
-    promises = _promises(log.coarsened(), together, found, asked)
-    order = sorted(range(len(asked)), key=lambda i: -promises[i].gain)
-    likely = [asked[i] for i in order if not asked[i].far][:LIKELIEST]
-    return likely, [one for one in asked if one not in likely]
-
-
-def _promises(
-    log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], asked: Sequence[Hypothesis]
-) -> list[Promise]:
-    """Return what each hypothesis promises beside those that are taken, as `promised` does, from one evaluation."""
-    problem = freed(log, (*together, *(replace(one, instead=()) for one in asked)))
-    point = problem.at(problem.model.theta({**usual_values(log), **found}))
-    # an unknown at its bound promises what only the hypothesis in its place can keep
-    held = {name for one in asked for name in one.instead}
-    own = [name for name in freed(log, together).model.unknowns if name not in held]
-
-    def step(names: Sequence[str]) -> tuple[float, Array, Array]:
-        places = [problem.model.unknowns.index(name) for name in names]
-        gradient = point.gradient[places]
-        gram = point.gram[np.ix_(places, places)]
-        known = np.asarray(np.linalg.pinv(gram, rcond=len(places) * np.finfo(float).eps), dtype=np.float64)
-        moved: Array = known @ gradient
-        return 0.5 * float(gradient @ moved), moved, np.diag(known)
-
-    before = step(own)[0]
-    promises: list[Promise] = []
-    for one in asked:
-        names = list(dict.fromkeys((*own, *one.free)))
-        gain, moved, variances = step(names)
-        place = names.index(one.free[0])
-        promises.append(Promise(gain - before, float(abs(moved[place])), float(variances[place]) ** 0.5))
-    return promises
-
-
 def _ranked(tried: Iterable[_Tried]) -> list[_Tried]:
     return sorted(tried, key=lambda one: one.cost)
 
@@ -271,29 +182,36 @@ def _screened(
     """Yield the best from each start after a few steps, with one model step a sample."""
     absent = usual_values(log)
     asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
-    problems = [(delays, freed(delayed(log, delays).coarsened(), together)) for delays in asked]
+    whole = any(one.slow for one in together)
+    begun = log if whole else log.beginning(round(SCREENED_SECONDS / log.sample_time))
+    problems = [(delays, freed(delayed(begun, delays).coarsened(), together)) for delays in asked]
     for start in starts:
         tried: list[_Tried] = []
         for (delays, problem), own in product(problems, own_starts(log, together[-1])):
             guess = problem.model.theta({**absent, **start, **own})
             point = descend(problem.at, guess, SCREENING, flow_bounds(problem.model, [guess], log), radius=NEAR)
             tried.append(_Tried(together, point, problem.model.values(point.theta), delays))
-        yield min(tried, key=lambda one: one.cost)
+        best = min(tried, key=lambda one: one.cost)
+        if not whole:  # the whole may reach the relief valve's setting where its beginning does not
+            row = delayed(log, best.delays).coarsened()
+            best = _descended(row, best, freed(row, together).model.theta({**absent, **start, **best.values}), 1)
+        yield best
 
 
-def _settled(log: GreyBoxLog, tried: _Tried) -> _Tried:
-    """Return a set of hypotheses brought to its optimum, with one model step a sample."""
+def _settled(log: GreyBoxLog, tried: _Tried, wanted: float = np.inf) -> _Tried:
+    """Return a set of hypotheses brought to its optimum, with one model step a sample, if its cost may be as wanted."""
     early = delayed(log, tried.delays).coarsened()
-    best = _descended(early, tried, tried.point.theta, SETTLING)
+    best = _descended(early, tried, tried.point.theta, SETTLING, wanted=wanted)
     if (revived := _revived(log, best)) is not None:
-        best = min(best, _descended(early, best, revived, SETTLING), key=lambda one: one.cost)
+        best = min(best, _descended(early, best, revived, SETTLING, wanted=wanted), key=lambda one: one.cost)
     if len(tried.together[-1].delays) == 1:
         return best
     channel = tried.together[-1].late
     for step in (FINEST_DELAY, -FINEST_DELAY):
-        while (delay := best.delays.get(channel, 0.0) + step) >= 0.0:
+        while 0.0 <= (delay := best.delays.get(channel, 0.0) + step) <= LATEST:
             moved = replace(best, delays={channel: delay})
-            moved = _descended(delayed(log, moved.delays).coarsened(), moved, best.point.theta, SETTLING)
+            later = delayed(log, moved.delays).coarsened()
+            moved = _descended(later, moved, best.point.theta, SETTLING, wanted=best.cost)
             if moved.cost >= best.cost:
                 break
             best = moved
@@ -309,10 +227,12 @@ def _revived(log: GreyBoxLog, tried: _Tried) -> Array | None:
     return freed(log, tried.together).model.theta({**tried.values, **gone})
 
 
-def _descended(log: GreyBoxLog, tried: _Tried, start: Array, evaluations: int, *more: str) -> _Tried:
+def _descended(
+    log: GreyBoxLog, tried: _Tried, start: Array, evaluations: int, *more: str, wanted: float = np.inf
+) -> _Tried:
     problem = freed(log, tried.together, *more)
     bounds = flow_bounds(problem.model, [start], log)
-    point = descend(problem.at, start, evaluations, bounds, radius=NEAR)
+    point = descend(problem.at, start, evaluations, bounds, radius=NEAR, wanted=wanted)
     return replace(tried, point=point, values=problem.model.values(point.theta))
 
 
@@ -325,7 +245,7 @@ def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
     row = delayed(log, tried.delays)
     done: list[tuple[_Tried, FreedProblem]] = []
     for share, more in ((0.0, ()), (1.0, (STIFFNESS,))):
-        own = _balanced_by(row, share)
+        own = balanced_by(row, share)
         problem, begun = freed(own, tried.together, *more), done[-1][0] if done else tried
         start = problem.model.theta({**usual_values(own), **begun.values})
         done.append((_descended(own, begun, start, FINISHING, *more), problem))
@@ -335,13 +255,19 @@ def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
     return replace(best, fits=tuple(concluded(problem, one.point) for one, problem in count))
 
 
-def _likeliest(log: GreyBoxLog, tried: Sequence[Iterable[_Tried]]) -> list[_Tried]:
+def _likeliest(log: GreyBoxLog, tried: Sequence[Iterable[_Tried]], known: float = np.inf) -> list[_Tried]:
     """Return the likeliest of several sets of hypotheses, each tried from some starts, the best first.
 
-    The first set is carried on in any case: a few steps from a start are no measure of what promises most.
+    The first set is carried on in any case: a few steps from a start are no measure of what promises most. What cannot
+    come close to the best, or to what is known, is not followed to its optimum.
     """
+    known *= NEARLY_AS_GOOD
     first, *others = [_ranked(one) for one in tried]
     sets = [first, *sorted(others, key=lambda one: one[0].cost)[: FINALISTS - 1]]
     carried = [[start for start in one[:CARRIED] if start.cost < NEARLY * one[0].cost] for one in sets]
-    settled = _ranked(_ranked(_settled(log, start) for start in one)[0] for one in carried)
-    return _ranked(_finished(log, one) for one in settled if one.cost < settled[0].cost + CLOSE)
+    settled: list[_Tried] = []
+    for one in carried:
+        wanted = min((known, *(other.cost for other in settled))) + CLOSE
+        settled.append(_ranked(_settled(log, start, wanted) for start in one)[0])
+    best = min((known, *(one.cost for one in settled)))
+    return _ranked(_finished(log, one) for one in _ranked(settled) if one.cost < best + CLOSE)

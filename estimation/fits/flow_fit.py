@@ -3,13 +3,14 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from estimation.fits.explain import WORTH, explain, promised
+from estimation.fits.explain import WORTH, explain
 from estimation.fits.flow_log import flow_log, without_strays
 from estimation.fits.flow_search import MAKEUP_TRIED, balanced, flow_starts
 from estimation.fits.form_fit import FormFit, weighed, with_structure
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import BEGUN, DELIVERY, HYPOTHESES, LEAST_DELIVERY, OFFSET, Hypothesis
+from estimation.fits.promises import promised
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
 from estimation.notes import EstimateCode, RigCode

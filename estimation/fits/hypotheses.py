@@ -31,6 +31,8 @@ class Hypothesis:
         Whether what it adds is so far from its absence that the slope there says nothing of it.
     from_first_sample : bool
         Whether the search begins with the differential pressure that the log begins with, and with several levels.
+    slow : bool
+        Whether it shows over the whole log only, and not in its first seconds.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Hypothesis:
     instead: tuple[str, ...] = ()
     far: bool = False
     from_first_sample: bool = False
+    slow: bool = False
 
 
 DELIVERY = Hypothesis("delivery", ("pump_displacement",))
@@ -57,6 +60,10 @@ OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
 LATE_TRIED = (0.0, 2e-3, 5e-3, 9e-3)
 """Delays with which the search for a late channel begins [s]."""
 
+LATEST = 2e-2
+"""Longest delay that is sought [s]: no sensor, filter or bus is later. In a log of another actuator the misfit may fall
+with every millisecond more, and the search for a delay has no end."""
+
 HYPOTHESES = (
     Hypothesis("pressure_late", ("pressure_lag",), ({"pressure_lag": 1e-3},), LATE_TRIED),
     Hypothesis(
@@ -69,7 +76,7 @@ HYPOTHESES = (
     ),
     Hypothesis("position_late", ("position_lag",), ({"position_lag": 1e-3},), LATE_TRIED, "position_m"),
     OFFSET,
-    Hypothesis("pressure_drift", ("pressure_drift",)),
+    Hypothesis("pressure_drift", ("pressure_drift",), slow=True),
     Hypothesis("encoder_zero", ("position_zero",), ({"position_zero": -0.06}, {"position_zero": 0.06})),
     DELIVERY,
     Hypothesis("volume", ("chamber_volume",)),
@@ -80,10 +87,11 @@ HYPOTHESES = (
         ("air_softness", "air_onset"),
         tuple({"air_softness": 1e3, "air_onset": onset} for onset in (0.2, 0.5, 0.8)),
         far=True,
+        slow=True,
     ),
     Hypothesis("relief_low", ("relief_pressure", "relief_conductance"), shares_of_peak=(0.6, 0.85), far=True),
-    Hypothesis("leakage_growth", ("leakage_growth", "leakage_bend")),
-    Hypothesis("leakage_rise", ("leakage_rise",)),
+    Hypothesis("leakage_growth", ("leakage_growth", "leakage_bend"), slow=True),
+    Hypothesis("leakage_rise", ("leakage_rise",), slow=True),
     Hypothesis(
         "makeup_blocked",
         ("makeup_share_b",),

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from estimation.fits import flow_search
-from estimation.fits.explain import promised
 from estimation.fits.flow_log import flow_log
 from estimation.fits.flow_search import balanced, flow_starts
 from estimation.fits.greybox_fit import GreyBoxFit, roughly
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY
+from estimation.fits.promises import promised
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.flow import MASS_FLOW_FORM
 from experiments.open_benchmark.logger import PLAIN, Logger

@@ -1,0 +1,139 @@
+"""What each hypothesis promises beside a fit, by the slopes there: to first order, from one evaluation."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.fits.greybox_log import GreyBoxLog
+from estimation.fits.hypotheses import Hypothesis
+from estimation.fits.wide_problem import freed, usual_values, widened
+from estimation.models.wide_flow import WideFlowParameters
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+from plant.solvers.steps import parameter_names
+
+LIKELIEST = 4
+"""Hypotheses that are tried first, of which the slopes of the fit so far promise most."""
+
+
+class Promise(NamedTuple):
+    """What a hypothesis promises beside a fit, to first order.
+
+    Parameters
+    ----------
+    gain : float
+        In log-likelihood, Rao's score statistic over two [dimensionless].
+    size : float
+        How far what is freed first would move in its fitted coordinate: for a logarithm a relative change
+        [dimensionless].
+    deviation : float
+        How well that coordinate would then be known, what is presumed of it included [dimensionless].
+    """
+
+    gain: float
+    size: float
+    deviation: float
+
+
+def promised(
+    log: GreyBoxLog, parameters: EhaParameters, plain: Mapping[str, float], one: Hypothesis, *, by_mass: bool = False
+) -> Promise:
+    """Return what a hypothesis promises beside the plain fit, to first order.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    plain : Mapping[str, float]
+        What the plain form found [SI].
+    one : Hypothesis
+        What is asked.
+    by_mass : bool
+        Whether the plain fit balances mass: promises are of where it stands.
+
+    Returns
+    -------
+    Promise
+        Its promise.
+    """
+    wide = widened(log, parameters, plain)
+    return _promises(balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, (one,))[0]
+
+
+def balanced_by(log: GreyBoxLog, mass: float) -> GreyBoxLog:
+    """Return a log whose wide form balances mass (1), or volume (0).
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    mass : float
+        1 or 0 [dimensionless].
+
+    Returns
+    -------
+    GreyBoxLog
+        The log.
+    """
+    parameters = log.parameters.copy()
+    parameters[parameter_names(WideFlowParameters).index("by_mass")] = mass
+    return replace(log, parameters=parameters)
+
+
+def promising(
+    log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], asked: Sequence[Hypothesis]
+) -> tuple[list[Hypothesis], list[Hypothesis]]:
+    """Return the hypotheses that promise most beside those that are taken, best first; and the others.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    together : tuple of Hypothesis
+        What is taken already.
+    found : Mapping[str, float]
+        What the fit so far found [SI].
+    asked : sequence of Hypothesis
+        What else is asked.
+
+    Returns
+    -------
+    tuple of list of Hypothesis
+        The `LIKELIEST`, and the others.
+    """
+    promises = _promises(log.coarsened(), together, found, asked)
+    order = sorted(range(len(asked)), key=lambda i: -promises[i].gain)
+    likely = [asked[i] for i in order if not asked[i].far][:LIKELIEST]
+    return likely, [one for one in asked if one not in likely]
+
+
+def _promises(
+    log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], asked: Sequence[Hypothesis]
+) -> list[Promise]:
+    """Return what each hypothesis promises beside those that are taken, as `promised` does, from one evaluation."""
+    problem = freed(log, (*together, *(replace(one, instead=()) for one in asked)))
+    point = problem.at(problem.model.theta({**usual_values(log), **found}))
+    # an unknown at its bound promises what only the hypothesis in its place can keep
+    held = {name for one in asked for name in one.instead}
+    own = [name for name in freed(log, together).model.unknowns if name not in held]
+
+    def step(names: Sequence[str]) -> tuple[float, Array, Array]:
+        places = [problem.model.unknowns.index(name) for name in names]
+        gradient = point.gradient[places]
+        gram = point.gram[np.ix_(places, places)]
+        known = np.asarray(np.linalg.pinv(gram, rcond=len(places) * np.finfo(float).eps), dtype=np.float64)
+        moved: Array = known @ gradient
+        return 0.5 * float(gradient @ moved), moved, np.diag(known)
+
+    before = step(own)[0]
+    promises: list[Promise] = []
+    for one in asked:
+        names = list(dict.fromkeys((*own, *one.free)))
+        gain, moved, variances = step(names)
+        place = names.index(one.free[0])
+        promises.append(Promise(gain - before, float(abs(moved[place])), float(variances[place]) ** 0.5))
+    return promises
