@@ -224,13 +224,13 @@ def _fitted(ended: list[Ended]) -> tuple[list[GreyBoxFit], list[float]]:
         near = search.part.on(search.part.log.softened(*WAYS[0][1]))
         way = Way(near, NEARING, NEAR_ENOUGH, FINISHING, search.bounds, explained(search.part))
         best, others = rescaled(search.part, best, way)
+    else:
+        best = descend(search.part.at, best.theta, FINISHING, search.bounds)
     whole = search.whole
-    wanted = np.inf if first.explains else explained(whole)
-    best = descend(whole.at, best.theta, FINISHING, search.bounds, wanted=wanted)
+    best = descend(whole.at, best.theta, FINISHING, search.bounds)
     rival = second.search
     begun = min((rival.whole.at(theta) for theta in (best.theta, second.point.theta)), key=cost_of)
-    wanted = best.cost + UNLIKELY if best.cost < explained(whole) else explained(whole)
-    other = descend(rival.whole.at, begun.theta, NEARING, rival.bounds, wanted=wanted)
+    other = descend(rival.whole.at, begun.theta, NEARING, rival.bounds, wanted=best.cost + UNLIKELY)
     return [concluded(whole, best), concluded(rival.whole, other)], others
 
 

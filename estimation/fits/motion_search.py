@@ -197,7 +197,8 @@ def likeliest(searches: Sequence[MotionSearch]) -> list[Ended]:
                     return [Ended(one, at, one is search) for one, at in zip(searches, best, strict=True)]
         if all(point.cost > HOPELESS * explained(one.short) for one, point in zip(searches, best, strict=True)):
             break
-    return [Ended(one, at, explains=False) for one, at in zip(searches, best, strict=True)]
+    ends = [descend(one.short.at, at.theta, FINISHING, one.bounds) for one, at in zip(searches, best, strict=True)]
+    return [Ended(one, at, explains=False) for one, at in zip(searches, ends, strict=True)]
 
 
 def explained(problem: FreedProblem) -> float:
