@@ -12,7 +12,6 @@ from typing import TypeAlias
 import numpy as np
 
 from estimation.fits.descent import Point, descend
-from estimation.fits.flow_search import SCREENED_SECONDS
 from estimation.fits.form_fit import weighed
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
@@ -182,20 +181,14 @@ def _screened(
     """Yield the best from each start after a few steps, with one model step a sample."""
     absent = usual_values(log)
     asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
-    whole = any(one.slow for one in together)
-    begun = log if whole else log.beginning(round(SCREENED_SECONDS / log.sample_time))
-    problems = [(delays, freed(delayed(begun, delays).coarsened(), together)) for delays in asked]
+    problems = [(delays, freed(delayed(log, delays).coarsened(), together)) for delays in asked]
     for start in starts:
         tried: list[_Tried] = []
         for (delays, problem), own in product(problems, own_starts(log, together[-1])):
             guess = problem.model.theta({**absent, **start, **own})
             point = descend(problem.at, guess, SCREENING, flow_bounds(problem.model, [guess], log), radius=NEAR)
             tried.append(_Tried(together, point, problem.model.values(point.theta), delays))
-        best = min(tried, key=lambda one: one.cost)
-        if not whole:  # the whole may reach the relief valve's setting where its beginning does not
-            row = delayed(log, best.delays).coarsened()
-            best = _descended(row, best, freed(row, together).model.theta({**absent, **start, **best.values}), 1)
-        yield best
+        yield min(tried, key=lambda one: one.cost)
 
 
 def _settled(log: GreyBoxLog, tried: _Tried, wanted: float = np.inf) -> _Tried:

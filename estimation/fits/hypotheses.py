@@ -31,8 +31,6 @@ class Hypothesis:
         Whether what it adds is so far from its absence that the slope there says nothing of it.
     from_first_sample : bool
         Whether the search begins with the differential pressure that the log begins with, and with several levels.
-    slow : bool
-        Whether it shows over the whole log only, and not in its first seconds.
     """
 
     name: str
@@ -44,7 +42,6 @@ class Hypothesis:
     instead: tuple[str, ...] = ()
     far: bool = False
     from_first_sample: bool = False
-    slow: bool = False
 
 
 DELIVERY = Hypothesis("delivery", ("pump_displacement",))
@@ -76,7 +73,7 @@ HYPOTHESES = (
     ),
     Hypothesis("position_late", ("position_lag",), ({"position_lag": 1e-3},), LATE_TRIED, "position_m"),
     OFFSET,
-    Hypothesis("pressure_drift", ("pressure_drift",), slow=True),
+    Hypothesis("pressure_drift", ("pressure_drift",)),
     Hypothesis("encoder_zero", ("position_zero",), ({"position_zero": -0.06}, {"position_zero": 0.06})),
     DELIVERY,
     Hypothesis("volume", ("chamber_volume",)),
@@ -87,11 +84,10 @@ HYPOTHESES = (
         ("air_softness", "air_onset"),
         tuple({"air_softness": 1e3, "air_onset": onset} for onset in (0.2, 0.5, 0.8)),
         far=True,
-        slow=True,
     ),
     Hypothesis("relief_low", ("relief_pressure", "relief_conductance"), shares_of_peak=(0.6, 0.85), far=True),
-    Hypothesis("leakage_growth", ("leakage_growth", "leakage_bend"), slow=True),
-    Hypothesis("leakage_rise", ("leakage_rise",), slow=True),
+    Hypothesis("leakage_growth", ("leakage_growth", "leakage_bend")),
+    Hypothesis("leakage_rise", ("leakage_rise",)),
     Hypothesis(
         "makeup_blocked",
         ("makeup_share_b",),

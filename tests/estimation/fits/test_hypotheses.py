@@ -1,6 +1,7 @@
 """A log that the plain flow form does not explain says what is strange about rig, oil or logger."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -9,8 +10,11 @@ from scipy.signal import lfilter
 
 from estimation.eha.estimate import estimate_log
 from estimation.eha.explained import notes_of, rig_set_right, set_right
+from estimation.fits import explain as module
+from estimation.fits.descent import Point
 from estimation.fits.explain import Explanation
 from estimation.fits.flow_fit import fit_flow
+from estimation.fits.hypotheses import HYPOTHESES, LATEST
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.first_belief import begins_in_motion, first_load
 from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters, grown_leakage
@@ -25,6 +29,7 @@ from plant.sensors.sensors import BENCH, IDEAL, Sensors
 
 if TYPE_CHECKING:
     from estimation.fits.greybox_fit import GreyBoxFit
+    from estimation.fits.greybox_log import GreyBoxLog
 
 HEALTHY = EhaParameters()
 PRESSURE = "differential_pressure_pa"
@@ -144,6 +149,22 @@ def test_a_pressure_that_reads_too_much_at_rest_is_an_offset_and_no_load_at_the_
     assert offset == pytest.approx(1e5, rel=0.02)
     assert found.gate.passed
     assert found.quantities["bulk_modulus"].value == pytest.approx(HEALTHY.bulk_modulus, rel=0.01)
+
+
+def test_a_delay_is_sought_no_longer_than_a_sensor_may_have(monkeypatch: pytest.MonkeyPatch) -> None:
+    (late,) = (one for one in HYPOTHESES if one.name == "pressure_late")
+    plain = SimpleNamespace(coarsened=lambda: plain)
+
+    def falling(_: object, tried: module._Tried, *__: object, **___: object) -> module._Tried:
+        delay = tried.delays.get(late.late, 0.0)
+        return replace(tried, point=Point(np.zeros(1), 1e3 - delay, np.zeros(1), np.eye(1)))
+
+    monkeypatch.setattr(module, "_descended", falling)
+    monkeypatch.setattr(module, "_revived", lambda *_: None)
+    monkeypatch.setattr(module, "delayed", lambda log, _: log)
+    begun = module._Tried((late,), Point(np.zeros(1), 1e3, np.zeros(1), np.eye(1)), {}, {})
+    found = module._settled(cast("GreyBoxLog", plain), begun)
+    assert found.delays[late.late] == pytest.approx(LATEST, abs=1e-3)
 
 
 def test_an_encoder_that_was_homed_at_the_end_stop_is_named_and_shifted() -> None:
