@@ -208,6 +208,11 @@ def explained(problem: FreedProblem) -> float:
     ----------
     problem : FreedProblem
         The problem.
+
+    Returns
+    -------
+    float
+        Half a sum of squares [dimensionless].
     """
     return 0.5 * EXPLAINED * len(problem.log.measured)
 
