@@ -1,0 +1,99 @@
+"""Short logs of one actuator, and fits that are made up, for the numbers of the fits."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from estimation.fits.flow_log import flow_log
+from estimation.fits.flow_search import flow_starts
+from estimation.fits.freed_problem import FreedProblem
+from estimation.fits.greybox_fit import GreyBoxFit
+from estimation.fits.greybox_log import GreyBoxLog
+from estimation.fits.wide_problem import widened
+from estimation.models.flow import FLOW_FORM, STIFFNESS
+from plant.arrays import Array
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.notes import Note
+from plant.sensors.sensors import BENCH
+
+PAPER = EhaParameters()
+
+
+WORN = replace(PAPER, leakage_coefficient=2e-11, flow_bias=5e-6)
+
+
+SINGLE = replace(PAPER, area_difference=0.18, volume_difference=-0.1)
+
+
+PRESSURE, SPEED, POSITION = "differential_pressure_pa", "motor_speed_rad_s", "position_m"
+
+
+VARIANCES = {SPEED: 1e-4, POSITION: 1e-12, PRESSURE: 1e7}
+
+
+def noted(notes: Sequence[Note]) -> list[dict[str, Any]]:
+    return [{"code": str(note.code), **dict(note.data)} for note in notes]
+
+
+@cache
+def log(
+    seconds: float = 1.0,
+    sample_time: float = 1e-3,
+    p: EhaParameters = WORN,
+    position_noise: float = 0.0,
+    drive: str = "steps",
+) -> Record:
+    rng = np.random.default_rng(3)
+    sensors = replace(BENCH, position_noise=position_noise, position_quantum=1e-5) if position_noise else BENCH
+    speed = make_drive(drive, seconds, sample_time, p, rng)
+    return simulate(CIRCUIT, speed, sample_time, circuit_of(p), sensors=sensors, rng=rng)
+
+
+def seen(record: Record, p: EhaParameters = PAPER, **uncertainties: float) -> GreyBoxLog:
+    return flow_log(record, p, uncertainties, VARIANCES)
+
+
+@cache
+def problem(form: Any = FLOW_FORM, position_noise: float = 0.0) -> FreedProblem:
+    return FreedProblem.of(form, seen(log(0.5, position_noise=position_noise)))
+
+
+def usual(p: FreedProblem) -> Array:
+    start = {**flow_starts(PAPER, PAPER.bulk_modulus)[2], STIFFNESS: 2e7, "case_leakage": 4e-13}
+    return p.model.theta(start)
+
+
+def made_fit(
+    cost: float,
+    modulus: float,
+    std: float,
+    *,
+    chi: float = 1.0,
+    correlated: float = 0.0,
+    late: float = 0.0,
+    gain: float = 0.0,
+) -> GreyBoxFit:
+    values = {"bulk_modulus": modulus, "leakage_coefficient": 1e-12}
+    return GreyBoxFit(
+        FLOW_FORM,
+        np.zeros(2),
+        values,
+        {"bulk_modulus": std, "leakage_coefficient": 1e-13},
+        cost,
+        (chi,),
+        (correlated,),
+        {},
+        {SPEED: (late, gain), POSITION: (0.0, 0.1)},
+    )
+
+
+@cache
+def wide(stiffness: float = 3e7) -> GreyBoxLog:
+    return widened(seen(log(0.5), chamber_volume=0.1), PAPER, stiffness)

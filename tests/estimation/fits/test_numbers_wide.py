@@ -1,0 +1,180 @@
+"""Objections, hypotheses and the form of motion on short logs, kept in `numbers_wide.json`."""
+
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.fits import motion_fit
+from estimation.fits.explain import Explanation, explain, promised
+from estimation.fits.flow_fit import _objections
+from estimation.fits.flow_search import flow_starts
+from estimation.fits.force_scale import disagree
+from estimation.fits.form_fit import weighed, with_structure
+from estimation.fits.freed_problem import FreedProblem
+from estimation.fits.greybox_fit import GreyBoxFit
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES
+from estimation.fits.motion_fit import _log, _starts, _steps
+from estimation.fits.wide_problem import delayed, freed, own_starts, usual_values
+from estimation.models.flow import STIFFNESS
+from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS
+from tests.estimation.fits.short_logs import PAPER, POSITION, PRESSURE, SPEED, WORN, log, made_fit, noted, seen, wide
+from tests.numbers import Found, Numbers
+
+NUMBERS = Numbers(__file__)
+
+
+@NUMBERS.case()
+def objections_on_either_side() -> dict[str, Any]:
+    told: dict[str, Any] = {}
+    for noisy in (False, True):
+        for chi in (1.19, 1.21, 1.43, 1.45):
+            told[f"chi-square {chi}, noisy: {noisy}"] = noted(_objections(made_fit(100.0, 2e8, 1e6, chi=chi), noisy))
+        for correlated in (0.09, -0.11, 0.29, 0.31):
+            told[f"correlation {correlated}, noisy: {noisy}"] = noted(
+                _objections(made_fit(100.0, 2e8, 1e6, correlated=correlated), noisy)
+            )
+    for name, late, gain, chi in (
+        ("late", 1e-3, 21.0, 1.0),
+        ("early", -1e-3, 21.0, 1.0),
+        ("hardly worth it", 1e-3, 19.0, 1.0),
+        ("hardly late", 1.9e-4, 30.0, 1.0),
+        ("just late", 2.1e-4, 30.0, 1.0),
+        ("too late", 0.021, 30.0, 1.0),
+        ("not too late", 0.019, 30.0, 1.0),
+        ("a fifth of the misfit", 1e-3, 100.0, 2.0),
+        ("a third of it", 1e-3, 150.0, 2.0),
+    ):
+        told[name] = noted(_objections(made_fit(1000.0, 2e8, 1e6, chi=chi, late=late, gain=gain), False))
+    told["weighed"] = {
+        name: list(pair)
+        for name, pair in weighed(
+            [made_fit(3.0, 2e8, 1e6), made_fit(6.0, 2.2e8, 2e6), made_fit(3e3, 9e8, np.inf)]
+        ).items()
+    }
+    told["with structure"] = list(with_structure({"bulk_modulus": (2e8, 1e5)}, 1e-3)["bulk_modulus"])
+    told["disagree"] = [disagree([1.0, share]) for share in (1.049, 1.051, 0.953, 0.951)]
+    return told
+
+
+@NUMBERS.case()
+def the_wide_form() -> dict[str, Any]:
+    base = wide()
+    told: dict[str, Any] = {
+        "row": dict(zip(usual_values(base), base.parameters, strict=True)),
+        "drives": base.drives[[0, 77, -1]],
+        "presumed": {name: list(pair) for name, pair in base.presumed.items()},
+        "starts of its own": {one.name: list(own_starts(base, one)) for one in HYPOTHESES if one.shares_of_peak},
+    }
+    loud = replace(base, measured=base.measured * 3.3e6 / float(np.nanmax(np.abs(base.measured))))
+    louder = replace(base, measured=base.measured * 3.36e6 / float(np.nanmax(np.abs(base.measured))))
+    told["unknowns near the relief"] = [list(freed(one, (DELIVERY,)).model.unknowns) for one in (loud, louder)]
+    for channel, delay in ((PRESSURE, 4e-3), (SPEED, 3e-3), (POSITION, 2e-3), (PRESSURE, 2e-4)):
+        late = delayed(base, {channel: delay})
+        told[f"{channel} {1e3 * delay:g} ms late"] = {
+            "drives": late.drives[[40, -1]],
+            "measured [Pa]": late.measured[[40, -6], 0],
+            "lost": int(np.count_nonzero(np.isnan(late.measured))) - int(np.count_nonzero(np.isnan(base.measured))),
+        }
+    for one in HYPOTHESES:
+        tried = freed(base, (one,))
+        start = {**usual_values(base), "case_leakage": 4e-13, "speed_lead": 1e-5, **own_starts(base, one)[0]}
+        point = tried.at(tried.model.theta(start))
+        told[f"{one.name}: cost and slope"] = [point.cost, float(point.gradient[-1])]
+    return told
+
+
+@NUMBERS.case(relative=0.01)
+def promises_of_hypotheses() -> dict[str, Any]:
+    record = log(0.5)
+    off = record.replace(**{PRESSURE: record[PRESSURE] + 2e5})
+    plain = {
+        **flow_starts(PAPER, PAPER.bulk_modulus)[2],
+        "leakage_coefficient": 2e-11,
+        "flow_bias": 5e-6,
+        STIFFNESS: 2e7,
+    }
+    told: dict[str, Any] = {}
+    for one in HYPOTHESES:
+        gain, size, deviation = promised(seen(off), PAPER, plain, one)
+        told[one.name] = {"gain": gain, "size": Found(size, deviation)}
+    told["delivery by mass"] = list(promised(seen(record), PAPER, plain, DELIVERY, by_mass=True))
+    return told
+
+
+@NUMBERS.case(relative=0.01)
+def explanations() -> dict[str, Any]:
+    record = log(0.5)
+    off = seen(record.replace(**{PRESSURE: record[PRESSURE] + 2e5}))
+    asked = [one for one in HYPOTHESES if one.name in ("pressure_offset", "speed_late", "volume", "leakage_rise")]
+    found: Explanation = explain(
+        off, PAPER, flow_starts(PAPER, PAPER.bulk_modulus)[:1], lambda fit: fit.chi_square[0] < 1.3, asked=asked
+    )
+    return {
+        "names": list(found.names),
+        "rivals": found.rivals,
+        "delays": dict(found.delays),
+        "stated pressure [Pa]": found.stated_pressure,
+        "values": {name: Found(*pair) for name, pair in found.values.items()},
+        "cost": found.fit.cost,
+    }
+
+
+@NUMBERS.case()
+def the_motion_form() -> dict[str, Any]:
+    record = log(0.5)
+    speed = record[SPEED].copy()
+    speed[100:104] = np.nan
+    found = _log(record.replace(motor_speed_rad_s=speed), WORN, {"chamber_volume": 0.1}, 1e-4)
+    fast = _log(log(0.3, 1e-4), PAPER, {}, 1e-4)
+    told: dict[str, Any] = {
+        "drives": found.drives[[3, 101, -1]],
+        "measured [m]": found.measured[[3, 101, -1], 0],
+        "steps": np.bincount(found.steps),
+        "steps of a step": np.bincount(_steps(found.drives, 5e-3)),
+        "noise": asdict(found.noise[0]),
+        "fast": {"length": len(fast.drives), "time [s]": fast.sample_time, "noise": asdict(fast.noise[0])},
+        "starts": _starts(PAPER, 4e8)[::4],
+        "starts of a frictionless rig": _starts(
+            replace(
+                PAPER,
+                friction_quadratic=0.0,
+                friction_coulomb=0.0,
+                leakage_coefficient=0.0,
+                flow_bias=0.0,
+                makeup_conductance=0.0,
+            ),
+            2e8,
+        )[4],
+    }
+    for form in MOTION_FORMS:
+        one = FreedProblem(form, found, UNKNOWNS, LINEAR)
+        point = one.at(one.model.theta(_starts(WORN, 2e8)[0]))
+        told[form.name] = {"cost": point.cost, "gradient": point.gradient, "diagonal": np.diag(point.gram)}
+    guesses, (lower, upper) = motion_fit._guesses(one, _starts(PAPER, 2e8)[:2])  # pyright: ignore[reportPossiblyUnboundVariable]
+    told["bounds"] = [lower, upper]
+    told["first guess"] = guesses[0]
+    return told
+
+
+@NUMBERS.case()
+def objections_to_a_motion_fit() -> dict[str, Any]:
+    def fits(chi: float, other: float, cost: float) -> list[GreyBoxFit]:
+        return [made_fit(10.0, 2e8, 1e6, chi=chi), made_fit(cost, other, 1e6)]
+
+    told: dict[str, Any] = {}
+    for name, made, others in (
+        ("fine", fits(1.09, 2.08e8, 14.9), [2.09e8]),
+        ("poor", fits(1.11, 2e8, 14.9), []),
+        ("laws disagree", fits(1.0, 2.11e8, 14.9), []),
+        ("laws disagree, but one is worse", fits(1.0, 2.11e8, 15.1), []),
+        ("any scale", fits(1.0, 2e8, 11.0), [1.88e8]),
+    ):
+        told[name] = noted(motion_fit._objections(made, made[0], others))
+    return told
+
+
+@pytest.mark.parametrize("case", NUMBERS.cases)
+def test_numbers_stand(case: str) -> None:
+    NUMBERS.check(case)

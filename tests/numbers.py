@@ -1,0 +1,219 @@
+"""Numbers that stand: what an engine makes of a small fixed input, kept in a file that a person can read.
+
+Codes of astronomers and chemists are tested against reference values; so is this one. A module ``test_numbers.py``
+names its cases, and ``numbers.json`` beside it keeps what they gave (``test_numbers_flow.py``: ``numbers_flow.json``).
+A number says no more than that nothing moved: where a formula has a claim that can be tested, test the claim.
+
+`python -m tests.numbers` prints what moved, all of it or only that of the folders named; ``--write`` keeps what is
+found instead. Read what moved before you keep it: each line is a number that a user may see move.
+"""
+
+import argparse
+import importlib.util
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+
+FORMULA = 1e-6
+"""How far a number may move that a formula gives, over its size [fraction]: other processors round otherwise."""
+
+WITHIN, WIDTH = 0.03, 0.01
+"""How far the end of a search may move, over its deviation, and how far the deviation may, over itself [fraction]."""
+
+KEPT_DIGITS = 10
+
+
+@dataclass(frozen=True)
+class Found:
+    """The end of a search: a value, and the deviation that says how well it is known.
+
+    Parameters
+    ----------
+    value, std : float
+        In one unit.
+    """
+
+    value: float
+    std: float
+
+
+Case = Callable[[], Mapping[str, Any]]
+
+
+class Numbers:
+    """The cases of one module, and the file of what they gave.
+
+    Parameters
+    ----------
+    module : str
+        The module's ``__file__``.
+    """
+
+    def __init__(self, module: str) -> None:
+        self.file = Path(module).with_name(Path(module).stem.removeprefix("test_") + ".json")
+        self.made: dict[str, tuple[Case, float]] = {}
+
+    @property
+    def cases(self) -> list[str]:
+        """What the cases are called."""
+        return list(self.made)
+
+    def case(self, relative: float = FORMULA) -> Callable[[Case], Case]:
+        """Return a decorator that adds a case under the name of its function.
+
+        Parameters
+        ----------
+        relative : float
+            How far its numbers may move, over their size [fraction].
+        """
+
+        def added(function: Case) -> Case:
+            self.made[function.__name__.strip("_").replace("_", " ")] = function, relative
+            return function
+
+        return added
+
+    def found(self, name: str) -> dict[str, Any]:
+        """Return what a case gives now, as the file keeps it."""
+        return _plain(self.made[name][0]())
+
+    def kept(self) -> dict[str, Any]:
+        """Return what the file keeps."""
+        return json.loads(self.file.read_text("utf-8")) if self.file.exists() else {}
+
+    def moved(self, name: str) -> list[str]:
+        """Return a line for each number of a case that moved, came or went."""
+        return list(_moved(name, self.kept().get(name, {}), self.found(name), self.made[name][1]))
+
+    def check(self, name: str) -> None:
+        """Fail if a number of a case moved, came or went."""
+        moved = self.moved(name)
+        assert not moved, "see `python -m tests.numbers`:\n" + "\n".join(moved)
+
+    def write(self) -> None:
+        """Keep what all cases give now."""
+        kept = {name: self.found(name) for name in self.made}
+        self.file.write_text(_lines(kept) + "\n", "utf-8")
+
+
+def _plain(value: Any) -> Any:
+    """Return what JSON can hold: numbers with `KEPT_DIGITS` digits, or names of those that are not finite."""
+    match value:
+        case Found(value=middle, std=std):
+            return {"value": _plain(middle), "std": _plain(std)}
+        case Mapping():
+            return {str(name): _plain(one) for name, one in value.items()}
+        case bool() | np.bool_():
+            return bool(value)
+        case int() | np.integer():
+            return int(value)
+        case float() | np.floating():
+            return float(f"{value:.{KEPT_DIGITS}g}") if math.isfinite(value) else str(float(value))
+        case complex() | np.complexfloating():
+            return [_plain(float(value.real)), _plain(float(value.imag))]
+        case np.ndarray() if value.ndim == 0:
+            return _plain(value.item())
+        case np.ndarray() | list() | tuple():
+            return [_plain(one) for one in value]
+        case None | str():
+            return value
+        case _:
+            raise TypeError(f"a kept number is a number, text, list or mapping, got {value!r}")
+
+
+def _moved(name: str, kept: Any, found: Any, relative: float) -> Iterator[str]:
+    if isinstance(kept, dict) and isinstance(found, dict):
+        if set(found) == {"value", "std"} == set(kept):
+            yield from _search_moved(name, kept, found)
+            return
+        for key in dict.fromkeys([*kept, *found]):
+            yield from _moved(f"{name}: {key}", kept.get(key, "nothing"), found.get(key, "nothing"), relative)
+    elif isinstance(kept, list) and isinstance(found, list) and len(kept) == len(found):
+        size = max((abs(one) for one in kept if _is_number(one)), default=0.0)
+        pairs: list[tuple[Any, Any]] = list(zip(kept, found, strict=True))
+        for i, (old, new) in enumerate(pairs):
+            if not (_is_number(old) and _is_number(new) and abs(new - old) <= 1e-9 * size):
+                yield from _moved(f"{name} [{i}]", old, new, relative)
+    elif isinstance(kept, float) and _is_number(found):
+        if not abs(found - kept) <= relative * abs(kept):
+            yield f"{name}: {kept!r} -> {found!r}"
+    elif kept != found or isinstance(kept, bool) != isinstance(found, bool):
+        yield f"{name}: {kept!r} -> {found!r}"
+
+
+def _search_moved(name: str, kept: Mapping[str, Any], found: Mapping[str, Any]) -> Iterator[str]:
+    if not (_is_number(kept["std"]) and _is_number(found["std"])):
+        if kept["std"] != found["std"]:  # nothing is known of the value, and it may end anywhere
+            yield f"{name}, deviation: {kept['std']!r} -> {found['std']!r}"
+    elif abs(found["value"] - kept["value"]) > WITHIN * kept["std"] + FORMULA * abs(kept["value"]):
+        yield f"{name}: {kept['value']!r} -> {found['value']!r}, deviation {kept['std']!r}"
+    elif abs(found["std"] - kept["std"]) > WIDTH * kept["std"]:
+        yield f"{name}, deviation: {kept['std']!r} -> {found['std']!r}"
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _lines(value: Any, indent: str = "") -> str:
+    """Return JSON with a line a number or a list of numbers."""
+    if isinstance(value, dict) and set(value) != {"value", "std"}:
+        inner = indent + "  "
+        entries = [
+            f"{inner}{json.dumps(name, ensure_ascii=False)}: {_lines(one, inner)}" for name, one in value.items()
+        ]
+        return "{\n" + ",\n".join(entries) + f"\n{indent}}}" if entries else "{}"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def modules(folders: Sequence[str]) -> list[Numbers]:
+    """Return the cases of all modules below some folders of tests.
+
+    Parameters
+    ----------
+    folders : sequence of str
+        From the project's folder.
+    """
+    files = sorted({file for folder in folders for file in (ROOT / folder).rglob("test_numbers*.py")})
+    return [_imported(file).NUMBERS for file in files]
+
+
+def _imported(file: Path) -> Any:
+    name = ".".join(file.relative_to(ROOT).with_suffix("").parts)
+    spec = importlib.util.spec_from_file_location(name, file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Print what moved, or keep it; return whether anything did that was not kept."""
+    parser = argparse.ArgumentParser(prog="python -m tests.numbers", description=__doc__)
+    parser.add_argument("folders", nargs="*", default=["tests"], help="folders of tests; all if none is named")
+    parser.add_argument("--write", action="store_true", help="keep what is found")
+    given = parser.parse_args(arguments)
+    moved: list[str] = []
+    for numbers in modules(given.folders):
+        place = str(numbers.file.parent.relative_to(ROOT))
+        lines = [line for name in numbers.cases for line in numbers.moved(name)]
+        lines += [f"{name}: no longer made" for name in numbers.kept() if name not in numbers.made]
+        moved += [f"{place}: {line}" for line in lines]
+        if given.write:
+            numbers.write()
+    sys.stdout.write("\n".join(moved or ["nothing moved"]) + "\n")
+    return int(bool(moved) and not given.write)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
