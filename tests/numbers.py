@@ -45,6 +45,22 @@ class Found:
     std: float
 
 
+@dataclass(frozen=True)
+class Roughly:
+    """A number that other processors move: how often a search asks, the end of one along a valley.
+
+    Parameters
+    ----------
+    value : float
+        In any unit.
+    share : float
+        How far it may move, over its size [fraction].
+    """
+
+    value: float
+    share: float
+
+
 Case = Callable[[], Mapping[str, Any]]
 
 
@@ -109,6 +125,8 @@ def _plain(value: Any) -> Any:
     match value:
         case Found(value=middle, std=std):
             return {"value": _plain(middle), "std": _plain(std)}
+        case Roughly(value=middle, share=share):
+            return {"value": _plain(middle), "within": share}
         case Mapping():
             return {str(name): _plain(one) for name, one in value.items()}
         case bool() | np.bool_():
@@ -133,6 +151,9 @@ def _moved(name: str, kept: Any, found: Any, relative: float) -> Iterator[str]:
     if isinstance(kept, dict) and isinstance(found, dict):
         if set(found) == {"value", "std"} == set(kept):
             yield from _search_moved(name, kept, found)
+            return
+        if set(found) == {"value", "within"} == set(kept):
+            yield from _moved(name, float(kept["value"]), found["value"], found["within"])
             return
         for key in dict.fromkeys([*kept, *found]):
             yield from _moved(f"{name}: {key}", kept.get(key, "nothing"), found.get(key, "nothing"), relative)
@@ -165,7 +186,7 @@ def _is_number(value: Any) -> bool:
 
 def _lines(value: Any, indent: str = "") -> str:
     """Return JSON with a line a number or a list of numbers."""
-    if isinstance(value, dict) and set(value) != {"value", "std"}:
+    if isinstance(value, dict) and set(value) not in ({"value", "std"}, {"value", "within"}):
         inner = indent + "  "
         entries = [
             f"{inner}{json.dumps(name, ensure_ascii=False)}: {_lines(one, inner)}" for name, one in value.items()

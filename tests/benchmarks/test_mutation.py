@@ -68,13 +68,16 @@ def test_a_seed_draws_the_same_faults_and_another_others() -> None:
     assert once == again != other
 
 
-def test_a_file_is_tried_on_its_own_test_first_and_on_its_folder() -> None:
+def test_a_file_is_tried_on_kept_numbers_on_its_own_test_and_on_its_folder() -> None:
     assert mirrored(ROOT, "plant/eha/circuit.py") == [
+        "tests/plant/eha/test_numbers.py",
         "tests/plant/eha/test_circuit.py",
         "plant/eha/circuit.py",
         "tests/plant/eha",
     ]
     assert mirrored(ROOT, "faults/diagnosis/calibration.py") == [
+        "tests/faults/diagnosis/test_numbers.py",
+        "tests/faults/diagnosis/test_numbers_verdict.py",
         "faults/diagnosis/calibration.py",
         "tests/faults/diagnosis",
     ]

@@ -14,7 +14,7 @@ from estimation.fits.form_fit import FormFit
 from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, explained, fit_greybox
 from estimation.fits.greybox_problem import Problem, search_bounds
 from estimation.fits.greybox_problem import weighed as sums_of
-from estimation.fits.hypotheses import HYPOTHESES, LIMITS, PRESUMED
+from estimation.fits.hypotheses import HYPOTHESES, LIMITS
 from estimation.fits.wide_problem import flow_bounds, freed
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM
 from tests.estimation.fits.short_logs import (
@@ -55,9 +55,6 @@ def logs_of_the_flow_form() -> dict[str, Any]:
         "starts": flow_starts(PAPER, 4e8)[::5],
         "starts without leakage": flow_starts(replace(PAPER, leakage_coefficient=0.0, flow_bias=0.0), 2e8)[0],
         "count of starts": len(flow_starts(PAPER, 4e8)),
-        "hypotheses": {one.name: asdict(one) for one in HYPOTHESES},
-        "limits": {name: list(pair) for name, pair in LIMITS.items()},
-        "presumed": PRESUMED,
     }
     for name, some in {
         "plain": record,
@@ -140,6 +137,7 @@ def bounds_of_searches() -> dict[str, Any]:
     noisy = problem(FLOW_FORM, 3e-5)
     mass = problem(MASS_FLOW_FORM)
     return {
+        "limits": {name: list(pair) for name, pair in LIMITS.items()},
         "without limits": list(search_bounds(model, guesses, {})),
         "with limits": list(search_bounds(model, guesses, limits)),
         "of the flow form": list(flow_bounds(model, guesses, problem().log)),
@@ -204,6 +202,7 @@ def grey_box_fits() -> dict[str, Any]:
         )
     )
     told["noisy drives"] = told_of(concluded(noisy, noisy.at(theta)))
+    told["usual search"] = asdict(Search())
     told["explained"] = [explained(one, replace_cost(one.at(theta), share * one.blocks)) for share in (0.59, 0.61)]
     told["insensitive"] = [int(np.count_nonzero(np.isfinite(list(concluded(one, one.at(theta)).std.values()))))]
     return told

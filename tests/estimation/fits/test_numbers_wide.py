@@ -14,7 +14,7 @@ from estimation.fits.force_scale import disagree
 from estimation.fits.form_fit import weighed, with_structure
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit
-from estimation.fits.hypotheses import DELIVERY, HYPOTHESES
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, PRESUMED
 from estimation.fits.motion_fit import _log, _starts, _steps
 from estimation.fits.wide_problem import delayed, freed, own_starts, usual_values
 from estimation.models.flow import STIFFNESS
@@ -62,6 +62,8 @@ def objections_on_either_side() -> dict[str, Any]:
 def the_wide_form() -> dict[str, Any]:
     base = wide()
     told: dict[str, Any] = {
+        "hypotheses": {one.name: asdict(one) for one in HYPOTHESES},
+        "presumed of rigs": PRESUMED,
         "row": dict(zip(usual_values(base), base.parameters, strict=True)),
         "drives": base.drives[[0, 77, -1]],
         "presumed": {name: list(pair) for name, pair in base.presumed.items()},
@@ -98,7 +100,7 @@ def promises_of_hypotheses() -> dict[str, Any]:
     told: dict[str, Any] = {}
     for one in HYPOTHESES:
         gain, size, deviation = promised(seen(off), PAPER, plain, one)
-        told[one.name] = {"gain": gain, "size": Found(size, deviation)}
+        told[one.name] = {"gain": round(gain, 3), "size": Found(size, deviation)}
     told["delivery by mass"] = list(promised(seen(record), PAPER, plain, DELIVERY, by_mass=True))
     return told
 
