@@ -2,8 +2,8 @@
 
 A line of a function is executed by the tests that coverage.py names. What is executed once for all (constants,
 defaults, what a cache keeps) and what runs compiled (loops whose text is pasted into kernels) is not seen there; so the
-tests that execute the functions which use the name, the rest of the file, and the mirrored folder's tests come after
-them.
+mirrored folder's kept numbers, the tests that execute the functions which use the name, the rest of the file, and the
+mirrored folder's tests come after them.
 """
 
 import ast
@@ -95,12 +95,16 @@ class Executed:
             Names of tests. Within a group those that execute the fewest lines come first.
         """
         near = mirrored(self.root, path)
-        groups = [self._at(path, line), *self._later(path, line)]
+        groups = [self._at(path, line), self._kept_numbers(near), *self._later(path, line)]
         groups.append({test for file, tests in self.all_tests.items() if file.startswith(near[-1]) for test in tests})
         ordered: dict[str, None] = {}
         for group in groups:
             ordered |= dict.fromkeys(sorted(group, key=lambda test: (_far(test, near), self._cost[test], test)))
         return [test for test in ordered if (self.root / test.partition("::")[0]).is_file()]
+
+    def _kept_numbers(self, near: Sequence[str]) -> set[str]:
+        """Return the kept numbers of the mirrored folder, which take seconds and see constants."""
+        return {test for file in near if "test_numbers" in file for test in self.all_tests.get(file, ())}
 
     def _at(self, path: str, line: int) -> set[str]:
         statement = _innermost(self.trees[path], line)

@@ -14,10 +14,14 @@ import pytest
 
 from estimation.engine.contract import FilterProblem, Trace
 from estimation.filters.batch import filter_batch
-from estimation.filters.imm import bank_parameters, log_transitions
+from estimation.filters.imm import IMM_SETTINGS, bank_parameters, log_transitions
 from estimation.filters.online import OnlineFilter
+from estimation.filters.particle import PARTICLE_SETTINGS
 from estimation.filters.relinearised import relinearised
 from estimation.filters.run import METHODS, filter_problem, in_si, run_filter
+from estimation.filters.sif import SIF_SETTINGS
+from estimation.filters.svsf import SVSF_SETTINGS
+from estimation.filters.ukf import UKF_SETTINGS
 from estimation.log_checks.first_belief import first_belief
 from estimation.models.eha_forms import FORMS
 from estimation.models.gaussian import Gaussian
@@ -192,6 +196,26 @@ def bank_of_the_nine_conditions() -> dict[str, Any]:
         "NIS": dict(found.nis),
         "usual dwell": run_filter(METHODS["imm"], model, prior, actuator_log(), PAPER).log_likelihood,
     }
+
+
+ALLOWED = (-3.0, -2.9, -0.1, 0.0, 1e-9, 0.1, 0.99, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0)
+
+
+@NUMBERS.case()
+def settings_that_are_allowed() -> dict[str, Any]:
+    each = {
+        "ukf": UKF_SETTINGS,
+        "svsf": SVSF_SETTINGS,
+        "sif": SIF_SETTINGS,
+        "imm": IMM_SETTINGS,
+        "particle": PARTICLE_SETTINGS,
+    }
+    told = {
+        f"{method}, {one.name}": {"usual": one.default, "of three states": [x for x in ALLOWED if one.allows(x, 3)]}
+        for method, settings in each.items()
+        for one in settings
+    }
+    return told | {"log-likelihood of a usual ukf": METHODS["ukf"](task()).log_likelihood}
 
 
 @NUMBERS.case()

@@ -2,14 +2,15 @@
 
 from dataclasses import asdict, replace
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
-from estimation.fits import motion_fit
-from estimation.fits.explain import Explanation, explain, promised
-from estimation.fits.flow_fit import _objections
-from estimation.fits.flow_search import flow_starts
+from estimation.fits import flow_fit, motion_fit
+from estimation.fits.explain import Explanation, Promise, explain, promised
+from estimation.fits.flow_fit import _asked, _near, _objections
+from estimation.fits.flow_search import _guess, _search, flow_starts
 from estimation.fits.force_scale import disagree
 from estimation.fits.form_fit import weighed, with_structure
 from estimation.fits.freed_problem import FreedProblem
@@ -17,10 +18,11 @@ from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, PRESUMED
 from estimation.fits.motion_fit import _log, _starts, _steps
 from estimation.fits.wide_problem import delayed, freed, own_starts, usual_values
-from estimation.models.flow import STIFFNESS
+from estimation.models.flow import FLOW_FORM, STIFFNESS
 from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS
+from plant.log.record import Record
 from tests.estimation.fits.short_logs import PAPER, POSITION, PRESSURE, SPEED, WORN, log, made_fit, noted, seen, wide
-from tests.numbers import Found, Numbers
+from tests.numbers import Found, Numbers, Roughly
 
 NUMBERS = Numbers(__file__)
 
@@ -56,6 +58,50 @@ def objections_on_either_side() -> dict[str, Any]:
     told["with structure"] = list(with_structure({"bulk_modulus": (2e8, 1e5)}, 1e-3)["bulk_modulus"])
     told["disagree"] = [disagree([1.0, share]) for share in (1.049, 1.051, 0.953, 0.951)]
     return told
+
+
+@NUMBERS.case()
+def what_is_asked_of_a_log() -> dict[str, Any]:
+    """Promises of the delivery on either side of where it is asked, and lengths of logs."""
+    told: dict[str, Any] = {}
+    sound, base = made_fit(100.0, 2e8, 1e6), wide()
+    for gain, size, deviation in (
+        (9.0, 0.02, 0.05),
+        (11.0, 0.02, 0.05),
+        (11.0, 0.009, 0.05),
+        (11.0, 0.011, 0.05),
+        (9.0, 0.02, 0.09),
+        (9.0, 0.02, 0.11),
+    ):
+        with patch.object(flow_fit, "promised", return_value=Promise(gain, size, deviation)):
+            asked, remarks = _asked(base, PAPER, sound, loaded=False)
+        told[f"gain {gain:g}, size {size:g}, deviation {deviation:g}"] = [[one.name for one in asked], noted(remarks)]
+    told["of a poor fit"] = [one.name for one in _asked(base, PAPER, made_fit(1.0, 2e8, 1e6, chi=2.0), loaded=False)[0]]
+    lengths = (np.zeros((count, 2)) for count in (50000, 50001))
+    told["of long logs under load"] = [
+        [one.name for one in _asked(replace(base, drives=drives), PAPER, sound, loaded=True)[0]] for drives in lengths
+    ]
+    starts = flow_starts(PAPER, 3e8)
+    told["near a fit"] = [dict(one) for one in _near(sound, starts, lambda _: True)]
+    told["near none"] = [dict(one) for one in _near(sound, starts, lambda _: False)[:2]]
+    return told
+
+
+@NUMBERS.case(relative=1e-4)
+def first_guesses_of_the_flow_form() -> dict[str, Any]:
+    log_of = seen(log(0.5))
+    costs = FreedProblem.costs
+    with patch.object(FreedProblem, "costs", autospec=True, side_effect=costs) as asked:
+        found = _guess(FLOW_FORM, log_of, flow_starts(PAPER, 2e8))
+    guesses = np.array(asked.call_args.args[1])
+    return {
+        "count": len(guesses),
+        "guessed of modulus, leakage, bias": [
+            sorted({round(float(one), 4) for one in guesses[:, i]}) for i in range(3)
+        ],
+        "found": {name: Roughly(value, 0.05) for name, value in found.items() if name != "speed_lead"},
+        "samples": [_search(replace(log_of, sample_time=time)).screened for time in (1e-3, 3e-3)],
+    }
 
 
 @NUMBERS.case()
@@ -150,6 +196,10 @@ def the_motion_form() -> dict[str, Any]:
             2e8,
         )[4],
     }
+    long = {name: np.zeros(31000) for name in (SPEED, "position_m")}
+    long[SPEED][::2] = 1.0
+    long["position_m"][::3] = 1e-6
+    told["samples of a long log"] = len(_log(Record(1e-3, long), PAPER, {}, 1e-4).drives)
     for form in MOTION_FORMS:
         one = FreedProblem(form, found, UNKNOWNS, LINEAR)
         point = one.at(one.model.theta(_starts(WORN, 2e8)[0]))

@@ -42,13 +42,15 @@ def noted(notes: Any) -> list[dict[str, Any]]:
 
 
 @cache
-def log(condition: str = "minor_leakage", drive: str = "prbs", after: str = "", seconds: float = 3.0) -> Record:
+def log(
+    condition: str = "minor_leakage", drive: str = "prbs", after: str = "", seconds: float = 3.0, share: float = 0.55
+) -> Record:
     """Return a short log of a circuit, which another condition may befall midway."""
     rng = np.random.default_rng(11)
     speed = make_drive(drive, seconds, 2e-3, PAPER, rng)
     first = circuit_of(parameters_for(CONDITIONS[condition]))
     later = circuit_of(parameters_for(CONDITIONS[after])) if after else first
-    return simulate(CIRCUIT, speed, 2e-3, abrupt(first, later, 0.55 * seconds), sensors=RIG, rng=rng)
+    return simulate(CIRCUIT, speed, 2e-3, abrupt(first, later, share * seconds), sensors=RIG, rng=rng)
 
 
 @cache
@@ -59,8 +61,9 @@ def blocks(
     pressure: bool = True,
     drive: str = "prbs",
     seconds: float = 3.0,
+    share: float = 0.55,
 ) -> Blocks:
-    record = log(condition, drive, after, seconds)
+    record = log(condition, drive, after, seconds, share)
     return blocks_of(record if pressure else record.replace(differential_pressure_pa=None))
 
 

@@ -100,7 +100,7 @@ def conditions_as_coordinates() -> dict[str, Any]:
     }
 
 
-@NUMBERS.case(relative=1e-4)
+@NUMBERS.case(relative=1e-6)
 def predictions_of_circuits() -> dict[str, Any]:
     one = blocks(seconds=1.5)
     rows = parameter_rows(ACTUATOR.conditions[[0, 5]], ACTUATOR.circuit, ACTUATOR.rated)

@@ -12,12 +12,12 @@ from estimation.eha.result import BulkModulusEstimate
 from faults.conditions import severity
 from faults.diagnosis.advice import advice_for, speeds_held
 from faults.diagnosis.calibration import shipped_calibration
-from faults.diagnosis.circuit_runs import blocks_of, coordinates_of
+from faults.diagnosis.circuit_runs import Blocks, blocks_of, coordinates_of
 from faults.diagnosis.class_regions import (
     fit_classes,
     region_scores,
 )
-from faults.diagnosis.end_stop import stopped
+from faults.diagnosis.end_stop import _stands, stopped
 from faults.diagnosis.evidence import Scoreboard, bounded, friction_left_open, weigh
 from faults.diagnosis.innovation_bank import innovation_scores
 from faults.diagnosis.load import first_guesses, under_load
@@ -186,13 +186,24 @@ def evidence_for_conditions() -> dict[str, Any]:
     }
 
 
-@NUMBERS.case(relative=1e-4)
+@NUMBERS.case(relative=1e-7)
 def innovations_of_the_bank() -> dict[str, Any]:
     fast = Record(1e-3, {name: np.repeat(log(seconds=1.5)[name], 2) for name in log(seconds=1.5)})
     return {
         "log-likelihoods": innovation_scores(log(seconds=1.5), ACTUATOR.circuit),
         "of a fast log": innovation_scores(fast, PAPER),
     }
+
+
+STANDING = (*((reach, 0.3) for reach in (0.3, 0.5, 0.7)), *((5.0, rest) for rest in (0.03, 0.05, 0.07, 0.09, 0.12)))
+"""Reaches [mm] and rests [s] on either side of where a piston counts as one that stands at an end."""
+
+
+def resting(reach: float, rest: float) -> Blocks:
+    """Return a piston that goes out, rests so long, and comes back."""
+    time = 0.01 * np.arange(201)
+    gone = np.interp(time, [0.0, 0.05, 0.05 + rest, 0.1 + rest], [0.0, reach, reach, 0.0])
+    return replace(blocks(), velocity=np.diff(gone) / 0.01)
 
 
 @NUMBERS.case(relative=0.01)
@@ -208,6 +219,9 @@ def pistons_at_their_ends() -> dict[str, Any]:
         "reach and stop [m]": [one.reach, with_stop.stop],
         "scales before and after": [fits.best.scales, again.best.scales],
         "free": [free.stop, same is classes()],
+        "stands": {
+            f"{reach:g} mm away for {rest:g} s": _stands(resting(1e-3 * reach, rest)) for reach, rest in STANDING
+        },
     }
 
 
