@@ -58,6 +58,10 @@ def rounds_of_free_fits() -> dict[str, Any]:
     with patch.object(class_fit, "predicted", side_effect=runs) as asked:
         fit_classes(blocks("major_friction"), ACTUATOR, start=ACTUATOR.conditions[6])
     told["of all classes from one start"] = Roughly(asked.call_count, 0.1)
+    alike = np.repeat(class_fit.nominal_runs(blocks(), ACTUATOR)[:1], 9, axis=0)
+    with patch.object(class_fit, "predicted", side_effect=runs) as asked:
+        fit_classes(blocks(), ACTUATOR, runs=alike)
+    told["where nine classes are alike"] = Roughly(asked.call_count, 0.1)
     return told
 
 

@@ -177,6 +177,7 @@ def circuit_about_an_actuator() -> dict[str, Any]:
     leaking = replace(PAPER, leakage_coefficient=2e-11, chamber_volume=4e-3, relief_pressure=7e6)
     tight = replace(PAPER, leakage_coefficient=1e-12, bulk_modulus=9e8)
     rows = np.array([parameter_row(p) for p in (CircuitParameters(), WORN)])
+    turned = replace(PAPER, area_difference=-0.18, volume_difference=0.1)
     loaded = {"pushed": WORN, "pulled": replace(WORN, load_force=500.0)}
     states = np.array([[0, 0, 0, 0, 1, 1, 1], [0, 0, 0, 0, 0, 1, 1], [0, 0, 0, 0, 1, -1, 0]], dtype=np.float64)
     return {
@@ -185,7 +186,7 @@ def circuit_about_an_actuator() -> dict[str, Any]:
         "leakage inside the cylinder [m^3/(s Pa)]": [p.cylinder_leakage for p in (CircuitParameters(), WORN)],
         "leakage once settled [m^3/(s Pa)]": [p.settled_leakage for p in (CircuitParameters(), WORN)],
         "oil wanted [m^3]": [oil_demand(p) for p in (CircuitParameters(), WORN)],
-        "longest stroke [m]": [float(longest_stroke(p)) for p in (PAPER, WORN)],
+        "longest stroke [m]": [float(longest_stroke(p)) for p in (PAPER, WORN, turned)],
         "oil at rest [m^3]": {name: [float(one) for one in at_rest(p)[4:]] for name, p in loaded.items()},
         "scales": [circuit_scales(p).tolist() for p in (CircuitParameters(), WORN)],
         "steps a second": circuit_step_rate(circuit_values(rows)),

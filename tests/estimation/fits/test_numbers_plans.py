@@ -1,0 +1,169 @@
+"""How searches are led: in which order, with how many steps, on which part of a log, kept in `numbers_plans.json`.
+
+Descents are replaced by ones that stay where they begin, so that nothing is computed but the plan.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+from estimation.fits import explain as explaining
+from estimation.fits import flow_search, force_scale, greybox_fit, motion_fit
+from estimation.fits.descent import Point
+from estimation.fits.flow_search import flow_starts
+from estimation.fits.freed_problem import FreedProblem
+from estimation.fits.hypotheses import HYPOTHESES
+from estimation.fits.motion_fit import _log, _searched, _starts
+from estimation.models.motion import MOTION_FORMS
+from plant.arrays import Array
+from plant.log.record import Record
+from tests.estimation.fits.short_logs import PAPER, log, made_fit, seen
+from tests.numbers import Numbers
+
+NUMBERS = Numbers(__file__)
+Cost = Callable[[int], float]
+
+
+def still(theta: Array, cost: float) -> Point:
+    """Return a point of a misfit without slopes."""
+    return Point(theta, cost, np.zeros(len(theta)), np.eye(len(theta)))
+
+
+@contextmanager
+def planned(cost: Cost, *modules: Any) -> Iterator[list[list[float]]]:
+    """Write down evaluations, samples, steps, noise and radius of each descent, which stays where it begins.
+
+    Its cost is that of its number in the order of descents.
+    """
+    plan: list[list[float]] = []
+
+    def descended(at: Any, start: Array, evaluations: int, *others: Any, **named: Any) -> Point:
+        one = at.__self__.log
+        noise = [one.noise[0].variance, one.noise[0].walk]
+        rest = [other for other in others[1:] if isinstance(other, float)]
+        plan.append([evaluations, len(one.measured), int(np.max(one.steps)), *noise, *rest, *named.values()])
+        return still(start, cost(len(plan)))
+
+    def together(at: Any, starts: Sequence[Array], evaluations: int, *others: Any, **named: Any) -> list[Point]:
+        return [descended(at, start, evaluations, *others, **named) for start in starts]
+
+    with ExitStack() as stack:
+        for module in modules:
+            for name, fake in (("descend", descended), ("descend_together", together)):
+                if hasattr(module, name):
+                    stack.enter_context(patch.object(module, name, fake))
+        stack.enter_context(patch.object(FreedProblem, "at", lambda _, theta: still(theta, 1e9)))
+        yield plan
+
+
+def grouped(plan: list[list[float]]) -> list[list[Any]]:
+    """Return equal descents in a row as one, with their count."""
+    told: list[list[Any]] = []
+    for one in plan:
+        if told and told[-1][1] == one:
+            told[-1][0] += 1
+        else:
+            told.append([1, one])
+    return told
+
+
+@NUMBERS.case()
+def plan_of_the_form_of_motion() -> dict[str, Any]:
+    rng = np.random.default_rng(5)
+    samples = 12000
+    speed = 100.0 * np.sign(np.sin(0.003 * np.arange(samples)))
+    long = Record(
+        1e-3, {"motor_speed_rad_s": speed, "position_m": np.cumsum(3e-7 * speed) + 1e-6 * rng.standard_normal(samples)}
+    )
+    whole = _log(long, PAPER, {}, 1e-4)
+    first = replace(made_fit(1.0, 2e8, 1e6, chi=1.05), theta=np.zeros(11))
+    told: dict[str, Any] = {}
+    for name, cost in (("nothing explains it", lambda k: 1e7 + k), ("the first explains it", lambda k: 100.0 + k)):
+        with (
+            planned(cost, motion_fit, force_scale) as plan,
+            patch.object(motion_fit, "concluded", lambda _, point: point),
+        ):
+            found, others = _searched(MOTION_FORMS[0], whole, _starts(PAPER, 2e8)[:4])
+        told[name] = {"descents": grouped(plan), "cost": float(found.cost), "others": len(others)}
+        with (
+            planned(cost, motion_fit, force_scale) as plan,
+            patch.object(motion_fit, "concluded", lambda _, point: point),
+        ):
+            motion_fit._compared(MOTION_FORMS[1], whole, first, _starts(PAPER, 2e8)[:4])
+        told[f"{name}, the second form"] = grouped(plan)
+    return told
+
+
+@NUMBERS.case()
+def plan_of_explanations() -> dict[str, Any]:
+    told: dict[str, Any] = {}
+    short = seen(log(0.5))
+    asked = [one for one in HYPOTHESES if one.name in ("pressure_late", "pressure_offset", "relief_low", "volume")]
+    promises = [explaining.Promise(float(gain), 1.0, 1.0) for gain in range(20)]
+    costs = {
+        "all alike": lambda _: 1000.0,
+        "one is better": lambda k: 1000.0 - 10.0 * (k % 7 == 0),
+        "one is far better": lambda k: 1000.0 - 900.0 * (k % 7 == 0),
+    }
+
+    def promised(_: Any, __: Any, ___: Any, given: Sequence[Any]) -> list[Any]:
+        return promises[: len(given)]
+
+    def concluded(_: Any, point: Point) -> Any:
+        return made_fit(point.cost, 2e8, 1e6)
+
+    for name, cost in costs.items():
+        with (
+            planned(cost, explaining) as plan,
+            patch.object(explaining, "_promises", promised),
+            patch.object(explaining, "concluded", concluded),
+        ):
+            for paired in (False, True):
+                plan.clear()
+                found = explaining.explain(
+                    short, PAPER, flow_starts(PAPER, 2e8)[:3], lambda _: False, asked=asked, paired=paired
+                )
+                told[f"{name}, paired: {paired}"] = {
+                    "descents": grouped(plan),
+                    "names": list(found.names),
+                    "rivals": found.rivals,
+                    "delays": dict(found.delays),
+                }
+    return told
+
+
+@NUMBERS.case()
+def plan_of_the_flow_form() -> dict[str, Any]:
+    told: dict[str, Any] = {}
+
+    def concluded(_: Any, point: Point, disturbed: bool = True) -> Any:
+        return [point.cost, disturbed]
+
+    for name, one in {"plain": seen(log(0.5)), "noisy position": seen(log(0.5, position_noise=3e-5))}.items():
+        for kind, cost in (
+            ("explained at once", lambda k: 10.0 + k),
+            ("never explained", lambda k: 1e5 + k),
+            ("others are rivals", lambda k: 1e5 + 65.0 * (k % 3)),
+            ("others are unlikely", lambda k: 1e5 + 80.0 * (k % 3)),
+            ("some are disturbed", lambda k: 1e5 + 30.0 * (k % 3)),
+        ):
+            with (
+                planned(cost, flow_search, greybox_fit) as plan,
+                patch.object(flow_search, "concluded", concluded),
+                patch.object(FreedProblem, "costs", lambda _, thetas: np.arange(len(thetas))),
+                patch.object(flow_search, "each", lambda work, items: [work(item) for item in items]),
+                patch.object(greybox_fit, "each", lambda work, items: [work(item) for item in items]),
+            ):
+                found = flow_search.balanced(one, PAPER, flow_starts(PAPER, 2e8)[:3])
+            told[f"{name}, {kind}"] = {"descents": grouped(plan), "costs and whether disturbed": found}
+    return told
+
+
+@pytest.mark.parametrize("case", NUMBERS.cases)
+def test_numbers_stand(case: str) -> None:
+    NUMBERS.check(case)
