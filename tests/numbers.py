@@ -25,6 +25,9 @@ ROOT = Path(__file__).resolve().parents[1]
 FORMULA = 1e-6
 """How far a number may move that a formula gives, over its size [fraction]: other processors round otherwise."""
 
+ROUNDING = 1e-12
+"""How far a number in a list may move, over the largest of the list: what is left of larger ones [fraction]."""
+
 WITHIN, WIDTH = 0.03, 0.01
 """How far the end of a search may move, over its deviation, and how far the deviation may, over itself [fraction]."""
 
@@ -161,7 +164,7 @@ def _moved(name: str, kept: Any, found: Any, relative: float) -> Iterator[str]:
         size = max((abs(one) for one in kept if _is_number(one)), default=0.0)
         pairs: list[tuple[Any, Any]] = list(zip(kept, found, strict=True))
         for i, (old, new) in enumerate(pairs):
-            if not (_is_number(old) and _is_number(new) and abs(new - old) <= 1e-9 * size):
+            if not (_is_number(old) and _is_number(new) and abs(new - old) <= ROUNDING * size):
                 yield from _moved(f"{name} [{i}]", old, new, relative)
     elif isinstance(kept, float) and _is_number(found):
         if not abs(found - kept) <= relative * abs(kept):

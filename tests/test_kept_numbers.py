@@ -47,7 +47,7 @@ def _told(now: Mapping[str, Any]) -> Any:
     "change",
     [
         {"pressure": 2.0e6 * (1.0 + 0.9e-6)},
-        {"flows": np.array([1e-5, -2e-5, 1e-15])},
+        {"flows": np.array([1e-5, -2e-5, 1e-17])},
         {"modulus": Found(2.00025e8, 1.009e6)},
         {"points": Roughly(215, 0.1)},
         {"nothing_known": Found(9.0, np.inf)},
@@ -63,7 +63,7 @@ def test_rounding_of_other_processors_is_no_move(tmp_path: Path, change: Mapping
         {"pressure": 2.0e6 * (1.0 + 1.1e-6)},
         {"pressure": np.nan},
         {"pressure": None},
-        {"flows": np.array([1e-5, -2e-5, 1e-13])},
+        {"flows": np.array([1e-5, -2e-5, 1e-16])},
         {"flows": np.array([1e-5, -2e-5])},
         {"modulus": Found(2.00035e8, 1e6)},
         {"modulus": Found(2e8, 1.011e6)},

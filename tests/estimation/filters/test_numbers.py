@@ -32,6 +32,7 @@ from plant.eha.model import EhaParameters, EhaValues
 from plant.eha.simulate import LUMPED, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
+from plant.solvers.steps import parameter_names
 from tests.estimation.filters.banks import Mode, run_imm
 from tests.numbers import Numbers
 
@@ -177,7 +178,7 @@ def bank_of_the_nine_conditions() -> dict[str, Any]:
     rows = bank_parameters(filter_problem(model, prior, actuator_log(), PAPER))
     assert found.belief is not None
     return {
-        "modes": [row[5:10] for row in rows],
+        "modes": [dict(zip(parameter_names(EhaParameters)[5:10], row[5:10], strict=True)) for row in rows],
         "modes of a frictionless rig": len(
             bank_parameters(
                 filter_problem(

@@ -31,11 +31,13 @@ from faults.diagnosis.class_regions import (
 from faults.diagnosis.severity import limits_of, severities, severities_at, what_is_not_told, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
 from plant.arrays import Array
+from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.doubts import PRESSURE_GAIN, Spread
 from plant.eha.drives import make_drive
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import RIG
+from plant.solvers.steps import parameter_names
 from tests.faults.diagnosis.short_logs import (
     ACTUATOR,
     INFORMATION,
@@ -88,13 +90,14 @@ def blocks_of_logs() -> dict[str, Any]:
 def conditions_as_coordinates() -> dict[str, Any]:
     points = np.vstack([ACTUATOR.conditions[[0, 4, 8]], ACTUATOR.conditions[0] + 0.3, ACTUATOR.conditions[2] - 5.0])
     points[1, -1], points[4, 4] = -9.0, 2.0
+    names, rows = parameter_names(CircuitParameters), parameter_rows(points, ACTUATOR.circuit, ACTUATOR.rated)
     return {
         "of nine": dict(zip(CONDITIONS, ACTUATOR.conditions, strict=True)),
         "rated velocity [m/s]": [ACTUATOR.rated, SHORT.rated],
         "stroke [m]": [ACTUATOR.circuit.stroke, SHORT.circuit.stroke],
         "of another rig": coordinates_of(SHORT.circuit, 0.05),
-        "rows": parameter_rows(points, ACTUATOR.circuit, ACTUATOR.rated),
-        "rows of another rig": parameter_rows(points[:1], SHORT.circuit, SHORT.rated),
+        "rows": [dict(zip(names, row, strict=True)) for row in rows],
+        "of another rig's": dict(zip(names, parameter_rows(points[:1], SHORT.circuit, SHORT.rated)[0], strict=True)),
         "prior of a class": WITHIN[np.triu_indices(7)],
         "prior of a circuit": WEAK[np.triu_indices(7)],
     }
