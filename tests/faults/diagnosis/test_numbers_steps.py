@@ -10,7 +10,7 @@ import pytest
 from faults.diagnosis import class_fit, onset, out_of_model
 from faults.diagnosis.class_fit import _at, _step, fit_freely
 from faults.diagnosis.class_regions import fit_classes
-from faults.diagnosis.onset import _when, likeliest_split
+from faults.diagnosis.onset import _when, likeliest_split, part_of
 from faults.diagnosis.out_of_model import _bias, _biases, _larger_pump, _least, _nearest_severity, _one_step
 from plant.arrays import Array
 from plant.log.record import Record
@@ -31,8 +31,13 @@ def biased(*found: tuple[float, float]) -> dict[str, tuple[float, float]]:
 def one_step_of_a_free_fit() -> dict[str, Any]:
     told: dict[str, Any] = {}
     centre = ACTUATOR.conditions[1]
-    alone = blocks(pressure=False)
-    for name, one, off in (("near", blocks(), 0.1), ("far", blocks(), 6.0), ("without pressure", alone, 1.0)):
+    alone, part = blocks(pressure=False), part_of(blocks(), 20, 200)
+    for name, one, off in (
+        ("near", blocks(), 0.1),
+        ("far", blocks(), 6.0),
+        ("without pressure", alone, 1.0),
+        ("in part", part, 1.0),
+    ):
         found = _at(one, ACTUATOR, centre, centre + off * OFF, PULL)
         told[name] = {
             "cost": found.cost,
@@ -76,6 +81,9 @@ def one_step_of_a_bias() -> dict[str, Any]:
             fit = _at(one, ACTUATOR, centre, centre + 0.1 * OFF, PULL)
             found = _one_step(one, fit, trust, ACTUATOR, sizes)
             told[f"{name}, trusted {trust:g}"] = {of: list(pair) for of, pair in found.items()}
+    part = part_of(blocks(), 20, 200)
+    fit = _at(part, ACTUATOR, centre, centre + OFF, PULL)
+    told["in part"] = {of: list(pair) for of, pair in _one_step(part, fit, 0.1, ACTUATOR, SIZES).items()}
     told["least that matters"] = {of: [_least(of, error, SIZES) for error in (0.0, SIZES[of])] for of in SIZES}
     told["told as"] = noted([_bias(of, 0.2) for of in SIZES])
     told["larger pump [m^3/rad]"] = _larger_pump(ACTUATOR.circuit).pump_displacement
