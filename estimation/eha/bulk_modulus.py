@@ -242,9 +242,8 @@ def _fit(
     if form != "flow":
         return FITTED[form][0](log.record, parameters, guess, {}, log.variances)
     doubted = {name: max(one) for name, one in spreads.items()}
-    loaded = not chosen and first_load(log.record, log.variances) != 0.0
-    moving = begins_in_motion(log.record)
-    fit = fit_flow(log.record, parameters, guess, doubted, log.variances, loaded=loaded, moving=moving)
+    record, loaded = log.record, not chosen and first_load(log.record, log.variances) != 0.0
+    fit = fit_flow(record, parameters, guess, doubted, log.variances, loaded=loaded, moving=begins_in_motion(record))
     explained = fit.explanation is not None and fit.bound <= LARGEST_BOUND
     return fit if explained or not loaded else None  # a filter needs no state at rest
 

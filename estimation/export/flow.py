@@ -10,6 +10,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from estimation.models.chambers import OPENING, logarithm_of, observe_chambers
+from estimation.models.completed_flow import CRACKS
 from estimation.models.eha_forms import BULK_MODULUS, volume_left_open
 from estimation.models.flow import flow_rates
 from estimation.models.model import ProcessModel, StateVariable
@@ -62,7 +63,8 @@ def flow_filter_step(state: tuple[Scalar, ...], drives: Any, p: Any, h: Scalar) 
     pressures = (as_expression(state[0]), as_expression(state[1]))
     constants = dict(zip(("bulk_modulus", *(s.name for s in STATES[3:])), state[2:], strict=True))
     values = {field.name: getattr(p, field.name) for field in fields(EhaParameters)}
-    known = SimpleNamespace(**{**values, **constants, "case_leakage": 0.0, "makeup_opening": OPENING})
+    absent = dict.fromkeys(("case_leakage", *CRACKS), 0.0)
+    known = SimpleNamespace(**{**values, **constants, **absent, "makeup_opening": OPENING})
     rates = [as_expression(rate) for rate in flow_rates(pressures, (*drives, h), known, 0.5)]
     slopes = jacobian(rates, pressures)
     matrix = [[(ONE if i == j else 0.0) - h * slopes[i][j] for j in range(2)] for i in range(2)]

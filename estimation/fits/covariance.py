@@ -45,7 +45,7 @@ def automatic_lags(residual: Array) -> int:
 
 
 def least_squares_covariance(
-    jacobian: Array, residual: Array, n_used: int, lags: int, prior: Array
+    jacobian: Array, residual: Array, n_used: int, lags: int, prior: Array, *, warned: bool = True
 ) -> tuple[Array, Array]:
     """Return ``B = (J'J + P)^-1`` and the sandwich ``B (J'RJ + P) B`` of a residual with autocovariance R.
 
@@ -63,6 +63,8 @@ def least_squares_covariance(
         Span of the autocovariance [samples], 0 for white; see `automatic_lags`.
     prior : ndarray, shape (p,)
         Diagonal of P: one over the variance of each parameter before the fit, zero where nothing is known.
+    warned : bool
+        Whether the caller is warned where the parameters are not separately determined; else nothing is known there.
 
     Returns
     -------
@@ -79,12 +81,13 @@ def least_squares_covariance(
     n_parameters = jacobian.shape[1]
     triangles = [np.linalg.qr(part, mode="r") for part in _parts(jacobian)]
     triangle = np.linalg.qr(np.concatenate([*triangles, np.diag(np.sqrt(prior))]), mode="r") / scale
-    if np.linalg.matrix_rank(triangle) < n_parameters:
-        warnings.warn(LogWarning(EstimateCode.NOT_DETERMINED.note()), stacklevel=3)
-        inverse = np.linalg.pinv(triangle)
-    else:
-        inverse = np.linalg.inv(triangle)
+    determined = np.linalg.matrix_rank(triangle) == n_parameters
+    inverse = np.linalg.inv(triangle) if determined else np.linalg.pinv(triangle)
     bread = inverse @ inverse.T / np.outer(scale, scale)
+    if not determined and not warned:
+        return bread, np.full_like(bread, np.inf)
+    if not determined:
+        warnings.warn(LogWarning(EstimateCode.NOT_DETERMINED.note()), stacklevel=3)
     meat = _meat(jacobian, _autocovariance(residual, n_used, min(lags, n_used // 10)))
     return bread, bread @ (meat * (n_used / (n_used - n_parameters)) + np.diag(prior)) @ bread
 

@@ -245,7 +245,8 @@ def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
     done.sort(key=lambda one: one[0].cost)
     best = done[0][0]
     count = [one for one in done if one[0].cost < best.cost + ALIKE]
-    return replace(best, fits=tuple(concluded(problem, one.point) for one, problem in count))
+    first, *rivals = (concluded(problem, one.point, warned=False) for one, problem in count)
+    return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
 
 
 def _likeliest(log: GreyBoxLog, tried: Sequence[Iterable[_Tried]], known: float = np.inf) -> list[_Tried]:

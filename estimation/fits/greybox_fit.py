@@ -217,7 +217,7 @@ def _cost(point: Point) -> float:
     return point.cost
 
 
-def concluded(problem: Problem, point: Point, *, disturbed: bool = True) -> GreyBoxFit:
+def concluded(problem: Problem, point: Point, *, disturbed: bool = True, warned: bool = True) -> GreyBoxFit:
     """Return what a solution says, with its deviations.
 
     Parameters
@@ -228,6 +228,9 @@ def concluded(problem: Problem, point: Point, *, disturbed: bool = True) -> Grey
         Its solution.
     disturbed : bool
         Whether the deviations hold the drives' noise too, and what the rig's own doubts would change is told.
+    warned : bool
+        Whether the caller is warned where the unknowns are not separately determined; else their deviations are
+        infinite.
 
     Returns
     -------
@@ -243,7 +246,7 @@ def concluded(problem: Problem, point: Point, *, disturbed: bool = True) -> Grey
         if len(felt) < len(theta):
             slopes = slopes[:, felt]
         bread, spread = least_squares_covariance(
-            slopes, errors.ravel(), used, automatic_lags(errors.ravel()), problem.prior[felt]
+            slopes, errors.ravel(), used, automatic_lags(errors.ravel()), problem.prior[felt], warned=warned
         )
 
         def response(shift: Array) -> Array:

@@ -222,7 +222,26 @@ def flow_rates(
 def fed_rates(
     state: tuple[Scalar, Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar, *, by_mass: bool
 ) -> tuple[Scalar, Scalar, Scalar]:
-    """Return the rates of both chambers and of the inner circuit that feeds them [Pa/s]; as `flow_rates`."""
+    """Return the rates of both chambers and of the inner circuit that feeds them.
+
+    Parameters
+    ----------
+    state : tuple of float or Expression
+        Absolute pressures of both chambers and of the inner circuit [Pa].
+    drives : tuple
+        As of `flow_rates`.
+    p : namespace
+        As of `flow_rates`, and `accumulator_stiffness` [Pa/m^3].
+    share : float or Expression
+        How far into the step [fraction].
+    by_mass : bool
+        See `chamber_rates`.
+
+    Returns
+    -------
+    tuple of float or Expression
+        Rates [Pa/s].
+    """
     p1, p2, supply = state
     fed = SimpleNamespace(**{**vars(p), "accumulator_pressure": supply})
     into_1, into_2 = inner_flows((p1, p2), fed, (p.crack_a, p.crack_b))

@@ -17,8 +17,8 @@ from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from estimation.log_checks.sensor_check import PRESSURE
 from plant.arrays import Array
-from plant.eha.circuit import under_pressure
 from plant.eha.circuit_parameters import CircuitParameters, circuit_values, longest_stroke
+from plant.eha.circuit_start import under_pressure
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT
 from plant.errors import LogError
@@ -54,8 +54,7 @@ AT_STOP = 0.02
 """A log shows a stop if its piston turned this near to one, as a share of half the stroke [fraction]."""
 
 TOLERANCE, DRIVE_TOLERANCE = 1e-4, 2e-3
-"""Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_run`: far below what is
-compared."""
+"""Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_run`: far below what counts."""
 
 _CONTROL = cast("ErrorControl", CIRCUIT.control)
 
@@ -87,8 +86,7 @@ class Blocks:
     stop : float or None
         How far from where the log begins the piston ran into a stop [m]; None where only the rig knows of stops.
     begun : tuple of float, or None
-        Differential pressure [Pa] and velocity [m/s] with which the log begins; None where it begins at rest, or does
-        not tell.
+        Differential pressure [Pa] and velocity [m/s] with which the log begins; None at rest, and where it is not told.
     """
 
     speed: Array
@@ -158,22 +156,22 @@ def blocks_of(record: Record) -> Blocks:
         velocity = _mean(whole["velocity_m_s"], block)
     else:
         raise LogError(f"velocity_m_s or position_m is needed; the log has {', '.join(record)}")
-    pressure, begun = whole.get("differential_pressure_pa"), None
+    pressure = whole.get("differential_pressure_pa")
     if pressure is not None:
-        begun = _begun(pressure, velocity)
         pressure = _mean(pressure, block)
         if not np.any(np.isfinite(pressure[round(SETTLING / (block * sample_time)) :])):
-            pressure = begun = None  # a sensor that was out for all of the stretch
+            pressure = None  # a sensor that was out for all of the stretch
             del whole["differential_pressure_pa"]
     speed = bridged(whole["motor_speed_rad_s"])
-    noise = _noise(whole, block, sample_time)
-    return Blocks(speed, sample_time, block, velocity, pressure, noise, course=whole.get(LEAKAGE_COURSE), begun=begun)
+    noise, course, begun = _noise(whole, block, sample_time), whole.get(LEAKAGE_COURSE), _begun(whole, velocity)
+    return Blocks(speed, sample_time, block, velocity, pressure, noise, course=course, begun=begun)
 
 
-def _begun(pressure: Array, velocity: Array) -> tuple[float, float] | None:
+def _begun(whole: Mapping[str, Array], velocity: Array) -> tuple[float, float] | None:
     """Return pressure and velocity at the start of a log that does not begin at rest."""
-    first, size = float(pressure[0]), float(np.sqrt(np.nanmean(pressure**2))) if np.any(np.isfinite(pressure)) else 0.0
-    return (first, float(np.nan_to_num(velocity[0]))) if abs(first) > LEAST_BEGUN * size else None
+    pressure = whole.get("differential_pressure_pa", np.zeros(1))
+    size = float(np.sqrt(np.nanmean(pressure**2)))
+    return (float(pressure[0]), float(np.nan_to_num(velocity[0]))) if abs(pressure[0]) > LEAST_BEGUN * size else None
 
 
 def _noise(whole: Mapping[str, Array], block: int, sample_time: float) -> Array:
@@ -311,9 +309,8 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
 
 def _start(blocks: Blocks, row: Array) -> Array:
     """Return the state in which a circuit begins: at rest, or as the log does."""
-    if blocks.begun is None:
-        return CIRCUIT.start(row)
-    return np.array(under_pressure(*blocks.begun, circuit_values(row)), dtype=np.float64)
+    begun = None if blocks.begun is None else under_pressure(*blocks.begun, circuit_values(row))
+    return CIRCUIT.start(row) if begun is None else np.array(begun, dtype=np.float64)
 
 
 def _drift(course: Array) -> Array:

@@ -15,11 +15,11 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.compiled.functions import Scalar, maximum, minimum, where
+from plant.compiled.functions import Scalar, minimum, where
 from plant.components.accumulator import gas_pressure
 from plant.components.check_valve import make_up_flow
 from plant.components.end_stop import end_stop_force
-from plant.components.oil import ATMOSPHERE, oil_pressure, specific_volume
+from plant.components.oil import ATMOSPHERE, oil_pressure
 from plant.components.orifice import laminar_orifice_flow, orifice_constant
 from plant.components.presliding import bristle_rate, presliding_friction
 from plant.components.valves import pumped_flow, relief_flow
@@ -206,50 +206,6 @@ def circuit_derivative(state: CircuitState, command: Scalar, p: CircuitValues) -
     area_a, area_b = piston_areas(p)
     push = area_a * (pressures.a - ATMOSPHERE) - area_b * (pressures.b - ATMOSPHERE) - load_on_rod(x, p)
     return turning, yielding, v, (push - friction + stopped) / p.moving_mass, *flows
-
-
-def at_rest(p: CircuitValues) -> CircuitState:
-    """Return the state at rest in mid-stroke: both chambers at the accumulator's pressure, or one above it for a load.
-
-    Parameters
-    ----------
-    p : CircuitParameters or namespace of float
-        The circuit.
-
-    Returns
-    -------
-    tuple of float
-        As named in `STATES`.
-    """
-    return under_pressure(p.load_force / p.piston_area, 0.0, p)
-
-
-def under_pressure(pressure: Scalar, velocity: Scalar, p: CircuitValues) -> CircuitState:
-    """Return a state in mid-stroke under a differential pressure: one chamber stands above the accumulator's pressure.
-
-    The seals are strained as far as what pushes the piston strains them.
-
-    Parameters
-    ----------
-    pressure : float
-        Differential pressure [Pa].
-    velocity : float
-        Piston velocity [m/s].
-    p : CircuitParameters or namespace of float
-        The circuit.
-
-    Returns
-    -------
-    tuple of float
-        As named in `STATES`.
-    """
-    push = p.piston_area * pressure - p.load_force
-    bristle = maximum(minimum(push / where(p.friction_coulomb > 0.0, p.friction_coulomb, 1.0), 1.0), -1.0)
-    filled_a, filled_b = (
-        volume / specific_volume(p.accumulator_pressure + more, p.bulk_modulus, p.air_fraction, p.vapour_pressure)
-        for volume, more in zip(chamber_volumes(0.0, p), (maximum(pressure, 0.0), maximum(-pressure, 0.0)), strict=True)
-    )
-    return 0.0, bristle, 0.0, velocity, filled_a, filled_b, p.accumulator_oil
 
 
 def observe_circuit(state: CircuitState, p: CircuitValues) -> Mapping[str, Scalar]:

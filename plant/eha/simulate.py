@@ -14,7 +14,6 @@ from plant.compiled.functions import Scalar, sign
 from plant.components.friction import quadratic_friction
 from plant.eha.circuit import (
     STATES,
-    at_rest,
     circuit_breaches,
     circuit_derivative,
     circuit_scales,
@@ -22,6 +21,7 @@ from plant.eha.circuit import (
     observe_circuit,
 )
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of, circuit_values
+from plant.eha.circuit_start import at_rest
 from plant.eha.model import EhaParameters, lumped_step, reduced_derivative
 from plant.eha.parameter_path import ParameterPath
 from plant.errors import HydrostateError

@@ -80,3 +80,9 @@ def test_the_span_grows_with_the_correlation_as_andrews_has_it() -> None:
     coloured = lfilter([1.0], [1.0, -0.6], noise)
     wanted = 1.1447 * (4.0 * 0.36 / (1.0 - 0.36) ** 2 * count) ** (1.0 / 3.0)
     assert automatic_lags(coloured) == pytest.approx(wanted, rel=0.05)
+
+
+def test_what_is_not_determined_is_not_known_where_nobody_is_warned() -> None:
+    column = np.random.default_rng(1).standard_normal(40)
+    _, spread = least_squares_covariance(np.column_stack([column, column]), column, 40, 0, np.zeros(2), warned=False)
+    assert np.all(np.isinf(spread))

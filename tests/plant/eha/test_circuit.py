@@ -15,14 +15,13 @@ from plant.components.oil import effective_bulk_modulus
 from plant.eha.circuit import (
     CircuitState,
     Pressures,
-    at_rest,
     circuit_derivative,
     circuit_flows,
     circuit_pressures,
     observe_circuit,
-    under_pressure,
 )
 from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.circuit_start import at_rest, under_pressure
 from plant.eha.drives import make_drive
 from plant.eha.simulate import CIRCUIT, LUMPED, simulate
 from plant.eha.steady_state import steady_state

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from faults.conditions import CONDITIONS, parameters_for
 from faults.eha.inject import abrupt, growing
 from faults.eha.physical import throttled, worn_pump
-from plant.eha.circuit import at_rest, circuit_breaches
+from plant.eha.circuit import circuit_breaches
 from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.circuit_start import at_rest
 from plant.eha.drives import sine
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, LUMPED, PLANTS, simulate

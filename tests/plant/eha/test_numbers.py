@@ -10,7 +10,6 @@ from plant.compiled.functions import Scalar
 from plant.eha.around_mean import break_frequency_about
 from plant.eha.circuit import (
     STATES,
-    at_rest,
     chamber_volumes,
     circuit_breaches,
     circuit_derivative,
@@ -21,6 +20,7 @@ from plant.eha.circuit import (
     observe_circuit,
 )
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of, circuit_values, longest_stroke, oil_demand
+from plant.eha.circuit_start import at_rest
 from plant.eha.cylinder_sizing import BORES_MM, RODS_MM, Duty, buckling_rod, cylinder_circuit, size_cylinder
 from plant.eha.doubts import DOUBTS, spreads_of
 from plant.eha.drives import chirp, make_drive, multisine, nine_steps, prbs, sine
