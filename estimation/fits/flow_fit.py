@@ -3,13 +3,21 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from estimation.fits.explain import WORTH, explain
+from estimation.fits.explain import VANISHED, WORTH, explain
 from estimation.fits.flow_log import flow_log, without_strays
 from estimation.fits.flow_search import MAKEUP_TRIED, balanced, flow_starts
 from estimation.fits.form_fit import FormFit, weighed, with_structure
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
-from estimation.fits.hypotheses import BEGUN, DELIVERY, HYPOTHESES, LEAST_DELIVERY, OFFSET, Hypothesis
+from estimation.fits.hypotheses import (
+    BEGUN,
+    DELIVERY,
+    HYPOTHESES,
+    LEAST_DELIVERY,
+    OFFSET,
+    START_LOAD,
+    Hypothesis,
+)
 from estimation.fits.promises import promised
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
@@ -27,6 +35,10 @@ REPORTED = ("leakage_coefficient", "flow_bias")
 
 LARGEST_CHI_SQUARE = 1.2
 """Mean squared normalised residual above which the model is said to leave something out [dimensionless]."""
+
+DOUBTED = 1.1
+"""The same above which a fit without make-up is doubted where a log begins in motion: sensors' noise is known to a
+twentieth [dimensionless]."""
 
 LARGEST_AUTOCORRELATION = 0.1
 """Correlation of neighbouring residuals above which the same is said [dimensionless]."""
@@ -122,9 +134,9 @@ def fit_flow(
     best, found = min(fits, key=_cost), weighed(fits, SURER, [_beforehand(fit) for fit in fits])
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
     explains = partial(_explains, noisy=log.passes_on)
-    asked, remarks = _asked(log, parameters, swinging, loaded=loaded, moving=moving)
+    asked, remarks = _asked(log, parameters, swinging, loaded=loaded, moving=moving, likeliest=swinging is best)
     if asked:
-        near = _near(swinging, starts, explains, everywhere=loaded or moving)
+        near = _near(swinging, starts, explains, in_motion=loaded or moving)
         strange = explain(log, parameters, near, explains, asked=asked, paired=asked != (DELIVERY,))
         one = strange.fit
         if explains(one) and one.cost < best.cost - WORTH:
@@ -139,7 +151,7 @@ def fit_flow(
 
 
 def _asked(
-    log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, loaded: bool, moving: bool
+    log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, loaded: bool, moving: bool, likeliest: bool
 ) -> tuple[tuple[Hypothesis, ...], tuple[Note, ...]]:
     """Return what a log is asked beside the plain form, given its likelier fit with volumes that swing; and a remark.
 
@@ -156,9 +168,14 @@ def _asked(
     if delivery.gain > WORTH and delivery.size > LEAST_DELIVERY:
         return (DELIVERY,), ()
     open_by = delivery.deviation
-    return (BEGUN,) if moving else (), (
-        RigCode.WEAR_NOT_EXCLUDED.note(percent=200.0 * open_by),
-    ) if open_by > OPEN_DELIVERY else ()
+    remarks = (RigCode.WEAR_NOT_EXCLUDED.note(percent=200.0 * open_by),) if open_by > OPEN_DELIVERY else ()
+    if not moving:
+        return (), remarks
+    # chambers shut in far above the accumulator take no make-up for seconds, and a search from rest ends without any
+    fed = swinging.values["makeup_conductance"] > VANISHED * parameters.makeup_conductance
+    lost = likeliest and not fed and swinging.chi_square[0] > DOUBTED
+    begun = promised(log, parameters, swinging.values, START_LOAD, by_mass=by_mass)
+    return (BEGUN,) if lost or begun.gain > WORTH else (), remarks
 
 
 def _near(
@@ -166,14 +183,15 @@ def _near(
     starts: Sequence[Mapping[str, float]],
     explains: Callable[[GreyBoxFit], bool],
     *,
-    everywhere: bool,
+    in_motion: bool,
 ) -> Sequence[Mapping[str, float]]:
     """Return where the search for what is strange begins: a fit that explains the log is in no wrong valley.
 
-    But one that begins at rest where the log does not may be, so the search then begins ``everywhere``.
+    But one that begins at rest may be where the log does not (``in_motion``): without make-up, which is then tried too.
     """
-    if explains(fit) and not everywhere:
-        return [fit.values]
+    if explains(fit):
+        fed = {**fit.values, "makeup_conductance": MAKEUP_TRIED[0]}
+        return [fit.values, fed] if in_motion else [fit.values]
     usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
     return [{name: value for name, value in fit.values.items() if name not in (STIFFNESS, *CRACKS)}, *usual]
 
