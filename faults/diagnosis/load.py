@@ -41,13 +41,13 @@ def first_guesses(record: Record, parameters: EhaParameters, estimate: BulkModul
     Yields
     ------
     EhaParameters
-        Under the load that holds the log's first pressure, if it begins under one; as the rig file says; under the
-        load that holds its mean pressure.
+        As the rig file says; under the load that holds the log's first pressure, if it begins under one; under the load
+        that holds its mean pressure.
     """
     found = {} if estimate.explanation is None else estimate.explanation.values
+    yield parameters
     if parameters.load_force == 0.0 and "start_pressure" in found:
         yield replace(parameters, load_force=found["start_pressure"][0] * parameters.piston_area)
-    yield parameters
     yield replace(parameters, load_force=float(np.nanmean(record[PRESSURE])) * parameters.piston_area)
 
 
@@ -66,7 +66,7 @@ def under_load(
     Returns
     -------
     tuple of Diagnosis and EhaParameters
-        The diagnosis, and the actuator with its load; those of the first guess where no load explains the log.
+        The diagnosis, and the actuator with its load; the likeliest where no load explains the log.
     """
     tried: list[tuple[Diagnosis, EhaParameters]] = []
     for guess in guesses:
@@ -80,4 +80,4 @@ def under_load(
             if not biases:
                 break
             loaded = replace(loaded, load_force=loaded.load_force + biases[0] * loaded.piston_area)
-    return tried[0]
+    return min(tried, key=lambda one: one[0].scoreboard.fits.best.cost)
