@@ -77,6 +77,7 @@ def test_a_file_is_tried_on_kept_numbers_on_its_own_test_and_on_its_folder() -> 
     ]
     assert mirrored(ROOT, "faults/diagnosis/calibration.py") == [
         "tests/faults/diagnosis/test_numbers.py",
+        "tests/faults/diagnosis/test_numbers_steps.py",
         "tests/faults/diagnosis/test_numbers_verdict.py",
         "faults/diagnosis/calibration.py",
         "tests/faults/diagnosis",

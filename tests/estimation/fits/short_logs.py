@@ -96,4 +96,4 @@ def made_fit(
 
 @cache
 def wide(stiffness: float = 3e7) -> GreyBoxLog:
-    return widened(seen(log(0.5), chamber_volume=0.1), PAPER, stiffness)
+    return widened(seen(log(0.5), chamber_volume=0.1), PAPER, {STIFFNESS: stiffness})

@@ -1,20 +1,23 @@
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from estimation.fits import motion_fit
+from estimation.fits import motion_fit, motion_search
+from estimation.fits.descent import Point, descend
 from estimation.fits.form_fit import FormFit
-from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.motion_fit import fit_motion
+from estimation.fits.motion_search import Ended, MotionSearch, likeliest
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
-from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS
+from estimation.models.motion import MOTION_FORMS, UNKNOWNS
 from estimation.notes import EstimateCode
 from faults.conditions import CONDITIONS, parameters_for
+from plant.arrays import Array
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import PLANTS, simulate
@@ -44,6 +47,16 @@ def seen(record: Record, speed_variance: float = 1e-4) -> GreyBoxLog:
     return motion_fit._log(record, HEALTHY, {}, speed_variance)
 
 
+def heard(record: Record) -> GreyBoxLog:
+    """Return a log with the noise of motor speed that it has."""
+    return seen(record, measurement_variances(record, ("motor_speed_rad_s",))["motor_speed_rad_s"])
+
+
+def searches_of(log: GreyBoxLog) -> list[MotionSearch]:
+    starts = motion_fit._starts(HEALTHY, HEALTHY.bulk_modulus)
+    return [MotionSearch.of(form, log, starts) for form in MOTION_FORMS]
+
+
 @pytest.fixture(scope="module")
 def healthy() -> FormFit:
     """What two seconds of a healthy actuator say, from a first guess of twice the value."""
@@ -68,8 +81,7 @@ def test_what_a_doubtful_piston_area_does_to_bulk_modulus_is_told(healthy: FormF
     assert abs(healthy.rig_slopes["piston_area"]["bulk_modulus"]) > 1e-3 * HEALTHY.bulk_modulus
 
 
-def test_a_shaken_position_is_not_explained(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(motion_fit, "FINALISTS", 1)
+def test_a_shaken_position_is_not_explained() -> None:
     record = short_log(0.5)
     shaken = record["position_m"] + 2e-5 * np.sin(0.2 * np.arange(len(record["position_m"])))
     fit = fit_motion(record.replace(position_m=shaken), HEALTHY, HEALTHY.bulk_modulus)
@@ -81,25 +93,35 @@ def test_a_shaken_position_is_not_explained(monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_long_log_is_searched_on_its_beginning_and_ends_on_the_whole(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    log, starts = seen(short_log(1.0)), motion_fit._starts(HEALTHY, HEALTHY.bulk_modulus)
-    monkeypatch.setattr(motion_fit, "FINALISTS", 1)
-    monkeypatch.setattr(motion_fit, "SEARCHED", 500)
-    beginning, _ = motion_fit._searched(MOTION_FORMS[0], log.beginning(500), starts)
-    fit, _ = motion_fit._searched(MOTION_FORMS[0], log, starts)
-    whole = FreedProblem(MOTION_FORMS[0], log, UNKNOWNS, LINEAR)
-    assert fit.cost == whole.at(fit.theta).cost
-    assert fit.cost < 0.9 * whole.at(beginning.theta).cost
+    log = heard(short_log(2.0))
+    monkeypatch.setattr(motion_search, "SCREENED", 500)
+    monkeypatch.setattr(motion_search, "SEARCHED", 1000)
+    searches = searches_of(log)
+    ended = likeliest(searches)
+    first = next(one for one in ended if one.explains)
+    assert first.point.cost == first.search.part.at(first.point.theta).cost
+    assert len(first.search.part.log.measured) == 1000
+    fits, _ = motion_fit._fitted(ended)
+    assert fits[0].cost == first.search.whole.at(fits[0].theta).cost
+    assert fits[0].cost < first.search.whole.at(first.point.theta).cost - 20.0  # likelier by far
 
 
-@pytest.mark.parametrize(("explained", "brought"), [(np.inf, 9), (0.0, 3)])
-def test_starts_that_larger_noise_does_not_explain_are_left_out(explained: float, brought: int) -> None:
-    whole = FreedProblem(MOTION_FORMS[0], seen(short_log(0.2)), UNKNOWNS, LINEAR)
-    guesses, bounds = motion_fit._guesses(whole, motion_fit._starts(HEALTHY, HEALTHY.bulk_modulus))
-    near = list(motion_fit._brought_near(whole, guesses, bounds, explained))
-    assert len(near) == brought
-    assert all(np.all((bounds[0] <= theta) & (theta <= bounds[1])) for theta in near)
-    best = min(whole.at(theta).cost for theta in near)
-    assert best < min(whole.at(guess).cost for guess in guesses)
+@pytest.mark.parametrize(("wanted", "alike", "brought"), [(np.inf, 0.0, 3), (np.inf, np.inf, 2), (0.0, 0.0, 1)])
+def test_starts_that_larger_noise_does_not_explain_or_that_end_alike_are_left_out(
+    wanted: float, alike: float, brought: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(motion_search, "explained", lambda _: wanted)
+    monkeypatch.setattr(motion_search, "SAME_COST", alike)
+    monkeypatch.setattr(motion_search, "SAME_MODULUS", alike)
+    search, screened = searches_of(seen(short_log(0.2)))[0], dict[int, list[Point]]()
+    lower, upper = search.bounds
+    for rank in range(2):
+        near = list(search.brought_near(rank, screened))
+        assert len(near) == brought
+        assert all(np.all((lower <= theta) & (theta <= upper)) for theta in near)
+        best = min(search.short.at(theta).cost for theta in near)
+        assert best < min(search.short.at(guess).cost for guess in search.guesses)
+    assert all(len(points) == len(search.guesses) for points in screened.values())
 
 
 @pytest.mark.slow
@@ -150,16 +172,16 @@ def test_a_log_without_position_is_refused_with_what_it_lacks() -> None:
 
 
 def test_without_a_variance_the_noise_of_motor_speed_is_read_off_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
-    record, walks = short_log(0.3), list[float]()
+    record, walks, guesses = short_log(0.3), list[float](), list[float]()
 
-    def searched(_: object, log: GreyBoxLog, starts: list[dict[str, float]]) -> tuple[GreyBoxFit, list[float]]:
-        walks.append(log.noise[0].walk)
-        guesses.append(starts[0]["bulk_modulus"])
-        return found(2e8), []
+    def ended(searches: list[MotionSearch]) -> list[Ended]:
+        whole = searches[0].whole
+        walks.append(whole.log.noise[0].walk)
+        guesses.append(whole.model.values(searches[0].guesses[0])["bulk_modulus"])
+        return []
 
-    guesses: list[float] = []
-    monkeypatch.setattr(motion_fit, "_searched", searched)
-    monkeypatch.setattr(motion_fit, "_compared", lambda *given: (given[2], []))
+    monkeypatch.setattr(motion_fit, "likeliest", ended)
+    monkeypatch.setattr(motion_fit, "_fitted", lambda _: ([found(2e8), found(2e8)], []))
     read = measurement_variances(record, ("motor_speed_rad_s",))
     for variances in (None, read, {"motor_speed_rad_s": 4.0 * read["motor_speed_rad_s"]}):
         fit_motion(record, HEALTHY, 0.0, variances=variances)
@@ -237,19 +259,42 @@ def test_another_optimum_far_from_the_best_is_objected_to() -> None:
     assert motion_fit._objections([best], best, [1.98e8, 2.01e8]) == ()
 
 
-def test_the_second_law_is_searched_by_itself_only_where_the_first_explains_nothing(
-    monkeypatch: pytest.MonkeyPatch, healthy: FormFit
+@pytest.mark.parametrize("near", [True, False])
+def test_the_other_law_goes_on_on_the_whole_log_from_where_it_stands_better(
+    near: bool, healthy: FormFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    log, starts = seen(short_log(0.3)), motion_fit._starts(HEALTHY, HEALTHY.bulk_modulus)
-    anew = found(1e8), [9e7]
-    monkeypatch.setattr(motion_fit, "_searched", lambda *_: anew)
-    first = FreedProblem(MOTION_FORMS[0], log, UNKNOWNS, LINEAR)
-    theta = first.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
-    near = replace(found(2e8), theta=theta)
-    fit, others = motion_fit._compared(MOTION_FORMS[1], log, near, starts)
+    first, second = searches_of(heard(short_log(2.0)))
+    there = first.whole.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
+    worst = max(second.guesses, key=lambda theta: second.whole.at(theta).cost)
+    own = descend(second.whole.at, there, 40, second.bounds).theta if near else worst
+    begun: list[Array] = []
+
+    def noted(at: Any, start: Array, *others: Any, **named: Any) -> Point:
+        if at.__self__ is second.whole:
+            begun.append(start)
+        return descend(at, start, *others, **named)
+
+    monkeypatch.setattr(motion_fit, "descend", noted)
+    ended = [
+        Ended(second, second.part.at(own), explains=False),
+        Ended(first, first.part.at(there), explains=True),
+    ]
+    fits, _ = motion_fit._fitted(ended)
+    assert [fit.model for fit in fits] == [first.whole.model, second.whole.model]
+    (start,) = begun
+    assert np.array_equal(start, own if near else fits[0].theta)
+    assert fits[1].cost == second.whole.at(fits[1].theta).cost <= second.whole.at(start).cost
+
+
+def test_the_likelier_law_is_fitted_first_where_neither_explains_the_log(healthy: FormFit) -> None:
+    first, second = searches_of(heard(short_log(2.0)))
+    values = {name: healthy.parameters[name][0] for name in UNKNOWNS}
+    there = first.whole.model.theta(values)
+    ended = [
+        Ended(first, first.part.at(first.guesses[-1]), explains=False),
+        Ended(second, second.part.at(there), explains=False),
+    ]
+    fits, others = motion_fit._fitted(ended)
     assert others == []
-    second = FreedProblem(MOTION_FORMS[1], log, UNKNOWNS, LINEAR)
-    assert fit.cost < second.at(theta).cost
-    assert fit.cost == second.at(fit.theta).cost
-    unlike = replace(near, chi_square=(1.01 * motion_fit.EXPLAINED,))
-    assert motion_fit._compared(MOTION_FORMS[1], log, unlike, starts) is anew
+    assert fits[0].cost < second.whole.at(there).cost
+    assert fits[0].cost == second.whole.at(fits[0].theta).cost

@@ -5,7 +5,6 @@ Descents are replaced by ones that stay where they begin, so that nothing is com
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
 
@@ -13,12 +12,14 @@ import numpy as np
 import pytest
 
 from estimation.fits import explain as explaining
-from estimation.fits import flow_search, force_scale, greybox_fit, motion_fit
+from estimation.fits import flow_search, force_scale, greybox_fit, motion_fit, motion_search
+from estimation.fits import promises as promising
 from estimation.fits.descent import Point
 from estimation.fits.flow_search import flow_starts
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.hypotheses import HYPOTHESES
-from estimation.fits.motion_fit import _log, _searched, _starts
+from estimation.fits.motion_fit import _fitted, _log, _starts
+from estimation.fits.motion_search import MotionSearch, likeliest
 from estimation.models.motion import MOTION_FORMS
 from plant.arrays import Array
 from plant.log.record import Record
@@ -81,21 +82,25 @@ def plan_of_the_form_of_motion() -> dict[str, Any]:
         1e-3, {"motor_speed_rad_s": speed, "position_m": np.cumsum(3e-7 * speed) + 1e-6 * rng.standard_normal(samples)}
     )
     whole = _log(long, PAPER, {}, 1e-4)
-    first = replace(made_fit(1.0, 2e8, 1e6, chi=1.05), theta=np.zeros(11))
     told: dict[str, Any] = {}
-    for name, cost in (("nothing explains it", lambda k: 1e7 + k), ("the first explains it", lambda k: 100.0 + k)):
-        with (
-            planned(cost, motion_fit, force_scale) as plan,
-            patch.object(motion_fit, "concluded", lambda _, point: point),
-        ):
-            found, others = _searched(MOTION_FORMS[0], whole, _starts(PAPER, 2e8)[:4])
-        told[name] = {"descents": grouped(plan), "cost": float(found.cost), "others": len(others)}
-        with (
-            planned(cost, motion_fit, force_scale) as plan,
-            patch.object(motion_fit, "concluded", lambda _, point: point),
-        ):
-            motion_fit._compared(MOTION_FORMS[1], whole, first, _starts(PAPER, 2e8)[:4])
-        told[f"{name}, the second form"] = grouped(plan)
+    for name, cost in (
+        ("nothing comes close", lambda k: 1e7 + k),
+        ("nothing explains it", lambda k: 3000.0 + k),
+        ("the first explains it", lambda k: 100.0 + k),
+        ("the second explains it", lambda k: 3000.0 + k if k < 20 else 100.0 + k),
+        ("the first seconds alone are explained at first", lambda k: 6000.0 if k % 6 == 1 else 100.0),
+    ):
+        with planned(cost, motion_fit, motion_search, force_scale) as plan:
+            ended = likeliest([MotionSearch.of(form, whole, _starts(PAPER, 2e8)[:4]) for form in MOTION_FORMS])
+            told[name] = {"descents": grouped(plan), "explains": [one.explains for one in ended]}
+            plan.clear()
+            with patch.object(motion_fit, "concluded", lambda _, point: point):
+                found, others = _fitted(ended)
+            told[name] |= {
+                "descents of the fit": grouped(plan),
+                "costs": [float(one.cost) for one in found],
+                "others": len(others),
+            }
     return told
 
 
@@ -104,7 +109,7 @@ def plan_of_explanations() -> dict[str, Any]:
     told: dict[str, Any] = {}
     short = seen(log(0.5))
     asked = [one for one in HYPOTHESES if one.name in ("pressure_late", "pressure_offset", "relief_low", "volume")]
-    promises = [explaining.Promise(float(gain), 1.0, 1.0) for gain in range(20)]
+    promises = [promising.Promise(float(gain), 1.0, 1.0) for gain in range(20)]
     costs = {
         "all alike": lambda _: 1000.0,
         "one is better": lambda k: 1000.0 - 10.0 * (k % 7 == 0),
@@ -120,7 +125,7 @@ def plan_of_explanations() -> dict[str, Any]:
     for name, cost in costs.items():
         with (
             planned(cost, explaining) as plan,
-            patch.object(explaining, "_promises", promised),
+            patch.object(promising, "_promises", promised),
             patch.object(explaining, "concluded", concluded),
         ):
             for paired in (False, True):

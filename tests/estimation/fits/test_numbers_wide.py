@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation.fits import flow_fit, motion_fit
-from estimation.fits.explain import Explanation, Promise, explain, promised
+from estimation.fits.explain import Explanation, explain
 from estimation.fits.flow_fit import _asked, _near, _objections
 from estimation.fits.flow_search import _guess, _search, flow_starts
 from estimation.fits.force_scale import disagree
@@ -17,6 +17,8 @@ from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, PRESUMED
 from estimation.fits.motion_fit import _log, _starts, _steps
+from estimation.fits.motion_search import MotionSearch
+from estimation.fits.promises import Promise, promised
 from estimation.fits.wide_problem import delayed, freed, own_starts, usual_values
 from estimation.models.flow import FLOW_FORM, STIFFNESS
 from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS
@@ -74,16 +76,27 @@ def what_is_asked_of_a_log() -> dict[str, Any]:
         (9.0, 0.02, 0.11),
     ):
         with patch.object(flow_fit, "promised", return_value=Promise(gain, size, deviation)):
-            asked, remarks = _asked(base, PAPER, sound, loaded=False)
+            asked, remarks = _asked(base, PAPER, sound, loaded=False, moving=False)
         told[f"gain {gain:g}, size {size:g}, deviation {deviation:g}"] = [[one.name for one in asked], noted(remarks)]
-    told["of a poor fit"] = [one.name for one in _asked(base, PAPER, made_fit(1.0, 2e8, 1e6, chi=2.0), loaded=False)[0]]
+    told["of a poor fit"] = [
+        one.name for one in _asked(base, PAPER, made_fit(1.0, 2e8, 1e6, chi=2.0), loaded=False, moving=False)[0]
+    ]
+    with patch.object(flow_fit, "promised", return_value=Promise(9.0, 0.02, 0.05)):
+        told["in motion, explained and not"] = [
+            [one.name for one in _asked(base, PAPER, made_fit(1.0, 2e8, 1e6, chi=chi), loaded=False, moving=True)[0]]
+            for chi in (1.0, 2.0)
+        ]
     lengths = (np.zeros((count, 2)) for count in (50000, 50001))
     told["of long logs under load"] = [
-        [one.name for one in _asked(replace(base, drives=drives), PAPER, sound, loaded=True)[0]] for drives in lengths
+        [one.name for one in _asked(replace(base, drives=drives), PAPER, sound, loaded=True, moving=False)[0]]
+        for drives in lengths
     ]
     starts = flow_starts(PAPER, 3e8)
-    told["near a fit"] = [dict(one) for one in _near(sound, starts, lambda _: True)]
-    told["near none"] = [dict(one) for one in _near(sound, starts, lambda _: False)[:2]]
+    told["near a fit"] = [dict(one) for one in _near(sound, starts, lambda _: True, everywhere=False)]
+    told["near none"] = [dict(one) for one in _near(sound, starts, lambda _: False, everywhere=False)[:2]]
+    told["near a fit that begins otherwise"] = [
+        dict(one) for one in _near(sound, starts, lambda _: True, everywhere=True)[:2]
+    ]
     return told
 
 
@@ -204,9 +217,9 @@ def the_motion_form() -> dict[str, Any]:
         one = FreedProblem(form, found, UNKNOWNS, LINEAR)
         point = one.at(one.model.theta(_starts(WORN, 2e8)[0]))
         told[form.name] = {"cost": point.cost, "gradient": point.gradient, "diagonal": np.diag(point.gram)}
-    guesses, (lower, upper) = motion_fit._guesses(one, _starts(PAPER, 2e8)[:2])  # pyright: ignore[reportPossiblyUnboundVariable]
-    told["bounds"] = [lower, upper]
-    told["first guess"] = guesses[0]
+    search = MotionSearch.of(MOTION_FORMS[-1], found, _starts(PAPER, 2e8)[:2])
+    told["bounds"] = list(search.bounds)
+    told["first guess"] = search.guesses[0]
     return told
 
 
