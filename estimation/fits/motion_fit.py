@@ -217,15 +217,18 @@ def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
 
 
 def _fitted(ended: list[Ended]) -> tuple[list[GreyBoxFit], list[float]]:
-    """Return the fits of both structures to the whole log, and other bulk moduli that explain it."""
+    """Return the fits of both structures to the whole log, and other bulk moduli that explain it.
+
+    Other scales are looked for wherever the end explains the log, though no search said so: a gate passes on the end.
+    """
     first, second = sorted(ended, key=lambda one: (not one.explains, one.point.cost))
     search, best, others = first.search, first.point, list[float]()
-    if first.explains:
+    if not first.explains:
+        best = descend(search.part.at, best.theta, FINISHING, search.bounds)
+    if best.cost < explained(search.part):
         near = search.part.on(search.part.log.softened(*WAYS[0][1]))
         way = Way(near, NEARING, NEAR_ENOUGH, FINISHING, search.bounds, explained(search.part))
         best, others = rescaled(search.part, best, way)
-    else:
-        best = descend(search.part.at, best.theta, FINISHING, search.bounds)
     whole = search.whole
     best = descend(whole.at, best.theta, FINISHING, search.bounds)
     rival = second.search

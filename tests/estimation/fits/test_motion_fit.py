@@ -286,15 +286,20 @@ def test_the_other_law_goes_on_on_the_whole_log_from_where_it_stands_better(
     assert fits[1].cost == second.whole.at(fits[1].theta).cost <= second.whole.at(start).cost
 
 
-def test_the_likelier_law_is_fitted_first_where_neither_explains_the_log(healthy: FormFit) -> None:
+@pytest.mark.parametrize("late", [True, False])
+def test_what_the_searches_leave_unexplained_is_fitted_on_and_tried_on_other_scales_if_that_explains_it(
+    late: bool, healthy: FormFit, monkeypatch: pytest.MonkeyPatch
+) -> None:
     first, second = searches_of(heard(short_log(2.0)))
-    values = {name: healthy.parameters[name][0] for name in UNKNOWNS}
-    there = first.whole.model.theta(values)
+    there = first.whole.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
     ended = [
         Ended(first, first.part.at(first.guesses[-1]), explains=False),
         Ended(second, second.part.at(there), explains=False),
     ]
+    monkeypatch.setattr(motion_fit, "rescaled", lambda _, best, __: (best, [9e7]))
+    if not late:
+        monkeypatch.setattr(motion_fit, "explained", lambda _: 0.0)
     fits, others = motion_fit._fitted(ended)
-    assert others == []
+    assert others == ([9e7] if late else [])
     assert fits[0].cost < second.whole.at(there).cost
     assert fits[0].cost == second.whole.at(fits[0].theta).cost

@@ -85,7 +85,7 @@ def plan_of_the_form_of_motion() -> dict[str, Any]:
     told: dict[str, Any] = {}
     for name, cost in (
         ("nothing comes close", lambda k: 1e7 + k),
-        ("nothing explains it", lambda k: 3000.0 + k),
+        ("nothing explains the first seconds", lambda k: 3000.0 + k),
         ("the first explains it", lambda k: 100.0 + k),
         ("the second explains it", lambda k: 3000.0 + k if k < 20 else 100.0 + k),
         ("the first seconds alone are explained at first", lambda k: 6000.0 if k % 6 == 1 else 100.0),
