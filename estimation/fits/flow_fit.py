@@ -135,6 +135,8 @@ def fit_flow(
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
     explains = partial(_explains, noisy=log.passes_on)
     asked, remarks = _asked(log, parameters, swinging, loaded=loaded, moving=moving, likeliest=swinging is best)
+    if BEGUN in asked:  # so many valleys that one is believed only where sensors' noise is all that it leaves
+        explains = partial(_explains_all, noisy=log.passes_on)
     if asked:
         near = _near(swinging, starts, explains, in_motion=loaded or moving)
         strange = explain(log, parameters, near, explains, asked=asked, paired=asked != (DELIVERY,))
@@ -147,6 +149,8 @@ def fit_flow(
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     believed = found if sure else with_structure(found, STRUCTURE)
     reasons = _objections(best, log.passes_on)
+    if BEGUN in asked and not reasons and not explains(best):
+        reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
     return FormFit(believed, std / value, best.chi_square[0], reasons, best.rig_slopes, remarks=remarks)
 
 
@@ -206,6 +210,10 @@ def _cost(fit: GreyBoxFit) -> float:
 
 def _explains(fit: GreyBoxFit, noisy: bool) -> bool:
     return not _objections(fit, noisy)
+
+
+def _explains_all(fit: GreyBoxFit, noisy: bool) -> bool:
+    return _explains(fit, noisy) and (noisy or fit.chi_square[0] <= DOUBTED)
 
 
 def _objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
