@@ -229,8 +229,7 @@ def concluded(problem: Problem, point: Point, *, disturbed: bool = True, warned:
     disturbed : bool
         Whether the deviations hold the drives' noise too, and what the rig's own doubts would change is told.
     warned : bool
-        Whether the caller is warned where the unknowns are not separately determined; else their deviations are
-        infinite.
+        Whether the caller is warned where unknowns are not separately determined; else their deviations are infinite.
 
     Returns
     -------

@@ -119,7 +119,7 @@ def plan_of_explanations() -> dict[str, Any]:
     def promised(_: Any, __: Any, ___: Any, given: Sequence[Any]) -> list[Any]:
         return promises[: len(given)]
 
-    def concluded(_: Any, point: Point) -> Any:
+    def concluded(_: Any, point: Point, **_told: bool) -> Any:
         return made_fit(point.cost, 2e8, 1e6)
 
     for name, cost in costs.items():

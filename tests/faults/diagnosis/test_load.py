@@ -76,7 +76,7 @@ def test_loads_that_hold_the_first_and_the_mean_pressure_are_tried_about_the_rig
     assert loads(first_guesses(record, HEALTHY, ESTIMATE)) == [0.0, pytest.approx(2e5 * area)]
     begun: Any = SimpleNamespace(explanation=SimpleNamespace(values={"start_pressure": (4e5, 1e3)}))
     assert loads(first_guesses(record, HEALTHY, begun)) == [
-        pytest.approx(4e5 * area), 0.0, pytest.approx(2e5 * area)
+        0.0, pytest.approx(4e5 * area), pytest.approx(2e5 * area)
     ]  # fmt: skip
     told = replace(HEALTHY, load_force=500.0)
     assert loads(first_guesses(record, told, begun)) == [500.0, pytest.approx(2e5 * area)]
