@@ -178,7 +178,7 @@ def _asked(
     # chambers shut in far above the accumulator take no make-up for seconds, and a search from rest ends without any
     fed = swinging.values["makeup_conductance"] > VANISHED * parameters.makeup_conductance
     lost = likeliest and not fed and swinging.chi_square[0] > DOUBTED
-    begun = promised(log, parameters, swinging.values, START_LOAD, by_mass=by_mass)
+    begun = promised(log.coarsened(), parameters, swinging.values, START_LOAD, by_mass=by_mass)
     return (BEGUN,) if lost or begun.gain > WORTH else (), remarks
 
 
