@@ -48,7 +48,8 @@ MAY_VANISH, VANISHED = ("leakage_coefficient", "flow_bias", "makeup_conductance"
 """What a search may take for nothing by mistake, and the share of the rig's value below which it has."""
 
 NEARLY_AS_GOOD = 1.1
-"""The same over a finished one's cost, for long model steps have errors [dimensionless]."""
+"""What the cost of a finished set is multiplied by before others are compared with it: their model steps are long, and
+have errors [dimensionless]."""
 
 CLOSE = 60.0
 """Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""
@@ -153,7 +154,8 @@ def explain(
     first = finished[0]
     if paired and not accepted(first.fit):
         late = delayed(wide, first.delays)
-        others = [one for one in HYPOTHESES if one not in first.together]
+        taken = {one.name for one in first.together}
+        others = [one for one in HYPOTHESES if one.name not in taken]
         likely, others = promising(late, first.together, first.values, others)
         tried = [*likely, *(one for one in others if one.far)]
         pairs = _likeliest(late, [_screened(late, (*first.together, one), [first.values]) for one in tried], first.cost)

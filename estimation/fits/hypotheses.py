@@ -58,8 +58,9 @@ LATE_TRIED = (0.0, 2e-3, 5e-3, 9e-3)
 """Delays with which the search for a late channel begins [s]."""
 
 LATEST = 2e-2
-"""Longest delay that is sought [s]: no sensor, filter or bus is later. In a log of another actuator the misfit may fall
-with every millisecond more, and the search for a delay has no end."""
+"""Longest delay that is sought, or told of [s]: no sensor, filter or bus is later, and what a slope tells of a shift
+holds for one that is short beside what moves. In a log of another actuator the misfit may fall with every millisecond
+more, and the search for a delay would have no end."""
 
 HYPOTHESES = (
     Hypothesis("pressure_late", ("pressure_lag",), ({"pressure_lag": 1e-3},), LATE_TRIED),

@@ -17,7 +17,6 @@ model leaves out (make-up, changing volumes); without the sensor the model's own
 START_STD = 3e8
 """Standard deviation of the first guess [Pa]: convergence is driven by it (errata E10)."""
 
-
 TURNING = 0.2
 """Share of a log's motor speed, root mean square, from which the motor turns [fraction]."""
 
@@ -95,9 +94,9 @@ def begins_in_motion(record: Record) -> bool:
     bool
         Whether the first motor speed is more than `TURNING` of the log's, by root mean square.
     """
-    speed = record["motor_speed_rad_s"] if "motor_speed_rad_s" in record else np.zeros(1)
-    seen = speed[np.isfinite(speed)]
-    return bool(len(seen)) and abs(float(seen[0])) > TURNING * float(np.sqrt(np.mean(seen**2)))
+    speed = record["motor_speed_rad_s"]
+    first = abs(_first(record, "motor_speed_rad_s"))
+    return first > 0.0 and first > TURNING * float(np.sqrt(np.nanmean(speed**2)))
 
 
 def _first(record: Record, channel: str) -> float:

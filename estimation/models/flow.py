@@ -214,9 +214,13 @@ def flow_rates(
     tuple of float or Expression
         Rates [Pa/s].
     """
+    return chamber_rates(state, _delivery(drives, p, share), p, by_mass=by_mass, cracks=(p.crack_a, p.crack_b))
+
+
+def _delivery(drives: Any, p: SimpleNamespace, share: Scalar) -> Delivery:
+    """Return what acts on the chambers within a step, of what was measured at its ends."""
     speeds, (x, next_x), step = drives
-    delivery = Delivery(delivered_flow(speeds, p, step, share), (next_x - x) / step, x + share * (next_x - x))
-    return chamber_rates(state, delivery, p, by_mass=by_mass, cracks=(p.crack_a, p.crack_b))
+    return Delivery(delivered_flow(speeds, p, step, share), (next_x - x) / step, x + share * (next_x - x))
 
 
 def fed_rates(
@@ -249,16 +253,13 @@ def fed_rates(
     return *flow_rates((p1, p2), drives, fed, share, by_mass=by_mass), pushed_back
 
 
-def _by_mass(
-    state: tuple[Scalar, Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar
-) -> tuple[Scalar, Scalar, Scalar]:
+def _by_mass(state: Any, drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     return fed_rates(state, drives, p, share, by_mass=True)
 
 
 def _held(state: tuple[Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, Scalar]:
-    speeds, (x, next_x), step = drives
-    delivery = Delivery(delivered_flow(speeds, p, step, share), (next_x - x) / step, 0.0)
-    return chamber_rates(state, delivery, p, by_mass=False, cracks=(p.crack_a, p.crack_b))
+    in_the_middle = _delivery(drives, p, share)._replace(position=0.0)
+    return chamber_rates(state, in_the_middle, p, by_mass=False, cracks=(p.crack_a, p.crack_b))
 
 
 def _at_rest(p: SimpleNamespace) -> tuple[Scalar, Scalar]:
