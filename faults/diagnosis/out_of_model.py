@@ -24,6 +24,13 @@ from plant.notes import Note
 UNEXPLAINED = (0.12, 0.08)
 """Share of velocity and of pressure, root mean square, that the best circuit may leave [dimensionless]."""
 
+EARLIER = 0.1
+"""Time over which velocity is averaged once more where pressure is logged [s]: a piston that hardly moves breaks loose
+some blocks sooner or later than the circuit's, and goes as far."""
+
+UNEXPLAINED_LONGER = 0.06
+"""Share of velocity that means over `EARLIER` may leave [dimensionless]: half of what blocks may."""
+
 YIELDING = 0.015
 """Share of the velocity at which the pump's whole flow would move the piston, root mean square, that may be left in any
 case where pressure is followed [dimensionless]: a piston that hardly moves yields on its seals, which no circuit
@@ -118,12 +125,25 @@ def _unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[No
     yielding = YIELDING * pump * float(np.sqrt(np.mean(blocks.speed**2)))
     least = np.array([0.0] if blocks.pressure is None else [yielding, 0.0])
     heard = fits.best.scales > np.maximum(2.0 * blocks.noise, least)
+    if blocks.pressure is not None:
+        heard[0] &= _left_longer(blocks, fits.best) > UNEXPLAINED_LONGER * sizes[0]
     names = ("velocity", "differential pressure")
     return [
         AgainstCode.UNEXPLAINED.note(percent=100.0 * share, channel=name)
         for name, share, limit, loud in zip(names, shares, UNEXPLAINED, heard, strict=False)
         if share > limit and loud
     ]
+
+
+def _left_longer(blocks: Blocks, fit: PointFit) -> float:
+    """Return what a circuit leaves of the mean velocity over `EARLIER`, root mean square [m/s]."""
+    left = (blocks.velocity - fit.fitted[:, 0])[blocks.first :]
+    together = max(1, round(EARLIER / (blocks.block * blocks.sample_time)))
+    parts = left[: len(left) // together * together].reshape(-1, together)
+    there = np.isfinite(parts)
+    means = np.where(there, parts, 0.0).sum(axis=1) / np.maximum(there.sum(axis=1), 1)
+    known = np.any(there, axis=1)
+    return float(np.sqrt(np.mean(means[known] ** 2))) if np.any(known) else float("inf")
 
 
 def _biases(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
