@@ -35,6 +35,9 @@ from plant.eha.model import EhaParameters
 SCREENING, SETTLING, FINISHING = 7, 40, 12
 """Evaluations of the model for a start, for one that is carried on, and for the last, with short model steps."""
 
+ROUNDS = 6
+"""How often the last ones are made at most, while each gains what would tell a hypothesis from another [count]."""
+
 NEAR = 2.0
 """First radius of a search [dimensionless]: it begins where the plain form ended, or a simpler hypothesis."""
 
@@ -243,12 +246,25 @@ def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
         own = balanced_by(row, share)
         problem, begun = freed(own, tried.together, *more), done[-1][0] if done else tried
         start = problem.model.theta({**usual_values(own), **begun.values})
-        done.append((_descended(own, begun, start, FINISHING, *more), problem))
+        done.append((_to_its_end(own, begun, start, *more), problem))
     done.sort(key=lambda one: one[0].cost)
     best = done[0][0]
     count = [one for one in done if one[0].cost < best.cost + ALIKE]
     first, *rivals = (concluded(problem, one.point, warned=False) for one, problem in count)
     return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
+
+
+def _to_its_end(log: GreyBoxLog, tried: _Tried, start: Array, *more: str) -> _Tried:
+    """Return the end of a search with short model steps: where long ones end may be far from it."""
+    best = _descended(log, tried, start, FINISHING, *more)
+    for _ in range(ROUNDS - 1):
+        further = _descended(log, best, best.point.theta, FINISHING, *more)
+        gained = best.cost - further.cost
+        if gained > 0.0:
+            best = further
+        if gained < CLOSE:
+            break
+    return best
 
 
 def _likeliest(log: GreyBoxLog, tried: Sequence[Iterable[_Tried]], known: float = np.inf) -> list[_Tried]:
