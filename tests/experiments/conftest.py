@@ -8,12 +8,16 @@ from typing import Any
 import pytest
 from matplotlib.figure import Figure
 
+from experiments.diaphragm_motor.study import DIAPHRAGM_MOTOR
+from experiments.motor_paper.study import MOTOR_PAPER
 from experiments.nine_conditions.figures import FIGURES
 from experiments.nine_conditions.settings import StudySettings
 from experiments.nine_conditions.study import NINE_CONDITIONS
+from experiments.page.frames import Tables
 from experiments.page.style import styled
+from experiments.piezo_stack.study import PIEZO_STACK, StackSettings
 from experiments.running.progress import untracked
-from experiments.running.study import Found, write_result
+from experiments.running.study import Found, Seeded, write_result
 
 SMALL = StudySettings(
     seed=7,
@@ -47,6 +51,24 @@ def drawn(study: Found) -> dict[str, Figure]:
         for figure in figures.values():
             figure.draw_without_rendering()
     return figures
+
+
+STACK = StackSettings(seed=7, quick=True, voltage_limit_v=140.0, power_limit_w=1e3)
+
+
+@pytest.fixture(scope="session")
+def stack_tables() -> Tables:
+    return PIEZO_STACK.find(STACK, untracked).frames
+
+
+@pytest.fixture(scope="session")
+def motor_tables() -> Tables:
+    return DIAPHRAGM_MOTOR.find(Seeded(7), untracked).frames
+
+
+@pytest.fixture(scope="session")
+def motor_paper_tables() -> Tables:
+    return MOTOR_PAPER.find(Seeded(2024), untracked).frames
 
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

@@ -14,8 +14,6 @@ from experiments.motor_paper.sensing import (
 )
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 
-pytestmark = pytest.mark.slow
-
 MOTOR = DiaphragmMotorParameters()
 WANTED, WORKING = "A3, A4, A5, as the paper wants", "A4 and drive voltage"
 

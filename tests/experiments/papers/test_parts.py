@@ -7,6 +7,8 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
+from experiments.circuit.study import circuit_studies
+from experiments.nine_conditions.printed_equations import printed_equations
 from experiments.page.frames import Tables
 from experiments.papers import parts
 from experiments.papers.claims import figure_table, row_table
@@ -14,7 +16,8 @@ from experiments.papers.parts import PapersSettings, gather, quick_papers, read_
 from experiments.papers.study import papers_study
 from experiments.papers.verdict import Ours, Row
 from experiments.running.progress import Track, untracked
-from experiments.running.study import run_study
+from experiments.running.study import Found, run_study
+from faults.conditions import CONDITIONS
 
 QUICK = quick_papers(7)
 
@@ -93,12 +96,11 @@ SMALL = PapersSettings(
 )
 
 
-@pytest.mark.slow
-def test_the_page_is_built_and_no_row_is_without_a_verdict(tmp_path: Path) -> None:
-    page = run_study(papers_study(tmp_path / "parts"), SMALL, tmp_path / "papers", Console(quiet=True))
+def page_of_the_papers(folder: Path) -> None:
+    page = run_study(papers_study(folder / "parts"), SMALL, folder / "papers", Console(quiet=True))
     assert page.name == "report.html"
     words = page.read_text(encoding="utf-8")
-    tables = read_tables(tmp_path / "papers")
+    tables = read_tables(folder / "papers")
     rows, figures = tables["rows"], tables["figures"]
     assert len(rows) > 500
     assert set(rows["verdict"]) == {"reproduced", "predicted", "calibrated to", "not reproduced", "erratum"}
@@ -116,3 +118,34 @@ def test_the_page_is_built_and_no_row_is_without_a_verdict(tmp_path: Path) -> No
     )
     assert verdicts["Figure 12", "r square"] == "reproduced"
     assert verdicts["section 4", "dead zone under major leakage"] == "predicted"
+
+
+@pytest.mark.slow
+def test_the_page_is_built_and_no_row_is_without_a_verdict(tmp_path: Path) -> None:
+    page_of_the_papers(tmp_path)
+
+
+def test_every_row_has_a_verdict_and_none_is_without_its_number(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    study: Found,
+    stack_tables: Tables,
+    motor_tables: Tables,
+    motor_paper_tables: Tables,
+) -> None:
+    chambers = {"value_pa": 2.071e8, "std_pa": 1e5, "error_percent": 0.05, "z": 1.0, "gate_passed": True}
+    circuit = {**circuit_studies(parts.CIRCUIT_RIG, SMALL.seed, SMALL.study)}
+    circuit["figure 11 modelled chambers"] = lambda: pd.DataFrame(
+        [{"condition": condition, **chambers} for condition in CONDITIONS]
+    )
+    printed = printed_equations(parts.NINE_RIG, SMALL.study)
+    made: Mapping[str, Callable[[], Tables]] = {
+        "study": lambda: {**study.frames, "printed equations": printed},
+        "circuit": lambda: {name: make() for name, make in circuit.items()},
+        "piezo-stack": lambda: stack_tables,
+        "diaphragm-motor": lambda: motor_tables,
+        "motor-paper": lambda: motor_paper_tables,
+    }
+    found = {name: lambda _, __, make=make: make() for name, make in made.items()}
+    monkeypatch.setattr(parts, "PARTS", {**parts.PARTS, **found})
+    page_of_the_papers(tmp_path)
