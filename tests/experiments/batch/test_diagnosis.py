@@ -21,7 +21,6 @@ from plant.sensors.sensors import BENCH
 RIG = Rig()
 
 
-@pytest.mark.slow
 def test_a_batch_finds_what_diagnose_finds() -> None:
     log = next(iter(draw_logs([TEST], drives=("prbs",), duration=3.0)))
     row, found = diagnosed(log.record, RIG), diagnose_log(log.record, RIG)
@@ -41,7 +40,6 @@ def test_a_log_in_none_of_the_nine_conditions_is_a_mismatch_with_a_reason() -> N
     assert row["reason"].endswith("; ".join(map(str, diagnose_log(spoilt, RIG).against)))
 
 
-@pytest.mark.slow
 def test_a_log_at_rest_is_in_no_class() -> None:
     rng = np.random.default_rng(0)
     still = {"motor_speed_rad_s": np.zeros(2000), "position_m": 1e-7 * rng.standard_normal(2000)}

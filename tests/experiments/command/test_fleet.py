@@ -29,7 +29,6 @@ def test_a_limit_that_cannot_be_used_is_refused(tmp_path: Path, option: str, wor
     assert words in " ".join(said.split())
 
 
-@pytest.mark.slow
 def test_a_folder_of_logs_becomes_a_page_with_the_sick_one_first(tmp_path: Path) -> None:
     logs = tmp_path / "logs"
     for name, condition in (("A_1", "normal"), ("A_2", "normal"), ("B_1", "normal"), ("B_2", "minor_leakage")):

@@ -43,7 +43,6 @@ def test_a_fault_is_diagnosed_with_its_severity(tmp_path: Path) -> None:
     assert said("estimate", log)["outcome"] == "mismatch"
 
 
-@pytest.mark.slow
 def test_a_fault_that_is_simulated_is_the_one_diagnosed(tmp_path: Path) -> None:
     log = tmp_path / "run.csv"
     words = ["simulate", "--plant", "diaphragm-motor", "--load", "10", "--out", str(log), "--fault"]
@@ -55,7 +54,6 @@ def test_a_fault_that_is_simulated_is_the_one_diagnosed(tmp_path: Path) -> None:
         assert "must be" in done.stderr
 
 
-@pytest.mark.slow
 def test_friction_and_load_are_named_together_on_screen(tmp_path: Path) -> None:
     log = logged(tmp_path, motor_with_fault(MOTOR, "friction", 8.0))
     done = RUN.invoke(app, ["diagnose", "--plant", "diaphragm-motor", "--load", "10", str(log)])
@@ -73,7 +71,6 @@ def test_leakage_and_load_are_estimated_and_bulk_modulus_is_not(tmp_path: Path) 
     assert "the piston leaks" in entries["findings"][0]
 
 
-@pytest.mark.slow
 def test_another_motor_is_a_mismatch_until_a_healthy_run_is_given(tmp_path: Path) -> None:
     other = replace(MOTOR, sensor_gain=(0.9,) * 7)
     log = logged(tmp_path, motor_with_fault(other, "electrode_2_gain", 0.2))

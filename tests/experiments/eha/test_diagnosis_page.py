@@ -28,7 +28,6 @@ def page() -> str:
     return diagnosis_page({**result, "not_told": ["one thing is not told", "another neither"]}, found, log)
 
 
-@pytest.mark.slow
 def test_the_page_says_what_how_bad_and_what_to_do(page: str) -> None:
     assert "<h1>The actuator leaks inside more than it should (minor leakage); friction is normal.</h1>" in page
     assert page.index("What to do") < page.index("How bad it is") < page.index("Measured and fitted")
@@ -38,7 +37,6 @@ def test_the_page_says_what_how_bad_and_what_to_do(page: str) -> None:
     assert page.count('class="limit"') == 6
 
 
-@pytest.mark.slow
 def test_every_paragraph_begins_with_a_capital_and_ends_with_a_full_stop(page: str) -> None:
     paragraphs = [re.sub("<[^>]*>", "", one).strip() for one in re.findall("<p>(.*?)</p>", page, re.DOTALL)]
     assert "One thing is not told." in paragraphs

@@ -80,7 +80,6 @@ def test_a_log_is_diagnosed_and_estimated(tmp_path: Path) -> None:
     assert leakage["ci95"][0] < leakage["value"] < leakage["ci95"][1]
 
 
-@pytest.mark.slow
 def test_a_log_of_another_load_is_a_mismatch_without_numbers(tmp_path: Path) -> None:
     log = _logged(tmp_path, "normal")
     (said,) = json.loads(RUN.invoke(app, ["estimate", "--plant", "piezo-stack", "--json", str(log)]).stdout)

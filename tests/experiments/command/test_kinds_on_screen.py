@@ -1,0 +1,77 @@
+"""What a terminal shows of the other actuators' logs."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from experiments.cli import app
+
+
+def invoke(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(one) for one in arguments])
+
+
+@pytest.fixture(scope="module")
+def stack_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("stack") / "run.csv"
+    made = invoke(
+        "simulate", "--plant", "piezo-stack", "--load", 10, "--duration", 0.03, "--fault", "major_leakage", "--out", out
+    )
+    assert made.exit_code == 0, made.output
+    return out
+
+
+def test_the_stack_s_condition_and_verdict_stand_in_a_table_with_the_message_below(stack_log: Path) -> None:
+    done = invoke("diagnose", "--plant", "piezo-stack", "--load", 10, stack_log)
+    assert done.exit_code == 0, done.output
+    assert "major_leakage" in done.stdout
+    assert "verdict" in done.stdout
+    assert f"{stack_log}:" in " ".join(done.stdout.split())
+
+
+def test_a_healthy_run_of_the_stack_calibrates_it(stack_log: Path, tmp_path: Path) -> None:
+    healthy = tmp_path / "healthy.csv"
+    words = ("--plant", "piezo-stack", "--load", 10)
+    assert invoke("simulate", *words, "--duration", 0.03, "--out", healthy).exit_code == 0
+    done = invoke("diagnose", *words, "--healthy", healthy, stack_log)
+    assert done.exit_code == 0, done.output
+    assert "major_leakage" in done.stdout
+
+
+def test_a_sensor_that_the_stack_does_not_have_is_refused(stack_log: Path) -> None:
+    done = invoke("estimate", "--plant", "piezo-stack", "--sensors", "position,thermometer", stack_log)
+    assert done.exit_code == 2
+    assert "--sensors must be of stack, force, position, pressure, got 'thermometer'" in " ".join(done.stderr.split())
+
+
+def test_what_the_stack_s_sensors_could_tell_is_said_before_a_run() -> None:
+    done = invoke("identifiability", "--plant", "piezo-stack", "--sensors", "position", "--seconds", 0.05)
+    assert done.exit_code == 0, done.output
+    assert "leakage" in done.stdout
+
+
+def test_a_motor_s_log_that_no_fault_explains_is_unknown_on_screen(tmp_path: Path) -> None:
+    logs = {}
+    for name, words in {"leaky": ("--load", 10, "--fault", "valve_4_leak=0.1"), "rust": ("--load", 10)}.items():
+        logs[name] = tmp_path / f"{name}.csv"
+        assert invoke("simulate", "--plant", "diaphragm-motor", *words, "--out", logs[name]).exit_code == 0
+    rows = logs["rust"].read_text(encoding="utf-8").splitlines()
+    wrong = [row.rsplit(",", 1) for row in rows[1:]]  # an encoder that counts twice
+    doubled = [f"{before},{2.0 * float(position)!r}" for before, position in wrong]
+    logs["rust"].write_text("\n".join([rows[0], *doubled]) + "\n", encoding="utf-8")
+    done = invoke("diagnose", "--plant", "diaphragm-motor", "--load", 10, *logs.values())
+    said = " ".join(done.stdout.split())
+    assert "probability [%]" in said
+    assert "leaky" in said
+    assert "valve 4 leak" in said
+    assert "UNKNOWN" in said
+
+
+@pytest.mark.parametrize("wrong", ["chamber_5_gas", "rust=1", "chamber_5_gas=7"])
+def test_a_fault_of_the_motor_needs_a_name_and_a_severity_that_it_can_have(wrong: str, tmp_path: Path) -> None:
+    out = tmp_path / "run.csv"
+    done = invoke("simulate", "--plant", "diaphragm-motor", "--fault", wrong, "--out", out)
+    assert done.exit_code == 2
+    assert "must be" in done.stderr
+    assert not out.exists()

@@ -1,0 +1,191 @@
+"""Connections end when a client says nothing, reads nothing, or says what is no HTTP; and only so many are held."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+from uvicorn.config import Config
+from uvicorn.server import ServerState
+
+from experiments.serve import connection
+from experiments.serve.connection import FULL, LATE, PatientProtocol
+
+SOON = 0.02
+"""Patience of these tests [s]."""
+
+Heard = list[str]
+App = Callable[[Any, Any, Any], Awaitable[None]]
+
+ASKED = b"GET / HTTP/1.1\r\nHost: bench\r\n\r\n"
+POSTED = b"POST / HTTP/1.1\r\nHost: bench\r\nTransfer-Encoding: chunked\r\n\r\n"
+
+
+class Wire(asyncio.Transport):
+    """A transport that keeps what is written to it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.written, self.closed, self.aborted = b"", False, False
+
+    def write(self, data: Any) -> None:
+        self.written += bytes(data)
+
+    def close(self) -> None:
+        self.closed = True
+
+    def abort(self) -> None:
+        self.aborted = self.closed = True
+
+    def is_closing(self) -> bool:
+        return self.closed
+
+    def pause_reading(self) -> None: ...
+
+    def resume_reading(self) -> None: ...
+
+
+async def answers(_: Any, receive: Any, send: Any) -> None:
+    """Answer slower than headers may take to come."""
+    await asyncio.sleep(2.0 * SOON)
+    await send({"type": "http.response.start", "status": 204, "headers": []})
+    await send({"type": "http.response.body", "body": b""})
+    del receive
+
+
+@pytest.fixture(autouse=True)
+def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection, "HEADERS_IN", SOON)
+    monkeypatch.setattr(connection, "READ_IN", SOON)
+
+
+def connected(app: App = answers) -> tuple[PatientProtocol, Wire]:
+    """Return a connection and its wire, on the loop that runs."""
+    config = Config(app, lifespan="off", log_config=None)
+    config.load()
+    protocol = PatientProtocol(config, ServerState(), {}, asyncio.get_running_loop())
+    wire = Wire()
+    protocol.connection_made(wire)
+    return protocol, wire
+
+
+def test_a_client_that_sends_no_headers_is_told_that_it_is_late() -> None:
+    async def said() -> Wire:
+        protocol, wire = connected()
+        protocol.data_received(ASKED[:20])
+        await asyncio.sleep(3.0 * SOON)
+        protocol.data_received(ASKED[20:])  # too late: nothing listens
+        await asyncio.sleep(3.0 * SOON)
+        protocol.connection_lost(None)
+        return wire
+
+    wire = asyncio.run(said())
+    assert wire.closed
+    assert wire.written == LATE
+
+
+def test_an_answer_may_take_longer_than_headers() -> None:
+    async def said() -> bytes:
+        protocol, wire = connected()
+        protocol.data_received(ASKED)
+        await asyncio.sleep(2.5 * SOON)
+        protocol.connection_lost(None)
+        return wire.written
+
+    assert asyncio.run(said()).startswith(b"HTTP/1.1 204")
+
+
+def test_a_connection_that_is_lost_is_not_told_that_it_is_late() -> None:
+    async def said() -> Wire:
+        protocol, wire = connected()
+        protocol.connection_lost(None)
+        await asyncio.sleep(2.0 * SOON)
+        return wire
+
+    assert asyncio.run(said()).written == b""
+
+
+def test_a_connection_that_is_closing_is_not_told_either() -> None:
+    async def said() -> Wire:
+        _, wire = connected()
+        wire.close()
+        await asyncio.sleep(2.0 * SOON)
+        return wire
+
+    assert asyncio.run(said()).written == b""
+
+
+def test_one_connection_too_many_is_refused_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection, "most_connections", lambda: 0)
+
+    async def said() -> Wire:
+        return connected()[1]
+
+    wire = asyncio.run(said())
+    assert wire.closed
+    assert wire.written == FULL
+
+
+@pytest.mark.parametrize("reads", [False, True])
+def test_only_a_client_that_does_not_read_is_cut_off(reads: bool) -> None:
+    async def said() -> Wire:
+        protocol, wire = connected()
+        protocol.data_received(ASKED)
+        protocol.pause_writing()
+        if reads:
+            protocol.resume_writing()
+        await asyncio.sleep(1.5 * SOON)
+        protocol.connection_lost(None)
+        return wire
+
+    assert asyncio.run(said()).aborted is not reads
+
+
+def test_what_is_no_http_is_refused_and_who_works_on_an_answer_is_told() -> None:
+    heard: Heard = []
+
+    async def listens(_: Any, receive: Any, send: Any) -> None:
+        del send
+        while (message := await receive())["type"] != "http.disconnect":
+            heard.append("body")
+        heard.append(message["type"])
+
+    async def said() -> Wire:
+        protocol, wire = connected(listens)
+        protocol.data_received(POSTED)
+        await asyncio.sleep(0)
+        protocol.data_received(b"no length\r\n")
+        await asyncio.sleep(0.5 * SOON)
+        protocol.connection_lost(None)
+        return wire
+
+    wire = asyncio.run(said())
+    assert heard[-1] == "http.disconnect"
+    assert wire.written.startswith(b"HTTP/1.1 400") or wire.aborted
+
+
+def test_a_broken_body_after_the_answer_began_ends_the_connection() -> None:
+    async def begins(_: Any, receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": b"half", "more_body": True})
+        while (await receive())["type"] != "http.disconnect":
+            pass
+
+    async def said() -> Wire:
+        protocol, wire = connected(begins)
+        protocol.data_received(POSTED)
+        await asyncio.sleep(0.5 * SOON)
+        protocol.data_received(b"no length\r\n")
+        await asyncio.sleep(0.5 * SOON)
+        protocol.connection_lost(None)
+        return wire
+
+    wire = asyncio.run(said())
+    assert wire.aborted
+    assert b"400" not in wire.written
+
+
+@pytest.mark.parametrize(("files", "most"), [(-1, 512), (1024, 480), (100_000, 512), (32, 8)])
+def test_connections_leave_files_for_everything_else(files: int, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection.resource, "getrlimit", lambda _: (files, files))
+    assert connection.most_connections() == most

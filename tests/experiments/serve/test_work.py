@@ -1,0 +1,110 @@
+"""What a process of the server makes of one log: a result and a page, or a reason."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from experiments.cli import app
+from experiments.serve import gauges, work
+from experiments.serve.work import Task, work_on
+
+
+@pytest.fixture(scope="module")
+def stack_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("stack") / "kept-under-a-number.csv"
+    words = ["simulate", "--plant", "piezo-stack", "--duration", "0.03", "--fault", "major_leakage", "--out", str(out)]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    return out
+
+
+def task(log: Path, folder: Path, **changes: Any) -> Task:
+    given = {"name": "mine.csv", "verb": "diagnose", "plant": "piezo-stack", "rig": None, "columns": ()}
+    return Task(**{"log": log, "page": folder / "page.html", "phase": folder / "phase", **given, **changes})
+
+
+def test_another_actuator_s_log_gets_its_condition_its_page_and_a_row(stack_log: Path, tmp_path: Path) -> None:
+    found = work_on(task(stack_log, tmp_path))
+    assert (found.result["outcome"], found.result["condition"]) == ("ok", "major_leakage")
+    assert found.entries is not None
+    assert found.entries["found_condition"] == "major_leakage"
+    assert "mine.csv" in (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert (tmp_path / "phase").read_text(encoding="utf-8") == work.WRITING
+
+
+def test_an_estimate_has_no_row_and_no_place_on_the_server_is_told(stack_log: Path, tmp_path: Path) -> None:
+    found = work_on(task(stack_log, tmp_path, verb="estimate"))
+    assert found.entries is None
+    assert "crossport_leakage" in found.result["quantities"]
+    assert stack_log.name not in json.dumps(found.result)
+    assert str(stack_log.parent) not in json.dumps(found.result)
+
+
+@pytest.mark.parametrize("verb", ["diagnose", "estimate", "inspect"])
+def test_what_is_no_log_fails_with_a_reason_that_has_the_client_s_name(verb: str, tmp_path: Path) -> None:
+    log = tmp_path / "kept-under-a-number.csv"
+    log.write_bytes(b"\x00\x01\x02")
+    found = work_on(task(log, tmp_path, verb=verb))
+    assert found.result["outcome"] == "failed"
+    assert found.result["message"]
+    assert "kept-under-a-number" not in json.dumps(found.result)
+    assert found.entries == ({"outcome": "failed", "reason": found.entries["reason"]} if found.entries else None)
+    assert (found.entries is None) is (verb != "diagnose")
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_an_error_of_ours_is_told_to_the_client_and_ends_nothing(
+    stack_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(_: Task) -> None:
+        raise ZeroDivisionError("by nothing")
+
+    monkeypatch.setattr(work, "_found", broken)
+    found = work_on(task(stack_log, tmp_path))
+    assert found.result["outcome"] == "failed"
+    assert "internal error" in found.result["message"]
+
+
+def test_a_log_that_wants_too_much_memory_ends_the_process_with_its_own_code(
+    stack_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Ended(BaseException):
+        pass
+
+    def end(code: int) -> None:
+        raise Ended(code)
+
+    def greedy(_: Task) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(work, "_found", greedy)
+    monkeypatch.setattr(work, "os", SimpleNamespace(_exit=end))
+    with pytest.raises(Ended) as ended:
+        work_on(task(stack_log, tmp_path))
+    assert ended.value.args == (work.NO_MEMORY,)
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [(None, ""), (gauges.HydrostateError("no such stream"), "no such stream"), (KeyError("x"), "internal error")],
+)
+def test_a_stream_s_process_says_how_it_ended(
+    error: Exception | None, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def watched(*_: Any) -> None:
+        if error is not None:
+            raise error
+
+    sent: list[Any] = []
+    out: Any = SimpleNamespace(send=sent.append, close=lambda: sent.append("closed"))
+    monkeypatch.setattr(gauges, "watch_network", watched)
+    monkeypatch.setattr(gauges, "threading", SimpleNamespace(Thread=lambda **_: SimpleNamespace(start=lambda: None)))
+    monkeypatch.setattr(gauges.signal, "signal", lambda *_: None)
+    gauges.watch_stream(out, 1, "tcp://nowhere:1", None, (), 0.1, tmp_path / "state.npz")
+    *_, (kind, last), closed = sent
+    assert (kind, last["event"], closed) == ("event", "end", "closed")
+    assert last["outcome"] == ("ok" if error is None else "failed")
+    assert words in json.dumps(last)

@@ -1,0 +1,85 @@
+"""How the command ends: with its code, after what still runs, and with every word out."""
+
+import atexit
+import gc
+import os
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from experiments import cli
+
+
+class Ended(BaseException):
+    """Stands in for the end of the process."""
+
+
+@pytest.fixture
+def order(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    """Return what happens at the end of the command, in order."""
+    happened: list[str] = []
+
+    def end(code: int) -> None:
+        happened.append(f"end {code}")
+        raise Ended
+
+    thresholds = gc.get_threshold()
+    monkeypatch.setattr(os, "_exit", end)
+    monkeypatch.setattr(atexit, "_run_exitfuncs", lambda: happened.append("exit functions"))
+    monkeypatch.setattr(cli, "trust_sources", lambda: happened.append("sources trusted"))
+    monkeypatch.setattr(cli, "LEFT_TO_END", 5.0)
+    for name in ("OPENBLAS", "OMP", "MKL"):
+        monkeypatch.setenv(f"{name}_NUM_THREADS", "3")
+    yield happened
+    gc.set_threshold(*thresholds)
+
+
+def test_a_thread_is_waited_for_and_what_asked_to_be_called_at_the_exit_is(
+    order: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go_on = threading.Event()
+
+    def works() -> None:
+        go_on.wait(5.0)
+        order.append("thread done")
+
+    def command() -> None:
+        threading.Thread(target=works).start()
+        threading.Timer(0.05, go_on.set).start()
+        raise SystemExit(1)
+
+    monkeypatch.setattr(cli, "app", command)
+    with pytest.raises(Ended):
+        cli.main()
+    assert order == ["sources trusted", "thread done", "exit functions", "end 1"]
+
+
+def test_an_end_without_a_code_is_left_to_python(order: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def command() -> None:
+        raise SystemExit("words")
+
+    monkeypatch.setattr(cli, "app", command)
+    with pytest.raises(SystemExit, match="words"):
+        cli.main()
+    assert order == ["sources trusted"]
+
+
+def test_the_users_own_count_of_threads_stands_and_one_is_the_default(
+    order: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    monkeypatch.setattr(cli, "app", lambda: None)
+    cli.main()
+    assert (os.environ["OMP_NUM_THREADS"], os.environ["MKL_NUM_THREADS"]) == ("1", "3")
+    assert order == ["sources trusted"]
+
+
+def test_the_version_is_that_of_the_installed_package() -> None:
+    from importlib.metadata import version
+
+    from typer.testing import CliRunner
+
+    done = CliRunner().invoke(cli.app, ["--version"])
+    assert done.exit_code == 0
+    assert done.stdout.strip() == f"hydrostate {version('hydrostate')}"
