@@ -1,0 +1,91 @@
+"""Where a study's tasks run: what a task raises is kept, and a cluster that is not there is said."""
+
+import sys
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from experiments.running.executors import SerialExecutor, open_executor
+from plant.errors import HydrostateError
+
+
+def test_what_a_task_raises_is_raised_where_its_result_is_asked_for() -> None:
+    future = SerialExecutor().submit(int, "no number")
+    assert isinstance(future.exception(), ValueError)
+    with pytest.raises(ValueError, match="no number"):
+        future.result()
+
+
+def test_a_cluster_needs_dask(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with (
+        pytest.raises(HydrostateError, match=r"pip install 'hydrostate\[cluster\]'"),
+        open_executor(cluster="tcp://a:1"),
+    ):
+        pass
+
+
+@pytest.mark.parametrize("error", [OSError("timed out"), ValueError("no port")])
+def test_a_scheduler_that_does_not_answer_is_said_with_its_address(
+    error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def client(*_: Any, **__: Any) -> None:
+        raise error
+
+    monkeypatch.setitem(sys.modules, "distributed", SimpleNamespace(Client=client))
+    with pytest.raises(HydrostateError, match=f"tcp://a:1: no Dask scheduler answers there: {error}"):
+        open_executor(cluster="tcp://a:1").__enter__()
+
+
+def test_a_cluster_runs_as_many_tasks_as_it_has_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    closed: list[bool] = []
+
+    class Client:
+        def __init__(self, address: str, timeout: str) -> None:
+            assert (address, timeout) == ("tcp://a:1", "20s")
+
+        def __enter__(self) -> "Client":
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            closed.append(True)
+
+        def ncores(self) -> dict[str, int]:
+            return {"one": 2, "two": 3}
+
+        def get_executor(self, *, pure: bool) -> SerialExecutor:
+            assert not pure
+            return SerialExecutor()
+
+    monkeypatch.setitem(sys.modules, "distributed", SimpleNamespace(Client=Client))
+    with open_executor(cluster="tcp://a:1") as (executor, width):
+        assert (executor.submit(abs, -2).result(), width) == (2, 5)
+        assert not closed
+    assert closed
+
+
+@pytest.mark.parametrize("stopped", [False, True])
+def test_processes_in_flight_are_ended_only_when_the_user_will_not_wait(
+    stopped: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from experiments.running import executors
+
+    happened: list[str] = []
+    pool = SimpleNamespace(shutdown=lambda **how: happened.append(f"shut {how}"))
+    child = SimpleNamespace(terminate=lambda: happened.append("terminated"))
+    monkeypatch.setattr(executors, "process_pool", lambda workers: pool if workers == 3 else None)
+    monkeypatch.setattr(executors.multiprocessing, "active_children", lambda: [child])
+
+    def use() -> None:
+        with open_executor(3) as (executor, width):
+            assert (executor, width) == (pool, 3)
+            if stopped:
+                raise KeyboardInterrupt
+
+    if stopped:
+        with pytest.raises(KeyboardInterrupt):
+            use()
+    else:
+        use()
+    assert happened == ["terminated"] * stopped + ["shut {'wait': True, 'cancel_futures': True}"]
