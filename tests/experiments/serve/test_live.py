@@ -14,6 +14,7 @@ import pytest
 
 from benchmarks.server_trials import feeding
 from experiments.serve import gauges as module
+from experiments.serve import live
 from experiments.serve.events import told
 from experiments.serve.gauges import Gauges
 from experiments.serve.live import KEPT, Stream, Streams
@@ -99,6 +100,48 @@ def test_a_view_is_told_the_history_and_then_what_is_new(stream: Stream, monkeyp
     assert [one["time_s"] for one in found[0][1]["history"]] == [1.0]
     assert found[2][1]["time_s"] == 2.0
     assert streams.looking == 0
+
+
+def test_a_stream_that_ended_is_watched_anew_and_a_process_that_hangs_is_killed(
+    stream: Stream, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    happened: list[str] = []
+
+    class Hangs:
+        """A process that says one thing and does not end."""
+
+        def __init__(self, target: Any, args: tuple[Any, ...], daemon: bool) -> None:
+            assert daemon
+            assert args[2] == stream.address
+            self._out, self.alive = args[0], True
+            del target
+
+        def start(self) -> None:
+            happened.append("started")
+            self._out.send(("gauges", {"time_s": 1.0}))
+
+        def join(self, _: float) -> None: ...
+
+        def is_alive(self) -> bool:
+            return self.alive
+
+        def terminate(self) -> None:
+            self.kill()
+
+        def kill(self) -> None:
+            happened.append("killed")
+            self.alive = False
+            if happened.count("killed") == 2:
+                stream._closed.set()
+
+    context = SimpleNamespace(Pipe=multiprocessing.Pipe, Process=Hangs)
+    monkeypatch.setattr(live, "multiprocessing", SimpleNamespace(get_context=lambda _: context))
+    monkeypatch.setattr(live, "AGAIN_AFTER", 0.05)
+    stream.start()
+    assert stream._closed.wait(10.0)
+    stream.close()
+    assert happened == ["started", "killed"] * 2
+    assert [one["number"] for one in stream.since(0)] == [1, 2]
 
 
 @pytest.mark.slow

@@ -1,0 +1,59 @@
+"""What a batch says on standard error while it runs."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from experiments.batch.study_file import parse_study
+from experiments.command import batch
+from plant.errors import HydrostateError
+
+
+@pytest.fixture
+def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    notes: list[str] = []
+    monkeypatch.setattr(batch, "note", notes.append)
+    return notes
+
+
+def test_kept_rows_of_other_software_are_said_with_what_made_them(said: list[str]) -> None:
+    old = {"versions": {"numpy": "1.0", "scipy": "2.0"}, "commit": "0123456789abcdef"}
+    batch._say_differences(old, {"versions": {"numpy": "1.1", "scipy": "2.0"}, "commit": "fedcba"})
+    (one,) = said
+    assert "numpy 1.0, commit 0123456789;" in one
+    assert "scipy" not in one
+
+
+@pytest.mark.parametrize("old", [None, {"versions": {"numpy": "1.0"}, "commit": "a"}])
+def test_nothing_is_said_of_the_same_software_or_of_a_new_store(old: Any, said: list[str]) -> None:
+    batch._say_differences(old, {"versions": {"numpy": "1.0"}, "commit": "a"})
+    assert said == []
+
+
+def test_only_the_first_failures_are_named(said: list[str]) -> None:
+    failures = [(f"case {k}", "no log") for k in range(batch.MOST_NAMED + 3)]
+    with batch._shown(len(failures), 0) as advance:
+        advance(len(failures), SimpleNamespace(failures=failures))  # type: ignore[arg-type]
+    named = [one for one in said if one.startswith("case ")]
+    assert named == [f"case {k}: no log" for k in range(batch.MOST_NAMED)]
+    assert said.count("more cases failed; the report names all") == 1
+
+
+def test_pace_counts_only_what_this_run_did(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = iter([100.0, 110.0, 110.0, 110.0, 110.0, 110.0])
+    monkeypatch.setattr(batch.time, "monotonic", lambda: next(now))
+    pace = batch.Pace(total=60, before=20)
+    pace.done += 20
+    assert pace.rate == pytest.approx(2.0)
+    assert str(pace).startswith("40 of 60 cases, 2 a second")
+
+
+def test_logs_of_the_command_line_replace_those_of_a_study_that_has_some() -> None:
+    methods = [{"verb": "diagnose"}]
+    study = parse_study({"name": "a", "logs": [{"glob": "old/*.csv", "methods": methods}]}, "a.toml")
+    assert [one.glob for one in batch._with_logs(study, "new/*.csv").logs] == ["new/*.csv"]
+    assert batch._with_logs(study, None) is study
+    without = parse_study({"name": "b", "runs": [{"methods": methods}]}, "b.toml")
+    with pytest.raises(HydrostateError, match="--logs replaces the logs of a study, and b has none"):
+        batch._with_logs(without, "*.csv")
