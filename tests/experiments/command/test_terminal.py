@@ -1,0 +1,58 @@
+"""What a terminal is told when a command ends in another way than it was meant to."""
+
+import logging
+
+import pytest
+
+from experiments.command import terminal
+from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, guarded
+from plant.errors import HydrostateError
+
+
+def raising(error: BaseException) -> int:
+    def run() -> None:
+        raise error
+
+    return guarded(run)
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "words"),
+    [
+        (KeyboardInterrupt(), INTERRUPTED, "hydrostate: interrupted"),
+        (HydrostateError("a rig is needed"), USAGE, "hydrostate: a rig is needed"),
+        (ZeroDivisionError("by nothing"), SOME_FAILED, "an internal error (ZeroDivisionError: by nothing)"),
+        (MemoryError(), SOME_FAILED, "the work on it needs more memory than there is"),
+    ],
+)
+def test_whatever_goes_wrong_is_one_sentence_and_a_code(
+    error: BaseException, code: int, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert raising(error) == code
+    said = capsys.readouterr()
+    assert words in said.err
+    assert said.out == ""
+    assert "Traceback" not in said.err
+
+
+def test_the_traceback_is_printed_where_it_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("HYDROSTATE_DEBUG", "1")
+    assert raising(ZeroDivisionError("by nothing")) == SOME_FAILED
+    assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("values", [[], [1.0], [2.0, 2.0, 2.0]])
+def test_what_does_not_vary_has_no_curve(values: list[float]) -> None:
+    assert terminal.sparkline(values, 8) == ""
+
+
+def test_compiling_is_said_once_and_every_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(terminal, "note", said.append)
+    notice = terminal._KernelNotice()
+    for level in (logging.INFO, logging.INFO, logging.WARNING):
+        notice.emit(logging.LogRecord("kernels", level, "", 0, "no compiler", None, None))
+    assert len(said) == 2
+    assert said[1] == "warning: no compiler"
