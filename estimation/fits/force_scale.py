@@ -1,6 +1,6 @@
 """Whether a log without pressure holds the scale of forces, by leaving its optimum and looking for it anew."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,7 +73,7 @@ class Way:
 
 
 def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[float]]:
-    """Look for optima with stiffness or forces on another scale.
+    """Look for optima with forces or stiffness on another scale, until some disagree.
 
     Parameters
     ----------
@@ -91,7 +91,10 @@ def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[
     """
     found, moduli = [best], list[float]()
     for _ in range(RESCALED):
-        found += _ended(problem, best, way)
+        for moved in _moved(problem.model.values(best.theta)):
+            found += _ended(problem, best, moved, way)
+            if disagree([_bulk_modulus(problem, one) for one in found if one.cost < way.explained or one is best]):
+                break
         lowest = min(found, key=lambda point: point.cost)
         moved = abs(np.log(_bulk_modulus(problem, lowest) / _bulk_modulus(problem, best)))
         over, best = lowest.cost > best.cost - BETTER, lowest
@@ -121,13 +124,20 @@ def _bulk_modulus(problem: FreedProblem, point: Point) -> float:
     return problem.model.values(point.theta)["bulk_modulus"]
 
 
-def _ended(problem: FreedProblem, best: Point, way: Way) -> list[Point]:
-    """Return the optima downhill from another's, stiffness or all forces on another scale; searched side by side."""
-    values = problem.model.values(best.theta)
-    moved = [{"bulk_modulus": values["bulk_modulus"] * factor} for factor in STIFFENED]
+def _moved(values: Mapping[str, float]) -> Iterator[list[dict[str, float]]]:
+    """Yield where an optimum is left for: all forces on another scale, then another stiffness alone."""
+    scaled: list[dict[str, float]] = []
     for factor in SCALES:
         growing = {name: values[name] * factor for name in GROWING}
-        moved.append(growing | {name: values[name] / factor for name in FALLING})
+        scaled.append(growing | {name: values[name] / factor for name in FALLING})
+    yield scaled
+    yield [{"bulk_modulus": values["bulk_modulus"] * factor} for factor in STIFFENED]
+
+
+def _ended(problem: FreedProblem, best: Point, moved: Sequence[Mapping[str, float]], way: Way) -> list[Point]:
+    """Return the optima downhill from another's, some of its values moved; searched side by side."""
+    values = problem.model.values(best.theta)
     starts = [np.clip(problem.model.theta({**values, **some}), *way.bounds) for some in moved]
     near = descend_together(way.near.at_each, starts, way.nearing, way.bounds, way.near_enough)
-    return descend_together(problem.at_each, [one.theta for one in near], way.finishing, way.bounds)
+    starts = [one.theta for one in near]
+    return descend_together(problem.at_each, starts, way.finishing, way.bounds, wanted=way.explained)

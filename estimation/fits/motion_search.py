@@ -4,8 +4,8 @@ A start is brought near under larger noise, then searched on the first seconds; 
 the log. Both structures of friction are searched in turn, so that neither is searched in vain where the other explains.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from estimation.fits.descent import Point, descend, descend_together
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import search_bounds
+from estimation.fits.side_by_side import LANES
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.motion import LINEAR, UNKNOWNS
 from plant.arrays import Array
@@ -47,8 +48,12 @@ ENOUGH = 0.1
 FINALISTS = 3
 """Starts that are carried on each way, the likeliest of each way first, until one explains the log."""
 
-ROUGHLY = 2
-"""By how many times model steps are longer while a start is only brought near."""
+ROUGHLY, COARSELY = 2, 4
+"""By how many times model steps are longer while a start is only brought near, and while starts are compared."""
+
+MOST_WORK = 12_000_000
+"""Steps of eight runs side by side from which on no other start is tried; one that was begun is ended. A count, no
+clock, so that every machine finds the same."""
 
 EXPLAINED = 1.1
 """Mean squared normalised residual up to which a form explains the log [dimensionless]."""
@@ -56,8 +61,49 @@ EXPLAINED = 1.1
 HOPELESS = 3.0
 """The same from which no other than the likeliest start of each way is tried [dimensionless]."""
 
+SLIGHT = 1e-3
+"""Cost that a further step must promise where nothing explains the log, over what would explain it [fraction]."""
+
 SAME_COST, SAME_MODULUS = 0.02, 0.01
 """Relative difference of misfits, and of bulk moduli, up to which two starts came to the same pit [fraction]."""
+
+
+@dataclass(eq=False)
+class Begun:
+    """What all searches of a log share.
+
+    Parameters
+    ----------
+    screened : dict
+        Starts as they were screened, likeliest first, by way. Under larger noise the structures of friction hardly
+        differ: one screening serves both.
+    work : int
+        Steps of eight runs side by side that were taken [steps].
+    """
+
+    screened: dict[int, list[Point]] = field(default_factory=dict[int, list[Point]])
+    work: int = 0
+
+    def at(self, problem: FreedProblem) -> Callable[[Array], Point]:
+        """Return a problem's misfit as a function of the coordinates, its work counted."""
+
+        def counted(theta: Array) -> Point:
+            self._count(problem, 1 + len(theta))
+            return problem.at(theta)
+
+        return counted
+
+    def at_each(self, problem: FreedProblem) -> Callable[[Sequence[Array]], list[Point]]:
+        """Return the same for several points side by side."""
+
+        def counted(thetas: Sequence[Array]) -> list[Point]:
+            self._count(problem, len(thetas) * (1 + len(thetas[0])))
+            return problem.at_each(thetas)
+
+        return counted
+
+    def _count(self, problem: FreedProblem, runs: int) -> None:
+        self.work += int(np.sum(problem.log.steps)) * -(-runs // LANES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +152,7 @@ class MotionSearch:
         part, short = (whole.on(log.beginning(samples)) for samples in (SEARCHED, SCREENED))
         return cls(whole, part, short, guesses, bounds)
 
-    def brought_near(self, rank: int, screened: dict[int, list[Point]]) -> Iterator[Array]:
+    def brought_near(self, rank: int, begun: Begun) -> Iterator[Array]:
         """Yield where the starts of a rank lead on the short beginning under larger noise.
 
         One whose misfit is over what explains the log with the larger noise too is left out, and one that comes to
@@ -116,8 +162,8 @@ class MotionSearch:
         ----------
         rank : int
             0 for the likeliest start of each way.
-        screened : dict
-            Starts as they were screened, likeliest first, by way; filled in here.
+        begun : Begun
+            What was screened so far, and the work; filled in here.
 
         Yields
         ------
@@ -126,25 +172,21 @@ class MotionSearch:
         """
         reached: list[Point] = []
         for way, (first, second) in enumerate(WAYS):
-            if way not in screened:
-                screen = self._roughly(first)
-                points = descend_together(screen.at_each, self.guesses, SCREENING, self.bounds, NEAR_ENOUGH)
-                screened[way] = sorted(points, key=cost_of)
-            begun = screened[way][rank].theta
+            if way not in begun.screened:
+                screen = begun.at_each(rough(self.short, first, COARSELY))
+                points = descend_together(screen, self.guesses, SCREENING, self.bounds, NEAR_ENOUGH)
+                begun.screened[way] = sorted(points, key=cost_of)
+            start = begun.screened[way][rank].theta
             if second == UNCHANGED:
-                yield begun
+                yield start
                 continue
-            near = descend(self._roughly(second).at, begun, NEARING, self.bounds, NEAR_ENOUGH)
-            if near.cost < explained(self.short) and not any(self._same_pit(near, other) for other in reached):
+            near = descend(begun.at(rough(self.short, second)), start, NEARING, self.bounds, NEAR_ENOUGH)
+            if near.cost < explained(self.short) and not any(self.same_pit(near, other) for other in reached):
                 yield near.theta
             reached.append(near)
 
-    def _roughly(self, factors: tuple[float, float]) -> FreedProblem:
-        """Return the problem on the short beginning with more noise and longer model steps."""
-        log = self.short.log.softened(*factors)
-        return self.short.on(replace(log, steps=np.maximum(log.steps // ROUGHLY, 1)))
-
-    def _same_pit(self, one: Point, other: Point) -> bool:
+    def same_pit(self, one: Point, other: Point) -> bool:
+        """Return whether two points of the short beginning lie in the same pit."""
         moved = abs(np.log(bulk_modulus(self.whole, one) / bulk_modulus(self.whole, other)))
         return abs(one.cost - other.cost) < SAME_COST * other.cost and bool(moved < SAME_MODULUS)
 
@@ -181,24 +223,96 @@ def likeliest(searches: Sequence[MotionSearch]) -> list[Ended]:
     list of Ended
         One of each.
     """
-    best = [search.short.at(search.guesses[0]) for search in searches]
-    screened: list[dict[int, list[Point]]] = [{} for _ in searches]
+    begun = Begun()
+    tries = [_Tries(search, begun) for search in searches]
     for rank in range(FINALISTS):
-        for i, search in enumerate(searches):
-            wanted = explained(search.short)
-            for near in search.brought_near(rank, screened[i]):
-                point = descend(search.short.at, near, FINISHING, search.bounds, ENOUGH, wanted=wanted)
-                best[i] = min(best[i], point, key=cost_of)
-                if point.cost >= wanted:
-                    continue
-                more = descend(search.part.at, point.theta, FINISHING, search.bounds, wanted=explained(search.part))
-                if more.cost < explained(search.part):
-                    best[i] = more
-                    return [Ended(one, at, one is search) for one, at in zip(searches, best, strict=True)]
-        if all(point.cost > HOPELESS * explained(one.short) for one, point in zip(searches, best, strict=True)):
+        for one in tries:
+            for near in one.search.brought_near(rank, begun):
+                if rank > 0 and begun.work > MOST_WORK:
+                    break
+                if (found := one.carried_on(near)) is not None:
+                    return [Ended(each.search, found if each is one else each.best, each is one) for each in tries]
+        if begun.work > MOST_WORK or all(one.best.cost > HOPELESS * explained(one.search.short) for one in tries):
             break
-    ends = [descend(one.short.at, at.theta, FINISHING, one.bounds) for one, at in zip(searches, best, strict=True)]
-    return [Ended(one, at, explains=False) for one, at in zip(searches, ends, strict=True)]
+    return [Ended(one.search, one.ended(), explains=False) for one in tries]
+
+
+class _Tries:
+    """What one search tried.
+
+    Parameters
+    ----------
+    search : MotionSearch
+        The search.
+    begun : Begun
+        Its work is counted there.
+    """
+
+    def __init__(self, search: MotionSearch, begun: Begun) -> None:
+        self.search, self._begun = search, begun
+        self.best = search.short.at(search.guesses[0])
+        self._followed: list[tuple[Point, Point]] = []
+
+    def carried_on(self, near: Array) -> Point | None:
+        """Return where a start leads on the first `SEARCHED` samples if it explains them.
+
+        What explains the shorter beginning is followed once a pit, and once in all after `MOST_WORK`.
+        """
+        search, wanted = self.search, explained(self.search.short)
+        point = descend(self._begun.at(search.short), near, FINISHING, search.bounds, ENOUGH, wanted=wanted)
+        self.best = min(self.best, point, key=cost_of)
+        known = any(search.same_pit(point, other) for other, _ in self._followed)
+        if point.cost >= wanted or known or (self._followed and self._begun.work > MOST_WORK):
+            return None
+        wanted = explained(search.part)
+        more = descend(self._begun.at(search.part), point.theta, FINISHING, search.bounds, wanted=wanted)
+        self._followed.append((point, more))
+        return more if more.cost < wanted else None
+
+    def ended(self) -> Point:
+        """Return where the search ends on the shorter beginning if nothing explains the log."""
+        search = self.search
+        if self._followed:
+            _, more = min(self._followed, key=lambda pair: pair[1].cost)
+            return search.short.at(more.theta)
+        return descend(search.short.at, self.best.theta, FINISHING, search.bounds, slight(search.short))
+
+
+def rough(problem: FreedProblem, factors: tuple[float, float], longer: int = ROUGHLY) -> FreedProblem:
+    """Return a problem with more noise and longer model steps.
+
+    Parameters
+    ----------
+    problem : FreedProblem
+        The problem.
+    factors : tuple of float
+        Factors on variance and random walk [dimensionless].
+    longer : int
+        By how many times model steps are longer.
+
+    Returns
+    -------
+    FreedProblem
+        The other problem.
+    """
+    log = problem.log.softened(*factors)
+    return problem.on(replace(log, steps=np.maximum(log.steps // longer, 1)))
+
+
+def slight(problem: FreedProblem) -> float:
+    """Return the cost that a further step must promise where nothing explains a log [dimensionless].
+
+    Parameters
+    ----------
+    problem : FreedProblem
+        The problem.
+
+    Returns
+    -------
+    float
+        Half a sum of squares [dimensionless].
+    """
+    return SLIGHT * explained(problem)
 
 
 def explained(problem: FreedProblem) -> float:

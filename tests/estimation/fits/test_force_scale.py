@@ -77,15 +77,21 @@ def test_a_pit_a_few_percent_away_is_found(scale: float) -> None:
 
 
 def test_all_forces_grow_together_and_what_yields_to_them_falls() -> None:
-    _, _, seen = searched(flat(lambda _: 0.0))
+    _, _, seen = searched(flat(lambda theta: float(theta[0] != HERE[0])), explained=0.5)
     before, fixed = MODEL.values(HERE), ("flow_bias", "speed_lead")
     falls = ("leakage_coefficient", "makeup_conductance", "case_leakage")
-    changes = [{name: MODEL.values(point.theta)[name] / before[name] for name in UNKNOWNS} for point in seen[:4]]
-    for factor, changed in zip((0.93, 1.07), changes[:2], strict=True):
-        assert changed == pytest.approx({name: factor if name == "bulk_modulus" else 1.0 for name in UNKNOWNS})
-    for factor, changed in zip((0.8, 1.25), changes[2:], strict=True):
+    changes = [{name: MODEL.values(point.theta)[name] / before[name] for name in UNKNOWNS} for point in seen]
+    for factor, changed in zip((0.8, 1.25), changes[:2], strict=True):
         expected = {name: 1.0 if name in fixed else 1.0 / factor if name in falls else factor for name in UNKNOWNS}
         assert changed == pytest.approx(expected)
+    for factor, changed in zip((0.93, 1.07), changes[-2:], strict=True):
+        assert changed == pytest.approx({name: factor if name == "bulk_modulus" else 1.0 for name in UNKNOWNS})
+
+
+def test_another_stiffness_alone_is_not_asked_where_scales_of_force_disagree() -> None:
+    _, _, seen = searched(flat(lambda _: 0.0))
+    moduli = {round(MODEL.values(point.theta)["bulk_modulus"] / 2e8, 6) for point in seen}
+    assert moduli == {0.8, 1.25}
 
 
 def test_a_valley_that_goes_on_for_ever_is_left_after_three_rounds() -> None:

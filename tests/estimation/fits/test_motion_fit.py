@@ -12,7 +12,7 @@ from estimation.fits.form_fit import FormFit
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.motion_fit import fit_motion
-from estimation.fits.motion_search import Ended, MotionSearch, likeliest
+from estimation.fits.motion_search import Begun, Ended, MotionSearch, likeliest
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from estimation.models.motion import MOTION_FORMS, UNKNOWNS
 from estimation.notes import EstimateCode
@@ -113,15 +113,16 @@ def test_starts_that_larger_noise_does_not_explain_or_that_end_alike_are_left_ou
     monkeypatch.setattr(motion_search, "explained", lambda _: wanted)
     monkeypatch.setattr(motion_search, "SAME_COST", alike)
     monkeypatch.setattr(motion_search, "SAME_MODULUS", alike)
-    search, screened = searches_of(seen(short_log(0.2)))[0], dict[int, list[Point]]()
+    search, begun = searches_of(seen(short_log(0.2)))[0], Begun()
     lower, upper = search.bounds
     for rank in range(2):
-        near = list(search.brought_near(rank, screened))
+        near = list(search.brought_near(rank, begun))
         assert len(near) == brought
         assert all(np.all((lower <= theta) & (theta <= upper)) for theta in near)
         best = min(search.short.at(theta).cost for theta in near)
         assert best < min(search.short.at(guess).cost for guess in search.guesses)
-    assert all(len(points) == len(search.guesses) for points in screened.values())
+    assert all(len(points) == len(search.guesses) for points in begun.screened.values())
+    assert begun.work > 0
 
 
 @pytest.mark.slow

@@ -11,7 +11,16 @@ from estimation.fits import motion_search
 from estimation.fits.descent import Point
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.motion_fit import unseen
-from estimation.fits.motion_search import FINALISTS, HOPELESS, WAYS, MotionSearch, explained, likeliest
+from estimation.fits.motion_search import (
+    FINALISTS,
+    HOPELESS,
+    MOST_WORK,
+    WAYS,
+    Begun,
+    MotionSearch,
+    explained,
+    likeliest,
+)
 
 SHORT, PART = 100, 400
 Misfit = Callable[[float], float]
@@ -20,7 +29,8 @@ Misfit = Callable[[float], float]
 class Search:
     """A search whose starts stand at 0, 1, 2, ..., a rank of `WAYS` each, and whose descents end where they begin."""
 
-    def __init__(self, misfit: Misfit, name: str, asked: list[str]) -> None:
+    def __init__(self, misfit: Misfit, name: str, asked: list[str], steps: int = 1) -> None:
+        self._steps = steps
         self.guesses, self.bounds = [np.zeros(1)], (np.full(1, -9.0), np.full(1, 99.0))
         self.short, self.part = (self._problem(misfit, samples) for samples in (SHORT, PART))
         self._name, self._asked = name, asked
@@ -29,17 +39,20 @@ class Search:
         def at(theta: np.ndarray) -> Point:
             return Point(theta, 0.5 * samples * misfit(float(theta[0])), np.zeros(1), np.eye(1))
 
-        return SimpleNamespace(at=at, log=SimpleNamespace(measured=np.zeros((samples, 1))))
+        return SimpleNamespace(at=at, log=SimpleNamespace(measured=np.zeros((samples, 1)), steps=[self._steps]))
 
-    def brought_near(self, rank: int, screened: dict[int, list[Point]]) -> Sequence[np.ndarray]:
-        assert isinstance(screened, dict)
+    def same_pit(self, one: Point, other: Point) -> bool:
+        return bool(one.theta[0] == other.theta[0])
+
+    def brought_near(self, rank: int, begun: Begun) -> Sequence[np.ndarray]:
+        assert isinstance(begun, Begun)
         self._asked.append(f"{self._name}{rank}")
         return [np.array([float(len(WAYS) * rank + way)]) for way in range(len(WAYS))]
 
 
-def ended(*misfits: Misfit) -> tuple[list[motion_search.Ended], list[str]]:
+def ended(*misfits: Misfit, steps: int = 1) -> tuple[list[motion_search.Ended], list[str]]:
     asked: list[str] = []
-    searches = [Search(misfit, name, asked) for misfit, name in zip(misfits, "ab", strict=True)]
+    searches = [Search(misfit, name, asked, steps) for misfit, name in zip(misfits, "ab", strict=True)]
     return likeliest(cast("list[MotionSearch]", searches)), asked
 
 
@@ -70,6 +83,13 @@ def test_every_start_is_tried_before_a_log_that_is_nearly_explained_is_given_up(
     found, asked = ended(lambda _: 1.2, lambda _: 1.3)
     assert len(asked) == 2 * FINALISTS
     assert not any(one.explains for one in found)
+
+
+def test_no_other_start_is_tried_once_the_work_is_done() -> None:
+    for steps, ranks in ((1, FINALISTS), (MOST_WORK, 1)):
+        found, asked = ended(lambda _: 1.2, lambda _: 1.3, steps=steps)
+        assert len(asked) == 2 * ranks
+        assert not any(one.explains for one in found)
 
 
 def test_what_explains_the_first_seconds_alone_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
