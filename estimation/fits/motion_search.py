@@ -48,8 +48,8 @@ ENOUGH = 0.1
 FINALISTS = 3
 """Starts that are carried on each way, the likeliest of each way first, until one explains the log."""
 
-ROUGHLY, COARSELY = 2, 4
-"""By how many times model steps are longer while a start is only brought near, and while starts are compared."""
+ROUGHLY = 2
+"""By how many times model steps are longer while a start is only brought near."""
 
 MOST_WORK = 12_000_000
 """Steps of eight runs side by side from which on no other start is tried; one that was begun is ended. A count, no
@@ -173,7 +173,7 @@ class MotionSearch:
         reached: list[Point] = []
         for way, (first, second) in enumerate(WAYS):
             if way not in begun.screened:
-                screen = begun.at_each(rough(self.short, first, COARSELY))
+                screen = begun.at_each(rough(self.short, first))
                 points = descend_together(screen, self.guesses, SCREENING, self.bounds, NEAR_ENOUGH)
                 begun.screened[way] = sorted(points, key=cost_of)
             start = begun.screened[way][rank].theta
@@ -278,7 +278,7 @@ class _Tries:
         return descend(search.short.at, self.best.theta, FINISHING, search.bounds, slight(search.short))
 
 
-def rough(problem: FreedProblem, factors: tuple[float, float], longer: int = ROUGHLY) -> FreedProblem:
+def rough(problem: FreedProblem, factors: tuple[float, float]) -> FreedProblem:
     """Return a problem with more noise and longer model steps.
 
     Parameters
@@ -287,8 +287,6 @@ def rough(problem: FreedProblem, factors: tuple[float, float], longer: int = ROU
         The problem.
     factors : tuple of float
         Factors on variance and random walk [dimensionless].
-    longer : int
-        By how many times model steps are longer.
 
     Returns
     -------
@@ -296,7 +294,7 @@ def rough(problem: FreedProblem, factors: tuple[float, float], longer: int = ROU
         The other problem.
     """
     log = problem.log.softened(*factors)
-    return problem.on(replace(log, steps=np.maximum(log.steps // longer, 1)))
+    return problem.on(replace(log, steps=np.maximum(log.steps // ROUGHLY, 1)))
 
 
 def slight(problem: FreedProblem) -> float:
