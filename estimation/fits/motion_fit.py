@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.fits.averaged import block_means, samples_a_block
-from estimation.fits.descent import LEAST_GAIN, RIDGE, Point, descend
+from estimation.fits.descent import descend
 from estimation.fits.flow_log import DRAIN_START, LEAST_LEAKAGE
 from estimation.fits.flow_search import LEAD_START
 from estimation.fits.force_scale import Way, disagree, rescaled
@@ -15,7 +15,6 @@ from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighe
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_log import GreyBoxLog, OutputNoise
 from estimation.fits.motion_search import (
-    ENOUGH,
     EXPLAINED,
     FINISHING,
     NEAR_ENOUGH,
@@ -27,11 +26,10 @@ from estimation.fits.motion_search import (
     explained,
     likeliest,
     rough,
-    slight,
 )
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
-from estimation.models.motion import MOTION_FORMS, UNKNOWNS, MotionParameters
+from estimation.models.motion import MOTION_FORMS, MotionParameters
 from estimation.notes import EstimateCode
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -76,10 +74,6 @@ presliding is of another make, noise alone explains a tenth to a half of the err
 MOST_MOVED = 0.03
 """Share of bulk modulus by which a misfit that does not show may move it, above which it is not believed [fraction]: as
 much as noise may (`estimation.eha.result.LARGEST_BOUND`)."""
-
-NEVER_TOLD = 2.0 * MOST_MOVED
-"""Relative deviation by noise alone, as foreseen on a part of the log, from which no number will be told [fraction]:
-twice what a told one may have, because the rest of the log may hold it better."""
 
 UNLIKELY = 72.0
 """Difference of log-likelihood from which a structure counts for nothing beside the other [dimensionless]."""
@@ -227,35 +221,21 @@ def _fitted(ended: list[Ended]) -> tuple[list[GreyBoxFit], list[float]]:
     """Return the fits of both structures to the whole log, and other bulk moduli that explain it.
 
     Other scales are looked for wherever the end explains the log, though no search said so: a gate passes on the end.
-    Where noise alone leaves so much open that no number is told, they are not.
     """
     first, second = sorted(ended, key=lambda one: (not one.explains, one.point.cost))
     search, best, others = first.search, first.point, list[float]()
     if not first.explains:
-        best = descend(search.part.at, best.theta, NEARING, search.bounds, slight(search.part))
-    explains = best.cost < explained(search.part)
-    told = explains and _deviation(search, best) < NEVER_TOLD
-    if told:
+        best = descend(search.part.at, best.theta, FINISHING, search.bounds)
+    if best.cost < explained(search.part):
         near = rough(search.part, WAYS[0][1])
         way = Way(near, NEARING, NEAR_ENOUGH, FINISHING, search.bounds, explained(search.part))
         best, others = rescaled(search.part, best, way)
-        told = not disagree([*others, search.part.model.values(best.theta)["bulk_modulus"]])
     whole = search.whole
-    evaluations, enough = (FINISHING, LEAST_GAIN) if told else (NEARING, ENOUGH if explains else slight(whole))
-    best = descend(whole.at, best.theta, evaluations, search.bounds, enough)
+    best = descend(whole.at, best.theta, FINISHING, search.bounds)
     rival = second.search
-    other = min((rival.whole.at(theta) for theta in (best.theta, second.point.theta)), key=cost_of)
-    if told or other.cost < best.cost:
-        other = descend(rival.whole.at, other.theta, NEARING, rival.bounds, enough, wanted=best.cost + UNLIKELY)
+    begun = min((rival.whole.at(theta) for theta in (best.theta, second.point.theta)), key=cost_of)
+    other = descend(rival.whole.at, begun.theta, NEARING, rival.bounds, wanted=best.cost + UNLIKELY)
     return [concluded(whole, best), concluded(rival.whole, other)], others
-
-
-def _deviation(search: MotionSearch, point: Point) -> float:
-    """Return the relative deviation that noise will leave on the whole log, from the curvature on a part [fraction]."""
-    gram = point.gram + np.diag(np.full(len(point.theta), RIDGE))
-    shorter = len(search.part.log.measured) / len(search.whole.log.measured)
-    place = UNKNOWNS.index("bulk_modulus")
-    return float(np.sqrt(np.linalg.inv(gram)[place, place] * shorter))
 
 
 def _objections(fits: list[GreyBoxFit], best: GreyBoxFit, others: list[float]) -> tuple[Note, ...]:
