@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.fits.averaged import block_means, samples_a_block
-from estimation.fits.descent import descend
+from estimation.fits.descent import Point, descend
 from estimation.fits.flow_log import DRAIN_START, LEAST_LEAKAGE
 from estimation.fits.flow_search import LEAD_START
 from estimation.fits.force_scale import Way, disagree, rescaled
 from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
+from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_log import GreyBoxLog, OutputNoise
 from estimation.fits.motion_search import (
@@ -226,16 +227,23 @@ def _fitted(ended: list[Ended]) -> tuple[list[GreyBoxFit], list[float]]:
     search, best, others = first.search, first.point, list[float]()
     if not first.explains:
         best = descend(search.part.at, best.theta, FINISHING, search.bounds)
-    if best.cost < explained(search.part):
-        near = rough(search.part, WAYS[0][1])
-        way = Way(near, NEARING, NEAR_ENOUGH, FINISHING, search.bounds, explained(search.part))
-        best, others = rescaled(search.part, best, way)
+    asked = best.cost < explained(search.part)
+    if asked:
+        best, others = _rescaled(search.part, best, search)
     whole = search.whole
     best = descend(whole.at, best.theta, FINISHING, search.bounds)
+    if not asked and best.cost < explained(whole):
+        best, others = _rescaled(whole, best, search)
     rival = second.search
     begun = min((rival.whole.at(theta) for theta in (best.theta, second.point.theta)), key=cost_of)
     other = descend(rival.whole.at, begun.theta, NEARING, rival.bounds, wanted=best.cost + UNLIKELY)
     return [concluded(whole, best), concluded(rival.whole, other)], others
+
+
+def _rescaled(problem: FreedProblem, best: Point, search: MotionSearch) -> tuple[Point, list[float]]:
+    """Return the best optimum of forces on other scales, and other bulk moduli that explain the log."""
+    way = Way(rough(problem, WAYS[0][1]), NEARING, NEAR_ENOUGH, FINISHING, search.bounds, explained(problem))
+    return rescaled(problem, best, way)
 
 
 def _objections(fits: list[GreyBoxFit], best: GreyBoxFit, others: list[float]) -> tuple[Note, ...]:

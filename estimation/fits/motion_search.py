@@ -6,6 +6,7 @@ the log. Both structures of friction are searched in turn, so that neither is se
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -86,21 +87,19 @@ class Begun:
 
     def at(self, problem: FreedProblem) -> Callable[[Array], Point]:
         """Return a problem's misfit as a function of the coordinates, its work counted."""
-
-        def counted(theta: Array) -> Point:
-            self._count(problem, 1 + len(theta))
-            return problem.at(theta)
-
-        return counted
+        return partial(self._at, problem)
 
     def at_each(self, problem: FreedProblem) -> Callable[[Sequence[Array]], list[Point]]:
         """Return the same for several points side by side."""
+        return partial(self._at_each, problem)
 
-        def counted(thetas: Sequence[Array]) -> list[Point]:
-            self._count(problem, len(thetas) * (1 + len(thetas[0])))
-            return problem.at_each(thetas)
+    def _at(self, problem: FreedProblem, theta: Array) -> Point:
+        self._count(problem, 1 + len(theta))
+        return problem.at(theta)
 
-        return counted
+    def _at_each(self, problem: FreedProblem, thetas: Sequence[Array]) -> list[Point]:
+        self._count(problem, len(thetas) * (1 + len(thetas[0])))
+        return problem.at_each(thetas)
 
     def _count(self, problem: FreedProblem, runs: int) -> None:
         self.work += int(np.sum(problem.log.steps)) * -(-runs // LANES)

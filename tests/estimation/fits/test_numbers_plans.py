@@ -5,6 +5,7 @@ Descents are replaced by ones that stay where they begin, so that nothing is com
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from typing import Any
 from unittest.mock import patch
 
@@ -44,7 +45,7 @@ def planned(cost: Cost, *modules: Any) -> Iterator[list[list[float]]]:
     plan: list[list[float]] = []
 
     def descended(at: Any, start: Array, evaluations: int, *others: Any, **named: Any) -> Point:
-        one = at.__self__.log
+        one = (at.args[0] if isinstance(at, partial) else at.__self__).log
         noise = [one.noise[0].variance, one.noise[0].walk]
         rest = [other for other in others[1:] if isinstance(other, float)]
         plan.append([evaluations, len(one.measured), int(np.max(one.steps)), *noise, *rest, *named.values()])
