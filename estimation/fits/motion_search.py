@@ -274,7 +274,8 @@ class _Tries:
         if self._followed:
             _, more = min(self._followed, key=lambda pair: pair[1].cost)
             return search.short.at(more.theta)
-        return descend(search.short.at, self.best.theta, FINISHING, search.bounds, slight(search.short))
+        promising = SLIGHT * explained(search.short)
+        return descend(search.short.at, self.best.theta, FINISHING, search.bounds, promising)
 
 
 def rough(problem: FreedProblem, factors: tuple[float, float]) -> FreedProblem:
@@ -294,22 +295,6 @@ def rough(problem: FreedProblem, factors: tuple[float, float]) -> FreedProblem:
     """
     log = problem.log.softened(*factors)
     return problem.on(replace(log, steps=np.maximum(log.steps // ROUGHLY, 1)))
-
-
-def slight(problem: FreedProblem) -> float:
-    """Return the cost that a further step must promise where nothing explains a log [dimensionless].
-
-    Parameters
-    ----------
-    problem : FreedProblem
-        The problem.
-
-    Returns
-    -------
-    float
-        Half a sum of squares [dimensionless].
-    """
-    return SLIGHT * explained(problem)
 
 
 def explained(problem: FreedProblem) -> float:

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.fits.averaged import samples_a_block
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, severity
 from faults.diagnosis.circuit_runs import COORDINATES, Blocks, blocks_of, coordinates_of, parameter_rows, predicted
@@ -138,7 +139,7 @@ def _unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[No
 def _left_longer(blocks: Blocks, fit: PointFit) -> float:
     """Return what a circuit leaves of the mean velocity over `EARLIER`, root mean square [m/s]."""
     left = (blocks.velocity - fit.fitted[:, 0])[blocks.first :]
-    together = max(1, round(EARLIER / (blocks.block * blocks.sample_time)))
+    together = samples_a_block(blocks.block * blocks.sample_time, EARLIER)
     parts = left[: len(left) // together * together].reshape(-1, together)
     there = np.isfinite(parts)
     means = np.where(there, parts, 0.0).sum(axis=1) / np.maximum(there.sum(axis=1), 1)

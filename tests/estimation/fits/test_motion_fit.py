@@ -304,3 +304,23 @@ def test_what_the_searches_leave_unexplained_is_fitted_on_and_tried_on_other_sca
     assert others == ([9e7] if late else [])
     assert fits[0].cost < second.whole.at(there).cost
     assert fits[0].cost == second.whole.at(fits[0].theta).cost
+
+
+def test_what_only_the_whole_log_explains_is_tried_on_other_scales_too(
+    healthy: FormFit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, second = searches_of(heard(short_log(2.0)))
+    there = first.whole.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
+    ended = [Ended(one, one.part.at(there), explains=False) for one in (first, second)]
+    asked: list[object] = []
+
+    def rescaled(problem: object, best: Point, _: object) -> tuple[Point, list[float]]:
+        asked.append(problem)
+        return best, [9e7]
+
+    monkeypatch.setattr(motion_fit, "rescaled", rescaled)
+    monkeypatch.setattr(motion_fit, "explained", lambda problem: np.inf if problem in wholes else 0.0)
+    wholes = (first.whole, second.whole)
+    assert motion_fit._fitted(ended)[1] == [9e7]
+    assert len(asked) == 1
+    assert asked[0] in wholes
