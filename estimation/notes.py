@@ -135,49 +135,47 @@ class RigCode(Code):
     """Notes on a rig, its oil or its logger that differ from what the rig file says, and explain the log."""
 
     PRESSURE_LATE = (
-        "differential_pressure_pa is {late_ms:.2f} +- {half_width_ms:.2f} ms late (lag or delay of its sensor); this "
+        "differential_pressure_pa is {late_ms:.2f} ± {half_width_ms:.2f} ms late (lag or delay of its sensor); this "
         "was corrected"
     )
     INPUT_LATE = (
-        "{channel} is {late_ms:.2f} +- {half_width_ms:.2f} ms late (lag or delay of its sensor or filter); this was "
+        "{channel} is {late_ms:.2f} ± {half_width_ms:.2f} ms late (lag or delay of its sensor or filter); this was "
         "corrected"
     )
     PRESSURE_OFFSET = (
-        "differential_pressure_pa reads {offset_pa:.4g} +- {half_width_pa:.2g} Pa too much; the offset was subtracted"
+        "differential_pressure_pa reads {offset_pa:.4g} ± {half_width_pa:.2g} Pa too much; the offset was subtracted"
     )
     PRESSURE_DRIFTS = (
-        "the offset of differential_pressure_pa drifts by {drift_pa:.4g} +- {half_width_pa:.2g} Pa over the log; the "
+        "the offset of differential_pressure_pa drifts by {drift_pa:.4g} ± {half_width_pa:.2g} Pa over the log; the "
         "drift was subtracted"
     )
-    ENCODER_ZERO = (
-        "position_m reads {zero_mm:.1f} +- {half_width_mm:.1f} mm at mid-stroke; it was shifted to zero there"
-    )
+    ENCODER_ZERO = "position_m reads {zero_mm:.1f} ± {half_width_mm:.1f} mm at mid-stroke; it was shifted to zero there"
     AREA_TO_DISPLACEMENT = (
-        "the ratio of pump displacement to piston area is {percent:.2f} +- {half_width:.2f} % of that in the rig file: "
+        "the ratio of pump displacement to piston area is {percent:.2f} ± {half_width:.2f} % of that in the rig file: "
         "one of the two is wrong, and the log does not tell which"
     )
     PUMP_WORN = (
-        "the pump delivers {percent:.1f} +- {half_width:.1f} % of its displacement: it is worn, or displacement or "
+        "the pump delivers {percent:.1f} ± {half_width:.1f} % of its displacement: it is worn, or displacement or "
         "piston area in the rig file is wrong"
     )
     WEAR_NOT_EXCLUDED = (
         "pump wear is not excluded: a pump that delivers up to {percent:.0f} % less would look like leakage at the "
         "speeds of this log, and bulk modulus would be lower by as much"
     )
-    VOLUME_DIFFERS = "the chamber volume is {percent:.0f} +- {half_width:.0f} % of that in the rig file"
+    VOLUME_DIFFERS = "the chamber volume is {percent:.0f} ± {half_width:.0f} % of that in the rig file"
     STARTS_UNDER_LOAD = (
         "the log begins at a differential pressure of {pressure_pa:.3g} Pa, which is a load of {force_n:.3g} N"
     )
     AIR_ENTRAINED = (
-        "the oil contains {percent:.2g} +- {half_width:.2g} % of air at atmospheric pressure; bulk modulus is given at "
+        "the oil contains {percent:.2g} ± {half_width:.2g} % of air at atmospheric pressure; bulk modulus is given at "
         "{stated_pa:.3g} Pa absolute, and would be {liquid_pa:.3g} Pa without the air"
     )
     AIR_ENTERS = (
-        "air enters the oil after {percent_of_log:.0f} % of the log: {percent:.2g} +- {half_width:.2g} % at "
+        "air enters the oil after {percent_of_log:.0f} % of the log: {percent:.2g} ± {half_width:.2g} % at "
         "atmospheric pressure"
     )
     RELIEF_LOW = (
-        "the relief valve opens at {setting_pa:.3g} +- {half_width_pa:.2g} Pa instead of the {rig_pa:.3g} Pa in the "
+        "the relief valve opens at {setting_pa:.3g} ± {half_width_pa:.2g} Pa instead of the {rig_pa:.3g} Pa in the "
         "rig file: it is set too low, or leaks"
     )
     LEAKAGE_GROWS = (
@@ -200,7 +198,6 @@ class RigCode(Code):
         "compared at the measured value"
     )
     CHECKS_CRACK = (
-        "the make-up valves open {crack_pa:.3g} +- {half_width_pa:.2g} Pa below the accumulator pressure in the rig "
-        "file"
+        "the make-up valves open {crack_pa:.3g} ± {half_width_pa:.2g} Pa below the accumulator pressure in the rig file"
     )
     EXPLAINED_OTHERWISE = "{count} other explanation(s) fit the log about as well; the interval includes them"

@@ -45,7 +45,7 @@ class EquationsCode(Code):
     PARAMETERS_NOT_TOLD = "the logs cannot separate {names}: fix one of them, or use a drive that tells them apart"
     PARAMETER_NOT_FELT = "the logs do not determine {name}: no output depends on it"
     PARAMETER_POORLY_TOLD = (
-        "{name} is known only to +- {percent:.0f} %; its error is correlated most with that of {other} (correlation "
+        "{name} is known only to ± {percent:.0f} %; its error is correlated most with that of {other} (correlation "
         "{correlation:.3f})"
     )
     STARTS_DISAGREE = (

@@ -1,6 +1,6 @@
 """Sigma points as expressions: mean and covariance through a function, without its derivative.
 
-The scaled transform of Julier (2002) with points ``z +- c L_i``, where ``P = L L'`` and
+The scaled transform of Julier (2002) with points ``z ± c L_i``, where ``P = L L'`` and
 ``c^2 = alpha^2 (n + kappa)``. Its sums are rewritten so that nothing large cancels. With ``A_i`` and ``S_i`` half the
 difference and half the second difference of the function over the points of pair i, over c, and ``d`` the shift of
 the mean from the centre's image::

@@ -45,7 +45,7 @@ LOGGERS = (
     ),
     Kind(
         "coarse_converters",
-        "16-bit encoder over 500 mm, 12-bit pressure over +-250 bar",
+        "16-bit encoder over 500 mm, 12-bit pressure over ±250 bar",
         lambda setup, _: setup.with_sensor((POSITION,), quantum=0.5 / 2**16).with_sensor(
             PRESSURES, quantum=5e7 / 2**12
         ),

@@ -34,7 +34,7 @@ def gain_of(record: Record, references: tuple[str, ...]) -> float:
 def test_a_reference_takes_the_bias_of_a_closed_loop_away() -> None:
     told = np.array([[gain_of(record, names) for names in ((), ("r",))] for record in map(closed_loop, range(3))])
     alone, staged = told.mean(axis=0) - 1.0
-    # over 20 seeds the gains are 0.58 +- 0.16 and 0.99 +- 0.22
+    # over 20 seeds the gains are 0.58 ± 0.16 and 0.99 ± 0.22
     assert alone < -0.3
     assert abs(staged) < 3.0 * 0.22 / np.sqrt(3.0)
 
