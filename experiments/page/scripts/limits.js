@@ -26,6 +26,7 @@
     const sign = input.dataset.side === "below" ? -1 : 1;
     const [value, near, far] = ["value", "low", "high"].map((name) => sign * Number(input.dataset[name]));
     const limit = sign * Number(input.value);
+    if (input.dataset.doubted !== undefined) return "doubted"; // no fit explains the log: neither good nor bad
     if (input.value === "" || !Number.isFinite(limit) || !Number.isFinite(value)) return "none";
     const [low, high] = [Math.min(near, far), Math.max(near, far)];
     if (low > limit) return "over";
@@ -34,7 +35,7 @@
   }
 
   const WORDS = {
-    none: "no limit", over: "past the limit", likely: "probably past the limit",
+    doubted: "not reliable", none: "no limit", over: "past the limit", likely: "probably past the limit",
     open: "may be past the limit", within: "within the limit",
   };
 

@@ -1,10 +1,12 @@
 """The page on one log."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from estimation.finding import Finding
 from experiments.eha.diagnosis_page import diagnosis_page
 from experiments.eha.entries import diagnosis_entries
 from faults.conditions import CONDITIONS, parameters_for
@@ -13,16 +15,22 @@ from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
 from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
 from plant.sensors.sensors import RIG
 
 
 @pytest.fixture(scope="module")
-def page() -> str:
+def diagnosed() -> tuple[Finding, Record]:
     p = parameters_for(CONDITIONS["minor_leakage"])
     rng = np.random.default_rng(2)
     drive = make_drive("steps", 3.0, 1e-3, EhaParameters(), rng)
     log = simulate(CIRCUIT, drive, 1e-3, p, sensors=RIG, rng=rng).replace(differential_pressure_pa=None)
-    found = diagnose_log(log, Rig())
+    return diagnose_log(log, Rig()), log
+
+
+@pytest.fixture(scope="module")
+def page(diagnosed: tuple[Finding, Record]) -> str:
+    found, log = diagnosed
     assert (found.condition, found.unknown) == ("minor_leakage", False)
     result = {"file": "run.csv", "rig": "paper", **diagnosis_entries(found)}
     return diagnosis_page({**result, "not_told": ["one thing is not told", "another neither"]}, found, log)
@@ -41,3 +49,16 @@ def test_every_paragraph_begins_with_a_capital_and_ends_with_a_full_stop(page: s
     paragraphs = [re.sub("<[^>]*>", "", one).strip() for one in re.findall("<p>(.*?)</p>", page, re.DOTALL)]
     assert "One thing is not told." in paragraphs
     assert [one for one in paragraphs if not (one[0].isupper() and one.endswith("."))] == []
+
+
+def test_severities_of_a_log_that_no_fit_explains_are_marked_as_not_reliable(
+    page: str, diagnosed: tuple[Finding, Record]
+) -> None:
+    found, log = diagnosed
+    unknown = diagnosis_page(
+        {"file": "run.csv", "rig": "paper", **diagnosis_entries(found), "unknown": True, "reasons": []},
+        replace(found, unknown=True),
+        log,
+    )
+    assert len(re.findall("<input[^>]* data-doubted>", unknown)) == unknown.count('class="limit"') > 0
+    assert not re.search("<input[^>]* data-doubted>", page)

@@ -155,6 +155,13 @@ def test_a_curve_is_hidden_by_its_button(opened: Any) -> None:
     assert page.locator(".live .panel").first.screenshot() != before
 
 
+def test_a_log_that_no_fit_explains_has_no_severity_within_its_limit(opened: Any) -> None:
+    page = opened("unknown")
+    assert set(page.locator(".state").all_inner_texts()) == {"not reliable"}
+    page.locator("input.limit[name=leakage_flow]").fill("50")
+    assert set(page.locator(".state").all_inner_texts()) == {"not reliable"}
+
+
 def test_a_limit_that_the_reader_sets_changes_the_state_and_is_remembered(opened: Any) -> None:
     page = opened("diagnosis")
     limit, state = page.locator("input.limit[name=leakage_flow]"), page.locator(".state").first
