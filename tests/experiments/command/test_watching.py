@@ -1,0 +1,225 @@
+"""Rows to a watch: what a broken, late, slow or restarted stream does to it is said, and changes nothing else."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from experiments.cli import app
+from experiments.command import watching
+from experiments.command.watch_told import Told
+from experiments.command.watching import SAVED_EVERY, Asked, told_of, watch_rows
+from faults.watch.saved import load_state
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.errors import LogError
+from plant.log.stream_source import Received
+
+T = 0.01
+SPEED = 50.0
+"""Motor speed, forward and back [rad/s]."""
+
+HEADER = "time_s,motor_speed_rad_s,velocity_m_s"
+LEARNT = 60.0
+"""Least time that a watch learns [s]."""
+
+
+def rows(start: float, seconds: float, share: float = 1.0, seed: int = 0, T: float = T) -> list[str]:
+    """Return rows of an actuator whose piston moves by a share of what the pump delivers, reversed every 0.1 s."""
+    p, rng = EhaParameters(), np.random.default_rng(seed)
+    count = round(seconds / T)
+    speed = SPEED * rng.choice((-1.0, 1.0), count // 10 + 1).repeat(10)[:count]
+    velocity = share * 0.9 * p.pump_displacement * speed / p.piston_area
+    told = zip(start + T * np.arange(count), speed + 0.05 * rng.standard_normal(count), velocity, strict=True)
+    return [f"{t:.3f},{n:.6f},{v:.8f}\n" for t, n, v in told]
+
+
+def asked(**changes: Any) -> Asked:
+    given: dict[str, Any] = {"false_alarms": 1.0, "learning": LEARNT, "healthy": None, "no_pressure": False}
+    return Asked(Rig(), {}, **{**given, **changes})
+
+
+def watched(
+    lines: list[str], state: Path | None = None, header: str = HEADER, **changes: Any
+) -> tuple[list[dict[str, Any]], Told]:
+    """Watch lines; return what is told, and who told it."""
+    events: list[dict[str, Any]] = []
+    told = Told(events.append)
+    watch_rows(told, [header + "\n", *lines], asked(**changes), "bench", state)
+    return events, told
+
+
+def named(events: list[dict[str, Any]]) -> list[str]:
+    return [event["event"] for event in events]
+
+
+def position(lines: list[str], offset: float = 0.0, T: float = T) -> list[str]:
+    """Return the same rows, position instead of velocity."""
+    cells = [line.split(",") for line in lines]
+    place = offset + np.cumsum([float(velocity) for *_, velocity in cells]) * T
+    return [f"{time},{speed},{x:.12f}\n" for (time, speed, _), x in zip(cells, place, strict=True)]
+
+
+def test_what_changes_during_a_gap_is_no_alarm_for_it_is_learnt_again(capsys: pytest.CaptureFixture[str]) -> None:
+    healthy, leaking = rows(0.0, 70.0), [rows(start, 5.0, share=0.6, seed=1) for start in (72.0, 70.5)]
+    events, told = watched(healthy + leaking[0])
+    assert "bench: warning: rows are missing before 72" in capsys.readouterr().err
+    assert named(events) == ["start", "ready"]
+    assert told.rows == len(healthy) + len(leaking[0])
+    short, _ = watched(healthy + leaking[1])  # half a second is filled with missing samples
+    assert named(short) == ["start", "ready", "alarm", "change"]
+    assert capsys.readouterr().err == ""
+
+
+def test_velocity_is_summed_over_all_pieces_as_if_position_came() -> None:
+    lines = rows(0.0, 70.0) + rows(70.0, 5.0, share=0.6, seed=1)
+    by_velocity, _ = watched(lines)
+    by_position, _ = watched(position(lines), header=HEADER.replace("velocity_m_s", "position_m"))
+    assert named(by_velocity) == ["start", "ready", "alarm", "change"]
+    assert [one["time_s"] for one in by_velocity] == [one["time_s"] for one in by_position]
+    assert by_velocity[2]["score"] == pytest.approx(by_position[2]["score"], rel=1e-4)
+
+
+def test_the_state_is_kept_while_the_stream_runs_and_not_only_at_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import faults.watch.saved as saved
+
+    times: list[float] = []
+    save = saved.save_watch
+
+    def noted(watch: Any, path: Path, travelled: float = 0.0) -> None:
+        times.append(watch.last)
+        save(watch, path, travelled)
+
+    monkeypatch.setattr(saved, "save_watch", noted)
+    lines = rows(0.0, 35.0)
+    _, told = watched(lines, tmp_path / "state.npz")
+    assert told.watch is not None
+    steps = np.diff(times[:-1])  # the last one is that of the end
+    assert len(times) == 4
+    assert np.all((steps > SAVED_EVERY) & (steps < SAVED_EVERY + 1.0))
+    _, _, travelled = load_state(tmp_path / "state.npz")
+    assert travelled == pytest.approx(T * sum(float(line.split(",")[2]) for line in lines), abs=1e-9)
+
+
+def test_a_broken_row_costs_nothing_of_what_was_learnt_before_it(tmp_path: Path) -> None:
+    state = tmp_path / "state.npz"
+    with pytest.raises(LogError, match="'motor_speed_rad_s' must hold numbers, got 'x'"):
+        watched([*rows(0.0, 70.0), "70.000,x,0\n"], state)
+    events, _ = watched(rows(70.0, 5.0, share=0.6, seed=1), state)
+    assert named(events) == ["start", "ready", "alarm", "change"]
+
+
+def test_a_restarted_watch_knows_how_far_the_piston_had_come(tmp_path: Path) -> None:
+    lines, state = rows(0.0, 70.0) + rows(70.0, 5.0, share=0.6, seed=1), tmp_path / "state.npz"
+    whole, _ = watched(lines)
+    before, _ = watched(lines[:6500], state)
+    after, _ = watched(lines[6500:], state)
+    assert [(one["event"], one["time_s"]) for one in [*before, *after[2:]]] == [
+        (one["event"], one["time_s"]) for one in whole
+    ]
+    assert named(after)[:2] == ["start", "ready"]
+
+
+def test_a_stream_that_goes_on_elsewhere_is_learnt_again_and_that_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for start, follows in ((70.5, True), (80.0, False), (10.0, False)):
+        state = tmp_path / f"{start}.npz"
+        watched(rows(0.0, 70.0), state)
+        capsys.readouterr()
+        events, _ = watched(rows(start, 5.0, share=0.6, seed=1), state)
+        assert ("alarm" in named(events)) is follows
+        assert ("the stream does not continue at 70 s" in capsys.readouterr().err) is not follows
+
+
+def test_a_state_of_another_rate_is_refused(tmp_path: Path) -> None:
+    state = tmp_path / "state.npz"
+    watched(rows(0.0, 10.0), state)
+    with pytest.raises(LogError, match="was saved at 100 Hz, but the stream has 50 Hz"):
+        watched(rows(10.0, 10.0, T=0.02), state)
+
+
+def test_a_last_row_that_is_cut_is_left_out_and_said(capsys: pytest.CaptureFixture[str]) -> None:
+    _, told = watched([*rows(0.0, 5.0), "5.000,1"])
+    assert told.rows == 500
+    assert "the last row is incomplete and was left out" in capsys.readouterr().err
+
+
+def test_a_stream_without_motion_is_refused_by_its_name() -> None:
+    with pytest.raises(LogError, match="a watch needs motor_speed_rad_s, and position_m or velocity_m_s") as refused:
+        watched(["0,1\n", "1,1\n", "2,1\n"], header="time_s,motor_speed_rad_s")
+    assert refused.value.source == "bench"
+
+
+def test_nothing_at_all_is_no_stream() -> None:
+    with pytest.raises(LogError, match="a header line is needed, nothing came"):
+        watch_rows(Told(lambda _: None), ["\n", "  \n"], asked(), "bench", None)
+
+
+def test_empty_lines_before_the_header_are_no_header() -> None:
+    events: list[dict[str, Any]] = []
+    watch_rows(Told(events.append), ["\n", HEADER + "\n", *rows(0.0, 5.0)], asked(), "bench", None)
+    assert named(events) == ["start"]
+
+
+def written(path: Path, lines: list[str], header: str = HEADER) -> Path:
+    path.write_text(header + "\n" + "".join(lines))
+    return path
+
+
+def test_alarms_in_a_log_that_is_called_healthy_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wrong = written(tmp_path / "wrong.csv", rows(0.0, 80.0) + rows(80.0, 10.0, share=0.6, seed=1))
+    watched(rows(0.0, 5.0), healthy=wrong)
+    assert f"{wrong}: warning: 1 alarms in this healthy log" in capsys.readouterr().err
+    right = written(tmp_path / "right.csv", rows(0.0, 80.0))
+    watched(rows(0.0, 5.0), healthy=right)
+    assert "alarms" not in capsys.readouterr().err
+
+
+def test_a_healthy_log_without_the_pressure_of_the_stream_is_refused(tmp_path: Path) -> None:
+    healthy = written(tmp_path / "healthy.csv", rows(0.0, 80.0))
+    with_pressure = [line.replace("\n", ",1e5\n") for line in rows(0.0, 5.0)]
+    header = HEADER + ",differential_pressure_pa"
+    with pytest.raises(LogError, match="the healthy log must have differential_pressure_pa, as the stream has"):
+        watched(with_pressure, header=header, healthy=healthy)
+    events, _ = watched(with_pressure, header=header, healthy=healthy, no_pressure=True)
+    assert named(events) == ["start", "ready"]
+
+
+def test_batches_that_are_missing_are_counted_by_their_fate(capsys: pytest.CaptureFixture[str]) -> None:
+    told_of("mqtt://bench/press", Received(batches=7, late=1, lost=2, dropped=3))
+    assert capsys.readouterr().err.splitlines() == [
+        "mqtt://bench/press: warning: 2 batches never came beside 7 that were read",
+        "mqtt://bench/press: warning: 1 batches came late or twice beside 7 that were read",
+        "mqtt://bench/press: warning: 3 batches found no room to wait beside 7 that were read",
+    ]
+    told_of("mqtt://bench/press", Received(batches=7))
+    assert capsys.readouterr().err == ""
+
+
+def test_what_is_missing_is_told_even_if_the_stream_ends_in_an_error(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def lines(_: str, received: Received) -> Any:
+        received.lost = 4
+        yield HEADER + "\n"
+        yield "nothing\n"
+
+    monkeypatch.setattr(watching, "stream_lines", lines)
+    with pytest.raises(LogError):
+        watching.watch_network(Told(lambda _: None), "tcp://bench:1", asked(), None)
+    assert "4 batches never came" in capsys.readouterr().err
+
+
+def test_what_the_reader_doubts_of_a_stream_is_said_once() -> None:
+    lines = "".join([HEADER + ",speed_rpm\n", *(line.replace("\n", ",7\n") for line in rows(0.0, 5.0))])
+    done = CliRunner().invoke(app, ["watch", "-"], input=lines)
+    said = [line for line in done.stderr.splitlines() if "warning" in line]
+    assert done.exit_code == 0, done.stderr
+    assert [json.loads(line)["event"] for line in done.stdout.splitlines()] == ["start", "end"]
+    assert len(said) == len(set(said))
