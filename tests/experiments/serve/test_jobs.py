@@ -11,9 +11,10 @@ import pytest
 from pebble import ProcessExpired
 
 from experiments.serve.desk import Desk
-from experiments.serve.jobs import MOST_TRIES, Jobs, log_file, page_file, phase_file
+from experiments.serve.jobs import MOST_TRIES, MOST_VIEWS, BusyError, Jobs, log_file, page_file, phase_file
 from experiments.serve.settings import MB, Settings
 from experiments.serve.store import Kept, Store
+from experiments.serve.work import NO_MEMORY, Worked
 from plant.errors import HydrostateError
 
 
@@ -93,6 +94,7 @@ def test_what_is_unfinished_is_taken_up_in_its_order_and_what_ended_servers_is_g
     [
         (TimeoutError(), "took longer than 300 s"),
         (ProcessExpired("gone", code=-9), "code -9"),
+        (ProcessExpired("gone", code=NO_MEMORY), "needs more memory than the 3072 MB"),
         (ValueError("odd"), "please report it"),
     ],
 )
@@ -107,6 +109,125 @@ def test_work_that_is_lost_is_told_so(
     assert found is not None
     assert (found.state, jobs.waiting) == ("failed", 0)
     assert words in str(found.message)
+
+
+@pytest.fixture
+def pending(monkeypatch: pytest.MonkeyPatch) -> list["Future[Any]"]:
+    """Return the futures of a pool whose work is still under way."""
+    futures: list[Future[Any]] = []
+    monkeypatch.setattr(Ending, "ends", staticmethod(futures.append), raising=False)
+    monkeypatch.setattr("experiments.serve.jobs.ProcessPool", Ending)
+    return futures
+
+
+def worked(outcome: str = "ok") -> Worked:
+    return Worked({"file": "a.csv", "outcome": outcome, "message": "said"}, None)
+
+
+def files_of(settings: Settings, identity: str) -> list[Path]:
+    return [
+        path for path in (place(settings, identity) for place in (log_file, page_file, phase_file)) if path.exists()
+    ]
+
+
+@pytest.mark.parametrize(("outcome", "state"), [("ok", "done"), ("mismatch", "done"), ("failed", "failed")])
+def test_work_that_is_done_is_kept_with_its_page_and_leaves_the_queue(
+    settings: Settings, store: Store, pending: list["Future[Any]"], outcome: str, state: str
+) -> None:
+    jobs = Jobs(settings, store)
+    jobs.submit(added(store, settings, "a"))
+    assert (jobs.waiting, jobs.phase("a")) == (1, None)
+    phase_file(settings, "a").write_text("reading the log")
+    page_file(settings, "a").write_text("a page")
+    assert jobs.phase("a") == "reading the log"
+    pending[0].set_result(worked(outcome))
+    found = store.get("a")
+    assert found is not None
+    assert (found.state, found.outcome, jobs.waiting, jobs.phase("a")) == (state, outcome, 0, None)
+    assert files_of(settings, "a") == [log_file(settings, "a"), page_file(settings, "a")]
+
+
+def test_a_log_that_is_taken_back_leaves_no_file_even_if_its_page_is_written_afterwards(
+    settings: Settings, store: Store, pending: list["Future[Any]"]
+) -> None:
+    jobs = Jobs(settings, store)
+    for identity in ("a", "b"):
+        jobs.submit(added(store, settings, identity))
+    pending[0].set_running_or_notify_cancel()
+    jobs.cancel("a")  # too late to leave the queue: its process is at it
+    page_file(settings, "a").write_text("half")
+    pending[0].set_result(worked())
+    jobs.cancel("b")  # in time
+    jobs.cancel("b")
+    assert files_of(settings, "a") == files_of(settings, "b") == []
+    assert jobs.waiting == 0
+    unfinished = [one.id for one in store.unfinished()]
+    assert unfinished == ["a", "b"]  # whoever takes a log back deletes it in the store
+
+
+def test_a_log_that_is_deleted_in_the_store_meanwhile_leaves_no_page(
+    settings: Settings, store: Store, pending: list["Future[Any]"]
+) -> None:
+    jobs = Jobs(settings, store)
+    jobs.submit(added(store, settings, "a"))
+    page_file(settings, "a").write_text("a page")
+    store.delete("a")
+    pending[0].set_result(worked())
+    assert files_of(settings, "a") == []
+    assert (store.get("a"), jobs.waiting) == (None, 0)
+
+
+def test_what_is_under_way_when_a_server_closes_stays_unfinished(
+    settings: Settings, store: Store, pending: list["Future[Any]"]
+) -> None:
+    jobs = Jobs(settings, store)
+    jobs.submit(added(store, settings, "a"))
+    jobs.close()
+    pending[0].set_exception(ProcessExpired("the pool was stopped", code=-15))
+    assert [one.id for one in store.unfinished()] == ["a"]
+    assert files_of(settings, "a") == [log_file(settings, "a")]
+
+
+def test_a_diagnosis_that_is_lost_has_a_row_in_the_fleet_and_another_verb_has_none(
+    settings: Settings, store: Store, pending: list["Future[Any]"]
+) -> None:
+    jobs = Jobs(settings, store)
+    for identity, verb in (("a", "diagnose"), ("b", "estimate")):
+        log_file(settings, identity).write_bytes(b"")
+        jobs.submit(store.add(identity, f"{identity}.csv", verb, 0))
+        pending[-1].cancel()
+    ((identity, name, entries),) = store.diagnosed()
+    assert (identity, name) == ("a", "a.csv")
+    assert entries == {"outcome": "failed", "reason": "it was cancelled"}
+    said = [one.message for one in store.latest(2)]
+    assert said == ["it was cancelled"] * 2
+
+
+def test_no_more_pages_over_many_logs_are_made_at_once_than_may_be(
+    settings: Settings, store: Store, pending: list["Future[Any]"]
+) -> None:
+    jobs = Jobs(settings, store)
+    for _ in range(MOST_VIEWS):
+        jobs.view(len, "page")
+    with pytest.raises(BusyError):
+        jobs.view(len, "page")
+    assert len(pending) == MOST_VIEWS
+    pending[3].set_result(4)
+    pending[5].set_exception(TimeoutError())
+    for _ in range(2):
+        jobs.view(len, "page")
+    with pytest.raises(BusyError):
+        jobs.view(len, "page")
+
+
+def test_files_of_work_that_stopped_are_cleared_and_phases_of_work_are_not(
+    settings: Settings, store: Store, pending: list["Future[Any]"]
+) -> None:
+    (settings.work / "half.part").write_bytes(b"x")
+    (settings.work / "other").write_bytes(b"x")
+    Jobs(settings, store).resume()
+    assert [path.name for path in settings.work.iterdir()] == ["other"]
+    assert pending == []
 
 
 def test_a_folder_has_one_server_and_no_files_of_logs_that_are_gone(

@@ -108,3 +108,60 @@ def test_a_stream_s_process_says_how_it_ended(
     assert (kind, last["event"], closed) == ("event", "end", "closed")
     assert last["outcome"] == ("ok" if error is None else "failed")
     assert words in json.dumps(last)
+
+
+def test_a_worker_is_bound_to_its_limit_of_memory_and_ends_with_its_server(monkeypatch: pytest.MonkeyPatch) -> None:
+    import resource
+
+    limits, looks, slept, ended = dict[int, Any](), list[Any](), list[float](), list[int]()
+    parents, environment = iter([41, 41, 1]), {"OMP_NUM_THREADS": "2"}
+    monkeypatch.setattr(resource, "setrlimit", limits.__setitem__)
+    thread = SimpleNamespace(
+        Thread=lambda target, daemon: SimpleNamespace(start=lambda: looks.append((target, daemon)))
+    )
+    monkeypatch.setattr(work, "threading", thread)
+    monkeypatch.setattr(work, "time", SimpleNamespace(sleep=slept.append))
+    process = {"environ": environment, "getppid": lambda: next(parents), "_exit": ended.append}
+    monkeypatch.setattr(work, "os", SimpleNamespace(**process))
+    work.begin_worker(41, 1000)
+    assert limits == {resource.RLIMIT_DATA: (1000, 1000), resource.RLIMIT_CORE: (0, 0)}
+    assert environment["OPENBLAS_NUM_THREADS"] == environment["MKL_NUM_THREADS"] == "1"
+    assert environment["OMP_NUM_THREADS"] == "2"
+    ((look, daemon),) = looks
+    assert daemon
+    look()
+    assert (slept, ended) == ([work.LOOKED_AFTER] * 2, [1])
+
+
+def test_a_log_that_is_looked_into_gets_a_page_with_its_columns_and_the_client_s_name(
+    stack_log: Path, tmp_path: Path
+) -> None:
+    found = work_on(task(stack_log, tmp_path, verb="inspect"))
+    assert found.result["outcome"] == "ok"
+    assert found.result["reads"] is True
+    assert found.entries is None
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "mine.csv" in page
+    assert "time_s" in page
+
+
+def test_a_log_of_the_gear_pump_actuator_gets_the_row_of_a_batch(tmp_path: Path) -> None:
+    out = tmp_path / "kept-under-a-number.csv"
+    words = ["simulate", "--duration", "2", "--sample-time", "2e-3", "--condition", "major_leakage"]
+    made = CliRunner().invoke(app, [*words, "--out", str(out)])
+    assert made.exit_code == 0, made.output
+    found = work_on(task(out, tmp_path, plant=None))
+    assert found.entries is not None
+    assert found.result["plant"] == "eha"
+    assert found.entries["found_condition"] == found.result["condition"]
+    assert (tmp_path / "page.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+
+
+def test_a_rig_that_cannot_be_read_fails_a_log_with_its_reason(stack_log: Path, tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text("moving_mass = 'heavy'")
+    found = work_on(task(stack_log, tmp_path, rig=rig))
+    assert found.entries is not None
+    assert found.result["outcome"] == found.entries["outcome"] == "failed"
+    assert "rig.toml" in found.result["message"]
+    assert "rig.toml" in found.entries["reason"]

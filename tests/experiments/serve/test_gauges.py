@@ -1,0 +1,150 @@
+"""The process of a stream: what its gauges say of what came, and how it ends."""
+
+import os
+import signal
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.serve import gauges
+from experiments.serve.gauges import EVERY, Gauges, watch_stream
+
+HEADER = "time_s,motor_speed_rad_s,velocity_m_s\n"
+
+
+class Clock:
+    """A monotonic clock that stands where it is put [s]."""
+
+    now = 100.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def sent() -> list[Any]:
+    return []
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    one = Clock()
+    monkeypatch.setattr(gauges, "time", one)
+    return one
+
+
+def watching(sent: list[Any]) -> Gauges:
+    found = Gauges(SimpleNamespace(send=sent.append))  # type: ignore[arg-type]
+    found.watch = SimpleNamespace(balances=("flow",), scores=(1.0,), thresholds=(4.0,), last=7.0)  # type: ignore[assignment]
+    return found
+
+
+def test_gauges_come_no_more_often_than_they_may_and_lose_no_extreme_meanwhile(sent: list[Any], clock: Clock) -> None:
+    found = watching(sent)
+    found.saw({"a": np.array([1.0])}, 0.1, False)
+    for seconds, value in ((0.2, 9.0), (0.6, -9.0), (1.01, 0.0)):
+        clock.now = 100.0 + seconds * EVERY
+        found.saw({"a": np.array([value])}, 0.2, False)
+    assert [entries["rows"] for _, entries in sent] == [1, 4]
+    last = sent[-1][1]
+    assert (last["low"], last["high"], last["values"]) == ({"a": -9.0}, {"a": 9.0}, {"a": 0.0})
+
+
+def test_a_channel_that_is_silent_has_no_range_and_its_rows_are_not_whole(sent: list[Any], clock: Clock) -> None:
+    del clock
+    watching(sent).saw({"a": np.array([np.nan, np.nan]), "b": np.array([1.0, 2.0])}, 0.1, False)
+    ((_, told),) = sent
+    assert (told["low"], told["high"], told["rows"]) == ({"b": 1.0}, {"b": 2.0}, 0)
+    assert told["values"] == {"a": None, "b": 2.0}
+
+
+def test_before_the_watch_has_begun_there_are_no_gauges(sent: list[Any], clock: Clock) -> None:
+    del clock
+    Gauges(SimpleNamespace(send=sent.append)).saw({"a": np.array([1.0])}, 0.1, False)  # type: ignore[arg-type]
+    assert sent == []
+
+
+class Pipe:
+    """The end of a pipe to a server, which may be gone."""
+
+    def __init__(self, gone: bool = False) -> None:
+        self.sent: list[Any] = []
+        self.gone, self.closed = gone, False
+
+    def send(self, one: Any) -> None:
+        if self.gone:
+            raise BrokenPipeError
+        self.sent.append(one)
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.fixture
+def looks(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """Return the threads that would look after the server; signals stay as they are."""
+    threads: list[Any] = []
+
+    def thread(target: Any, daemon: bool) -> Any:
+        assert daemon
+        return SimpleNamespace(start=lambda: threads.append(target))
+
+    monkeypatch.setattr(gauges, "threading", SimpleNamespace(Thread=thread))
+    monkeypatch.setattr(gauges, "signal", SimpleNamespace(signal=lambda *_: None, SIGINT=signal.SIGINT, SIG_IGN=None))
+    return threads
+
+
+def run(pipe: Pipe, state: Path, server: int = 1) -> None:
+    watch_stream(pipe, server, "tcp://nowhere:1", None, (), 0.1, state)  # type: ignore[arg-type]
+
+
+def rows(*_: object) -> list[str]:
+    """Return three seconds of rows, the last of which is broken."""
+    return [HEADER, *(f"{0.01 * k:.2f},20,0.01\n" for k in range(300)), "3.00,x,0\n"]
+
+
+def test_a_stream_that_breaks_tells_its_last_gauges_before_its_end(
+    looks: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.command.watching.stream_lines", rows)
+    pipe = Pipe()
+    run(pipe, tmp_path / "state.npz")
+    *_, (kind, last), (_, end) = pipe.sent
+    assert (kind, last["rows"]) == ("gauges", 300)
+    assert (end["event"], end["outcome"]) == ("end", "failed")
+    assert "must hold numbers" in end["message"]
+    assert pipe.closed
+    assert len(looks) == 1
+    assert (tmp_path / "state.npz").exists()
+
+
+def test_a_server_that_is_gone_is_told_nothing_and_raises_nothing(
+    looks: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    del looks
+    monkeypatch.setattr("experiments.command.watching.stream_lines", rows)
+    pipe = Pipe(gone=True)
+    run(pipe, tmp_path / "state.npz")
+    assert pipe.closed
+
+
+def test_the_process_ends_when_its_server_has_and_not_before(
+    looks: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.command.watching.stream_lines", rows)
+    run(Pipe(), tmp_path / "state.npz", server=41)
+    parents, slept, ended = iter([41, 41, 1]), list[float](), list[int]()
+    monkeypatch.setattr(gauges, "os", SimpleNamespace(getppid=lambda: next(parents), _exit=ended.append))
+    monkeypatch.setattr(gauges, "time", SimpleNamespace(sleep=slept.append))
+    looks[0]()
+    assert (slept, ended) == ([1.0, 1.0], [1])
+
+
+@pytest.fixture(autouse=True)
+def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep what a process sets for itself out of this one."""
+    for name in ("OPENBLAS", "OMP", "MKL"):
+        monkeypatch.setenv(f"{name}_NUM_THREADS", os.environ.get(f"{name}_NUM_THREADS", "1"))
