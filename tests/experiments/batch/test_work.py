@@ -1,16 +1,20 @@
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from typer.testing import CliRunner
 
-from experiments.batch.cases import Task, plan_study
+from experiments.batch import work
+from experiments.batch.cases import Plan, Task, plan_study
 from experiments.batch.series import Group
 from experiments.batch.study_file import parse_study
-from experiments.batch.work import DRAWN_ONCE, Part, run_task
+from experiments.batch.work import DRAWN_ONCE, Part, lost_task, run_task
+from experiments.cli import app
 from plant.eha.drives import DRIVES
 from plant.eha.model import EhaParameters
 from tests.experiments.batch.conftest import FILTER, small_plan
@@ -109,3 +113,118 @@ def test_a_filter_that_diverges_beside_others_is_a_row_without_numbers() -> None
     numbers = ("bulk_modulus_pa", "bulk_modulus_std_pa", "error_percent", "nis_position", "log_likelihood")
     assert [diverged[name] for name in numbers] == [None] * 5
     assert None not in [fine[name] for name in numbers]
+
+
+def rows_of(plan: Plan) -> list[dict[str, Any]]:
+    return table_of(run_task(Task(plan.rig, plan.groups, plan.study.plant))).to_pylist()
+
+
+def test_a_filter_uses_pressure_only_if_it_may_and_starts_from_the_rig_s_guess_unless_told() -> None:
+    pressure = {"verb": "filter", "form": "pressure", "method": "ekf"}
+    methods = [pressure, {**pressure, "pressure": False}]
+    change = {"plants": ["lumped"], "drives": ["steps"], "conditions": ["normal"], "seeds": 1, "duration_s": 0.5}
+    told = rows_of(
+        small_plan(**change, methods=methods, starts_pa=[EhaParameters().bulk_modulus, 1e8], sample_time_s=1e-3)
+    )
+    own = rows_of(small_plan(**change, methods=methods, starts_pa=[], sample_time_s=1e-3))
+    assert [row["nis_pressure"] is None for row in own] == [False, True]
+    by_use = {pressure: [row for row in told if row["pressure"] is pressure] for pressure in (True, False)}
+    for row in own:
+        same, other = by_use[row["pressure"]]
+        assert row["bulk_modulus_pa"] == pytest.approx(same["bulk_modulus_pa"], rel=1e-12)
+        assert row["bulk_modulus_pa"] != other["bulk_modulus_pa"]
+
+
+def test_a_method_knows_the_simulated_condition_or_the_healthy_rig_as_the_study_says() -> None:
+    filters = [{**FILTER, "told": told} for told in ("condition", "healthy")]
+    change = {"conditions": ["major_leakage"], "seeds": 1, "starts_pa": [2e8], "duration_s": 0.5}
+    knowing, healthy = rows_of(small_plan(**change, methods=filters))
+    assert (knowing["told"], healthy["told"]) == ("condition", "healthy")
+    assert 5.0 * abs(knowing["error_percent"]) < abs(healthy["error_percent"])
+
+
+def test_an_estimate_of_a_simulated_run_has_its_error_and_its_filter_s_innovations() -> None:
+    change = {"plants": ["lumped"], "drives": ["steps"], "conditions": ["normal"], "seeds": 1}
+    asked = [{"verb": "estimate", "form": "pressure", "method": "ekf"}, {"verb": "estimate"}]
+    plan = small_plan(**change, duration_s=1.0, sample_time_s=1e-3, starts_pa=[], methods=asked)
+    filtered, fitted = rows_of(plan)
+    for row in (filtered, fitted):
+        truth = EhaParameters().bulk_modulus
+        assert row["true_bulk_modulus_pa"] == truth
+        assert row["error_percent"] == pytest.approx(100.0 * (row["bulk_modulus_pa"] / truth - 1.0))
+    assert filtered["nis_pressure"] > 0.0
+
+
+def log_of(seconds: float = 0.5, **changes: np.ndarray) -> str:
+    """Return a log that moves, as CSV."""
+    time = np.arange(0.0, seconds, 1e-3)
+    columns = {
+        "motor_speed_rad_s": 100.0 * np.sin(20.0 * time),
+        "position_m": -1.5e-3 * np.cos(20.0 * time),
+        "velocity_m_s": 0.03 * np.sin(20.0 * time),
+        **changes,
+    }
+    rows = np.column_stack([time, *columns.values()])
+    lines = [",".join(f"{one:.9g}" if np.isfinite(one) else "" for one in row) for row in rows]
+    return "\n".join([",".join(["time_s", *columns]), *lines]) + "\n"
+
+
+def logs_plan(folder: Path, *methods: dict[str, Any], plant: str = "eha") -> Plan:
+    content = {"name": "logs", "plant": plant, "logs": [{"glob": "*.csv", "methods": list(methods)}]}
+    return plan_study(parse_study(content, "logs.toml"), folder)
+
+
+def test_what_the_reader_says_of_a_log_stands_in_each_of_its_rows_and_a_filter_reads_its_noise(tmp_path: Path) -> None:
+    speed = 100.0 * np.sin(20.0 * np.arange(0.0, 0.5, 1e-3))
+    speed[100:103] = np.nan
+    (tmp_path / "a.csv").write_text(log_of(motor_speed_rad_s=speed), encoding="utf-8")
+    (tmp_path / "b.csv").write_text(log_of(), encoding="utf-8")
+    rows = rows_of(logs_plan(tmp_path, FILTER, {"verb": "estimate", "form": "acceleration", "method": "ekf"}))
+    assert [row["file"] for row in rows] == ["a.csv", "a.csv", "b.csv", "b.csv"]
+    holed, whole = rows[:2], rows[2:]
+    assert all("motor_speed_rad_s is missing in 3" in row["warnings"] for row in holed)
+    assert not any("missing in" in (row["warnings"] or "") for row in whole)
+    assert whole[0]["true_bulk_modulus_pa"] is None
+    assert whole[0]["error_percent"] is None
+    assert whole[0]["duration_s"] == pytest.approx(0.5, abs=2e-3)
+
+
+def test_a_method_that_breaks_on_a_log_is_a_row_and_the_other_methods_are_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("by nothing")
+
+    (tmp_path / "a.csv").write_text(log_of(), encoding="utf-8")
+    monkeypatch.setattr(work, "diagnosed", broken)
+    rows = rows_of(logs_plan(tmp_path, {"verb": "diagnose"}, FILTER))
+    outcomes = {row["verb"]: row["outcome"] for row in rows}
+    assert outcomes == {"diagnose": "failed", "filter": "ok"}
+    (reason,) = (row["reason"] for row in rows if row["verb"] == "diagnose")
+    assert reason == "an internal error, ZeroDivisionError: by nothing"
+
+
+def test_a_study_of_another_actuator_has_its_conditions_as_simulated_and_as_found(tmp_path: Path) -> None:
+    methods = [{"verb": "diagnose"}]
+    runs = [{"conditions": ["normal"], "duration_s": 0.03, "methods": methods}]
+    content = {"name": "stack", "plant": "piezo-stack", "runs": runs}
+    (simulated,) = rows_of(plan_study(parse_study(content, "stack.toml"), tmp_path))
+    assert (simulated["plant"], simulated["condition"]) == ("piezo-stack", "normal")
+    assert simulated["found_condition"] == "normal"
+    out = tmp_path / "run.csv"
+    words = ["simulate", "--plant", "piezo-stack", "--duration", "0.03", "--fault", "major_leakage", "--out", str(out)]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    (logged,) = rows_of(logs_plan(tmp_path, *methods, plant="piezo-stack"))
+    assert (logged["plant"], logged["file"], logged["found_condition"]) == ("piezo-stack", "run.csv", "major_leakage")
+
+
+def test_cases_of_a_worker_that_ended_are_failed_rows_with_their_keys() -> None:
+    plan = small_plan(seeds=1)
+    task = Task(plan.rig, plan.groups)
+    part = lost_task(task, "the worker ended")
+    rows = table_of(part).to_pylist()
+    assert [row["key"] for row in rows] == list(plan.keys)
+    assert {(row["outcome"], row["reason"]) for row in rows} == {("failed", "the worker ended")}
+    words = [said for said, _ in part.failures]
+    assert words[0] == "reduced sine normal seed 0 (filter)"
+    assert len(words) == len(rows)
