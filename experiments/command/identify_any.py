@@ -146,7 +146,8 @@ def _answer(
 
         write_free_run(found.model, data, logs[0].name, figure)
     if asked.simulated is not None:
-        _write_simulated(found.model, data, figure_path(asked.simulated, Path(output), len(asked.outputs)))
+        place = figure_path(asked.simulated, Path(output), len(asked.outputs))
+        _write_simulated(found.model, data, place or asked.simulated)
     answer = None if asked.response is None else _response(data, logs[0].name, asked.response, len(asked.outputs))
     return {**BLANK, **entries(found), "test": test, "frequency_response": answer}
 
@@ -276,7 +277,8 @@ def simulate_any(logs: Sequence[Path], path: Path, asked: Asked, *, as_json: boo
             results.append({"inputs": list(inputs), "output": outputs[index], "structure": model.structure, **quality})
             if asked.simulated is not None:
                 several = figure_path(asked.simulated, log, len(logs))
-                _write_simulated(model, data, figure_path(several, Path(outputs[index]), len(models)))
+                place = figure_path(several, Path(outputs[index]), len(models))
+                _write_simulated(model, data, place or asked.simulated)
         first = results[0]
         message = clauses([f"{one['output']}: fit {one['fit_percent']:.1f} % running free" for one in results])
         return {"outcome": "ok", **first, "outputs": results, "model_file": str(path), "message": message}
@@ -285,10 +287,8 @@ def simulate_any(logs: Sequence[Path], path: Path, asked: Asked, *, as_json: boo
     finish(run_logs(logs, work, blank, "simulating"), _simulated_screen, as_json=as_json, out=out)
 
 
-def _write_simulated(model: "FreeRunModel", data: "Channels", path: Path | None) -> None:
+def _write_simulated(model: "FreeRunModel", data: "Channels", path: Path) -> None:
     """Write time, inputs, measured and simulated output of the first log as CSV."""
-    if path is None:
-        return
     import numpy as np
     import pandas as pd
 

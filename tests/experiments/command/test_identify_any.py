@@ -165,6 +165,58 @@ def test_a_frequency_response_is_drawn_and_printed_with_its_levels(tmp_path: Pat
             assert told["noise_power"] == pytest.approx(1e-4 / 1024 / 3, rel=0.2)
 
 
+@pytest.fixture(scope="module")
+def saved(logs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return models of both outputs."""
+    path = tmp_path_factory.mktemp("model") / "model.json"
+    channels = ("--input", "Valve [%],load", "--output", "flow,heat", "--order", 1, "--delay", 1)
+    ran = run(logs[0], *channels, "--out", path, "--json")
+    assert ran.exit_code == 0, ran.output
+    return path
+
+
+def test_a_saved_model_is_simulated_on_each_log_and_each_run_is_written_to_its_own_file(
+    logs: list[Path], saved: Path, tmp_path: Path
+) -> None:
+    shown = run(*logs[1:], "--simulate", saved, "--simulated", tmp_path / "run.csv")
+    assert shown.exit_code == 0, shown.output
+    assert [shown.stdout.count(name) for name in ("flow", "heat")] == [2, 2]
+    written = sorted(path.name for path in tmp_path.iterdir())
+    assert written == [f"run-{log}-{output}.csv" for log in ("run2", "run3") for output in ("flow", "heat")]
+    table = pd.read_csv(tmp_path / "run-run2-flow.csv")
+    assert list(table) == ["time_s", "Valve [%]", "load", "flow", "flow_simulated"]
+    assert table["time_s"].to_numpy() == pytest.approx(0.02 * np.arange(300))
+    assert np.std(table["flow_simulated"] - table["flow"]) < 0.05 * np.std(table["flow"])
+    (tmp_path / "alone").mkdir()
+    run(logs[1], "--simulate", saved, "--output", "heat", "--simulated", tmp_path / "alone" / "run.csv")
+    assert [path.name for path in (tmp_path / "alone").iterdir()] == ["run.csv"]
+
+
+def test_a_saved_model_is_asked_for_one_of_its_outputs_or_for_columns_of_other_names(
+    logs: list[Path], saved: Path, tmp_path: Path
+) -> None:
+    (one,) = json.loads(run(logs[1], "--simulate", saved, "--output", "heat", "--json").stdout)
+    assert [part["output"] for part in one["outputs"]] == ["heat"]
+    table = pd.read_csv(logs[1]).rename(columns={"Valve [%]": "a", "load": "b", "flow": "c", "heat": "d"})
+    table.to_csv(tmp_path / "renamed.csv", index=False)
+    names = ("--input", "a,b", "--output", "c,d")
+    (other,) = json.loads(run(tmp_path / "renamed.csv", "--simulate", saved, *names, "--json").stdout)
+    assert [part["output"] for part in other["outputs"]] == ["c", "d"]
+    assert other["outputs"][1]["fit_percent"] == pytest.approx(one["outputs"][0]["fit_percent"], abs=1e-9)
+    for wrong in (("--input", "a", "--output", "c,d"), ("--input", "a,b", "--output", "c")):
+        refused = run(tmp_path / "renamed.csv", "--simulate", saved, *wrong)
+        assert refused.exit_code == 2
+        assert "the model goes from 2 inputs to 2 outputs, got columns for" in " ".join(refused.output.split())
+
+
+def test_a_frequency_response_has_one_input(logs: list[Path], tmp_path: Path) -> None:
+    channels = ("--input", "Valve [%],load", "--output", "heat", "--order", 1, "--delay", 1)
+    ran = run(logs[0], *channels, "--response", tmp_path / "response.png")
+    assert ran.exit_code == 2
+    assert "--response takes one input, got Valve [%], load" in " ".join(ran.output.split())
+    assert not (tmp_path / "response.png").exists()
+
+
 def test_a_backlash_is_said_with_its_interval(tmp_path: Path) -> None:
     data = logged(PLANTED[2], 1)
     table = pd.DataFrame({"u": data.u[0][:, 0], "y": data.y[0]}, index=0.01 * np.arange(data.y[0].size))

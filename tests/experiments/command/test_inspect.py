@@ -76,3 +76,55 @@ def test_names_with_escape_codes_do_not_reach_the_terminal(tmp_path: Path) -> No
     path.write_text("time_s,x\x1b[31m\n" + "".join(f"{k},{k}\n" for k in range(20)))
     done = invoke(path)
     assert "\x1b" not in done.stdout + done.stderr
+
+
+def test_several_files_are_looked_into_together_unless_what_is_written_goes_with_one(
+    strange: Path, tmp_path: Path
+) -> None:
+    other = tmp_path / "other.csv"
+    other.write_text("time_s,x\n" + "".join(f"{0.1 * k:.1f},{k}\n" for k in range(20)))
+    assert len(json.loads(invoke(strange, other, "--json").stdout)) == 2
+    for option in (("--html", tmp_path / "a.html"), ("--write", tmp_path / "a.toml"), ("--with", strange)):
+        done = invoke(strange, other, *option)
+        assert done.exit_code == 2
+        assert "go with one file, got several" in done.stderr
+    assert not list(tmp_path.glob("a.*"))
+
+
+def test_each_channel_is_the_surest_column_of_all_files_of_a_test(tmp_path: Path) -> None:
+    named, vague = tmp_path / "named.csv", tmp_path / "vague.csv"
+    weg = np.cumsum(4e-4 * SPEED) * 1e-3
+    for path, heading in ((named, "position [mm]"), (vague, "ch2")):
+        rows = (f"{t:.3f},{1e3 * x:.6f}\n" for t, x in zip(TIME, weg, strict=True))
+        path.write_text(f"time_s,{heading}\n" + "".join(rows))
+    for first, second in ((named, vague), (vague, named)):
+        (found,) = json.loads(invoke(first, "--with", second, "--json").stdout)
+        assert found["columns"]["position_m"] == "position [mm]:mm"
+
+
+def test_what_a_clock_lacks_is_said_in_the_column_s_own_unit(tmp_path: Path) -> None:
+    steps = np.ones(40)
+    steps[7] = 5.0  # three are missing
+    steps[20] = 0.0
+    steps[30] = -1.0
+    time = np.concatenate([[0.0], np.cumsum(steps)])
+    path = tmp_path / "flawed.csv"
+    path.write_text("time_ms,speed_rpm\n" + "".join(f"{t:.3f},{100 + k}\n" for k, t in enumerate(time)))
+    (found,) = json.loads(invoke(path, "--json").stdout)
+    clock = found["tables"][0]["clock"]
+    assert (clock["step"], clock["gaps"], clock["repeats"], clock["backward"]) == (1.0, 1, 1, 1)
+    told = " ".join(invoke(path).stdout.split())
+    assert "clock: steps of 1 in the column's unit; 1 gaps, 1 repeats, 1 steps back" in told
+    even = tmp_path / "even.csv"
+    even.write_text("time_ms,speed_rpm\n" + "".join(f"{k + 0.1 * (k % 2):.3f},{100 + k}\n" for k in range(40)))
+    assert "jitter of" in " ".join(invoke(even).stdout.split())
+
+
+def test_a_log_without_a_clock_or_a_known_column_is_told_what_to_give(tmp_path: Path) -> None:
+    path = tmp_path / "blank.csv"
+    rng = np.random.default_rng(0)
+    path.write_text("k,note\n" + "".join(f"{one:.4f},word\n" for one in rng.normal(size=50)))
+    told = " ".join(invoke(path).stdout.split())
+    assert "no column is a clock: --sample-time S reads it" in told
+    assert "no column was recognised; name the columns yourself" in told
+    assert "or add to one command" not in told

@@ -173,10 +173,11 @@ def test_a_heartbeat_comes_while_no_row_does_and_every_event_has_the_clock(log: 
     assert code == 0
     assert [one["event"] for one in events if one["event"] != "alive"] == ["start", "end"]
     assert events[-1]["event"] == "end"
-    silent = [one["silent_s"] for one in events if one["event"] == "alive" and one["samples"]]
+    taken = [one["samples"] for one in events if one["event"] == "alive"]
+    silent = [one["silent_s"] for one in events if one["event"] == "alive" and one["samples"] == 400]
+    assert taken == sorted(taken)  # a beat may fall between two pieces of what came
     assert len(silent) >= 2
     assert silent == sorted(silent)
-    assert {one["samples"] for one in events if one["event"] == "alive"} <= {0, 400}
     stamps = [datetime.fromisoformat(one["clock"]) for one in events]
     assert stamps == sorted(stamps)
     assert stamps[-1].tzinfo is not None
