@@ -36,10 +36,10 @@ class Desk:
     jobs: Jobs
     streams: Streams
     room: Room
+    _lock: TextIO
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
-        self._lock: TextIO | None = None
         self._fleet: tuple[str, asyncio.Future[str]] | None = None
 
     def open(self) -> None:
@@ -73,8 +73,7 @@ class Desk:
         self.streams.close()
         self.jobs.close()
         self.store.close()
-        if self._lock is not None:
-            self._lock.close()
+        self._lock.close()
 
     def require_place(self) -> None:
         """Refuse a log that would wait too long.
@@ -186,21 +185,27 @@ class Desk:
             If no log was diagnosed yet, or too much is asked at once.
         """
         revision = await asyncio.to_thread(self.store.revision)
-        known = self._fleet
-        if known is None or known[0] != revision or known[1].cancelled():
+        page = self._page_of(revision)
+        if page is None:
             rows = await asyncio.to_thread(lambda: list(self.store.diagnosed()))
             if not rows:
                 raise RefusedError(404, "no log was diagnosed yet")
+            page = self._page_of(revision)  # another request may have asked for it meanwhile
+        if page is None:
             name = self.settings.folder.resolve().name
-            page = asyncio.ensure_future(
-                self._view(fleet_view, rows, self.settings.pattern, dict(self.settings.limits), name)
-            )
-            self._fleet = known = (revision, page)
+            made = self._view(fleet_view, rows, self.settings.pattern, dict(self.settings.limits), name)
+            page = asyncio.ensure_future(made)
+            self._fleet = (revision, page)
         try:
-            return await asyncio.shield(known[1])
+            return await asyncio.shield(page)
         except RefusedError:
             self._fleet = None
             raise
+
+    def _page_of(self, revision: str) -> "asyncio.Future[str] | None":
+        """Return the page of the fleet that is there or under way, None where it is to be made."""
+        known = self._fleet
+        return None if known is None or known[0] != revision or known[1].cancelled() else known[1]
 
     async def comparison(self, first: str, second: str) -> str:
         """Return the page of two logs side by side.

@@ -1,5 +1,5 @@
 from collections.abc import Callable, Generator
-from concurrent.futures import Executor, Future
+from concurrent.futures import CancelledError, Executor, Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from pathlib import Path
@@ -7,10 +7,12 @@ from threading import Event
 from typing import Any
 
 import pyarrow as pa
+import pytest
 
 from experiments.batch.part_store import open_store
 from experiments.batch.runner import WORKER_ENDED
 from experiments.running.executors import SerialExecutor
+from plant.errors import HydrostateError
 from tests.experiments.batch.conftest import rows_in_parts, run_into, small_plan
 
 
@@ -93,3 +95,58 @@ def test_a_case_that_ends_its_worker_is_found_and_costs_no_other(tmp_path: Path,
         row for row in reference.to_pylist() if row["key"] != deadly
     ]
     assert rows_in_parts(store) == 24
+
+
+class KilledWorker(Exception):  # noqa: N818  Dask's name for it, by which it is known where Dask is not installed
+    """A worker of a cluster ended while it had a task."""
+
+
+class _Failing(SerialExecutor):
+    """Fails in its own way at the task that has one certain case."""
+
+    def __init__(self, key: str, error: BaseException) -> None:
+        self._key, self._error = key, error
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        if self._key not in args[0].keys:
+            return super().submit(fn, *args, **kwargs)
+        future: Future[Any] = Future()
+        future.set_exception(self._error)
+        return future
+
+
+def _open_failing(key: str, error: BaseException) -> Any:
+    @contextmanager
+    def opener() -> Generator[tuple[Executor, int]]:
+        yield _Failing(key, error), 2
+
+    return opener
+
+
+def test_a_cluster_s_worker_that_ended_costs_the_case_and_not_the_cluster(tmp_path: Path, reference: pa.Table) -> None:
+    plan, store = small_plan(), open_store(tmp_path / "store")
+    tally = run_into(store, plan, opener=_open_failing(plan.keys[10], KilledWorker("it ended")))
+    rows = store.rows().to_pylist()
+    assert (tally.done, tally.failed) == (24, 1)
+    assert [row["key"] for row in rows if row["reason"] == WORKER_ENDED] == [plan.keys[10]]
+    kept = [row for row in rows if row["key"] != plan.keys[10]]
+    assert kept == [row for row in reference.to_pylist() if row["key"] != plan.keys[10]]
+
+
+@pytest.mark.parametrize(
+    ("error", "raised", "words"),
+    [
+        (CancelledError(), HydrostateError, "the cluster went away; run the same command again to go on"),
+        (ZeroDivisionError("ours"), ZeroDivisionError, "ours"),
+    ],
+)
+def test_a_cluster_that_goes_away_and_an_error_of_ours_end_the_study_and_lose_nothing_that_was_kept(
+    error: BaseException, raised: type[Exception], words: str, tmp_path: Path, reference: pa.Table
+) -> None:
+    plan, store = small_plan(), open_store(tmp_path / "store")
+    with pytest.raises(raised, match=words):
+        run_into(store, plan, opener=_open_failing(plan.keys[-1], error))
+    before = len(store.rows())
+    assert 0 < before < 24
+    assert run_into(store, plan).done == 24 - before
+    assert store.rows().equals(reference)

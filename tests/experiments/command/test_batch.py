@@ -1,9 +1,12 @@
 import json
+from collections.abc import Callable
 from pathlib import Path
+from threading import Event
 
 import pytest
 from typer.testing import CliRunner, Result
 
+from experiments.batch.runner import Tally
 from experiments.cli import app
 
 STUDY = """
@@ -75,6 +78,53 @@ def test_cases_that_fail_are_named_and_the_exit_code_says_so(study: Path, tmp_pa
     stopped = invoke("batch", study, "--out", tmp_path / "other", "--workers", 1, "--max-failures", 1)
     assert "--max-failures is 1" in stopped.stderr
     assert "the same command goes on from there" in stopped.stderr
+
+
+def test_a_dry_run_tells_a_program_what_is_left(study: Path, tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    for left in (18, 0):
+        (plan,) = json.loads(invoke("batch", study, "--dry-run", "--json", "--workers", 2, "--out", store).stdout)
+        assert (plan["cases"], plan["series"], plan["left"], plan["workers"]) == (18, 6, left, 2)
+        assert (plan["seconds"] > 0.0) is (left > 0)
+        assert invoke("batch", study, "--out", store, "--workers", 1).exit_code == 0
+
+
+def test_a_part_that_was_damaged_is_set_aside_and_its_cases_are_run_again(study: Path, tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    invoke("batch", study, "--out", store, "--workers", 1)
+    part = next(path for path in store.rglob("*.parquet") if "part" in path.as_posix())
+    part.write_bytes(part.read_bytes()[:-100])
+    again = invoke("batch", study, "--out", store, "--workers", 1)
+    assert again.exit_code == 0
+    assert "cannot be read: it is set aside, and its cases are run again" in again.stderr
+    assert "18 of 18 cases done" in again.stderr
+
+
+def test_an_interrupted_study_has_its_own_exit_code_and_says_how_to_go_on(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object, on_part: Callable[..., None], stop: Event, **__: object) -> Tally:
+        del on_part
+        stop.set()
+        return Tally(stopped="interrupted")
+
+    invoke("batch", study, "--out", tmp_path / "store", "--workers", 1)
+    monkeypatch.setattr("experiments.batch.runner.run_batch", interrupted)
+    done = invoke("batch", study, "--out", tmp_path / "store", "--workers", 1, "--json")
+    assert done.exit_code == 130
+    (told,) = json.loads(done.stdout)
+    assert told["outcome"] == "interrupted"
+    assert "interrupted: 18 of 18 cases are kept in" in done.stderr
+
+
+def test_a_long_study_speaks_now_and_then_where_nobody_sees_its_bar(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    quiet = invoke("batch", study, "--out", tmp_path / "quiet", "--workers", 1).stderr
+    monkeypatch.setattr("experiments.command.batch.QUIET_SECONDS", 0.0)
+    told = invoke("batch", study, "--out", tmp_path / "told", "--workers", 1).stderr
+    assert len(told.splitlines()) > len(quiet.splitlines())
+    assert "18 of 18" in told
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,9 @@
 """`hydrostate fleet`: from logs to a page, and again from the store."""
 
 from pathlib import Path
+from typing import Any
 
+import pyarrow as pa
 import pytest
 from typer.testing import CliRunner
 
@@ -49,3 +51,74 @@ def test_a_folder_of_logs_becomes_a_page_with_the_sick_one_first(tmp_path: Path)
     code, _, _ = invoke("fleet", tmp_path / "fleet" / "store", *named, "--out", tmp_path / "again")
     assert code == 1
     assert "Start with B." in (tmp_path / "again" / "index.html").read_text("utf-8")
+
+
+ROW = {"verb": "diagnose", "outcome": "ok", "found_condition": "normal", "reason": None, "quantities": None}
+
+
+class Stored:
+    """A store of a batch study, as far as its rows go."""
+
+    def __init__(self, rows: list[dict[str, Any]]) -> None:
+        self._rows = rows
+
+    def manifest(self) -> dict[str, Any]:
+        return {"name": "batch"}
+
+    def rows(self, columns: list[str]) -> pa.Table:
+        return pa.Table.from_pylist([{name: row.get(name) for name in columns} for row in self._rows])
+
+
+@pytest.mark.parametrize(("outcomes", "code"), [(["ok", "ok"], 0), (["ok", "failed"], 1), (["failed", "failed"], 2)])
+def test_the_exit_code_of_a_fleet_says_whether_all_some_or_none_could_be_read(
+    outcomes: list[str], code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = [{**ROW, "file": f"P_2026-01-0{day}.csv", "outcome": one} for day, one in enumerate(outcomes, start=1)]
+    monkeypatch.setattr("experiments.batch.part_store.open_store", lambda _: Stored(rows))
+    named = ("--pattern", "{actuator}_{date}.csv", "--out", tmp_path / "fleet")
+    found, out, said = invoke("fleet", tmp_path, *named)
+    assert (found, out.strip()) == (code, f"{tmp_path}/fleet/index.html")
+    assert ("could not be read" in said) is (code > 0)
+
+
+def test_a_store_without_diagnoses_is_no_fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stored = Stored([{**ROW, "file": "a.csv", "verb": "estimate"}])
+    monkeypatch.setattr("experiments.batch.part_store.open_store", lambda _: stored)
+    code, _, said = invoke("fleet", tmp_path, "--out", tmp_path / "fleet")
+    assert code == 2
+    assert "must contain logs that were diagnosed" in said
+
+
+def test_files_are_named_by_a_table_or_by_a_pattern_and_not_by_both(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stored = Stored([{**ROW, "file": "a.csv"}, {**ROW, "file": "b.csv"}])
+    monkeypatch.setattr("experiments.batch.part_store.open_store", lambda _: stored)
+    table = tmp_path / "names.csv"
+    table.write_text("file,actuator,date\na.csv,Press 7,2026-01-02\nb.csv,Press 7,2026-01-03\n")
+    code, _, _ = invoke("fleet", tmp_path, "--names", table, "--out", tmp_path / "fleet")
+    assert code == 0
+    assert "None of 1 actuators is past a limit." in (tmp_path / "fleet" / "index.html").read_text("utf-8")
+    code, _, said = invoke("fleet", tmp_path, "--names", table, "--pattern", "{actuator}.csv", "--out", tmp_path / "x")
+    assert code == 2
+    assert "--pattern and --names say the same" in said
+
+
+def test_the_logs_of_another_rig_are_diagnosed_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rig, logs, asked = tmp_path / "rig.toml", tmp_path / "logs", list[Any]()
+    assert invoke("rig", "init", rig)[0] == 0
+    logs.mkdir()
+    for name in ("a.csv", "b.CSV", "c.txt", "note.md"):
+        (logs / name).write_text("time_s\n")
+
+    def ran(plan: Any, *_: Any) -> None:
+        asked.append(plan)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("experiments.command.batch.run_plan", ran)
+    invoke("fleet", logs, "--rig", rig, "--columns", "position_m=POS:mm", "--out", tmp_path / "fleet")
+    (plan,) = asked
+    assert plan.study.rig == str(rig.resolve())
+    assert {one.glob for one in plan.study.logs} >= {"**/*.csv", "**/*.CSV"}
+    assert all(one.columns == {"position_m": "POS:mm"} for one in plan.study.logs)
+    assert not any("md" in one.glob for one in plan.study.logs)

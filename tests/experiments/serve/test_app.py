@@ -128,6 +128,22 @@ def test_a_full_queue_says_when_to_come_again(served: Served) -> None:
     assert int(answer.headers["retry-after"]) > 0
 
 
+def test_no_more_logs_come_in_at_once_than_may_and_no_more_views_are_open(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "MOST_UPLOADS", 0)
+    monkeypatch.setattr(server, "MOST_LOOKING", 0)
+    monkeypatch.setattr("experiments.serve.live.Stream.start", lambda _: None)
+    client = served(streams={"bench": "tcp://127.0.0.1:1"})
+    answers = [
+        client.post("/api/logs", params={"name": "a.csv"}, content=b"a"),
+        client.get("/api/streams/bench/events"),
+    ]
+    assert [one.status_code for one in answers] == [429, 429]
+    assert "0 logs are coming in" in answers[0].text
+    assert "0 views are open, close one" in answers[1].text
+
+
 @pytest.mark.parametrize("settings", [{"largest": 1000}, {"room": 1000}])
 def test_a_body_that_is_too_large_is_refused_while_it_comes(
     served: Served, tmp_path: Path, settings: dict[str, int]

@@ -3,11 +3,12 @@
 import asyncio
 from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from experiments.serve import limits
-from experiments.serve.limits import RefusedError, receive_file
+from experiments.serve.limits import Guard, RefusedError, receive_file
 from experiments.serve.settings import Settings
 from plant.errors import HydrostateError
 
@@ -61,3 +62,51 @@ def test_a_host_that_others_reach_wants_a_token(tmp_path: Path, token: str | Non
     with pytest.raises(HydrostateError, match="token"):
         Settings(folder=tmp_path, host="192.168.0.7", token=token)
     assert Settings(folder=tmp_path, host="192.168.0.7", token="0123456789abcdef").token  # noqa: S106
+
+
+def guarded(app: Any, folder: Path, **settings: Any) -> tuple[Guard, list[dict[str, Any]], Any]:
+    """Return a guard, what it sends, and what asks it for a page."""
+    guard, sent = Guard(app, Settings(folder=folder, **settings)), list[dict[str, Any]]()
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    async def receive() -> dict[str, Any]:
+        return {"type": "http.request", "body": b"", "more_body": False}
+
+    scope = {"type": "http", "method": "GET", "path": "/", "query_string": b"", "headers": [(b"host", b"localhost")]}
+    return guard, sent, lambda: guard(scope, receive, send)
+
+
+def test_requests_beyond_the_most_are_told_to_come_again_and_the_others_are_answered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(limits, "MOST_REQUESTS", 1)
+    waiting = asyncio.Event()
+
+    async def slow(_scope: Any, _receive: Any, send: Any) -> None:
+        await waiting.wait()
+        await send({"type": "http.response.start", "status": 204, "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+
+    async def both() -> list[int]:
+        _, sent, ask = guarded(slow, tmp_path)
+        first = asyncio.ensure_future(ask())
+        await asyncio.sleep(0.0)
+        await ask()
+        waiting.set()
+        await first
+        await ask()
+        return [message["status"] for message in sent if message["type"] == "http.response.start"]
+
+    assert asyncio.run(both()) == [429, 204, 204]
+
+
+def test_a_refusal_in_the_middle_of_an_answer_sends_no_second_one(tmp_path: Path) -> None:
+    async def half(_scope: Any, _receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        raise RefusedError(408, "too late")
+
+    _, sent, ask = guarded(half, tmp_path)
+    asyncio.run(ask())
+    assert [message["type"] for message in sent] == ["http.response.start"]

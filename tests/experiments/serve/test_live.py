@@ -3,6 +3,7 @@
 import asyncio
 import json
 import multiprocessing
+import os
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -142,6 +143,69 @@ def test_a_stream_that_ended_is_watched_anew_and_a_process_that_hangs_is_killed(
     stream.close()
     assert happened == ["started", "killed"] * 2
     assert [one["number"] for one in stream.since(0)] == [1, 2]
+
+
+def test_a_quiet_stream_says_now_and_then_that_it_is_still_there(
+    stream: Stream, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.serve.events.EVERY", 0.0)
+    monkeypatch.setattr("experiments.serve.events.ALIVE", -1.0)
+    looks = iter([False, False, True])
+
+    async def gone() -> bool:
+        return next(looks)
+
+    async def looked() -> list[bytes]:
+        return [text async for text in told(stream, SimpleNamespace(looking=0), gone)]  # type: ignore[arg-type]
+
+    history, *rest = asyncio.run(looked())
+    assert history.startswith(b"event: history")
+    assert rest == [b": still here\n\n"] * 2
+
+
+def test_a_server_that_closes_ends_the_process_of_every_stream_and_begins_none_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    happened: list[str] = []
+    begun = threading.Semaphore(0)
+
+    class Watches:
+        """A process that runs until it is ended."""
+
+        def __init__(self, target: Any, args: tuple[Any, ...], daemon: bool) -> None:
+            del target, daemon
+            self._out, self._name, self._ended = args[0], args[2], threading.Event()
+
+        def start(self) -> None:
+            self._kept = self._out  # which this process alone holds open
+            self._theirs = os.dup(self._out.fileno())
+            begun.release()
+
+        def join(self, _: float) -> None:
+            self._ended.wait(10.0)
+
+        def is_alive(self) -> bool:
+            return not self._ended.is_set()
+
+        def terminate(self) -> None:
+            happened.append(f"ended {self._name}")
+            self._ended.set()
+            os.close(self._theirs)
+
+        def kill(self) -> None:
+            happened.append("killed")
+
+    context = SimpleNamespace(Pipe=multiprocessing.Pipe, Process=Watches)
+    monkeypatch.setattr(live, "multiprocessing", SimpleNamespace(get_context=lambda _: context))
+    monkeypatch.setattr(live, "AGAIN_AFTER", 10.0)
+    store = Store(tmp_path / "a.sqlite")
+    streams = Streams(Settings(folder=tmp_path, streams={"bench": "tcp://a:1", "press": "tcp://b:2"}), store)
+    streams.start()
+    assert all(begun.acquire(timeout=10.0) for _ in streams.by_name)
+    streams.close()
+    assert sorted(happened) == ["ended tcp://a:1", "ended tcp://b:2"]
+    assert not any(one._thread.is_alive() for one in streams.by_name.values())
+    store.close()
 
 
 @pytest.mark.slow

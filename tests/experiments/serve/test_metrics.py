@@ -32,6 +32,17 @@ def test_every_stream_tells_rows_values_and_how_far_each_balance_is_from_an_alar
     assert [line for line in lines if not LINE.fullmatch(line)] == []
 
 
+def test_a_number_that_is_none_is_left_out_and_not_written_as_a_word() -> None:
+    gauges = {"rows": 1, "gaps": 0, "received": 0.0, "values": {"a": float("inf"), "b": float("nan"), "c": 2.0}}
+    gauges |= {"scores": {"flow": float("nan")}, "thresholds": {"flow": 1.0}}
+    state = {"name": "press", "state": "watching", "message": "", "gauges": gauges}
+    text = exposition({}, None, [(state, 0)], 1.0)
+    told = [line for line in text.splitlines() if line.startswith("hydrostate_stream_value")]
+    assert told == ['hydrostate_stream_value{stream="press",channel="c"} 2']
+    assert "alarm_share" not in text
+    assert "hydrostate_logs" not in text
+
+
 @pytest.mark.parametrize("name", ['a"b', "a\\b", "a\nb"])
 def test_no_name_breaks_a_line(name: str) -> None:
     text = exposition({name: 1}, 0, [], 0.0)

@@ -73,3 +73,12 @@ def test_a_file_that_is_no_such_database_is_refused(tmp_path: Path) -> None:
     connection.close()
     with pytest.raises(HydrostateError, match="a later Hydrostate wrote version 99"):
         Store(tmp_path / "later.sqlite")
+
+
+def test_a_log_that_goes_while_it_is_added_is_said_to_be_gone(tmp_path: Path) -> None:
+    store = Store(tmp_path / "a.sqlite")
+    with sqlite3.connect(tmp_path / "a.sqlite") as connection:
+        connection.execute("CREATE TRIGGER gone AFTER INSERT ON logs BEGIN DELETE FROM logs WHERE id = new.id; END")
+    connection.close()
+    with pytest.raises(HydrostateError, match=r"run\.csv: was deleted while it came"):
+        store.add("a", "run.csv", "diagnose", 10)

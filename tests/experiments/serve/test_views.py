@@ -61,3 +61,17 @@ def test_logs_of_one_name_are_told_apart_and_a_date_that_is_none_leaves_a_log_wi
     assert "P_2026-99-99.csv" in page
     assert f"logs/{'3' * 16}" in page
     assert "None of 4 actuators" in page
+
+
+def test_what_has_no_value_is_shown_as_missing_and_what_is_no_quantity_is_left_out() -> None:
+    first = {
+        "file": "a.csv",
+        "message": "one",
+        "severity": {"added_friction": {"value": None, "unit": "N"}, "note": "x"},
+    }
+    second = result(12.0, 1.0)
+    (row,) = compared(first, second)
+    assert (row["difference"], row["changed"]) == (None, False)
+    page = compare_view(first, second)
+    assert "12.00 (11.0 to 13.0)" in page
+    assert "None" not in page

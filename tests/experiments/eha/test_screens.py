@@ -1,0 +1,90 @@
+"""What a terminal shows of many logs of the gear-pump actuator, and of few."""
+
+from typing import Any
+
+import pytest
+
+from experiments.command.terminal import rendered
+from experiments.eha.entries import NO_DIAGNOSIS, NO_ESTIMATE
+from experiments.eha.screens import MOST_MESSAGES, MOST_TABLES, diagnoses_shown, estimates_shown
+
+
+def estimate(number: int, passed: bool = True, **changes: Any) -> dict[str, Any]:
+    modulus = {"value": 2.0712e8, "ci95": [2.0e8, 2.1e8], "ci95_total": [1.8e8, 2.4e8], "std": 1e6}
+    told = {"file": f"run{number}.csv", "outcome": "ok", "message": f"reason {number}", "bulk_modulus_pa": modulus}
+    return {**NO_ESTIMATE, **told, "bound_percent": 0.5, "gate": {"passed": passed, "reasons": []}, **changes}
+
+
+def shown(results: list[dict[str, Any]]) -> str:
+    return rendered(*estimates_shown(results, {}))
+
+
+def test_a_value_has_both_intervals_in_megapascals_and_its_verdict() -> None:
+    line = next(line for line in shown([estimate(1)]).splitlines() if "run1.csv" in line)
+    assert " ".join(line.split()) == "run1.csv 207.12 200.00 to 210.00 180 to 240 0.5 ok"
+
+
+def test_a_value_that_is_not_to_be_relied_on_is_called_doubtful_and_its_reason_is_given() -> None:
+    told = shown([estimate(1), estimate(2, passed=False)])
+    assert "run2.csv: reason 2" in told
+    assert "reason 1" not in told
+    assert told.count("doubtful") == 1
+
+
+def test_a_log_without_a_value_or_an_interval_has_dashes() -> None:
+    nothing = {"value": None, "ci95": None, "ci95_total": None}
+    told = shown([estimate(1, False, bulk_modulus_pa=nothing, outcome="not_observable", bound_percent=float("inf"))])
+    line = next(line for line in told.splitlines() if "run1.csv" in line)
+    assert line.split() == ["run1.csv", "-", "-", "-", "-", "not", "observable"]
+    alone = {"value": 2e8, "ci95": None, "ci95_total": None}
+    line = next(line for line in shown([estimate(1, bulk_modulus_pa=alone)]).splitlines() if "run1" in line)
+    assert line.split() == ["run1.csv", "200.00", "-", "-", "0.5", "ok"]
+
+
+def test_of_many_logs_the_doubtful_are_counted_and_not_explained_one_by_one() -> None:
+    many = [estimate(number, passed=number % 2 == 0) for number in range(MOST_MESSAGES + 3)]
+    told = shown(many)
+    assert f"3 of {len(many)} logs gave no reliable value" in told
+    assert "reason" not in told.replace("give the reasons", "")
+    assert "no reliable value" not in shown([estimate(number) for number in range(MOST_MESSAGES + 1)])
+
+
+SCORES = {"normal": 0.1, "minor_leakage": 0.2}
+
+
+def diagnosis(number: int, **changes: Any) -> dict[str, Any]:
+    told = {"file": f"run{number}.csv", "outcome": "ok", "message": f"said {number}", "expected": None}
+    found = {"condition": "normal", "runner_up": "minor_leakage", "margin": 2.0, "unknown": False, "scores": SCORES}
+    found["probabilities"] = {"normal": 0.9, "minor_leakage": 0.1}
+    about = {"transfer_function_scores": None, "transfer_function_condition": None, "channels": [], "notes": []}
+    return {**NO_DIAGNOSIS, **told, **found, **about, **changes}
+
+
+def diagnosed(results: list[dict[str, Any]], **options: Any) -> str:
+    return rendered(*diagnoses_shown(results, {"scores": False, "transfer_functions": None, **options}))
+
+
+def test_many_diagnoses_are_a_table_with_a_line_each() -> None:
+    many = [diagnosis(number) for number in range(MOST_TABLES)]
+    many += [diagnosis(8, unknown=True), diagnosis(9, probabilities=None, condition=None, margin=None, runner_up=None)]
+    told = diagnosed(many)
+    lines = {line.split()[0]: line.split() for line in told.splitlines() if line.strip().startswith("run")}
+    assert lines["run0.csv"][-1] == "yes"
+    assert lines["run0.csv"][1:4] == ["normal", "90.0", "minor_leakage"]
+    assert lines["run8.csv"][-1] == "UNKNOWN"
+    assert "run9.csv: said 9" in told  # what was not judged says why
+    assert "said 0" not in told
+
+
+@pytest.mark.parametrize("channels", [["differential_pressure_pa"], ["velocity_m_s"]])
+def test_the_errors_of_a_log_are_a_table_if_asked_for_with_the_best_and_the_runner_up_marked(
+    channels: list[str],
+) -> None:
+    others = {"transfer_function_scores": {"normal": 0.3, "minor_leakage": 0.05}}
+    one = diagnosis(1, channels=channels, **others, transfer_function_condition="minor_leakage", probabilities=None)
+    told = diagnosed([one], scores=True)
+    assert f"model error [{'1' if channels[0].startswith('diff') else 'm/s'}]" in told
+    marks = {line.split()[0]: line for line in told.splitlines() if line.split()[:1] in (["normal"], ["minor_leakage"])}
+    assert marks["normal"].rstrip().endswith("<- best")
+    assert marks["minor_leakage"].rstrip().endswith("runner-up, best transfer function")
+    assert "model error" not in diagnosed([one])

@@ -1,0 +1,147 @@
+"""Pages over many logs are made once, and anew where that helps; files of logs that are kept stay."""
+
+import asyncio
+from collections.abc import Iterator
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pebble import ProcessExpired
+
+from experiments.serve.desk import Desk
+from experiments.serve.jobs import BusyError, log_file, page_file
+from experiments.serve.limits import RefusedError
+from experiments.serve.settings import Settings
+from experiments.serve.store import DONE, FAILED
+
+RESULT = {"outcome": "ok", "message": "normal"}
+
+
+@pytest.fixture
+def desk(tmp_path: Path, in_threads: None) -> Iterator[Desk]:  # noqa: ARG001
+    opened = Desk(Settings(folder=tmp_path / "kept"))
+    opened.open()
+    yield opened
+    opened.close()
+
+
+def kept(desk: Desk, identity: str, state: str = DONE) -> None:
+    log_file(desk.settings, identity).write_bytes(b"a")
+    desk.store.add(identity, f"{identity}.csv", "diagnose", 1)
+    desk.store.finish(identity, state, RESULT, {"outcome": "ok"})
+
+
+class Views:
+    """What makes pages, as it is told; it counts what is asked."""
+
+    def __init__(self) -> None:
+        self.rows: list[list[str]] = []
+        self.error: Exception | None = None
+
+    def view(self, make: Any, *args: Any) -> "Future[str]":
+        del make
+        self.rows.append([identity for identity, *_ in args[0]])
+        if isinstance(self.error, BusyError):
+            raise self.error
+        future: Future[str] = Future()
+        if self.error is None:
+            future.set_result(f"page {len(self.rows)}")
+        else:
+            future.set_exception(self.error)
+        return future
+
+
+@pytest.fixture
+def views(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> Views:
+    one = Views()
+    monkeypatch.setattr(desk.jobs, "view", one.view)
+    return one
+
+
+def test_the_page_of_the_fleet_is_made_once_for_all_who_ask_and_anew_when_a_log_came_or_went(
+    desk: Desk, views: Views
+) -> None:
+    async def asked() -> list[str]:
+        kept(desk, "a")
+        pages = list(await asyncio.gather(desk.fleet(), desk.fleet()))
+        pages.append(await desk.fleet())
+        kept(desk, "b")
+        pages.append(await desk.fleet())
+        desk.delete("a")
+        return [*pages, await desk.fleet()]
+
+    assert asyncio.run(asked())[2:] == ["page 1", "page 2", "page 3"]
+    assert views.rows == [["a"], ["a", "b"], ["b"]]
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (TimeoutError(), "took too long"),
+        (ProcessExpired("gone", code=-9), "took too long"),
+        (BusyError(), "too many pages"),
+    ],
+)
+def test_a_page_that_could_not_be_made_is_made_when_it_is_asked_for_again(
+    desk: Desk, views: Views, error: Exception, words: str
+) -> None:
+    async def asked() -> str:
+        kept(desk, "a")
+        views.error = error
+        with pytest.raises(RefusedError, match=words) as refused:
+            await desk.fleet()
+        assert refused.value.status == 429
+        assert refused.value.headers["Retry-After"]
+        views.error = None
+        return await desk.fleet()
+
+    assert asyncio.run(asked()) == "page 2"
+
+
+def test_one_who_stops_waiting_takes_the_page_from_no_one_else(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    pending: Future[str] = Future()
+    monkeypatch.setattr(desk.jobs, "view", lambda *_: pending)
+
+    async def asked() -> str:
+        kept(desk, "a")
+        one, other = asyncio.ensure_future(desk.fleet()), asyncio.ensure_future(desk.fleet())
+        while desk._fleet is None:
+            await asyncio.sleep(0.001)
+        one.cancel()
+        await asyncio.sleep(0.01)
+        pending.set_result("page")
+        return await other
+
+    assert asyncio.run(asked()) == "page"
+
+
+def test_files_of_logs_that_are_kept_stay_and_those_of_no_log_go(desk: Desk, tmp_path: Path) -> None:
+    kept(desk, "a")
+    for identity in ("a", "gone"):
+        page_file(desk.settings, identity).write_text("page")
+    log_file(desk.settings, "gone").write_bytes(b"a")
+    desk.close()
+    again = Desk(Settings(folder=tmp_path / "kept"))
+    again.open()
+    assert [path.name for path in desk.settings.logs.iterdir()] == ["a"]
+    assert [path.name for path in desk.settings.pages.iterdir()] == ["a.html"]
+    assert again.page("a") == page_file(again.settings, "a")
+    again.close()
+    desk.open()
+
+
+def test_a_log_that_failed_has_no_page_and_its_reason_is_told(desk: Desk) -> None:
+    kept(desk, "a", FAILED)
+    page_file(desk.settings, "a").write_text("half")
+    with pytest.raises(RefusedError, match=r"a\.csv has no page: normal") as refused:
+        desk.page("a")
+    assert refused.value.status == 404
+    kept(desk, "b")
+    with pytest.raises(RefusedError, match=r"b\.csv has no page"):
+        desk.page("b")
+
+
+def test_a_stream_is_known_by_its_name(desk: Desk) -> None:
+    with pytest.raises(RefusedError, match="no stream 'press' is watched"):
+        desk.stream("press")
