@@ -2,7 +2,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.batch.compare import compare_studies
+from experiments.batch.compare import compare_studies, in_sentences
 from plant.errors import HydrostateError
 
 
@@ -87,3 +87,12 @@ def test_few_series_get_no_interval_and_no_verdict() -> None:
 def test_studies_without_a_case_in_common_are_an_error() -> None:
     with pytest.raises(HydrostateError, match="must have cases in common"):
         compare_studies(study(3, 0.0, condition="normal"), study(3, 0.0, condition="minor_friction"))
+
+
+def test_few_series_have_no_interval_and_the_sentence_has_none_either() -> None:
+    few, many = (compare_studies(study(seeds, 0.0), study(seeds, -0.3, seed=2)) for seeds in (2, 20))
+    for table, there in ((few, False), (many, True)):
+        sentences = in_sentences(table, ("A", "B"))
+        (about,) = [one for one in sentences if "error of bulk modulus" in one]
+        assert ("95 % interval" in about) is there
+        assert about.endswith("better" if there else "no difference shown")

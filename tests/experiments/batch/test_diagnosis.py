@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.population import OUT_OF_MODEL, TEST, draw_logs
 from estimation.notes import SensorCode
-from experiments.batch.diagnosis import diagnosed
+from experiments.batch.diagnosis import class_row, diagnosed
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.diagnose import diagnose_log
 from plant.eha.drives import make_drive
@@ -68,3 +68,16 @@ def test_what_was_left_out_of_a_log_is_a_warning_of_its_row() -> None:
     left_out = SensorCode.OUTLIERS_LEFT_OUT.note(channel="velocity_m_s", count=20, total=3000)
     assert [one.message.note for one in caught] == [left_out]
     assert (row["outcome"], row["found_condition"]) == ("ok", "minor_leakage")
+
+
+def test_conditions_that_move_alike_are_no_class() -> None:
+    log = diagnose_log(steps(), RIG)
+    best, second = sorted(log.probabilities, key=lambda name: -log.probabilities[name])[:2]
+    alike = replace(log, probabilities={**dict.fromkeys(log.probabilities, 0.0), best: 0.5001, second: 0.4999})
+    row = class_row(alike)
+    assert row["outcome"] == "not_observable"
+    assert row["margin"] == pytest.approx(0.5001 / 0.4999)
+    assert f"{best} and {second} move alike" in row["reason"]
+    assert "found_condition" not in row
+    apart = class_row(replace(alike, probabilities={**alike.probabilities, best: 0.51, second: 0.49}))
+    assert (apart["outcome"], apart["found_condition"]) == ("ok", best)

@@ -1,4 +1,5 @@
 import errno
+import json
 import os
 import sys
 from pathlib import Path
@@ -161,3 +162,17 @@ def test_an_unknown_protocol_is_a_sentence() -> None:
     pytest.importorskip("fsspec", reason="the extra `remote` is not installed")
     with pytest.raises(HydrostateError, match="store nowhere://a"):
         open_store("nowhere://a")
+
+
+def test_a_store_of_another_format_is_refused_and_one_without_parts_has_no_rows(store: PartStore) -> None:
+    run_into(store, small_plan(seeds=1))
+    manifest = Path(store.name) / "manifest.json"
+    content = json.loads(manifest.read_text())
+    manifest.write_text(json.dumps({**content, "format": "later"}))
+    with pytest.raises(HydrostateError, match=r"must be of format .*, got 'later'"):
+        open_store(store.name).manifest()
+    manifest.write_text(json.dumps(content))
+    for part in (Path(store.name) / "parts").iterdir():
+        part.unlink()
+    left = open_store(store.name).rows(["outcome", "key"])
+    assert (len(left), left.column_names) == (0, ["outcome", "key"])

@@ -2,9 +2,12 @@ import json
 import zipfile
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
 
+from estimation.identification.model.recursion import filtered
 from experiments.cli import app
 from tests.c_compiler import compiled
 
@@ -101,3 +104,29 @@ def test_a_model_that_is_not_there_and_an_unknown_kind_are_refused(given: tuple[
     done = export("model", *given)
     assert done.exit_code == 2
     assert said in done.stderr
+
+
+def test_one_model_is_exported_and_a_file_of_two_is_refused(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.normal(size=60), 5)
+    y = [filtered([0.0, gain], [1.0, -0.5], u) + 0.01 * rng.normal(size=300) for gain in (0.5, 1.0)]
+    table = pd.DataFrame({"t": 0.1 * np.arange(300), "u": u, "a": y[0], "b": y[1]})
+    table.to_csv(tmp_path / "log.csv", index=False)
+    for outputs, code in (("a", 0), ("a,b", 2)):
+        model = tmp_path / f"{len(outputs)}.json"
+        asked = ["identify", str(tmp_path / "log.csv"), "--input", "u", "--output", outputs, "--order", "1"]
+        assert CliRunner().invoke(app, [*asked, "--out", str(model)]).exit_code == 0
+        done = export("model", model, "--out", tmp_path / f"out{len(outputs)}")
+        assert done.exit_code == code, done.output
+        assert ("one model is needed, got 2" in done.output) is (code == 2)
+
+
+def test_what_the_reader_doubts_of_the_log_that_a_filter_is_made_for_is_said(log: Path, tmp_path: Path) -> None:
+    lines = log.read_text().splitlines()
+    cells = lines[500].split(",")
+    lines[500] = ",".join([cells[0], "", *cells[2:]])
+    holed = tmp_path / "holed.csv"
+    holed.write_text("\n".join(lines) + "\n")
+    done = export("c", holed, "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    assert "is missing in 1 of" in " ".join(done.stderr.split())

@@ -48,3 +48,13 @@ def test_what_is_not_known_is_refused(arguments: tuple[str, ...], said: str) -> 
     done = _run(*arguments)
     assert done.exit_code == 2
     assert said in done.stderr
+
+
+def test_the_ranking_is_a_line_a_drive_and_names_the_best() -> None:
+    done = _run("--rank")
+    assert done.exit_code == 0
+    ranked = json.loads(_run("--rank", "--json").stdout)
+    drives = [one["drive"] for one in ranked]
+    shown = [line.split()[0] for line in done.stdout.splitlines() if line.split()[:1] and line.split()[0] in drives]
+    assert shown[: len(drives)] == drives
+    assert f"{drives[0]} is the most informative" in done.stdout

@@ -66,3 +66,14 @@ def test_a_file_is_no_folder_for_results(tmp_path: Path) -> None:
     with pytest.raises(HydrostateError, match=r"--out .*taken: the folder cannot be made"):
         prepare_output(tmp_path / "taken")
     assert (tmp_path / "taken").read_text() == "mine"
+
+
+def test_a_folder_that_may_not_be_written_and_a_folder_in_a_file_s_place_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "model.json").mkdir()
+    with pytest.raises(HydrostateError, match=r"model\.json: a file is needed, got a directory"):
+        prepare_output(tmp_path / "model.json")
+    monkeypatch.setattr("os.access", lambda *_: False)
+    with pytest.raises(HydrostateError, match="there is no permission to write there"):
+        prepare_output(tmp_path / "out")

@@ -1,6 +1,7 @@
 """`hydrostate size-cylinder`: a small calculator at the command line."""
 
 import json
+import math
 
 import pytest
 from typer.testing import CliRunner
@@ -41,3 +42,10 @@ def test_what_cannot_be_is_refused(more: list[str], said: str) -> None:
     done = RUN.invoke(app, [*DUTY, *more])
     assert done.exit_code == 2
     assert said in " ".join(done.stderr.split())
+
+
+def test_a_cylinder_that_is_named_is_worked_out_if_it_suffices() -> None:
+    (found,) = json.loads(RUN.invoke(app, [*DUTY, "--bore", "0.05", "--rod", "0.03", "--json"]).stdout)
+    assert (found["bore"], found["rod"]) == (0.05, 0.03)
+    assert 10000.0 < found["extend_force"] < 1e7 * math.pi / 4.0 * 0.05**2
+    assert 0.0 < found["retract_force"] < 1e7 * math.pi / 4.0 * (0.05**2 - 0.03**2)

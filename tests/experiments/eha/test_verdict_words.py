@@ -146,3 +146,20 @@ def test_the_library_agrees_or_names_another_and_changes_no_verdict() -> None:
 def test_the_library_is_silent_where_the_log_is_not_of_one_known_condition(found: Finding) -> None:
     assert library_said(diagnosis_entries(with_library(found, "normal"))) == ""
     assert library_said(diagnosis_entries(found_as("minor_leakage"))) == ""
+
+
+def test_a_library_in_which_one_condition_alone_ran_says_nothing() -> None:
+    errors = {"normal": 0.0012, "minor_leakage": 0.0019}
+    found = {"condition": "normal", "unknown": False, "since_s": None, "transfer_function_scores": errors}
+    assert "agrees" in library_said(found)
+    assert library_said({**found, "transfer_function_scores": {**errors, "minor_leakage": float("inf")}}) == ""
+
+
+def test_how_far_the_runner_up_of_nine_models_is_behind_is_told_in_the_words_of_its_size() -> None:
+    about = {"condition": "normal", "runner_up": "minor_leakage", "unknown": False}
+    said = {margin: models_said({**about, "margin": margin}) for margin in (1.001, 1.5, 3.0, float("inf"))}
+    assert "only 0.1 % larger" in said[1.001]
+    assert "50 % larger" in said[1.5]
+    assert "3.0 times as large" in said[3.0]
+    assert said[float("inf")] == "normal, which fits exactly, as minor_leakage does not"
+    assert models_said({**about, "margin": 1.5, "unknown": True}).endswith(said[1.5])

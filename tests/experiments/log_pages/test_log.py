@@ -30,3 +30,31 @@ def test_every_channel_is_drawn_over_one_time_axis(log: hs.Log) -> None:
             np.testing.assert_array_equal(axis.lines[0].get_ydata(), log.record[name])
     finally:
         plt.close("all")
+
+
+def test_an_option_of_the_wrong_kind_is_refused_before_any_work(log: hs.Log) -> None:
+    with pytest.raises(hs.HydrostateError, match="form must be a text such as 'auto', got 3"):
+        log.estimate(form=3)
+    with pytest.raises(hs.HydrostateError, match="start_std must be a number, got 'wide'"):
+        log.estimate(start_std="wide")
+    with pytest.raises(hs.HydrostateError, match="did you mean 'form'"):
+        log.estimate(forms="auto")
+
+
+def test_a_part_of_a_log_runs_from_an_earlier_to_a_later_time(log: hs.Log) -> None:
+    part = log.between(0.1, 0.2)
+    assert (part.record.start_time, len(part.record)) == (pytest.approx(0.1), 101)
+    np.testing.assert_array_equal(part.record["position_m"], log.record["position_m"][100:201])
+    for begin, end in ((0.2, 0.1), (0.1, 0.1), (-0.1, 0.2)):
+        with pytest.raises(hs.HydrostateError, match="from an earlier to a later time"):
+            log.between(begin, end)
+
+
+def test_an_answer_has_what_was_found_and_says_what_it_has_not(log: hs.Log) -> None:
+    answer = log.estimate()
+    assert answer.outcome == answer.finding.outcome
+    assert "outcome" in dir(answer)
+    with pytest.raises(AttributeError, match="did you mean 'outcome'"):
+        _ = answer.outcom
+    with pytest.raises(AttributeError):
+        _ = answer._outcome

@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 
-from experiments.open_benchmark.equations import rates
+from experiments.open_benchmark.equations import rates, stop_force
 from experiments.open_benchmark.flows import check_flow, filling, leakage_flow, orifice_flow, pump_flow
 from experiments.open_benchmark.friction import SLIPS, friction_force, steady_friction
+from experiments.open_benchmark.logger import PLAIN, Logger
 from experiments.open_benchmark.machine import ATMOSPHERE, Machine
 from experiments.open_benchmark.oil import specific_volume, stiffness
 from experiments.open_benchmark.run import RECORD, TICK, at_rest, run
 from plant.arrays import Array
+from plant.errors import HydrostateError
 
 LOSSLESS = Machine(
     leakage=0.0, drain=0.0, check_a=0.0, check_b=0.0, flow_bias=0.0, quadratic=0.0, linear=0.0, coulomb=1e-9
@@ -138,3 +140,24 @@ def test_the_motor_keeps_to_its_current_limit() -> None:
     m, out = Machine(), np.zeros(7)
     rates(at_rest(m), np.zeros(4), np.array([0.0, 1.0, 1.0, 0.0, 1.0]), 1e4, m, out)
     assert out[0] == m.acceleration
+
+
+def test_the_end_stops_push_out_of_their_way_and_never_pull() -> None:
+    m = Machine()
+    end = 0.5 * m.stroke
+    assert [stop_force(x, 5.0, m) for x in (0.0, 0.999 * end, -0.999 * end)] == [0.0] * 3
+    assert stop_force(end + 1e-4, 0.0, m) == pytest.approx(-m.stop_stiffness * 1e-4)
+    assert stop_force(-end - 1e-4, 0.0, m) == pytest.approx(m.stop_stiffness * 1e-4)
+    inward, outward = (stop_force(end + 1e-4, v, m) for v in (-0.01, 0.01))
+    assert outward == pytest.approx(-m.stop_stiffness * 1e-4 - 0.01 * m.stop_damping)
+    assert inward > outward
+    assert stop_force(end + 1e-6, -10.0, m) == 0.0  # it leaves faster than the stop follows
+
+
+def test_a_run_that_ran_away_is_no_log() -> None:
+    states = run(Machine(), course(50.0, 0.2))
+    logger = Logger(sample_time=1e-3, channels=PLAIN)
+    assert len(logger.log(states, np.random.default_rng(0))) > 0
+    states[-1, 2] = np.nan
+    with pytest.raises(HydrostateError, match="must stay finite, got one that ran away"):
+        logger.log(states, np.random.default_rng(0))

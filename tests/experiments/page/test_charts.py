@@ -68,3 +68,13 @@ def test_a_log_of_twenty_seconds_at_ten_kilohertz_stays_under_three_megabytes() 
         for name in ("speed", "position", "velocity", "pressure")
     ]
     assert len(Charts(time, "time [s]", panels, "run").html("one", "The log.")) < 2.4e6
+
+
+def test_a_curve_without_a_number_has_an_empty_row_in_the_table() -> None:
+    x = np.arange(20.0)
+    curves = [Curve("silent", np.full(20, np.nan)), Curve("half", np.where(x < 10, x, np.nan))]
+    html = Charts(x, "time [s]", [Panel("velocity", "mm/s", curves)], "run").html("one", "A caption.")
+    rows = re.findall(r"<tr>(.*?)</tr>", html, re.DOTALL)
+    cells = {row.split("velocity, ")[1].split("<")[0]: re.findall(r"<td[^>]*>(.*?)</td>", row) for row in rows[1:]}
+    assert not any(re.search(r"\d|nan", cell) for cell in cells["silent"])
+    assert [float(cell) for cell in cells["half"][:3]] == [0.0, 9.0, 4.5]

@@ -38,3 +38,9 @@ def test_the_library_keeps_its_licence_and_its_version() -> None:
     assert "Permission is hereby granted" in place.joinpath("LICENSE").read_text("utf-8")
     version = place.joinpath("VERSION").read_text("utf-8").strip()
     assert f"(v{version})" in place.joinpath("uPlot.iife.min.js").read_text("utf-8")[:300]
+
+
+def test_only_a_page_of_a_server_may_ask_it_for_more() -> None:
+    for mark in ("dropped-logs", "live-stream"):
+        assert policy(with_scripts(page_with(f'<div class="{mark}"></div>'))).endswith("; connect-src 'self'")
+    assert "connect-src" not in policy(with_scripts(page_with('<figure class="charts"></figure>')))

@@ -11,6 +11,8 @@ from fastapi.testclient import TestClient
 
 from experiments.serve import app as server
 from experiments.serve.limits import HEADERS
+from experiments.serve.settings import Settings
+from plant.errors import HydrostateError
 
 Served = Callable[..., TestClient]
 
@@ -235,3 +237,13 @@ def test_an_error_that_nobody_foresaw_is_told_in_a_sentence(
     assert answer.status_code == 500
     assert "please report it" in answer.json()["detail"]
     assert "Traceback" not in capsys.readouterr().err
+
+
+def test_a_folder_that_cannot_be_had_ends_the_server_with_its_reason(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    settings = Settings(folder=tmp_path / "file" / "kept")
+    for told in (None, list[HydrostateError]()):
+        app = server.make_app(settings, None if told is None else told.append)
+        with pytest.raises(HydrostateError, match="the server's folder cannot be made"), TestClient(app):
+            pass
+        assert told is None or len(told) == 1

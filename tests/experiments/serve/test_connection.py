@@ -189,3 +189,28 @@ def test_a_broken_body_after_the_answer_began_ends_the_connection() -> None:
 def test_connections_leave_files_for_everything_else(files: int, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connection.resource, "getrlimit", lambda _: (files, files))
     assert connection.most_connections() == most
+
+
+def test_a_client_that_reads_again_though_it_never_stopped_is_left_alone() -> None:
+    async def said() -> Wire:
+        protocol, wire = connected()
+        protocol.data_received(ASKED)
+        protocol.resume_writing()
+        await asyncio.sleep(2.5 * SOON)
+        protocol.connection_lost(None)
+        return wire
+
+    wire = asyncio.run(said())
+    assert wire.written.startswith(b"HTTP/1.1 204")
+    assert not wire.aborted
+
+
+def test_noise_before_any_request_is_refused_and_nobody_is_told() -> None:
+    async def said() -> Wire:
+        protocol, wire = connected()
+        protocol.data_received(b"\x16\x03\x01 no request\r\n\r\n")
+        protocol.connection_lost(None)
+        return wire
+
+    wire = asyncio.run(said())
+    assert wire.written.startswith(b"HTTP/1.1 400")

@@ -1,0 +1,38 @@
+"""Events of a watch as entries: what an alarm says of its cause, and what is not known."""
+
+from typing import Any
+
+import pytest
+
+from experiments.command.watch_told import Told
+from faults.watch.events import SLOW, Alarm, Change
+
+
+def told(*events: Any) -> list[dict[str, Any]]:
+    lines: list[dict[str, Any]] = []
+    Told(lines.append).events(events)
+    return lines
+
+
+def alarm(balance: str) -> Alarm:
+    return Alarm(time=12.0, balance=balance, since=11.25, interval=(11.0, 11.5), score=9.0, threshold=4.0)
+
+
+def test_a_sudden_change_has_its_time_and_a_slow_one_is_told_as_growth() -> None:
+    (sudden,), (slow,) = told(alarm("flow")), told(alarm(SLOW))
+    assert sudden["message"] == "the flow balance changed at 11.25 s"
+    assert "lost flow has grown more than warm oil explains" in slow["message"]
+    assert (sudden["since_s"], sudden["since_ci95_s"]) == (11.25, [11.0, 11.5])
+
+
+def test_what_a_change_did_to_lost_flow_and_pressure_is_in_percent_or_is_not_known() -> None:
+    known, blind = told(
+        Change(time=14.0, alarm=alarm("flow"), lost=(0.1, 0.4), pressure=-0.05),
+        Change(time=14.0, alarm=alarm("motion"), lost=None, pressure=None),
+    )
+    assert known["lost_flow_percent"] == pytest.approx({"before": 10.0, "after": 40.0})
+    assert known["pressure_change_percent"] == pytest.approx(-5.0)
+    assert "10 % of the pump's delivery before, 40 % after" in known["message"]
+    assert blind["lost_flow_percent"] == {"before": None, "after": None}
+    assert blind["pressure_change_percent"] is None
+    assert "the cause of the change is not known" in blind["message"]

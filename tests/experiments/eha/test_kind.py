@@ -1,0 +1,87 @@
+"""What the gear-pump actuator's verbs are told: which transfer functions, which figure."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import faults.eha.bank
+from estimation.eha.estimate import estimate_log
+from experiments.eha.kind import EHA
+from experiments.published.library import read_library
+from plant.eha.drives import sine
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.eha.simulate import LUMPED, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+OPTIONS = {"transfer_functions": None, "no_pressure": False, "seed": 7}
+OTHER = Rig("other", EhaParameters(moving_mass=9.0))
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[EhaParameters, float]]:
+    """Return what banks are identified for, and the first number of their noise."""
+    asked: list[tuple[EhaParameters, float]] = []
+
+    def identified(parameters: EhaParameters, rng: np.random.Generator, **_: Any) -> dict[str, Any]:
+        asked.append((parameters, float(rng.random())))
+        return {}
+
+    monkeypatch.setattr(faults.eha.bank, "identify_bank", identified)
+    return asked
+
+
+def linear_of(rig: Rig, **options: Any) -> Any:
+    assert EHA.diagnose is not None
+    _, (_, linear) = EHA.diagnose.prepare(rig, {**OPTIONS, **options})
+    return linear
+
+
+def test_the_library_is_that_of_the_paper_s_rig_and_no_test_is_simulated_for_it(asked: list[Any]) -> None:
+    for wanted in (None, True):
+        found = linear_of(Rig(), transfer_functions=wanted)()
+        assert found.keys() == read_library().keys()
+        for name, model in read_library().items():
+            np.testing.assert_array_equal(found[name].numerator, model.numerator)
+    assert linear_of(Rig(), transfer_functions=False) is None
+    assert asked == []
+
+
+def test_another_rig_s_transfer_functions_are_identified_only_if_asked_for_and_once(
+    asked: list[Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert linear_of(OTHER) is None
+    linear = linear_of(OTHER, transfer_functions=True)
+    assert asked == []  # not before they are needed
+    linear()
+    linear()
+    assert asked == [(OTHER.parameters, float(np.random.default_rng(7).random()))]
+    assert capsys.readouterr().err.count("identifying nine transfer functions") == 1
+
+
+def log() -> Record:
+    p, rng = EhaParameters(), np.random.default_rng(1)
+    return simulate(LUMPED, sine(2.0, 1e-3, p.rated_speed, 5.0), 1e-3, p, sensors=BENCH, rng=rng)
+
+
+def test_a_log_that_was_fitted_has_no_figure_and_the_reader_is_told_how_to_get_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert EHA.estimate is not None
+    assert EHA.estimate.figure is not None
+    EHA.estimate.figure(estimate_log(log(), Rig()), "run.csv", tmp_path / "run.png")
+    assert "no figure: run.csv was not filtered; ask for one with --method ekf" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_rig_s_leakage_is_said_to_be_taken_as_known_unless_a_condition_is_named_or_it_is_estimated() -> None:
+    assert EHA.estimate is not None
+    remarks = EHA.estimate.remarks
+    told = {"condition": None, "form": "pressure", "rig": "mine"}
+    (said,) = remarks([told])
+    assert "leakage and friction were taken to be those of the rig 'mine'" in said
+    for change in ({"condition": "normal"}, {"form": "flow"}, {"form": None}):
+        assert list(remarks([{**told, **change}])) == []
