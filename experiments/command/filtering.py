@@ -140,7 +140,7 @@ class Filtering:
 
         T = stream.sample_time
         if self.filtered is None and not gap and self.state is not None and self.state.exists():
-            self._resume(T, last - (len(rows) - 1) * T)
+            self._resume(self.state, T, last - (len(rows) - 1) * T)
         if self.filtered is None or gap:
             if gap:
                 note(f"{self.source}: warning: rows are missing before {last:g} s, so the filter restarts")
@@ -149,23 +149,21 @@ class Filtering:
                 self.filtered, self._sums = begun(self.asked, record, self.like), None
             except LogError as error:
                 raise LogError(error.message, self.source) from error
-            self._start(T, "begun")
+            self._start(self.filtered, "begun")
         return self.filtered
 
-    def _resume(self, sample_time: float, start: float) -> None:
+    def _resume(self, state: Path, sample_time: float, start: float) -> None:
         """Go on from the state file; rows that are missing up to here are missing samples."""
         import numpy as np
 
         from estimation.eha.online import SAME_RATE, load_filter
         from plant.log.csv_stream import LONGEST_GAP
 
-        if self.state is None:
-            return
-        filtered, last = load_filter(self.state, self.asked)
+        filtered, last = load_filter(state, self.asked)
         T = filtered.problem.sample_time
         if abs(T / sample_time - 1.0) > SAME_RATE:
             raise LogError(
-                f"{self.state} was saved at {1.0 / T:g} Hz, but the stream has {1.0 / sample_time:g} Hz", self.source
+                f"{state} was saved at {1.0 / T:g} Hz, but the stream has {1.0 / sample_time:g} Hz", self.source
             )
         missing = round((start - last) / T) - 1
         if not 0 <= missing * T <= LONGEST_GAP:
@@ -176,7 +174,7 @@ class Filtering:
         self.filtered, self.last = filtered, last
         now = filtered.now()
         self._sums = now.nis, now.count
-        self._start(T, "continued")
+        self._start(filtered, "continued")
 
     def _take(self, filtered: "OnlineFilter", channels: "Mapping[str, NDArray[np.float64]]") -> None:
         from estimation.eha.online import samples_of
@@ -186,11 +184,10 @@ class Filtering:
         except LogError as error:
             raise LogError(error.message, self.source) from error
 
-    def _start(self, sample_time: float, how: str) -> None:
-        if self.filtered is not None:
-            task = self.filtered.problem
-            about = {"form": self.asked.form, "method": self.asked.method, "channels": list(task.channels)}
-            self._line("start", file=self.source, rate_hz=round(1.0 / sample_time, 6), **about, message=how)
+    def _start(self, filtered: "OnlineFilter", how: str) -> None:
+        task = filtered.problem
+        about = {"form": self.asked.form, "method": self.asked.method, "channels": list(task.channels)}
+        self._line("start", file=self.source, rate_hz=round(1.0 / task.sample_time, 6), **about, message=how)
 
     def _estimate(self, filtered: "OnlineFilter") -> None:
         """Tell what is believed, and how large innovations were since it was last told."""

@@ -190,12 +190,7 @@ class Desk:
             rows = await asyncio.to_thread(lambda: list(self.store.diagnosed()))
             if not rows:
                 raise RefusedError(404, "no log was diagnosed yet")
-            page = self._page_of(revision)  # another request may have asked for it meanwhile
-        if page is None:
-            name = self.settings.folder.resolve().name
-            made = self._view(fleet_view, rows, self.settings.pattern, dict(self.settings.limits), name)
-            page = asyncio.ensure_future(made)
-            self._fleet = (revision, page)
+            page = self._page_of(revision) or self._begun(revision, rows)  # another request may have begun it meanwhile
         try:
             return await asyncio.shield(page)
         except RefusedError:
@@ -206,6 +201,14 @@ class Desk:
         """Return the page of the fleet that is there or under way, None where it is to be made."""
         known = self._fleet
         return None if known is None or known[0] != revision or known[1].cancelled() else known[1]
+
+    def _begun(self, revision: str, rows: list[tuple[str, str, dict[str, Any]]]) -> "asyncio.Future[str]":
+        """Begin the page of the fleet."""
+        settings = self.settings
+        made = self._view(fleet_view, rows, settings.pattern, dict(settings.limits), settings.folder.resolve().name)
+        page = asyncio.ensure_future(made)
+        self._fleet = (revision, page)
+        return page
 
     async def comparison(self, first: str, second: str) -> str:
         """Return the page of two logs side by side.

@@ -151,6 +151,16 @@ def test_a_state_is_not_continued_without_a_channel_it_was_begun_with(bench: Rec
     assert refused.value.source == "bench"
 
 
+def test_a_column_of_the_rig_that_the_stream_has_not_is_said(bench: Record, capsys: pytest.CaptureFixture[str]) -> None:
+    told: list[dict[str, Any]] = []
+    rig = {"pressure_a_pa": "PA:bar"}
+    Filtering(told.append, Asked(P, "pressure", "ekf"), (rig, {}), 1.0, source="bench").follow(lines_of(bench)[:401])
+    (said,) = capsys.readouterr().err.splitlines()
+    assert said.startswith("bench: warning: ")
+    assert "PA:bar" in said
+    assert estimates(told)[-1]["samples"] == 400
+
+
 def test_a_last_row_that_is_cut_is_left_out_and_said(bench: Record, capsys: pytest.CaptureFixture[str]) -> None:
     told, _ = filtered([*lines_of(bench)[:401], "2.0,1"])
     assert estimates(told)[-1]["samples"] == 400

@@ -1,14 +1,12 @@
 """Rows to a watch: what a broken, late, slow or restarted stream does to it is said, and changes nothing else."""
 
-import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from experiments.cli import app
 from experiments.command import watching
 from experiments.command.watch_told import Told
 from experiments.command.watching import SAVED_EVERY, Asked, told_of, watch_rows
@@ -216,10 +214,14 @@ def test_what_is_missing_is_told_even_if_the_stream_ends_in_an_error(
     assert "4 batches never came" in capsys.readouterr().err
 
 
-def test_what_the_reader_doubts_of_a_stream_is_said_once() -> None:
-    lines = "".join([HEADER + ",speed_rpm\n", *(line.replace("\n", ",7\n") for line in rows(0.0, 5.0))])
-    done = CliRunner().invoke(app, ["watch", "-"], input=lines)
-    said = [line for line in done.stderr.splitlines() if "warning" in line]
-    assert done.exit_code == 0, done.stderr
-    assert [json.loads(line)["event"] for line in done.stdout.splitlines()] == ["start", "end"]
-    assert len(said) == len(set(said))
+def test_a_column_of_the_rig_that_the_stream_has_not_is_said_once_and_one_that_was_asked_for_is_refused(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    bench = Rig(columns={"differential_pressure_pa": "DP:bar"})
+    watch_rows(Told(lambda _: None), [HEADER + "\n", *rows(0.0, 5.0)], replace(asked(), bench=bench), "bench", None)
+    (said,) = capsys.readouterr().err.splitlines()
+    assert said.startswith("bench: warning: ")
+    assert "DP:bar" in said
+    wanted = replace(asked(), columns=bench.columns)
+    with pytest.raises(LogError, match="DP"):
+        watch_rows(Told(lambda _: None), [HEADER + "\n", *rows(0.0, 5.0)], wanted, "bench", None)
