@@ -1,13 +1,14 @@
 """A filter with noise levels tuned to the log says how far it may be off, at any rate."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from estimation.eha.bulk_modulus import _fitted, estimate_bulk_modulus
-from estimation.eha.by_filter import _verdict
+from estimation.eha.by_filter import _settled, _verdict
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate
 from estimation.finding import Outcome
 from estimation.fits.form_fit import FormFit
@@ -101,3 +102,17 @@ def test_a_filter_that_diverged_or_cannot_know_gives_no_gate() -> None:
     outcome, gate = _verdict(nothing, REST, True, 1.01 * LARGEST_BOUND)
     assert outcome is Outcome.NOT_OBSERVABLE
     assert not gate.passed
+
+
+@pytest.mark.parametrize(("second", "taken"), [(5.0, "again"), (-5.0, "first"), (0.0, "first")])
+def test_of_two_passes_the_likelier_is_returned_with_the_first(second: float, taken: str) -> None:
+    begun: list[float] = []
+
+    def filtered(guess: float) -> Any:
+        begun.append(guess)
+        name, likelihood = ("first", 0.0) if len(begun) == 1 else ("again", second)
+        return SimpleNamespace(name=name, log_likelihood=likelihood, settled=lambda _: (2e8, 1e6))
+
+    found, first = _settled(filtered, 1e7)
+    assert begun == [1e7, 2e8]  # a first guess far below the answer, and then the answer
+    assert (found.name, first.name) == (taken, "first")

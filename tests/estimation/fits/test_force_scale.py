@@ -108,3 +108,8 @@ def test_optima_that_disagree_end_the_search() -> None:
 def test_moduli_disagree_from_a_twentieth_on() -> None:
     assert not disagree([2.0e8, 2.099e8])
     assert disagree([2.0e8, 1.95e8, 2.101e8])
+
+
+def test_an_optimum_that_is_hardly_better_ends_the_search_where_it_is() -> None:
+    best, _, _ = searched(flat(lambda theta: 10.0 * theta[0]), explained=-np.inf)  # 2.2 lower a round, 5 are wanted
+    assert best.theta[0] - HERE[0] == pytest.approx(np.log(0.8))

@@ -11,6 +11,7 @@ from estimation.models.eha_forms import (
     PRESSURE_FORM,
     acceleration_step,
     pressure_step,
+    volume_left_open,
     with_bulk_modulus,
 )
 from estimation.models.model import ProcessModel
@@ -108,3 +109,21 @@ def test_while_it_sticks_motion_says_nothing_of_bulk_modulus() -> None:
 def test_only_the_bulk_modulus_is_replaced() -> None:
     p = EhaParameters()
     assert vars(with_bulk_modulus(p, 1e8)) == {**asdict(p), "bulk_modulus": 1e8}
+
+
+def test_oil_of_which_nothing_is_known_moves_each_state_as_far_as_it_may() -> None:
+    p, T = EhaParameters(), 1e-3
+    variance, moves = volume_left_open(p, {"motor_speed_rad_s": np.array([0.0, 4.0])}, T)
+    np.testing.assert_allclose(variance, [0.0, 4.0 * p.pump_displacement**2])
+    displaced, _ = volume_left_open(p, {"position_m": np.array([9.0])}, T)
+    assert displaced == pytest.approx(9.0 * p.piston_area**2)
+    volume = 1e-7
+    # with the piston still, equation 5.8 compresses it all, half of it in each of two equal chambers
+    assert volume * moves["differential_pressure_pa"] == pytest.approx(p.bulk_modulus * volume / p.chamber_volume)
+    for chamber in ("pressure_a_pa", "pressure_b_pa"):
+        assert moves[chamber] == pytest.approx(0.5 * moves["differential_pressure_pa"])
+    # and with rigid oil the piston makes room for it within a sample
+    assert p.piston_area * volume * moves["position_m"] == pytest.approx(volume)
+    assert T * moves["velocity_m_s"] == pytest.approx(moves["position_m"])
+    pushed = p.piston_area * moves["differential_pressure_pa"]
+    assert p.moving_mass * moves["acceleration_m_s2"] == pytest.approx(pushed)

@@ -1,5 +1,6 @@
 """Faults named from logs of the diaphragm motor."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from estimation.diaphragm_motor.signature import logged_signature
 from faults.diaphragm_motor.diagnose import TOLD_APART, MotorDiagnosis, _calibrated, diagnose_motor, separations
-from faults.diaphragm_motor.faults import HEALTHY, motor_with_fault
+from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS, motor_with_fault
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import BENCH_SENSORS, SAMPLE_TIME, motor_drive, simulate_motor
 from plant.errors import LogError
@@ -60,6 +61,23 @@ def test_a_healthy_motor_is_healthy() -> None:
     found = diagnose_motor(log_of(MOTOR), MOTOR)
     assert (found.best.name, found.unknown, found.lookalikes) == (HEALTHY, False, ())
     assert found.best.probability > 0.9
+
+
+def test_a_fault_s_probability_falls_with_the_share_of_its_severities_that_the_log_leaves() -> None:
+    found = diagnose_motor(log_of(MOTOR), MOTOR)
+    share = {match.name: match for match in found.matches}
+    kinds = [fault.kind for fault in MOTOR_FAULTS.values()]
+    told = 0
+    for name, fault in MOTOR_FAULTS.items():
+        match, healthy = share[name], share[HEALTHY]
+        reach = fault.severities[-1] - fault.severities[0]
+        left = min(1.0, math.sqrt(2.0 * math.pi) * match.deviation / reach)
+        prior = 0.5 / len(set(kinds)) / kinds.count(fault.kind) / 0.5
+        if match.probability > 1e-12:
+            odds = prior * left * math.exp(-0.5 * (match.chi_square - healthy.chi_square))
+            assert match.probability / healthy.probability == pytest.approx(odds, rel=1e-6)
+            told += left < 1.0
+    assert told > 3
 
 
 @pytest.mark.parametrize("name", ["friction", pytest.param("load", marks=pytest.mark.slow)])

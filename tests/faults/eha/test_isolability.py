@@ -1,12 +1,17 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from estimation.trust.identifiability import SENSED
 from faults.conditions import CONDITIONS
-from faults.eha.isolability import condition_distances, overdetermined, structural_isolability, wrong_verdicts
+from faults.eha.bank import mathematical_bank, predict_run
+from faults.eha.isolability import SPREAD, condition_distances, overdetermined, structural_isolability, wrong_verdicts
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
 
 P = EhaParameters()
 T = 2e-3
@@ -63,3 +68,32 @@ def test_twice_the_experiment_brings_more_distance() -> None:
 def test_a_channel_without_noise_or_unknown_is_refused() -> None:
     with pytest.raises(HydrostateError, match="a channel must be one of"):
         condition_distances(P, _drive("prbs"), T, ("pressure_a_pa",))
+
+
+def test_a_distance_is_that_of_two_normal_laws_with_the_spread_of_a_class_and_the_sensors_noise() -> None:
+    drive, channels = _drive("steps")[:200], ("velocity_m_s", "differential_pressure_pa")
+    found = condition_distances(P, drive, T, channels)
+    log = Record(T, {"motor_speed_rad_s": drive})
+    healthy = predict_run(log, P)
+    # noise, and an error of 5 % that lasts 50 ms: it is as much as 25 samples' own
+    noise = {"velocity_m_s": BENCH.velocity_noise**2}
+    noise["differential_pressure_pa"] = BENCH.pressure_noise**2 + BENCH.pressure_quantum**2 / 12.0
+    sizes = {name: np.sqrt(one + 0.05**2 * (0.05 / T) * np.var(healthy[name])) for name, one in noise.items()}
+
+    def seen(model: EhaParameters) -> np.ndarray:
+        run = predict_run(log, model)
+        return np.concatenate([run[name] / size for name, size in sizes.items()])
+
+    models = mathematical_bank(P)
+    for assumed in ("normal", "minor_friction"):
+        model = models[assumed]
+        covariance = np.eye(2 * len(drive))
+        for name, share in SPREAD.items():
+            value = getattr(model, name)
+            slope = (seen(replace(model, **{name: 1.001 * value})) - seen(model)) / 0.001 * share
+            covariance += np.outer(slope, slope)
+        for true in ("minor_leakage", "major_friction"):
+            away = seen(models[true]) - seen(model)
+            wanted = 0.5 * away @ np.linalg.solve(covariance, away)
+            row, column = (found.conditions.index(name) for name in (true, assumed))
+            assert found.nats[row, column] == pytest.approx(wanted, rel=1e-6)

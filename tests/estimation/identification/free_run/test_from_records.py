@@ -91,3 +91,13 @@ def test_an_input_of_which_nothing_or_nothing_but_a_level_is_known_is_not_split(
     level = Record(T, {"u": np.where(np.arange(N) // 10 == 100, np.nan, 3.0), "y": answered(binary())})
     with pytest.warns(LogWarning):
         assert [len(one) for one in pieces(level, ["u"])] == [1000, N - 1010]
+
+
+def test_parts_that_are_less_than_a_two_hundredth_of_a_log_are_left_out() -> None:
+    u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 600), 15)
+    for length, kept in ((44, [8940]), (45, [45, 8940])):
+        seen = u.copy()
+        seen[length:60] = np.nan
+        with pytest.warns(LogWarning):
+            parts = pieces(Record(T, {"u": seen, "y": u}), ["u"])
+        assert [len(part) for part in parts] == kept

@@ -1,6 +1,8 @@
 """State space of several inputs and outputs: derivatives, start, covariance, order, and what is shared by outputs."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from estimation.identification.free_run.saved import load_models, save_models
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
 from estimation.identification.state_space.choose import chosen_state, state_candidates
-from estimation.identification.state_space.identify import identify_outputs, identify_state_space
+from estimation.identification.state_space.identify import _judged, identify_outputs, identify_state_space
 from estimation.identification.state_space.joint import joined
 from estimation.identification.state_space.problem import Problem, Size
 from estimation.identification.state_space.starts import subspace_starts
@@ -148,3 +150,19 @@ def test_a_model_no_better_than_the_mean_is_not_sound() -> None:
         found = identify_state_space(data, order=2, delay=1)
     assert not any(one.sound for one in found)
     assert IdentificationCode.NO_FIT in [one.message.note.code for one in said]  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(("radius", "slowest"), [(0.9, -0.02 / np.log(0.9)), (1.0, np.inf), (1.2, np.inf)])
+def test_a_time_constant_that_a_log_is_too_short_for_is_told_in_seconds(radius: float, slowest: float) -> None:
+    a = np.array([[radius, 1.0], [0.0, 0.3]])
+    best: Any = SimpleNamespace(doubt="time_constant", fit=SimpleNamespace(a=a, size=SimpleNamespace(n=2)))
+    data: Any = SimpleNamespace(u=[], y=[], sample_time=0.02, duration=5.0, output="y")
+    model: Any = SimpleNamespace(quality=lambda *_: SimpleNamespace(fit_percent=90.0))
+    found = _judged(model, data, best, 0.1, ())
+    (note,) = found.notes
+    assert note.code == IdentificationCode.TIME_CONSTANT_BEYOND_RECORD
+    assert note.data["time_constant_s"] == pytest.approx(slowest)
+    assert (note.data["duration_s"], note.data["order"], found.held_back_percent) == (5.0, 2, pytest.approx(90.0))
+    best.doubt = ""
+    assert _judged(model, data, best, 0.1, ()).notes == ()
+    assert [one.code for one in _judged(model, data, best, 1.0, ()).notes] == [IdentificationCode.NO_FIT]

@@ -45,6 +45,11 @@ def test_an_expression_is_what_python_makes_of_it(expression: str) -> None:
     assert kernel(f"return {expression}")(*GIVEN) == pytest.approx(wanted, rel=1e-15)
 
 
+def test_a_whole_number_is_divided_by_a_known_one_as_python_does_and_by_a_known_zero_to_zero() -> None:
+    assert kernel("return n // 4, n % 4, -n // 4, -n % 4, n // -4, n % -4", "known")(*GIVEN) == (1, 2, -2, 2, -2, -2)
+    assert kernel("return n // 0, n % 0, 7 // 0, 7 % 0", "nothing")(*GIVEN) == (0, 0, 0, 0)
+
+
 REFUSED = {
     "return [a for a in values]": "ListComp is not compiled",
     "return ~n": "Invert is not compiled",
