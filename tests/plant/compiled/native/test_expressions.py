@@ -1,6 +1,7 @@
 """One expression at a time: it is compiled to what Python computes, or refused in words."""
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 from plant.compiled.native.kinds import KernelError
 from plant.compiled.native.load import load_native
+from plant.compiled.native.operators import _divided
 from plant.compiled.native.signature import signature
 
 TAKES = "x : float\nn : int\nflag : bool\nvalues : ndarray, shape (k,)\nwhole : ndarray of int, shape (k,)"
@@ -48,6 +50,22 @@ def test_an_expression_is_what_python_makes_of_it(expression: str) -> None:
 def test_a_whole_number_is_divided_by_a_known_one_as_python_does_and_by_a_known_zero_to_zero() -> None:
     assert kernel("return n // 4, n % 4, -n // 4, -n % 4, n // -4, n % -4", "known")(*GIVEN) == (1, 2, -2, 2, -2, -2)
     assert kernel("return n // 0, n % 0, 7 // 0, 7 % 0", "nothing")(*GIVEN) == (0, 0, 0, 0)
+
+
+@pytest.mark.parametrize(("divisor", "guarded"), [("0", True), ("%k", True), ("4", False), ("-4", False)])
+def test_no_processor_divides_by_zero_and_what_is_known_not_to_be_is_not_asked(divisor: str, guarded: bool) -> None:
+    lines: list[str] = []
+
+    def op(text: str) -> str:
+        lines.append(text)
+        return f"%{len(lines)}"
+
+    for rest in (False, True):
+        lines.clear()
+        _divided(SimpleNamespace(op=op), "%n", divisor, rest=rest)  # type: ignore[arg-type]
+        (asked,) = [line for line in lines if line.startswith("sdiv")]
+        assert (asked == f"sdiv i64 %n, {divisor}") is not guarded
+        assert (f"icmp eq i64 {divisor}, 0" in lines) is guarded
 
 
 REFUSED = {
