@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.chamber_filter import on_circuit
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
-from estimation.eha.by_flow_filter import drive_noise, filter_flow
+from estimation.eha.by_flow_filter import BIASES, LEAKAGES, MODULI, drive_noise, filter_flow
 from estimation.models.chambers import FLOOR_NOISE
 from estimation.models.eha_forms import BULK_MODULUS
 from faults.conditions import CONDITIONS, parameters_for
@@ -129,3 +129,15 @@ def test_on_the_foreign_bench_it_is_within_one_percent_on_every_log(shared: Path
     for row in truth.itertuples():
         value, _ = last(read_record(shared / "bench" / str(row.file)))
         assert value == pytest.approx(row.bulk_modulus_pa, rel=0.01), row.file
+
+
+def test_first_guesses_lie_side_by_side_from_a_healthy_actuator_to_beyond_the_worst_of_table_3() -> None:
+    for guesses, worst in ((LEAKAGES, 12.6), (BIASES, 6.1)):
+        steps = np.divide(guesses[1:], guesses[:-1])
+        assert guesses[0] == 1.0
+        assert np.all(steps > 1.0)
+        assert np.all(steps <= 2.0)
+        assert guesses[-1] > worst
+    steps = np.divide(MODULI[1:], MODULI[:-1])
+    assert np.all((steps > 1.0) & (steps <= 2.0))
+    assert 1.0 in MODULI

@@ -3,12 +3,13 @@
 # ruff: noqa: ARG005 - every function is given the same three things
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from estimation.equations.conclude import concluded
+from estimation.equations.conclude import concluded, covariance_of
 from estimation.equations.definition import Equations, Parameter
 from estimation.equations.fit import EquationsFit, _started, fit_equations, simulated
 from estimation.equations.problem import Problem, part_of
@@ -169,3 +170,34 @@ def test_initial_states_are_sought_in_ten_steps_at_most() -> None:
     problem = Problem(flat, (part_of(flat, record),), "rk4", 1, np.array([1.0]))
     theta = _started(problem, problem.coordinates(np.array([0.8, 1.0])), [1])
     assert problem.values(theta)[1] == pytest.approx((2.0 / 3.0) ** 10)
+
+
+def linear(slopes: np.ndarray) -> Any:
+    """Return a problem whose residuals are white and whose sensitivities are given."""
+    errors = 0.1 * np.tile([1.0, 1.0, -1.0, -1.0], len(slopes) // 4)  # neighbours do not correlate
+    part = SimpleNamespace(measured=np.zeros(len(slopes)))
+    return SimpleNamespace(slopes=lambda _: slopes, residuals=lambda _: [errors], parts=[part])
+
+
+def test_deviations_are_those_of_linear_least_squares_however_weakly_an_unknown_is_felt() -> None:
+    rng = np.random.default_rng(0)
+    slopes = rng.normal(size=(400, 3)) * [1e-4, 1.0, 1e3]
+    found = covariance_of(linear(slopes), np.zeros(3))
+    exact = 0.01 * 400 / 397 * np.linalg.inv(slopes.T @ slopes)
+    assert found.std == pytest.approx(np.sqrt(np.diag(exact)), rel=1e-9)
+    assert found.correlation[0, 1] == pytest.approx(exact[0, 1] / np.sqrt(exact[0, 0] * exact[1, 1]), rel=1e-6)
+    assert found.groups == ()
+    scaled = slopes / np.linalg.norm(slopes, axis=0)
+    assert found.condition == pytest.approx(np.linalg.cond(scaled))
+
+
+def test_what_is_not_felt_and_what_moves_together_is_told_and_the_rest_keeps_its_deviation() -> None:
+    rng = np.random.default_rng(0)
+    own, shared = rng.normal(size=(2, 400))
+    found = covariance_of(linear(np.column_stack([shared, own, np.zeros(400), -2.0 * shared])), np.zeros(4))
+    assert np.isfinite(found.std).tolist() == [False, True, False, False]
+    assert set(found.groups) == {(2,), (0, 3)}
+    assert np.isnan(found.correlation[1]).tolist() == [True, False, True, True]
+    assert found.condition == np.inf
+    pair = np.column_stack([own, shared])
+    assert found.std[1] ** 2 == pytest.approx(0.01 * 400 / 398 * np.linalg.inv(pair.T @ pair)[0, 0], rel=1e-9)
