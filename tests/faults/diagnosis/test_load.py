@@ -48,6 +48,8 @@ def test_a_load_is_found_with_the_condition_under_it(force: float) -> None:
     found = diagnose_log(log("minor_leakage", load_force=force), Rig())
     assert found.condition == "minor_leakage"
     assert load_of(found) == pytest.approx(force, abs=60.0)
+    (note,) = [note for note in found.notes if note.code is ClassCode.LOAD_ON_ROD]
+    assert note.data["pressure_pa"] * HEALTHY.piston_area == pytest.approx(note.data["force_n"])
 
 
 def test_a_load_in_the_rig_file_needs_no_finding() -> None:

@@ -85,3 +85,40 @@ def test_features_need_a_run_and_a_clock() -> None:
     for wrong in (0.0, np.nan):
         with pytest.raises(HydrostateError, match="sample_time must be positive and finite"):
             channel_features(["p"], [np.ones((1, 64))], wrong, Recipe())
+
+
+def bands_of(samples: int, octaves: int, sample_time: float = 0.01) -> list[str]:
+    found = channel_features(
+        ["p"], [np.random.default_rng(0).normal(size=(1, samples))], sample_time, Recipe(1, octaves)
+    )
+    return [name.removeprefix("p power ") for name in found if "power" in name]
+
+
+def test_bands_are_octaves_below_half_the_rate_as_far_as_a_run_has_lines_in_them() -> None:
+    assert bands_of(200, 3) == ["6.25-12.5 Hz", "12.5-25 Hz", "25-50 Hz"]
+    assert bands_of(200, 0) == []
+    # 16 samples of 10 ms: lines every 6.25 Hz, and no edge below half of that
+    assert bands_of(16, 10) == ["3.125-6.25 Hz", "6.25-12.5 Hz", "12.5-25 Hz", "25-50 Hz"]
+
+
+def test_the_shape_of_a_run_is_that_of_its_moments_and_its_power_that_of_its_spectrum() -> None:
+    rng = np.random.default_rng(1)
+    run = 5.0 + 2.0 * rng.exponential(size=400)
+    row = channel_features(["p"], [run[None]], 0.01, Recipe(2, octaves=1)).loc[0]
+    left = run - run.mean()
+    floor = 1e-4 * np.sqrt(np.mean(run**2))  # what is taken for rounding
+    deviation = run.std() + floor
+    wanted = {
+        "mean 1/2": run[:200].mean(),
+        "deviation 2/2": run[200:].std(),
+        "skewness": np.mean(left**3) / deviation**3,
+        "kurtosis": np.mean(left**4) / deviation**4,
+        "crest": np.abs(left).max() / deviation,
+        "log deviation": np.log(deviation),
+    }
+    windowed = left * (0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(400) / 399))
+    lines = [np.sum(windowed * np.exp(-2j * np.pi * k * np.arange(400) / 400)) for k in range(101, 201)]
+    wanted["power 25-50 Hz"] = np.log(
+        np.mean(np.abs(lines) ** 2) / 400 + floor**2
+    )  # lines 0.25 Hz apart, from above 25 Hz
+    assert {name: row[f"p {name}"] for name in wanted} == pytest.approx(wanted, rel=1e-6)
