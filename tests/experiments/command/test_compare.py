@@ -1,0 +1,46 @@
+"""Two studies side by side at the terminal and for a program."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from experiments.cli import app
+
+STUDY = """
+name = "{name}"
+[[runs]]
+plants = ["reduced"]
+drives = ["sine"]
+conditions = ["normal"]
+seeds = 6
+starts_pa = [{start}]
+duration_s = 0.05
+methods = [{{ verb = "filter", form = "acceleration", method = "ekf" }}]
+"""
+
+
+@pytest.fixture(scope="module")
+def stores(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("compared")
+    for name, start in (("near", 2e8), ("far", 0.0)):
+        (folder / f"{name}.toml").write_text(STUDY.format(name=name, start=start), encoding="utf-8")
+        words = ["batch", str(folder / f"{name}.toml"), "--out", str(folder / name), "--workers", "1"]
+        assert CliRunner().invoke(app, words).exit_code == 0
+    return folder / "near", folder / "far"
+
+
+def test_a_program_gets_the_rows_that_the_screen_shows(stores: tuple[Path, Path]) -> None:
+    words = ["compare", *map(str, stores)]
+    shown = CliRunner().invoke(app, words)
+    (told,) = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
+    assert shown.exit_code == 0, shown.output
+    assert (told["first"], told["second"]) == tuple(map(str, stores))
+    (error,) = [row for row in told["rows"] if row["condition"] == "all" and row["measure"] == "error of bulk modulus"]
+    assert error["series"] == 6
+    assert error["difference"] == pytest.approx(error["second"] - error["first"])
+    assert "near [%]" in shown.stdout
+    assert f"{error['difference']:+.3g}" in shown.stdout
+    same = CliRunner().invoke(app, ["compare", str(stores[0]), str(stores[0])])
+    assert "A [%]" in same.stdout  # studies of one name

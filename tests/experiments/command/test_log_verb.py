@@ -1,0 +1,46 @@
+"""One log with its figure and its page; files of other loggers go with one log."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from experiments.cli import app
+
+
+def invoke(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(one) for one in arguments])
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("verb") / "run.csv"
+    made = invoke("simulate", "--drive", "prbs", "--duration", 2, "--sample-time", 1e-3, "--out", path)
+    assert made.exit_code == 0, made.output
+    return path
+
+
+def test_an_estimate_is_drawn_and_written_as_a_page_where_asked(log: Path, tmp_path: Path) -> None:
+    wanted = ("--figure", tmp_path / "run.png", "--report", tmp_path / "run")
+    done = invoke("estimate", log, "--form", "pressure", "--method", "ekf", *wanted)
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "run.png").read_bytes()[:4] == b"\x89PNG"
+    page = (tmp_path / "run.html").read_text("utf-8")
+    assert "run.csv" in page
+    assert "bulk modulus" in page
+
+
+def test_files_of_other_loggers_go_with_one_log(log: Path, tmp_path: Path) -> None:
+    lines = [line.replace('"', "").split(",") for line in log.read_text().splitlines()]
+    names = lines[0]
+    pressure = names.index("differential_pressure_pa")
+    parts = {"motion": [k for k in range(len(names)) if k != pressure], "pressure": [0, pressure]}
+    for name, columns in parts.items():
+        rows = (",".join(cells[k] for k in columns) for cells in lines)
+        (tmp_path / f"{name}.csv").write_text("\n".join(rows) + "\n")
+    together = invoke("estimate", tmp_path / "motion.csv", "--with", tmp_path / "pressure.csv", "--json")
+    assert together.exit_code == 0, together.output
+    assert '"differential_pressure_pa"' in together.stdout
+    refused = invoke("estimate", log, tmp_path / "motion.csv", "--with", tmp_path / "pressure.csv")
+    assert refused.exit_code == 2
+    assert "--with goes with one log, got several" in refused.stderr

@@ -1,0 +1,45 @@
+"""The heading of a log's page, and the sentence for what was found."""
+
+from dataclasses import replace
+
+import pytest
+
+from estimation.finding import Finding, Gate, Outcome, Quantity
+from estimation.notes import EstimateCode
+from experiments.log_pages.entries import message_of
+from experiments.log_pages.finding_page import _title
+
+PASSED, DOUBTED = Gate(True, ()), Gate(False, (EstimateCode.DIVERGED.note(),))
+
+
+def found(**changes: object) -> Finding:
+    plain = Finding(
+        actuator="eha",
+        outcome=Outcome.OK,
+        quantities={"bulk_modulus": Quantity.normal(2.07e8, 1e6, "Pa")},
+        gate=PASSED,
+        channels=("velocity_m_s",),
+    )
+    return replace(plain, **changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "title"),
+    [
+        ({}, "Estimated values, which passed the consistency check."),
+        ({"gate": DOUBTED}, "Estimated values, but do not rely on them."),
+        ({"quantities": {"bulk_modulus": Quantity(None, "Pa")}}, "No values: the log contains too little"),
+        ({"condition": "minor_leakage", "probabilities": {"minor_leakage": 0.9}}, "Found: minor leakage."),
+        ({"condition": "minor_leakage", "unknown": True}, "No verdict: the log does not fit any known condition."),
+    ],
+)
+def test_the_title_promises_no_more_than_was_found(changes: dict[str, object], title: str) -> None:
+    assert _title(found(**changes)).startswith(title)
+
+
+def test_a_condition_that_the_gate_doubts_is_said_with_the_doubt() -> None:
+    named = {"condition": "minor_leakage", "probabilities": {"minor_leakage": 0.9}}
+    assert "not to be relied on" not in message_of(found(**named))
+    said = message_of(found(**named, gate=DOUBTED))
+    assert said.startswith("minor_leakage")
+    assert f"not to be relied on: {EstimateCode.DIVERGED.note()}" in said

@@ -1,0 +1,49 @@
+"""What is asked of the motor leaves the piston within its travel and the speed within its rating, for every draw."""
+
+import numpy as np
+import pytest
+
+from experiments.open_benchmark.drives import (
+    Room,
+    multisine,
+    position_steps,
+    prbs,
+    sines,
+    steps,
+    tracking,
+)
+from experiments.open_benchmark.run import TICK
+
+ROOM = Room(duration=6.0, rated=125.0, travel=0.03, glide=4e-4)
+
+
+@pytest.mark.parametrize("drive", [steps, prbs, multisine, sines])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_speed_is_within_its_rating_and_leads_the_piston_no_farther_than_from_side_to_side(
+    drive: object, seed: int
+) -> None:
+    assert callable(drive)
+    speed = drive(ROOM, np.random.default_rng(seed))
+    assert speed.shape == (ROOM.ticks,)
+    assert np.max(np.abs(speed)) <= ROOM.rated * (1.0 + 1e-9)
+    where = np.cumsum(ROOM.glide * speed * TICK)
+    assert 0.2 * ROOM.travel < np.ptp(where) <= 2.1 * ROOM.travel  # from one side to the other
+
+
+@pytest.mark.parametrize("drive", [position_steps, tracking])
+def test_a_position_is_asked_for_within_the_travel_and_no_faster_than_the_motor_turns(drive: object) -> None:
+    assert callable(drive)
+    for seed in range(4):
+        asked = drive(ROOM, np.random.default_rng(seed))
+        assert asked.shape == (ROOM.ticks,)
+        assert np.max(np.abs(asked)) <= ROOM.travel * (1.0 + 1e-9)
+    followed = tracking(ROOM, np.random.default_rng(0))
+    assert followed[0] == 0.0
+    assert np.max(np.abs(np.diff(followed))) / TICK <= 0.8 * ROOM.glide * ROOM.rated * (1.0 + 1e-9)
+
+
+def test_a_binary_signal_has_one_size_and_comes_back_from_where_it_is_drawn_to() -> None:
+    speed = prbs(ROOM, np.random.default_rng(2))
+    assert len(np.unique(np.abs(speed))) == 1
+    assert np.any(speed > 0.0)
+    assert np.any(speed < 0.0)

@@ -1,0 +1,33 @@
+"""A severity as a row of a page: in a reader's unit, or left out where the log does not tell it."""
+
+import math
+
+import pytest
+
+from estimation.finding import Quantity
+from experiments.page.severity_rows import severity_row
+
+
+@pytest.mark.parametrize(
+    "one",
+    [
+        Quantity(None, "N"),
+        Quantity(3.0, "N"),
+        Quantity(math.inf, "N", (1.0, 2.0)),
+        Quantity(3.0, "N", (1.0, math.inf)),
+        Quantity(3.0, "N", (math.nan, 4.0)),
+    ],
+)
+def test_what_a_log_does_not_tell_has_no_row(one: Quantity) -> None:
+    assert severity_row("added_friction", "added friction", one, 0.0, 10.0) is None
+
+
+def test_the_bar_reaches_from_zero_over_the_interval_to_the_limit() -> None:
+    row = severity_row("added_friction", "added friction", Quantity(3.0, "N", (1.0, 5.0)), 0.0, 10.0)
+    assert row is not None
+    assert row.first <= 0.0
+    assert row.last >= 10.0
+    assert row.limit_text == "10"
+    open_row = severity_row("added_friction", "added friction", Quantity(3.0, "N", (1.0, 5.0)), 0.0, None)
+    assert open_row is not None
+    assert open_row.limit_text == ""
