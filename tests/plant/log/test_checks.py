@@ -297,3 +297,11 @@ def test_a_clock_alone_and_a_channel_that_is_hardly_there_are_no_log() -> None:
         source="a.csv",
     )
     assert list(kept.channels) == ["motor_speed_rad_s", "velocity_m_s"]
+
+
+def test_a_channel_that_is_logged_every_second_row_is_slower_too() -> None:
+    half = np.where(np.arange(N) % 2 == 0, 1e6 * VELOCITY, np.nan)
+    checked = check(differential_pressure_pa=half)
+    assert [(note.code, dict(note.data)) for note in checked.notes] == [
+        (LogCode.CHANNEL_SLOWER, {"channel": "differential_pressure_pa", "rows": 2})
+    ]

@@ -6,7 +6,7 @@ import pytest
 from scipy.io import loadmat
 
 from estimation.identification import LinearModel, dc_gain_interval, fit_output_error
-from estimation.identification.model.uncertainty import _deviations
+from estimation.identification.model.uncertainty import _deviations, response_band
 from estimation.identification.notes import IdentificationCode
 from plant.errors import CovarianceWarning, HydrostateError
 
@@ -142,3 +142,16 @@ def test_a_zero_on_a_pole_is_no_deviation_away() -> None:
 def test_a_pole_that_takes_hours_has_the_lowest_bandwidth_that_is_looked_at() -> None:
     slow = LinearModel([1e-12], [1.0, -(1.0 - 1e-12)], 1e-3, "u", "y")
     assert slow.bandwidth_hz == pytest.approx(500.0 * 1e-5)
+
+
+def test_a_band_is_the_spread_along_the_response_and_across_it() -> None:
+    gradient = np.array([[1.0 + 2.0j, -1.0j], [3.0 + 0.0j, 4.0j]])
+    covariance = np.array([[0.04, 0.01], [0.01, 0.09]])
+    response = np.array([2.0j, 0.0])  # along the imaginary axis, and nowhere
+    band = response_band(np.array([1.0, 2.0]), response, gradient, covariance, 0.95)
+    along, across = (part @ covariance @ part for part in (gradient[0].imag, gradient[0].real))
+    assert band.gain_std == pytest.approx([np.sqrt(along), np.sqrt(gradient[1].real @ covariance @ gradient[1].real)])
+    assert band.phase_std[0] == pytest.approx(np.sqrt(across) / 2.0)
+    assert band.phase_std[1] == np.inf
+    assert band.gain_high - np.abs(response) == pytest.approx(1.959964 * band.gain_std, rel=1e-6)
+    assert band.gain_low == pytest.approx(np.maximum(np.abs(response) - 1.959964 * band.gain_std, 0.0), rel=1e-6)
