@@ -99,6 +99,9 @@ def test_leakage_that_changes_by_more_than_oil_thins_is_a_fault(factor: float, c
 def test_the_chamber_that_is_blocked_or_drains_is_named() -> None:
     assert told("makeup_blocked", makeup_share_b=(0.01, 0.0)).data["side"] == "B"
     assert told("makeup_blocked", makeup_share_b=(99.0, 0.0)).data["side"] == "A"
+    # one valve as free as the other is the border
+    for share, side in ((0.9, "B"), (1.1, "A")):
+        assert told("makeup_blocked", makeup_share_b=(share, 0.0)).data["side"] == side
     for side in "ab":
         drained = {f"drain_share_{side}": (7.0, 1.0), "case_leakage": (2e-13, 0.0)}
         assert data(told(f"port_{side}_drains", **drained)) == {"side": side.upper(), "drain": 1.4e-12}

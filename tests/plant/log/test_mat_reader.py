@@ -9,7 +9,7 @@ import scipy.io
 from hypothesis import given
 from hypothesis import strategies as st
 
-from plant.log.mat_reader import DamagedMatError, Value, read_variables
+from plant.log.mat_reader import DEEPEST, DamagedMatError, Value, read_variables
 
 RNG = np.random.default_rng(3)
 CONTENT: dict[str, Any] = {
@@ -105,3 +105,18 @@ def test_a_file_cut_anywhere_is_refused_or_read_to_the_cut() -> None:
 @given(tail=st.binary(max_size=200))
 def test_random_bytes_after_the_header_cannot_crash_the_reader(tail: bytes) -> None:
     variables_or_damage(WHOLE[False][:128] + tail)
+
+
+def test_structs_within_structs_are_read_as_deep_as_they_may_be_and_no_deeper() -> None:
+    def nested(depth: int) -> dict[str, Any]:
+        content: Any = np.arange(3.0)
+        for _ in range(depth):
+            content = {"inner": content}
+        return {"outer": content}
+
+    found: Any = read_variables(written(nested(DEEPEST), compress=False))["outer"]
+    for _ in range(DEEPEST):
+        found = found["inner"]
+    assert np.array_equal(found, np.arange(3.0))
+    with pytest.raises(DamagedMatError, match=f"over {DEEPEST} deep"):
+        read_variables(written(nested(2 * DEEPEST), compress=False))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimation.arrays import Array
-from estimation.identification.free_run.choose_linear import candidate, chosen, linear_candidates
+from estimation.identification.free_run.choose_linear import _forms, candidate, chosen, linear_candidates
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import Form, Problem, fit_linear
@@ -248,3 +248,14 @@ def test_a_structure_that_cannot_have_a_log_says_so(structure: str, log: Channel
     by = scaled(log)[1]
     with pytest.raises(HydrostateError, match=said):
         adopt(structure, Form(2, (2,), (1,)), log, by)
+
+
+def test_an_order_is_tried_behind_the_estimated_dead_times_and_behind_none_or_one_sample() -> None:
+    assert _forms(2, (3, 0), 2, None) == [
+        Form(2, (2, 3), (3, 0)),  # one value more where the output answers at once
+        Form(2, (3, 3), (3, 0)),
+        Form(2, (3, 3), (0, 0)),
+        Form(2, (2, 2), (1, 1)),
+    ]
+    assert _forms(2, (1,), 1, None) == [Form(2, (2,), (1,)), Form(2, (3,), (1,)), Form(2, (3,), (0,))]
+    assert _forms(2, (3, 0), 2, 4) == [Form(2, (4, 4), (3, 0))]

@@ -1,0 +1,41 @@
+"""What a polynomial over neighbouring lines leaves of the output of a periodic test: distortion and nothing else."""
+
+import numpy as np
+import pytest
+
+from estimation.identification.signals.distortion import BESIDE, CURVED, _left
+
+RNG = np.random.default_rng(4)
+
+
+def drawn(count: int) -> np.ndarray:
+    return RNG.normal(size=count) + 1j * RNG.normal(size=count)
+
+
+def test_a_response_that_bends_no_more_than_the_polynomial_leaves_nothing() -> None:
+    inside = drawn(40)
+    lines = np.arange(40) / 40.0
+    output = (1.0 + 2.0j * lines + 0.5 * lines**2) * inside
+    assert np.abs(_left(output, inside)).max() < 1e-10
+
+
+@pytest.mark.parametrize("place", [0, 2, 11, 19])
+def test_each_line_is_what_least_squares_over_its_neighbours_misses_it_by_in_units_of_its_own_noise(place: int) -> None:
+    inside, output = drawn(20), drawn(20)
+    span = 2 * BESIDE + 1
+    begin = min(max(place - BESIDE, 0), 20 - span)
+    window = slice(begin, begin + span)
+    powers = (np.arange(begin, begin + span) - place)[:, None] ** np.arange(CURVED + 1.0)
+    columns = powers * inside[window, None]
+    others = np.arange(span) != place - begin
+    without = np.linalg.lstsq(columns[others], output[window][others], rcond=None)[0]
+    # the error of a prediction from the others alone, over its deviation: both are larger by 1 / (1 - leverage)
+    hat = columns @ np.linalg.pinv(columns)
+    missed = (output[place] - columns[place - begin] @ without) * np.sqrt(1.0 - hat[place - begin, place - begin].real)
+    assert _left(output, inside)[place] == pytest.approx(missed)
+
+
+def test_fewer_lines_than_a_polynomial_spans_leave_nothing_known() -> None:
+    span = 2 * BESIDE + 1
+    assert np.isnan(_left(drawn(span - 1), drawn(span - 1))).all()
+    assert np.isfinite(_left(drawn(span), drawn(span))).all()
