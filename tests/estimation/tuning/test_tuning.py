@@ -8,7 +8,7 @@ from estimation.filters.run import run_filter
 from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, first_belief
 from estimation.models.eha_forms import BULK_MODULUS, PRESSURE_FORM
 from estimation.tuning.scoring import Coordinate
-from estimation.tuning.tuning import Tuning, tune
+from estimation.tuning.tuning import Tuning, speed_noise, tune
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
@@ -106,3 +106,13 @@ def test_a_coordinate_stays_above_its_floor_and_is_linear_where_it_is_told() -> 
     assert log_like.value(-40.0)[0] == pytest.approx(1.0)
     assert log_like.value(np.log(2.0)) == pytest.approx((5.0, 4.0))
     assert Coordinate("friction_linear", 0, -2.0, scale=10.0).value(0.5) == pytest.approx((3.0, 10.0))
+
+
+def test_noise_of_measured_speed_makes_pressure_wander_as_equation_5_8_pumps_it() -> None:
+    p, T, deviation = EhaParameters(), 1e-3, 0.5
+    noise = deviation * np.random.default_rng(0).standard_normal((1000, 400))  # runs of 400 samples
+    record = Record(T, {"motor_speed_rad_s": noise[0], "position_m": np.zeros(400)})
+    pressure = np.cumsum(p.bulk_modulus / p.chamber_volume * p.pump_displacement * noise * T, axis=1)  # piston held
+    density = speed_noise(record, p, deviation**2)
+    assert np.var(pressure[:, -1]) == pytest.approx(density * 400 * T, rel=0.15)
+    assert speed_noise(record, p) == pytest.approx(density, rel=0.5)  # read off the log

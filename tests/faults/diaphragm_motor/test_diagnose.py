@@ -66,6 +66,7 @@ def test_a_healthy_motor_is_healthy() -> None:
 def test_a_fault_s_probability_falls_with_the_share_of_its_severities_that_the_log_leaves() -> None:
     found = diagnose_motor(log_of(MOTOR), MOTOR)
     share = {match.name: match for match in found.matches}
+    assert (share[HEALTHY].severity, share[HEALTHY].interval) == (0.0, (0.0, 0.0))
     kinds = [fault.kind for fault in MOTOR_FAULTS.values()]
     told = 0
     for name, fault in MOTOR_FAULTS.items():
