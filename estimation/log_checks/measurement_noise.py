@@ -19,12 +19,16 @@ well below any bench sensor, so that a noiseless simulation stays solvable."""
 NORMAL_MAD = 1.482602218505602
 """Standard deviation of a normal variable over its median absolute deviation."""
 
+ROUNDING = 1e-12
+"""Share of a channel's largest value up to which a step is that of floating-point numbers [fraction]."""
+
 
 def measurement_variances(record: Record, channels: Sequence[str]) -> Mapping[str, float]:
     """Estimate each channel's measurement variance from its second differences.
 
     A second difference removes everything smooth and holds six times the variance of white noise; its median absolute
-    deviation ignores the moments at which the piston really jumps. A channel that mostly repeats its last value is
+    deviation ignores the moments at which the piston really jumps. Differences of what a converter rounded are whole
+    steps, and so would be their median; it is taken within its step. A channel that mostly repeats its last value is
     taken for quantised: one twelfth of the squared quantum is the least that it can have.
 
     Parameters
@@ -56,8 +60,28 @@ def _variance(channel: str, values: Array) -> float:
     smallest = max(SMALLEST_VARIANCE.get(channel, 0.0), _quantum(values) ** 2 / 12.0)
     if not len(bends):
         return smallest
-    deviation = NORMAL_MAD * float(np.median(np.abs(bends - np.median(bends)))) / 6.0**0.5
+    deviation = NORMAL_MAD * _grouped_median(np.abs(bends - np.median(bends)), _step(values)) / 6.0**0.5
     return float(max(deviation**2, smallest))
+
+
+def _grouped_median(sizes: Array, step: float) -> float:
+    """Return the median of sizes that were rounded to steps, each as likely anywhere within half a step of its value.
+
+    Sizes of which more than half are none have a median of none: what they differ by is less than a step tells.
+    """
+    median = float(np.median(sizes))
+    same = np.count_nonzero(np.abs(sizes - median) < 0.25 * step)
+    if same == 0 or median < 0.25 * step:
+        return median
+    low = max(median - 0.5 * step, 0.0)
+    below = np.count_nonzero(sizes <= median - 0.25 * step)
+    return low + (median + 0.5 * step - low) * (0.5 * len(sizes) - below) / same
+
+
+def _step(values: Array) -> float:
+    """Return the smallest step of a channel that is more than rounding of its floating-point values."""
+    steps = np.abs(np.diff(values))
+    return float(np.min(steps[steps > ROUNDING * np.max(np.abs(values))], initial=np.inf))
 
 
 def _quantum(values: Array) -> float:

@@ -63,6 +63,21 @@ def test_a_coarse_quantum_counts_although_most_samples_repeat() -> None:
     assert variance_of("differential_pressure_pa", quantised) == pytest.approx(1e8 / 12.0, rel=1e-9)
 
 
+@pytest.mark.parametrize("step", [0.1, 0.3, 0.5, 0.7, 1.0, 1.2, 1.5, 2.0, 2.5, 3.0])
+def test_noise_that_a_converter_rounds_is_found_between_whole_steps(step: float) -> None:
+    rng = np.random.default_rng(6)
+    noisy = 300.0 * np.sin(np.arange(40_000) * 1.3e-3) + rng.normal(0.0, 1.0, 40_000)
+    held = np.sqrt(1.0 + step**2 / 12.0)  # a converter that rounds adds noise of its own
+    found = np.sqrt(variance_of("velocity_m_s", step * np.round(noisy / step)))
+    assert found / held == pytest.approx(1.0, abs=0.04 if step <= 2.5 else 0.13)
+
+
+def test_a_ramp_with_a_few_kinks_has_no_noise_of_a_step() -> None:
+    rare = np.zeros(5_000)
+    rare[::10] = 1.0
+    assert variance_of("velocity_m_s", rare + 1e-4 * np.arange(5_000)) == SMALLEST_VARIANCE["velocity_m_s"]
+
+
 def test_a_noiseless_ramp_is_not_taken_for_quantised() -> None:
     assert variance_of("position_m", 4e-5 * np.arange(1_000)) == SMALLEST_VARIANCE["position_m"]
 
