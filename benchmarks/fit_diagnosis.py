@@ -2,7 +2,8 @@
 
 A quarter of them are of the open benchmark, whose physics no estimator shares: on the circuit's own logs hardly a class
 is wrong, and weights learnt there would be too sure elsewhere. Writes ``faults/diagnosis/calibration.json`` (``--out``
-another file). Test seeds, other splits of the benchmark and foreign logs are never looked at.
+another file). Test seeds, other splits of the benchmark and foreign logs are never looked at. ``--widths`` fits the
+widths with pressure alone, which needs nothing but the fitted circuits, and leaves all else as it is.
 """
 
 import argparse
@@ -11,7 +12,6 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 import hydrostate
-from benchmarks.population import TRAINING, draw_logs
+from benchmarks.population import DRIVES, TRAINING, Drawn, draw_logs
 from experiments.open_benchmark.folders import write_set
 from experiments.open_benchmark.kinds import VERSION
 from experiments.open_benchmark.loaders import read_truth, rows_of
@@ -29,7 +29,9 @@ from experiments.published.library import read_library
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.class_regions import ClassFits
 from faults.diagnosis.evidence import EVIDENCES, weigh
+from faults.diagnosis.onset import last_part
 from faults.diagnosis.severity import UNITS, severities, severities_at
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -54,13 +56,16 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=24)
     parser.add_argument("--out", type=Path, default=Path("faults/diagnosis/calibration.json"))
+    parser.add_argument("--widths", action="store_true", help="fit the widths with pressure alone")
     options = parser.parse_args(arguments)
+    if options.widths:
+        return _only_widths(options.seeds, options.out)
     modes = {"with_pressure": True, "without_pressure": False}
     with ProcessPoolExecutor(len(modes)) as pool:
         parts = pool.map(fitted, len(modes) * [options.seeds], modes.values())
         found: dict[str, object] = dict(zip(modes, parts, strict=True))
     for name, part in found.items():
-        print(name, 9 * options.seeds * (len(POPULATIONS) + 1), "logs", part)
+        print(name, len(CONDITIONS) * len(DRIVES) * options.seeds * (len(POPULATIONS) + 1), "logs", part)
     found["provenance"] = {
         "script": "python -m benchmarks fit_diagnosis",
         "population": "benchmarks.population.draw_logs, and as many logs as one of its populations has of the open "
@@ -75,14 +80,32 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
+def _only_widths(seeds: int, out: Path) -> int:
+    """Fit the widths with pressure and write them beside what is there; return 0."""
+    actuator = Actuator.of(EhaParameters())
+    ratios = _no_ratios()
+    for _, log in _training(range(TRAINING, TRAINING + seeds)):
+        _add_ratios(ratios, last_part(log.record, actuator).fits, log.parameters, actuator)
+    found = json.loads(out.read_text(encoding="utf-8"))
+    found["with_pressure"]["widths"] = _widths(ratios)
+    found["provenance"]["seeds of the widths with pressure"] = seeds
+    out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    print(found["with_pressure"]["widths"])
+    return 0
+
+
 def fitted(seeds: int, pressure: bool) -> dict[str, dict[str, float]]:
     """Return the weights and the widths, with pressure or without."""
     odds, truths, ratios = gathered(range(TRAINING, TRAINING + seeds), pressure=pressure)
     weights = fitted_weights(odds, truths)
     return {
         "weights": dict(zip(EVIDENCES, weights.round(4).tolist(), strict=True)),
-        "widths": {key: round(fitted_width(values), 3) for key, values in ratios.items()},
+        "widths": _widths(ratios),
     }
+
+
+def _widths(ratios: dict[str, list[float]]) -> dict[str, float]:
+    return {key: round(fitted_width(values), 3) for key, values in ratios.items()}
 
 
 def gathered(seeds: Sequence[int], *, pressure: bool) -> tuple[Array, NDArray[np.int64], dict[str, list[float]]]:
@@ -90,21 +113,37 @@ def gathered(seeds: Sequence[int], *, pressure: bool) -> tuple[Array, NDArray[np
     actuator, library = Actuator.of(EhaParameters()), read_library()
     odds: list[Array] = []
     truths: list[int] = []
-    ratios: dict[str, list[float]] = {name: [] for name in UNITS if name != "entrained_air"}
-    drawn = ((like, draw_logs(seeds, width=width, like=like)) for width, like in POPULATIONS)
-    for weighed, logs in chain(drawn, [(True, open_logs(len(CONDITIONS) * len(seeds)))]):
-        for log in logs:
-            record = log.record if pressure else log.record.replace(**{PRESSURE: None})
-            board = weigh(record, actuator, library)
-            if weighed:
-                odds.append(np.array([board.log_odds[name] for name in EVIDENCES]))
-                truths.append(list(CONDITIONS).index(log.condition))
-            true = severities_at(coordinates_of(log.parameters, actuator.rated), actuator)
-            for name, one in severities(board.fits, actuator).items():
-                if name in ratios:
-                    reach = one.ci95[1] - one.value if true[name] > one.value else one.value - one.ci95[0]
-                    ratios[name].append(abs(true[name] - one.value) / max(reach, np.finfo(float).tiny))
+    ratios = _no_ratios()
+    for weighed, log in _training(seeds):
+        record = log.record if pressure else log.record.replace(**{PRESSURE: None})
+        board = weigh(record, actuator, library)
+        if weighed:
+            odds.append(np.array([board.log_odds[name] for name in EVIDENCES]))
+            truths.append(list(CONDITIONS).index(log.condition))
+        _add_ratios(ratios, board.fits, log.parameters, actuator)
     return np.array(odds), np.array(truths), ratios
+
+
+def _training(seeds: Sequence[int]) -> Iterator[tuple[bool, "Drawn | OpenLog"]]:
+    """Yield each training log, and whether weights see it."""
+    for width, like in POPULATIONS:
+        for log in draw_logs(seeds, width=width, like=like):
+            yield like, log
+    for log in open_logs(len(CONDITIONS) * len(DRIVES) * len(seeds)):
+        yield True, log
+
+
+def _no_ratios() -> dict[str, list[float]]:
+    return {name: [] for name in UNITS if name != "entrained_air"}
+
+
+def _add_ratios(ratios: dict[str, list[float]], fits: ClassFits, p: EhaParameters, actuator: Actuator) -> None:
+    """Add a log's errors over half-widths, by severity."""
+    true = severities_at(coordinates_of(p, actuator.rated), actuator)
+    for name, one in severities(fits, actuator).items():
+        if name in ratios and one.value is not None and one.ci95 is not None:
+            reach = one.ci95[1] - one.value if true[name] > one.value else one.value - one.ci95[0]
+            ratios[name].append(abs(true[name] - one.value) / max(reach, np.finfo(float).tiny))
 
 
 class OpenLog(NamedTuple):

@@ -58,7 +58,7 @@ TOLERANCE, DRIVE_TOLERANCE = 1e-4, 2e-3
 
 _CONTROL = cast("ErrorControl", CIRCUIT.control)
 
-_COLUMN = {field.name: i for i, field in enumerate(fields(CircuitParameters))}
+COLUMN = {field.name: i for i, field in enumerate(fields(CircuitParameters))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,10 +257,10 @@ def parameter_rows(points: Array, rig: CircuitParameters, rated: float) -> Array
         ("bulk_modulus", modulus),
         ("presliding_displacement", rig.presliding_displacement * yielding),
     ):
-        rows[:, _COLUMN[name]] = values
+        rows[:, COLUMN[name]] = values
     share = np.minimum(1.0, leakage / rig.leakage_coefficient) if rig.leakage_coefficient > 0.0 else np.ones(len(rows))
     for name in ("pump_crossport_leakage", "pump_case_leakage"):
-        rows[:, _COLUMN[name]] *= share
+        rows[:, COLUMN[name]] *= share
     return rows
 
 
@@ -315,9 +315,9 @@ def _start(blocks: Blocks, row: Array) -> Array:
 
 def _drift(course: Array) -> Array:
     """Return the factors on a circuit's parameters, shape (samples, parameters): viscosity falls as leakage rises."""
-    factors = np.ones((len(course), len(_COLUMN)))
-    factors[:, [_COLUMN[name] for name in _LEAKAGES]] = course[:, None]
-    factors[:, _COLUMN["friction_linear"]] = 1.0 / course
+    factors = np.ones((len(course), len(COLUMN)))
+    factors[:, [COLUMN[name] for name in _LEAKAGES]] = course[:, None]
+    factors[:, COLUMN["friction_linear"]] = 1.0 / course
     return factors
 
 
@@ -332,12 +332,12 @@ def _between_stops(blocks: Blocks, rows: Array) -> Array:
     """
     if blocks.stop is not None:
         rows = rows.copy()
-        rows[..., _COLUMN["stroke"]] = 2.0 * blocks.stop
+        rows[..., COLUMN["stroke"]] = 2.0 * blocks.stop
         return rows
-    half = 0.5 * rows[..., _COLUMN["stroke"]]
+    half = 0.5 * rows[..., COLUMN["stroke"]]
     shown = np.abs(blocks.reach - half) <= AT_STOP * half
     rows = rows.copy()
-    rows[..., _COLUMN["stroke"]] = np.where(shown, 2.0 * half, longest_stroke(circuit_values(rows)))
+    rows[..., COLUMN["stroke"]] = np.where(shown, 2.0 * half, longest_stroke(circuit_values(rows)))
     return rows
 
 

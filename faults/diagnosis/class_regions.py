@@ -26,6 +26,7 @@ from faults.diagnosis.class_fit import (
     nominal_runs,
     scales_of,
 )
+from faults.diagnosis.model_doubt import between_fits, doubt_of, seldom_known_slopes
 from plant.arrays import Array
 
 ROUGHLY_GAINED = 10.0
@@ -68,7 +69,8 @@ class ClassFits:
     scores : ndarray, shape (9,)
         How well each condition's region holds the fitted circuits: log-likelihoods [dimensionless].
     spread : ndarray, shape (7, 7)
-        Covariance of the coordinates for intervals, see `spread_of` [dimensionless].
+        Covariance of the coordinates for intervals [dimensionless], see `faults.diagnosis.model_doubt`, and without
+        pressure `spread_of`.
     lasting : float
         By what a model error that lasts divides the information [dimensionless], see `lasting_misfit`; 1 at the least,
         and without pressure.
@@ -135,7 +137,11 @@ def fit_classes(
     best = fits[least] if blocks.pressure is not None else _scaled(fits[least], centre)
     # without pressure no balance of flows looks for another pump or other faults, so regions alone have to
     lasting = 1.0 if blocks.pressure is None else max(1.0, lasting_misfit(best.fitted, blocks))
-    spread = spread_of(best, known[least], blocks, centre)
+    if blocks.pressure is None:
+        spread = spread_of(best, known[least], blocks, centre)
+    else:
+        seen, seldom = _NO_FRICTION if stuck else np.ones(len(COORDINATES)), seldom_known_slopes(best, blocks, actuator)
+        spread = doubt_of(best, seldom, blocks, actuator.conditions, held, seen) + between_fits(fits, best, blocks)
     errors = np.array([scales_of(blocks, run) for run in runs])
     return ClassFits(best, known[least], nominal, errors, held, spread, lasting)
 
@@ -148,11 +154,11 @@ def _scaled(fit: PointFit, centre: Array) -> PointFit:
 
 
 def spread_of(fit: PointFit, information: Array, blocks: Blocks, centre: Array) -> Array:
-    """Return the covariance of a fit's coordinates, for intervals that know how well the model describes this log.
+    """Return the covariance of a fit's coordinates without pressure, for intervals that know how well the model holds.
 
     What is left of a log that the model describes is the sensors' noise, which averages away; the error of a wrong
     model lasts. So variances grow with what is left after averaging over a tenth of a second, over what white noise
-    would leave. Without pressure the common scale is known only as far as actuators of one kind are alike, and an
+    would leave. The common scale of pressure is known only as far as actuators of one kind are alike, and an
     actuator that differs much from its kind in what its log tells is taken to do so in what it does not tell.
 
     Parameters
@@ -162,7 +168,7 @@ def spread_of(fit: PointFit, information: Array, blocks: Blocks, centre: Array) 
     information : ndarray, shape (7, 7)
         What is believed of it, see `believed_information`.
     blocks : Blocks
-        Its log.
+        Its log, without pressure.
     centre : ndarray, shape (7,)
         Coordinates of the condition that it is in.
 
@@ -172,12 +178,11 @@ def spread_of(fit: PointFit, information: Array, blocks: Blocks, centre: Array) 
         Covariance under the weak prior [dimensionless].
     """
     known = information / max(1.0, lasting_misfit(fit.fitted, blocks)) + np.linalg.inv(WEAK)
-    if blocks.pressure is None:
-        weight = information @ np.linalg.inv(np.eye(len(WITHIN)) + WITHIN @ information)
-        off, told = fit.coordinates - centre, float(np.trace(WITHIN @ weight))
-        unlike = (ALIKE_COUNT * ALIKE + float(off @ weight @ off)) / (ALIKE_COUNT + told)
-        pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
-        known = known + np.outer(pull, pull) / (unlike * float(pull @ PRESSURE_SCALE))
+    weight = information @ np.linalg.inv(np.eye(len(WITHIN)) + WITHIN @ information)
+    off, told = fit.coordinates - centre, float(np.trace(WITHIN @ weight))
+    unlike = (ALIKE_COUNT * ALIKE + float(off @ weight @ off)) / (ALIKE_COUNT + told)
+    pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
+    known = known + np.outer(pull, pull) / (unlike * float(pull @ PRESSURE_SCALE))
     return np.asarray(np.linalg.inv(known), dtype=np.float64)
 
 

@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from faults.diagnosis.circuit_runs import Blocks
 from faults.diagnosis.class_fit import LASTING, Actuator, misfit
 from faults.diagnosis.class_regions import ClassFits, fit_classes
-from plant.arrays import Array
 
 RESTS = 0.05
 """Least time that a piston stands at the farthest place it reached before that may be a stop [s]."""
@@ -39,7 +39,8 @@ def stopped(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Blocks
     -------
     tuple of Blocks and ClassFits
         As they came where the piston does not stand at its farthest place, where a circuit without a stop follows it,
-        or where a stop there explains no more than friction does.
+        or where a stop there explains no more than friction does. What the log holds while the piston stands at the
+        stop is then missing: how a stop yields would be taken for friction.
     """
     sizes = np.sqrt(np.nanmean(blocks.outputs[blocks.first :] ** 2, axis=0))
     if np.all(fits.best.scales <= POOR * sizes) or not _stands(blocks):
@@ -47,11 +48,21 @@ def stopped(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Blocks
     with_stop = replace(blocks, stop=blocks.reach)
     again = fit_classes(with_stop, actuator)
     gained = misfit(blocks, fits.best.fitted) - misfit(with_stop, again.best.fitted)
-    return (with_stop, again) if gained > GAIN * LASTING else (blocks, fits)
+    if gained <= GAIN * LASTING:
+        return blocks, fits
+    there = _at_farthest(blocks)
+    pressure = None if blocks.pressure is None else np.where(there, np.nan, blocks.pressure)
+    free = replace(with_stop, velocity=np.where(there, np.nan, blocks.velocity), pressure=pressure)
+    return free, fit_classes(free, actuator, start=again.best.coordinates)
 
 
 def _stands(blocks: Blocks) -> bool:
     """Return whether the piston stands long enough at the farthest place that it reaches."""
-    gone: Array = np.abs(np.cumsum(np.nan_to_num(blocks.velocity))) * blocks.block * blocks.sample_time
-    there = gone > blocks.reach - NEAR
+    there = _at_farthest(blocks)
     return blocks.reach > 2.0 * NEAR and int(np.sum(there)) * blocks.block * blocks.sample_time > RESTS
+
+
+def _at_farthest(blocks: Blocks) -> NDArray[np.bool_]:
+    """Return in which blocks the piston is at the farthest place that it reaches."""
+    gone = np.abs(np.cumsum(np.nan_to_num(blocks.velocity))) * blocks.block * blocks.sample_time
+    return gone > blocks.reach - NEAR

@@ -85,7 +85,9 @@ def residual(left: np.ndarray, *, pressure: bool = True) -> tuple[PointFit, Bloc
 def test_what_lasts_widens_intervals_and_white_noise_does_not() -> None:
     white = np.random.default_rng(1).normal(size=100)
     lasting = np.repeat(white[:10] / np.std(white[:10]), 10)
-    spreads = [spread_of(*_with(left), ACTUATOR.conditions[0]) for left in (np.zeros(100), white, lasting)]
+    spreads = [
+        spread_of(*_with(left, pressure=False), ACTUATOR.conditions[0]) for left in (np.zeros(100), white, lasting)
+    ]
     quiet, noisy, coloured = (float(np.sqrt(spread[0, 0])) for spread in spreads)
     assert noisy < 1.3 * quiet
     assert coloured > 1.5 * quiet

@@ -1,0 +1,132 @@
+"""How far off may a fitted circuit be? The doubt of severities where pressure is logged.
+
+A circuit that is fitted to a log has the rig's seals, make-up valves, mass and accumulator, and a judged share of its
+leakage in the pump. Where those are others, what is fitted gives way. So they are unknowns beside the fitted ones for
+one linear step, each with the spread that is judged of it: what the log leaves open of them widens the intervals, and
+so does what it says of them, because the fit did not go that way (consider covariance: Tapley, Schutz and Born,
+Statistical Orbit Determination, 2004, chapter 6). What is left of a log that no sensor makes is a wrong model's error,
+which a longer log does not average away; that is counted here, and once.
+"""
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from faults.diagnosis.circuit_runs import COLUMN, Blocks, parameter_rows, predicted
+from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, misfit
+from plant.arrays import Array
+
+SELDOM_KNOWN: Mapping[str, float] = MappingProxyType(
+    {
+        "presliding_damping": 0.53,
+        "makeup_opening": 0.93,
+        "moving_mass": 0.15,
+        "accumulator_pressure": 0.23,
+        "pump_case_leakage": 0.03,
+        "pump_crossport_leakage": 0.26,
+    }
+)
+"""Standard deviations, judged: of logarithms, and of the pump's two leakages as shares of the whole [dimensionless]."""
+
+_SHARES: Mapping[str, float] = MappingProxyType({"pump_case_leakage": 1.0, "pump_crossport_leakage": -1.0})
+"""Ways in which shares are nudged: the cylinder leaks the rest."""
+
+NUDGE = 0.05
+"""Step of the finite differences in logarithms and shares [dimensionless]."""
+
+LOOKS = 10.0
+"""Independent looks that a log gives at a wrong model's error, however long it is [dimensionless]."""
+
+
+def seldom_known_slopes(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
+    """Return how the outputs answer `SELDOM_KNOWN`, by one run of circuits side by side.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    blocks : Blocks
+        Its log.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (6, n, outputs)
+        Derivatives with respect to logarithms and shares [m/s, Pa].
+    """
+    (row,) = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
+    rows = np.tile(row, (1 + len(SELDOM_KNOWN), 1))  # circuits that run side by side share their steps' errors
+    for nudged, name in zip(rows[1:], SELDOM_KNOWN, strict=True):
+        at = COLUMN[name]
+        if name in _SHARES:
+            nudged[at] += _SHARES[name] * NUDGE * row[COLUMN["leakage_coefficient"]]
+        else:
+            nudged[at] *= np.exp(NUDGE)
+    steps = np.array([NUDGE * _SHARES.get(name, 1.0) for name in SELDOM_KNOWN])
+    runs = predicted(blocks, rows)
+    return (runs[1:] - runs[0]) / steps[:, None, None]
+
+
+def doubt_of(fit: PointFit, seldom: Array, blocks: Blocks, centres: Array, odds: Array, seen: Array) -> Array:
+    """Return the second moment of a fit's error in its coordinates.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    seldom : ndarray, shape (m, n, outputs)
+        How the outputs answer what is seldom known, see `seldom_known_slopes`.
+    blocks : Blocks
+        Its log, with pressure.
+    centres : ndarray, shape (conditions, 7)
+        Coordinates of the conditions about which the weak prior may lie.
+    odds : ndarray, shape (conditions,)
+        Log-likelihoods of the conditions [dimensionless], up to a constant.
+    seen : ndarray, shape (7,)
+        1 for what the log can tell, 0 for what it cannot, as friction of a piston that sticks.
+
+    Returns
+    -------
+    ndarray, shape (7, 7)
+        Covariance, and the squares of the steps that prior and log ask for [dimensionless].
+    """
+    first, known = blocks.first, len(fit.coordinates)
+    left = (blocks.outputs - fit.fitted)[first:]
+    there = np.isfinite(left)
+    unexplained = np.maximum(1.0 - (blocks.noise / fit.scales) ** 2, 0.0)
+    weight = fit.scales * np.sqrt(1.0 + unexplained * np.sum(there, axis=0) / LOOKS)
+    slopes = np.concatenate([fit.slopes * seen[:, None, None], seldom])[:, first:]
+    slopes = np.where(there, slopes / weight, 0.0).reshape(len(slopes), -1)
+    prior = np.zeros((len(slopes), len(slopes)))
+    prior[:known, :known] = np.linalg.inv(WEAK)
+    prior[known:, known:] = np.diag([sigma**-2.0 for sigma in SELDOM_KNOWN.values()])
+    covariance = np.linalg.inv(slopes @ slopes.T + prior)
+    pulled = slopes @ np.where(there, left / weight, 0.0).ravel()
+    steps = (covariance @ (pulled + (centres - fit.coordinates) @ prior[:known]).T)[:known]
+    shares = np.exp(odds - np.max(odds))
+    return np.asarray(covariance[:known, :known] + (steps * shares / np.sum(shares)) @ steps.T, dtype=np.float64)
+
+
+def between_fits(fits: Sequence[PointFit], best: PointFit, blocks: Blocks) -> Array:
+    """Return what other ends of a search, which explain the log nearly as well, add to the doubt of the best.
+
+    Parameters
+    ----------
+    fits : sequence of PointFit
+        The ends of the search.
+    best : PointFit
+        The one that is told.
+    blocks : Blocks
+        The log.
+
+    Returns
+    -------
+    ndarray, shape (7, 7)
+        Second moment about the best [dimensionless]; none where the others explain much less.
+    """
+    worse = np.array([misfit(blocks, fit.fitted) - misfit(blocks, best.fitted) for fit in fits]) / LASTING
+    shares = np.exp(np.min(worse) - worse)
+    off = np.array([fit.coordinates - best.coordinates for fit in fits])
+    return np.asarray((off.T * shares / np.sum(shares)) @ off, dtype=np.float64)
