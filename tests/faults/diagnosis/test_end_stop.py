@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS
-from faults.diagnosis.circuit_runs import Blocks, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.circuit_runs import COORDINATES, Blocks, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.end_stop import NEAR, RESTS, stopped
 from faults.notes import ClassCode
+from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
 from plant.eha.simulate import CIRCUIT, simulate
@@ -22,12 +23,12 @@ ACTUATOR = Actuator.of(RIG)
 OUT_AND_BACK = np.repeat([100.0, 60.0, 0.0, -100.0, -60.0, 0.0], 600)
 
 
-def log_of(stop: float | None, place: int = 0) -> Blocks:
+def log_of(stop: float | None, place: int = 0, circuit: CircuitParameters = ACTUATOR.circuit) -> Blocks:
     """Return what a circuit leaves of a drive out and back that would take it some 35 mm, with and without a stop."""
     empty = np.zeros(len(OUT_AND_BACK) // 10)
     noise = np.array([4e-5, 2e3])
     blank = Blocks(np.append(OUT_AND_BACK, 0.0), 1e-3, 10, empty, empty, noise, stop=stop)
-    rows = parameter_rows(ACTUATOR.conditions[[place]], ACTUATOR.circuit, ACTUATOR.rated)
+    rows = parameter_rows(ACTUATOR.conditions[[place]], circuit, ACTUATOR.rated)
     (found,) = predicted(blank, rows)
     found = found + np.random.default_rng(0).normal(size=found.shape) * noise
     return replace(blank, velocity=found[:, 0], pressure=found[:, 1], stop=None)
@@ -40,6 +41,19 @@ def test_a_piston_that_runs_into_a_stop_is_followed_once_the_stop_is_known() -> 
     assert seen.stop == pytest.approx(0.02, abs=2e-4)
     assert np.all(fits.best.scales < 0.3 * without.best.scales)
     assert list(CONDITIONS)[int(np.argmax(fits.scores))] == "normal"
+
+
+def test_how_a_stop_yields_is_not_taken_for_friction_or_leakage() -> None:
+    soft = replace(ACTUATOR.circuit, end_stop_stiffness=1e7, end_stop_damping=0.0)
+    log = log_of(0.02, circuit=soft)
+    seen, fits = stopped(log, fit_classes(log, ACTUATOR), ACTUATOR)
+    assert seen.stop is not None
+    stands = np.cumsum(log.velocity) * log.block * log.sample_time > log.reach - NEAR
+    assert np.all(np.isnan(seen.outputs[stands]))
+    assert np.all(np.isfinite(seen.outputs[~stands]))
+    off = fits.best.coordinates - ACTUATOR.conditions[0]
+    told = [COORDINATES.index(name) for name in ("leakage", "bias", "friction_rest", "friction_rated", "bulk_modulus")]
+    assert np.all(np.abs(off[told]) < 0.06)  # flow bias would be 25 % off
 
 
 def test_a_piston_that_the_drive_left_standing_met_no_stop() -> None:
