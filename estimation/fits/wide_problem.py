@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from estimation.fits.form_fit import LONGEST_STEP
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import search_bounds
@@ -25,6 +26,10 @@ SHARPEST_RELIEF = 3e-3
 """Least rise of pressure over its setting within which a relief valve passes the largest flow of the log [fraction].
 Valves need 0.05 to 0.2. At a sharper corner, which no sensor resolves, the model chatters from open to closed: slopes
 are then so steep that the deviation of bulk modulus comes out twenty times too small."""
+
+FASTEST_MAKEUP = 0.5 * LONGEST_STEP
+"""Least time in which a wide open make-up valve fills a chamber [s]. At a fifth of a model step the model may chatter,
+as at a sharp relief valve: the deviation of bulk modulus came out nine times too small."""
 
 ADIABATIC = 1.4
 """Exponent of nitrogen that is compressed quickly [dimensionless]."""
@@ -176,6 +181,8 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     stiffest = ADIABATIC * rig["accumulator_pressure"] / (LEAST_GAS * rig["chamber_volume"])
     limits = {"speed_lead": (0.0, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
     limits[START_LEVEL] = (-rig["accumulator_pressure"], _shut_in(log))
+    stiff = max(rig["bulk_modulus"], *(model.values(guess)["bulk_modulus"] for guess in guesses))
+    limits["makeup_conductance"] = (0.0, 2.0 * rig["chamber_volume"] / (FASTEST_MAKEUP * stiff))
     if log.passes_on:
         found = [model.values(guess)["bulk_modulus"] for guess in guesses]
         limits["bulk_modulus"] = (min(found) / MOST_BIASED, MOST_BIASED * max(found))

@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 
+from estimation.fits import freed_problem
 from estimation.fits.greybox_log import greybox_log
-from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
-from estimation.fits.wide_problem import freed, own_starts, widened
+from estimation.fits.hypotheses import BEGUN, HYPOTHESES, Hypothesis
+from estimation.fits.wide_problem import flow_bounds, freed, own_starts, usual_values, widened
 from estimation.models.flow import FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
+from tests.estimation.fits.short_logs import wide
 
 RIG = EhaParameters()
 VARIANCES = {"differential_pressure_pa": 1e6}
@@ -25,3 +27,23 @@ def test_every_search_of_a_log_with_a_dead_pressure_sensor_begins_at_a_number(on
     known = dict.fromkeys(model.unknowns, 1.0)
     for start in own_starts(log, one):
         assert np.all(np.isfinite(model.theta({**known, **start})))
+
+
+@pytest.mark.parametrize("opening", [1e2, 1e4])
+@pytest.mark.parametrize("modulus", [5e7, 2e8, 1.5e9])
+def test_slopes_of_the_widest_make_up_valve_are_those_of_the_model_and_no_chatter(
+    modulus: float, opening: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = wide()
+    problem = freed(log, (BEGUN,))
+    values = {**usual_values(log), "bulk_modulus": modulus, "makeup_opening": opening, "case_leakage": 1e-13}
+    theta = problem.model.theta({**values, "leakage_coefficient": 2e-11, "speed_lead": 1e-5})
+    place = problem.model.unknowns.index("makeup_conductance")
+    theta[place] = flow_bounds(problem.model, [theta], log)[1][place]
+
+    def effects(nudge: float) -> np.ndarray:
+        monkeypatch.setattr(freed_problem, "NUDGE", nudge)
+        slopes = freed(log, (BEGUN,)).linearised(theta)[1]
+        return np.sqrt(np.einsum("ij,ij->j", slopes, slopes))
+
+    assert effects(1e-5) == pytest.approx(effects(1e-3), rel=0.1, abs=1.0)
