@@ -12,9 +12,11 @@ from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import (
     BEGUN,
     DELIVERY,
+    ENCODER_ZERO,
     HYPOTHESES,
     LATEST,
     LEAST_DELIVERY,
+    LEAST_ZERO,
     OFFSET,
     START_LOAD,
     Hypothesis,
@@ -58,6 +60,9 @@ LATE_SHARE = 0.25
 OPEN_DELIVERY = 0.1
 """Standard deviation of the logarithm of the pump's delivery from which a worn pump is not excluded
 [dimensionless]: one that delivers 80 % lies within two of it."""
+
+ALWAYS_ASKED = (DELIVERY, ENCODER_ZERO)
+"""What a log that the plain form explains is asked all the same, where the slopes promise a gain: both may hide."""
 
 MOST_ASKED = 50_000
 """A longer log is not asked what is strange about it: the answer takes minutes [samples]."""
@@ -130,14 +135,16 @@ def fit_flow(
     best, found = min(fits, key=_cost), weighed(fits, SURER, [_beforehand(fit) for fit in fits])
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
     explains = partial(_explains, noisy=log.passes_on)
-    asked, remarks = _asked(log, parameters, swinging, loaded=loaded, moving=moving, likeliest=swinging is best)
+    asked, remarks = _asked(log, parameters, swinging, best, loaded=loaded, moving=moving)
     if BEGUN in asked:  # so many valleys that one is believed only where sensors' noise is all that it leaves
         explains = partial(_explains_all, noisy=log.passes_on)
     if asked:
         near = _near(swinging, starts, explains, in_motion=loaded or moving)
-        strange = explain(log, parameters, near, explains, asked=asked, paired=asked != (DELIVERY,))
+        near = [best.values, *near] if best is not swinging and explains(best) else near
+        paired = any(one not in ALWAYS_ASKED for one in asked)
+        strange = explain(log, parameters, near, explains, asked=asked, paired=paired)
         one = strange.fit
-        if explains(one) and one.cost < best.cost - WORTH:
+        if explains(one) and one.cost < _wanted(strange.names, best, swinging):
             bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
             believed = with_structure(strange.values, STRUCTURE)
             return FormFit(believed, bound, one.chi_square[0], (), one.rig_slopes, strange)
@@ -150,12 +157,23 @@ def fit_flow(
     return FormFit(believed, std / value, best.chi_square[0], reasons, best.rig_slopes, remarks=remarks)
 
 
-def _asked(
-    log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, *, loaded: bool, moving: bool, likeliest: bool
-) -> tuple[tuple[Hypothesis, ...], tuple[Note, ...]]:
-    """Return what a log is asked beside the plain form, given its likelier fit with volumes that swing; and a remark.
+def _wanted(names: Sequence[str], best: GreyBoxFit, swinging: GreyBoxFit) -> float:
+    """Return the cost below which what is strange is believed rather than the plain form.
 
-    Held volumes may explain a log whose encoder was homed elsewhere: it is asked all the same.
+    No actuator holds its chambers' volumes. So an encoder's zero need explain a log no better than held volumes do.
+    """
+    if tuple(names) == (ENCODER_ZERO.name,):
+        return min(best.cost + WORTH, swinging.cost - WORTH)
+    return best.cost - WORTH
+
+
+def _asked(
+    log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, best: GreyBoxFit, *, loaded: bool, moving: bool
+) -> tuple[tuple[Hypothesis, ...], tuple[Note, ...]]:
+    """Return what a log is asked beside the plain form, given its likelier fit with volumes that swing, and its best.
+
+    A remark says what it leaves open. Held volumes may explain a log whose encoder was homed elsewhere: it is asked all
+    the same.
     """
     if len(log.drives) > MOST_ASKED:
         return (), ()
@@ -165,17 +183,21 @@ def _asked(
         return (BEGUN,) if moving else HYPOTHESES, ()
     by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
     delivery = promised(log, parameters, swinging.values, DELIVERY, by_mass=by_mass)
-    if delivery.gain > WORTH and delivery.size > LEAST_DELIVERY:
-        return (DELIVERY,), ()
-    open_by = delivery.deviation
+    zeros = [promised(log, parameters, swinging.values, ENCODER_ZERO, by_mass=by_mass)]
+    if best is not swinging:  # volumes that swing may have led the fit astray, where the slopes promise nothing
+        zeros.append(promised(log, parameters, best.values, ENCODER_ZERO))
+    worth = (delivery, LEAST_DELIVERY), (max(zeros), LEAST_ZERO)
+    told = [promise.gain > WORTH and promise.size > least for promise, least in worth]
+    asked = tuple(one for one, worthwhile in zip(ALWAYS_ASKED, told, strict=True) if worthwhile)
+    open_by = 0.0 if DELIVERY in asked else delivery.deviation
     remarks = (RigCode.WEAR_NOT_EXCLUDED.note(percent=200.0 * open_by),) if open_by > OPEN_DELIVERY else ()
     if not moving:
-        return (), remarks
+        return asked, remarks
     # chambers shut in far above the accumulator take no make-up for seconds, and a search from rest ends without any
     fed = swinging.values["makeup_conductance"] > VANISHED * parameters.makeup_conductance
-    lost = likeliest and not fed and swinging.chi_square[0] > DOUBTED
+    lost = swinging is best and not fed and swinging.chi_square[0] > DOUBTED
     begun = promised(log.coarsened(), parameters, swinging.values, START_LOAD, by_mass=by_mass)
-    return (BEGUN,) if lost or begun.gain > WORTH else (), remarks
+    return (BEGUN, *asked) if lost or begun.gain > WORTH else asked, remarks
 
 
 def _near(

@@ -31,6 +31,8 @@ class Hypothesis:
         Whether what it adds is so far from its absence that the slope there says nothing of it.
     from_first_sample : bool
         Whether the search begins with the differential pressure that the log begins with, and with several levels.
+    from_mid_travel : bool
+        Whether the search also begins with an encoder that reads zero in the middle of the log's travel.
     """
 
     name: str
@@ -42,10 +44,16 @@ class Hypothesis:
     instead: tuple[str, ...] = ()
     far: bool = False
     from_first_sample: bool = False
+    from_mid_travel: bool = False
 
 
 DELIVERY = Hypothesis("delivery", ("pump_displacement",))
 """Asked of every log: a pump that delivers less may pass for leakage, with bulk modulus a fifth too low."""
+
+ENCODER_ZERO = Hypothesis(
+    "encoder_zero", ("position_zero",), ({"position_zero": -0.06}, {"position_zero": 0.06}), from_mid_travel=True
+)
+"""Asked of every log too: chambers that hold their volumes, or valves that crack, may pass for an encoder's zero."""
 
 START_LOAD = Hypothesis("start_load", ("start_pressure", "start_level"))
 
@@ -75,7 +83,7 @@ HYPOTHESES = (
     Hypothesis("position_late", ("position_lag",), ({"position_lag": 1e-3},), LATE_TRIED, "position_m"),
     OFFSET,
     Hypothesis("pressure_drift", ("pressure_drift",)),
-    Hypothesis("encoder_zero", ("position_zero",), ({"position_zero": -0.06}, {"position_zero": 0.06})),
+    ENCODER_ZERO,
     DELIVERY,
     Hypothesis("volume", ("chamber_volume",)),
     START_LOAD,
@@ -129,3 +137,7 @@ seldom measured; a pump that delivers less than its displacement is worn."""
 
 LEAST_DELIVERY = 1e-2
 """Relative change of the pump's delivery below which it is not freed: no rig file is surer [fraction]."""
+
+LEAST_ZERO = 0.5
+"""Least reading of the encoder in the middle position that is sought, in its typical size of 10 mm: 5 mm change a
+chamber of the paper's actuator by a third of a percent [dimensionless]."""

@@ -38,7 +38,9 @@ LEAST_GAS = 1.0
 """Least gas of the inner circuit's accumulator, in chamber volumes; judged. With less its pressure would follow every
 stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
 
-POSITION, START_PRESSURE, START_LEVEL = "position_m", "start_pressure", "start_level"
+POSITION, POSITION_ZERO = "position_m", "position_zero"
+
+START_PRESSURE, START_LEVEL = "start_pressure", "start_level"
 
 LEAST_PEAK = 1.0
 """Highest differential pressure taken of a log whose sensor is dead: the logarithm of none is no start [Pa]."""
@@ -152,6 +154,9 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
         seen = log.measured[np.isfinite(log.measured[:, 0]), 0]
         begun = float(seen[0]) if len(seen) else 0.0
         return [{START_PRESSURE: begun, START_LEVEL: share * _shut_in(log)} for share in LEVELS_TRIED]
+    if one.from_mid_travel:
+        read = log.drives[:, WIDE_FLOW_FORM.drives.index(POSITION)]
+        return [*one.starts, {POSITION_ZERO: 0.5 * float(np.min(read) + np.max(read))}]
     if not one.shares_of_peak:
         return one.starts
     peak = max(float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)

@@ -13,7 +13,7 @@ from estimation.eha.explained import notes_of, rig_set_right, set_right
 from estimation.fits import explain as module
 from estimation.fits.descent import Point
 from estimation.fits.explain import Explanation
-from estimation.fits.flow_fit import fit_flow
+from estimation.fits.flow_fit import _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
 from estimation.fits.hypotheses import HYPOTHESES, LATEST
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.first_belief import begins_in_motion, first_load
@@ -26,6 +26,7 @@ from plant.eha.rig import Rig
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, IDEAL, Sensors
+from tests.estimation.fits.short_logs import made_fit
 
 if TYPE_CHECKING:
     from estimation.fits.greybox_fit import GreyBoxFit
@@ -191,6 +192,25 @@ def test_a_log_that_begins_under_load_says_so() -> None:
     begun = record.slice(1500, len(record))
     found = explained(begun)
     assert "start_load" in found.names
+
+
+@pytest.mark.parametrize("condition", ["major_leakage", "major_leakage_major_friction"])
+def test_an_encoder_homed_elsewhere_is_named_where_held_volumes_explain_the_log_too(condition: str) -> None:
+    p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(5)
+    record = simulate(CIRCUIT, make_drive("multisine", 4.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    assert fit_flow(record, HEALTHY, HEALTHY.bulk_modulus).explanation is None
+    found = explained(record.replace(position_m=record["position_m"] + 0.12))
+    (note,) = notes_of(found, HEALTHY)
+    assert note.code is RigCode.ENCODER_ZERO
+    assert note.data["zero_mm"] == pytest.approx(120.0, abs=note.data["half_width_mm"])
+    assert note.data["half_width_mm"] < 20.0
+
+
+def test_an_encoder_zero_need_be_no_likelier_than_held_volumes_and_anything_else_must() -> None:
+    held, swinging = made_fit(100.0, 2e8, 1e6), made_fit(300.0, 2e8, 1e6)
+    assert _wanted(("encoder_zero",), held, swinging) == 100.0 + module.WORTH
+    assert _wanted(("encoder_zero",), held, held) == 100.0 - module.WORTH
+    assert _wanted(("volume",), held, swinging) == _wanted(("encoder_zero", "air"), held, swinging) == 90.0
 
 
 def test_a_log_cut_out_of_a_run_where_pressure_crosses_zero_is_fitted_from_sides_shut_in_high() -> None:

@@ -76,12 +76,10 @@ def what_is_asked_of_a_log() -> dict[str, Any]:
         (9.0, 0.02, 0.11),
     ):
         with patch.object(flow_fit, "promised", return_value=Promise(gain, size, deviation)):
-            asked, remarks = _asked(base, PAPER, sound, loaded=False, moving=False, likeliest=True)
+            asked, remarks = _asked(base, PAPER, sound, sound, loaded=False, moving=False)
         told[f"gain {gain:g}, size {size:g}, deviation {deviation:g}"] = [[one.name for one in asked], noted(remarks)]
-    told["of a poor fit"] = [
-        one.name
-        for one in _asked(base, PAPER, made_fit(1.0, 2e8, 1e6, chi=2.0), loaded=False, moving=False, likeliest=True)[0]
-    ]
+    poor = made_fit(1.0, 2e8, 1e6, chi=2.0)
+    told["of a poor fit"] = [one.name for one in _asked(base, PAPER, poor, poor, loaded=False, moving=False)[0]]
     for gain, fed, chi, likeliest in (
         (9.0, 1.0, 1.15, True),
         (11.0, 1.0, 1.0, True),
@@ -94,14 +92,11 @@ def what_is_asked_of_a_log() -> dict[str, Any]:
         plain = made_fit(1.0, 2e8, 1e6, chi=chi)
         fit = replace(plain, values={**plain.values, "makeup_conductance": fed * PAPER.makeup_conductance})
         with patch.object(flow_fit, "promised", return_value=Promise(gain, 0.0, 0.05)):
-            asked, _ = _asked(base, PAPER, fit, loaded=False, moving=True, likeliest=likeliest)
+            asked, _ = _asked(base, PAPER, fit, fit if likeliest else sound, loaded=False, moving=True)
         told[f"in motion: {gain:g}, {fed:g}, {chi:g}, {likeliest}"] = [one.name for one in asked]
     lengths = (np.zeros((count, 2)) for count in (50000, 50001))
     told["of long logs under load"] = [
-        [
-            one.name
-            for one in _asked(replace(base, drives=drives), PAPER, sound, loaded=True, moving=False, likeliest=True)[0]
-        ]
+        [one.name for one in _asked(replace(base, drives=drives), PAPER, sound, sound, loaded=True, moving=False)[0]]
         for drives in lengths
     ]
     starts = flow_starts(PAPER, 3e8)

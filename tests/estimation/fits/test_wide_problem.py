@@ -1,12 +1,14 @@
 """Where the searches for what is strange about a log begin."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from estimation.fits import freed_problem
 from estimation.fits.greybox_log import greybox_log
-from estimation.fits.hypotheses import BEGUN, HYPOTHESES, Hypothesis
-from estimation.fits.wide_problem import flow_bounds, freed, own_starts, usual_values, widened
+from estimation.fits.hypotheses import BEGUN, ENCODER_ZERO, HYPOTHESES, Hypothesis
+from estimation.fits.wide_problem import POSITION_ZERO, flow_bounds, freed, own_starts, usual_values, widened
 from estimation.models.flow import FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
 from plant.eha.model import EhaParameters
@@ -27,6 +29,14 @@ def test_every_search_of_a_log_with_a_dead_pressure_sensor_begins_at_a_number(on
     known = dict.fromkeys(model.unknowns, 1.0)
     for start in own_starts(log, one):
         assert np.all(np.isfinite(model.theta({**known, **start})))
+
+
+def test_an_encoder_is_first_taken_to_read_zero_in_mid_travel() -> None:
+    moved = wide()
+    drives = moved.drives.copy()
+    drives[:, 1] = np.linspace(0.1, 0.16, len(drives))
+    last = own_starts(replace(moved, drives=drives), ENCODER_ZERO)[-1]
+    assert last[POSITION_ZERO] == pytest.approx(0.13)
 
 
 @pytest.mark.parametrize("opening", [1e2, 1e4])
