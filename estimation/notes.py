@@ -162,6 +162,10 @@ class RigCode(Code):
         "pump wear is not excluded: a pump that delivers up to {percent:.0f} % less would look like leakage at the "
         "speeds of this log, and bulk modulus would be lower by as much"
     )
+    SINGLE_ROD = (
+        "side B of the piston has {percent:.1f} ± {half_width:.1f} % of the area of side A, which the rig file does "
+        "not say; chamber B has {volume_percent:.0f} % of the volume of chamber A"
+    )
     VOLUME_DIFFERS = "the chamber volume is {percent:.0f} ± {half_width:.0f} % of that in the rig file"
     STARTS_UNDER_LOAD = (
         "the log begins at a differential pressure of {pressure_pa:.3g} Pa, which is a load of {force_n:.3g} N"

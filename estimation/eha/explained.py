@@ -36,6 +36,9 @@ LAGS: Mapping[str, str] = {PRESSURE: "pressure_lag", SPEED: "speed_lag", POSITIO
 LEAKAGE_COURSE = "leakage_course"
 """Channel of a log that was set right: leakage over what it is when the log ends [dimensionless]."""
 
+RIG_ENTRIES = ("pump_displacement", "chamber_volume", "area_difference", "volume_difference", "pilot_share")
+"""Entries of a rig file that a log may correct."""
+
 OUTSIDE = {
     RigCode.PUMP_WORN,
     RigCode.LEAKAGE_GROWS,
@@ -132,6 +135,19 @@ def _volume(found: Explanation, p: EhaParameters) -> Note:
     return RigCode.VOLUME_DIFFERS.note(percent=100.0 * value / p.chamber_volume, half_width=100.0 * half_width)
 
 
+def _single_rod(found: Explanation, _: EhaParameters) -> Note:
+    differ, volumes = found.values["area_difference"][0], found.values["volume_difference"][0]
+    half_width = 2.0 * _half_width(found, "area_difference") / (1.0 + differ) ** 2
+    return RigCode.SINGLE_ROD.note(
+        percent=100.0 * _b_over_a(differ), half_width=100.0 * half_width, volume_percent=100.0 * _b_over_a(volumes)
+    )
+
+
+def _b_over_a(difference: float) -> float:
+    """Return side B over side A, given their difference over their sum."""
+    return (1.0 - difference) / (1.0 + difference)
+
+
 def _load(found: Explanation, p: EhaParameters) -> Note:
     value = found.values["start_pressure"][0]
     return RigCode.STARTS_UNDER_LOAD.note(pressure_pa=value, force_n=value * p.piston_area)
@@ -191,6 +207,7 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "encoder_zero": _zero,
     "delivery": _delivery,
     "volume": _volume,
+    "single_rod": _single_rod,
     "start_load": _load,
     "air": _air,
     "air_midway": _air,
@@ -255,7 +272,7 @@ def _brought_forward(record: Record, channel: str, late: float) -> Array:
 
 
 def rig_set_right(parameters: EhaParameters, found: Explanation) -> EhaParameters:
-    """Return the rig with the pump's delivery and the chambers' volume that explain a log.
+    """Return the rig with the pump's delivery and the chambers' volumes and areas that explain a log.
 
     Parameters
     ----------
@@ -269,5 +286,5 @@ def rig_set_right(parameters: EhaParameters, found: Explanation) -> EhaParameter
     EhaParameters
         The rig.
     """
-    names = [name for name in ("pump_displacement", "chamber_volume") if name in found.values]
+    names = [name for name in RIG_ENTRIES if name in found.values]
     return replace(parameters, **{name: found.values[name][0] for name in names})

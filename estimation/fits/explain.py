@@ -152,7 +152,8 @@ def explain(
     likely, others = promising(wide, (), starts[0], asked)
     finished = _likeliest(wide, [_screened(wide, (one,), starts) for one in likely])
     if others and not accepted(finished[0].fit):
-        more = _likeliest(wide, [_screened(wide, (one,), starts) for one in others], finished[0].cost)
+        known = finished[0].cost
+        more = _likeliest(wide, [_screened(wide, (one,), starts, NEARLY * known) for one in others], known)
         finished = _ranked([*finished, *more])
     first = finished[0]
     if paired and not accepted(first.fit):
@@ -181,9 +182,12 @@ def _ranked(tried: Iterable[_Tried]) -> list[_Tried]:
 
 
 def _screened(
-    log: GreyBoxLog, together: tuple[Hypothesis, ...], starts: Sequence[Mapping[str, float]]
+    log: GreyBoxLog,
+    together: tuple[Hypothesis, ...],
+    starts: Sequence[Mapping[str, float]],
+    wanted: float = np.inf,
 ) -> Iterator[_Tried]:
-    """Yield the best from each start after a few steps, with one model step a sample."""
+    """Yield the best from each start after a few steps, with one model step a sample; fewer if it cannot be wanted."""
     absent = usual_values(log)
     asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
     problems = [(delays, freed(delayed(log, delays).coarsened(), together)) for delays in asked]
@@ -191,7 +195,8 @@ def _screened(
         tried: list[_Tried] = []
         for (delays, problem), own in product(problems, own_starts(log, together[-1])):
             guess = problem.model.theta({**absent, **start, **own})
-            point = descend(problem.at, guess, SCREENING, flow_bounds(problem.model, [guess], log), radius=NEAR)
+            bounds = flow_bounds(problem.model, [guess], log)
+            point = descend(problem.at, guess, SCREENING, bounds, radius=NEAR, wanted=wanted)
             tried.append(_Tried(together, point, problem.model.values(point.theta), delays))
         yield min(tried, key=lambda one: one.cost)
 

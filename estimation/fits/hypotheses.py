@@ -103,6 +103,11 @@ HYPOTHESES = (
         ({"makeup_share_b": 1e-4}, {"makeup_share_b": 1e4, "makeup_conductance": 1e-13}),
         far=True,
     ),
+    Hypothesis(
+        "single_rod",
+        ("area_difference", "volume_difference", "pilot_share"),
+        tuple({"area_difference": differ, "volume_difference": differ, "pilot_share": 1.0} for differ in (-0.15, 0.15)),
+    ),
     Hypothesis("checks_crack", ("crack_pressure",), ({"crack_pressure": 1e4},)),
     Hypothesis("port_a_drains", ("drain_share_a",), ({"drain_share_a": 1e2},)),
     Hypothesis("port_b_drains", ("drain_share_b",), ({"drain_share_b": 1e2},)),
@@ -127,6 +132,9 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "crack_b": (-2e4, 2e4),
     "leakage_bend": (-4.0, 4.0),
     "leakage_rise": (-6.0, 6.0),
+    "area_difference": (-0.6, 0.6),
+    "volume_difference": (-0.6, 0.6),
+    "pilot_share": (0.0, 10.0),
 }
 """Least and largest values where physics gives them [SI]. A make-up valve that opens within a smaller drop has a corner
 that no step of the integrator and no sensor resolves."""

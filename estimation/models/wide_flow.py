@@ -176,6 +176,9 @@ LINEAR = {
     "leakage_bend": 1.0,
     "leakage_rise": 1.0,
     "crack_pressure": 1e4,
+    "area_difference": 0.1,
+    "volume_difference": 0.1,
+    "pilot_share": 1.0,
     STIFFNESS: 1e8,
 }
 """Parameters that may be zero or negative, each with a typical size [SI]."""

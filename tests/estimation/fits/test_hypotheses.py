@@ -206,6 +206,19 @@ def test_an_encoder_homed_elsewhere_is_named_where_held_volumes_explain_the_log_
     assert note.data["half_width_mm"] < 20.0
 
 
+def test_a_single_rod_whose_rig_file_gives_one_area_is_named_with_both() -> None:
+    rod = replace(HEALTHY, area_difference=0.18, volume_difference=0.1, pilot_share=1.0)
+    found = explained(log(parameters=rod))
+    (note,) = notes_of(found, HEALTHY)
+    assert note.code is RigCode.SINGLE_ROD
+    assert note.data["percent"] == pytest.approx(100.0 * 0.82 / 1.18, abs=2.0)
+    assert note.data["volume_percent"] == pytest.approx(100.0 * 0.9 / 1.1, abs=2.0)
+    mended = rig_set_right(HEALTHY, found)
+    assert mended.area_difference == pytest.approx(0.18, abs=0.01)
+    assert mended.volume_difference == pytest.approx(0.1, abs=0.01)
+    assert mended.pilot_share > 0.0
+
+
 def test_an_encoder_zero_need_be_no_likelier_than_held_volumes_and_anything_else_must() -> None:
     held, swinging = made_fit(100.0, 2e8, 1e6), made_fit(300.0, 2e8, 1e6)
     assert _wanted(("encoder_zero",), held, swinging) == 100.0 + module.WORTH
