@@ -12,6 +12,7 @@ from typing import cast
 
 import numpy as np
 
+from estimation.arrays import IntArray
 from estimation.eha.explained import LEAKAGE_COURSE
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
@@ -79,8 +80,9 @@ class Blocks:
         Mean differential pressure over each block [Pa], None where it is not logged.
     noise : ndarray, shape (outputs,)
         Standard deviation of what the sensors add to velocity [m/s] and pressure [Pa].
-    earlier : tuple of int and ndarray, shape (parameters,), or None
-        Another circuit that ran up to a sample, as a row of parameters; None if one ran throughout.
+    earlier : tuple of int or ndarray, shape (circuits,), and ndarray, shape (parameters,), or None
+        Another circuit that ran up to a sample, or up to one before each circuit, as a row of parameters; None if one
+        ran throughout.
     course : ndarray, shape (samples,), or None
         Leakage over what it is when the log ends [dimensionless]; None where it does not change.
     stop : float or None
@@ -95,7 +97,7 @@ class Blocks:
     velocity: Array
     pressure: Array | None
     noise: Array
-    earlier: tuple[int, Array] | None = None
+    earlier: tuple[int | IntArray, Array] | None = None
     course: Array | None = None
     stop: float | None = None
     begun: tuple[float, float] | None = None
@@ -277,21 +279,20 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
     ----------
     blocks : Blocks
         The log.
-    rows : ndarray, shape (m, parameters) or (samples, m, parameters)
-        The circuits; what they are at each sample, if they change.
+    rows : ndarray, shape (m, parameters)
+        The circuits.
 
     Returns
     -------
     ndarray, shape (m, n, outputs)
         Mean velocity [m/s] over each block, and mean pressure [Pa] where it is logged.
     """
-    rows = rows[None] if rows.ndim == 2 else rows
+    rows = _between_stops(blocks, rows)[None]
     if blocks.earlier is not None:
-        until, row = blocks.earlier
-        rows = np.where(np.arange(len(blocks.speed))[:, None, None] < until, row, rows)
+        until, before = blocks.earlier
+        rows = _after(until, _between_stops(blocks, before[None])[0], rows[0], len(blocks.speed))
     if blocks.course is not None:
         rows = rows * _drift(blocks.course)[:, None, :]
-    rows = _between_stops(blocks, rows)
     starts = np.array([_start(blocks, row) for row in rows[0]])
     runs = controlled_run(
         CIRCUIT.name,
@@ -305,6 +306,17 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
         drive_tolerance=DRIVE_TOLERANCE,
     )
     return _outputs(blocks, np.moveaxis(runs, 0, 2), rows)  # as they lie in memory
+
+
+def _after(until: int | IntArray, before: Array, rows: Array, samples: int) -> Array:
+    """Return what circuits are at each sample if another one ran up to a sample, shape (samples, m, parameters)."""
+    ends = np.broadcast_to(until, len(rows))
+    first, last = int(np.min(ends)), int(np.max(ends))
+    found = np.empty((samples, *rows.shape))
+    found[:first], found[last:] = before, rows
+    between = np.arange(first, last)[:, None] < ends
+    found[first:last] = np.where(between[..., None], before, rows)
+    return found
 
 
 def _start(blocks: Blocks, row: Array) -> Array:
@@ -330,14 +342,13 @@ def _between_stops(blocks: Blocks, rows: Array) -> Array:
     A piston that turned back before it came to a stop, or that went past it, shows none. A stop that the log itself
     has shown goes before the rig's.
     """
-    if blocks.stop is not None:
-        rows = rows.copy()
-        rows[..., COLUMN["stroke"]] = 2.0 * blocks.stop
-        return rows
-    half = 0.5 * rows[..., COLUMN["stroke"]]
-    shown = np.abs(blocks.reach - half) <= AT_STOP * half
     rows = rows.copy()
-    rows[..., COLUMN["stroke"]] = np.where(shown, 2.0 * half, longest_stroke(circuit_values(rows)))
+    if blocks.stop is not None:
+        rows[:, COLUMN["stroke"]] = 2.0 * blocks.stop
+        return rows
+    half = 0.5 * rows[:, COLUMN["stroke"]]
+    shown = np.abs(blocks.reach - half) <= AT_STOP * half
+    rows[:, COLUMN["stroke"]] = np.where(shown, 2.0 * half, longest_stroke(circuit_values(rows)))
     return rows
 
 

@@ -226,12 +226,11 @@ def _when(blocks: Blocks, before: Array, after: Array, place: int, actuator: Act
     first = max(place - round(LATE / step), blocks.first)
     candidates = np.arange(first, min(place + round(EARLY / step), len(blocks.velocity) - 1))
     (row,) = parameter_rows(after[None], actuator.circuit, actuator.rated)
-    sample = np.arange(len(blocks.speed))[:, None, None]
     costs: list[float] = []
     least, best = np.inf, before
     for some in np.array_split(candidates, range(LANES, len(candidates), LANES)):
-        paths = np.where(sample < blocks.block * some[:, None], before, row)
-        for run in predicted(blocks, paths):
+        changing = replace(blocks, earlier=(blocks.block * some, before))
+        for run in predicted(changing, np.repeat(row[None], len(some), axis=0)):
             left = (blocks.outputs - run)[blocks.first :] / least_scales(blocks)
             costs.append(0.5 * float(np.nansum(left**2)))
             if costs[-1] < least:

@@ -96,7 +96,7 @@ def controlled_run(
         run(
             np.ascontiguousarray(starts[filled].T),
             speed,
-            np.ascontiguousarray(parameters[:, filled]),
+            np.ascontiguousarray(parameters if lanes == runs else parameters[:, filled]),
             sample_time,
             1.0 / (tolerance * scales),
             bend * control.drive_scale(parameters[0, 0]),
