@@ -62,6 +62,7 @@ def descend(
     least_gain: float = LEAST_GAIN,
     radius: float = FIRST_RADIUS,
     wanted: float = np.inf,
+    least_share: float = 0.0,
 ) -> Point:
     """Return the least cost downhill from a start: Gauss-Newton steps within a trust region and bounds.
 
@@ -85,6 +86,8 @@ def descend(
     wanted : float
         Cost above which the result is of no use [dimensionless]: a search ends where all steps that are left would not
         bring it down to that, gaining each what the last one did or the next one promises.
+    least_share : float
+        Share of the cost that a step which lowers it must take off, else it is the last [fraction].
 
     Returns
     -------
@@ -102,7 +105,14 @@ def descend(
     [1.0, 1.0]
     """
     return descend_together(
-        lambda thetas: [at(one) for one in thetas], [start], evaluations, bounds, least_gain, radius, wanted
+        lambda thetas: [at(one) for one in thetas],
+        [start],
+        evaluations,
+        bounds,
+        least_gain,
+        radius,
+        wanted,
+        least_share,
     )[0]
 
 
@@ -114,6 +124,7 @@ def descend_together(
     least_gain: float = LEAST_GAIN,
     radius: float = FIRST_RADIUS,
     wanted: float = np.inf,
+    least_share: float = 0.0,
 ) -> list[Point]:
     """Return the least cost downhill from each of several starts, all a step at a time; see `descend`.
 
@@ -133,13 +144,15 @@ def descend_together(
         Length of the longest first step [dimensionless].
     wanted : float
         See `descend` [dimensionless].
+    least_share : float
+        See `descend` [fraction].
 
     Returns
     -------
     list of Point
         The best point from each start.
     """
-    searches = [_search(start, evaluations, bounds, least_gain, radius, wanted) for start in starts]
+    searches = [_search(start, evaluations, bounds, least_gain, radius, wanted, least_share) for start in starts]
     asked = {i: next(search) for i, search in enumerate(searches)}
     ended: dict[int, Point] = {}
     while asked:
@@ -154,7 +167,13 @@ def descend_together(
 
 
 def _search(
-    start: Array, evaluations: int, bounds: tuple[Array, Array], least_gain: float, radius: float, wanted: float
+    start: Array,
+    evaluations: int,
+    bounds: tuple[Array, Array],
+    least_gain: float,
+    radius: float,
+    wanted: float,
+    least_share: float,
 ) -> Generator[Array, Point, Point]:
     """Yield where the cost is to be evaluated, and return the best point."""
     best = yield np.clip(start, *bounds)
@@ -174,7 +193,10 @@ def _search(
             radius = max(radius, 2.0 * length)
         gained = best.cost - tried.cost if gain > POOR else np.inf
         if gain > 0.0:
+            last = best.cost - tried.cost < least_share * best.cost
             best = tried
+            if last:
+                break
     return best
 
 

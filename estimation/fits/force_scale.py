@@ -27,6 +27,10 @@ BETTER = 5.0
 ELSEWHERE = 0.005
 """Relative difference in bulk modulus from which the same [fraction]."""
 
+ALMOST, NEARBY = 1e-3, 0.3
+"""Relative difference in bulk modulus, and the same over its deviation, up to which an optimum that was come near to
+counts as the known one and is not sought more exactly [fraction]."""
+
 LARGEST_DISAGREEMENT = 0.05
 """Relative difference in bulk modulus of two optima that explain a log, above which neither is believed [fraction]."""
 
@@ -58,6 +62,8 @@ class Way:
         Cost that a further step must promise there [dimensionless].
     finishing : int
         Evaluations of the model on the problem itself.
+    enough : float
+        Cost that a further step must promise there [dimensionless].
     bounds : tuple of ndarray, shape (unknowns,)
         Lowest and highest coordinates [dimensionless].
     explained : float
@@ -68,6 +74,7 @@ class Way:
     nearing: int
     near_enough: float
     finishing: int
+    enough: float
     bounds: tuple[Array, Array]
     explained: float
 
@@ -140,4 +147,21 @@ def _ended(problem: FreedProblem, best: Point, moved: Sequence[Mapping[str, floa
     starts = [np.clip(problem.model.theta({**values, **some}), *way.bounds) for some in moved]
     near = descend_together(way.near.at_each, starts, way.nearing, way.bounds, way.near_enough)
     starts = [one.theta for one in near]
-    return descend_together(problem.at_each, starts, way.finishing, way.bounds, wanted=way.explained)
+    found = descend_together(problem.at_each, starts, way.finishing, way.bounds, way.enough, wanted=way.explained)
+    alike = max(ALMOST, NEARBY * _deviation(problem, best))
+    here = np.log(_bulk_modulus(problem, best))
+    away = [
+        i
+        for i, one in enumerate(found)
+        if one.cost < way.explained and abs(np.log(_bulk_modulus(problem, one)) - here) > alike
+    ]
+    starts = [found[i].theta for i in away]
+    for i, one in zip(away, descend_together(problem.at_each, starts, way.finishing, way.bounds), strict=True):
+        found[i] = one
+    return found
+
+
+def _deviation(problem: FreedProblem, point: Point) -> float:
+    """Return the relative standard deviation of bulk modulus at a point if residuals are white [fraction]."""
+    place = problem.model.unknowns.index("bulk_modulus")
+    return float(np.sqrt(np.linalg.pinv(point.gram, hermitian=True)[place, place]))

@@ -16,13 +16,17 @@ from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_log import GreyBoxLog, OutputNoise
 from estimation.fits.motion_search import (
+    ENOUGH,
     EXPLAINED,
     FINISHING,
+    HOPELESS,
     NEAR_ENOUGH,
     NEARING,
+    SLIGHT_SHARE,
     WAYS,
     Ended,
     MotionSearch,
+    bulk_modulus,
     cost_of,
     explained,
     likeliest,
@@ -225,24 +229,37 @@ def _fitted(ended: list[Ended]) -> tuple[list[GreyBoxFit], list[float]]:
     """
     first, second = sorted(ended, key=lambda one: (not one.explains, one.point.cost))
     search, best, others = first.search, first.point, list[float]()
+    part, whole, bounds = search.part, search.whole, search.bounds
     if not first.explains:
-        best = descend(search.part.at, best.theta, FINISHING, search.bounds)
-    asked = best.cost < explained(search.part)
+        best = descend(part.at, best.theta, FINISHING, bounds, least_share=SLIGHT_SHARE)
+    asked = best.cost < explained(part)
     if asked:
-        best, others = _rescaled(search.part, best, search)
-    whole = search.whole
-    best = descend(whole.at, best.theta, FINISHING, search.bounds)
+        best, others = _rescaled(part, best, search)
+    hopeful = asked and not disagree([bulk_modulus(part, best), *others])
+    best = descend(whole.at, best.theta, FINISHING, bounds, least_share=0.0 if hopeful else SLIGHT_SHARE)
     if not asked and best.cost < explained(whole):
         best, others = _rescaled(whole, best, search)
-    rival = second.search
-    begun = min((rival.whole.at(theta) for theta in (best.theta, second.point.theta)), key=cost_of)
-    other = descend(rival.whole.at, begun.theta, NEARING, rival.bounds, wanted=best.cost + UNLIKELY)
-    return [concluded(whole, best), concluded(rival.whole, other)], others
+    told = best.cost < explained(whole) and not disagree([bulk_modulus(whole, best), *others])
+    if told and not hopeful:
+        best = descend(whole.at, best.theta, FINISHING, bounds)
+    return [concluded(whole, best), concluded(second.search.whole, _rival(second, best, told=told))], others
+
+
+def _rival(second: Ended, best: Point, *, told: bool) -> Point:
+    """Return where the other structure of friction comes to on the whole log; not far where no number is told."""
+    whole, bounds = second.search.whole, second.search.bounds
+    begun = min((whole.at(theta) for theta in (best.theta, second.point.theta)), key=cost_of)
+    if told:
+        return descend(whole.at, begun.theta, NEARING, bounds, wanted=best.cost + UNLIKELY)
+    wanted = explained(whole)
+    if begun.cost > max(best.cost, HOPELESS * wanted) or best.cost < wanted:
+        return begun
+    return descend(whole.at, begun.theta, NEARING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
 
 
 def _rescaled(problem: FreedProblem, best: Point, search: MotionSearch) -> tuple[Point, list[float]]:
     """Return the best optimum of forces on other scales, and other bulk moduli that explain the log."""
-    way = Way(rough(problem, WAYS[0][1]), NEARING, NEAR_ENOUGH, FINISHING, search.bounds, explained(problem))
+    way = Way(rough(problem, WAYS[0][1]), NEARING, NEAR_ENOUGH, FINISHING, ENOUGH, search.bounds, explained(problem))
     return rescaled(problem, best, way)
 
 

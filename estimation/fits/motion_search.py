@@ -44,7 +44,7 @@ NEAR_ENOUGH = 0.01
 """Cost that a further step must promise while a start is only brought near [dimensionless]."""
 
 ENOUGH = 0.1
-"""The same while one is searched on the short beginning [dimensionless]."""
+"""The same while one is searched on a beginning of the log [dimensionless]."""
 
 FINALISTS = 3
 """Starts that are carried on each way, the likeliest of each way first, until one explains the log."""
@@ -64,6 +64,10 @@ HOPELESS = 3.0
 
 SLIGHT = 1e-3
 """Cost that a further step must promise where nothing explains the log, over what would explain it [fraction]."""
+
+SLIGHT_SHARE = 0.01
+"""Share of the misfit that a step must take off where nothing explains the log, else it is the last [fraction]: no
+number is believed then, and how far the log is from explained is known well enough."""
 
 SAME_COST, SAME_MODULUS = 0.02, 0.01
 """Relative difference of misfits, and of bulk moduli, up to which two starts came to the same pit [fraction]."""
@@ -233,7 +237,8 @@ def likeliest(searches: Sequence[MotionSearch]) -> list[Ended]:
                     return [Ended(each.search, found if each is one else each.best, each is one) for each in tries]
         if begun.work > MOST_WORK or all(one.best.cost > HOPELESS * explained(one.search.short) for one in tries):
             break
-    return [Ended(one.search, one.ended(), explains=False) for one in tries]
+    likelier = min(tries, key=lambda one: one.best.cost)
+    return [Ended(one.search, one.ended() if one is likelier else one.best, explains=False) for one in tries]
 
 
 class _Tries:
@@ -264,7 +269,7 @@ class _Tries:
         if point.cost >= wanted or known or (self._followed and self._begun.work > MOST_WORK):
             return None
         wanted = explained(search.part)
-        more = descend(self._begun.at(search.part), point.theta, FINISHING, search.bounds, wanted=wanted)
+        more = descend(self._begun.at(search.part), point.theta, FINISHING, search.bounds, ENOUGH, wanted=wanted)
         self._followed.append((point, more))
         return more if more.cost < wanted else None
 
@@ -274,6 +279,8 @@ class _Tries:
         if self._followed:
             _, more = min(self._followed, key=lambda pair: pair[1].cost)
             return search.short.at(more.theta)
+        if self.best.cost > HOPELESS * explained(search.short) and self._begun.work > MOST_WORK:
+            return self.best
         promising = SLIGHT * explained(search.short)
         return descend(search.short.at, self.best.theta, FINISHING, search.bounds, promising)
 

@@ -27,7 +27,7 @@ def searched(at: Callable[[np.ndarray], Point], explained: float = np.inf) -> tu
         return points
 
     problem = cast("FreedProblem", SimpleNamespace(model=MODEL, at_each=at_each))
-    return *rescaled(problem, at(HERE), Way(problem, 12, 0.01, 25, (-FAR, FAR), explained)), seen
+    return *rescaled(problem, at(HERE), Way(problem, 12, 0.01, 25, 0.1, (-FAR, FAR), explained)), seen
 
 
 def valleys(scale: float, lower: float) -> Callable[[np.ndarray], Point]:
