@@ -16,6 +16,7 @@ from faults.diagnosis.circuit_runs import LONGEST, Blocks, blocks_of, parameter_
 from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, least_scales, misfit, nominal_runs
 from faults.diagnosis.class_regions import ClassFits, fit_classes, lasting_misfit
 from faults.diagnosis.end_stop import stopped
+from faults.diagnosis.out_of_model import unexplained
 from faults.watch.events import SLOW, Alarm
 from faults.watch.watch import LEAST_LEARNING, SLOWEST, watch_record
 from plant.arrays import Array
@@ -131,7 +132,8 @@ def find_onset(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Cha
     -------
     tuple of Change, Blocks and ClassFits, or None
         The change, the log with all before it taken as missing, and the circuits that fit the rest, which go on from
-        where the circuit before had brought the piston; None for a log in one condition throughout.
+        where the circuit before had brought the piston; None for a log in one condition throughout, and where no
+        circuit follows what came before.
     """
     place = likeliest_split(blocks, fits.best)
     if place is None:
@@ -144,6 +146,10 @@ def find_onset(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Cha
     )
     first, last = (int(np.argmax(one.scores)) for one in found)
     if gain < GAIN * LASTING or first == last:
+        return None
+    if unexplained(
+        parts[0], found[0], actuator
+    ):  # what comes and goes has no last condition, only a last quiet stretch
         return None
     before = parameter_rows(found[0].best.coordinates[None], actuator.circuit, actuator.rated)[0]
     low, best, high = _when(blocks, before, found[1].best.coordinates, place, actuator)

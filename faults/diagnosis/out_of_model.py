@@ -90,7 +90,7 @@ def reasons_against(blocks: Blocks, fits: ClassFits, region: float, actuator: Ac
     list[Note]
         None for a log that fits.
     """
-    return [*_unexplained(blocks, fits, actuator), *_biases(blocks, fits, actuator), *_outside(fits, region, actuator)]
+    return [*unexplained(blocks, fits, actuator), *_biases(blocks, fits, actuator), *_outside(fits, region, actuator)]
 
 
 def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
@@ -119,7 +119,23 @@ def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
     return () if differs <= allowed else (SensorCode.SENSORS_DISAGREE.note(difference_m_s=differs),)
 
 
-def _unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
+def unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
+    """Return a note for each output of which the best circuit leaves more than it may.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks.
+    fits : ClassFits
+        The circuits fitted to it.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    list[Note]
+        None where a circuit follows the log.
+    """
     sizes = np.sqrt(np.nanmean(blocks.outputs[blocks.first :] ** 2, axis=0))
     shares = fits.best.scales / np.maximum(sizes, np.finfo(float).tiny)
     pump = actuator.circuit.pump_displacement / actuator.circuit.piston_area

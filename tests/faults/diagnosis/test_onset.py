@@ -16,11 +16,13 @@ from faults.diagnosis.circuit_runs import Blocks
 from faults.diagnosis.class_fit import Actuator, PointFit
 from faults.diagnosis.diagnose import Diagnosis, diagnose_clean
 from faults.diagnosis.onset import MOST_ALARMS, LastPart, last_part, likeliest_split, part_of
+from faults.diagnosis.out_of_model import unexplained
 from faults.eha.inject import abrupt
 from faults.watch.events import Alarm, Event, Ready
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
+from plant.eha.parameter_path import ParameterPath
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import RIG
@@ -76,6 +78,24 @@ def test_a_log_in_one_condition_is_judged_whole() -> None:
     assert found.record is record
     assert found.blocks.earlier is None
     assert np.all(np.isfinite(found.blocks.velocity))
+
+
+def with_bursts(*begins: float) -> Record:
+    """Return six seconds at 2 ms of a healthy actuator whose Coulomb friction is fivefold for bursts of 0.3 s."""
+    rng = np.random.default_rng(11)
+    speed = make_drive("multisine", 6.0, 2e-3, HEALTHY, rng)
+    rough = replace(ACTUATOR.circuit, friction_coulomb=5.0 * ACTUATOR.circuit.friction_coulomb)
+    times = (0.0, *(time for begin in begins for time in (begin, begin + 0.3)))
+    path = ParameterPath(times, (ACTUATOR.circuit, *[rough, ACTUATOR.circuit] * len(begins)))
+    return simulate(CIRCUIT, speed, 2e-3, path, sensors=RIG, rng=rng)
+
+
+def test_a_quiet_end_is_no_last_condition_where_no_circuit_follows_what_came_before() -> None:
+    record = with_bursts(0.6, 1.2, 1.9)
+    found = last_part(record, ACTUATOR)
+    assert found.onset is None
+    assert found.record is record
+    assert unexplained(found.blocks, found.fits, ACTUATOR)
 
 
 def alarm(since: float) -> Alarm:
