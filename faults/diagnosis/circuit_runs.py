@@ -8,7 +8,6 @@ Eight circuits run side by side in one kernel, so a Gauss-Newton step with all i
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
-from typing import cast
 
 import numpy as np
 
@@ -21,10 +20,10 @@ from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters, circuit_values, longest_stroke
 from plant.eha.circuit_start import under_pressure
 from plant.eha.model import EhaParameters
+from plant.eha.one_sided import as_wide, circuit_plant, run_circuits
 from plant.eha.simulate import CIRCUIT
 from plant.errors import LogError
 from plant.log.record import Record
-from plant.solvers.adaptive import ErrorControl, controlled_run
 from plant.solvers.block_means import block_means
 from plant.solvers.steps import parameter_row
 
@@ -56,8 +55,6 @@ AT_STOP = 0.02
 
 TOLERANCE, DRIVE_TOLERANCE = 1e-4, 2e-3
 """Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_run`: far below what counts."""
-
-_CONTROL = cast("ErrorControl", CIRCUIT.control)
 
 COLUMN = {field.name: i for i, field in enumerate(fields(CircuitParameters))}
 
@@ -290,21 +287,13 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
     rows = _between_stops(blocks, rows)[None]
     if blocks.earlier is not None:
         until, before = blocks.earlier
-        rows = _after(until, _between_stops(blocks, before[None])[0], rows[0], len(blocks.speed))
+        before = as_wide(_between_stops(blocks, before[None])[0], rows.shape[-1])
+        rows = _after(until, before, rows[0], len(blocks.speed))
     if blocks.course is not None:
-        rows = rows * _drift(blocks.course)[:, None, :]
+        rows = rows * _drift(blocks.course, rows.shape[-1])[:, None, :]
     starts = np.array([_start(blocks, row) for row in rows[0]])
-    runs = controlled_run(
-        CIRCUIT.name,
-        _CONTROL,
-        starts,
-        blocks.speed,
-        rows,
-        blocks.sample_time,
-        CIRCUIT.parameter_class,
-        tolerance=TOLERANCE,
-        drive_tolerance=DRIVE_TOLERANCE,
-    )
+    step, allowed = blocks.sample_time, {"tolerance": TOLERANCE, "drive_tolerance": DRIVE_TOLERANCE}
+    runs = run_circuits(starts, blocks.speed, rows, step, **allowed)
     return _outputs(blocks, np.moveaxis(runs, 0, 2), rows)  # as they lie in memory
 
 
@@ -325,9 +314,9 @@ def _start(blocks: Blocks, row: Array) -> Array:
     return CIRCUIT.start(row) if begun is None else np.array(begun, dtype=np.float64)
 
 
-def _drift(course: Array) -> Array:
+def _drift(course: Array, width: int) -> Array:
     """Return the factors on a circuit's parameters, shape (samples, parameters): viscosity falls as leakage rises."""
-    factors = np.ones((len(course), len(COLUMN)))
+    factors = np.ones((len(course), width))
     factors[:, [COLUMN[name] for name in _LEAKAGES]] = course[:, None]
     factors[:, COLUMN["friction_linear"]] = 1.0 / course
     return factors
@@ -357,5 +346,6 @@ def _outputs(blocks: Blocks, states: Array, rows: Array) -> Array:
     velocity = np.diff(states[:: blocks.block, 2], axis=0) / (blocks.block * blocks.sample_time)
     if blocks.pressure is None:
         return np.ascontiguousarray(velocity.T)[..., None]
-    pressure = block_means(CIRCUIT.observe, PRESSURE, states[:-1], rows, blocks.block, CIRCUIT.parameter_class)
+    whose = circuit_plant(rows.shape[-1]).parameter_class
+    pressure = block_means(CIRCUIT.observe, PRESSURE, states[:-1], rows, blocks.block, whose)
     return np.stack([velocity.T, pressure.T], axis=-1)

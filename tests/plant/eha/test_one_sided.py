@@ -1,0 +1,67 @@
+"""A circuit with unlike make-up valves: the circuit where nothing is wrong, and each side answers its own fault."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.one_sided import ONE_SIDED, OneSidedParameters, as_wide, circuit_plant, one_sided
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.errors import RigError
+from plant.log.record import Record
+from plant.solvers.steps import parameter_row
+
+PAPER = CircuitParameters()
+DRIVE = np.repeat([110.0, -110.0, 90.0, -90.0], 250)
+
+
+def run(sign: float = 1.0, /, **faults: float) -> Record:
+    return simulate(ONE_SIDED, sign * DRIVE, 2e-3, one_sided(PAPER, **faults))
+
+
+def lowest(record: Record) -> tuple[float, float]:
+    return float(np.min(record["pressure_a_pa"])), float(np.min(record["pressure_b_pa"]))
+
+
+def test_with_nothing_wrong_it_is_the_circuit() -> None:
+    plain = simulate(CIRCUIT, DRIVE, 2e-3, PAPER)
+    same = run()
+    for name in plain:
+        assert same[name] == pytest.approx(plain[name], rel=1e-9, abs=1e-9 * float(np.max(np.abs(plain[name]))))
+
+
+@pytest.mark.parametrize(("side", "low", "sign"), [("a", 0, -1.0), ("b", 1, 1.0)])
+def test_a_chamber_whose_valve_is_stuck_shut_draws_no_oil_and_its_pressure_falls(
+    side: str, low: int, sign: float
+) -> None:
+    sound, stuck = (lowest(run(sign, **fault))[low] for fault in ({}, {f"makeup_shut_{side}": 1.0}))
+    assert sound > 0.7 * PAPER.accumulator_pressure
+    assert stuck < 0.3 * PAPER.accumulator_pressure
+    assert lowest(run(-sign, **{f"makeup_shut_{side}": 1.0}))[low] > 0.9 * PAPER.accumulator_pressure  # filled before
+
+
+@pytest.mark.parametrize(("side", "sign"), [("a", 1.0), ("b", -1.0)])
+def test_a_seat_that_leaks_slows_the_piston_where_its_chamber_pushes(side: str, sign: float) -> None:
+    sound, leaking = run(), run(**{f"seat_leakage_{side}": 1e-10})
+    pushing = np.sign(DRIVE) == sign
+    lost = [
+        1.0 - np.sum(np.abs(leaking["velocity_m_s"][there])) / np.sum(np.abs(sound["velocity_m_s"][there]))
+        for there in (pushing, ~pushing)
+    ]
+    assert lost[0] > 0.1
+    assert lost[0] > 2.0 * abs(lost[1])
+
+
+def test_a_row_tells_by_its_length_which_circuit_it_is_and_what_is_added_is_nothing_wrong() -> None:
+    short, long = parameter_row(PAPER), parameter_row(one_sided(PAPER))
+    assert circuit_plant(len(short)) is CIRCUIT
+    assert circuit_plant(len(long)) is ONE_SIDED
+    assert as_wide(short, len(long)).tolist() == long.tolist()
+    assert as_wide(short, len(short)).tolist() == short.tolist()
+
+
+def test_no_more_of_a_valve_can_be_shut_than_there_is() -> None:
+    assert one_sided(PAPER, makeup_shut_a=1.0).makeup_shut_a == 1.0
+    with pytest.raises(RigError, match="makeup_shut_b must be at most 1"):
+        replace(OneSidedParameters(), makeup_shut_b=1.2)
