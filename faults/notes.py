@@ -15,6 +15,14 @@ class AgainstCode(Code):
         "the ratio of pump flow to piston flow is {percent:+.0f} % off the rig file: motor speed or position reads "
         "wrong, or the rig file is of another actuator"
     )
+    PUMP_DELIVERS_LESS = (
+        "a pump that delivers {percent:.0f} % of its displacement explains the log better than any of the nine "
+        "conditions: it is worn, or displacement or piston area in the rig file is wrong"
+    )
+    MAKEUP_STUCK = (
+        "a make-up valve of chamber {side} that is stuck shut explains the log better than any of the nine conditions"
+    )
+    MAKEUP_LEAKS = "a make-up valve that leaks explains the log better than any of the nine conditions"
     SPEED_BIAS = "motor speed reads wrong by {bias_rad_s:+.3g} rad/s"
     PRESSURE_BIAS = "differential pressure reads wrong by {bias_pa:+.3g} Pa"
     OIL_SOFT = "the oil's bulk modulus is {share:.2f} times that in the rig file: air in the oil, or a soft hose"
@@ -39,6 +47,9 @@ class ClassCode(Code):
     )
     LEAKAGE_AND_BIAS_ALIKE = "the log does not separate the leakage coefficient from the flow bias"
     VELOCITY_LOST_TOLD = "the log does determine the velocity lost: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
+    NOT_EXCLUDED = (
+        "without differential_pressure_pa, other faults are not excluded: {faults} would explain the log about as well"
+    )
     MODELS_DIVERGED = "the models of all conditions diverged; check units and rig file"
     MODELS_ALIKE = (
         "no class: the models of all conditions move alike under this drive; move the actuator, ideally in steps"

@@ -135,10 +135,12 @@ def _work_on(fault: Note) -> Note | None:
     match fault.code:
         case RigCode.LEAKAGE_GROWS:
             return AdviceCode.STOP_LEAKAGE.note()
-        case RigCode.PUMP_WORN:
+        case RigCode.PUMP_WORN | AgainstCode.PUMP_DELIVERS_LESS:
             return AdviceCode.CHECK_PUMP.note()
-        case RigCode.MAKEUP_BLOCKED | RigCode.PORT_DRAINS:
+        case RigCode.MAKEUP_BLOCKED | RigCode.PORT_DRAINS | AgainstCode.MAKEUP_STUCK:
             return AdviceCode.CHECK_MAKEUP.note(side=fault.data["side"])
+        case AgainstCode.MAKEUP_LEAKS:
+            return AdviceCode.CHECK_MAKEUP.note(side="A or B")
         case RigCode.RELIEF_LOW:
             return AdviceCode.CHECK_RELIEF.note()
         case RigCode.AIR_ENTERS:

@@ -28,6 +28,7 @@ from faults.diagnosis.evidence import Scoreboard, weigh
 from faults.diagnosis.load import first_guesses, under_load
 from faults.diagnosis.models_verdict import models_verdict, ranked
 from faults.diagnosis.out_of_model import SOFT, reasons_against, sensors_disagree
+from faults.diagnosis.outside import faults_outside
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import limits_of, severities, severities_at, what_is_not_told, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
@@ -282,15 +283,16 @@ def diagnose_clean(
         *sensors_disagree(board.window, board.blocks),
         *reasons_against(board.blocks, board.fits, region, actuator),
     )
+    others, not_excluded = ((), ()) if against else faults_outside(board.blocks, board.fits, actuator)
     found = severities(board.fits, actuator, numbers.widths(pressure))
     return Diagnosis(
         max(probabilities, key=lambda name: probabilities[name]),
         probabilities,
-        against,
+        (*against, *others),
         found,
         severities_at(actuator.conditions[0], actuator),
         limits_of(actuator),
-        tuple(what_is_not_told(board.fits, found, pressure=pressure)),
+        (*what_is_not_told(board.fits, found, pressure=pressure), *not_excluded),
         board,
     )
 

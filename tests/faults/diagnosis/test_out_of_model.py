@@ -248,6 +248,13 @@ def test_a_pump_that_moves_more_or_less_than_the_rig_file_says_is_named(gain: fl
     assert AgainstCode.PUMP_OFF not in reasons(run_of(place, pump=1.0 + 0.15 * (gain - 1.0)))
 
 
+def test_without_pressure_a_pump_that_moves_less_is_left_to_the_search_for_faults_outside() -> None:
+    place = tuple(ACTUATOR.conditions[0].tolist())
+    for gain, said in ((1.2, True), (0.8, False)):
+        log = replace(run_of(place, pump=gain), pressure=None, noise=NOISE[:1])
+        assert (AgainstCode.PUMP_OFF in reasons(log)) == said
+
+
 def test_a_motor_that_never_turned_biases_nothing() -> None:
     log = replace(healthy(), speed=np.zeros_like(healthy().speed))
     assert not {AgainstCode.SPEED_BIAS, AgainstCode.PUMP_OFF} & set(reasons(log, ACTUATOR.conditions[0]))

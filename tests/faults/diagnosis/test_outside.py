@@ -1,0 +1,138 @@
+"""Without pressure, a fault outside the nine that explains a log better is named, and a sound log has none."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.clean import clean_log
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis import outside
+from faults.diagnosis.circuit_runs import COORDINATES, Blocks, parameter_rows, predicted
+from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.class_regions import fit_classes
+from faults.diagnosis.diagnose import diagnose_clean
+from faults.diagnosis.outside import faults_outside
+from faults.notes import AgainstCode, ClassCode
+from plant.eha.circuit_parameters import CircuitParameters, circuit_of
+from plant.eha.model import EhaParameters
+from plant.eha.one_sided import ONE_SIDED, one_sided
+from plant.eha.simulate import simulate
+from plant.notes import Code
+from plant.sensors.sensors import RIG
+
+ACTUATOR = Actuator.of(EhaParameters())
+SOUND = ACTUATOR.circuit
+NOISE = np.array([1e-4])
+LEVELS = [120.0, -120.0, 60.0, -90.0, 110.0, 40.0, -110.0, -50.0]
+MAJOR = float(np.exp(ACTUATOR.conditions[list(CONDITIONS).index("major_leakage"), COORDINATES.index("leakage")]))
+
+
+@cache
+def log_of(circuit: CircuitParameters = SOUND, condition: str = "minor_friction", *, pressure: bool = False) -> Blocks:
+    """Return the log that a circuit leaves of eight speeds, held for 0.4 s each, with noise."""
+    speed = np.repeat(LEVELS, 200)
+    empty, noise = np.zeros(len(speed) // 5), np.append(NOISE, 2e3) if pressure else NOISE
+    blank = Blocks(np.append(speed, speed[-1]), 2e-3, 5, empty, empty if pressure else None, noise)
+    place = list(CONDITIONS).index(condition)
+    (found,) = predicted(blank, parameter_rows(ACTUATOR.conditions[[place]], circuit, ACTUATOR.rated))
+    found = found + np.random.default_rng(0).normal(size=found.shape) * noise
+    return replace(blank, velocity=found[:, 0], pressure=found[:, 1] if pressure else None)
+
+
+def said(blocks: Blocks) -> tuple[list[tuple[Code, dict[str, object]]], str]:
+    """Return what speaks against all nine, and the faults that are not excluded."""
+    against, open_ = faults_outside(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
+    assert [note.code for note in open_] in ([], [ClassCode.NOT_EXCLUDED])
+    return [(note.code, dict(note.data)) for note in against], "".join(str(note.data["faults"]) for note in open_)
+
+
+FAULTS = {
+    "pump": (replace(SOUND, pump_displacement=0.8 * SOUND.pump_displacement), AgainstCode.PUMP_DELIVERS_LESS),
+    "valve A": (one_sided(SOUND, makeup_shut_a=1.0), AgainstCode.MAKEUP_STUCK),
+    "valve B": (one_sided(SOUND, makeup_shut_b=1.0), AgainstCode.MAKEUP_STUCK),
+    "seat A": (one_sided(SOUND, seat_leakage_a=0.6 * MAJOR), AgainstCode.MAKEUP_LEAKS),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_that_no_condition_has_is_named(name: str) -> None:
+    circuit, code = FAULTS[name]
+    ((found, data),), _ = said(log_of(circuit))
+    assert found == code
+    assert data == (
+        {"percent": pytest.approx(80.0)} if name == "pump" else {"side": name[-1]} if "valve" in name else {}
+    )
+
+
+@pytest.mark.parametrize("condition", ["normal", "minor_leakage", "major_friction", "major_leakage_major_friction"])
+def test_no_fault_is_named_in_a_sound_circuit(condition: str) -> None:
+    assert not said(log_of(condition=condition))[0]
+
+
+@pytest.mark.parametrize(
+    "circuit",
+    [
+        replace(SOUND, pump_case_leakage=0.0),
+        replace(SOUND, makeup_conductance=10.0 * SOUND.makeup_conductance),
+        replace(SOUND, accumulator_gas=3.0 * SOUND.accumulator_gas, presliding_displacement=4e-5),
+    ],
+    ids=["no drain", "wide valves", "another accumulator"],
+)
+def test_what_no_rig_file_knows_is_no_fault(circuit: CircuitParameters) -> None:
+    assert not said(log_of(circuit))[0]
+
+
+def test_a_valve_that_never_had_to_open_is_not_excluded_and_a_worn_pump_is_where_speeds_tell_it() -> None:
+    against, open_ = said(log_of(condition="normal"))
+    assert not against
+    assert "stuck shut" in open_
+    assert "worn pump" not in open_
+
+
+def test_with_pressure_and_where_the_piston_sticks_nothing_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen, still = log_of(pressure=True), replace(log_of(), velocity=0.0 * log_of().velocity)
+    fits = [fit_classes(blocks, ACTUATOR) for blocks in (seen, still)]
+    monkeypatch.setattr(outside, "fit_classes", lambda *_, **__: pytest.fail("a circuit was fitted"))
+    for blocks, one in zip((seen, still), fits, strict=True):
+        assert faults_outside(blocks, one, ACTUATOR) == ((), ())
+
+
+def test_a_gain_that_the_sound_circuit_makes_up_when_asked_again_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    blocks = log_of(FAULTS["pump"][0])
+    fits = fit_classes(blocks, ACTUATOR)
+    assert faults_outside(blocks, fits, ACTUATOR)[0]
+    fit, worn = outside.fit_classes, FAULTS["pump"][0].pump_displacement
+    ended: list[np.ndarray] = []
+
+    def as_good(blocks: Blocks, actuator: Actuator, **how: np.ndarray) -> object:
+        found = fit(blocks, actuator, **how)
+        if actuator.circuit.pump_displacement == worn:
+            ended.append(found.best.coordinates)
+        again = ended and np.array_equal(how.get("start", np.zeros(0)), ended[-1])
+        return replace(found, scores=found.scores + 1e3) if again else found
+
+    monkeypatch.setattr(outside, "fit_classes", as_good)
+    assert not faults_outside(blocks, fits, ACTUATOR)[0]
+
+
+def test_a_diagnosis_without_pressure_says_what_a_valve_that_is_stuck_shut_does() -> None:
+    rng = np.random.default_rng(2)
+    speed = np.repeat(LEVELS, 200)
+    stuck = one_sided(circuit_of(parameters_for(CONDITIONS["minor_leakage"])), makeup_shut_b=1.0)
+    log = simulate(ONE_SIDED, speed, 2e-3, stuck, sensors=RIG, rng=rng).replace(differential_pressure_pa=None)
+    found = diagnose_clean(clean_log(log, EhaParameters()), ACTUATOR)
+    assert [note.code for note in found.against] == [AgainstCode.MAKEUP_STUCK]
+
+
+def test_of_two_circuits_one_after_the_other_the_last_may_have_the_fault() -> None:
+    sound, stuck = log_of(), one_sided(SOUND, makeup_shut_b=1.0)
+    place = [list(CONDITIONS).index("minor_friction")]
+    before, after = (parameter_rows(ACTUATOR.conditions[place], circuit, ACTUATOR.rated) for circuit in (SOUND, stuck))
+    both = predicted(replace(sound, earlier=(100, before[0]), pressure=sound.velocity), after)[0]
+    first, last = (predicted(replace(sound, pressure=sound.velocity), rows)[0] for rows in (before, after))
+    assert both[:20] == pytest.approx(first[:20], rel=0.01)
+    assert np.max(np.abs(both - first)[20:, 0]) > 1e-3
+    assert np.max(np.abs(both - last)[:40, 1]) > 1e3
+    assert both.shape == last.shape
