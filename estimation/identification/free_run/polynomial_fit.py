@@ -8,7 +8,7 @@ import numpy as np
 from estimation.arrays import Array, BoolArray, IntArray
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_fit import LinearFit
-from estimation.identification.free_run.polynomial_kernel import carry, run_free
+from estimation.identification.free_run.polynomial_kernel import carry, run_free, write_products
 from estimation.identification.search.levenberg import levenberg
 
 BEYOND = 0.1
@@ -76,8 +76,8 @@ class PolynomialFit:
 
     Parameters
     ----------
-    terms : ndarray of int, shape (k, d)
-        Variables that each term multiplies; -1 stands for 1.
+    terms : ndarray of int, shape (k, 3)
+        Variables that each term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
     theta : ndarray, shape (k + n_start * logs,)
         Coefficients, and the first outputs of each log.
     cost : float
@@ -133,8 +133,8 @@ class Runs:
 
     Parameters
     ----------
-    terms : ndarray of int, shape (k, d)
-        Variables that each term multiplies; -1 stands for 1.
+    terms : ndarray of int, shape (k, 3)
+        Variables that each term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
     data : Channels
         Scaled.
     """
@@ -200,7 +200,7 @@ class Runs:
             part = output[begin : begin + u.shape[0]]
             begin += u.shape[0]
             direct = np.zeros((part.size, count + (n * len(slopes) if starts else 0)))
-            direct[:, :count] = products(self.variables, terms, u, part)
+            write_products(*_signals(self.variables, u, part), terms, direct)
             direct[:n, :count] = 0.0
             if starts:
                 direct[np.arange(n), count + index * n + np.arange(n)] = 1.0
@@ -221,24 +221,30 @@ class Runs:
         target = self.target[self.used]
         weight = np.zeros(theta.size)
         weight[: self.terms.shape[0]] = penalty * target.size * (self.terms[:, 1] >= 0)
-        huge = (np.inf, np.eye(theta.size), np.zeros(theta.size))
+        nowhere, least = (np.eye(theta.size), np.zeros(theta.size)), np.inf
 
         def at(values: Array) -> tuple[float, Array, Array]:
+            nonlocal least
             ran = self.run(values)
             if ran is None:
-                return huge
-            jacobian = self.sensitivities(*ran, self.terms, starts=True)[self.used]
+                return np.inf, *nowhere
             left = ran[0][self.used] - target
+            reached = float(left @ left + weight @ values**2)
+            if not reached < least:  # the step is rejected, and its slopes are not asked for
+                return reached, *nowhere
+            jacobian = self.sensitivities(*ran, self.terms, starts=True)
+            jacobian = jacobian if self.used.all() else jacobian[self.used]
             gram = jacobian.T @ jacobian
             # first values of a log whose outputs are held back have no effect
             gram[np.diag_indices_from(gram)] += 1e-12 * max(float(np.diag(gram).max()), 1.0) + weight
             if not np.isfinite(gram).all():
-                return huge
-            return float(left @ left + weight @ values**2), gram, jacobian.T @ left + weight * values
+                return np.inf, *nowhere
+            least = reached
+            return reached, gram, jacobian.T @ left + weight * values
 
-        if not np.isfinite(at(theta)[0]):
-            return None
         cost, best = levenberg(at, theta, lambda _: True, tolerance=TOLERANCE, most_steps=steps)
+        if not np.isfinite(cost):
+            return None
         return PolynomialFit(self.variables, self.terms, best, cost - float(weight @ best**2))
 
 
@@ -265,8 +271,8 @@ def products(variables: Variables, terms: IntArray, u: Array, y: Array) -> Array
 
     Parameters
     ----------
-    terms : ndarray of int, shape (k, d)
-        Variables that each term multiplies; -1 stands for 1.
+    terms : ndarray of int, shape (k, 3)
+        Variables that each term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
     u : ndarray, shape (n, m)
         Inputs.
     y : ndarray, shape (n,)
@@ -277,16 +283,16 @@ def products(variables: Variables, terms: IntArray, u: Array, y: Array) -> Array
     ndarray, shape (n, k)
         One column a term.
     """
-    n = y.size
-    single, held = np.empty((variables.lag.size, n)), np.empty((variables.lag.size, n))
+    out = np.empty((y.size, terms.shape[0]))
+    write_products(*_signals(variables, u, y), terms, out)
+    return out
+
+
+def _signals(variables: Variables, u: Array, y: Array) -> tuple[Array, Array]:
+    """Return the lagged signals as they are and held at their ends, one column each."""
+    single = np.empty((y.size, variables.lag.size))
     for v, (source, lag) in enumerate(zip(variables.source, variables.lag, strict=True)):
         series = y if source == 0 else u[:, source - 1]
-        early = min(int(lag), n)
-        single[v, :early], single[v, early:] = series[0], series[: n - early]
-        np.clip(single[v], *variables.limits[v], out=held[v])
-    out = np.ones((terms.shape[0], n))
-    for row, term in zip(out, terms, strict=True):
-        chosen = term[term >= 0]
-        for v in chosen:
-            row *= single[v] if chosen.size == 1 else held[v]
-    return np.ascontiguousarray(out.T)
+        early = min(int(lag), y.size)
+        single[:early, v], single[early:, v] = series[0], series[: y.size - early]
+    return single, np.clip(single, variables.limits[:, 0], variables.limits[:, 1])

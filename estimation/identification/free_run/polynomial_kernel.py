@@ -1,5 +1,7 @@
 """The free run of a polynomial model sample by sample, and how a change of its terms is carried on by its feedback."""
 
+import numpy as np
+
 from estimation.arrays import Array, IntArray
 from estimation.identification.search.jit import compiled
 
@@ -22,8 +24,8 @@ def run_free(
     ----------
     theta : ndarray, shape (k,)
         Coefficient of each term.
-    terms : ndarray of int, shape (k, d)
-        Variables that a term multiplies; -1 stands for 1.
+    terms : ndarray of int, shape (k, 3)
+        Variables that a term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
     source, lag : ndarray of int, shape (v,)
         Of each variable: 0 for the output, else the input's number from 1, and how many samples earlier.
     limits : ndarray, shape (v, 2)
@@ -39,6 +41,10 @@ def run_free(
     """
     n, n_start = out.size, slope.shape[1]
     z, held = limits[:, 0].copy(), limits[:, 0].copy()
+    # where a slope by each variable goes: one place more takes those by inputs, and by outputs that are held
+    single, inner, rates = source.copy(), source.copy(), np.zeros(n_start + 1)
+    for v in range(source.size):
+        single[v] = lag[v] - 1 if source[v] == 0 else n_start
     for t in range(n_start, n):
         for v in range(source.size):
             if source[v] == 0:
@@ -46,35 +52,61 @@ def run_free(
             else:
                 z[v] = u[max(t - lag[v], 0), source[v] - 1]
             held[v] = min(max(z[v], limits[v, 0]), limits[v, 1])
-        for k in range(n_start):
-            slope[t, k] = 0.0
+            inner[v] = n_start if z[v] < limits[v, 0] or z[v] > limits[v, 1] else single[v]
+        rates[:] = 0.0
         total = 0.0
         for i in range(terms.shape[0]):
-            single = terms.shape[1] < 2 or terms[i, 1] < 0
-            value = theta[i]
-            for d in range(terms.shape[1]):
-                if terms[i, d] >= 0:
-                    value *= z[terms[i, d]] if single else held[terms[i, d]]
-            total += value
-            for d in range(terms.shape[1]):
-                v = terms[i, d]
-                if v < 0 or source[v] != 0:
-                    continue
-                if not single and (z[v] < limits[v, 0] or z[v] > limits[v, 1]):
-                    continue
-                part = theta[i]
-                for other in range(terms.shape[1]):
-                    if other != d and terms[i, other] >= 0:
-                        part *= held[terms[i, other]]
-                slope[t, lag[v] - 1] += part
+            a, b, c, value = terms[i, 0], terms[i, 1], terms[i, 2], theta[i]
+            if a < 0:
+                total += value
+            elif b < 0:
+                total += value * z[a]
+                rates[single[a]] += value
+            elif c < 0:
+                total += value * held[a] * held[b]
+                rates[inner[a]] += value * held[b]
+                rates[inner[b]] += value * held[a]
+            else:
+                first, last = value * held[a], held[b] * held[c]
+                total += first * last
+                rates[inner[a]] += value * last
+                rates[inner[b]] += first * held[c]
+                rates[inner[c]] += first * held[b]
         if not abs(total) < 1e3:
             return t
         if total < ends[0] or total > ends[1]:
             total = min(max(total, ends[0]), ends[1])
-            for k in range(n_start):
-                slope[t, k] = 0.0
+            rates[:] = 0.0
+        for k in range(n_start):
+            slope[t, k] = rates[k]
         out[t] = total
     return -1
+
+
+@compiled
+def write_products(single: Array, held: Array, terms: IntArray, out: Array) -> None:
+    """Write the product of each term, row by row.
+
+    Parameters
+    ----------
+    single, held : ndarray, shape (n, v)
+        Variables as they are, for terms of one, and held at their ends, for products.
+    terms : ndarray of int, shape (k, 3)
+        As `run_free` takes them.
+    out : ndarray, shape (n, p)
+        Its first k columns are written.
+    """
+    for t in range(out.shape[0]):
+        for i in range(terms.shape[0]):
+            a, b, c = terms[i, 0], terms[i, 1], terms[i, 2]
+            if a < 0:
+                out[t, i] = 1.0
+            elif b < 0:
+                out[t, i] = single[t, a]
+            elif c < 0:
+                out[t, i] = held[t, a] * held[t, b]
+            else:
+                out[t, i] = held[t, a] * held[t, b] * held[t, c]
 
 
 @compiled

@@ -93,13 +93,14 @@ def without_term(fit: PolynomialFit, index: int, data: Channels) -> PolynomialFi
 def _gains(own: Array, every: Array, residual: Array) -> Array:
     """Return how much of the squared residual each candidate explains beside what is there, in the linearised run."""
     with np.errstate(over="ignore", invalid="ignore"):
-        size = np.sqrt(np.einsum("ij,ij->j", every, every))
-    usable = np.isfinite(size) & (size > 0.0)
-    unit = np.where(usable, every, 0.0) / np.where(usable, size, 1.0)
-    scale = np.sqrt(np.einsum("ij,ij->j", own, own))
-    basis = np.linalg.qr(own / np.where(scale > 0.0, scale, 1.0))[0]
-    left = unit - basis @ (basis.T @ unit)
-    power = np.einsum("ij,ij->j", left, left)
+        size = np.einsum("ij,ij->j", every, every)
+        usable = np.isfinite(size) & (size > 0.0)
+        size = np.where(usable, size, 1.0)
+        scale = np.sqrt(np.einsum("ij,ij->j", own, own))
+        basis = np.linalg.qr(own / np.where(scale > 0.0, scale, 1.0))[0]
+        shadow = basis.T @ every
+        power = 1.0 - np.einsum("ij,ij->j", shadow, shadow) / size
+        explained = every.T @ residual - shadow.T @ (basis.T @ residual)
     # what is nearly a sum of those that are there only makes values undetermined
     fresh = usable & (power > 1e-6)
-    return np.where(fresh, (left.T @ residual) ** 2 / np.where(fresh, power, 1.0), 0.0)
+    return np.where(fresh, explained, 0.0) ** 2 / np.where(fresh, power * size, 1.0)

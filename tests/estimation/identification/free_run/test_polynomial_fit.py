@@ -158,8 +158,8 @@ def test_pruning_takes_out_a_product_that_explains_nothing_and_keeps_the_plants_
 
 WAYS = pytest.mark.parametrize("way", [lambda loop: loop, lambda loop: loop.__wrapped__], ids=["compiled", "Python"])
 SOURCE, LAG = np.array([0, 0, 1]), np.array([1, 2, 1])
-TERMS = np.array([[-1, -1], [0, -1], [1, -1], [2, -1], [0, 1], [0, 2]])
-THETA = np.array([0.05, 0.9, -0.3, 0.4, 0.6, -0.5])
+TERMS = np.array([[-1, -1, -1], [0, -1, -1], [1, -1, -1], [2, -1, -1], [0, 1, -1], [0, 2, -1], [0, 0, 1], [1, 2, 2]])
+THETA = np.array([0.05, 0.9, -0.3, 0.4, 0.6, -0.5, -0.7, 0.8])
 
 
 def ran(way: Callable[[Any], Any], theta: Array, limit: float, ends: tuple[float, float]) -> tuple[int, Array, Array]:
@@ -174,7 +174,7 @@ def ran(way: Callable[[Any], Any], theta: Array, limit: float, ends: tuple[float
 def next_output(theta: Array, limit: float, ends: tuple[float, float], y1: float, y2: float, u1: float) -> float:
     """Return what follows two outputs and an input: single terms as they are, products of what is held in limits."""
     h1, h2, hu = np.clip([y1, y2, u1], -limit, limit)
-    return float(np.clip(theta @ [1.0, y1, y2, u1, h1 * h2, h1 * hu], *ends))
+    return float(np.clip(theta @ [1.0, y1, y2, u1, h1 * h2, h1 * hu, h1 * h1 * h2, h2 * hu * hu], *ends))
 
 
 @WAYS
@@ -197,7 +197,7 @@ def test_a_free_run_holds_products_and_outputs_in_their_ranges(
 
 @WAYS
 def test_a_run_that_grows_beyond_bounds_tells_where(way: Callable[[Any], Any]) -> None:
-    where, out, _ = ran(way, np.array([0.0, 3.0, 0.0, 0.0, 0.0, 0.0]), 10.0, (-np.inf, np.inf))
+    where, out, _ = ran(way, np.array([0.0, 3.0, *np.zeros(6)]), 10.0, (-np.inf, np.inf))
     assert 2 < where < 20
     assert abs(3.0 * out[where - 1]) >= 1e3
 
