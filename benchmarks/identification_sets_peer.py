@@ -1,8 +1,9 @@
 """Runs in a peer's own environment, which knows nothing of this project: fits a set, writes the free run on its tests.
 
-``python identification_sets_peer.py PEER SET.npz RESULT.npz``
+``python identification_sets_peer.py PEER SET.npz RESULT.npz SECONDS``, which end it when its processor time has passed.
 """
 
+import resource
 import sys
 import warnings
 
@@ -75,6 +76,47 @@ def jax_sysid(u, y, tests):
     return [run(model, *test) for test in tests]
 
 
+def jax_sysid_nonlinear(u, y, tests):
+    """Nonlinear state space of jax-sysid: a linear part and a layer of tanh, its states by the last third."""
+    import jax
+    import jax.numpy as jnp
+    from jax_sysid.models import Model
+
+    jax.config.update("jax_enable_x64", True)
+    hidden, m = 8, u.shape[1]
+
+    def state(x, u, params):
+        A, B, W, V, b = params[:5]
+        return A @ x + B @ u + W @ jnp.tanh(V @ jnp.hstack((x, u)) + b)
+
+    def output(x, u, params):
+        C, D, c, W, V, b = params[5:]
+        return C @ x + D @ u + c + W @ jnp.tanh(V @ jnp.hstack((x, u)) + b)
+
+    def fit(u, y, n):
+        rng = np.random.default_rng(0)
+        layers = [
+            (0.1 * rng.normal(size=(one, hidden)), rng.normal(size=(hidden, n + m)), rng.normal(size=hidden))
+            for one in (n, 1)
+        ]
+        linear = [0.9 * np.eye(n), 0.1 * rng.normal(size=(n, m))]
+        readout = [rng.normal(size=(1, n)), np.zeros((1, m)), np.zeros(1)]
+        model = Model(n, 1, m, state_fcn=state, output_fcn=output)
+        model.init(params=[*linear, *layers[0], *readout, *layers[1]], x0=np.zeros(n))
+        model.loss(rho_x0=1e-4, rho_th=1e-4)
+        model.optimization(adam_eta=1e-3, adam_epochs=500, lbfgs_epochs=1000, iprint=-1)
+        model.fit(y.reshape(-1, 1), u)
+        return model
+
+    def run(model, u, y):
+        known = int(np.isfinite(y).sum())  # outputs are missing at the end alone
+        x0 = model.learn_x0(u[:known], y[:known].reshape(-1, 1), RTS_epochs=10, verbosity=False)
+        return np.ravel(np.asarray(model.predict(np.asarray(x0), u)[0], dtype=float))
+
+    model = fit(u, y, held_out(fit, run, (2, 4), u, y))
+    return [run(model, *test) for test in tests]
+
+
 def sysidentpy(u, y, tests):
     """Polynomial NARX of SysIdentPy by FROLS, lags and degree by the last third."""
     from sysidentpy.basis_function import Polynomial
@@ -104,11 +146,17 @@ def sysidentpy(u, y, tests):
     return [run(model, *test) for test in tests]
 
 
-PEERS = {"sippy": sippy, "jax-sysid": jax_sysid, "sysidentpy": sysidentpy}
+PEERS = {
+    "sippy": sippy,
+    "jax-sysid": jax_sysid,
+    "jax-sysid-nonlinear": jax_sysid_nonlinear,
+    "sysidentpy": sysidentpy,
+}
 
 
-def main(name, data, result):
+def main(name, data, result, seconds):
     """Fit one set with one peer, in the scale of order one."""
+    resource.setrlimit(resource.RLIMIT_CPU, (int(seconds), int(seconds) + 5))
     warnings.simplefilter("ignore")
     stored = np.load(data)
     u, y = stored["u"], stored["y"]
