@@ -5,7 +5,7 @@ Ours as a stranger would run it: ``default`` chooses order and dead time of a li
 of the mean (0 is perfect, 1 as good as the mean), initial states estimated for all alike. ``first`` is a first-order
 model with offset, ``scipy`` output error of orders 1 to 4 from ARX, by BIC, both by `scipy.optimize.least_squares`.
 Peers run in environments of their own (`make peers`), each size chosen on the last third of the training data; they are
-skipped where there are none. ``--simulated 0 3`` takes our own sets of seeds 0 to 2 instead, each with one nonlinearity,
+skipped where there are none. ``--simulated 0 3`` takes our own sets of seeds 0 to 2 instead, each with a nonlinearity,
 and ``--machines 0 3`` simulated machines and circuits. How often the default loses to the better baseline is said at
 the end. ``--begun 0.2`` estimates initial states from the first fifth of the test alone: a model with an unstable pole,
 whose state is fitted to the whole test, follows the output without its inputs.
