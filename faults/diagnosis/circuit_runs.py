@@ -53,7 +53,7 @@ LEAST_BEGUN = 0.1
 AT_STOP = 0.02
 """A log shows a stop if its piston turned this near to one, as a share of half the stroke [fraction]."""
 
-TOLERANCE, DRIVE_TOLERANCE = 1e-4, 2e-3
+ALLOWED = {"tolerance": 1e-4, "drive_tolerance": 2e-3}
 """Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_run`: far below what counts."""
 
 COLUMN = {field.name: i for i, field in enumerate(fields(CircuitParameters))}
@@ -292,8 +292,7 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
     if blocks.course is not None:
         rows = rows * _drift(blocks.course, rows.shape[-1])[:, None, :]
     starts = np.array([_start(blocks, row) for row in rows[0]])
-    step, allowed = blocks.sample_time, {"tolerance": TOLERANCE, "drive_tolerance": DRIVE_TOLERANCE}
-    runs = run_circuits(starts, blocks.speed, rows, step, **allowed)
+    runs = run_circuits(starts, blocks.speed, rows, blocks.sample_time, **ALLOWED)
     return _outputs(blocks, np.moveaxis(runs, 0, 2), rows)  # as they lie in memory
 
 
