@@ -217,7 +217,11 @@ def _downhill(point: Point, curvature: Array, radius: float, bounds: tuple[Array
 def _step(point: Point, curvature: Array, radius: float, bounds: tuple[Array, Array]) -> Array:
     """Return the best step by the quadratic model that ends within the radius and within bounds."""
     lower, upper = (bound - point.theta for bound in bounds)
-    step, free = np.zeros(len(point.theta)), np.ones(len(point.theta), dtype=bool)
+    step = _shortened(curvature, point.gradient, radius)
+    outside = (step < lower) | (step > upper)
+    if not outside.any():
+        return step
+    step, free = np.clip(step, lower, upper), ~outside
     while free.any():
         gradient = point.gradient[free] + curvature[np.ix_(free, ~free)] @ step[~free]
         step[free] = _shortened(curvature[np.ix_(free, free)], gradient, radius)

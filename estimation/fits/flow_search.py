@@ -15,7 +15,7 @@ from estimation.fits.descent import Point, descend
 from estimation.fits.flow_log import DRAIN_START, LEAST_LEAKAGE, OPENING_START, usual_leakage
 from estimation.fits.form_fit import FAULTS_TRIED
 from estimation.fits.freed_problem import FreedProblem
-from estimation.fits.greybox_fit import NEAR_ENOUGH, GreyBoxFit, Search, concluded, explained, roughly
+from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, explained, roughly
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem
 from estimation.fits.wide_problem import flow_bounds
@@ -48,6 +48,10 @@ GUESSED_WITHIN = 0.3
 
 SCREENED_SECONDS = 4.0
 """Starts are compared on the beginning of the log: it tells a wrong valley from a right one [s]."""
+
+ROUGH_ENOUGH = 0.05
+"""Half the sum of squares that a further step must promise while model steps are long [dimensionless]: their errors put
+the optimum off by more. With 0.3 logs of a sine, whose valleys are flat, took twice as many short steps after."""
 
 FINISHING = 15
 """Evaluations with short model steps: what is not there by then is a conductance that vanishes, a little at a time."""
@@ -123,7 +127,7 @@ def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mappin
     Returns
     -------
     sequence of GreyBoxFit
-        One at least.
+        One at least. Rig slopes and lateness are told of the likeliest, and of the likeliest with volumes that swing.
     """
     rough = _rough(log, parameters, starts)
     least = min(one.point.cost for one in rough)
@@ -134,8 +138,22 @@ def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mappin
         return problem, descend(problem.at, theta, FINISHING, bounds)
 
     done = each(finished, likely)
-    least = min(point.cost for _, point in done)
-    return each(lambda one: concluded(*one, disturbed=one[1].cost < least + UNLIKELY), done)
+    best = min(done, key=_cost)
+    swinging = min((one for one in done if not _held(one[0])), key=_cost)
+    least = best[1].cost
+
+    def told(one: tuple[Problem, Point]) -> GreyBoxFit:
+        return concluded(*one, disturbed=_cost(one) < least + UNLIKELY, asked=one is best or one is swinging)
+
+    return each(told, done)
+
+
+def _cost(one: tuple[Problem, Point]) -> float:
+    return one[1].cost
+
+
+def _held(problem: Problem) -> bool:
+    return problem.model.rates is HELD_FLOW_FORM.rates
 
 
 def _plain(one: _Rough) -> bool:
@@ -144,8 +162,7 @@ def _plain(one: _Rough) -> bool:
     Elsewhere valves that crack would take up what is strange and hide it: an encoder that was homed at the end stop,
     or a worn pump. Held chambers are the lumped plant's, which has no such valves.
     """
-    held = one.problem.model.rates is HELD_FLOW_FORM.rates
-    return not held and not one.problem.log.gaps.size and explained(one.problem, one.point)
+    return not _held(one.problem) and not one.problem.log.gaps.size and explained(one.problem, one.point)
 
 
 def _completed(one: _Rough, log: GreyBoxLog) -> tuple[Problem, Array, tuple[Array, Array]]:
@@ -203,12 +220,12 @@ def _guess(form: GreyBoxModel, log: GreyBoxLog, starts: Sequence[Mapping[str, fl
     ]
     likeliest = guesses[int(np.argmin(problem.costs(guesses)))]
     bounds = flow_bounds(form, guesses, log)
-    found = descend(problem.at, likeliest, search.evaluations, bounds, NEAR_ENOUGH, GUESSED_WITHIN)
+    found = descend(problem.at, likeliest, search.evaluations, bounds, ROUGH_ENOUGH, GUESSED_WITHIN)
     return problem.model.values(found.theta)
 
 
 def _search(log: GreyBoxLog) -> Search:
-    return Search(screened=ceil(SCREENED_SECONDS / log.sample_time))
+    return Search(screened=ceil(SCREENED_SECONDS / log.sample_time), near_enough=ROUGH_ENOUGH)
 
 
 def _searched(

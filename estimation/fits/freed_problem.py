@@ -6,6 +6,7 @@ kernel without unknowns serves every hypothesis.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import islice
 
 import numpy as np
@@ -14,7 +15,7 @@ from estimation.fits.descent import Point
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_loops import compile_kernel
 from estimation.fits.greybox_problem import OUTLIER, Problem, weighed
-from estimation.fits.side_by_side import LANES, MANY, compile_side_by_side
+from estimation.fits.side_by_side import LANES, MANY, ResidualsRun, compile_side_by_side
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
@@ -54,6 +55,9 @@ class FreedProblem(Problem):
         self._bare, self._sizes = model, linear
         self._last: list[tuple[Array, Array, Array, Array]] = []
         self._columns = [parameter_names(model.parameters).index(name) for name in free]
+        self._kernels: dict[int, ResidualsRun] = {}
+        self._units = np.array([linear.get(name, np.nan) for name in free])
+        self._logarithmic = np.isnan(self._units)
 
     @classmethod
     def of(cls, model: GreyBoxModel, log: GreyBoxLog) -> "FreedProblem":
@@ -155,12 +159,31 @@ class FreedProblem(Problem):
         if self.log.gaps.size or len(self.log.drives) > MOST_SIDE_BY_SIDE:
             yield from super().disturbed(theta, drives)
             return
-        row, waiting, variance = self._rows(theta[None], self.log.parameters), iter(drives), self._variances(theta)
+        waiting = iter(drives)
         while some := list(islice(waiting, MANY)):
             lanes = LANES if len(some) <= LANES else MANY
-            filled = np.stack([*some, *some[-1:] * (lanes - len(some))], axis=-1)
-            found = self._side_by_side(np.repeat(row, lanes, axis=0), filled, variance)
+            found = self.disturbed_together(theta, np.stack([*some, *some[-1:] * (lanes - len(some))], axis=-1))
             yield from (found[..., i] for i in range(len(some)))
+
+    def disturbed_together(self, theta: Array, drives: Array) -> Array:
+        """Return the normalised residuals under several other driving channels than the log's, in one run.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        drives : ndarray, shape (n, channels, `LANES` or `MANY`)
+            The channels [SI].
+
+        Returns
+        -------
+        ndarray, shape (outputs, blocks, `LANES` or `MANY`)
+            As of `residuals`.
+        """
+        if self.log.gaps.size:  # what a gap leaves open only the other kernel follows
+            return super().disturbed_together(theta, drives)
+        rows = np.repeat(self._rows(theta[None], self.log.parameters), drives.shape[-1], axis=0)
+        return self._side_by_side(rows, drives, self._variances(theta))
 
     def _run(
         self,
@@ -199,8 +222,9 @@ class FreedProblem(Problem):
     def _rows(self, thetas: Array, parameters: Array) -> Array:
         """Return the parameters at some points, shape (points, parameters)."""
         rows = np.repeat(parameters[None], len(thetas), axis=0)
-        for i in range(len(rows)):
-            rows[i, self._columns] = list(self.model.values(thetas[i]).values())
+        values = thetas * self._units
+        np.exp(thetas, out=values, where=self._logarithmic)
+        rows[:, self._columns] = values
         return rows
 
     def _residuals(self, rows: Array, drives: Array | None, variance: Array) -> Array:
@@ -216,10 +240,16 @@ class FreedProblem(Problem):
     def _side_by_side(self, rows: Array, drives: Array, variance: Array) -> Array:
         """Return the normalised residuals of up to `MANY` runs, shape (outputs, blocks, runs)."""
         lanes = LANES if len(rows) <= LANES else MANY
-        found, filled = self._room(lanes), np.concatenate([rows, np.repeat(rows[-1:], lanes - len(rows), axis=0)])
+        found = self._room(lanes)
+        filled = rows if len(rows) == lanes else np.concatenate([rows, np.repeat(rows[-1:], lanes - len(rows), axis=0)])
         with np.errstate(all="ignore"):  # a try that runs away is stepped back from
-            compile_side_by_side(self._bare, lanes)(filled, drives, self.log.measured, *self._course(variance), found)
+            self._kernel_of(lanes)(filled, drives, self.log.measured, *self._course(variance), found)
         return found[..., : len(rows)]
+
+    def _kernel_of(self, lanes: int) -> ResidualsRun:
+        if lanes not in self._kernels:
+            self._kernels[lanes] = compile_side_by_side(self._bare, lanes)
+        return self._kernels[lanes]
 
     def _alone(self, row: Array, drives: Array | None, variance: Array) -> Array:
         errors = self._room()
@@ -229,9 +259,17 @@ class FreedProblem(Problem):
 
 def _nudged(theta: Array) -> Array:
     """Return a point and its neighbours, a row each."""
-    return np.vstack([theta, theta + NUDGE * np.eye(len(theta))])
+    return theta + _nudges(len(theta))
+
+
+@cache
+def _nudges(unknowns: int) -> Array:
+    """Return the steps from a point to itself and to its neighbours, a row each."""
+    return np.eye(unknowns + 1, unknowns, -1) * NUDGE
 
 
 def _differences(found: Array) -> tuple[Array, Array]:
     """Return the residuals at a point and their slopes, of the residuals there and at its neighbours."""
-    return found[..., 0], (found[..., 1:] - found[..., :1]) / NUDGE
+    slopes = found[..., 1:] - found[..., :1]
+    slopes /= NUDGE
+    return found[..., 0], slopes

@@ -4,15 +4,15 @@ The variance of an estimate has three parts, told apart: noise of the outputs, n
 well the rig's own parameters are known. The last two are read off the fit's linear response to them.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.fits.covariance import automatic_lags, least_squares_covariance
 from estimation.fits.descent import Point, descend
+from estimation.fits.drive_noise import drive_variance
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem, search_bounds
 from estimation.models.greybox import GreyBoxModel
@@ -34,12 +34,6 @@ NEAR_ENOUGH = 0.01
 
 EXPLAINED = 1.2
 """Mean squared normalised residual up to which no other finalist is tried [dimensionless]."""
-
-DRIVE_DRAWS = 16
-"""Realisations of the driving channels' noise; their spread is known to 18 %, of a part that is seldom the larger."""
-
-SAMPLES_KEPT = 50_000
-"""Longest log whose draws are kept for the next one [samples]: 13 MB."""
 
 NOISE_DOUBT = 0.2
 """Standard deviation of the share of a driving channel's noise that is counted with the slopes: its size is known to
@@ -104,12 +98,15 @@ class Search:
         Starts that are carried on.
     evaluations : int
         Evaluations of the model that a finalist may take.
+    near_enough : float
+        Half the sum of squares that a further step must promise [dimensionless].
     """
 
     screened: int = SCREENED_SAMPLES
     screening: int = 12
     finalists: int = 2
     evaluations: int = 40
+    near_enough: float = NEAR_ENOUGH
 
 
 DEFAULT_SEARCH = Search()
@@ -178,8 +175,8 @@ def roughly(
 
     def descended(guess: Array, samples: int, evaluations: int) -> Point:
         if samples < len(log.measured):
-            return descend(problem.on(log.beginning(samples)).at, guess, evaluations, bounds, NEAR_ENOUGH)
-        return descend(whole.at, guess, evaluations, bounds, NEAR_ENOUGH, wanted=wanted)
+            return descend(problem.on(log.beginning(samples)).at, guess, evaluations, bounds, search.near_enough)
+        return descend(whole.at, guess, evaluations, bounds, search.near_enough, wanted=wanted)
 
     if len(guesses) > 1:
         screened = each(lambda guess: descended(guess, search.screened, search.screening), guesses)
@@ -217,7 +214,9 @@ def _cost(point: Point) -> float:
     return point.cost
 
 
-def concluded(problem: Problem, point: Point, *, disturbed: bool = True, warned: bool = True) -> GreyBoxFit:
+def concluded(
+    problem: Problem, point: Point, *, disturbed: bool = True, asked: bool = True, warned: bool = True
+) -> GreyBoxFit:
     """Return what a solution says, with its deviations.
 
     Parameters
@@ -227,7 +226,9 @@ def concluded(problem: Problem, point: Point, *, disturbed: bool = True, warned:
     point : Point
         Its solution.
     disturbed : bool
-        Whether the deviations hold the drives' noise too, and what the rig's own doubts would change is told.
+        Whether the deviations hold the drives' noise too.
+    asked : bool
+        Whether it is told, of a fit so disturbed, what the rig's doubts would change and which drives come late.
     warned : bool
         Whether the caller is warned where unknowns are not separately determined; else their deviations are infinite.
 
@@ -252,10 +253,10 @@ def concluded(problem: Problem, point: Point, *, disturbed: bool = True, warned:
             return bread @ (slopes.T @ shift.ravel())
 
         variance = np.diag(spread) + (NOISE_DOUBT * (bread @ problem.untilted(theta, errors)[felt])) ** 2
-        variance = variance + (_drive_variance(problem, theta, response) if disturbed else 0.0)
+        variance = variance + (drive_variance(problem, theta, bread, slopes) if disturbed else 0.0)
         # the window's estimate need not be positive: then nothing is known
         noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))
-        if disturbed:
+        if disturbed and asked:
             rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in _rig_slopes(problem, theta, response)}
             late = dict(_lateness(problem, theta, errors.ravel(), lambda shift: shift - slopes @ response(shift)))
     sizes = dict(model.linear)
@@ -276,32 +277,6 @@ def concluded(problem: Problem, point: Point, *, disturbed: bool = True, warned:
         chi_square=tuple(map(float, squares / seen)),
         autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),
     )
-
-
-def _drive_variance(problem: Problem, theta: Array, response: Callable[[Array], Array]) -> Array | float:
-    """Return the variance that noise of the driving channels adds: measured once, it acts on all later outputs."""
-    log = problem.log
-    if not any(spread > 0.0 for spread in log.drive_std):
-        return 0.0
-    rough = problem.on(log.coarsened())
-    undisturbed = rough.residuals(theta)
-    spread = np.array(log.drive_std)
-    draws = (log.drives + spread * noise for noise in _normal_draws(*log.drives.shape))
-    return sum(response(errors - undisturbed) ** 2 for errors in rough.disturbed(theta, draws)) / DRIVE_DRAWS
-
-
-def _normal_draws(samples: int, channels: int) -> Iterable[Array]:
-    """Return `DRIVE_DRAWS` draws of white noise, the same for every log: a fit can be repeated."""
-    if samples <= SAMPLES_KEPT:
-        return _kept_draws(samples, channels)
-    rng = np.random.default_rng(0)
-    return (rng.standard_normal((samples, channels)) for _ in range(DRIVE_DRAWS))
-
-
-@lru_cache(maxsize=1)
-def _kept_draws(samples: int, channels: int) -> Array:
-    """Return the draws, kept for the other forms of the balance and for the next log of that length."""
-    return np.random.default_rng(0).standard_normal((DRIVE_DRAWS, samples, channels))
 
 
 def _rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Array]) -> Iterator[tuple[str, Array]]:

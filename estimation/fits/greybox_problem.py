@@ -81,6 +81,9 @@ class Problem:
         self.model, self.log = model, log
         self._kernel = kernel or compile_kernel(model)
         self._block = max(1, round(log.block / log.sample_time))
+        self._passes_on = log.passes_on
+        self._white = np.array([noise.variance for noise in log.noise])
+        self._walk = np.array([noise.walk * self._block * log.sample_time for noise in log.noise])
         sizes = dict(model.linear)
         presumed = [log.presumed.get(name, (sizes.get(name, 1.0), np.inf)) for name in model.unknowns]
         self.presumed = model.theta({name: value for name, (value, _) in zip(model.unknowns, presumed, strict=True)})
@@ -187,6 +190,23 @@ class Problem:
         """
         return (self.residuals(theta, drives=one) for one in drives)
 
+    def disturbed_together(self, theta: Array, drives: Array) -> Array:
+        """Return the normalised residuals under several other driving channels than the log's.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        drives : ndarray, shape (n, channels, several)
+            The channels [SI].
+
+        Returns
+        -------
+        ndarray, shape (outputs, blocks, several)
+            As of `residuals`.
+        """
+        return np.stack([*self.disturbed(theta, map(np.ascontiguousarray, np.moveaxis(drives, -1, 0)))], axis=-1)
+
     def slopes(self, theta: Array) -> Array:
         """Return the derivatives of the normalised residuals.
 
@@ -253,7 +273,7 @@ class Problem:
         return np.array([(one.passed_on * values.get(one.passed_by, 0.0)) ** 2 for one in self.log.noise])
 
     def _variances(self, theta: Array) -> Array:
-        return np.array([noise.variance for noise in self.log.noise]) + self._passing(theta)
+        return self._white + self._passing(theta) if self._passes_on else self._white
 
     def _tilts(self, theta: Array) -> Iterator[tuple[int, int, float]]:
         """Yield each output whose variance moves with an unknown: its place, the unknown's, the share that moves."""
@@ -291,9 +311,7 @@ class Problem:
 
     def _course(self, variance: Array) -> tuple[float, IntArray, int, Array, Array]:
         """Return sample time, model steps up to each sample, samples a block, and both noises of each output."""
-        log = self.log
-        walk = np.array([noise.walk * self._block * log.sample_time for noise in log.noise])
-        return log.sample_time, log.steps, self._block, variance, walk
+        return self.log.sample_time, self.log.steps, self._block, variance, self._walk
 
 
 def weighed(errors: Array, slopes: Array) -> tuple[float, Array, Array]:
@@ -312,7 +330,9 @@ def weighed(errors: Array, slopes: Array) -> tuple[float, Array, Array]:
         As a kernel gives them.
     """
     weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)
-    cost = float(np.sum((1.0 - 0.5 * weight) * weight * errors**2))
+    weighted = weight * errors
+    cost = float(weighted.ravel() @ ((1.0 - 0.5 * weight) * errors).ravel())
     columns = slopes.reshape(errors.size, -1)
-    bent = columns * np.where(weight < 1.0, STRAIGHT, 1.0).reshape(-1, 1)
-    return cost, (weight * errors).ravel() @ columns, np.tril(bent.T @ columns)
+    straight = columns[np.flatnonzero(weight < 1.0)]  # few, so that weighing them again is less than weighing all
+    gram = columns.T @ columns - (1.0 - STRAIGHT) * (straight.T @ straight)
+    return cost, weighted.ravel() @ columns, np.tril(gram)

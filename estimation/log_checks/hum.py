@@ -7,6 +7,7 @@ import numpy as np
 
 from estimation.fits.convolution import smooth_length
 from estimation.log_checks.bridging import bridged
+from estimation.log_checks.order import median
 from estimation.log_checks.sensor_check import PRESSURE
 from estimation.notes import SensorCode
 from plant.arrays import Array
@@ -81,7 +82,7 @@ def _lines(values: Array) -> Array:
     length += length % 2
     power = np.abs(np.fft.rfft(bends * np.hanning(len(bends)), length)) ** 2
     parts = np.array_split(power, max(1, len(power) // NEARBY))
-    usual = np.concatenate([np.full(len(part), np.median(part)) for part in parts])
+    usual = np.concatenate([np.full(len(part), median(part)) for part in parts])
     return power / np.maximum(usual, np.finfo(float).tiny)
 
 

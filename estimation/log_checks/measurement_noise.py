@@ -5,6 +5,7 @@ from math import comb
 
 import numpy as np
 
+from estimation.log_checks.order import median
 from plant.arrays import Array
 from plant.log.record import Record
 
@@ -60,7 +61,7 @@ def _variance(channel: str, values: Array) -> float:
     smallest = max(SMALLEST_VARIANCE.get(channel, 0.0), _quantum(values) ** 2 / 12.0)
     if not len(bends):
         return smallest
-    deviation = NORMAL_MAD * _grouped_median(np.abs(bends - np.median(bends)), _step(values)) / 6.0**0.5
+    deviation = NORMAL_MAD * _grouped_median(np.abs(bends - median(bends)), _step(values)) / 6.0**0.5
     return float(max(deviation**2, smallest))
 
 
@@ -69,13 +70,13 @@ def _grouped_median(sizes: Array, step: float) -> float:
 
     Sizes of which more than half are none have a median of none: what they differ by is less than a step tells.
     """
-    median = float(np.median(sizes))
-    same = np.count_nonzero(np.abs(sizes - median) < 0.25 * step)
-    if same == 0 or median < 0.25 * step:
-        return median
-    low = max(median - 0.5 * step, 0.0)
-    below = np.count_nonzero(sizes <= median - 0.25 * step)
-    return low + (median + 0.5 * step - low) * (0.5 * len(sizes) - below) / same
+    middle = median(sizes)
+    same = np.count_nonzero(np.abs(sizes - middle) < 0.25 * step)
+    if same == 0 or middle < 0.25 * step:
+        return middle
+    low = max(middle - 0.5 * step, 0.0)
+    below = np.count_nonzero(sizes <= middle - 0.25 * step)
+    return low + (middle + 0.5 * step - low) * (0.5 * len(sizes) - below) / same
 
 
 def _step(values: Array) -> float:
@@ -133,5 +134,5 @@ def position_variance(position: Array) -> float:
     if not (len(bends) and len(moved)):
         return SMALLEST_VARIANCE["position_m"]
     parts = np.array_split(bends, max(1, len(bends) // WINDOW))
-    variance = np.median([np.mean(part**2) for part in parts]) / comb(2 * SMOOTH, SMOOTH)
+    variance = median(np.array([float(np.mean(part**2)) for part in parts])) / comb(2 * SMOOTH, SMOOTH)
     return float(max(variance, np.min(moved) ** 2 / 12.0))

@@ -5,7 +5,9 @@ import math
 import warnings
 from typing import Any
 
+from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Finding, Outcome
+from estimation.log_checks.clean import CleanLog
 from estimation.notes import ChannelCode, SensorCode
 from experiments.log_pages.entries import quantity_entry
 from faults.diagnosis.diagnose import diagnose_log
@@ -26,8 +28,8 @@ WHY_NONE = {
 }
 
 
-def diagnosed(record: Record, rig: Rig) -> dict[str, Any]:
-    """Say which of the nine conditions a log was taken in, or that it is in none.
+def diagnosed(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEstimate] | None = None) -> dict[str, Any]:
+    """Say which of the nine conditions a log was taken in, or that it is in none; see `diagnose_log`.
 
     Returns
     -------
@@ -45,7 +47,7 @@ def diagnosed(record: Record, rig: Rig) -> dict[str, Any]:
     LogWarning
         If samples were left out.
     """
-    found = diagnose_log(record, rig)
+    found = diagnose_log(record, rig, seen)
     for note in found.notes:
         if isinstance(note.code, SensorCode):
             warnings.warn(LogWarning(note), stacklevel=2)

@@ -5,20 +5,24 @@ of one kernel, 32 side by side and never fewer than a kernel of lanes takes.
 """
 
 import threading
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pyarrow.parquet as pq
 
-from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from estimation.eha.bulk_modulus import DEFAULT_OPTIONS, EstimateOptions, estimate_bulk_modulus, left_out
+from estimation.eha.estimate import estimated
+from estimation.eha.result import BulkModulusEstimate
 from estimation.engine.contract import FilterProblem
 from estimation.filters.run import METHODS, filter_problem, predicted_channels
 from estimation.finding import OUTCOMES
+from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, first_belief
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
 from estimation.models.eha_forms import BULK_MODULUS, FORMS
@@ -37,7 +41,7 @@ from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
 from plant.eha.simulate import PLANTS, simulate
-from plant.errors import LogError
+from plant.errors import LogError, LogWarning
 from plant.log.record import Record
 from plant.sensors.sensors import SENSORS, measure, noise_variances
 
@@ -48,6 +52,9 @@ DRAWN_ONCE = ("sine", "chirp")
 
 TRACK_ROWS = 200
 """About how many points of a filter's history are kept until its mean over the last `SETTLED` is taken."""
+
+Seen: TypeAlias = tuple[CleanLog, BulkModulusEstimate]
+"""A log that was looked at, and its estimate."""
 
 _one_at_a_time = threading.Lock()
 """Warnings are caught for a whole process, so that threads of one worker take turns where they are."""
@@ -83,7 +90,7 @@ def run_task(task: Task) -> Part:
     for number, (series, keys, works) in enumerate(task.groups):
         places = range(after, after := after + len(keys))
         try:
-            prepared = _prepared(series, task)
+            prepared = replace(_prepared(series, task), usual=sum(map(_is_usual, works)))
         except Exception as error:  # whatever a series brings up must not cost the others their results
             rows.fail(places, error)
             continue
@@ -124,11 +131,28 @@ class _Prepared:
     warnings: str | None = None
     other: ActuatorKind | None = None
     problems: dict[tuple[object, ...], FilterProblem] = field(default_factory=dict[tuple[object, ...], FilterProblem])
+    usual: int = 0
+    """Cases that rest on the same estimate of bulk modulus, that of the log as it is with all automatic [count]."""
 
     @property
     def truth(self) -> float | None:
         """Bulk modulus that was simulated [Pa]."""
         return self.entries.get(TRUTH)
+
+    @cached_property
+    def _found(self) -> tuple[CleanLog, BulkModulusEstimate, tuple[LogWarning, ...]]:
+        with caught() as said:
+            found = estimated(clean_log(self.record, self.rig.parameters), self.rig, DEFAULT_OPTIONS)
+        return *found, tuple(said)
+
+    def shared(self, record: Record, parameters: EhaParameters, work: Work) -> Seen | None:
+        """Return the estimate that cases share, and say again what was said of it; None where a case is alone."""
+        if self.usual < 2 or not _is_usual(work) or record is not self.record or parameters != self.rig.parameters:
+            return None
+        log, found, said = self._found
+        for one in said:
+            warnings.warn(one, stacklevel=2)
+        return log, found
 
 
 def _prepared(series: Series, task: Task) -> _Prepared:
@@ -184,7 +208,7 @@ def _run(place: int, prepared: _Prepared, work: Work, rows: Rows, lanes: Lanes) 
         if prepared.other is not None:
             found = found_of(prepared.other, work.verb, prepared.record, prepared.rig)
         elif work.verb == "diagnose":
-            found = diagnosed(record, prepared.rig)
+            found = diagnosed(record, prepared.rig, prepared.shared(record, prepared.rig.parameters, work))
         else:
             found = _estimated(record, parameters, work, prepared)
     found["warnings"] = _sentences([prepared.warnings, *said] if prepared.warnings else said)
@@ -199,19 +223,26 @@ def _told(prepared: _Prepared, work: Work) -> tuple[Record, EhaParameters]:
 
 
 def _estimated(record: Record, parameters: EhaParameters, work: Work, prepared: _Prepared) -> Row:
-    found = estimate_bulk_modulus(
-        record,
-        parameters,
-        form=work.form,
-        method=work.method,
-        start=work.start_pa,
-        start_std=work.start_std_pa,
-    )
+    seen = prepared.shared(record, parameters, work)
+    if seen is None:
+        options: dict[str, Any] = {"form": work.form, "method": work.method}
+        options |= {"start": work.start_pa, "start_std": work.start_std_pa}
+        found = estimate_bulk_modulus(record, parameters, **options)
+    else:
+        found = seen[1]
+        for note in left_out(*seen):
+            warnings.warn(LogWarning(note), stacklevel=2)
     reasons = [str(note) for note in found.gate.reasons] if found.value is not None else [OUTCOMES[found.outcome]]
     row: Row = {"outcome": found.outcome.value, "reason": "; ".join(reasons) or None, "trusted": found.gate.passed}
     row |= {"bulk_modulus_pa": found.value, "bulk_modulus_std_pa": found.std}
     row["error_percent"] = error_percent(found.value, prepared.truth)
     return row | {NIS[channel]: value for channel, value in found.nis.items() if channel in NIS}
+
+
+def _is_usual(work: Work) -> bool:
+    """Return whether a case rests on the estimate of bulk modulus with all automatic."""
+    options = EstimateOptions(form=work.form, method=work.method, start=work.start_pa, start_std=work.start_std_pa)
+    return work.pressure and (work.verb == "diagnose" or (work.verb == "estimate" and options == DEFAULT_OPTIONS))
 
 
 def _problem(record: Record, parameters: EhaParameters, work: Work, prepared: _Prepared) -> FilterProblem:

@@ -15,7 +15,7 @@ from experiments.page.panels import Curve, Mark, Panel
 from experiments.page.render import render_page
 from experiments.page.severity_rows import severity_rows
 from experiments.page.words import in_words, sentence
-from faults.diagnosis.circuit_runs import blocks_of
+from faults.diagnosis.blocks import blocks_of
 
 if TYPE_CHECKING:
     from estimation.finding import Finding

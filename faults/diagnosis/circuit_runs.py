@@ -1,29 +1,22 @@
 """Circuits run under a log's motor speed, and what is compared with the log: mean velocity and pressure over blocks.
 
-What is compared is coarse on purpose: the mean velocity and the mean pressure over blocks of 10 ms, whatever the log's
-sample rate, so that encoder, differentiation and pressure noise hardly count and the log's length alone sets the cost.
 Eight circuits run side by side in one kernel, so a Gauss-Newton step with all its derivatives costs one of them.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import lru_cache
 
 import numpy as np
 
 from estimation.arrays import IntArray
-from estimation.eha.explained import LEAKAGE_COURSE
-from estimation.log_checks.bridging import bridged
-from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from estimation.log_checks.sensor_check import PRESSURE
+from faults.diagnosis.blocks import Blocks
 from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters, circuit_values, longest_stroke
-from plant.eha.circuit_start import under_pressure
+from plant.eha.circuit_start import at_rest, under_pressure
 from plant.eha.model import EhaParameters
-from plant.eha.one_sided import as_wide, circuit_plant, run_circuits
+from plant.eha.one_sided import as_wide, circuit_groups, circuit_plant
 from plant.eha.simulate import CIRCUIT
-from plant.errors import LogError
-from plant.log.record import Record
 from plant.solvers.block_means import block_means
 from plant.solvers.steps import parameter_row
 
@@ -35,175 +28,13 @@ differs from seal to seal; held where it is wrong, it bends friction and leakage
 PRESLIDING_REACH = 3.0
 """Farthest that presliding displacement is taken from the rig's, as a logarithm [dimensionless]: 20 times."""
 
-BLOCK = 0.01
-"""Time over which velocity and pressure are averaged [s]."""
-
-SETTLING = 0.1
-"""Time at the start that does not count [s]: the circuit starts at rest, a log need not."""
-
-LONGEST = 30.0
-"""Longest stretch of a log that is simulated [s]."""
-
-RATE = 1e-3
-"""Sample time to which faster logs are averaged [s]."""
-
-LEAST_BEGUN = 0.1
-"""Share of a log's pressure, root mean square, from which what it begins with is more than noise [fraction]."""
-
 AT_STOP = 0.02
 """A log shows a stop if its piston turned this near to one, as a share of half the stroke [fraction]."""
 
 ALLOWED = {"tolerance": 1e-4, "drive_tolerance": 2e-3}
-"""Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_run`: far below what counts."""
+"""Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_groups`: far below what counts."""
 
 COLUMN = {field.name: i for i, field in enumerate(fields(CircuitParameters))}
-
-
-@dataclass(frozen=True, eq=False)
-class Blocks:
-    """A log as it is compared with a model.
-
-    Parameters
-    ----------
-    speed : ndarray, shape (samples,)
-        Motor speed [rad/s], whole.
-    sample_time : float
-        Time between its samples [s].
-    block : int
-        Samples in a block.
-    velocity : ndarray, shape (n,)
-        Mean velocity over each block [m/s]; NaN where unknown.
-    pressure : ndarray, shape (n,), or None
-        Mean differential pressure over each block [Pa], None where it is not logged.
-    noise : ndarray, shape (outputs,)
-        Standard deviation of what the sensors add to velocity [m/s] and pressure [Pa].
-    earlier : tuple of int or ndarray, shape (circuits,), and ndarray, shape (parameters,), or None
-        Another circuit that ran up to a sample, or up to one before each circuit, as a row of parameters; None if one
-        ran throughout.
-    course : ndarray, shape (samples,), or None
-        Leakage over what it is when the log ends [dimensionless]; None where it does not change.
-    stop : float or None
-        How far from where the log begins the piston ran into a stop [m]; None where only the rig knows of stops.
-    begun : tuple of float, or None
-        Differential pressure [Pa] and velocity [m/s] with which the log begins; None at rest, and where it is not told.
-    """
-
-    speed: Array
-    sample_time: float
-    block: int
-    velocity: Array
-    pressure: Array | None
-    noise: Array
-    earlier: tuple[int | IntArray, Array] | None = None
-    course: Array | None = None
-    stop: float | None = None
-    begun: tuple[float, float] | None = None
-
-    @property
-    def outputs(self) -> Array:
-        """What is measured, shape (n, outputs): velocity [m/s], and pressure [Pa] if there is one."""
-        return np.column_stack([self.velocity] if self.pressure is None else [self.velocity, self.pressure])
-
-    @property
-    def travel(self) -> float:
-        """How far the piston moves to and fro [m]."""
-        return float(np.ptp(np.cumsum(np.nan_to_num(self.velocity)))) * self.block * self.sample_time
-
-    @property
-    def reach(self) -> float:
-        """How far the piston goes from where the log begins [m], to either side."""
-        gone = np.cumsum(np.nan_to_num(self.velocity)) * self.block * self.sample_time
-        return float(np.max(np.abs(gone), initial=0.0))
-
-    @property
-    def first(self) -> int:
-        """First block that counts."""
-        return round(SETTLING / (self.block * self.sample_time))
-
-
-def blocks_of(record: Record) -> Blocks:
-    """Return a log in blocks.
-
-    Parameters
-    ----------
-    record : Record
-        A log with motor speed, and position or velocity.
-
-    Returns
-    -------
-    Blocks
-        Means over `BLOCK`, of `LONGEST` at most.
-
-    Raises
-    ------
-    LogError
-        If neither position nor velocity is logged, or the log is shorter than `SETTLING` and a few blocks.
-    """
-    pooled = max(1, round(RATE / record.sample_time))
-    record = record.slice(0, round(LONGEST / record.sample_time) + 1)
-    sample_time = pooled * record.sample_time
-    block = max(2, round(BLOCK / sample_time))
-    count = (len(record) // pooled - 1) // block
-    if count * block * sample_time < 2.0 * SETTLING or count < 8:
-        raise LogError(
-            f"a diagnosis needs a log of 8 blocks of {block * sample_time:g} s or more, got {record.duration:g} s"
-        )
-    whole = {name: _pooled(record[name], pooled)[: count * block + 1] for name in record if name in _NEEDED}
-    if "position_m" in whole and np.any(np.isfinite(whole["position_m"])):
-        velocity = np.diff(bridged(whole["position_m"])[::block]) / (block * sample_time)
-    elif "velocity_m_s" in whole and np.any(np.isfinite(whole["velocity_m_s"])):
-        velocity = _mean(whole["velocity_m_s"], block)
-    else:
-        raise LogError(f"velocity_m_s or position_m is needed; the log has {', '.join(record)}")
-    pressure = whole.get("differential_pressure_pa")
-    if pressure is not None:
-        pressure = _mean(pressure, block)
-        if not np.any(np.isfinite(pressure[round(SETTLING / (block * sample_time)) :])):
-            pressure = None  # a sensor that was out for all of the stretch
-            del whole["differential_pressure_pa"]
-    speed = bridged(whole["motor_speed_rad_s"])
-    noise, course, begun = _noise(whole, block, sample_time), whole.get(LEAKAGE_COURSE), _begun(whole, velocity)
-    return Blocks(speed, sample_time, block, velocity, pressure, noise, course=course, begun=begun)
-
-
-def _begun(whole: Mapping[str, Array], velocity: Array) -> tuple[float, float] | None:
-    """Return pressure and velocity at the start of a log that does not begin at rest."""
-    pressure = whole.get("differential_pressure_pa", np.zeros(1))
-    size = float(np.sqrt(np.nanmean(pressure**2)))
-    return (float(pressure[0]), float(np.nan_to_num(velocity[0]))) if abs(pressure[0]) > LEAST_BEGUN * size else None
-
-
-def _noise(whole: Mapping[str, Array], block: int, sample_time: float) -> Array:
-    """Return the white noise of the channels as it is left in the blocks."""
-    record, velocity, pressure = Record(sample_time, whole), "velocity_m_s", "differential_pressure_pa"
-    if "position_m" in whole:
-        noise = [(2.0 * position_variance(whole["position_m"])) ** 0.5 / (block * sample_time)]
-    else:
-        noise = [(measurement_variances(record, [velocity])[velocity] / block) ** 0.5]
-    if pressure in whole:
-        noise.append((measurement_variances(record, [pressure])[pressure] / block) ** 0.5)
-    return np.array(noise)
-
-
-_NEEDED = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa", LEAKAGE_COURSE)
-
-
-def _pooled(values: Array, pooled: int) -> Array:
-    return values if pooled == 1 else _mean(values, pooled, spare=0)
-
-
-def _mean(values: Array, block: int, spare: int = 1) -> Array:
-    """Return the means of blocks over the samples that are there; NaN where more than half are missing.
-
-    What a clipped sensor left out is not like what it kept: the mean of a small rest would lie off.
-    """
-    count = (len(values) - spare) // block
-    parts = values[: count * block].reshape(count, block)
-    there = np.isfinite(parts)
-    if np.all(there):
-        return parts.mean(axis=1)
-    seen = there.sum(axis=1)
-    return np.where(2 * seen >= block, np.where(there, parts, 0.0).sum(axis=1) / np.maximum(seen, 1), np.nan)
 
 
 def coordinates_of(p: EhaParameters, rated: float) -> Array:
@@ -291,9 +122,13 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
         rows = _after(until, before, rows[0], len(blocks.speed))
     if blocks.course is not None:
         rows = rows * _drift(blocks.course, rows.shape[-1])[:, None, :]
-    starts = np.array([_start(blocks, row) for row in rows[0]])
-    runs = run_circuits(starts, blocks.speed, rows, blocks.sample_time, **ALLOWED)
-    return _outputs(blocks, np.moveaxis(runs, 0, 2), rows)  # as they lie in memory
+    groups = circuit_groups(_starts(blocks, rows[0]), blocks.speed, rows, blocks.sample_time, **ALLOWED)
+    found, first = list[Array](), 0
+    for states in groups:
+        last = first + states.shape[2]
+        found.append(_outputs(blocks, states, rows[:, first:last]))
+        first = last
+    return found[0] if len(found) == 1 else np.concatenate(found)
 
 
 def _after(until: int | IntArray, before: Array, rows: Array, samples: int) -> Array:
@@ -307,10 +142,12 @@ def _after(until: int | IntArray, before: Array, rows: Array, samples: int) -> A
     return found
 
 
-def _start(blocks: Blocks, row: Array) -> Array:
-    """Return the state in which a circuit begins: at rest, or as the log does."""
-    begun = None if blocks.begun is None else under_pressure(*blocks.begun, circuit_values(row))
-    return CIRCUIT.start(row) if begun is None else np.array(begun, dtype=np.float64)
+def _starts(blocks: Blocks, rows: Array) -> Array:
+    """Return the states in which circuits begin, shape (m, states): at rest, or as the log does."""
+    p = circuit_values(rows)
+    begun = None if blocks.begun is None else under_pressure(*blocks.begun, p)
+    states = at_rest(p) if begun is None else begun
+    return np.stack(np.broadcast_arrays(*states, rows[:, 0])[:-1], axis=-1, dtype=np.float64)
 
 
 def _drift(course: Array, width: int) -> Array:

@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.circuit_runs import COORDINATES, Blocks, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.blocks import Blocks, root_mean_square
+from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
 from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of, longest_stroke
 from plant.eha.model import EhaParameters
@@ -26,6 +28,9 @@ FARTHEST = 0.7
 
 GAINED = 0.5
 """Gain in log-likelihood below which the search ends [dimensionless]."""
+
+PROMISING = 2e-3
+"""Gain that a step must promise to be tried [dimensionless]: less moves nothing by a fifteenth of its deviation."""
 
 LEAST_SCALE = 1e-3
 """Share of an output's root mean square that a residual counts as in any case [dimensionless]: no model is exact."""
@@ -159,7 +164,7 @@ def scales_of(blocks: Blocks, fitted: Array) -> Array:
         Residuals [m/s, Pa], not below the sensors' noise and `LEAST_SCALE`.
     """
     left = blocks.outputs[blocks.first :] - fitted[blocks.first :]
-    return np.maximum(np.sqrt(np.nanmean(left**2, axis=0)), least_scales(blocks))
+    return np.maximum(root_mean_square(left), least_scales(blocks))
 
 
 def least_scales(blocks: Blocks) -> Array:
@@ -175,8 +180,23 @@ def least_scales(blocks: Blocks) -> Array:
     ndarray, shape (outputs,)
         The sensors' noise, and not below `LEAST_SCALE` of the signal [m/s, Pa].
     """
-    size = np.sqrt(np.nanmean(blocks.outputs[blocks.first :] ** 2, axis=0))
-    return np.maximum(blocks.noise, LEAST_SCALE * size)
+    return np.maximum(blocks.noise, LEAST_SCALE * blocks.sizes)
+
+
+def least_misfit(blocks: Blocks) -> float:
+    """Return what `misfit` is at the least: of a model that leaves the sensors' noise alone.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+
+    Returns
+    -------
+    float
+        Up to a constant of the log [dimensionless].
+    """
+    return float(blocks.counts @ np.log(least_scales(blocks)))
 
 
 def misfit(blocks: Blocks, fitted: Array) -> float:
@@ -196,12 +216,11 @@ def misfit(blocks: Blocks, fitted: Array) -> float:
     """
     if not np.all(np.isfinite(fitted)):
         return float("inf")
-    counts = np.sum(np.isfinite(blocks.outputs[blocks.first :]), axis=0)
-    return float(counts @ np.log(scales_of(blocks, fitted)))
+    return float(blocks.counts @ np.log(scales_of(blocks, fitted)))
 
 
 def fit_freely(
-    blocks: Blocks, actuator: Actuator, condition: str, start: Array | None = None, gained: float = GAINED
+    blocks: Blocks, actuator: Actuator, condition: str, start: Array | PointFit | None = None, gained: float = GAINED
 ) -> PointFit:
     """Fit the circuit to a log with next to no prior.
 
@@ -213,8 +232,9 @@ def fit_freely(
         The healthy actuator.
     condition : str
         The nearest condition, about which the weak prior lies.
-    start : ndarray, shape (7,), optional
-        Coordinates where the search begins [dimensionless]; those of the condition if not given.
+    start : ndarray of shape (7,), or PointFit, optional
+        Coordinates where the search begins [dimensionless], or a fit about another condition from which it goes on;
+        those of the condition if not given.
     gained : float
         Gain in log-likelihood below which the search ends [dimensionless].
 
@@ -224,23 +244,62 @@ def fit_freely(
         The best circuit.
     """
     centre = actuator.conditions[list(CONDITIONS).index(condition)]
-    pull = np.asarray(LASTING * np.linalg.inv(WEAK), dtype=np.float64)
-    best, step, reach = _at(blocks, actuator, centre, centre if start is None else start, pull), centre, 0.0
+    pull = _pull()
+    if isinstance(start, PointFit):
+        best = about(blocks, actuator, condition, start)
+    else:
+        best = _at(blocks, actuator, centre, centre if start is None else start, pull)
+    step, promised, reach = centre, 0.0, 0.0
+    least = least_misfit(blocks)
     for _ in range(ROUNDS):  # a step that gains nothing is taken a third as long
+        if best.cost - least < PROMISING:  # the sensors' noise is all that is left
+            break
         if reach == 0.0:
             step, reach = _step(blocks, best, centre, pull), 1.0
-            if not np.all(np.isfinite(step)):  # a circuit of no numbers is run for ever
+            promised = _promised(blocks, best, centre, pull, step)
+            # a circuit of no numbers is run for ever
+            if promised < PROMISING or not np.all(np.isfinite(step)):
                 break
         there = _at(blocks, actuator, centre, best.coordinates + reach * step, pull)
-        if there.cost < best.cost:
-            gain, best, reach = best.cost - there.cost, there, 0.0
+        gain = best.cost - there.cost
+        if gain > 0.0:
+            best, reach = there, 0.0
             if gain < gained:
                 break
-        else:
+        else:  # of the parabola through both costs, with the slope here
+            curvature = (2.0 * promised * reach - gain) / reach**2
             reach *= 0.3
-            if reach < 0.02:
+            if reach < 0.02 or promised**2 / curvature < PROMISING:
                 break
     return best
+
+
+def about(blocks: Blocks, actuator: Actuator, condition: str, fit: PointFit) -> PointFit:
+    """Return a fit as it counts about another condition.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    actuator : Actuator
+        The healthy actuator.
+    condition : str
+        The condition about which the weak prior lies.
+    fit : PointFit
+        The fit.
+
+    Returns
+    -------
+    PointFit
+        The same circuit, with its cost there.
+    """
+    off = fit.coordinates - actuator.conditions[list(CONDITIONS).index(condition)]
+    return replace(fit, cost=misfit(blocks, fit.fitted) + 0.5 * float(off @ _pull() @ off))
+
+
+@cache
+def _pull() -> Array:
+    return np.asarray(LASTING * np.linalg.inv(WEAK), dtype=np.float64)
 
 
 def _at(blocks: Blocks, actuator: Actuator, centre: Array, point: Array, pull: Array) -> PointFit:
@@ -248,8 +307,7 @@ def _at(blocks: Blocks, actuator: Actuator, centre: Array, point: Array, pull: A
     runs = predicted(blocks, parameter_rows(around, actuator.circuit, actuator.rated))
     scales = scales_of(blocks, runs[0])
     slopes = (runs[1:] - runs[0]) / STEP
-    seen = np.isfinite(blocks.outputs[blocks.first :])
-    weighted = np.where(seen, slopes[:, blocks.first :] / scales, 0.0).reshape(len(point), -1)
+    weighted = np.where(blocks.seen, slopes[:, blocks.first :] / scales, 0.0).reshape(len(point), -1)
     information = weighted @ weighted.T
     off = point - centre
     cost = misfit(blocks, runs[0]) + 0.5 * float(off @ pull @ off)
@@ -257,7 +315,18 @@ def _at(blocks: Blocks, actuator: Actuator, centre: Array, point: Array, pull: A
 
 
 def _step(blocks: Blocks, fit: PointFit, centre: Array, pull: Array) -> Array:
-    left = np.nan_to_num((blocks.outputs - fit.fitted)[blocks.first :]) / fit.scales**2
-    slope = np.einsum("ink,nk->i", fit.slopes[:, blocks.first :], left) - pull @ (fit.coordinates - centre)
-    step = np.linalg.solve(fit.information + pull, slope)
+    """Return a Gauss-Newton step, no longer than `FARTHEST`."""
+    step: Array = np.linalg.solve(fit.information + pull, _uphill(blocks, fit, centre, pull))
     return step * min(1.0, FARTHEST / float(np.max(np.abs(step))))
+
+
+def _promised(blocks: Blocks, fit: PointFit, centre: Array, pull: Array, step: Array) -> float:
+    """Return the gain in log-posterior that a step promises."""
+    return float(step @ (_uphill(blocks, fit, centre, pull) - 0.5 * (fit.information + pull) @ step))
+
+
+def _uphill(blocks: Blocks, fit: PointFit, centre: Array, pull: Array) -> Array:
+    """Return the slope of the log-posterior, shape (7,)."""
+    left = np.nan_to_num((blocks.outputs - fit.fitted)[blocks.first :]) / fit.scales**2
+    gained: Array = np.einsum("ink,nk->i", fit.slopes[:, blocks.first :], left)
+    return gained - pull @ (fit.coordinates - centre)

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faults.conditions import CONDITIONS
-from faults.diagnosis.circuit_runs import COORDINATES, Blocks
+from faults.diagnosis.blocks import Blocks
+from faults.diagnosis.circuit_runs import COORDINATES
 from faults.diagnosis.class_fit import (
     GAINED,
     LASTING,
@@ -20,6 +21,7 @@ from faults.diagnosis.class_fit import (
     WITHIN,
     Actuator,
     PointFit,
+    about,
     fit_freely,
     least_scales,
     misfit,
@@ -38,6 +40,10 @@ YIELDING = 5.0
 STRUCTURAL = 100.0
 """By how much a residual that no sensor makes widens what is believed [dimensionless], in variance: it lasts, and it is
 not what the derivatives say that it is."""
+
+NOISE_ALONE = 1.1
+"""Residuals over the sensors' noise, root mean square, up to which nothing else is left [dimensionless]: the noise is
+known to a twentieth. Searches from other conditions end at the same circuit then, or at one that explains much less."""
 
 AVERAGED = 10
 """Blocks over which residuals are averaged to see what lasts of them [dimensionless]: a tenth of a second."""
@@ -125,7 +131,12 @@ def fit_classes(
     order = np.argsort(nominal)[: STARTS if start is None else 1]
     near = [int(i) for i in order if nominal[i] <= nominal[order[0]] + len(blocks.velocity)]
     gained = GAINED if start is None else ROUGHLY_GAINED
-    fits = [fit_freely(blocks, actuator, list(CONDITIONS)[i], start, gained) for i in near or [int(order[0])]]
+    fits: list[PointFit] = []
+    for name in [list(CONDITIONS)[place] for place in near or [int(order[0])]]:
+        if not fits or not explains(blocks, fits[-1]):
+            fits.append(fit_freely(blocks, actuator, name, start, gained))
+        elif about(blocks, actuator, name, fits[-1]).cost < fits[-1].cost:  # the same circuit is nearer to this one
+            fits.append(fit_freely(blocks, actuator, name, fits[-1], gained))
     stuck = is_stuck(blocks, actuator)
     known = [believed_information(fit, blocks, stuck=stuck) for fit in fits]
     scores = [
@@ -144,6 +155,24 @@ def fit_classes(
         spread = doubt_of(best, seldom, blocks, actuator.conditions, held, seen) + between_fits(fits, best, blocks)
     errors = np.array([scales_of(blocks, run) for run in runs])
     return ClassFits(best, known[least], nominal, errors, held, spread, lasting)
+
+
+def explains(blocks: Blocks, fit: PointFit) -> bool:
+    """Return whether a circuit leaves the sensors' noise alone of a log.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    fit : PointFit
+        The circuit fitted to it.
+
+    Returns
+    -------
+    bool
+        Whether no output's residuals are more than `NOISE_ALONE` times the noise.
+    """
+    return bool(np.all(fit.scales <= NOISE_ALONE * least_scales(blocks)))
 
 
 def _scaled(fit: PointFit, centre: Array) -> PointFit:

@@ -103,7 +103,7 @@ class EhaEvidence:
     transfer_functions: Scores | None = None
 
 
-def diagnose_log(record: Record, rig: Rig) -> Finding:
+def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEstimate] | None = None) -> Finding:
     """Diagnose a log: bulk modulus, its gate, the condition, and how bad it is.
 
     Parameters
@@ -112,6 +112,8 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
         Motor speed, and position or velocity; differential pressure where it is logged.
     rig : Rig
         The healthy actuator.
+    seen : tuple of CleanLog and BulkModulusEstimate, optional
+        What `estimation.eha.estimate.estimated` gave of this log, with all automatic; found here if not given.
 
     Returns
     -------
@@ -124,9 +126,9 @@ def diagnose_log(record: Record, rig: Rig) -> Finding:
     LogError
         If the log has neither position nor velocity, or cannot be estimated.
     """
-    log = clean_log(record, rig.parameters)
+    log = clean_log(record, rig.parameters) if seen is None else seen[0]
     plain = _Plain(log, rig.parameters, begun(partial(_of_clean, log, rig.parameters)))
-    estimate = estimated(log, rig, EstimateOptions())[1]
+    estimate = estimated(log, rig, EstimateOptions())[1] if seen is None else seen[1]
     found, strange = finding_of(log, estimate, rig), explained(estimate, rig.parameters)
     outside = tuple(note for note in strange if note.code in OUTSIDE)
     if estimate.explanation is not None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from faults.diagnosis.circuit_runs import Blocks
+from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.class_fit import LASTING, Actuator, misfit
 from faults.diagnosis.class_regions import ClassFits, fit_classes
 

@@ -13,7 +13,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from faults.diagnosis.circuit_runs import COLUMN, Blocks, parameter_rows, predicted
+from faults.diagnosis.blocks import Blocks
+from faults.diagnosis.circuit_runs import COLUMN, parameter_rows, predicted
 from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, misfit
 from plant.arrays import Array
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from estimation.finding import Change
 from faults.conditions import CONDITIONS
-from faults.diagnosis.circuit_runs import LONGEST, Blocks, blocks_of, parameter_rows, predicted
+from faults.diagnosis.blocks import LONGEST, Blocks, blocks_of
+from faults.diagnosis.circuit_runs import parameter_rows, predicted
 from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, least_scales, misfit, nominal_runs
 from faults.diagnosis.class_regions import ClassFits, fit_classes, lasting_misfit
 from faults.diagnosis.end_stop import stopped

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faults.conditions import CONDITIONS
-from faults.diagnosis.circuit_runs import COORDINATES, Blocks
+from faults.diagnosis.blocks import Blocks
+from faults.diagnosis.circuit_runs import COORDINATES
 from faults.diagnosis.class_fit import Actuator, misfit, nominal_runs
 from faults.diagnosis.class_regions import ClassFits, fit_classes, is_stuck
 from faults.notes import AgainstCode, ClassCode

@@ -3,6 +3,7 @@
 Its parameters are the circuit's and go on with four more, so a row of one tells by its length which it is.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from typing import cast
 
@@ -15,7 +16,7 @@ from plant.eha.circuit import CircuitState, circuit_derivative, circuit_pressure
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.simulate import CIRCUIT, Plant
 from plant.errors import RigError
-from plant.solvers.adaptive import ErrorControl, controlled_run
+from plant.solvers.adaptive import ErrorControl, controlled_groups
 from plant.solvers.steps import parameter_names, ros2_step
 from plant.units import si
 
@@ -112,10 +113,10 @@ def as_wide(row: Array, width: int) -> Array:
     return np.concatenate([row, np.zeros(width - len(row))])
 
 
-def run_circuits(
+def circuit_groups(
     starts: Array, speed: Array, rows: Array, sample_time: float, *, tolerance: float, drive_tolerance: float
-) -> Array:
-    """Run circuits of one kind side by side in steps of controlled error.
+) -> Iterator[Array]:
+    """Run circuits of one kind side by side in steps of controlled error, some at a time.
 
     Parameters
     ----------
@@ -132,10 +133,10 @@ def run_circuits(
 
     Returns
     -------
-    ndarray, shape (runs, n, states)
-        States at the samples.
+    iterator of ndarray, shape (n, states, some runs)
+        States at the samples, see `plant.solvers.adaptive.controlled_groups`.
     """
     plant = circuit_plant(rows.shape[-1])
     control, whose = cast("ErrorControl", plant.control), plant.parameter_class
     allowed = {"tolerance": tolerance, "drive_tolerance": drive_tolerance}
-    return controlled_run(plant.name, control, starts, speed, rows, sample_time, whose, **allowed)
+    return controlled_groups(plant.name, control, starts, speed, rows, sample_time, whose, **allowed)

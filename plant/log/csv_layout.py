@@ -12,6 +12,7 @@ from pathlib import Path
 from plant.errors import LogError
 from plant.log.cells import MISSING
 from plant.log.headings import Heading, is_unit, unit_or_none
+from plant.log.layouts_seen import remember, remembered
 from plant.log.packed import opened
 from plant.log.stamps import is_stamp
 
@@ -88,12 +89,16 @@ def layout_of(path: Path) -> Layout:
     """
     with opened(path) as file:
         start = file.read(LOOKED_AT)
+    if (known := remembered(start, LINES)) is not None:
+        return known
     encoding = _encoding(start, str(path))
     text = start.decode(encoding, errors="replace").removeprefix("\ufeff")
     lines = [line.rstrip("\n") for line in islice(io.StringIO(text, newline=None), LINES)]
     if len(start) == LOOKED_AT and len(lines) < LINES:
         lines = lines[:-1] or lines  # the last one is cut
-    return layout_of_lines(lines, encoding, str(path))
+    layout = layout_of_lines(lines, encoding, str(path))
+    remember(start, LINES, layout)
+    return layout
 
 
 def _encoding(start: bytes, source: str) -> str:

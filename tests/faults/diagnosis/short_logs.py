@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.circuit_runs import Blocks, blocks_of
+from faults.diagnosis.blocks import Blocks, blocks_of
 from faults.diagnosis.class_fit import (
     Actuator,
     PointFit,

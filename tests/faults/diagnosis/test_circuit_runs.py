@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.circuit_runs import BLOCK, Blocks, blocks_of, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.blocks import BLOCK, Blocks, blocks_of
+from faults.diagnosis.circuit_runs import coordinates_of, parameter_rows, predicted
 from faults.diagnosis.class_fit import Actuator
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.model import EhaParameters

@@ -9,7 +9,8 @@ import pytest
 
 from faults.conditions import CONDITIONS
 from faults.diagnosis import class_fit
-from faults.diagnosis.circuit_runs import Blocks, parameter_rows, predicted
+from faults.diagnosis.blocks import Blocks
+from faults.diagnosis.circuit_runs import parameter_rows, predicted
 from faults.diagnosis.class_fit import FARTHEST, LASTING, WEAK, Actuator, fit_freely, misfit
 from plant.arrays import Array
 from plant.eha.model import EhaParameters

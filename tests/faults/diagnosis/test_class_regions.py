@@ -7,7 +7,8 @@ import pytest
 
 from faults.conditions import CONDITIONS
 from faults.diagnosis import class_regions
-from faults.diagnosis.circuit_runs import COORDINATES, Blocks, parameter_rows, predicted
+from faults.diagnosis.blocks import Blocks
+from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.class_fit import Actuator, PointFit
 from faults.diagnosis.class_regions import (
     ALIKE,

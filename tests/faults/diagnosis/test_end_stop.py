@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS
-from faults.diagnosis.circuit_runs import COORDINATES, Blocks, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.blocks import Blocks
+from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.diagnose import diagnose_log

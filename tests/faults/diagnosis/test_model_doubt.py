@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from faults.diagnosis.circuit_runs import COORDINATES, Blocks, parameter_rows, predicted
+from faults.diagnosis.blocks import Blocks
+from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, misfit
 from faults.diagnosis.model_doubt import LOOKS, SELDOM_KNOWN, between_fits, doubt_of, seldom_known_slopes
 from plant.eha.model import EhaParameters

@@ -8,8 +8,9 @@ import pytest
 
 from estimation.finding import Quantity
 from faults.conditions import CONDITIONS
+from faults.diagnosis.blocks import Blocks, blocks_of
 from faults.diagnosis.calibration import shipped_calibration
-from faults.diagnosis.circuit_runs import COORDINATES, Blocks, blocks_of, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.class_fit import (
     WEAK,
     WITHIN,

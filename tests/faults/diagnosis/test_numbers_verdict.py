@@ -11,8 +11,9 @@ import pytest
 from estimation.eha.result import BulkModulusEstimate
 from faults.conditions import severity
 from faults.diagnosis.advice import advice_for, speeds_held
+from faults.diagnosis.blocks import Blocks, blocks_of
 from faults.diagnosis.calibration import shipped_calibration
-from faults.diagnosis.circuit_runs import Blocks, blocks_of, coordinates_of
+from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.class_regions import (
     fit_classes,
     region_scores,

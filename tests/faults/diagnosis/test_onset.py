@@ -12,7 +12,7 @@ from benchmarks.watching import CircuitStream
 from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import onset
-from faults.diagnosis.circuit_runs import Blocks
+from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.class_fit import Actuator, PointFit
 from faults.diagnosis.diagnose import Diagnosis, diagnose_clean
 from faults.diagnosis.onset import MOST_ALARMS, LastPart, last_part, likeliest_split, part_of

@@ -1,0 +1,215 @@
+"""`blocks_of(record) -> Blocks`: a log as it is compared with circuits: mean velocity and pressure over blocks.
+
+What is compared is coarse on purpose: the mean velocity and the mean pressure over blocks of 10 ms, whatever the log's
+sample rate, so that encoder, differentiation and pressure noise hardly count and the log's length alone sets the cost.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.arrays import IntArray
+from estimation.eha.explained import LEAKAGE_COURSE
+from estimation.log_checks.bridging import bridged
+from estimation.log_checks.measurement_noise import measurement_variances, position_variance
+from plant.arrays import Array
+from plant.errors import LogError
+from plant.log.record import Record
+
+BLOCK = 0.01
+"""Time over which velocity and pressure are averaged [s]."""
+
+SETTLING = 0.1
+"""Time at the start that does not count [s]: the circuit starts at rest, a log need not."""
+
+LONGEST = 30.0
+"""Longest stretch of a log that is simulated [s]."""
+
+RATE = 1e-3
+"""Sample time to which faster logs are averaged [s]."""
+
+LEAST_BEGUN = 0.1
+"""Share of a log's pressure, root mean square, from which what it begins with is more than noise [fraction]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """A log as it is compared with a model.
+
+    Parameters
+    ----------
+    speed : ndarray, shape (samples,)
+        Motor speed [rad/s], whole.
+    sample_time : float
+        Time between its samples [s].
+    block : int
+        Samples in a block.
+    velocity : ndarray, shape (n,)
+        Mean velocity over each block [m/s]; NaN where unknown.
+    pressure : ndarray, shape (n,), or None
+        Mean differential pressure over each block [Pa], None where it is not logged.
+    noise : ndarray, shape (outputs,)
+        Standard deviation of what the sensors add to velocity [m/s] and pressure [Pa].
+    earlier : tuple of int or ndarray, shape (circuits,), and ndarray, shape (parameters,), or None
+        Another circuit that ran up to a sample, or up to one before each circuit, as a row of parameters; None if one
+        ran throughout.
+    course : ndarray, shape (samples,), or None
+        Leakage over what it is when the log ends [dimensionless]; None where it does not change.
+    stop : float or None
+        How far from where the log begins the piston ran into a stop [m]; None where only the rig knows of stops.
+    begun : tuple of float, or None
+        Differential pressure [Pa] and velocity [m/s] with which the log begins; None at rest, and where it is not told.
+    """
+
+    speed: Array
+    sample_time: float
+    block: int
+    velocity: Array
+    pressure: Array | None
+    noise: Array
+    earlier: tuple[int | IntArray, Array] | None = None
+    course: Array | None = None
+    stop: float | None = None
+    begun: tuple[float, float] | None = None
+
+    @cached_property
+    def outputs(self) -> Array:
+        """What is measured, shape (n, outputs): velocity [m/s], and pressure [Pa] if there is one."""
+        return np.column_stack([self.velocity] if self.pressure is None else [self.velocity, self.pressure])
+
+    @cached_property
+    def seen(self) -> NDArray[np.bool_]:
+        """Which of the outputs are there, of the blocks that count, shape (n - first, outputs)."""
+        return np.isfinite(self.outputs[self.first :])
+
+    @cached_property
+    def counts(self) -> NDArray[np.intp]:
+        """How many they are, shape (outputs,)."""
+        return np.sum(self.seen, axis=0)
+
+    @cached_property
+    def sizes(self) -> Array:
+        """Their root mean squares, shape (outputs,) [m/s, Pa]."""
+        return root_mean_square(self.outputs[self.first :])
+
+    @property
+    def travel(self) -> float:
+        """How far the piston moves to and fro [m]."""
+        return float(np.ptp(np.cumsum(np.nan_to_num(self.velocity)))) * self.block * self.sample_time
+
+    @cached_property
+    def reach(self) -> float:
+        """How far the piston goes from where the log begins [m], to either side."""
+        gone = np.cumsum(np.nan_to_num(self.velocity)) * self.block * self.sample_time
+        return float(np.max(np.abs(gone), initial=0.0))
+
+    @property
+    def first(self) -> int:
+        """First block that counts."""
+        return round(SETTLING / (self.block * self.sample_time))
+
+
+def root_mean_square(values: Array) -> Array:
+    """Return the root mean square of each column over the samples that are there.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, columns)
+        Any unit; NaN where missing.
+
+    Returns
+    -------
+    ndarray, shape (columns,)
+        In the same units; NaN where nothing is there.
+    """
+    squares = values**2
+    mean = np.mean(squares, axis=0)
+    return np.sqrt(mean if np.all(np.isfinite(mean)) else np.nanmean(squares, axis=0))
+
+
+def blocks_of(record: Record) -> Blocks:
+    """Return a log in blocks.
+
+    Parameters
+    ----------
+    record : Record
+        A log with motor speed, and position or velocity.
+
+    Returns
+    -------
+    Blocks
+        Means over `BLOCK`, of `LONGEST` at most.
+
+    Raises
+    ------
+    LogError
+        If neither position nor velocity is logged, or the log is shorter than `SETTLING` and a few blocks.
+    """
+    pooled = max(1, round(RATE / record.sample_time))
+    record = record.slice(0, round(LONGEST / record.sample_time) + 1)
+    sample_time = pooled * record.sample_time
+    block = max(2, round(BLOCK / sample_time))
+    count = (len(record) // pooled - 1) // block
+    if count * block * sample_time < 2.0 * SETTLING or count < 8:
+        raise LogError(
+            f"a diagnosis needs a log of 8 blocks of {block * sample_time:g} s or more, got {record.duration:g} s"
+        )
+    whole = {name: _pooled(record[name], pooled)[: count * block + 1] for name in record if name in _NEEDED}
+    if "position_m" in whole and np.any(np.isfinite(whole["position_m"])):
+        velocity = np.diff(bridged(whole["position_m"])[::block]) / (block * sample_time)
+    elif "velocity_m_s" in whole and np.any(np.isfinite(whole["velocity_m_s"])):
+        velocity = _mean(whole["velocity_m_s"], block)
+    else:
+        raise LogError(f"velocity_m_s or position_m is needed; the log has {', '.join(record)}")
+    pressure = whole.get("differential_pressure_pa")
+    if pressure is not None:
+        pressure = _mean(pressure, block)
+        if not np.any(np.isfinite(pressure[round(SETTLING / (block * sample_time)) :])):
+            pressure = None  # a sensor that was out for all of the stretch
+            del whole["differential_pressure_pa"]
+    speed = bridged(whole["motor_speed_rad_s"])
+    noise, course, begun = _noise(whole, block, sample_time), whole.get(LEAKAGE_COURSE), _begun(whole, velocity)
+    return Blocks(speed, sample_time, block, velocity, pressure, noise, course=course, begun=begun)
+
+
+def _begun(whole: Mapping[str, Array], velocity: Array) -> tuple[float, float] | None:
+    """Return pressure and velocity at the start of a log that does not begin at rest."""
+    pressure = whole.get("differential_pressure_pa", np.zeros(1))
+    size = float(np.sqrt(np.nanmean(pressure**2)))
+    return (float(pressure[0]), float(np.nan_to_num(velocity[0]))) if abs(pressure[0]) > LEAST_BEGUN * size else None
+
+
+def _noise(whole: Mapping[str, Array], block: int, sample_time: float) -> Array:
+    """Return the white noise of the channels as it is left in the blocks."""
+    record, velocity, pressure = Record(sample_time, whole), "velocity_m_s", "differential_pressure_pa"
+    if "position_m" in whole:
+        noise = [(2.0 * position_variance(whole["position_m"])) ** 0.5 / (block * sample_time)]
+    else:
+        noise = [(measurement_variances(record, [velocity])[velocity] / block) ** 0.5]
+    if pressure in whole:
+        noise.append((measurement_variances(record, [pressure])[pressure] / block) ** 0.5)
+    return np.array(noise)
+
+
+_NEEDED = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa", LEAKAGE_COURSE)
+
+
+def _pooled(values: Array, pooled: int) -> Array:
+    return values if pooled == 1 else _mean(values, pooled, spare=0)
+
+
+def _mean(values: Array, block: int, spare: int = 1) -> Array:
+    """Return the means of blocks over the samples that are there; NaN where more than half are missing.
+
+    What a clipped sensor left out is not like what it kept: the mean of a small rest would lie off.
+    """
+    count = (len(values) - spare) // block
+    parts = values[: count * block].reshape(count, block)
+    there = np.isfinite(parts)
+    if np.all(there):
+        return parts.mean(axis=1)
+    seen = there.sum(axis=1)
+    return np.where(2 * seen >= block, np.where(there, parts, 0.0).sum(axis=1) / np.maximum(seen, 1), np.nan)
