@@ -79,6 +79,7 @@ def widened(
         log,
         drives=np.column_stack([log.drives, np.arange(samples) / samples, rate]),
         drive_std=(*log.drive_std, 0.0, 0.0),
+        released={},
         parameters=parameter_row(
             WideFlowParameters(
                 **known,

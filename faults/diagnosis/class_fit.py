@@ -328,5 +328,5 @@ def _promised(blocks: Blocks, fit: PointFit, centre: Array, pull: Array, step: A
 def _uphill(blocks: Blocks, fit: PointFit, centre: Array, pull: Array) -> Array:
     """Return the slope of the log-posterior, shape (7,)."""
     left = np.nan_to_num((blocks.outputs - fit.fitted)[blocks.first :]) / fit.scales**2
-    gained: Array = np.einsum("ink,nk->i", fit.slopes[:, blocks.first :], left)
-    return gained - pull @ (fit.coordinates - centre)
+    gained = np.einsum("ink,nk->i", fit.slopes[:, blocks.first :], left) - pull @ (fit.coordinates - centre)
+    return np.asarray(gained, dtype=np.float64)
