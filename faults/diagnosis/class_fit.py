@@ -316,7 +316,7 @@ def _at(blocks: Blocks, actuator: Actuator, centre: Array, point: Array, pull: A
 
 def _step(blocks: Blocks, fit: PointFit, centre: Array, pull: Array) -> Array:
     """Return a Gauss-Newton step, no longer than `FARTHEST`."""
-    step = np.linalg.solve(fit.information + pull, _uphill(blocks, fit, centre, pull)).astype(np.float64)
+    step = np.asarray(np.linalg.solve(fit.information + pull, _uphill(blocks, fit, centre, pull)), dtype=np.float64)
     return step * min(1.0, FARTHEST / float(np.max(np.abs(step))))
 
 
