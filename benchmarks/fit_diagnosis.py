@@ -44,6 +44,9 @@ RIDGE = 1e-3
 HELD, HELD_ALIKE = 0.96, 0.95
 """Shares of all training logs, and of those of the first population, whose interval shall hold the truth."""
 
+FAR, TWICE = 0.995, 2.0
+"""Share of all training logs whose error shall be within so many half-widths: tails are longer than a Gaussian's."""
+
 POPULATIONS = ((0.1, True), (0.2, True), (0.1, False))
 """Spread, and whether the circuits are of the kind that is fitted: weights see the first two, widths all three; both
 see the open benchmark's logs, as many as one population has."""
@@ -75,6 +78,7 @@ def main(arguments: list[str]) -> int:
         "spread, and whether the circuit is of the kind that is fitted": [list(one) for one in POPULATIONS],
         "ridge": RIDGE,
         "held of all, of the first": [HELD, HELD_ALIKE],
+        "share of all within so many half-widths": [FAR, TWICE],
     }
     options.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     return 0
@@ -88,9 +92,14 @@ def _only_widths(seeds: int, out: Path) -> int:
         _add_ratios(ratios, last_part(log.record, actuator).fits, log.parameters, actuator)
     found = json.loads(out.read_text(encoding="utf-8"))
     found["with_pressure"]["widths"] = _widths(ratios)
-    found["provenance"]["seeds of the widths with pressure"] = seeds
+    found["provenance"] |= {
+        "seeds of the widths with pressure": seeds,
+        "share of all within so many half-widths with pressure": [FAR, TWICE],
+    }
     out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     print(found["with_pressure"]["widths"])
+    for name, values in ratios.items():
+        print(name, np.quantile(values, (0.5, 0.9, HELD, 0.98, FAR, 1.0)).round(2))
     return 0
 
 
@@ -167,7 +176,8 @@ def open_logs(count: int) -> Iterator[OpenLog]:
 def fitted_width(ratios: Sequence[float]) -> float:
     """Return by what an interval is stretched to hold its shares; the populations follow on each other, alike long."""
     first = ratios[: len(ratios) // (len(POPULATIONS) + 1)]
-    return max(float(np.quantile(ratios, HELD)), float(np.quantile(first, HELD_ALIKE)))
+    far = float(np.quantile(ratios, FAR)) / TWICE
+    return max(float(np.quantile(ratios, HELD)), float(np.quantile(first, HELD_ALIKE)), far)
 
 
 def fitted_weights(odds: Array, truths: NDArray[np.int64]) -> Array:
