@@ -36,7 +36,7 @@ _SHARES: Mapping[str, float] = MappingProxyType({"pump_case_leakage": 1.0, "pump
 NUDGE = 0.05
 """Step of the finite differences in logarithms and shares [dimensionless]."""
 
-LOOKS = 10.0
+LOOKS = 5.0
 """Independent looks that a log gives at a wrong model's error, however long it is [dimensionless]."""
 
 
