@@ -150,6 +150,9 @@ class RigCode(Code):
         "drift was subtracted"
     )
     ENCODER_ZERO = "position_m reads {zero_mm:.1f} ± {half_width_mm:.1f} mm at mid-stroke; it was shifted to zero there"
+    POSITION_PLAY = (
+        "position_m follows the piston with a play (backlash) of about {play_um:.1g} um; the play was taken up"
+    )
     AREA_TO_DISPLACEMENT = (
         "the ratio of pump displacement to piston area is {percent:.2f} ± {half_width:.2f} % of that in the rig file: "
         "one of the two is wrong, and the log does not tell which"

@@ -7,7 +7,8 @@ import numpy as np
 
 from estimation.finding import NORMAL_95
 from estimation.fits.explain import Explanation
-from estimation.log_checks.bridging import POSITION
+from estimation.fits.play import side_of_play
+from estimation.log_checks.bridging import POSITION, bridged
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.sensor_check import PRESSURE
 from estimation.models.wide_flow import GROWTH, grown_leakage
@@ -121,6 +122,10 @@ def _zero(found: Explanation, _: EhaParameters) -> Note:
     return RigCode.ENCODER_ZERO.note(zero_mm=1e3 * value, half_width_mm=1e3 * _half_width(found, "position_zero"))
 
 
+def _play(found: Explanation, _: EhaParameters) -> Note:
+    return RigCode.POSITION_PLAY.note(play_um=1e6 * found.values["position_play"][0])
+
+
 def _delivery(found: Explanation, p: EhaParameters) -> Note:
     value = found.values["pump_displacement"][0]
     share, half_width = value / p.pump_displacement, _half_width(found, "pump_displacement") / p.pump_displacement
@@ -205,6 +210,7 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "pressure_offset": _offset,
     "pressure_drift": _drift,
     "encoder_zero": _zero,
+    "position_play": _play,
     "delivery": _delivery,
     "volume": _volume,
     "single_rod": _single_rod,
@@ -239,8 +245,9 @@ def set_right(log: CleanLog, found: Explanation) -> CleanLog:
     """
     value = {name: pair[0] for name, pair in found.values.items()}
     record, changed = log.record, dict[str, Array]()
-    if zero := value.get("position_zero", 0.0):
-        changed[POSITION] = record[POSITION] - zero
+    zero, play = value.get("position_zero", 0.0), value.get("position_play", 0.0)
+    if zero or play:
+        changed[POSITION] = record[POSITION] - zero + 0.5 * play * side_of_play(bridged(record[POSITION]))
     elapsed = np.arange(len(record)) / len(record)
     late, drift = lateness(found, PRESSURE), value.get("pressure_drift", 0.0)
     offset = value.get("pressure_offset", 0.0) + drift * elapsed

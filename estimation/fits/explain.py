@@ -105,7 +105,12 @@ class _Tried:
 
     @property
     def cost(self) -> float:
-        return self.point.cost
+        return self.point.cost if self.meant else np.inf
+
+    @property
+    def meant(self) -> bool:
+        """Whether what was found is what the hypotheses say, and no use of what they free beside."""
+        return all(not one.least or abs(self.values[one.free[0]]) >= one.least for one in self.together)
 
     @property
     def fit(self) -> GreyBoxFit:
@@ -125,6 +130,7 @@ def explain(
     *,
     asked: Sequence[Hypothesis] = HYPOTHESES,
     paired: bool = True,
+    by_mass: bool = False,
 ) -> Explanation:
     """Return the hypotheses that explain a log best, alone or two together.
 
@@ -142,13 +148,16 @@ def explain(
         What is tried alone; pairs are with any other.
     paired : bool
         Whether pairs are tried where nothing explains the log alone.
+    by_mass : bool
+        Whether mass is balanced while hypotheses are compared, as where the likelier plain fit does; else volume. At
+        high pressure the two differ by more than what is strange.
 
     Returns
     -------
     Explanation
         The likeliest; whether it explains the log is for the gate to say.
     """
-    wide = widened(log, parameters, starts[0])
+    wide = balanced_by(widened(log, parameters, starts[0]), 1.0 if by_mass else 0.0)
     likely, others = promising(wide, (), starts[0], asked)
     finished = _likeliest(wide, [_screened(wide, (one,), starts) for one in likely])
     if others and not accepted(finished[0].fit):
@@ -256,6 +265,8 @@ def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
     best = done[0][0]
     count = [one for one in done if one[0].cost < best.cost + ALIKE]
     first, *rivals = (concluded(problem, one.point, warned=False) for one, problem in count)
+    if not best.meant:
+        first = replace(first, cost=np.inf)
     return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
 
 

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
+import numpy as np
+
 from estimation.fits.explain import VANISHED, WORTH, explain
 from estimation.fits.flow_log import flow_log, without_strays
 from estimation.fits.flow_search import MAKEUP_TRIED, balanced, flow_starts
@@ -18,6 +20,7 @@ from estimation.fits.hypotheses import (
     LEAST_DELIVERY,
     LEAST_ZERO,
     OFFSET,
+    PLAY,
     START_LOAD,
     Hypothesis,
 )
@@ -61,6 +64,11 @@ OPEN_DELIVERY = 0.1
 """Standard deviation of the logarithm of the pump's delivery from which a worn pump is not excluded
 [dimensionless]: one that delivers 80 % lies within two of it."""
 
+ZERO_WORTH = 30.0
+"""Gain in log-likelihood that the slopes must promise before a log that the plain form explains is asked for its
+encoder's zero [dimensionless]. They promise 100 at least where one is off by 60 mm or more, 2.5 at most on logs of 30
+other kinds, and 14 on one of a play, which a zero would explain wrongly."""
+
 ALWAYS_ASKED = (DELIVERY, ENCODER_ZERO)
 """What a log that the plain form explains is asked all the same, where the slopes promise a gain: both may hide."""
 
@@ -71,6 +79,9 @@ STRUCTURE = 2e-4
 """Relative standard deviation of bulk modulus from what the balance leaves out where no make-up valve may crack: in a
 log that the plain form does not explain, and in one with gaps in motor speed. The likeliest on 71 logs of the open
 benchmark's validation split. A plain fit needs none: it fits each valve and the accumulator [fraction]."""
+
+PLAY_STRUCTURE = 5e-3
+"""The same where the encoder has a play, as what the piston does while it crosses that is not known; judged."""
 
 SURER = 2.0
 """What a difference of log-likelihood between balances is divided by [dimensionless]: they leave out less than the
@@ -142,11 +153,13 @@ def fit_flow(
         near = _near(swinging, starts, explains, in_motion=loaded or moving)
         near = [best.values, *near] if best is not swinging and explains(best) else near
         paired = any(one not in ALWAYS_ASKED for one in asked)
-        strange = explain(log, parameters, near, explains, asked=asked, paired=paired)
+        by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
+        strange = explain(log, parameters, near, explains, asked=asked, paired=paired, by_mass=by_mass)
         one = strange.fit
         if explains(one) and one.cost < _wanted(strange.names, best, swinging):
             bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
-            believed = with_structure(strange.values, STRUCTURE)
+            left = PLAY_STRUCTURE if PLAY.name in strange.names else STRUCTURE
+            believed = with_structure(strange.values, left)
             return FormFit(believed, bound, one.chi_square[0], (), one.rig_slopes, strange)
     value, std = found["bulk_modulus"]
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
@@ -160,8 +173,11 @@ def fit_flow(
 def _wanted(names: Sequence[str], best: GreyBoxFit, swinging: GreyBoxFit) -> float:
     """Return the cost below which what is strange is believed rather than the plain form.
 
-    No actuator holds its chambers' volumes. So an encoder's zero need explain a log no better than held volumes do.
+    No actuator holds its chambers' volumes. So an encoder's zero need explain a log no better than held volumes do. How
+    a play is crossed is not known: with a second hypothesis it may explain a log that has neither.
     """
+    if PLAY.name in names and len(names) > 1:
+        return -np.inf
     if tuple(names) == (ENCODER_ZERO.name,):
         return min(best.cost + WORTH, swinging.cost - WORTH)
     return best.cost - WORTH
@@ -188,8 +204,8 @@ def _asked(
     zeros = [promised(log, parameters, swinging.values, ENCODER_ZERO, by_mass=by_mass)]
     if best is not swinging:  # volumes that swing may have led the fit astray, where the slopes promise nothing
         zeros.append(promised(log, parameters, best.values, ENCODER_ZERO))
-    worth = (delivery, LEAST_DELIVERY), (max(zeros), LEAST_ZERO)
-    told = [promise.gain > WORTH and promise.size > least for promise, least in worth]
+    worth = (delivery, WORTH, LEAST_DELIVERY), (max(zeros), ZERO_WORTH, LEAST_ZERO)
+    told = [promise.gain > gain and promise.size > size for promise, gain, size in worth]
     asked = tuple(one for one, worthwhile in zip(ALWAYS_ASKED, told, strict=True) if worthwhile)
     open_by = 0.0 if DELIVERY in asked else delivery.deviation
     remarks = (RigCode.WEAR_NOT_EXCLUDED.note(percent=200.0 * open_by),) if open_by > OPEN_DELIVERY else ()

@@ -31,6 +31,8 @@ class Hypothesis:
         Whether what it adds is so far from its absence that the slope there says nothing of it.
     from_first_sample : bool
         Whether the search begins with the differential pressure that the log begins with, and with several levels.
+    least : float
+        Size below which what is freed first is not what the hypothesis says [SI].
     from_mid_travel : bool
         Whether the search also begins with an encoder that reads zero in the middle of the log's travel.
     """
@@ -44,6 +46,7 @@ class Hypothesis:
     instead: tuple[str, ...] = ()
     far: bool = False
     from_first_sample: bool = False
+    least: float = 0.0
     from_mid_travel: bool = False
 
 
@@ -60,10 +63,16 @@ START_LOAD = Hypothesis("start_load", ("start_pressure", "start_level"))
 BEGUN = replace(START_LOAD, from_first_sample=True)
 """The same of a log that begins under load or in motion."""
 
+PLAY = Hypothesis("position_play", ("position_play",), ({"position_play": 5e-5},))
+
 OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
 
 LATE_TRIED = (0.0, 2e-3, 5e-3, 9e-3)
 """Delays with which the search for a late channel begins [s]."""
+
+LEAST_ROD = 0.02
+"""Least difference of a piston's areas over their sum that is a rod on one side [fraction]; judged. Chambers whose
+volumes alone differ look like an encoder that was homed elsewhere."""
 
 LATEST = 2e-2
 """Longest delay that is sought, or told of [s]: no sensor, filter or bus is later, and what a slope tells of a shift
@@ -84,6 +93,7 @@ HYPOTHESES = (
     OFFSET,
     Hypothesis("pressure_drift", ("pressure_drift",)),
     ENCODER_ZERO,
+    PLAY,
     DELIVERY,
     Hypothesis("volume", ("chamber_volume",)),
     START_LOAD,
@@ -107,6 +117,7 @@ HYPOTHESES = (
         "single_rod",
         ("area_difference", "volume_difference", "pilot_share"),
         tuple({"area_difference": differ, "volume_difference": differ, "pilot_share": 1.0} for differ in (-0.15, 0.15)),
+        least=LEAST_ROD,
     ),
     Hypothesis("checks_crack", ("crack_pressure",), ({"crack_pressure": 1e4},)),
     Hypothesis("port_a_drains", ("drain_share_a",), ({"drain_share_a": 1e2},)),
@@ -122,6 +133,7 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "pressure_offset": (-1e7, 1e7),
     "pressure_drift": (-1e7, 1e7),
     "position_zero": (-1.0, 1.0),
+    "position_play": (0.0, 2e-3),
     "start_pressure": (-1e7, 1e7),
     "start_level": (-2.5e5, 1e7),
     "air_softness": (0.0, 1e5),

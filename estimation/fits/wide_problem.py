@@ -11,6 +11,7 @@ from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import search_bounds
 from estimation.fits.hypotheses import LIMITS, PRESUMED, Hypothesis
+from estimation.fits.play import side_of_play
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
@@ -56,7 +57,7 @@ second valley, where all that the log shows is noise that the oil's stiffness ma
 def widened(
     log: GreyBoxLog, parameters: EhaParameters, found: Mapping[str, float] = MappingProxyType({})
 ) -> GreyBoxLog:
-    """Return a log as the wide flow form sees it: with the share of the log and the rate of position as drives.
+    """Return a log as the wide flow form sees it: the share of the log, the rate of position and its side are drives.
 
     Parameters
     ----------
@@ -72,13 +73,13 @@ def widened(
     GreyBoxLog
         The log, with what is presumed.
     """
-    samples = len(log.drives)
-    rate = np.gradient(log.drives[:, FLOW_FORM.drives.index(POSITION)]) / log.sample_time
+    samples, position = len(log.drives), log.drives[:, FLOW_FORM.drives.index(POSITION)]
+    rate = np.gradient(position) / log.sample_time
     known = {one.name: getattr(parameters, one.name) for one in fields(parameters)}
     return replace(
         log,
-        drives=np.column_stack([log.drives, np.arange(samples) / samples, rate]),
-        drive_std=(*log.drive_std, 0.0, 0.0),
+        drives=np.column_stack([log.drives, np.arange(samples) / samples, rate, side_of_play(position)]),
+        drive_std=(*log.drive_std, 0.0, 0.0, 0.0),
         released={},
         parameters=parameter_row(
             WideFlowParameters(
@@ -238,7 +239,7 @@ def delayed(log: GreyBoxLog, delays: Mapping[str, float]) -> GreyBoxLog:
             continue
         late = slice(-samples, None)
         if channel in FLOW_FORM.drives:
-            names = (channel, "position_rate") if channel == POSITION else (channel,)
+            names = (channel, "position_rate", "side_of_play") if channel == POSITION else (channel,)
             columns = [WIDE_FLOW_FORM.drives.index(name) for name in names]
             drives, measured = drives.copy(), measured.copy()
             drives[:-samples, columns] = log.drives[samples:, columns]

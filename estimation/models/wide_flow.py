@@ -42,6 +42,7 @@ class WideFlowParameters(FlowParameters):
     pressure_lag: float = si(0.0, "s", "first-order lag of the pressure sensor", "fitted")
     speed_lag: float = si(0.0, "s", "first-order lag of the motor's speed sensor", "fitted")
     position_lag: float = si(0.0, "s", "first-order lag of the encoder or of its filter", "fitted")
+    position_play: float = si(0.0, "m", "play between the piston and the encoder", "fitted")
     pressure_offset: float = si(0.0, "Pa", "offset of the differential pressure", "fitted")
     pressure_drift: float = si(0.0, "Pa", "what that offset gains over the log, evenly", "fitted")
     position_zero: float = si(0.0, "m", "encoder's reading in the middle position", "fitted")
@@ -78,9 +79,10 @@ def _stiffness(pressure: Scalar, elapsed: Scalar, p: SimpleNamespace) -> Scalar:
 
 
 def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
-    speeds, (read, next_read), (begun, next_begun), (rate, next_rate), step = drives
+    speeds, (read, next_read), (begun, next_begun), (rate, next_rate), (side, next_side), step = drives
     p1, p2, behind, supply = state
-    x, next_x = read + p.position_lag * rate, next_read + p.position_lag * next_rate
+    x = read + p.position_lag * rate + 0.5 * p.position_play * side
+    next_x = next_read + p.position_lag * next_rate + 0.5 * p.position_play * next_side
     velocity, position = (next_x - x) / step, x + share * (next_x - x) - p.position_zero
     pumped = delivered_flow(speeds, _ahead(p), step, share)
     area_1, area_2 = piston_areas(p)
@@ -149,7 +151,7 @@ def _shown(state: tuple[Scalar, ...]) -> tuple[Scalar]:
 
 WIDE_FLOW_FORM = GreyBoxModel(
     name="wide_flow",
-    drives=("motor_speed_rad_s", "position_m", "elapsed", "position_rate"),
+    drives=("motor_speed_rad_s", "position_m", "elapsed", "position_rate", "side_of_play"),
     outputs=("differential_pressure_pa",),
     unknowns=(),
     initial=_at_rest,
@@ -165,6 +167,7 @@ LINEAR = {
     "pressure_lag": 1e-3,
     "speed_lag": 1e-3,
     "position_lag": 1e-3,
+    "position_play": 1e-5,
     "pressure_offset": 1e4,
     "pressure_drift": 1e4,
     "position_zero": 1e-2,

@@ -58,6 +58,7 @@ def test_a_pump_that_delivers_far_less_is_worn(share: float, code: RigCode) -> N
 def test_volume_load_relief_and_check_valves_are_told_beside_the_rigs() -> None:
     v = P.chamber_volume
     assert data(told("volume", chamber_volume=(0.8 * v, 0.02 * v))) == {"percent": 80.0, "half_width": 2.0 * NORMAL}
+    assert data(told("position_play", position_play=(5e-5, 1e-6))) == {"play_um": 50.0}
     areas = told("single_rod", area_difference=(0.25, 0.01), volume_difference=(-0.25, 0.1), pilot_share=(1.0, 0.1))
     half_width = 200.0 * 0.01 * NORMAL / 1.25**2
     assert data(areas) == {"percent": 60.0, "half_width": half_width, "volume_percent": 500.0 / 3.0}

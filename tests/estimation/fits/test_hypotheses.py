@@ -219,10 +219,27 @@ def test_a_single_rod_whose_rig_file_gives_one_area_is_named_with_both() -> None
     assert mended.pilot_share > 0.0
 
 
+def test_play_of_the_encoder_is_named_and_taken_up() -> None:
+    record, play = log("prbs", 6.0), 3e-5
+    read = record["position_m"].copy()
+    for i in range(1, len(read)):
+        read[i] = min(max(read[i - 1], read[i] - 0.5 * play), read[i] + 0.5 * play)
+    given = record.replace(position_m=read)
+    found = explained(given)
+    assert found.names == ("position_play",)
+    (note,) = notes_of(found, HEALTHY)
+    assert note.code is RigCode.POSITION_PLAY
+    assert note.data["play_um"] == pytest.approx(1e6 * play, rel=0.3)
+    mended = set_right(clean_log(given, HEALTHY), found).record["position_m"]
+    assert np.std(mended - record["position_m"]) < 0.6 * np.std(read - record["position_m"])
+
+
 def test_an_encoder_zero_need_be_no_likelier_than_held_volumes_and_anything_else_must() -> None:
     held, swinging = made_fit(100.0, 2e8, 1e6), made_fit(300.0, 2e8, 1e6)
     assert _wanted(("encoder_zero",), held, swinging) == 100.0 + module.WORTH
     assert _wanted(("encoder_zero",), held, held) == 100.0 - module.WORTH
+    assert _wanted(("position_play",), held, swinging) == 100.0 - module.WORTH
+    assert _wanted(("position_play", "position_late"), held, swinging) == -np.inf
     assert _wanted(("volume",), held, swinging) == _wanted(("encoder_zero", "air"), held, swinging) == 90.0
 
 
