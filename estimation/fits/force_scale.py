@@ -31,6 +31,9 @@ ALMOST, NEARBY = 1e-3, 0.3
 """Relative difference in bulk modulus, and the same over its deviation, up to which an optimum that was come near to
 counts as the known one and is not sought more exactly [fraction]."""
 
+FAR_AWAY = 0.1
+"""The same from which an optimum is another one, however exactly it is sought [fraction]."""
+
 LARGEST_DISAGREEMENT = 0.05
 """Relative difference in bulk modulus of two optima that explain a log, above which neither is believed [fraction]."""
 
@@ -148,15 +151,12 @@ def _ended(problem: FreedProblem, best: Point, moved: Sequence[Mapping[str, floa
     near = descend_together(way.near.at_each, starts, way.nearing, way.bounds, way.near_enough)
     starts = [one.theta for one in near]
     found = descend_together(problem.at_each, starts, way.finishing, way.bounds, way.enough, wanted=way.explained)
-    alike = max(ALMOST, NEARBY * _deviation(problem, best))
-    here = np.log(_bulk_modulus(problem, best))
-    away = [
-        i
-        for i, one in enumerate(found)
-        if one.cost < way.explained and abs(np.log(_bulk_modulus(problem, one)) - here) > alike
-    ]
-    starts = [found[i].theta for i in away]
-    for i, one in zip(away, descend_together(problem.at_each, starts, way.finishing, way.bounds), strict=True):
+    alike, here = max(ALMOST, NEARBY * _deviation(problem, best)), np.log(_bulk_modulus(problem, best))
+    moved = [abs(np.log(_bulk_modulus(problem, one)) - here) for one in found]
+    close = [i for i in range(len(found)) if found[i].cost < way.explained and alike < moved[i] < FAR_AWAY]
+    starts, enough = [found[i].theta for i in close], way.near_enough
+    ends = descend_together(problem.at_each, starts, way.finishing, way.bounds, enough)
+    for i, one in zip(close, ends, strict=True):
         found[i] = one
     return found
 

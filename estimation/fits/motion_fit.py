@@ -27,7 +27,6 @@ from estimation.fits.motion_search import (
     Ended,
     MotionSearch,
     bulk_modulus,
-    cost_of,
     explained,
     likeliest,
     rough,
@@ -242,19 +241,19 @@ def _fitted(ended: list[Ended]) -> tuple[list[GreyBoxFit], list[float]]:
     told = best.cost < explained(whole) and not disagree([bulk_modulus(whole, best), *others])
     if told and not hopeful:
         best = descend(whole.at, best.theta, FINISHING, bounds)
-    return [concluded(whole, best), concluded(second.search.whole, _rival(second, best, told=told))], others
+    return [concluded(whole, best), *_rival(second, best, told=told)], others
 
 
-def _rival(second: Ended, best: Point, *, told: bool) -> Point:
-    """Return where the other structure of friction comes to on the whole log; not far where no number is told."""
-    whole, bounds = second.search.whole, second.search.bounds
-    begun = min((whole.at(theta) for theta in (best.theta, second.point.theta)), key=cost_of)
-    if told:
-        return descend(whole.at, begun.theta, NEARING, bounds, wanted=best.cost + UNLIKELY)
-    wanted = explained(whole)
-    if begun.cost > max(best.cost, HOPELESS * wanted) or best.cost < wanted:
-        return begun
-    return descend(whole.at, begun.theta, NEARING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
+def _rival(second: Ended, best: Point, *, told: bool) -> list[GreyBoxFit]:
+    """Return the fit of the other structure of friction to the whole log; none where it cannot matter."""
+    whole, bounds, thetas = second.search.whole, second.search.bounds, [best.theta, second.point.theta]
+    costs = whole.costs(thetas)
+    begun, wanted, share = thetas[int(np.argmin(costs))], best.cost + UNLIKELY, 0.0
+    if not told:
+        wanted, share = explained(whole), SLIGHT_SHARE
+        if best.cost < wanted or float(np.min(costs)) > max(best.cost, HOPELESS * wanted):
+            return []
+    return [concluded(whole, descend(whole.at, begun, NEARING, bounds, wanted=wanted, least_share=share))]
 
 
 def _rescaled(problem: FreedProblem, best: Point, search: MotionSearch) -> tuple[Point, list[float]]:

@@ -279,7 +279,7 @@ class _Tries:
         if self._followed:
             _, more = min(self._followed, key=lambda pair: pair[1].cost)
             return search.short.at(more.theta)
-        if self.best.cost > HOPELESS * explained(search.short) and self._begun.work > MOST_WORK:
+        if self._begun.work > MOST_WORK:
             return self.best
         promising = SLIGHT * explained(search.short)
         return descend(search.short.at, self.best.theta, FINISHING, search.bounds, promising)

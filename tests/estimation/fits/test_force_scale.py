@@ -113,3 +113,20 @@ def test_moduli_disagree_from_a_twentieth_on() -> None:
 def test_an_optimum_that_is_hardly_better_ends_the_search_where_it_is() -> None:
     best, _, _ = searched(flat(lambda theta: 10.0 * theta[0]), explained=-np.inf)  # 2.2 lower a round, 5 are wanted
     assert best.theta[0] - HERE[0] == pytest.approx(np.log(0.8))
+
+
+def test_a_search_that_ends_close_by_goes_on_before_it_is_said_to_disagree() -> None:
+    """Steps are a quarter of what they should be, so that the first descent ends seven to nine percent away."""
+
+    def slow(theta: np.ndarray) -> Point:
+        off, slopes = theta[0] - HERE[0], np.zeros((1, len(theta)))
+        slopes[0, 0] = 10.0
+        return Point(theta, 50.0 * off**2, 10.0 * slopes[0] * off, 4.0 * slopes.T @ slopes)
+
+    def each(at: Callable[[np.ndarray], Point]) -> FreedProblem:
+        return cast("FreedProblem", SimpleNamespace(model=MODEL, at_each=lambda thetas: [at(one) for one in thetas]))
+
+    way = Way(each(flat(lambda _: 0.0)), 12, 0.01, 25, 0.1, (-FAR, FAR), np.inf)
+    _, others = rescaled(each(slow), slow(HERE), way)
+    assert len(others) == 4
+    assert not disagree([2e8, *others])

@@ -324,3 +324,38 @@ def test_what_only_the_whole_log_explains_is_tried_on_other_scales_too(
     assert motion_fit._fitted(ended)[1] == [9e7]
     assert len(asked) == 1
     assert asked[0] in wholes
+
+
+@pytest.mark.parametrize("disagreeing", [True, False])
+def test_the_other_law_is_not_fitted_where_no_number_is_told(
+    disagreeing: bool, healthy: FormFit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, second = searches_of(heard(short_log(2.0)))
+    there = first.whole.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
+    ended = [Ended(one, one.part.at(there), explains=one is first) for one in (first, second)]
+    monkeypatch.setattr(motion_fit, "rescaled", lambda _, best, __: (best, [9e7] if disagreeing else []))
+    fits, others = motion_fit._fitted(ended)
+    assert len(fits) == (1 if disagreeing else 2)
+    assert others == ([9e7] if disagreeing else [])
+    assert bool(motion_fit._objections(fits, fits[0], others)) == disagreeing
+
+
+def test_what_is_far_from_explained_on_the_whole_log_is_fitted_by_one_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    record = short_log(0.5)
+    shaken = record["position_m"] + 2e-4 * np.sin(0.2 * np.arange(len(record["position_m"])))
+    first, second = searches_of(heard(record.replace(position_m=shaken)))
+    ended = [Ended(one, one.part.at(one.guesses[0]), explains=False) for one in (first, second)]
+    evaluated: list[int] = []
+
+    def counted(at: Any, start: Array, evaluations: int, *others: Any, **named: Any) -> Point:
+        def noted(theta: Array) -> Point:
+            evaluated.append(1)
+            return at(theta)
+
+        return descend(noted, start, evaluations, *others, **named)
+
+    monkeypatch.setattr(motion_fit, "descend", counted)
+    fits, _ = motion_fit._fitted(ended)
+    assert len(fits) == 1
+    assert fits[0].chi_square[0] > motion_fit.HOPELESS
+    assert len(evaluated) < 2 * motion_fit.FINISHING

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -90,6 +90,25 @@ def test_no_other_start_is_tried_once_the_work_is_done() -> None:
         found, asked = ended(lambda _: 1.2, lambda _: 1.3, steps=steps)
         assert len(asked) == 2 * ranks
         assert not any(one.explains for one in found)
+
+
+def test_where_the_work_is_done_nothing_is_carried_to_the_end_that_explains_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    finished: list[float] = []
+    descended = motion_search.descend
+
+    def noted(at: Callable[..., Point], start: np.ndarray, evaluations: int, bounds: Any, *others: Any) -> Point:
+        finished.append(float(start[0]))
+        return descended(at, start, evaluations, bounds, *others)
+
+    monkeypatch.setattr(
+        motion_search, "descend", lambda *a, wanted=None, **k: descended(*a, **k) if wanted else noted(*a)
+    )
+    for steps, ends in ((1, 1), (MOST_WORK, 0)):  # the likelier structure alone is carried on
+        finished.clear()
+        ended(lambda _: 1.2, lambda _: 1.3, steps=steps)
+        assert len(finished) == ends
 
 
 def test_what_explains_the_first_seconds_alone_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:

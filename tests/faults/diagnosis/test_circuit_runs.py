@@ -118,6 +118,18 @@ def test_an_earlier_circuit_runs_up_to_its_sample() -> None:
     assert np.abs(both[-10:] - before[-10:]).min() > 1e-3
 
 
+def test_each_circuit_may_have_another_before_it_up_to_a_sample_of_its_own() -> None:
+    plain, rows = healthy_blocks()
+    place = list(CONDITIONS).index("major_leakage")
+    (leaking,) = parameter_rows(ACTUATOR.conditions[[place]], ACTUATOR.circuit, ACTUATOR.rated)
+    ends = np.array([200, 500, 650])
+    both = predicted(replace(plain, earlier=(ends, leaking)), np.repeat(rows, 3, axis=0))
+    for end, found in zip(ends, both, strict=True):
+        alone = velocity_of(replace(plain, earlier=(int(end), leaking)), rows)
+        assert found[:, 0] == pytest.approx(alone, rel=1e-3, abs=1e-5)
+    assert np.abs(both[0, 30:45, 0] - both[1, 30:45, 0]).min() > 1e-3
+
+
 def test_a_course_of_leakage_is_that_of_warm_oil_all_leakages_up_and_viscous_friction_down() -> None:
     plain, rows = healthy_blocks()
     names = list(CircuitParameters.__dataclass_fields__)
