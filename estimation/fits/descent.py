@@ -87,7 +87,7 @@ def descend(
         Cost above which the result is of no use [dimensionless]: a search ends where all steps that are left would not
         bring it down to that, gaining each what the last one did or the next one promises.
     least_share : float
-        Share of the cost that a step which lowers it must take off, else it is the last [fraction].
+        Share of the cost that is left which a further step must promise [fraction].
 
     Returns
     -------
@@ -181,7 +181,7 @@ def _search(
     for left in range(evaluations - 1, 0, -1):
         curvature = best.gram + np.diag(np.abs(best.gradient) / REACH)
         step, promised, radius = _downhill(best, curvature, radius, bounds)
-        if promised < least_gain or best.cost - left * max(promised, gained) > wanted:
+        if promised < max(least_gain, least_share * best.cost) or best.cost - left * max(promised, gained) > wanted:
             break
         tried = yield best.theta + step
         gain, length = (best.cost - tried.cost) / promised, float(np.linalg.norm(step))
@@ -193,10 +193,7 @@ def _search(
             radius = max(radius, 2.0 * length)
         gained = best.cost - tried.cost if gain > POOR else np.inf
         if gain > 0.0:
-            last = best.cost - tried.cost < least_share * best.cost
             best = tried
-            if last:
-                break
     return best
 
 

@@ -247,13 +247,17 @@ def _fitted(ended: list[Ended]) -> tuple[list[GreyBoxFit], list[float]]:
 def _rival(second: Ended, best: Point, *, told: bool) -> list[GreyBoxFit]:
     """Return the fit of the other structure of friction to the whole log; none where it cannot matter."""
     whole, bounds, thetas = second.search.whole, second.search.bounds, [best.theta, second.point.theta]
-    costs = whole.costs(thetas)
-    begun, wanted, share = thetas[int(np.argmin(costs))], best.cost + UNLIKELY, 0.0
-    if not told:
-        wanted, share = explained(whole), SLIGHT_SHARE
-        if best.cost < wanted or float(np.min(costs)) > max(best.cost, HOPELESS * wanted):
-            return []
-    return [concluded(whole, descend(whole.at, begun, NEARING, bounds, wanted=wanted, least_share=share))]
+    costs, wanted = whole.costs(thetas), explained(whole)
+    begun = thetas[int(np.argmin(costs))]
+    if told:
+        point = descend(whole.at, begun, NEARING, bounds, wanted=best.cost + UNLIKELY)
+    elif best.cost < wanted or float(np.min(costs)) > max(best.cost, HOPELESS * wanted):
+        return []
+    else:
+        point = descend(whole.at, begun, NEARING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
+        if point.cost < wanted:
+            point = descend(whole.at, point.theta, FINISHING, bounds)
+    return [concluded(whole, point)]
 
 
 def _rescaled(problem: FreedProblem, best: Point, search: MotionSearch) -> tuple[Point, list[float]]:

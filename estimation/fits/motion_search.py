@@ -66,8 +66,8 @@ SLIGHT = 1e-3
 """Cost that a further step must promise where nothing explains the log, over what would explain it [fraction]."""
 
 SLIGHT_SHARE = 0.01
-"""Share of the misfit that a step must take off where nothing explains the log, else it is the last [fraction]: no
-number is believed then, and how far the log is from explained is known well enough."""
+"""Share of the misfit that a further step must promise where no number will be believed [fraction]: how far the log is
+from explained is then known well enough."""
 
 SAME_COST, SAME_MODULUS = 0.02, 0.01
 """Relative difference of misfits, and of bulk moduli, up to which two starts came to the same pit [fraction]."""
