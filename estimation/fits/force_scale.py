@@ -152,8 +152,8 @@ def _ended(problem: FreedProblem, best: Point, moved: Sequence[Mapping[str, floa
     starts = [one.theta for one in near]
     found = descend_together(problem.at_each, starts, way.finishing, way.bounds, way.enough, wanted=way.explained)
     alike, here = max(ALMOST, NEARBY * _deviation(problem, best)), np.log(_bulk_modulus(problem, best))
-    moved = [abs(np.log(_bulk_modulus(problem, one)) - here) for one in found]
-    close = [i for i in range(len(found)) if found[i].cost < way.explained and alike < moved[i] < FAR_AWAY]
+    apart = [abs(np.log(_bulk_modulus(problem, one)) - here) for one in found]
+    close = [i for i in range(len(found)) if found[i].cost < way.explained and alike < apart[i] < FAR_AWAY]
     starts, enough = [found[i].theta for i in close], way.near_enough
     ends = descend_together(problem.at_each, starts, way.finishing, way.bounds, enough)
     for i, one in zip(close, ends, strict=True):
