@@ -65,9 +65,10 @@ HOPELESS = 3.0
 SLIGHT = 1e-3
 """Cost that a further step must promise where nothing explains the log, over what would explain it [fraction]."""
 
-SLIGHT_SHARE = 0.01
+SLIGHT_SHARE = 0.002
 """Share of the misfit that a further step must promise where no number will be believed [fraction]: how far the log is
-from explained is then known well enough."""
+from explained is then known well enough. At a hundredth, a long way down was given up whose first steps promise
+little."""
 
 SAME_COST, SAME_MODULUS = 0.02, 0.01
 """Relative difference of misfits, and of bulk moduli, up to which two starts came to the same pit [fraction]."""
