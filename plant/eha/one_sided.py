@@ -56,7 +56,7 @@ def one_sided(p: CircuitParameters, **faults: float) -> OneSidedParameters:
     p : CircuitParameters
         The circuit.
     **faults : float
-        Entries of `OneSidedParameters`, each in its unit.
+        Entries of `OneSidedParameters` [each in its unit].
     """
     return OneSidedParameters(**{field.name: getattr(p, field.name) for field in fields(CircuitParameters)}, **faults)
 
@@ -67,7 +67,7 @@ def one_sided_derivative(state: CircuitState, command: Scalar, p: OneSidedParame
     Parameters
     ----------
     state : tuple of float or Expression
-        As named in `plant.eha.circuit.STATES`.
+        As named in `plant.eha.circuit.STATES` [SI].
     command : float or Expression
         Motor speed asked for [rad/s].
     p : OneSidedParameters or namespace of Expression
@@ -104,12 +104,31 @@ _WIDTH = len(parameter_names(OneSidedParameters))
 
 
 def circuit_plant(width: int) -> Plant:
-    """Return the circuit, or the one with unlike make-up valves, by how many parameters a row has."""
+    """Return the circuit, or the one with unlike make-up valves.
+
+    Parameters
+    ----------
+    width : int
+        How many parameters its row has.
+    """
     return ONE_SIDED if width == _WIDTH else CIRCUIT
 
 
 def as_wide(row: Array, width: int) -> Array:
-    """Return a row of parameters with as many as another circuit's: whose valves are alike, has nothing wrong."""
+    """Return a row of parameters with as many as another circuit's: where valves are alike, nothing is wrong.
+
+    Parameters
+    ----------
+    row : ndarray, shape (parameters,)
+        The circuit [SI].
+    width : int
+        How many parameters the other has.
+
+    Returns
+    -------
+    ndarray, shape (width,)
+        The same circuit [SI].
+    """
     return np.concatenate([row, np.zeros(width - len(row))])
 
 
