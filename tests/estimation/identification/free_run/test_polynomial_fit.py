@@ -19,11 +19,12 @@ from estimation.identification.free_run.linear_fit import Form, fit_linear
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.other_orders import is_wild
 from estimation.identification.free_run.polynomial_fit import Runs, products
-from estimation.identification.free_run.polynomial_kernel import run_free
+from estimation.identification.free_run.polynomial_kernel import run_free, write_products
 from estimation.identification.free_run.polynomial_terms import (
     MOST_CANDIDATES,
     STEPS,
     TRIED,
+    _gains,
     begun,
     candidate_terms,
     one_more,
@@ -200,6 +201,58 @@ def test_a_run_that_grows_beyond_bounds_tells_where(way: Callable[[Any], Any]) -
     where, out, _ = ran(way, np.array([0.0, 3.0, *np.zeros(6)]), 10.0, (-np.inf, np.inf))
     assert 2 < where < 20
     assert abs(3.0 * out[where - 1]) >= 1e3
+
+
+@WAYS
+def test_products_are_of_single_signals_as_they_are_and_of_several_as_they_are_held(way: Callable[[Any], Any]) -> None:
+    single = np.random.default_rng(4).normal(size=(9, 3))
+    held, out = np.clip(single, -0.5, 0.5), np.full((9, TERMS.shape[0] + 2), 7.0)
+    way(write_products)(single, held, TERMS, out)
+    for column, term in zip(out.T, TERMS, strict=False):
+        factors = [v for v in term if v >= 0]
+        wanted = single[:, factors[0]] if len(factors) == 1 else np.prod(held[:, factors], axis=1)
+        assert column == pytest.approx(wanted)
+    assert (out[:, TERMS.shape[0] :] == 7.0).all()
+
+
+def test_a_rejected_step_is_not_asked_for_its_slopes(monkeypatch: pytest.MonkeyPatch) -> None:
+    data, _ = scaled(log(200))
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    runs, costs, asked = Runs(start.variables, start.terms, data), list[float](), list[int]()
+    run, sensitivities = Runs.run, Runs.sensitivities
+
+    def running(self: Runs, theta: Array) -> Any:
+        found = run(self, theta)
+        costs.append(np.inf if found is None else float(np.nansum((found[0] - self.target) ** 2)))
+        return found
+
+    def asking(self: Runs, *given: Any, **how: Any) -> Array:
+        asked.append(len(costs) - 1)
+        return sensitivities(self, *given, **how)
+
+    monkeypatch.setattr(Runs, "run", running)
+    monkeypatch.setattr(Runs, "sensitivities", asking)
+    far = start.theta * np.array([1.0, 0.2, -1.0, -4.0, 1.0, 1.0])
+    assert runs.fit(far, 40) is not None
+    lowering = [k for k, cost in enumerate(costs) if cost < min(costs[:k], default=np.inf)]
+    assert asked == lowering
+    assert len(asked) < len(costs)
+
+
+def test_the_gain_of_a_product_is_what_it_explains_beside_what_is_there() -> None:
+    rng = np.random.default_rng(5)
+    own, every, residual = rng.normal(size=(50, 4)), rng.normal(size=(50, 5)), rng.normal(size=50)
+    every[:, 3] = own @ [1.0, -2.0, 0.5, 3.0]
+    every[:, 4] = np.inf
+    without = residual - own @ np.linalg.lstsq(own, residual, rcond=None)[0]
+    for k, gain in enumerate(_gains(own, every, without)):
+        if k >= 3:
+            assert gain == 0.0
+            continue
+        both = np.column_stack([own, every[:, k]])
+        left = residual - both @ np.linalg.lstsq(both, residual, rcond=None)[0]
+        assert gain == pytest.approx(without @ without - left @ left)
 
 
 def test_of_many_signals_only_cubes_of_one_source_are_tried() -> None:
