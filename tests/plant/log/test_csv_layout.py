@@ -82,3 +82,9 @@ def test_a_block_above_a_blank_line_is_not_the_header() -> None:
 def test_the_row_of_units_may_stand_below_another() -> None:
     made = layout("t,x", "time,way", "s,mm", "0.0,1.0", "0.1,2.0")
     assert [one.unit for one in made.headings] == ["s", "mm"]
+
+
+def test_a_log_without_a_number_has_its_first_line_for_a_header_and_all_others_for_rows() -> None:
+    made = layout("", "name;place", "press;hall", "lift;yard")
+    assert (names(made), made.skipped, made.delimiter) == (["name", "place"], 2, ";")
+    assert layout("name,place", "press,hall").skipped == 1

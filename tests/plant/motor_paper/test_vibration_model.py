@@ -113,3 +113,11 @@ def test_without_fractional_damping_the_model_keeps_its_states() -> None:
     damped = replace(MODEL, fractional_damping=1.0, fractional_order=0.5)
     assert state_space(damped).nstates > 4
     assert state_space(damped, signs="printed").nstates == 4
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e6])
+def test_what_rounding_leaves_of_a_real_pole_does_not_swing_however_fast_or_slow_it_is(size: float) -> None:
+    swinging = size * (-0.1 + 1.0j)
+    assert first_mode(np.array([swinging, swinging.conjugate(), 0.5 * size * (-1.0 + 1e-9j)])) == swinging
+    with pytest.raises(RigError, match="must oscillate"):
+        first_mode(size * np.array([-1.0 + 1e-9j, -1.0 - 1e-9j]))

@@ -140,7 +140,7 @@ def candidate(order: int, held_back: float, delay: int = 1, doubt: str = "", f: 
 
 def test_bends_are_tried_behind_the_best_linear_model_of_each_order_and_dead_time() -> None:
     best, late = candidate(1, 0.2), candidate(1, 0.3, delay=0)
-    linear = [candidate(1, 0.25), best, candidate(1, 0.4), late, candidate(ORDERS + 1, 0.1)]
+    linear = [candidate(1, 0.25, delay=2), best, candidate(1, 0.4, delay=7), late, candidate(ORDERS + 1, 0.1)]
     assert _bases(linear) == [best, late]
 
 
