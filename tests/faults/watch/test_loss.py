@@ -3,15 +3,22 @@ import pytest
 
 from faults.watch.loss import (
     ALIKE,
+    ALLOWED,
     DELAYS,
     KNOWN,
     LARGEST,
+    LAST,
+    LEAST_LEARNT,
     LEARNT,
     LIMIT,
+    OIL,
     OTHERS,
+    RATIO,
+    RISEN,
     SEEN,
     SHARE,
     SPANS,
+    SPREAD,
     WANTED,
     count_lag,
     count_work,
@@ -161,3 +168,22 @@ def test_another_drive_is_left_out_and_learnt_when_it_stays() -> None:
     assert not any(drive_is_alike(other, loss) for _ in range(int(LEARNT)))
     assert loss[SPANS] == 0.0
     assert drive_is_alike(other, loss)
+
+
+@pytest.mark.parametrize("known", [LEAST_LEARNT - 1.0, LEAST_LEARNT])
+def test_a_span_is_scored_by_its_distance_from_what_warm_oil_explains_over_its_deviation(known: float) -> None:
+    loss, levels = np.zeros(SEEN + 1), np.zeros((4, 2))
+    state = {SPANS: 12.0, WANTED: 12.0, SHARE: 0.08, RATIO: 1.0, SPREAD: 4e-4, KNOWN: known, SEEN: 20.0, LAST: 0.08}
+    for place, value in {**state, RISEN: 0.5, LIMIT: 7.0}.items():
+        loss[place] = value
+    assert not judge_loss(span(0.2), 33.0, loss, levels)
+    apart = 0.5 * (0.2 - 0.08) ** 2  # half the square of a difference has the variance of one
+    if known >= LEAST_LEARNT:
+        apart = min(apart, 9.0 * 4e-4)
+    spread = 4e-4 + (apart - 4e-4) / (known + 1.0)
+    assert loss[SPREAD] == pytest.approx(spread)
+    deviation = np.sqrt(spread) * (1.0 + 2.0 / np.sqrt(known + 2.0))  # the spread is an estimate itself
+    score = min((0.2 - 0.08 - (OIL - 1.0) * 0.08) / deviation, LARGEST)
+    assert loss[RISEN] == pytest.approx(0.5 + score - ALLOWED)
+    assert levels[20 % 4].tolist() == [0.2, 33.0]
+    assert (loss[LAST], loss[SEEN], loss[KNOWN]) == (0.2, 21.0, known + 1.0)
