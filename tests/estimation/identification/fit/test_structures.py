@@ -150,6 +150,7 @@ def test_an_unstable_model_warns() -> None:
     with pytest.warns(LogWarning) as caught:
         assert not fit_arx(u, y, 1.0, n_numerator=1, n_denominator=1, delay=1).is_stable
     (note,) = [one.message.note for one in caught]
+    assert caught[0].filename == __file__  # it points at who asked for the fit
     assert (note.code, note.data["structure"]) == (IdentificationCode.UNSTABLE, "ARX")
     assert note.data["modulus"] == pytest.approx(1.01, abs=0.002)
 

@@ -1,8 +1,17 @@
 import numpy as np
+import pytest
 
 from estimation.identification import LinearModel
 from estimation.identification.search.criterion import Structure
-from estimation.identification.search.pole_search import banded_spectra, reflected, search_poles
+from estimation.identification.search.pole_search import (
+    DAMPING_RATIOS,
+    _multiplied,
+    _pole_pairs,
+    _real_poles,
+    banded_spectra,
+    reflected,
+    search_poles,
+)
 
 
 def found(structure: Structure, u: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -44,3 +53,29 @@ def test_unstable_roots_are_reflected_into_the_unit_circle() -> None:
     rows = reflected([np.poly([1.25, 0.5]), np.poly([0.3, -0.2])])
     np.testing.assert_allclose(np.sort(np.roots([1.0, *rows[0]])), [0.5, 0.8])
     np.testing.assert_allclose(rows[1], np.poly([0.3, -0.2])[1:])
+
+
+def test_pairs_of_poles_are_real_or_conjugate_with_the_damping_ratios_that_are_named() -> None:
+    n = 2000
+    real = -_real_poles(n)[:, 0]
+    assert np.all((real > -1.0) & (real < 1.0))
+    ratios, frequencies = list[float](), list[float]()
+    for row in _pole_pairs(n):
+        roots = np.roots([1.0, *row])
+        assert np.abs(roots).max() < 1.0
+        if np.iscomplex(roots).any():
+            continuous = np.log(roots[0])
+            frequencies.append(abs(continuous))
+            ratios.append(-continuous.real / abs(continuous))
+        else:
+            assert all(np.min(np.abs(real - root.real)) < 1e-6 for root in roots)
+    assert np.unique(np.round(ratios, 6)).tolist() == pytest.approx(sorted(DAMPING_RATIOS), abs=1e-6)
+    assert min(frequencies) == pytest.approx(8.0 * np.pi / n)
+    assert max(frequencies) == pytest.approx(0.97 * np.pi)
+
+
+def test_products_of_denominators_are_those_of_their_polynomials() -> None:
+    rng = np.random.default_rng(0)
+    kept, additions = rng.normal(size=(3, 2)), rng.normal(size=(4, 1))
+    wanted = [np.polymul([1.0, *a], [1.0, *b])[1:] for a in kept for b in additions]
+    np.testing.assert_allclose(_multiplied(kept, additions), wanted)

@@ -1,0 +1,21 @@
+"""The sine of a drive is found to a small part of a spectral line, however long it lasted."""
+
+import numpy as np
+import pytest
+
+from estimation.diaphragm_motor.signature import steady_drive
+
+
+@pytest.mark.parametrize("seconds", [0.2, 2.0, 10.0])
+@pytest.mark.parametrize("off", [0.0, 0.25, 0.45])
+def test_frequency_swing_and_phase_of_a_drive_between_two_spectral_lines(seconds: float, off: float) -> None:
+    T = 1e-3
+    size = round(seconds / T)
+    frequency = (round(33.0 * seconds) + off) / seconds
+    voltage = 5.0 + 60.0 * np.sin(2.0 * np.pi * frequency * T * np.arange(size) + 0.4)
+    voltage += 0.01 * np.random.default_rng(0).standard_normal(size)
+    found = steady_drive(voltage, T)
+    # the deviation of a sine's frequency in white noise: sqrt(6) s / (pi a T sqrt(n)) over its length
+    deviation = np.sqrt(6.0) * 0.01 / (np.pi * 60.0 * seconds * np.sqrt(size))
+    assert found.frequency == pytest.approx(frequency, abs=6.0 * deviation)
+    assert found.peak_to_peak == pytest.approx(120.0, rel=1e-3)
