@@ -161,3 +161,34 @@ def test_only_a_continuous_model_is_made_discrete_and_it_goes_to_control_as_it_i
     one = continuous.discretised()
     assert one.dc_gain == pytest.approx(2.0)
     assert np.sort_complex(one.poles) == pytest.approx(np.sort_complex(np.exp(1e-3 * np.roots([1.0, 8.0, 100.0]))))
+
+
+@pytest.mark.parametrize("continuous", [False, True])
+def test_a_response_is_that_of_the_polynomials_and_its_gradient_is_its_derivative(continuous: bool) -> None:
+    late = {"continuous": True, "dead_time": 0.03} if continuous else {"delay": 2}
+    b, f = ([0.4, 2.0], [1.0, 0.3, 4.0]) if continuous else ([0.0, 0.0, 0.4, 0.2], [1.0, -1.2, 0.5])
+    frequency, T = np.array([0.0, 0.1, 0.7]), 0.1
+
+    def made(numerator: np.ndarray, denominator: np.ndarray) -> LinearModel:
+        return LinearModel(numerator, denominator, T, "u", "y", **late)
+
+    response, gradient = made(np.array(b), np.array(f)).response_gradient(frequency)
+    s = 2j * np.pi * frequency
+    if continuous:
+        wanted = np.polyval(b, s) / np.polyval(f, s) * np.exp(-0.03 * s)
+    else:
+        wanted = np.polyval(b[::-1], np.exp(-s * T)) / np.polyval(f[::-1], np.exp(-s * T))
+    np.testing.assert_allclose(response, wanted, rtol=1e-12)
+    free = len(b) - late.get("delay", 0)
+    values = np.array([*b[len(b) - free :], *f[1:]])
+    assert gradient.shape == (3, values.size)
+    for k in range(values.size):
+        step = np.zeros(values.size)
+        step[k] = 1e-6
+        sides = [
+            made(np.array([*b[: len(b) - free], *one[:free]]), np.array([1.0, *one[free:]])).response_gradient(
+                frequency
+            )[0]
+            for one in (values + step, values - step)
+        ]
+        np.testing.assert_allclose(gradient[:, k], (sides[0] - sides[1]) / 2e-6, rtol=1e-6, atol=1e-8)
