@@ -165,3 +165,20 @@ def test_where_no_bend_can_be_fitted_the_model_is_linear(monkeypatch: pytest.Mon
     found = identified(logged(PLANTED[0], 1))
     assert found.model.structure == "output-error"
     assert "no_nonlinearity" in {str(note.code) for note in found.notes}
+
+
+@pytest.mark.parametrize(
+    ("kind", "allowed", "refused"),
+    [
+        ("backlash", [[0.0], [0.99]], [[-0.01], [1.0], [1.5]]),  # a play as wide as the input moves nothing
+        ("dead-zone", [[-0.5, 0.5], [0.2, 0.2], [-1.0, 1.0]], [[0.5, 0.4], [-1.1, 0.0], [0.0, 1.1]]),
+        ("saturation", [[-0.5, 0.5], [-1.0, 1.0]], [[0.2, 0.2], [-1.1, 0.0], [0.0, 1.1]]),
+    ],
+)
+def test_a_bend_is_sought_only_where_the_input_shows_it(
+    kind: str, allowed: list[list[float]], refused: list[list[float]]
+) -> None:
+    u, bend = np.linspace(-1.0, 1.0, 201), KINDS[kind]
+    assert [bend.may(u, np.array(values)) for values in allowed] == [True] * len(allowed)
+    assert [bend.may(u, np.array(values)) for values in refused] == [False] * len(refused)
+    assert all(bend.may(u, start) for start in bend.starts(u))
