@@ -67,8 +67,8 @@ SLIGHT = 1e-3
 
 SLIGHT_SHARE = 0.002
 """Share of the misfit that a further step must promise where no number will be believed [fraction]: how far the log is
-from explained is then known well enough. At a hundredth, a long way down was given up whose first steps promise
-little."""
+from explained is then known well enough. At a hundredth, long ways down were given up whose first steps
+promise little."""
 
 SAME_COST, SAME_MODULUS = 0.02, 0.01
 """Relative difference of misfits, and of bulk moduli, up to which two starts came to the same pit [fraction]."""

@@ -32,6 +32,10 @@ FASTEST_MAKEUP = 0.5 * LONGEST_STEP
 """Least time in which a wide open make-up valve fills a chamber [s]. At a fifth of a model step the model may chatter,
 as at a sharp relief valve: the deviation of bulk modulus came out nine times too small."""
 
+MOST_VOLUME = 2.0
+"""Factor by which a chamber's volume is sought above or below the rig file's [dimensionless]: 4.6 deviations of what is
+presumed. Volumes 4 and 80 times as large took the place of an encoder's zero."""
+
 ADIABATIC = 1.4
 """Exponent of nitrogen that is compressed quickly [dimensionless]."""
 
@@ -189,6 +193,8 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     limits = {"speed_lead": (0.0, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
     limits[START_LEVEL] = (-rig["accumulator_pressure"], _shut_in(log))
     stiff = max(rig["bulk_modulus"], *(model.values(guess)["bulk_modulus"] for guess in guesses))
+    volume = rig["chamber_volume"]
+    limits["chamber_volume"] = (volume / MOST_VOLUME, MOST_VOLUME * volume)
     limits["makeup_conductance"] = (0.0, 2.0 * rig["chamber_volume"] / (FASTEST_MAKEUP * stiff))
     if log.passes_on:
         found = [model.values(guess)["bulk_modulus"] for guess in guesses]
