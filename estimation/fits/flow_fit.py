@@ -198,9 +198,7 @@ def _asked(
     if not _explains(swinging, log.passes_on):
         return (BEGUN,) if moving else HYPOTHESES, ()
     by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
-    delivery = swinging.released.get(DELIVERY.free[0])
-    if delivery is None:  # of a fit that counts for nothing beside the likeliest it is not told
-        delivery = promised(log, parameters, swinging.values, DELIVERY, by_mass=by_mass)
+    delivery = promised(log, parameters, swinging.values, DELIVERY, by_mass=by_mass)
     zeros = [promised(log, parameters, swinging.values, ENCODER_ZERO, by_mass=by_mass)]
     if best is not swinging:  # volumes that swing may have led the fit astray, where the slopes promise nothing
         zeros.append(promised(log, parameters, best.values, ENCODER_ZERO))

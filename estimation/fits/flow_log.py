@@ -10,12 +10,11 @@ from estimation.arrays import Array
 from estimation.fits.averaged import averaged
 from estimation.fits.form_fit import LONGEST_STEP
 from estimation.fits.greybox_log import GreyBoxLog, greybox_log
-from estimation.fits.hypotheses import DELIVERY, PRESUMED
 from estimation.log_checks.bridging import bridged, gaps
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from estimation.log_checks.outliers import without_outliers
 from estimation.models.completed_flow import CRACKS
-from estimation.models.flow import FLOW_FORM, STIFFNESS
+from estimation.models.flow import FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
 from plant.eha.model import EhaParameters, piston_areas
 from plant.log.record import Record
@@ -140,7 +139,6 @@ def flow_log(
         log,
         noise=(replace(log.noise[0], passed_on=passed_on, passed_by="bulk_modulus"),),
         timed=FLOW_FORM.drives,
-        released={DELIVERY.free[0]: (PRESUMED[DELIVERY.free[0]], (STIFFNESS, *CRACKS))},
         drive_std=(log.drive_std[0], 0.0),  # the residuals hold position's
         # where the piston is within a gap of its position is not known, where it is after it is
         measured=np.where(_within_gaps(record["position_m"])[:, None], np.nan, log.measured),

@@ -4,21 +4,20 @@ The variance of an estimate has three parts, told apart: noise of the outputs, n
 well the rig's own parameters are known. The last two are read off the fit's linear response to them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.fits.asked import lateness, promises_of_release, rig_slopes
 from estimation.fits.covariance import automatic_lags, least_squares_covariance
 from estimation.fits.descent import Point, descend
 from estimation.fits.drive_noise import drive_variance
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem, search_bounds
-from estimation.fits.release import Promise
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
+from plant.solvers.steps import parameter_names
 from plant.spare_processors import each
 
 LEAST_EFFECT = 1.0
@@ -39,6 +38,12 @@ EXPLAINED = 1.2
 NOISE_DOUBT = 0.2
 """Standard deviation of the share of a driving channel's noise that is counted with the slopes: its size is known to
 some percent, and it is white in theory alone [fraction]."""
+
+LATE_NUDGE = 1e-5
+"""Time by which a driving channel is brought forward to see what its timing does [s]."""
+
+RIG_NUDGE = 1e-3
+"""Relative change of a rig parameter by which the fit's response to it is read off [fraction]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +71,6 @@ class GreyBoxFit:
     late : Mapping[str, tuple of float]
         By driving channel whose timing is asked: the time by which it seems to come late [s], and what bringing it
         forward would gain in log-likelihood, to first order [dimensionless].
-    released : Mapping[str, Promise]
-        By parameter of the actuator of which it is asked: what it promises were it free.
     """
 
     model: GreyBoxModel
@@ -79,7 +82,6 @@ class GreyBoxFit:
     autocorrelation: tuple[float, ...]
     rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
     late: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
-    released: Mapping[str, Promise] = field(default_factory=dict[str, Promise])
 
 
 @dataclass(frozen=True)
@@ -236,14 +238,13 @@ def concluded(
         The fit.
     """
     model, theta = problem.model, point.theta
-    errors, every = problem.linearised(theta)
-    slopes, free = every, dict[str, Promise]()
-    felt = np.flatnonzero(np.einsum("ij,ij->j", every, every) > LEAST_EFFECT**2)
+    errors, slopes = problem.linearised(theta)
+    felt = np.flatnonzero(np.einsum("ij,ij->j", slopes, slopes) > LEAST_EFFECT**2)
     noise, rig, late = np.full(len(theta), np.inf), dict[str, Array](), dict[str, tuple[float, float]]()
     used = int(np.count_nonzero(errors))
     if len(felt) and used > len(theta):
         if len(felt) < len(theta):
-            slopes = every[:, felt]
+            slopes = slopes[:, felt]
         bread, spread = least_squares_covariance(
             slopes, errors.ravel(), used, automatic_lags(errors.ravel()), problem.prior[felt], warned=warned
         )
@@ -256,10 +257,8 @@ def concluded(
         # the window's estimate need not be positive: then nothing is known
         noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))
         if disturbed and asked:
-            doubted, asked_of = rig_slopes(problem, theta)
-            free = dict(promises_of_release(problem, point, errors, every, asked_of))
-            rig = {name: _spread_out(-response(slope), felt, len(theta)) for name, slope in doubted.items()}
-            late = dict(lateness(problem, theta, errors.ravel(), lambda shift: shift - slopes @ response(shift)))
+            rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in _rig_slopes(problem, theta, response)}
+            late = dict(_lateness(problem, theta, errors.ravel(), lambda shift: shift - slopes @ response(shift)))
     sizes = dict(model.linear)
     values = model.values(theta)
     unit = np.array([sizes.get(name, values[name]) for name in model.unknowns])
@@ -274,11 +273,49 @@ def concluded(
         std=dict(zip(model.unknowns, map(float, unit * noise), strict=True)),
         rig_slopes=slopes_si,
         late=late,
-        released=free,
         cost=point.cost,
         chi_square=tuple(map(float, squares / seen)),
         autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),
     )
+
+
+def _rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Array]) -> Iterator[tuple[str, Array]]:
+    """Yield by how much the unknowns would differ per relative change of each uncertain parameter of the rig."""
+    names, row = parameter_names(problem.model.parameters), problem.log.parameters
+    asked = [
+        name
+        for name, relative in problem.log.uncertainties.items()
+        if relative > 0.0 and name in names and name not in problem.model.unknowns
+    ]
+    nudged = [np.where(np.arange(len(row)) == names.index(name), row * (1.0 + RIG_NUDGE), row) for name in asked]
+    known, *shifted = problem.residuals_of(theta, [row, *nudged])
+    for name, errors in zip(asked, shifted, strict=True):
+        yield name, -response(errors - known) / RIG_NUDGE
+
+
+def _lateness(
+    problem: Problem, theta: Array, errors: Array, left: Callable[[Array], Array]
+) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Yield by how much each driving channel that is asked seems late, and what it is worth (Rao's score statistic).
+
+    ``left`` gives what the unknowns do not take up of a change of the residuals.
+    """
+    log = problem.log
+    if not log.timed:
+        return
+    rough = problem.on(log.coarsened())
+    reach = max(1, round(0.5 * log.block / log.sample_time))
+    padded = np.pad(log.drives, ((reach, reach), (0, 0)), mode="edge")
+    ahead = LATE_NUDGE * (padded[2 * reach :] - padded[: -2 * reach]) / (2 * reach * log.sample_time)
+    places = [problem.model.drives.index(channel) for channel in log.timed]
+    forward = [np.where(np.arange(log.drives.shape[1]) == place, ahead, 0.0) for place in places]
+    known, *shifted = rough.disturbed(theta, [log.drives + one for one in (0.0, *forward)])
+    for channel, moved in zip(log.timed, shifted, strict=True):
+        free = left((moved - known).ravel() / LATE_NUDGE)
+        power = float(free @ free)
+        if power > 0.0:
+            along = float(free @ errors)
+            yield channel, (-along / power, 0.5 * along**2 / power)
 
 
 def _spread_out(values: Array, places: NDArray[np.intp], length: int) -> Array:

@@ -91,9 +91,6 @@ class GreyBoxLog:
         Length over which residuals are averaged before they are squared [s].
     timed : tuple of str
         Driving channels of which a fit asks whether they come late.
-    released : Mapping[str, tuple of float and tuple of str]
-        Parameters of the actuator of which a fit asks what they would promise were they free: standard deviation of
-        their logarithm before the log is seen [dimensionless], and the unknowns that are held meanwhile.
     """
 
     drives: Array
@@ -108,9 +105,6 @@ class GreyBoxLog:
     presumed: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
     block: float = BLOCK
     timed: tuple[str, ...] = ()
-    released: Mapping[str, tuple[float, tuple[str, ...]]] = field(
-        default_factory=dict[str, tuple[float, tuple[str, ...]]]
-    )
 
     def beginning(self, samples: int) -> "GreyBoxLog":
         """Return the log's first part.

@@ -2,17 +2,39 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
 
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import Hypothesis
-from estimation.fits.release import Promise, released
 from estimation.fits.wide_problem import freed, usual_values, widened
 from estimation.models.wide_flow import WideFlowParameters
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.solvers.steps import parameter_names
 
 LIKELIEST = 4
 """Hypotheses that are tried first, of which the slopes of the fit so far promise most."""
+
+
+class Promise(NamedTuple):
+    """What a hypothesis promises beside a fit, to first order.
+
+    Parameters
+    ----------
+    gain : float
+        In log-likelihood, Rao's score statistic over two [dimensionless].
+    size : float
+        How far what is freed first would move in its fitted coordinate: for a logarithm a relative change
+        [dimensionless].
+    deviation : float
+        How well that coordinate would then be known, what is presumed of it included [dimensionless].
+    """
+
+    gain: float
+    size: float
+    deviation: float
 
 
 def promised(
@@ -99,10 +121,19 @@ def _promises(
     held = {name for one in asked for name in one.instead}
     own = [name for name in freed(log, together).model.unknowns if name not in held]
 
-    place = problem.model.unknowns.index
-    known = [place(name) for name in own]
+    def step(names: Sequence[str]) -> tuple[float, Array, Array]:
+        places = [problem.model.unknowns.index(name) for name in names]
+        gradient = point.gradient[places]
+        gram = point.gram[np.ix_(places, places)]
+        known = np.asarray(np.linalg.pinv(gram, rcond=len(places) * np.finfo(float).eps), dtype=np.float64)
+        moved: Array = known @ gradient
+        return 0.5 * float(gradient @ moved), moved, np.diag(known)
+
+    before = step(own)[0]
     promises: list[Promise] = []
     for one in asked:
-        free = [place(name) for name in dict.fromkeys((*own, *one.free))]
-        promises.append(released(point.gradient, point.gram, known, free, place(one.free[0])))
+        names = list(dict.fromkeys((*own, *one.free)))
+        gain, moved, variances = step(names)
+        place = names.index(one.free[0])
+        promises.append(Promise(gain - before, float(abs(moved[place])), float(variances[place]) ** 0.5))
     return promises

@@ -84,7 +84,6 @@ def widened(
         log,
         drives=np.column_stack([log.drives, np.arange(samples) / samples, rate, side_of_play(position)]),
         drive_std=(*log.drive_std, 0.0, 0.0, 0.0),
-        released={},
         parameters=parameter_row(
             WideFlowParameters(
                 **known,

@@ -316,7 +316,7 @@ def _at(blocks: Blocks, actuator: Actuator, centre: Array, point: Array, pull: A
 
 def _step(blocks: Blocks, fit: PointFit, centre: Array, pull: Array) -> Array:
     """Return a Gauss-Newton step, no longer than `FARTHEST`."""
-    step = np.asarray(np.linalg.solve(fit.information + pull, _uphill(blocks, fit, centre, pull)), dtype=np.float64)
+    step = np.linalg.solve(fit.information + pull, _uphill(blocks, fit, centre, pull)).astype(np.float64)
     return step * min(1.0, FARTHEST / float(np.max(np.abs(step))))
 
 
@@ -328,5 +328,5 @@ def _promised(blocks: Blocks, fit: PointFit, centre: Array, pull: Array, step: A
 def _uphill(blocks: Blocks, fit: PointFit, centre: Array, pull: Array) -> Array:
     """Return the slope of the log-posterior, shape (7,)."""
     left = np.nan_to_num((blocks.outputs - fit.fitted)[blocks.first :]) / fit.scales**2
-    gained = np.einsum("ink,nk->i", fit.slopes[:, blocks.first :], left) - pull @ (fit.coordinates - centre)
-    return np.asarray(gained, dtype=np.float64)
+    gained: Array = np.einsum("ink,nk->i", fit.slopes[:, blocks.first :], left)
+    return gained - pull @ (fit.coordinates - centre)

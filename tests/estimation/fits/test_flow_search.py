@@ -87,18 +87,6 @@ def test_what_a_hypothesis_promises_is_asked_where_the_plain_fit_stands() -> Non
     assert promised(log, HEALTHY, plain, DELIVERY, by_mass=False)[0] > 100.0
 
 
-@pytest.mark.parametrize("drive", ["steps", "prbs"])
-def test_what_a_worn_pump_promises_is_told_with_the_fit_as_the_wide_form_tells_it(drive: str) -> None:
-    p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(5)
-    speed = make_drive(drive, 2.0, 1e-3, p, rng)
-    log = seen(simulate(CIRCUIT, speed, 1e-3, p, sensors=BENCH, rng=rng))
-    fit = min(balanced(log, HEALTHY, STARTS), key=lambda one: one.cost)
-    mass = fit.model.rates is MASS_FLOW_FORM.rates
-    told, asked = fit.released["pump_displacement"], promised(log, HEALTHY, fit.values, DELIVERY, by_mass=mass)
-    assert told.deviation == pytest.approx(asked.deviation, rel=0.1)
-    assert told.gain == pytest.approx(asked.gain, rel=0.1, abs=0.5)
-
-
 def test_make_up_valves_that_crack_apart_are_fitted_and_do_not_bias_bulk_modulus() -> None:
     machine = Machine(crack_a=3e3, crack_b=0.0, ripple=0.0)
     rng = np.random.default_rng(3)
