@@ -24,7 +24,7 @@ from estimation.fits.hypotheses import (
     START_LOAD,
     Hypothesis,
 )
-from estimation.fits.promises import promised
+from estimation.fits.promises import promised, promised_each
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
 from estimation.notes import EstimateCode, RigCode
@@ -198,8 +198,7 @@ def _asked(
     if not _explains(swinging, log.passes_on):
         return (BEGUN,) if moving else HYPOTHESES, ()
     by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
-    delivery = promised(log, parameters, swinging.values, DELIVERY, by_mass=by_mass)
-    zeros = [promised(log, parameters, swinging.values, ENCODER_ZERO, by_mass=by_mass)]
+    delivery, *zeros = promised_each(log, parameters, swinging.values, ALWAYS_ASKED, by_mass=by_mass)
     if best is not swinging:  # volumes that swing may have led the fit astray, where the slopes promise nothing
         zeros.append(promised(log, parameters, best.values, ENCODER_ZERO))
     worth = (delivery, WORTH, LEAST_DELIVERY), (max(zeros), ZERO_WORTH, LEAST_ZERO)

@@ -15,7 +15,7 @@ from estimation.fits.descent import Point, descend
 from estimation.fits.flow_log import DRAIN_START, LEAST_LEAKAGE, OPENING_START, usual_leakage
 from estimation.fits.form_fit import FAULTS_TRIED
 from estimation.fits.freed_problem import FreedProblem
-from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, explained, roughly
+from estimation.fits.greybox_fit import NEAR_ENOUGH, GreyBoxFit, Search, concluded, explained, roughly
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem
 from estimation.fits.wide_problem import flow_bounds
@@ -220,12 +220,14 @@ def _guess(form: GreyBoxModel, log: GreyBoxLog, starts: Sequence[Mapping[str, fl
     ]
     likeliest = guesses[int(np.argmin(problem.costs(guesses)))]
     bounds = flow_bounds(form, guesses, log)
-    found = descend(problem.at, likeliest, search.evaluations, bounds, ROUGH_ENOUGH, GUESSED_WITHIN)
+    found = descend(problem.at, likeliest, search.evaluations, bounds, search.near_enough, GUESSED_WITHIN)
     return problem.model.values(found.theta)
 
 
 def _search(log: GreyBoxLog) -> Search:
-    return Search(screened=ceil(SCREENED_SECONDS / log.sample_time), near_enough=ROUGH_ENOUGH)
+    # where the noise moves with bulk modulus, steps promise less than they give
+    near_enough = NEAR_ENOUGH if log.passes_on else ROUGH_ENOUGH
+    return Search(screened=ceil(SCREENED_SECONDS / log.sample_time), near_enough=near_enough)
 
 
 def _searched(

@@ -259,13 +259,13 @@ class FreedProblem(Problem):
 
 def _nudged(theta: Array) -> Array:
     """Return a point and its neighbours, a row each."""
-    return theta + _nudges(len(theta))
+    return theta + NUDGE * _neighbours(len(theta))
 
 
 @cache
-def _nudges(unknowns: int) -> Array:
-    """Return the steps from a point to itself and to its neighbours, a row each."""
-    return np.eye(unknowns + 1, unknowns, -1) * NUDGE
+def _neighbours(unknowns: int) -> Array:
+    """Return the directions from a point to itself and to its neighbours, a row each."""
+    return np.eye(unknowns + 1, unknowns, -1)
 
 
 def _differences(found: Array) -> tuple[Array, Array]:

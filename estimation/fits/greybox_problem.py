@@ -330,9 +330,7 @@ def weighed(errors: Array, slopes: Array) -> tuple[float, Array, Array]:
         As a kernel gives them.
     """
     weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)
-    weighted = weight * errors
-    cost = float(weighted.ravel() @ ((1.0 - 0.5 * weight) * errors).ravel())
+    cost = float(np.sum((1.0 - 0.5 * weight) * weight * errors**2))
     columns = slopes.reshape(errors.size, -1)
-    straight = columns[np.flatnonzero(weight < 1.0)]  # few, so that weighing them again is less than weighing all
-    gram = columns.T @ columns - (1.0 - STRAIGHT) * (straight.T @ straight)
-    return cost, weighted.ravel() @ columns, np.tril(gram)
+    bent = columns * np.where(weight < 1.0, STRAIGHT, 1.0).reshape(-1, 1)
+    return cost, (weight * errors).ravel() @ columns, np.tril(bent.T @ columns)

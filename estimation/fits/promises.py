@@ -60,8 +60,39 @@ def promised(
     Promise
         Its promise.
     """
+    return promised_each(log, parameters, plain, (one,), by_mass=by_mass)[0]
+
+
+def promised_each(
+    log: GreyBoxLog,
+    parameters: EhaParameters,
+    plain: Mapping[str, float],
+    asked: Sequence[Hypothesis],
+    *,
+    by_mass: bool = False,
+) -> list[Promise]:
+    """Return what each of several hypotheses promises by itself, from one evaluation; see `promised`.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    plain : Mapping[str, float]
+        What the plain form found [SI].
+    asked : sequence of Hypothesis
+        What is asked; none holds an unknown of the plain form.
+    by_mass : bool
+        Whether the plain fit balances mass.
+
+    Returns
+    -------
+    list of Promise
+        Their promises.
+    """
     wide = widened(log, parameters, plain)
-    return _promises(balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, (one,))[0]
+    return _promises(balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, asked)
 
 
 def balanced_by(log: GreyBoxLog, mass: float) -> GreyBoxLog:

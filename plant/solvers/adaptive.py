@@ -117,8 +117,20 @@ def controlled_groups(
 
     Parameters
     ----------
-    starts, speed, parameters, sample_time, tolerance, drive_tolerance, longest
-        As of `controlled_run`.
+    starts : ndarray, shape (runs, states)
+        Initial states in SI.
+    speed : ndarray, shape (n,)
+        Drive at the samples [its SI unit], linear between.
+    parameters : ndarray, shape (1 or n, runs, parameters)
+        Parameter rows.
+    sample_time : float
+        Seconds between samples [s].
+    tolerance : float
+        Error of a step [dimensionless].
+    drive_tolerance : float, optional
+        By how much steps may smooth the drive [dimensionless].
+    longest : float
+        Longest step [s].
 
     Yields
     ------

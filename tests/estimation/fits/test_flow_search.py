@@ -8,8 +8,8 @@ from estimation.fits.flow_log import flow_log
 from estimation.fits.flow_search import balanced, flow_starts
 from estimation.fits.greybox_fit import GreyBoxFit, roughly
 from estimation.fits.greybox_log import GreyBoxLog
-from estimation.fits.hypotheses import DELIVERY
-from estimation.fits.promises import promised
+from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO
+from estimation.fits.promises import promised, promised_each
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.flow import MASS_FLOW_FORM
 from experiments.open_benchmark.logger import PLAIN, Logger
@@ -85,6 +85,14 @@ def test_what_a_hypothesis_promises_is_asked_where_the_plain_fit_stands() -> Non
     plain = by_mass(balanced(log, HEALTHY, STARTS)).values
     assert promised(log, HEALTHY, plain, DELIVERY, by_mass=True)[0] < 10.0
     assert promised(log, HEALTHY, plain, DELIVERY, by_mass=False)[0] > 100.0
+
+
+def test_what_is_promised_together_is_promised_alone() -> None:
+    log = seen(recorded("minor_friction", 10.0, 2e-3))
+    plain = balanced(log, HEALTHY, STARTS)[0].values
+    together = promised_each(log, HEALTHY, plain, (DELIVERY, ENCODER_ZERO))
+    for one, told in zip((DELIVERY, ENCODER_ZERO), together, strict=True):
+        assert tuple(told) == pytest.approx(tuple(promised(log, HEALTHY, plain, one)), rel=1e-4)
 
 
 def test_make_up_valves_that_crack_apart_are_fitted_and_do_not_bias_bulk_modulus() -> None:

@@ -147,7 +147,7 @@ def plan_of_explanations() -> dict[str, Any]:
 def plan_of_the_flow_form() -> dict[str, Any]:
     told: dict[str, Any] = {}
 
-    def concluded(_: Any, point: Point, disturbed: bool = True) -> Any:
+    def concluded(_: Any, point: Point, disturbed: bool = True, **_asked: bool) -> Any:
         return [point.cost, disturbed]
 
     for name, one in {"plain": seen(log(0.5)), "noisy position": seen(log(0.5, position_noise=3e-5))}.items():

@@ -214,3 +214,29 @@ def test_without_pressure_a_fit_is_moved_along_the_scale_to_its_condition(
     monkeypatch.setattr(class_regions, "nominal_runs", lambda *_: runs)
     monkeypatch.setattr(class_regions, "fit_freely", lambda *_: found)
     np.testing.assert_allclose(fit_classes(log, ACTUATOR).best.coordinates, ACTUATOR.conditions[0], atol=1e-9)
+
+
+def test_from_a_circuit_that_explains_the_log_no_search_begins_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    drive = 100.0 * np.sign(np.sin(2.0 * np.pi * np.arange(3001) / 600.0))
+    still = Blocks(drive, 1e-3, 10, np.zeros(300), np.zeros(300), np.array([2e-4, 2e4]))
+    truth = 0.6 * ACTUATOR.conditions[0] + 0.4 * ACTUATOR.conditions[3]
+    run = predicted(still, parameter_rows(truth[None], ACTUATOR.circuit, ACTUATOR.rated))[0]
+    noise = still.noise * np.random.default_rng(2).standard_normal(run.shape)
+    log = replace(still, velocity=(run + noise)[:, 0], pressure=(run + noise)[:, 1])
+    begun: list[bool] = []
+    usual = class_regions.fit_freely
+
+    def counted(*given: object) -> PointFit:
+        begun.append(given[3] is None)
+        return usual(*given)  # pyright: ignore[reportArgumentType] -- as it came
+
+    monkeypatch.setattr(class_regions, "fit_freely", counted)
+    quick = fit_classes(log, ACTUATOR)
+    assert begun.count(True) == 1
+    monkeypatch.setattr(class_regions, "explains", lambda *_: False)
+    whole = fit_classes(log, ACTUATOR)
+    assert begun.count(True) > 2
+    assert quick.best.cost < whole.best.cost + 0.5
+    off = quick.best.coordinates - whole.best.coordinates
+    assert float(off @ whole.best.information @ off) < 1.0
+    assert np.argmax(quick.scores) == np.argmax(whole.scores)

@@ -14,10 +14,7 @@ from faults.diagnosis.advice import advice_for, speeds_held
 from faults.diagnosis.blocks import Blocks, blocks_of
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_runs import coordinates_of
-from faults.diagnosis.class_regions import (
-    fit_classes,
-    region_scores,
-)
+from faults.diagnosis.class_regions import fit_classes, region_scores
 from faults.diagnosis.end_stop import _stands, stopped
 from faults.diagnosis.evidence import Scoreboard, bounded, friction_left_open, weigh
 from faults.diagnosis.innovation_bank import innovation_scores

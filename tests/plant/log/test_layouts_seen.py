@@ -1,6 +1,5 @@
 """A file that is written like an earlier one has its layout; what is written in any other way is looked at anew."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ def nothing_seen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def looked(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+def looked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Files that were looked at line by line."""
     found: list[str] = []
     usual = csv_layout.layout_of_lines
