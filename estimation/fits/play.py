@@ -30,9 +30,9 @@ def side_of_play(position: Array) -> Array:
 
     Examples
     --------
-    >>> moved = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 2.0, 1.0, 0.0])
-    >>> side_of_play(moved).round(1).tolist()
-    [0.0, 0.1, 0.4, 1.0, 0.9, 0.7, 0.3, -0.3, -1.0]
+    >>> out_and_back = 30.0 - np.abs(30.0 - np.arange(61.0))
+    >>> side_of_play(out_and_back)[[0, 20, 30, 34, 60]].round(1).tolist()
+    [0.0, 1.0, 0.9, -1.0, -1.0]
     """
     cell = max(CELLS * position_variance(position) ** 0.5, FINEST)
     at = np.round(position / cell)

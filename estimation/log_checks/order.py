@@ -47,8 +47,8 @@ def percentile(values: Array, percent: float) -> float:
 
     Examples
     --------
-    >>> percentile(np.array([3.0, 1.0, 2.0, 10.0]), 90.0)
-    7.9
+    >>> percentile(np.array([3.0, 1.0, 2.0, 10.0]), 50.0)
+    2.5
     """
     place = (len(values) - 1) * (percent / 100.0)
     low = floor(place)

@@ -1,9 +1,7 @@
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from estimation.fits import motion_fit, motion_search
@@ -22,17 +20,10 @@ from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import PLANTS, simulate
 from plant.errors import LogError
-from plant.log.files import read_record
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
 HEALTHY = EhaParameters()
-
-
-def bench(shared: Path, name: str) -> tuple[Record, float]:
-    truth = pd.read_csv(shared / "bench" / "truth.csv").set_index("file")
-    record = read_record(shared / "bench" / name).replace(differential_pressure_pa=None)
-    return record, float(truth.loc[name, "bulk_modulus_pa"])
 
 
 def short_log(seconds: float, seed: int = 1, sample_time: float = 1e-3) -> Record:
@@ -123,36 +114,6 @@ def test_starts_that_larger_noise_does_not_explain_or_that_end_alike_are_left_ou
         assert best < min(search.short.at(guess).cost for guess in search.guesses)
     assert all(len(points) == len(search.guesses) for points in begun.screened.values())
     assert begun.work > 0
-
-
-@pytest.mark.slow
-def test_a_foreign_log_without_pressure_gives_its_bulk_modulus(shared: Path) -> None:
-    record, truth = bench(shared, "run001.csv")
-    fit = fit_motion(record, HEALTHY, HEALTHY.bulk_modulus)
-    assert fit.parameters["bulk_modulus"][0] == pytest.approx(truth, rel=0.01)
-    assert fit.reasons == ()
-
-
-@pytest.mark.slow
-def test_foreign_logs_without_pressure_are_close_or_objected_to(shared: Path) -> None:
-    close = 0
-    for name in pd.read_csv(shared / "bench" / "truth.csv")["file"]:
-        record, truth = bench(shared, name)
-        fit = fit_motion(record, HEALTHY, HEALTHY.bulk_modulus)
-        error = abs(fit.parameters["bulk_modulus"][0] / truth - 1.0)
-        close += error < 0.05
-        assert error < 0.10 or fit.reasons
-    assert close >= 15
-
-
-@pytest.mark.slow
-def test_a_wrong_law_of_friction_is_objected_to(shared: Path) -> None:
-    record, _ = bench(shared, "run001.csv")
-    record = record.slice(0, 3000)
-    shaken = record["position_m"] + 2e-5 * np.sin(200.0 * np.arange(3000) * 1e-3)
-    fit = fit_motion(record.replace(position_m=shaken), HEALTHY, HEALTHY.bulk_modulus)
-    (large,) = (note for note in fit.reasons if note.code == EstimateCode.POSITION_RESIDUALS_LARGE)
-    assert large.data["ratio"] == pytest.approx(fit.chi_square**0.5)
 
 
 @pytest.mark.slow

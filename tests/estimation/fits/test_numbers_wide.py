@@ -1,5 +1,7 @@
 """Objections, hypotheses and the form of motion on short logs, kept in `numbers_wide.json`."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from typing import Any
 from unittest.mock import patch
@@ -62,6 +64,14 @@ def objections_on_either_side() -> dict[str, Any]:
     return told
 
 
+@contextmanager
+def all_promise(one: Promise) -> Iterator[None]:
+    """Let every hypothesis promise the same."""
+    each = [one] * len(flow_fit.ALWAYS_ASKED)
+    with patch.multiple(flow_fit, promised=lambda *_, **__: one, promised_each=lambda *_, **__: each):
+        yield
+
+
 @NUMBERS.case()
 def what_is_asked_of_a_log() -> dict[str, Any]:
     """Promises of the delivery on either side of where it is asked, and lengths of logs."""
@@ -74,8 +84,11 @@ def what_is_asked_of_a_log() -> dict[str, Any]:
         (11.0, 0.011, 0.05),
         (9.0, 0.02, 0.09),
         (9.0, 0.02, 0.11),
+        (29.0, 0.51, 0.05),
+        (31.0, 0.51, 0.05),
+        (31.0, 0.49, 0.05),
     ):
-        with patch.object(flow_fit, "promised", return_value=Promise(gain, size, deviation)):
+        with all_promise(Promise(gain, size, deviation)):
             asked, remarks = _asked(base, PAPER, sound, sound, loaded=False, moving=False)
         told[f"gain {gain:g}, size {size:g}, deviation {deviation:g}"] = [[one.name for one in asked], noted(remarks)]
     poor = made_fit(1.0, 2e8, 1e6, chi=2.0)
@@ -91,7 +104,7 @@ def what_is_asked_of_a_log() -> dict[str, Any]:
     ):
         plain = made_fit(1.0, 2e8, 1e6, chi=chi)
         fit = replace(plain, values={**plain.values, "makeup_conductance": fed * PAPER.makeup_conductance})
-        with patch.object(flow_fit, "promised", return_value=Promise(gain, 0.0, 0.05)):
+        with all_promise(Promise(gain, 0.0, 0.05)):
             asked, _ = _asked(base, PAPER, fit, fit if likeliest else sound, loaded=False, moving=True)
         told[f"in motion: {gain:g}, {fed:g}, {chi:g}, {likeliest}"] = [one.name for one in asked]
     lengths = (np.zeros((count, 2)) for count in (50000, 50001))
