@@ -69,6 +69,10 @@ ZERO_WORTH = 30.0
 encoder's zero [dimensionless]. They promise 100 at least where one is off by 60 mm or more, 2.5 at most on logs of 30
 other kinds, and 14 on one of a play, which a zero would explain wrongly."""
 
+TOO_WIDE = 20.0
+"""Conductance of the make-up valves, over that of the first guess, from which a search is begun with the guess too
+[dimensionless]."""
+
 ALWAYS_ASKED = (DELIVERY, ENCODER_ZERO)
 """What a log that the plain form explains is asked all the same, where the slopes promise a gain: both may hide."""
 
@@ -225,12 +229,16 @@ def _near(
     """Return where the search for what is strange begins: a fit that explains the log is in no wrong valley.
 
     But one that begins at rest may be where the log does not (``in_motion``): without make-up, which is then tried too.
+    So it is where make-up valves ended far wider than any, since the model is too rough there to find a way back.
     """
+    fed = {**fit.values, "makeup_conductance": MAKEUP_TRIED[0]}
     if explains(fit):
-        fed = {**fit.values, "makeup_conductance": MAKEUP_TRIED[0]}
         return [fit.values, fed] if in_motion else [fit.values]
     usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
-    return [{name: value for name, value in fit.values.items() if name not in (STIFFNESS, *CRACKS)}, *usual]
+    lost = fit.values["makeup_conductance"] > TOO_WIDE * MAKEUP_TRIED[0]
+    near = [fit.values, fed] if lost else [fit.values]
+    held = (STIFFNESS, *CRACKS)
+    return [*({name: value for name, value in one.items() if name not in held} for one in near), *usual]
 
 
 def _beforehand(fit: GreyBoxFit) -> float:

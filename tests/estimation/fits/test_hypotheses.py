@@ -13,7 +13,8 @@ from estimation.eha.explained import notes_of, rig_set_right, set_right
 from estimation.fits import explain as module
 from estimation.fits.descent import Point
 from estimation.fits.explain import Explanation
-from estimation.fits.flow_fit import _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
+from estimation.fits.flow_fit import _near, _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
+from estimation.fits.flow_search import MAKEUP_TRIED, flow_starts
 from estimation.fits.hypotheses import HYPOTHESES, LATEST
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.first_belief import begins_in_motion, first_load
@@ -204,6 +205,16 @@ def test_an_encoder_homed_elsewhere_is_named_where_held_volumes_explain_the_log_
     assert note.code is RigCode.ENCODER_ZERO
     assert note.data["zero_mm"] == pytest.approx(120.0, abs=note.data["half_width_mm"])
     assert note.data["half_width_mm"] < 20.0
+
+
+@pytest.mark.parametrize(("times", "begun"), [(19.0, 1), (21.0, 2)])
+def test_a_search_begins_with_usual_valves_too_where_a_fit_ended_with_far_wider_ones(times: float, begun: int) -> None:
+    plain = made_fit(100.0, 1.9e8, 1e6)
+    fit = replace(plain, values={**plain.values, "makeup_conductance": times * MAKEUP_TRIED[0]})
+    near = _near(fit, flow_starts(HEALTHY, 3e8), lambda _: False, in_motion=False)
+    assert [one["bulk_modulus"] for one in near[:begun]] == begun * [1.9e8]
+    assert near[begun - 1]["makeup_conductance"] == (fit.values if begun == 1 else near[-1])["makeup_conductance"]
+    assert near[begun]["bulk_modulus"] != 1.9e8
 
 
 def test_a_single_rod_whose_rig_file_gives_one_area_is_named_with_both() -> None:
