@@ -24,9 +24,10 @@ from estimation.fits.hypotheses import (
     START_LOAD,
     Hypothesis,
 )
-from estimation.fits.promises import promised, promised_each
+from estimation.fits.promises import Promise, promised, promised_each
+from estimation.fits.wide_problem import POSITION
 from estimation.models.completed_flow import CRACKS
-from estimation.models.flow import HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
+from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
 from estimation.notes import EstimateCode, RigCode
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
@@ -68,6 +69,13 @@ ZERO_WORTH = 30.0
 """Gain in log-likelihood that the slopes must promise before a log that the plain form explains is asked for its
 encoder's zero [dimensionless]. They promise 100 at least where one is off by 60 mm or more, 2.5 at most on logs of 30
 other kinds, and 14 on one of a play, which a zero would explain wrongly."""
+
+BESIDE_STOP = 0.02
+"""Share of its travel that an encoder homed at an end stop may read beyond the stop, which is soft; and what a log that
+begins in mid-stroke, at a reading of none, may read at first [fraction]."""
+
+NOTHING = Promise(0.0, 0.0, 0.0)
+"""What is not asked promises nothing."""
 
 TOO_WIDE = 20.0
 """Conductance of the make-up valves, over that of the first guess, from which a search is begun with the guess too
@@ -160,7 +168,7 @@ def fit_flow(
         by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
         strange = explain(log, parameters, near, explains, asked=asked, paired=paired, by_mass=by_mass)
         one = strange.fit
-        if explains(one) and one.cost < _wanted(strange.names, best, swinging):
+        if explains(one) and one.cost < _wanted(strange.names, best, swinging, homed=_homed_at_stop(log)):
             bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
             left = PLAY_STRUCTURE if PLAY.name in strange.names else STRUCTURE
             believed = with_structure(strange.values, left)
@@ -174,15 +182,24 @@ def fit_flow(
     return FormFit(believed, std / value, best.chi_square[0], reasons, best.rig_slopes, remarks=remarks)
 
 
-def _wanted(names: Sequence[str], best: GreyBoxFit, swinging: GreyBoxFit) -> float:
+def _homed_at_stop(log: GreyBoxLog) -> bool:
+    """Return whether an encoder may have been homed at an end stop: it reads one sign only, and not zero at first."""
+    read = log.drives[:, FLOW_FORM.drives.index(POSITION)]
+    low, high = float(np.min(read)), float(np.max(read))
+    beside = BESIDE_STOP * (high - low)
+    return min(max(-low, 0.0), max(high, 0.0)) <= beside < abs(float(read[0]))
+
+
+def _wanted(names: Sequence[str], best: GreyBoxFit, swinging: GreyBoxFit, *, homed: bool) -> float:
     """Return the cost below which what is strange is believed rather than the plain form.
 
-    No actuator holds its chambers' volumes. So an encoder's zero need explain a log no better than held volumes do. How
-    a play is crossed is not known: with a second hypothesis it may explain a log that has neither.
+    No actuator holds its chambers' volumes. So the zero of an encoder that may have been homed at a stop (``homed``)
+    need explain a log no better than held volumes do. How a play is crossed is not known: with a second hypothesis it
+    may explain a log that has neither.
     """
     if PLAY.name in names and len(names) > 1:
         return -np.inf
-    if tuple(names) == (ENCODER_ZERO.name,):
+    if tuple(names) == (ENCODER_ZERO.name,) and homed:
         return min(best.cost + WORTH, swinging.cost - WORTH)
     return best.cost - WORTH
 
@@ -192,7 +209,7 @@ def _asked(
 ) -> tuple[tuple[Hypothesis, ...], tuple[Note, ...]]:
     """Return what a log is asked beside the plain form, given its likelier fit with volumes that swing, and its best.
 
-    A remark says what it leaves open. Held volumes may explain a log whose encoder was homed elsewhere: it is asked all
+    A remark says what it leaves open. Held volumes may explain a log whose encoder was homed at a stop: it is asked all
     the same.
     """
     if len(log.drives) > MOST_ASKED:
@@ -204,7 +221,7 @@ def _asked(
     by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
     delivery, *zeros = promised_each(log, parameters, swinging.values, ALWAYS_ASKED, by_mass=by_mass)
     if best is not swinging:  # volumes that swing may have led the fit astray, where the slopes promise nothing
-        zeros.append(promised(log, parameters, best.values, ENCODER_ZERO))
+        zeros = [*zeros, promised(log, parameters, best.values, ENCODER_ZERO)] if _homed_at_stop(log) else [NOTHING]
     worth = (delivery, WORTH, LEAST_DELIVERY), (max(zeros), ZERO_WORTH, LEAST_ZERO)
     told = [promise.gain > gain and promise.size > size for promise, gain, size in worth]
     asked = tuple(one for one, worthwhile in zip(ALWAYS_ASKED, told, strict=True) if worthwhile)

@@ -1,6 +1,7 @@
 """A log that the plain flow form does not explain says what is strange about rig, oil or logger."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
@@ -24,7 +25,7 @@ from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
-from plant.eha.simulate import CIRCUIT, simulate
+from plant.eha.simulate import CIRCUIT, LUMPED, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, IDEAL, Sensors
 from tests.estimation.fits.short_logs import made_fit
@@ -247,11 +248,24 @@ def test_play_of_the_encoder_is_named_and_taken_up() -> None:
 
 def test_an_encoder_zero_need_be_no_likelier_than_held_volumes_and_anything_else_must() -> None:
     held, swinging = made_fit(100.0, 2e8, 1e6), made_fit(300.0, 2e8, 1e6)
-    assert _wanted(("encoder_zero",), held, swinging) == 100.0 + module.WORTH
-    assert _wanted(("encoder_zero",), held, held) == 100.0 - module.WORTH
-    assert _wanted(("position_play",), held, swinging) == 100.0 - module.WORTH
-    assert _wanted(("position_play", "position_late"), held, swinging) == -np.inf
-    assert _wanted(("volume",), held, swinging) == _wanted(("encoder_zero", "air"), held, swinging) == 90.0
+    wanted = partial(_wanted, homed=True)
+    assert wanted(("encoder_zero",), held, swinging) == 100.0 + module.WORTH
+    assert wanted(("encoder_zero",), held, held) == 100.0 - module.WORTH
+    assert _wanted(("encoder_zero",), held, swinging, homed=False) == 100.0 - module.WORTH
+    assert wanted(("position_play",), held, swinging) == 100.0 - module.WORTH
+    assert wanted(("position_play", "position_late"), held, swinging) == -np.inf
+    assert wanted(("volume",), held, swinging) == wanted(("encoder_zero", "air"), held, swinging) == 90.0
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_a_plant_that_holds_its_volumes_is_not_said_to_have_another_zero(seed: int) -> None:
+    """Both explain its log alike; an encoder homed at a stop would read one sign only, and not zero in mid-stroke."""
+    rng = np.random.default_rng(seed)
+    drive = make_drive("steps", 20.0, 1e-3, HEALTHY, rng)
+    found = fit_flow(simulate(LUMPED, drive, 1e-3, HEALTHY, sensors=BENCH, rng=rng), HEALTHY, HEALTHY.bulk_modulus)
+    assert found.explanation is None
+    value, std = found.parameters["bulk_modulus"]
+    assert abs(value - HEALTHY.bulk_modulus) < 2.5 * std < 3e-3 * HEALTHY.bulk_modulus
 
 
 def test_a_log_cut_out_of_a_run_where_pressure_crosses_zero_is_fitted_from_sides_shut_in_high() -> None:

@@ -113,6 +113,7 @@ def what_is_asked_of_a_log() -> dict[str, Any]:
         for drives in lengths
     ]
     starts = flow_starts(PAPER, 3e8)
+    sound = replace(sound, values={**sound.values, "makeup_conductance": PAPER.makeup_conductance})
     told["near a fit"] = [dict(one) for one in _near(sound, starts, lambda _: True, in_motion=False)]
     told["near none"] = [dict(one) for one in _near(sound, starts, lambda _: False, in_motion=False)[:2]]
     told["near a fit that begins otherwise"] = [

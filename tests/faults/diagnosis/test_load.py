@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from estimation.finding import Finding
+from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.load import first_guesses, under_load
@@ -127,7 +128,9 @@ def test_where_no_bias_is_told_the_next_guess_is_tried() -> None:
 
 
 @pytest.mark.slow
-def test_a_single_rod_by_its_mean_area_is_unknown() -> None:
-    blind = diagnose_log(log("minor_leakage", **ROD), Rig())
-    assert blind.unknown
-    assert AgainstCode.UNEXPLAINED in {note.code for note in blind.against} or not blind.gate.passed
+def test_a_single_rod_of_which_the_rig_file_gives_the_mean_area_is_named_with_its_condition() -> None:
+    found = diagnose_log(log("minor_leakage", **ROD), Rig())
+    assert (found.condition, found.unknown) == ("minor_leakage", False)
+    (note,) = [note for note in found.notes if note.code is RigCode.SINGLE_ROD]
+    assert note.data["percent"] == pytest.approx(100.0 * 0.85 / 1.15, abs=2.0)
+    assert found.quantities["bulk_modulus"].value == pytest.approx(HEALTHY.bulk_modulus, rel=0.005)
