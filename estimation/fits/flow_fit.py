@@ -24,7 +24,7 @@ from estimation.fits.hypotheses import (
     START_LOAD,
     Hypothesis,
 )
-from estimation.fits.promises import Promise, promised, promised_each
+from estimation.fits.promises import promised, promised_each
 from estimation.fits.wide_problem import POSITION
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
@@ -73,9 +73,6 @@ other kinds, and 14 on one of a play, which a zero would explain wrongly."""
 BESIDE_STOP = 0.02
 """Share of its travel that an encoder homed at an end stop may read beyond the stop, which is soft; and what a log that
 begins in mid-stroke, at a reading of none, may read at first [fraction]."""
-
-NOTHING = Promise(0.0, 0.0, 0.0)
-"""What is not asked promises nothing."""
 
 TOO_WIDE = 20.0
 """Conductance of the make-up valves, over that of the first guess, from which a search is begun with the guess too
@@ -220,11 +217,13 @@ def _asked(
         return (BEGUN,) if moving else HYPOTHESES, ()
     by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
     delivery, *zeros = promised_each(log, parameters, swinging.values, ALWAYS_ASKED, by_mass=by_mass)
-    if best is not swinging:  # volumes that swing may have led the fit astray, where the slopes promise nothing
-        zeros = [*zeros, promised(log, parameters, best.values, ENCODER_ZERO)] if _homed_at_stop(log) else [NOTHING]
-    worth = (delivery, WORTH, LEAST_DELIVERY), (max(zeros), ZERO_WORTH, LEAST_ZERO)
-    told = [promise.gain > gain and promise.size > size for promise, gain, size in worth]
-    asked = tuple(one for one, worthwhile in zip(ALWAYS_ASKED, told, strict=True) if worthwhile)
+    shows_zero = best is swinging or _homed_at_stop(log)
+    if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
+        zeros.append(promised(log, parameters, best.values, ENCODER_ZERO))
+    zero = max(zeros)
+    worn = delivery.gain > WORTH and delivery.size > LEAST_DELIVERY
+    shifted = shows_zero and zero.gain > ZERO_WORTH and zero.size > LEAST_ZERO
+    asked = tuple(one for one, worthwhile in ((DELIVERY, worn), (ENCODER_ZERO, shifted)) if worthwhile)
     open_by = 0.0 if DELIVERY in asked else delivery.deviation
     remarks = (RigCode.WEAR_NOT_EXCLUDED.note(percent=200.0 * open_by),) if open_by > OPEN_DELIVERY else ()
     if not moving:

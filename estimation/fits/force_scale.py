@@ -103,13 +103,13 @@ def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[
     for _ in range(RESCALED):
         for moved in _moved(problem.model.values(best.theta)):
             found += _ended(problem, best, moved, way)
-            if disagree([_bulk_modulus(problem, one) for one in found if one.cost < way.explained or one is best]):
+            if disagree([bulk_modulus(problem, one) for one in found if one.cost < way.explained or one is best]):
                 break
         lowest = min(found, key=lambda point: point.cost)
-        moved = abs(np.log(_bulk_modulus(problem, lowest) / _bulk_modulus(problem, best)))
+        moved = abs(np.log(bulk_modulus(problem, lowest) / bulk_modulus(problem, best)))
         over, best = lowest.cost > best.cost - BETTER, lowest
-        moduli = [_bulk_modulus(problem, one) for one in found if one is not best and one.cost < way.explained]
-        if over or moved < ELSEWHERE or disagree([_bulk_modulus(problem, best), *moduli]):
+        moduli = [bulk_modulus(problem, one) for one in found if one is not best and one.cost < way.explained]
+        if over or moved < ELSEWHERE or disagree([bulk_modulus(problem, best), *moduli]):
             break
     return best, moduli
 
@@ -130,7 +130,8 @@ def disagree(moduli: Sequence[float]) -> bool:
     return max(moduli) > (1.0 + LARGEST_DISAGREEMENT) * min(moduli)
 
 
-def _bulk_modulus(problem: FreedProblem, point: Point) -> float:
+def bulk_modulus(problem: FreedProblem, point: Point) -> float:
+    """Return the bulk modulus of a point [Pa]."""
     return problem.model.values(point.theta)["bulk_modulus"]
 
 
@@ -151,8 +152,8 @@ def _ended(problem: FreedProblem, best: Point, moved: Sequence[Mapping[str, floa
     near = descend_together(way.near.at_each, starts, way.nearing, way.bounds, way.near_enough)
     starts = [one.theta for one in near]
     found = descend_together(problem.at_each, starts, way.finishing, way.bounds, way.enough, wanted=way.explained)
-    alike, here = max(ALMOST, NEARBY * _deviation(problem, best)), np.log(_bulk_modulus(problem, best))
-    apart = [abs(np.log(_bulk_modulus(problem, one)) - here) for one in found]
+    alike, here = max(ALMOST, NEARBY * _deviation(problem, best)), np.log(bulk_modulus(problem, best))
+    apart = [abs(np.log(bulk_modulus(problem, one)) - here) for one in found]
     close = [i for i in range(len(found)) if found[i].cost < way.explained and alike < apart[i] < FAR_AWAY]
     starts, enough = [found[i].theta for i in close], way.near_enough
     ends = descend_together(problem.at_each, starts, way.finishing, way.bounds, enough)

@@ -10,7 +10,7 @@ from estimation.fits.averaged import block_means, samples_a_block
 from estimation.fits.descent import Point, descend
 from estimation.fits.flow_log import DRAIN_START, LEAST_LEAKAGE
 from estimation.fits.flow_search import LEAD_START
-from estimation.fits.force_scale import Way, disagree, rescaled
+from estimation.fits.force_scale import Way, bulk_modulus, disagree, rescaled
 from estimation.fits.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
@@ -26,7 +26,6 @@ from estimation.fits.motion_search import (
     WAYS,
     Ended,
     MotionSearch,
-    bulk_modulus,
     explained,
     likeliest,
     rough,

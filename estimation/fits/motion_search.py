@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from estimation.fits.descent import Point, descend, descend_together
+from estimation.fits.force_scale import bulk_modulus
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import search_bounds
@@ -319,11 +320,6 @@ def explained(problem: FreedProblem) -> float:
         Half a sum of squares [dimensionless].
     """
     return 0.5 * EXPLAINED * len(problem.log.measured)
-
-
-def bulk_modulus(problem: FreedProblem, point: Point) -> float:
-    """Return the bulk modulus of a point [Pa]."""
-    return problem.model.values(point.theta)["bulk_modulus"]
 
 
 def cost_of(point: Point) -> float:

@@ -225,9 +225,14 @@ def _told(prepared: _Prepared, work: Work) -> tuple[Record, EhaParameters]:
 def _estimated(record: Record, parameters: EhaParameters, work: Work, prepared: _Prepared) -> Row:
     seen = prepared.shared(record, parameters, work)
     if seen is None:
-        options: dict[str, Any] = {"form": work.form, "method": work.method}
-        options |= {"start": work.start_pa, "start_std": work.start_std_pa}
-        found = estimate_bulk_modulus(record, parameters, **options)
+        found = estimate_bulk_modulus(
+            record,
+            parameters,
+            form=work.form,
+            method=work.method,
+            start=work.start_pa,
+            start_std=work.start_std_pa,
+        )
     else:
         found = seen[1]
         for note in left_out(*seen):

@@ -42,8 +42,7 @@ def stopped(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Blocks
         or where a stop there explains no more than friction does. What the log holds while the piston stands at the
         stop is then missing: how a stop yields would be taken for friction.
     """
-    sizes = np.sqrt(np.nanmean(blocks.outputs[blocks.first :] ** 2, axis=0))
-    if np.all(fits.best.scales <= POOR * sizes) or not _stands(blocks):
+    if np.all(fits.best.scales <= POOR * blocks.sizes) or not _stands(blocks):
         return blocks, fits
     with_stop = replace(blocks, stop=blocks.reach)
     again = fit_classes(with_stop, actuator)

@@ -95,16 +95,15 @@ def doubt_of(fit: PointFit, seldom: Array, blocks: Blocks, centres: Array, odds:
     """
     first, known = blocks.first, len(fit.coordinates)
     left = (blocks.outputs - fit.fitted)[first:]
-    there = np.isfinite(left)
     unexplained = np.maximum(1.0 - (blocks.noise / fit.scales) ** 2, 0.0)
-    weight = fit.scales * np.sqrt(1.0 + unexplained * np.sum(there, axis=0) / LOOKS)
+    weight = fit.scales * np.sqrt(1.0 + unexplained * blocks.counts / LOOKS)
     slopes = np.concatenate([fit.slopes * seen[:, None, None], seldom])[:, first:]
-    slopes = np.where(there, slopes / weight, 0.0).reshape(len(slopes), -1)
+    slopes = np.where(blocks.seen, slopes / weight, 0.0).reshape(len(slopes), -1)
     prior = np.zeros((len(slopes), len(slopes)))
     prior[:known, :known] = np.linalg.inv(WEAK)
     prior[known:, known:] = np.diag([sigma**-2.0 for sigma in SELDOM_KNOWN.values()])
     covariance = np.linalg.inv(slopes @ slopes.T + prior)
-    pulled = slopes @ np.where(there, left / weight, 0.0).ravel()
+    pulled = slopes @ np.where(blocks.seen, left / weight, 0.0).ravel()
     steps = (covariance @ (pulled + (centres - fit.coordinates) @ prior[:known]).T)[:known]
     shares = np.exp(odds - np.max(odds))
     return np.asarray(covariance[:known, :known] + (steps * shares / np.sum(shares)) @ steps.T, dtype=np.float64)

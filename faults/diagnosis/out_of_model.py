@@ -137,14 +137,13 @@ def unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Not
     list[Note]
         None where a circuit follows the log.
     """
-    sizes = np.sqrt(np.nanmean(blocks.outputs[blocks.first :] ** 2, axis=0))
-    shares = fits.best.scales / np.maximum(sizes, np.finfo(float).tiny)
+    shares = fits.best.scales / np.maximum(blocks.sizes, np.finfo(float).tiny)
     pump = actuator.circuit.pump_displacement / actuator.circuit.piston_area
     yielding = YIELDING * pump * float(np.sqrt(np.mean(blocks.speed**2)))
     least = np.array([0.0] if blocks.pressure is None else [yielding, 0.0])
     heard = fits.best.scales > np.maximum(2.0 * blocks.noise, least)
     if blocks.pressure is not None:
-        heard[0] &= _left_longer(blocks, fits.best) > UNEXPLAINED_LONGER * sizes[0]
+        heard[0] &= _left_longer(blocks, fits.best) > UNEXPLAINED_LONGER * blocks.sizes[0]
     names = ("velocity", "differential pressure")
     return [
         AgainstCode.UNEXPLAINED.note(percent=100.0 * share, channel=name)
@@ -210,9 +209,8 @@ def _one_step(
     columns = [*fit.slopes, (larger - fit.fitted) / STEP, (faster - fit.fitted) / nudge]
     if blocks.pressure is not None:
         columns.append(np.column_stack([np.zeros(len(blocks.velocity)), np.ones(len(blocks.velocity))]))
-    seen = np.isfinite(blocks.outputs[first:])
-    weighted = np.where(seen, np.array(columns)[:, first:] / fit.scales, 0.0).reshape(len(columns), -1)
-    left = np.where(seen, (blocks.outputs - fit.fitted)[first:] / fit.scales, 0.0).ravel()
+    weighted = np.where(blocks.seen, np.array(columns)[:, first:] / fit.scales, 0.0).reshape(len(columns), -1)
+    left = np.where(blocks.seen, (blocks.outputs - fit.fitted)[first:] / fit.scales, 0.0).ravel()
     pull, pump = np.zeros((len(columns), len(columns))), len(WEAK)
     pull[:pump, :pump] = np.linalg.inv(WEAK)
     pull[pump, pump] = 1.0 / FREE_PUMP**2
