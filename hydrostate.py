@@ -82,7 +82,7 @@ def _refuse_shadows() -> None:
 _refuse_shadows()
 
 from experiments.log_pages.answers import Answer, Model, no_such  # noqa: E402 - after the check
-from experiments.log_pages.log import Log, known_options, refuse  # noqa: E402 - likewise
+from experiments.log_pages.log import Log, known_options, options_by_name, refuse  # noqa: E402 - likewise
 from plant.lazy import lazily  # noqa: E402 - likewise
 
 _late = lazily("hydrostate", __file__)
@@ -259,7 +259,11 @@ def simulate(
     if condition is not None:
         options["condition" if "condition" in simulation.options else "fault"] = condition
     asked = {**simulation.options, **known_options(options, simulation.options, "simulate")}
-    return Log(simulation.run(bench, {**asked, "seed": seed, "plant": plant}).record, bench, kind.name)
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
+        refuse(f"seed must be a whole number from 0 up, got {seed!r}")
+    with options_by_name():
+        record = simulation.run(bench, {**asked, "seed": seed, "plant": plant}).record
+    return Log(record, bench, kind.name)
 
 
 def _rig(rig: Any, kind: Any) -> "Rig[Any]":

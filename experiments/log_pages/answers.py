@@ -1,11 +1,13 @@
 """What a log says, in the hands of a Python user: it prints and draws itself, and turns into tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import pandas as pd
     from control import TransferFunction
     from matplotlib.axes import Axes
@@ -60,10 +62,12 @@ class Answer(Shown):
         The same by the names of the JSON contract.
     screen : callable
         From a list of entries to what a terminal shows.
+    page : callable
+        From a title to the page of the log, as HTML.
     """
 
-    def __init__(self, finding: "Finding", entries: Mapping[str, Any], screen: Any) -> None:
-        self.finding, self._entries, self._screen = finding, entries, screen
+    def __init__(self, finding: "Finding", entries: Mapping[str, Any], screen: Any, page: Callable[[str], str]) -> None:
+        self.finding, self._entries, self._screen, self._page = finding, entries, screen, page
 
     def __getattr__(self, name: str) -> Any:
         if not name.startswith("_") and name in type(self.finding).__dataclass_fields__:
@@ -71,7 +75,7 @@ class Answer(Shown):
         return super().__getattr__(name)
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *type(self.finding).__dataclass_fields__]
+        return sorted({*super().__dir__(), *type(self.finding).__dataclass_fields__})
 
     @property
     def bulk_modulus(self) -> "Quantity":
@@ -136,6 +140,34 @@ class Answer(Shown):
         }
         ends = [f"{interval}_{end}" for interval in ("ci95", "ci95_total") for end in ("low", "high")]
         return pd.DataFrame.from_dict(rows, orient="index", columns=["value", *ends, "unit"])
+
+    def report(self, path: "str | Path", title: str = "log") -> "Path":
+        """Write the page of the log: one HTML file with charts, which needs no network.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to; its ending becomes ``.html``.
+        title : str
+            What the page calls the log.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        HydrostateError
+            If the file cannot be written.
+        """
+        from pathlib import Path
+
+        from experiments.command.json_output import write_whole
+
+        file = Path(path).with_suffix(".html")
+        write_whole(file, self._page(title))
+        return file
 
     def plot(self) -> "list[Axes]":
         """Draw the probabilities, where there are some, and every quantity with its interval.

@@ -1,6 +1,8 @@
 """A log in the hands of a Python user: its channels, and the verbs that say what it holds."""
 
+import re
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from experiments.log_pages.answers import Answer, Model, Shown, no_such
@@ -35,6 +37,29 @@ def refuse(message: str) -> NoReturn:
     from plant.errors import HydrostateError
 
     raise HydrostateError(message)
+
+
+@contextmanager
+def options_by_name() -> "Iterator[None]":
+    """Give options in errors the names that Python users know them by: ``start_std`` in place of ``--start-std``.
+
+    Raises
+    ------
+    HydrostateError
+        The same as within, with its options renamed.
+    """
+    from plant.errors import HydrostateError
+
+    try:
+        yield
+    except HydrostateError as error:
+        error.message = _OPTION.sub(lambda found: found[1].replace("-", "_"), error.message)
+        error.args = (error.message if error.source is None else f"{error.source}: {error.message}",)
+        raise
+
+
+_OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
+"""An option as the command spells it."""
 
 
 def known_options(options: Mapping[str, Any], known: Mapping[str, Any], verb: str) -> Mapping[str, Any]:
@@ -190,9 +215,18 @@ class Log(Shown):
         asked = {**chosen.options, **known_options(options, chosen.options, verb)}
         if isinstance(asked.get("healthy"), Log):
             asked["healthy"] = asked["healthy"].record
-        rig, prepared = chosen.prepare(self.rig, {**asked, "seed": 2024})
-        found: Finding = chosen.run(self.record, rig, prepared)
-        return Answer(found, {**chosen.blank, **chosen.entries(found)}, lambda rows: chosen.screen(rows, asked))
+        with options_by_name():
+            rig, prepared = chosen.prepare(self.rig, {**asked, "seed": 2024})
+            found: Finding = chosen.run(self.record, rig, prepared)
+        entries = {**chosen.blank, **chosen.entries(found)}
+
+        def page(title: str) -> str:
+            from experiments.command.log_verb import page_of
+
+            about = {"file": title, "plant": self.plant, "rig": rig.name, "seed": 2024, "expected": None}
+            return page_of(chosen, {**about, **entries}, found, self.record)
+
+        return Answer(found, entries, lambda rows: chosen.screen(rows, asked), page)
 
     def to_frame(self) -> "pd.DataFrame":
         """Return the channels as a table.

@@ -1,5 +1,7 @@
 """A log in the hands of a Python user: as a table, and drawn."""
 
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -58,3 +60,35 @@ def test_an_answer_has_what_was_found_and_says_what_it_has_not(log: hs.Log) -> N
         _ = answer.outcom
     with pytest.raises(AttributeError):
         _ = answer._outcome
+
+
+def test_errors_give_options_the_names_that_python_users_know(log: hs.Log) -> None:
+    with pytest.raises(hs.HydrostateError, match=r"^form must be one of auto, "):
+        log.estimate(form="best")
+    with pytest.raises(hs.HydrostateError, match=r"^start_std must be positive"):
+        log.estimate(start_std=-1.0)
+    with pytest.raises(hs.HydrostateError, match=r"^drive must be one of sine, "):
+        hs.simulate(drive="square")
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, True])
+def test_a_seed_is_a_whole_number_from_0_up(seed: int) -> None:
+    with pytest.raises(hs.HydrostateError, match="seed must be a whole number from 0 up"):
+        hs.simulate(seed=seed)
+
+
+def test_an_answer_writes_its_page_whole_or_says_why_not(log: hs.Log, tmp_path: Path) -> None:
+    answer = log.estimate()
+    page = answer.report(tmp_path / "page", title="bench 7, Monday")
+    assert page == tmp_path / "page.html"
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith("<!DOCTYPE html>")
+    assert "bench 7, Monday" in text
+    with pytest.raises(hs.HydrostateError, match="cannot be written"):
+        answer.report(tmp_path / "no such folder" / "page.html")
+
+
+def test_a_diagnosis_writes_the_page_of_its_actuator(log: hs.Log, tmp_path: Path) -> None:
+    page = log.diagnose().report(tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "leakage" in page
+    assert "<canvas" in page or "uPlot" in page
