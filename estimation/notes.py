@@ -166,8 +166,9 @@ class RigCode(Code):
         "speeds of this log, and bulk modulus would be lower by as much"
     )
     SINGLE_ROD = (
-        "side B of the piston has {percent:.1f} ± {half_width:.1f} % of the area of side A, which the rig file does "
-        "not say; chamber B has {volume_percent:.0f} % of the volume of chamber A"
+        "side B of the piston has {percent:.1f} ± {half_width:.1f} % of the area of side A (rig file: "
+        "{rig_percent:.1f} %), chamber B has {volume_percent:.0f} % of the volume of chamber A (rig file: "
+        "{rig_volume_percent:.0f} %), and pilot_share is {pilot_share:.2g} (rig file: {rig_pilot_share:.2g})"
     )
     VOLUME_DIFFERS = "the chamber volume is {percent:.0f} ± {half_width:.0f} % of that in the rig file"
     STARTS_UNDER_LOAD = (

@@ -140,11 +140,17 @@ def _volume(found: Explanation, p: EhaParameters) -> Note:
     return RigCode.VOLUME_DIFFERS.note(percent=100.0 * value / p.chamber_volume, half_width=100.0 * half_width)
 
 
-def _single_rod(found: Explanation, _: EhaParameters) -> Note:
+def _single_rod(found: Explanation, p: EhaParameters) -> Note:
     differ, volumes = found.values["area_difference"][0], found.values["volume_difference"][0]
     half_width = 2.0 * _half_width(found, "area_difference") / (1.0 + differ) ** 2
     return RigCode.SINGLE_ROD.note(
-        percent=100.0 * _b_over_a(differ), half_width=100.0 * half_width, volume_percent=100.0 * _b_over_a(volumes)
+        percent=100.0 * _b_over_a(differ),
+        half_width=100.0 * half_width,
+        volume_percent=100.0 * _b_over_a(volumes),
+        pilot_share=found.values["pilot_share"][0],
+        rig_percent=100.0 * _b_over_a(p.area_difference),
+        rig_volume_percent=100.0 * _b_over_a(p.volume_difference),
+        rig_pilot_share=p.pilot_share,
     )
 
 

@@ -191,10 +191,12 @@ def costs(results: Iterable[Mapping[str, Any]]) -> list[str]:
     Returns
     -------
     list[str]
-        A sentence a kind of absence or entry of the rig; its share is that of the first of the logs.
+        A sentence a kind of absence or entry of the rig, with how many of several logs it holds for; its share is that
+        of the first of the logs.
     """
     results = list(results)
     said: dict[tuple[str, str | None], list[str]] = {}
     for note in (one for result in results for one in result["notes"] if one["code"] in COSTS):
         said.setdefault((note["code"], note["data"].get("entry")), []).append(note["text"])
-    return [f"{len(texts)} of {len(results)} logs: {texts[0]}" for texts in said.values()]
+    shares = (f"{len(texts)} of {len(results)} logs" if len(results) > 1 else "note" for texts in said.values())
+    return [f"{share}: {texts[0]}" for share, texts in zip(shares, said.values(), strict=True)]

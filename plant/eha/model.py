@@ -71,7 +71,7 @@ class EhaParameters:
         0.0, "1", "chambers A and B in mid-stroke: their difference over their sum", "0: alike", signed=True
     )
     pilot_share: float = si(
-        0.0, "1", "make-up valves opened by a pilot: their conductance over the valves' own", "0: plain checks"
+        0.0, "1", "make-up flow through valves that a pilot opens, over that of plain checks", "0: plain checks"
     )
     load_force: float = si(0.0, "N", "constant load on the rod, against extension", "none in the paper", signed=True)
     load_stiffness: float = si(0.0, "N/m", "spring on the rod, free in mid-stroke", "none in the paper")

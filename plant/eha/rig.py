@@ -37,6 +37,9 @@ _EXAMPLES: Mapping[str, str] = {
 EHA = "eha"
 """What a rig file calls the gear-pump actuator; one that names no plant is taken for what is needed."""
 
+UNEQUAL_SIDES = (*PAIRS.values(), "pilot_share")
+"""Entries that two numbers for sides A and B set: a template has them as comments, so that they do not contradict."""
+
 P = TypeVar("P", default=EhaParameters)
 
 
@@ -185,10 +188,12 @@ def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> 
     if file.plant not in (None, plant):
         raise RigError(f"a rig of plant {plant!r} is needed here, got one of {file.plant!r}")
     _known(file.parameters, _names(parameter_class), "parameters")
-    values = _values(
-        _unpaired(file.parameters, PAIRS if issubclass(parameter_class, EhaParameters) else {}), parameter_class
-    )
+    values = _values(_unpaired(file.parameters, _pairs_of(parameter_class)), parameter_class)
     return Rig(file.name, parameter_class(**values), file.uncertainty, file.columns, file.measured)
+
+
+def _pairs_of(parameter_class: type[Any]) -> Mapping[str, str]:
+    return PAIRS if issubclass(parameter_class, EhaParameters) else {}
 
 
 def _unpaired(given: Mapping[str, Any], pairs: Mapping[str, str]) -> dict[str, Any]:
@@ -199,7 +204,9 @@ def _unpaired(given: Mapping[str, Any], pairs: Mapping[str, str]) -> dict[str, A
         if not isinstance(pair, list):
             continue
         if difference in given:
-            raise RigError(f"parameters.{name} gives two numbers, so {difference} is not wanted beside it")
+            raise RigError(
+                f"parameters.{name} gives two numbers, which say {difference} too: remove the line of {difference}"
+            )
         if len(pair) != 2 or not all(type(one) in (int, float) and 0.0 < one < float("inf") for one in pair):
             raise RigError(f"parameters.{name} must be a positive number, or two for sides A and B, got {pair!r}")
         side_a, side_b = pair
@@ -272,11 +279,15 @@ def rig_template(
         "",
         "[parameters]",
     ]
+    pairs = _pairs_of(parameter_class)
     for name, note in notes(parameter_class).items():
         value = getattr(parameters, name)
+        if name in pairs:
+            lines.append(f"# two numbers where sides A and B differ: {name} = [A, B]")
         lines.append(f"# {note.meaning} [{note.unit}]; source: {note.source}")
         known = list(value) if isinstance(value, tuple) else value
-        lines.append(f"# {name} = NUMBER" if known is None else f"{name} = {known!r}")
+        sides = pairs and name in UNEQUAL_SIDES
+        lines.append(f"# {name} = NUMBER" if known is None else f"{'# ' if sides else ''}{name} = {known!r}")
     lines += [
         "",
         *_uncertainty_lines(parameter_class),

@@ -61,7 +61,15 @@ def test_volume_load_relief_and_check_valves_are_told_beside_the_rigs() -> None:
     assert data(told("position_play", position_play=(5e-5, 1e-6))) == {"play_um": 50.0}
     areas = told("single_rod", area_difference=(0.25, 0.01), volume_difference=(-0.25, 0.1), pilot_share=(1.0, 0.1))
     half_width = 200.0 * 0.01 * NORMAL / 1.25**2
-    assert data(areas) == {"percent": 60.0, "half_width": half_width, "volume_percent": 500.0 / 3.0}
+    assert data(areas) == {
+        "percent": 60.0,
+        "half_width": half_width,
+        "volume_percent": 500.0 / 3.0,
+        "pilot_share": 1.0,
+        "rig_percent": 100.0,
+        "rig_volume_percent": 100.0,
+        "rig_pilot_share": 0.0,
+    }
     assert data(told("start_load", start_pressure=(5e5, 1e3))) == {"pressure_pa": 5e5, "force_n": 5e5 * P.piston_area}
     assert data(told("relief_low", relief_pressure=(2e6, 1e4))) == {
         "setting_pa": 2e6,

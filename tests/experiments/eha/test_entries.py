@@ -155,6 +155,7 @@ def test_what_an_absent_channel_costs_is_a_note_and_said_once_of_all_logs() -> N
     sound = diagnosis_entries(diagnose_log(log(), Rig()))
     said = costs([entries, sound, entries])
     assert f"2 of 3 logs: {ClassCode.PRESSURE_ABSENT_CLASS.note()}" in said
+    assert f"note: {ClassCode.PRESSURE_ABSENT_CLASS.note()}" in costs([entries])
 
 
 def test_an_entry_of_the_rig_is_named_once_of_all_logs_that_it_limits() -> None:

@@ -164,12 +164,24 @@ def test_two_areas_and_volumes_are_a_mean_and_a_difference_with_piloted_valves(t
     assert rig_of(tmp_path, text + "pilot_share = 0.0\n").parameters.pilot_share == 0.0
 
 
+def test_a_template_takes_two_areas_and_volumes_in_place_of_one(tmp_path: Path) -> None:
+    text = rig_template().replace("\npiston_area = 0.00152", "\npiston_area = [15.2e-4, 10.64e-4]")
+    text = text.replace("\nchamber_volume = 0.00108", "\nchamber_volume = [1.08e-3, 0.756e-3]")
+    p = rig_of(tmp_path, text).parameters
+    assert piston_areas(p) == pytest.approx((15.2e-4, 10.64e-4))
+    assert p.volume_difference == pytest.approx(p.area_difference)
+    assert p.pilot_share == 1.0
+
+
 @pytest.mark.parametrize(
     ("entry", "said"),
     [
         ("piston_area = [1e-3]", r"piston_area must be a positive number, or two for sides A and B, got \[0.001\]"),
         ("piston_area = [1e-3, -1e-3]", "piston_area must be a positive number, or two"),
-        ("piston_area = [1e-3, 2e-3]\narea_difference = 0.1", "area_difference is not wanted beside it"),
+        (
+            "piston_area = [1e-3, 2e-3]\narea_difference = 0.1",
+            "two numbers, which say area_difference too: remove the line",
+        ),
         ("area_difference = 1.0", "area_difference must lie between -1 and 1, got 1.0"),
         ("moving_mass = [1.0, 2.0]", "moving_mass must be"),
     ],
