@@ -61,6 +61,10 @@ class ClassCode(Code):
         "too much: the force balance cannot separate the two"
     )
     END_STOP = "the piston ran into a stop {reach_mm:.0f} mm from where the log begins; the fit includes the stop"
+    HEALTHY_OF_THE_PAPER = (
+        "the rig file has a pump or piston of its own but the leakage and friction of the paper's actuator: the class "
+        "and every severity count from these; enter those of your healthy actuator"
+    )
     PRESSURE_ABSENT_CLASS = (
         "without differential_pressure_pa, friction shows only in velocity: the margins are usually smaller"
     )

@@ -41,7 +41,9 @@ NO_DIAGNOSIS: Mapping[str, Any] = {
     "notes": [],
 }
 
-COSTS = frozenset({"pressure_absent", "pressure_unused", "pressure_absent_class", "known_as_the_rig"})
+COSTS = frozenset(
+    {"pressure_absent", "pressure_unused", "pressure_absent_class", "known_as_the_rig", "healthy_of_the_paper"}
+)
 """Codes of what an absent channel costs, or a rig that is not well known: of all logs alike, so said once."""
 
 NO_CLASS = frozenset({"models_alike", "models_diverged"})

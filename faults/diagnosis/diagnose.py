@@ -41,6 +41,12 @@ from plant.log.record import Record
 from plant.notes import Note, distinct
 from plant.spare_processors import begun
 
+PUMP_AND_PISTON, ANOTHER = ("pump_displacement", "piston_area"), 0.1
+"""Entries that make another actuator, by more than this share [fraction]: judged, twice what an area is off at most."""
+
+HEALTHY = ("leakage_coefficient", "flow_bias", "friction_quadratic", "friction_linear", "friction_coulomb")
+"""Entries from which a class and its severities count."""
+
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
@@ -141,7 +147,8 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     scores = score_mathematical(log.record, mathematical_bank(rig.parameters))
     verdict = models_verdict(scores, log.record)
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
-    notes = (*log.left_out, *strange, *verdict.notes, *absent, *estimate.rig_notes)
+    unsure = (*_healthy_of_the_paper(plain.parameters), *estimate.rig_notes)
+    notes = (*log.left_out, *strange, *verdict.notes, *absent, *unsure)
     found = replace(found, outcome=verdict.outcome, notes=notes, channels=scores.channels)
     if log.mistakes:
         return replace(_without_class(found, log, scores, log.mistakes), outcome=Outcome.MISMATCH)
@@ -207,6 +214,14 @@ def _diagnosed(
     if estimate.form != "flow" or not estimate.gate.passed:
         return of(parameters), parameters
     return under_load(of, first_guesses(log.record, parameters, estimate))
+
+
+def _healthy_of_the_paper(p: EhaParameters) -> tuple[Note, ...]:
+    """Return a note where a rig file leaves the healthy values of the paper beside another pump or piston."""
+    of_paper = EhaParameters()
+    another = any(abs(getattr(p, name) / getattr(of_paper, name) - 1.0) > ANOTHER for name in PUMP_AND_PISTON)
+    left = all(getattr(p, name) == getattr(of_paper, name) for name in HEALTHY)
+    return (ClassCode.HEALTHY_OF_THE_PAPER.note(),) if another and left else ()
 
 
 def _load(p: EhaParameters) -> Note:

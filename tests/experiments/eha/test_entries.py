@@ -158,6 +158,26 @@ def test_what_an_absent_channel_costs_is_a_note_and_said_once_of_all_logs() -> N
     assert f"note: {ClassCode.PRESSURE_ABSENT_CLASS.note()}" in costs([entries])
 
 
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"piston_area": 2.0}, True),
+        ({"pump_displacement": 0.8}, True),
+        ({"piston_area": 2.0, "friction_coulomb": 2.0}, False),
+        ({"piston_area": 1.05, "pump_displacement": 1.05}, False),
+        ({"chamber_volume": 2.0}, False),
+    ],
+)
+def test_another_pump_or_piston_with_the_papers_leakage_and_friction_is_noted(
+    changed: dict[str, float], *, said: bool
+) -> None:
+    paper = EhaParameters()
+    rig = Rig(parameters=replace(paper, **{name: factor * getattr(paper, name) for name, factor in changed.items()}))
+    entries = diagnosis_entries(diagnose_log(log(), rig))
+    assert (ClassCode.HEALTHY_OF_THE_PAPER in codes(entries)) == said
+    assert any(str(ClassCode.HEALTHY_OF_THE_PAPER.note()) in line for line in costs([entries])) == said
+
+
 def test_an_entry_of_the_rig_is_named_once_of_all_logs_that_it_limits() -> None:
     found = [estimate_entries(estimate_log(log(condition), Rig())) for condition in ("normal", "major_leakage")]
     (said,) = costs(found)
