@@ -6,18 +6,19 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.command.json_output import Result
 from experiments.command.terminal import table
+from experiments.page.numbers import percent_said
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
 
 def quantities_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "Iterable[RenderableType]":
-    """Show what was estimated of each log: a table of quantities with their intervals, and the outcome in words.
+    """Show what was found of each log: a table of quantities with their intervals, the outcome in words, what to do.
 
     Parameters
     ----------
     results : sequence of Result
-        One a log, with ``quantities``.
+        One a log, with ``quantities``; ``probabilities`` and ``advice`` of a diagnosis.
     options : Mapping[str, Any]
         As given to the verb; none matters here.
     """
@@ -33,7 +34,10 @@ def quantities_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "
             said = [_ends(ends), *([_ends(whole)] if total else [])]
             shown.add_row(name.replace("_", " "), value, *said, entry["unit"])
         yield shown
-        yield f"{about}: {result['outcome'].replace('_', ' ')}: {result['message']}"
+        sure = result.get("probabilities", {}).get(result.get("condition"))
+        probable = "" if sure is None else f", probability {percent_said(sure)} %"
+        yield f"{about}: {result['outcome'].replace('_', ' ')}: {result['message']}{probable}"
+        yield from (f"{about}: next: {one}" for one in result.get("advice", ()))
 
 
 def _digits(ends: Sequence[float] | None) -> int:

@@ -8,13 +8,14 @@ from rich.console import Console
 from experiments.log_pages.screens import quantities_shown
 
 
-def shown(**entry: Any) -> str:
+def shown(said: dict[str, Any] | None = None, **entry: Any) -> str:
     result = {
         "file": "run.csv",
         "plant": "a",
         "quantities": {"spring_stiffness": {"unit": "N/m", **entry}},
         "outcome": "ok",
         "message": "said",
+        **(said or {}),
     }
     console = Console(width=200)
     with console.capture() as caught:
@@ -45,3 +46,15 @@ def test_the_interval_with_rig_error_stands_beside_the_other() -> None:
     found = shown(value=1e4, ci95=[9999.3, 10000.7], ci95_total=[9000.0, 11000.0])
     assert "with rig error" in found
     assert "9000 to 11000" in found
+
+
+def test_a_diagnosis_says_how_probable_its_condition_is_and_what_to_do_next() -> None:
+    said = {
+        "condition": "leaking",
+        "probabilities": {"normal": 0.127, "leaking": 0.873},
+        "advice": ["look at the seal"],
+    }
+    found = shown(said, value=1e4, ci95=None)
+    assert "run.csv: ok: said, probability 87.3 %" in found
+    assert "run.csv: next: look at the seal" in found
+    assert "probability" not in shown({**said, "condition": None}, value=1e4, ci95=None)
