@@ -82,7 +82,7 @@ def test_the_volumes_uncertainty_is_bulk_modulus_own(steps: Card) -> None:
     assert card.known_exactly["bulk_modulus"] == pytest.approx(steps.relative_std["bulk_modulus"], rel=1e-9)
     assert card.relative_std["friction_coulomb"] == pytest.approx(steps.relative_std["friction_coulomb"], rel=1e-3)
     assert "(chamber volume 2 %) its bound is 2 %, without" in " ".join(sentences(card))
-    assert "the rig file gives the volume no uncertainty" in " ".join(sentences(steps))
+    assert "these bounds take the volume as exact" in " ".join(sentences(steps))
 
 
 def test_the_pumps_uncertainty_goes_to_the_flow_bias_more_than_to_the_friction(steps: Card) -> None:
@@ -185,7 +185,7 @@ def test_a_card_says_no_more_than_it_knows() -> None:
     small = {"bulk_modulus": 0.002, "flow_bias": 0.001}
     quiet = card(relative_std=small, stuck=0.5, weakest_std=0.03, correlation=np.eye(2), uncertainties={})
     (rule,) = sentences(quiet)
-    assert "the rig file gives the volume no uncertainty" in rule
+    assert "these bounds take the volume as exact" in rule
     assert sentences(card(relative_std=small, stuck=0.0, weakest_std=0.0)) == sentences(
         card(relative_std=small, stuck=0.0, weakest_std=0.0, correlation=np.eye(2))
     )
