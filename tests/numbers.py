@@ -227,6 +227,11 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("folders", nargs="*", default=["tests"], help="folders of tests; all if none is named")
     parser.add_argument("--write", action="store_true", help="keep what is found")
     given = parser.parse_args(arguments)
+    for folder in given.folders:
+        if not any((ROOT / folder).rglob("test_numbers*.py")):
+            parser.error(
+                f"no numbers are kept under {folder}: name it from the project's folder, tests/estimation/trust"
+            )
     moved: list[str] = []
     for numbers in modules(given.folders):
         place = str(numbers.file.parent.relative_to(ROOT))

@@ -106,6 +106,9 @@ def test_the_command_says_what_moved_and_keeps_it(capsys: pytest.CaptureFixture[
     assert numbers.main(["tests/plant/components"]) == 0
     assert capsys.readouterr().out == "nothing moved\n"
     assert len(numbers.modules(["tests"])) >= 14
+    with pytest.raises(SystemExit):
+        numbers.main(["tests/plant/components", "estimation/trust"])
+    assert "no numbers are kept under estimation/trust" in capsys.readouterr().err
 
 
 def test_every_kept_number_is_made() -> None:
