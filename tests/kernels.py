@@ -5,7 +5,8 @@ import ctypes
 import inspect
 import math
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from fractions import Fraction
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from plant.compiled.expression import Expression
 from plant.compiled.native.load import load_native
+from plant.compiled.native.loops import Loop
 from plant.compiled.native.recipes import PACKAGES
 from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import bare_text, kernel_text, pasted
@@ -35,6 +37,14 @@ def text_of(monkeypatch: pytest.MonkeyPatch, module: ModuleType, compile_it: Cal
     compile_it()
     (text,) = texts
     return text
+
+
+@contextmanager
+def loops_in_python() -> Iterator[None]:
+    """Run loops as they are written: quickly enough where series are short, and seen by coverage."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Loop, "__call__", lambda loop, *args: loop.__wrapped__(*args))
+        yield
 
 
 def functions_of(text: str) -> SimpleNamespace:

@@ -13,12 +13,15 @@ import importlib.util
 import json
 import math
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from plant.errors import HydrostateError
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -121,6 +124,57 @@ class Numbers:
         """Keep what all cases give now."""
         kept = {name: self.found(name) for name in self.made}
         self.file.write_text(_lines(kept) + "\n", "utf-8")
+
+
+def some(values: Any, count: int = 5) -> list[Any]:
+    """Return so many values of an array, both ends among them, and the root mean square of all, which any moves.
+
+    Parameters
+    ----------
+    values : array_like
+        Real or complex [any unit].
+    count : int
+        How many are picked, evenly spaced.
+
+    Examples
+    --------
+    >>> some([3.0, 4.0], 2)
+    [3.0, 4.0, 3.5355339059327378]
+    """
+    flat = np.ravel(np.asarray(values))
+    if flat.size == 0:
+        return []
+    picked = flat[np.unique(np.linspace(0, flat.size - 1, count).astype(int))]
+    return [*picked.tolist(), float(np.sqrt(np.nanmean(np.abs(flat) ** 2)))]
+
+
+def refused(call: Callable[[], Any]) -> str | None:
+    """Return why a call is refused, None where it is not.
+
+    Parameters
+    ----------
+    call : callable
+        What is tried.
+    """
+    try:
+        call()
+    except HydrostateError as error:
+        return error.message
+    return None
+
+
+def warned(call: Callable[[], Any]) -> list[str]:
+    """Return the sentences that a call warns with.
+
+    Parameters
+    ----------
+    call : callable
+        What is tried.
+    """
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        call()
+    return [str(one.message) for one in caught]
 
 
 def _plain(value: Any) -> Any:

@@ -15,6 +15,10 @@ DEGREE = 2
 HALF_WIDTH = 6
 """Frequencies on either side that are taken into account; 7 degrees of freedom are left for the noise."""
 
+EMPTY = (1e-9, 1e-12)
+"""A band without input holds less than these shares of the median line and of the largest; rounding leaves 1e-15 of
+the largest [fraction]."""
+
 ComplexArray = NDArray[np.complex128]
 
 
@@ -95,7 +99,10 @@ def local_polynomial_response(u: ArrayLike, y: ArrayLike, sample_time: float) ->
     powers = distance[:, :, None] ** np.arange(DEGREE + 1)
     columns = np.concatenate([powers * spectra[0][places][:, :, None], powers.astype(np.complex128)], axis=2)
     size = np.linalg.norm(columns, axis=1, keepdims=True)
-    if (size[:, 0] < 1e-9 * np.median(np.abs(spectra[0]))).any() or not np.median(np.abs(spectra[0])) > 0.0:
+    lines = np.abs(spectra[0])
+    # where most bands are empty the median, too, is what rounding leaves
+    least = max(EMPTY[0] * float(np.median(lines)), EMPTY[1] * float(lines.max()))
+    if (size[:, 0] < least).any() or not least > 0.0:
         raise HydrostateError(
             "the input must hold all frequencies, got bands without any; drive with noise, PRBS or steps"
         )
