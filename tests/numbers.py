@@ -231,6 +231,9 @@ def _search_moved(name: str, kept: Mapping[str, Any], found: Mapping[str, Any]) 
     if not (_is_number(kept["std"]) and _is_number(found["std"])):
         if kept["std"] != found["std"]:  # nothing is known of the value, and it may end anywhere
             yield f"{name}, deviation: {kept['std']!r} -> {found['std']!r}"
+    elif not (_is_number(kept["value"]) and _is_number(found["value"])):
+        if kept["value"] != found["value"]:  # one of them is not finite
+            yield f"{name}: {kept['value']!r} -> {found['value']!r}"
     elif abs(found["value"] - kept["value"]) > WITHIN * kept["std"] + FORMULA * abs(kept["value"]):
         yield f"{name}: {kept['value']!r} -> {found['value']!r}, deviation {kept['std']!r}"
     elif abs(found["std"] - kept["std"]) > WIDTH * kept["std"]:

@@ -20,6 +20,7 @@ TOLD: Mapping[str, Any] = {
     "count": 3,
     "condition": "normal",
     "nothing known": Found(5.0, np.inf),
+    "not a number": Found(np.nan, 1.0),
     "none": None,
 }
 
@@ -51,6 +52,7 @@ def _told(now: Mapping[str, Any]) -> Any:
         {"modulus": Found(2.00025e8, 1.009e6)},
         {"points": Roughly(215, 0.1)},
         {"nothing_known": Found(9.0, np.inf)},
+        {"not_a": Found(np.nan, 1.0)},
     ],
 )
 def test_rounding_of_other_processors_is_no_move(tmp_path: Path, change: Mapping[str, Any]) -> None:
@@ -73,6 +75,7 @@ def test_rounding_of_other_processors_is_no_move(tmp_path: Path, change: Mapping
         {"count": 4},
         {"condition": "minor_leakage"},
         {"nothing_known": Found(5.0, 1.0)},
+        {"not_a": Found(5.0, 1.0)},
         {"none": 0},
     ],
 )
