@@ -19,22 +19,21 @@ def bandwidth(model: "LinearModel") -> float | None:
     Returns
     -------
     float or None
-        Frequency [Hz]; None if the gain never falls so far.
+        Frequency [Hz]; None if the gain never falls so far, or has no end at zero frequency.
     """
     top = 100.0 * float(np.abs(model.poles).max()) / (2.0 * np.pi) if model.continuous else 0.5 / model.sample_time
     grid = top * np.concatenate([[0.0], np.logspace(-5.0, -2.0, 300), np.linspace(0.01, 1.0, 2000)[1:]])
     gain = np.abs(model.response_gradient(grid)[0])
     wanted = gain[0] / np.sqrt(2.0)
     below = np.flatnonzero(gain < wanted)
-    if below.size == 0:
+    if below.size == 0 or not np.isfinite(wanted):
         return None
-    if below[0] <= 1:
-        return float(grid[1])
 
     def excess(frequency: float) -> float:
         return float(np.abs(model.response_gradient([frequency])[0][0]) - wanted)
 
-    return root_between(excess, float(grid[below[0] - 1]), float(grid[below[0]]), 2e-12)
+    # below the first step of the grid a root is wanted to a share of itself
+    return root_between(excess, float(grid[below[0] - 1]), float(grid[below[0]]), 2e-12 if below[0] > 1 else 0.0)
 
 
 def bandwidth_std(model: "LinearModel") -> float | None:

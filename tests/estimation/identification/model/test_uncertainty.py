@@ -139,9 +139,15 @@ def test_a_zero_on_a_pole_is_no_deviation_away() -> None:
     assert _deviations(np.array([1.0, 0.0]), np.zeros((2, 2))) == np.inf
 
 
-def test_a_pole_that_takes_hours_has_the_lowest_bandwidth_that_is_looked_at() -> None:
-    slow = LinearModel([1e-12], [1.0, -(1.0 - 1e-12)], 1e-3, "u", "y")
-    assert slow.bandwidth_hz == pytest.approx(500.0 * 1e-5)
+@pytest.mark.parametrize("share", [1e-4, 1e-6, 1e-10])
+def test_a_pole_that_takes_hours_has_its_own_bandwidth(share: float) -> None:
+    slow = LinearModel([share], [1.0, -(1.0 - share)], 1e-3, "u", "y")
+    assert slow.bandwidth_hz == pytest.approx(share / (2.0 * np.pi * 1e-3), rel=1e-4)
+
+
+def test_an_integrator_has_no_bandwidth() -> None:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        assert LinearModel([1.0], [1.0, -1.0], 1e-3, "u", "y").bandwidth_hz is None
 
 
 def test_a_band_is_the_spread_along_the_response_and_across_it() -> None:
