@@ -159,7 +159,11 @@ class StateSpace:
                 y_std,
             ]
         )
-        gain = self.dc_gain * np.outer(y_std, 1.0 / u_std)
+        gain, slopes = (one.real for one in self.response(1.0))
+        turn = np.diag(factors)
+        # the level is that of inputs at zero, which lie as far from their means as gains say
+        turn[-len(y_std) :] -= y_std[:, None] * np.tensordot(u_mean / u_std, slopes, axes=(0, 1))
+        gain = gain * np.outer(y_std, 1.0 / u_std)
         return StateSpace(
             self.a,
             self.b / u_std,
@@ -169,7 +173,7 @@ class StateSpace:
             self.delays,
             self.direct,
             self.sample_time,
-            self.covariance * np.outer(factors, factors),
+            turn @ self.covariance @ turn.T,
         )
 
     def with_delays_as_states(self) -> tuple[Array, Array, Array, Array]:

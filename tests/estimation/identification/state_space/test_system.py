@@ -69,3 +69,21 @@ def test_a_log_that_is_too_short_gives_no_start() -> None:
     assert _hankel(np.zeros((9, 2)), 0, 5).shape == (10, 0)
     assert _hankel(np.arange(10.0)[:, None], 0, 5).tolist() == [[0.0], [1.0], [2.0], [3.0], [4.0]]
     assert subspace_starts(joined(in_scale(20)), 3) == []
+
+
+def test_an_output_at_rest_is_as_well_known_in_units_as_in_scale() -> None:
+    u_mean, u_std = np.array([3.0, -40.0]), np.array([2.0, 5.0])
+    y_mean, y_std = np.array([1.0, 7.0]), np.array([0.5, 20.0])
+    in_units = SYSTEM.in_units(u_mean, u_std, y_mean, y_std)
+    for inputs in (np.zeros(M), np.array([10.0, -3.0])):
+        seen, told = (_at_rest(SYSTEM, (inputs - u_mean) / u_std), _at_rest(in_units, inputs))
+        np.testing.assert_allclose(told[0], y_mean + y_std * seen[0])
+        np.testing.assert_allclose(told[1], y_std * seen[1])
+
+
+def _at_rest(one: StateSpace, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Outputs at rest, and their deviations."""
+    found, slopes = (part.real for part in one.response(1.0))
+    by = np.tensordot(slopes, inputs, axes=(1, 0))
+    by[:, -P:] += np.eye(P)
+    return one.level + found @ inputs, np.sqrt(np.einsum("oi,ij,oj->o", by, one.covariance, by))
