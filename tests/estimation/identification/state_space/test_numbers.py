@@ -1,7 +1,7 @@
 """State spaces of small logs: outputs, derivatives, starts, ends and what is told of them, kept in `numbers.json`."""
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -168,9 +168,7 @@ def fits() -> dict[str, Any]:
     told["completed starts"] = first
     data = joint()
     told["refused"] = [
-        refused(
-            lambda: fit_state_space(Size(2, 2, 2, direct=True), Joint(0.1, (U[:n],), (outputs()[:n],)), effort=QUICK)
-        )
+        refused(partial(fit_state_space, size, Joint(0.1, (U[:n],), (outputs()[:n],)), effort=QUICK))
         for n in (17, 18, 59, 60)
     ]
     return told | {"samples": data.n_samples}
