@@ -268,3 +268,10 @@ def test_names_that_are_none_are_refused_in_a_simulation(swing: Any) -> None:
         simulated(model(), logged(swing), {}, {"velocity": 1.0})
     with pytest.raises(HydrostateError, match="values names 'mass'"):
         simulated(model(), logged(swing), {"mass": 1.0}, {})
+
+
+def test_a_log_that_is_too_short_for_tests_of_its_residual_is_fitted_all_the_same(swing: Any) -> None:
+    whole = logged(swing)
+    short = Record(SAMPLE_TIME, {name: whole[name][:20] for name in ("torque", "angle")})
+    values = fit_equations(model(), [whole, short]).values
+    assert {name: round(value, 1) for name, value in values.items()} == pytest.approx(TRUTH, abs=0.06)

@@ -77,6 +77,7 @@ def residuals_that_are_tested() -> dict[str, Any]:
         "other lengths": partial(cross_correlation_test, NOISE, U[:9]),
         "one too few for an input": partial(cross_correlation_test, NOISE[:13], NOISE[20:33], n_lags=5),
         "enough for an input": partial(cross_correlation_test, NOISE[:14], NOISE[20:34], n_lags=5),
+        "as few as lags": partial(cross_correlation_test, NOISE[:5], NOISE[20:25], n_lags=5),
         "other lengths for feedback": partial(feedback_test, NOISE, U[:9]),
         "one too few for feedback": partial(feedback_test, NOISE[:39], U[:39], n_lags=5),
         "enough for feedback": partial(feedback_test, NOISE[:40], U[:40], n_lags=5),
