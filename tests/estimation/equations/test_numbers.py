@@ -250,6 +250,8 @@ def fits_and_what_they_say() -> dict[str, Any]:
     other = found("plain").predicted(logged(0.0, 120).replace(angle=angle()[60:180], torque=TORQUE[60:180]))
     told["elsewhere"] = some(other["angle"], 4)
     told["from a state that is said"] = some(found("plain").predicted(logged(), {"angle": 0.5})["angle"], 4)
+    told["samples"] = [refused(partial(fit_equations, model(), [logged(last=n)])) for n in (5, 6)]
+    told["samples of two logs"] = refused(partial(fit_equations, model(), [logged(last=3), logged(last=4)]))
     this = Problem(model(), parts()[:1], "rk4", 1, np.ones(1))
     told["states begun"] = _started(this, THETA[:5] + 0.2, [3, 4])
     return told

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
-from estimation.identification.state_space import choose, fit, starts
+from estimation.identification.state_space import choose, fit, identify, starts
 from estimation.identification.state_space.body import StateSpaceBody, system_in_units
 from estimation.identification.state_space.fit import Effort, StateSpaceFit, fit_state_space, system_of
 from estimation.identification.state_space.identify import _judged, identify_outputs, identify_state_space
@@ -17,6 +17,7 @@ from estimation.identification.state_space.kernel import answers, run_states
 from estimation.identification.state_space.problem import Problem, Size
 from estimation.identification.state_space.system import StateSpace
 from plant.arrays import Array
+from plant.errors import HydrostateError
 from tests.kernels import loops_in_python
 from tests.numbers import Found, Numbers, refused, some, warned
 
@@ -120,6 +121,10 @@ def starts_of_searches() -> dict[str, Any]:
     for n in (59, 60, 61, 106, 107, 140):
         cut = Joint(0.1, (data.u[1][:n],), (data.y[1][:n],))
         told[f"of {n} samples"] = len(starts.subspace_starts(cut, 1))
+    long = Joint(0.1, (np.tile(U, (3, 1)),), (np.tile(outputs(), (3, 1)) + np.resize(NOISE, (720, 2)),))
+    for n in (430, 431, 600):
+        found = starts.subspace_starts(Joint(0.1, (long.u[0][:n],), (long.y[0][:n],)), 2)
+        told[f"of {n} samples"] = [np.sort(np.abs(np.linalg.eigvals(a))) for a, _ in found]
     told["Hankel"] = [starts._hankel(np.arange(12.0).reshape(6, 2), 1, 2), list(starts._hankel(U[:3], 0, 2).shape)]
     turn = np.array([[1.0, 0.4], [0.2, 1.0]])
     for name, poles in {"inside": (0.9, 0.5), "outside": (1.25, 0.5), "at the limit": (0.995, 1.001)}.items():
@@ -292,8 +297,15 @@ def what_is_identified() -> dict[str, Any]:
         one = replace(best, doubt=doubt, fit=replace(best.fit, theta=theta))
         judged = _judged(model, data, one, held, ())
         told[f"judged, {name}"] = [judged.sound, judged.held_back_percent, [dict(note.data) for note in judged.notes]]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(identify, "state_candidates", _asked)
+        told["orders tried"] = [refused(partial(identify_state_space, channels(), order=order)) for order in (None, 3)]
     told["warns"] = [one[:30] for one in warned(lambda: identify_state_space(_unrelated(), order=1, delay=1))]
     return told
+
+
+def _asked(data: Any, orders: Any, delay: Any) -> Any:
+    raise HydrostateError(f"{len(data)} outputs, orders {list(orders)}, delay {delay}")
 
 
 def _unrelated() -> list[Channels]:
