@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.log_checks.order import median
 from estimation.models.model import OPENING, ProcessModel
 from plant.arrays import Array
 from plant.compiled.functions import Scalar
@@ -75,7 +76,7 @@ def gaps(values: Array) -> tuple[Array, NDArray[np.bool_]]:
     [False, False]
     """
     n = np.diff(np.flatnonzero(np.isfinite(values))).astype(np.float64)
-    return n, n > WIDE * float(np.median(n)) if len(n) else np.zeros(0, dtype=np.bool_)
+    return n, n > WIDE * median(n) if len(n) else np.zeros(0, dtype=np.bool_)
 
 
 def _per_sample(values: Array, each: Array, before: float, after: float) -> Array:
@@ -119,7 +120,7 @@ def unknown_angle(speed: Array, sample_time: float) -> Array:
     walk = float(np.sum(steps**2) / np.sum(n))
     open_by = np.maximum(steps**2, np.where(gap, walk * n, 0.0)) * (n**2 - 1.0) / 12.0
     ends = np.array([present[0], len(speed) - 1 - present[-1]], dtype=np.float64)
-    before, after = np.where(ends > float(np.median(n)), walk * ends**2 / 3.0, 0.0)
+    before, after = np.where(ends > median(n), walk * ends**2 / 3.0, 0.0)
     return sample_time**2 * _per_sample(speed, open_by / n, float(before), float(after))
 
 

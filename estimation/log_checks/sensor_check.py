@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.frozen_encoder import jumped, missed_motion
 from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.log_checks.order import median
 from estimation.notes import SensorCode
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -308,7 +309,7 @@ def _is_clipped(seen: Array, level: float, p: EhaParameters) -> bool:
         return False
     steps = np.abs(np.diff(seen))
     moved = steps[steps > 0.0]
-    usual = float(np.median(moved))
+    usual = median(moved)
     far = ARRIVING * max(float(np.min(moved)), LEAST_ARRIVAL * usual)
     if count <= HEAPED * (np.count_nonzero(depth <= far) - count):
         return False
@@ -317,7 +318,7 @@ def _is_clipped(seen: Array, level: float, p: EhaParameters) -> bool:
     if repeats > COARSE and abs(abs(level) / p.relief_pressure - 1.0) < 1.0 - CLIPPED:
         return False
     bends = np.abs(np.diff(seen, 2))[steps[1:] > 0.0]
-    noisy = repeats <= COARSE and len(bends) > 0 and float(np.median(bends)) > NOISY * usual
+    noisy = repeats <= COARSE and len(bends) > 0 and median(bends) > NOISY * usual
     starts, lengths = holds(seen)
     here = (depth[starts] == 0.0) & (lengths >= LEAST_RUN)
     again = sum(

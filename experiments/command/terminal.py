@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 import typer
 from typer.core import TyperGroup
 
+from experiments.command.plain_values import take_plainly
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -303,6 +304,18 @@ def _usage_sentence(error: Exception) -> str | None:
 
 class HydrostateGroup(TyperGroup):
     """The command line, with its errors as sentences and the exit codes that the help promises."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse what stands before a command; no validator is imported for values that need none."""
+        take_plainly(self.get_params(ctx))
+        return super().parse_args(ctx, args)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a command by its name, of which the same holds."""
+        command = super().get_command(ctx, cmd_name)
+        if command is not None:
+            take_plainly(command.get_params(ctx))
+        return command
 
     def main(self, *args: Any, **kwargs: Any) -> NoReturn:
         """Run the command line and exit."""

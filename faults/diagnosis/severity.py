@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from estimation.finding import Quantity
+from estimation.log_checks.order import percentile
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows
 from faults.diagnosis.class_fit import WEAK, Actuator
@@ -111,7 +112,8 @@ def severities(
         if not np.isfinite(value):
             found[name] = Quantity(None, UNITS[name])
             continue
-        low, high = (float(end) for end in np.nanpercentile(table[name], (2.5, 97.5)))
+        finite = table[name][~np.isnan(table[name])]
+        low, high = (percentile(finite, percent) if len(finite) else np.nan for percent in (2.5, 97.5))
         stretch = 1.0 if widths is None else widths.get(name, 1.0)
         ends = value - stretch * (value - low), value + stretch * (high - value)
         found[name] = Quantity(value, UNITS[name], ends)

@@ -9,9 +9,8 @@ from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Generic
+from typing import Any, Generic
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from typing_extensions import TypeVar
 
 from plant.atomic import replacing
@@ -100,22 +99,6 @@ class Rig(Generic[P]):
         return spreads_of(doubts_of(self.parameters), self.uncertainties, self.measured)
 
 
-Strict = Annotated[float, Field(strict=True)]
-
-
-class _RigFile(BaseModel):
-    """What a rig file may hold."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    name: Annotated[str, Field(strict=True)] = "rig"
-    plant: Annotated[str, Field(strict=True)] | None = None
-    measured: tuple[Annotated[str, Field(strict=True)], ...] = ()
-    parameters: dict[str, Any] = {}
-    uncertainty: dict[str, Strict] = {}
-    columns: dict[str, Annotated[str, Field(strict=True)]] = {}
-
-
 def read_rig(path: str | Path, parameter_class: type[Any] = EhaParameters, plant: str = EHA) -> Rig[Any]:
     """Read a rig file; a parameter that it leaves out keeps the default.
 
@@ -139,14 +122,12 @@ def read_rig(path: str | Path, parameter_class: type[Any] = EhaParameters, plant
         If the file cannot be read or is no TOML, is of another kind of actuator, or an entry is unknown, of the wrong
         kind, or out of range.
     """
+    from plant.eha.rig_entries import wrong_kinds
+
     content = _content(Path(path))
     try:
-        return _rig(content, parameter_class, plant)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        wanted = first["msg"].removeprefix("Input should be ")
-        raise RigError(f"{path}: {where} must be {wanted}, got {first['input']!r}") from error
+        with wrong_kinds():
+            return _rig(content, parameter_class, plant)
     except RigError as error:
         raise RigError(f"{path}: {error}") from error
 
@@ -183,12 +164,14 @@ def _content(path: Path) -> dict[str, Any]:
 
 
 def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> Rig[Any]:
-    _known(content, _RigFile.model_fields, "")
-    file = _RigFile.model_validate(content)
+    from plant.eha.rig_entries import RigEntries, numbers_of
+
+    _known(content, RigEntries.model_fields, "")
+    file = RigEntries.model_validate(content)
     if file.plant not in (None, plant):
         raise RigError(f"a rig of plant {plant!r} is needed here, got one of {file.plant!r}")
     _known(file.parameters, _names(parameter_class), "parameters")
-    values = _values(_unpaired(file.parameters, _pairs_of(parameter_class)), parameter_class)
+    values = numbers_of(_unpaired(file.parameters, _pairs_of(parameter_class)), parameter_class)
     return Rig(file.name, parameter_class(**values), file.uncertainty, file.columns, file.measured)
 
 
@@ -214,14 +197,6 @@ def _unpaired(given: Mapping[str, Any], pairs: Mapping[str, str]) -> dict[str, A
         if name == "piston_area" and side_a != side_b:
             values.setdefault("pilot_share", 1.0)
     return values
-
-
-def _values(given: Mapping[str, Any], parameter_class: type[Any]) -> dict[str, Any]:
-    """Return the parameters that a file gives as numbers, or rows of numbers where the class has rows."""
-    rows = {name: isinstance(getattr(parameter_class, name, None), tuple) for name in given}
-    kinds: dict[str, Any] = {name: (tuple[Strict, ...] if row else Strict, ...) for name, row in rows.items()}
-    wanted = create_model("Wanted", parameters=(create_model("Parameters", **kinds), ...))
-    return wanted.model_validate({"parameters": given}).model_dump()["parameters"]
 
 
 def _names(parameter_class: type[Any]) -> list[str]:

@@ -22,16 +22,18 @@ DEAR = {
     "filterpy",
     "jinja2",
     "matplotlib",
+    "numpy.ma",
     "pandas",
     "pebble",
     "pint",
+    "pydantic",
     "rich",
     "scipy",
     "starlette",
     "statsmodels",
     "uvicorn",
 }
-"""Modules that no verb needs for its JSON; what Typer imports by itself (pydantic) is not ours to leave out."""
+"""Modules that no verb needs for its JSON."""
 
 TELLING = """
 import sys

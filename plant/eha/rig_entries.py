@@ -1,0 +1,63 @@
+"""What a rig file may hold, checked by pydantic, which only a rig file that is read needs."""
+
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+
+from plant.errors import RigError
+
+Strict = Annotated[float, Field(strict=True)]
+
+
+class RigEntries(BaseModel):
+    """What a rig file may hold."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: Annotated[str, Field(strict=True)] = "rig"
+    plant: Annotated[str, Field(strict=True)] | None = None
+    measured: tuple[Annotated[str, Field(strict=True)], ...] = ()
+    parameters: dict[str, Any] = {}
+    uncertainty: dict[str, Strict] = {}
+    columns: dict[str, Annotated[str, Field(strict=True)]] = {}
+
+
+def numbers_of(given: Mapping[str, Any], parameter_class: type[Any]) -> dict[str, Any]:
+    """Return the parameters that a file gives as numbers, or rows of numbers where the class has rows.
+
+    Parameters
+    ----------
+    given : Mapping[str, Any]
+        What the file says.
+    parameter_class : type
+        What holds the parameters.
+
+    Returns
+    -------
+    dict[str, Any]
+        The same names, checked [SI].
+    """
+    rows = {name: isinstance(getattr(parameter_class, name, None), tuple) for name in given}
+    kinds: dict[str, Any] = {name: (tuple[Strict, ...] if row else Strict, ...) for name, row in rows.items()}
+    wanted = create_model("Wanted", parameters=(create_model("Parameters", **kinds), ...))
+    return wanted.model_validate({"parameters": given}).model_dump()["parameters"]
+
+
+@contextmanager
+def wrong_kinds() -> Generator[None]:
+    """Raise our error where an entry of a rig file is of the wrong kind.
+
+    Raises
+    ------
+    RigError
+        With the entry, what it must be, and what it is.
+    """
+    try:
+        yield
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        wanted = first["msg"].removeprefix("Input should be ")
+        raise RigError(f"{where} must be {wanted}, got {first['input']!r}") from error

@@ -1,0 +1,79 @@
+"""Plain values reach a command as Typer's own validators hand them on, and those are imported for no others."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import pytest
+import typer
+from typer.core import TyperGroup
+
+from experiments.command.plain_values import take_plainly
+from experiments.command.terminal import HydrostateGroup
+
+GIVEN: list[dict[str, Any]] = []
+
+
+def taking(group: type[TyperGroup]) -> typer.Typer:
+    app = typer.Typer(cls=group)
+
+    @app.command()
+    def take(  # pyright: ignore[reportUnusedFunction] -- Typer calls it
+        logs: list[Path],
+        name: str = "auto",
+        count: Annotated[int, typer.Option(min=0, max=5)] = 1,
+        rate: float = 1.5,
+        whole: float = 2,
+        rig: Path | None = None,
+        there: Annotated[Path | None, typer.Option(exists=True, dir_okay=False)] = None,
+        columns: list[str] | None = None,
+        sure: bool = False,
+        open_choice: Annotated[bool | None, typer.Option("--open/--shut")] = None,
+    ) -> None:
+        GIVEN.append(dict(locals()))
+
+    @app.command()
+    def other() -> None: ...  # pyright: ignore[reportUnusedFunction] -- with one command there is no group
+
+    return app
+
+
+def said_by(group: type[TyperGroup], words: Sequence[str]) -> tuple[list[Any], str]:
+    """Return what reaches the command, and the error if it refuses."""
+    GIVEN.clear()
+    command = typer.main.get_command(taking(group))
+    try:
+        TyperGroup.main(command, ["take", *words], standalone_mode=False)  # pyright: ignore[reportArgumentType]
+    except Exception as error:
+        return [], str(getattr(error, "message", error))
+    return [{name: (type(value), value) for name, value in one.items()} for one in GIVEN], ""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["a.csv"],
+        ["a.csv", "b/c.csv", "--name", "flow", "--rig", "r.toml", "--columns", "a=b", "--columns", "c", "--sure"],
+        ["a.csv", "--count", "3", "--rate", "2e3", "--whole", "4", "--open"],
+        ["a.csv", "--count", "6"],
+        ["a.csv", "--count", "x"],
+        ["a.csv", "--rate", "inf", "--shut"],
+        ["a.csv", "--there", "FOLDER"],
+        ["a.csv", "--there", "FOLDER/none.csv"],
+        ["a.csv", "--there", "FOLDER/here.csv"],
+        ["FOLDER/here.csv", ""],
+        [],
+    ],
+)
+def test_a_command_is_given_what_typer_gives_it(tmp_path: Path, words: Sequence[str]) -> None:
+    (tmp_path / "here.csv").write_text("1")
+    put = [word.replace("FOLDER", str(tmp_path)) for word in words]
+    assert said_by(HydrostateGroup, put) == said_by(TyperGroup, put)
+
+
+def test_a_typer_that_works_in_another_way_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "typer._coercion", None)
+    command = typer.main.get_command(taking(TyperGroup))
+    take_plainly(command.params)
+    assert all(one._runtime_param is None for one in command.params)  # pyright: ignore
