@@ -180,14 +180,21 @@ def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[
     relieved = reaches_relief(log.measured, parameters.relief_pressure)
     forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
     afar = log.taken_at(parameters.bulk_modulus)
+
+    def found(starts: Sequence[Mapping[str, float]], *, alone: bool = False) -> list[_Rough]:
+        first = _searched(forms[0], log, afar, starts, alone=alone)
+        return [first, *_others(forms[1:], log, afar, first, alone=alone)]
+
     if not log.gaps.size:
-        first = _searched(forms[0], log, afar, [_guess(forms[0], afar, starts)], alone=True)
-        others = _others(forms[1:], log, afar, first, alone=True)
-        if _explains(first) or _explains(others[0]):
-            return [first, *others]
-        starts = [*starts, first.values]
-    first = _searched(forms[0], log, afar, starts)
-    return [first, *_others(forms[1:], log, afar, first)]
+        guess, near = _guess(forms[0], afar, starts)
+        # in a wrong valley the whole log takes all steps that there are
+        if not near and _explained(usual := found(starts)):
+            return usual
+        led = found([guess], alone=True)
+        if _explained(led):
+            return led
+        starts = [*starts, led[0].values]
+    return found(starts)
 
 
 def _others(
@@ -198,12 +205,18 @@ def _others(
     return each(lambda form: _searched(form, log, afar, [first.values], alone=alone, wanted=wanted), forms)
 
 
-def _explains(one: _Rough) -> bool:
-    return explained(one.problem, one.point)
+def _explained(found: Sequence[_Rough]) -> bool:
+    """Return whether a log is explained by volume or by mass; held chambers explain too much to count."""
+    return any(explained(one.problem, one.point) for one in found[:2])
 
 
-def _guess(form: GreyBoxModel, log: GreyBoxLog, starts: Sequence[Mapping[str, float]]) -> Mapping[str, float]:
-    """Return where the likeliest of many guesses about the first start leads on the beginning of a log."""
+def _guess(
+    form: GreyBoxModel, log: GreyBoxLog, starts: Sequence[Mapping[str, float]]
+) -> tuple[Mapping[str, float], bool]:
+    """Return where the likeliest of many guesses about the first start leads, and whether that explains the log.
+
+    Of the log its beginning is looked at.
+    """
     search = _search(log)
     problem = FreedProblem.of(form, log.beginning(search.screened).coarsened())
     around = {STIFFNESS: 0.0, **starts[0]}
@@ -221,7 +234,7 @@ def _guess(form: GreyBoxModel, log: GreyBoxLog, starts: Sequence[Mapping[str, fl
     likeliest = guesses[int(np.argmin(problem.costs(guesses)))]
     bounds = flow_bounds(form, guesses, log)
     found = descend(problem.at, likeliest, search.evaluations, bounds, search.near_enough, GUESSED_WITHIN)
-    return problem.model.values(found.theta)
+    return problem.model.values(found.theta), explained(problem, found)
 
 
 def _search(log: GreyBoxLog) -> Search:
