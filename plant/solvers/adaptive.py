@@ -150,7 +150,7 @@ def controlled_groups(
         run(
             np.ascontiguousarray(starts[filled].T),
             speed,
-            np.ascontiguousarray(parameters if lanes == runs else parameters[:, filled]),
+            np.ascontiguousarray(parameters) if lanes == runs else np.take(parameters, filled, axis=1),
             sample_time,
             1.0 / (tolerance * scales),
             bend * control.drive_scale(parameters[0, 0]),

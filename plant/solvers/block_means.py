@@ -57,7 +57,8 @@ def block_means(
     run = _compile(observe, channel, states.shape[1], parameter_class)
     for first in range(0, runs, LANES):
         some = range(first, min(first + LANES, runs))
-        rows = np.ascontiguousarray(parameters[:, [*some, *[first] * (LANES - len(some))]])
+        filled = [*some, *[first] * (LANES - len(some))]
+        rows = np.ascontiguousarray(parameters) if runs == LANES else np.take(parameters, filled, axis=1)
         run(states[..., some.start : some.stop], rows, block, means[:, some.start : some.stop])
     return means
 
