@@ -12,7 +12,7 @@ import numpy as np
 from estimation.identification.free_run.choose_linear import BLOCKS, Candidate, block_error, pooled
 from estimation.identification.free_run.data import Channels, blocks
 from estimation.identification.free_run.dense_polynomial import Asked, Judged, forms_tried, judged_recipes
-from estimation.identification.free_run.linear_fit import Form, fit_linear
+from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.other_orders import disagreement, is_wild
 from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs
 from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, one_more, without_term
@@ -84,7 +84,7 @@ def polynomial_candidates(
         Sizes that the data do not choose.
     """
     delays = min(linear, key=lambda one: one.held_back).form.delays
-    return [*_grown(linear, data), *_dense(data, forms_tried(delays, asked or Asked()))]
+    return [*_grown(linear, data), *_dense(data, delays, asked or Asked())]
 
 
 def _grown(linear: Sequence[Candidate], data: Channels) -> list[PolynomialCandidate]:
@@ -96,11 +96,12 @@ def _grown(linear: Sequence[Candidate], data: Channels) -> list[PolynomialCandid
     return [growth.finished() for growth in best]
 
 
-def _dense(data: Channels, forms: Sequence[Form]) -> list[PolynomialCandidate]:
+def _dense(data: Channels, delays: tuple[int, ...], asked: Asked) -> list[PolynomialCandidate]:
     """Return the models of every product that do best on what was held back, but for those that leave their range."""
     parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
     found: list[PolynomialCandidate] = []
-    for one in sorted(judged_recipes(data, parts, forms), key=lambda one: one.held_back)[:COMPARED]:
+    judged = judged_recipes(data, parts, forms_tried(delays, asked), asked)
+    for one in sorted(judged, key=lambda one: one.held_back)[:COMPARED]:
         fit = one.recipe.fit(data)
         if fit is not None and not is_wild(fit, data):
             found.append(_candidate(fit, one.recipe.fit, one, data))

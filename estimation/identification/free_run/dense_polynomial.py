@@ -5,19 +5,19 @@ the penalty: one least squares of the one-step error, then, of the sizes that do
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 
 import numpy as np
 
 from estimation.arrays import Array, IntArray
-from estimation.identification.free_run.choose_linear import block_error, pooled
+from estimation.identification.free_run.choose_linear import CLEARLY, block_error, pooled
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_fit import Form, LinearFit
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, Variables, products, variables_of
 
 SIZES = ((1, 2), (2, 2), (3, 2), (3, 3))
-"""Lags of the output and of each input."""
+"""Lags of the output and of each input that are tried first."""
 
 MOST_TERMS = 120
 """Of a model; larger sizes are left out."""
@@ -177,8 +177,13 @@ def forms_tried(delays: tuple[int, ...], asked: Asked) -> list[Form]:
     return list(dict.fromkeys(found))
 
 
-def judged_recipes(data: Channels, parts: Sequence[Channels], forms: Sequence[Form]) -> list[Judged]:
+def judged_recipes(
+    data: Channels, parts: Sequence[Channels], forms: Sequence[Form], asked: Asked | None = None
+) -> list[Judged]:
     """Return models of every product, each judged on blocks that its fits left out.
+
+    The free run is descended for the sizes that do best by one least squares, and for larger ones beside the best of
+    them as long as a further lag does clearly better.
 
     Parameters
     ----------
@@ -188,6 +193,8 @@ def judged_recipes(data: Channels, parts: Sequence[Channels], forms: Sequence[Fo
         The same without one block each.
     forms : sequence of Form
         Lags that are tried, with products of degree two and three.
+    asked : Asked, optional
+        Sizes that do not grow.
 
     Returns
     -------
@@ -203,14 +210,58 @@ def judged_recipes(data: Channels, parts: Sequence[Channels], forms: Sequence[Fo
         tried = [one for penalty in ONE_STEP if (one := _judged(Recipe(form, degree, penalty), data, parts))]
         found += tried
         best[form, degree] = min((one.held_back for one in tried), default=float("inf"))
-    for form, degree in sorted(best, key=lambda size: best[size])[:DESCENDED]:
-        one: Judged | None = None
-        for k in range(len(FREE_RUN)):
-            one = _judged(Recipe(form, degree, BEGUN, FREE_RUN[: k + 1]), data, parts, one)
-            if one is None:
-                break
-            found.append(one)
+    descended = [
+        one
+        for form, degree in sorted(best, key=lambda size: best[size])[:DESCENDED]
+        for one in _descended(form, degree, data, parts)
+    ]
+    return [*found, *descended, *_climbed(descended, data, parts, asked or Asked())]
+
+
+def _descended(form: Form, degree: int, data: Channels, parts: Sequence[Channels]) -> list[Judged]:
+    """Return models of one size whose free run is descended under one penalty after the other."""
+    found: list[Judged] = []
+    for k in range(len(FREE_RUN)):
+        one = _judged(Recipe(form, degree, BEGUN, FREE_RUN[: k + 1]), data, parts, found[-1] if found else None)
+        if one is None:
+            break
+        found.append(one)
     return found
+
+
+def _climbed(found: Sequence[Judged], data: Channels, parts: Sequence[Channels], asked: Asked) -> list[Judged]:
+    """Return models of a lag more than the best, and of more lags as long as each does clearly better."""
+    more: list[Judged] = []
+    best = min(found, key=lambda one: one.held_back, default=None)
+    while best is not None:
+        recipe = best.recipe
+        tried = [
+            one
+            for form in larger(recipe.form, asked)
+            if len(every_term(form.order + form.n_b, recipe.degree)) <= MOST_TERMS
+            for one in _descended(form, recipe.degree, data, parts)
+        ]
+        more += tried
+        least = (1.0 - CLEARLY) * best.held_back
+        best = min((one for one in tried if one.held_back < least), key=lambda one: one.held_back, default=None)
+    return more
+
+
+def larger(form: Form, asked: Asked) -> list[Form]:
+    """Return sizes of one lag more, of the output or of every input, but for what is asked for.
+
+    Parameters
+    ----------
+    asked : Asked
+        What is given and not chosen.
+
+    Examples
+    --------
+    >>> [(one.order, one.sizes) for one in larger(Form(3, (2,), (1,)), Asked())]
+    [(4, (2,)), (3, (3,))]
+    """
+    found = [] if asked.order is not None else [replace(form, order=form.order + 1)]
+    return found if asked.n_numerator is not None else [*found, replace(form, sizes=tuple(n + 1 for n in form.sizes))]
 
 
 def _judged(recipe: Recipe, data: Channels, parts: Sequence[Channels], before: Judged | None = None) -> Judged | None:

@@ -82,6 +82,35 @@ def test_sizes_that_are_asked_for_are_kept() -> None:
     assert forms_tried((5,), Asked(order=2, delay=2, n_numerator=7)) == [Form(2, (7,), (2,))]
 
 
+def late_product(n: int = 500) -> Channels:
+    """Return a log of a plant whose output answers an input three samples ago, and its product with the last."""
+    rng = np.random.default_rng(3)
+    u = rng.uniform(-1.5, 1.5, n)
+    u[:8] = 0.0
+    y = np.zeros(n)
+    for t in range(4, n):
+        y[t] = 0.5 * y[t - 1] + u[t - 3] + 0.5 * u[t - 3] * u[t - 1]
+    return scaled(channels_from([u[:, None]], [y + 0.01 * rng.normal(size=n)], 1.0, ["u"], "y"))[0]
+
+
+def test_a_lag_beyond_the_sizes_that_are_tried_first_is_found_and_no_further_one() -> None:
+    data = late_product()
+    parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
+    forms = [Form(1, (2,), (0,)), Form(1, (3,), (0,))]
+    found = judged_recipes(data, parts, forms)
+    best = min(found, key=lambda one: one.held_back)
+    assert best.recipe.form.sizes == (4,)
+    assert best.held_back < 0.1 * min(one.held_back for one in found if one.recipe.form in forms)
+    assert max(one.recipe.form.sizes[0] for one in found) <= 5
+
+
+def test_lags_that_are_asked_for_do_not_grow() -> None:
+    data = late_product()
+    parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
+    found = judged_recipes(data, parts, [Form(1, (3,), (0,))], Asked(order=1, n_numerator=3))
+    assert {one.recipe.form for one in found} == {Form(1, (3,), (0,))}
+
+
 def test_every_product_stands_once() -> None:
     terms = every_term(4, 3)
     assert len(terms) == 1 + 4 + 10 + 20
