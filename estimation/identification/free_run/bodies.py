@@ -78,7 +78,7 @@ class PolynomialBody:
             Output, scaled.
         """
         data = Channels((), "", 1.0, (np.ascontiguousarray(u),), (y,))
-        runs, k = Runs(self.variables, self.terms, data), self.coefficients.size
+        runs, k = Runs(self.variables, self.terms, data, early=True), self.coefficients.size
         known = runs.used
         start = first_values(y, self.variables.n_start)
         best, cost = np.full(y.size, np.nan), np.inf

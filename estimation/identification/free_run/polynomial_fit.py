@@ -137,17 +137,24 @@ class Runs:
         Variables that each term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
     data : Channels
         Scaled.
+    early : bool
+        Whether runs begin as early as the output's lags allow, with inputs that stood at their first values before the
+        log; unless told, they begin where no input counts that came before it, and what is earlier is as measured.
     """
 
-    def __init__(self, variables: Variables, terms: IntArray, data: Channels) -> None:
+    def __init__(self, variables: Variables, terms: IntArray, data: Channels, *, early: bool = False) -> None:
         self.variables, self.terms, self.data = variables, terms, data
         self.target = np.concatenate(data.y)
-        self.used: BoolArray = np.isfinite(self.target)
+        n, longest = variables.n_start, int(variables.lag.max(initial=0))
+        self.begins = [n if early else max(min(longest, y.size), n) for y in data.y]
+        given = [np.arange(y.size) < begin - n for y, begin in zip(data.y, self.begins, strict=True)]
+        self.used: BoolArray = np.isfinite(self.target) & ~np.concatenate(given)
 
     def start_values(self) -> Array:
-        """Return measured first outputs of each log, gaps filled by the first that is there."""
+        """Return the measured outputs that each log's run begins with, gaps filled by the first that is there."""
         n = self.variables.n_start
-        return np.concatenate([first_values(y, n) for y in self.data.y]) if n else np.zeros(0)
+        ends = zip(self.data.y, self.begins, strict=True)
+        return np.concatenate([first_values(y, begin)[begin - n :] for y, begin in ends]) if n else np.zeros(0)
 
     def run(self, theta: Array) -> tuple[Array, list[Array]] | None:
         """Return the outputs and their slopes by their own past, log by log; None where one runs away.
@@ -167,11 +174,12 @@ class Runs:
         free = not (self.terms[:, 1] >= 0).any()
         ends = np.array([-1e9, 1e9]) if free else self.variables.around(FARTHEST)
         for index, u in enumerate(self.data.u):
-            out = np.zeros(u.shape[0])
-            out[:n] = theta[k + index * n : k + (index + 1) * n]
+            out, begin = np.zeros(u.shape[0]), self.begins[index]
+            out[: begin - n] = first_values(self.data.y[index], begin - n)
+            out[begin - n : begin] = theta[k + index * n : k + (index + 1) * n]
             slope = np.zeros((u.shape[0], n))
-            one = self.variables
-            if run_free(theta[:k].copy(), self.terms, one.source, one.lag, one.limits, ends, u, out, slope) >= 0:
+            one, values = self.variables, theta[:k].copy()
+            if run_free(values, self.terms, one.source, one.lag, one.limits, ends, begin, u, out, slope) >= 0:
                 return None
             outs.append(out)
             slopes.append(slope)
@@ -195,16 +203,16 @@ class Runs:
             One column a value.
         """
         n, rows = self.variables.n_start, list[Array]()
-        begin, count = 0, terms.shape[0]
+        place, count = 0, terms.shape[0]
         for index, (u, slope) in enumerate(zip(self.data.u, slopes, strict=True)):
-            part = output[begin : begin + u.shape[0]]
-            begin += u.shape[0]
+            part, begin = output[place : place + u.shape[0]], self.begins[index]
+            place += u.shape[0]
             direct = np.zeros((part.size, count + (n * len(slopes) if starts else 0)))
             write_products(*_signals(self.variables, u, part), terms, direct)
-            direct[:n, :count] = 0.0
+            direct[:begin, :count] = 0.0
             if starts:
-                direct[np.arange(n), count + index * n + np.arange(n)] = 1.0
-            carry(slope, direct)
+                direct[begin - n + np.arange(n), count + index * n + np.arange(n)] = 1.0
+            carry(slope, begin, direct)
             rows.append(direct)
         return np.concatenate(rows)
 

@@ -14,11 +14,12 @@ def run_free(
     lag: IntArray,
     limits: Array,
     ends: Array,
+    begin: int,
     u: Array,
     out: Array,
     slope: Array,
 ) -> int:
-    """Write the output behind its first values, and its slope by its own past; return where it ran away, else -1.
+    """Write the output from a sample on, and its slope by its own past; return where it ran away, else -1.
 
     Parameters
     ----------
@@ -32,10 +33,12 @@ def run_free(
         Ends at which a variable is held in terms of degree two and more.
     ends : ndarray, shape (2,)
         Between which the output is held.
+    begin : int
+        First sample that is written; not less than the longest lag of the output.
     u : ndarray, shape (n, m)
         Inputs; before the first sample they stood at their first values.
     out : ndarray, shape (n,)
-        Holds as many first values as the longest lag of the output; the others are written.
+        Holds outputs before that sample; the others are written.
     slope : ndarray, shape (n, l)
         Written: derivative of each output by the l before it.
     """
@@ -45,7 +48,7 @@ def run_free(
     single, inner, rates = source.copy(), source.copy(), np.zeros(n_start + 1)
     for v in range(source.size):
         single[v] = lag[v] - 1 if source[v] == 0 else n_start
-    for t in range(n_start, n):
+    for t in range(begin, n):
         for v in range(source.size):
             if source[v] == 0:
                 z[v] = out[t - lag[v]]
@@ -110,17 +113,19 @@ def write_products(single: Array, held: Array, terms: IntArray, out: Array) -> N
 
 
 @compiled
-def carry(slope: Array, moved: Array) -> None:
+def carry(slope: Array, begin: int, moved: Array) -> None:
     """Turn the direct effect of values on the output into the whole one: what the output's past passes on is added.
 
     Parameters
     ----------
     slope : ndarray, shape (n, l)
         As `run_free` writes it.
+    begin : int
+        As `run_free` takes it.
     moved : ndarray, shape (n, p)
-        Direct effects; the first l rows are those of the first values.
+        Direct effects; rows before that sample are those of the first values.
     """
-    for t in range(slope.shape[1], moved.shape[0]):
+    for t in range(begin, moved.shape[0]):
         for k in range(slope.shape[1]):
             gain = slope[t, k]
             for j in range(moved.shape[1]):

@@ -1,5 +1,7 @@
 """Models of every product: their least squares, their penalty, and how they are judged."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from estimation.identification.free_run.dense_polynomial import Asked, Recipe, e
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import Form
 from estimation.identification.free_run.other_orders import disagreement, reordered
+from estimation.identification.free_run.polynomial_fit import Runs
 
 
 def bilinear(n: int, seed: int, noise: float) -> tuple[Array, Array]:
@@ -86,9 +89,8 @@ def late_product(n: int = 500) -> Channels:
     """Return a log of a plant whose output answers an input three samples ago, and its product with the last."""
     rng = np.random.default_rng(3)
     u = rng.uniform(-1.5, 1.5, n)
-    u[:8] = 0.0
     y = np.zeros(n)
-    for t in range(4, n):
+    for t in range(3, n):
         y[t] = 0.5 * y[t - 1] + u[t - 3] + 0.5 * u[t - 3] * u[t - 1]
     return scaled(channels_from([u[:, None]], [y + 0.01 * rng.normal(size=n)], 1.0, ["u"], "y"))[0]
 
@@ -102,6 +104,29 @@ def test_a_lag_beyond_the_sizes_that_are_tried_first_is_found_and_no_further_one
     assert best.recipe.form.sizes == (4,)
     assert best.held_back < 0.1 * min(one.held_back for one in found if one.recipe.form in forms)
     assert max(one.recipe.form.sizes[0] for one in found) <= 5
+
+
+def test_a_log_that_begins_in_motion_is_fitted_as_if_its_inputs_were_known_before_it() -> None:
+    data, recipe = late_product(), Recipe(Form(1, (4,), (0,)), 2, 1e-8, (1e-6,))
+    assert np.ptp(data.u[0][:4]) > 1.0
+    fit = recipe.fit(data)
+    assert fit is not None
+    noise = 0.01 / 1.27  # over the output's deviation
+    assert np.sqrt(fit.cost / 500) == pytest.approx(noise, rel=0.25)
+    two = replace(data, u=(data.u[0],) * 2, y=(data.y[0], np.roll(data.y[0], 1)))
+    runs = Runs(fit.variables, fit.terms, two)
+    theta = np.concatenate([fit.coefficients, runs.start_values()])
+    ran = runs.run(theta)
+    assert ran is not None
+    assert ran[0][:3] == pytest.approx(data.y[0][:3])
+    assert not runs.used[:2].any()
+    assert runs.used[2:500].all()
+    jacobian = runs.sensitivities(*ran, fit.terms, starts=True)
+    for k in range(theta.size):
+        step = 1e-6 * np.eye(theta.size)[k]
+        ends = [runs.run(theta + sign * step) for sign in (1.0, -1.0)]
+        moved = (ends[0][0] - ends[1][0]) / 2e-6  # type: ignore[index]
+        assert moved == pytest.approx(jacobian[:, k], abs=1e-5)
 
 
 def test_lags_that_are_asked_for_do_not_grow() -> None:
