@@ -152,8 +152,8 @@ def _rig_share(card: Card) -> list[str]:
     rule = "only the ratio of chamber volume to bulk modulus matters"
     if not card.uncertainties:
         return [
-            f"{rule}: an error of 1 % in the volume is an error of 1 % in bulk modulus; these bounds take the volume as "
-            "exact, because [uncertainty] in the rig file does not list it"
+            f"{rule}: an error of 1 % in the volume is an error of 1 % in bulk modulus; these bounds take the volume "
+            "as exact, because [uncertainty] in the rig file does not list it"
         ]
     given = ", ".join(f"{_words(name)} {percent(std)}" for name, std in card.uncertainties.items())
     whole, alone = card.relative_std["bulk_modulus"], card.known_exactly["bulk_modulus"]
