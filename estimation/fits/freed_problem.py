@@ -6,8 +6,9 @@ kernel without unknowns serves every hypothesis.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
@@ -51,7 +52,7 @@ class FreedProblem(Problem):
         sizes = tuple((name, linear[name]) for name in free if name in linear)
         if not log.gaps.size:  # what a gap leaves open costs as much again to follow
             model = replace(model, jump=())
-        super().__init__(replace(model, unknowns=tuple(free), linear=sizes), log, compile_kernel(model))
+        super().__init__(replace(model, unknowns=tuple(free), linear=sizes), log, partial(_by_itself, model))
         self._bare, self._sizes = model, linear
         self._last: list[tuple[Array, Array, Array, Array]] = []
         self._columns = [parameter_names(model.parameters).index(name) for name in free]
@@ -255,6 +256,11 @@ class FreedProblem(Problem):
         errors = self._room()
         super()._run(np.empty(0), errors, np.empty((0, 0, 0)), drives, row, variance)
         return errors
+
+
+def _by_itself(model: GreyBoxModel, *given: Any) -> tuple[float, Array, Array]:
+    """Run a model by itself: most problems run it side by side alone, and need not load this kernel."""
+    return compile_kernel(model)(*given)
 
 
 def _nudged(theta: Array) -> Array:
