@@ -5,38 +5,15 @@ import gc
 import os
 import sys
 import threading
+from collections.abc import Sequence
 from contextlib import suppress
-from typing import Annotated
+from functools import cache
+from importlib import import_module
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.circuit import command as circuit
-from experiments.command import (
-    batch,
-    compare,
-    conditions,
-    diagnose,
-    estimate,
-    export,
-    filter_stream,
-    fleet,
-    identifiability,
-    identify,
-    inspect,
-    isolability,
-    serve,
-    simulate,
-    size_cylinder,
-    watch,
-)
 from experiments.command.terminal import HydrostateGroup, emit
-from experiments.diaphragm_motor import command as diaphragm_motor
-from experiments.library import command as library
-from experiments.motor_paper import command as motor_paper
-from experiments.nine_conditions import command as nine_conditions
-from experiments.open_benchmark import command as open_benchmark
-from experiments.papers import command as papers
-from experiments.piezo_stack import command as piezo_stack
 from plant.compiled.native.recipes import trust_sources
 
 LEFT_TO_END = 10.0
@@ -59,16 +36,44 @@ internal error.
 Example: hydrostate simulate --condition minor_leakage --out run.csv, then hydrostate diagnose run.csv
 """
 
-app = typer.Typer(
-    name="hydrostate",
-    cls=HydrostateGroup,
-    pretty_exceptions_enable=False,
-    add_completion=False,
-    no_args_is_help=True,
-    rich_markup_mode="markdown",
-    context_settings={"help_option_names": ["--help", "-h"]},
-    epilog=EPILOG,
+VERBS = (
+    "nine_conditions.command",
+    "circuit.command",
+    "piezo_stack.command",
+    "diaphragm_motor.command",
+    "command.simulate",
+    "command.estimate",
+    "command.identify",
+    "library.command",
+    "command.diagnose",
+    "command.inspect",
+    "command.watch",
+    "command.filter_stream",
+    "command.identifiability",
+    "command.isolability",
+    "command.conditions",
+    "command.batch",
+    "command.compare",
+    "command.fleet",
+    "command.serve",
+    "motor_paper.command",
+    "papers.command",
+    "command.size_cylinder",
 )
+"""Modules that hold a verb each, in the order of the help."""
+
+ALONE = {"estimate": "command.estimate", "diagnose": "command.diagnose", "identify": "command.identify"}
+"""Verbs of a single log, whose module is imported without the others: these take a twentieth of a short run."""
+
+if TYPE_CHECKING:
+    app: typer.Typer
+    """All verbs; made when it is first asked for."""
+
+
+def __getattr__(name: str) -> Any:
+    if name != "app":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return _whole()
 
 
 def _show_version(wanted: bool) -> None:
@@ -79,8 +84,7 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
-def root(
+def _root(
     shown: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
     ] = False,
@@ -89,35 +93,51 @@ def root(
     del shown
 
 
-VERBS = (
-    nine_conditions,
-    circuit,
-    piezo_stack,
-    diaphragm_motor,
-    simulate,
-    estimate,
-    identify,
-    library,
-    diagnose,
-    inspect,
-    watch,
-    filter_stream,
-    identifiability,
-    isolability,
-    conditions,
-    batch,
-    compare,
-    fleet,
-    serve,
-    motor_paper,
-    papers,
-    size_cylinder,
-)
-for module in VERBS:
-    app.add_typer(module.commands)
-app.add_typer(conditions.rig_commands, name="rig")
-app.add_typer(export.commands, name="export")
-app.add_typer(open_benchmark.commands, name="benchmark")
+def _of(modules: Sequence[str]) -> typer.Typer:
+    """Return the command line with the verbs of some modules."""
+    made = typer.Typer(
+        name="hydrostate",
+        cls=HydrostateGroup,
+        pretty_exceptions_enable=False,
+        add_completion=False,
+        no_args_is_help=True,
+        rich_markup_mode="markdown",
+        context_settings={"help_option_names": ["--help", "-h"]},
+        epilog=EPILOG,
+    )
+    made.callback()(_root)
+    for module in modules:
+        made.add_typer(import_module(f"experiments.{module}").commands)
+    return made
+
+
+@cache
+def _whole() -> typer.Typer:
+    from experiments.command import conditions, export
+    from experiments.open_benchmark import command as open_benchmark
+
+    made = _of(VERBS)
+    made.add_typer(conditions.rig_commands, name="rig")
+    made.add_typer(export.commands, name="export")
+    made.add_typer(open_benchmark.commands, name="benchmark")
+    return made
+
+
+def app_for(words: Sequence[str]) -> typer.Typer:
+    """Return the command line that understands what was typed.
+
+    Parameters
+    ----------
+    words : sequence of str
+        What stands behind the program's name.
+
+    Returns
+    -------
+    typer.Typer
+        With all verbs, or with the one of a single log that is asked for.
+    """
+    alone = ALONE.get(words[0]) if words else None
+    return _whole() if alone is None else _of([alone])
 
 
 def main() -> None:
@@ -133,7 +153,7 @@ def main() -> None:
     for name in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{name}_NUM_THREADS", "1")
     try:
-        app()
+        app_for(sys.argv[1:])()
     except SystemExit as ended:
         if not isinstance(ended.code, int):
             raise

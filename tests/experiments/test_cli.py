@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import faults.conditions
-from experiments.cli import app
+from experiments.cli import ALONE, app, app_for
 from experiments.nine_conditions.settings import quick_settings
 from experiments.running.study import Study
 from faults.conditions import CONDITIONS
@@ -36,6 +36,14 @@ def test_help_gives_an_example_that_parses_so_far(command: tuple[str, ...]) -> N
     shown = invoke(*command, "--help")
     assert shown.exit_code == 0
     assert f"Example: hydrostate {' '.join(command)}" in " ".join(shown.stdout.split())
+
+
+@pytest.mark.parametrize(
+    "words", [[verb, *more] for verb in ALONE for more in (["--help"], [], ["--no-such", "x.csv"])]
+)
+def test_a_verb_that_is_loaded_alone_reads_as_among_the_others(words: list[str]) -> None:
+    alone, among = CliRunner().invoke(app_for(words), words), CliRunner().invoke(app, words)
+    assert (alone.exit_code, alone.output) == (among.exit_code, among.output)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from experiments.open_benchmark.run import run
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
-from plant.eha.simulate import CIRCUIT, simulate
+from plant.eha.simulate import CIRCUIT, LUMPED, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
@@ -57,7 +57,7 @@ def test_a_log_that_the_likeliest_guess_explains_is_fitted_as_by_a_search_from_e
     log = seen(recorded(condition))
     quick = balanced(log, HEALTHY, STARTS)
     assert max(tried) == 1
-    monkeypatch.setattr(flow_search, "_explains", lambda _: False)
+    monkeypatch.setattr(flow_search, "_explained", lambda _: False)
     whole = balanced(log, HEALTHY, STARTS)
     assert max(tried) > len(STARTS)
     assert len(quick) == len(whole)
@@ -73,6 +73,23 @@ def test_a_log_that_no_guess_explains_is_searched_from_every_start(tried: list[i
     drift = np.linspace(0.0, 3e5, len(record))
     balanced(seen(record.replace(differential_pressure_pa=record["differential_pressure_pa"] + drift)), HEALTHY, STARTS)
     assert max(tried) > len(STARTS)
+
+
+def test_a_guess_that_leads_into_a_wrong_valley_is_not_followed_over_the_whole_log(
+    tried: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(1)
+    drive = make_drive("multisine", 6.0, 1e-3, HEALTHY, rng)
+    log = seen(simulate(LUMPED, drive, 1e-3, HEALTHY, sensors=BENCH, rng=rng))
+    quick = balanced(log, HEALTHY, STARTS)
+    assert tried == [len(STARTS), 1, 1]
+    tried.clear()
+    guess = flow_search._guess  # pyright: ignore[reportPrivateUsage]
+    monkeypatch.setattr(flow_search, "_guess", lambda *given: (guess(*given)[0], True))
+    followed = balanced(log, HEALTHY, STARTS)
+    assert tried == [1, 1, 1, len(STARTS) + 1, 1, 1]
+    for one, other in zip(quick, followed, strict=True):
+        assert one.values == pytest.approx(other.values)
 
 
 def by_mass(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:
