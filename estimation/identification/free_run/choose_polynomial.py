@@ -32,8 +32,9 @@ HIGHEST_BASE = 4
 BASES, SCREENED, KEPT = 6, 3, 2
 """Linear models that products are added to, how many products they are given first, and how many models go on."""
 
-COMPARED = 20
-"""Models of every product, best on what was held back, that are fitted to all data and tried in other orders."""
+COMPARED, LARGER = 16, 6
+"""Models of every product, best on what was held back, that are fitted to all data and tried in other orders: of the
+sizes that are tried first, and of larger ones, so that neither leave out the other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +101,10 @@ def _dense(data: Channels, delays: tuple[int, ...], asked: Asked) -> list[Polyno
     """Return the models of every product that do best on what was held back, but for those that leave their range."""
     parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
     found: list[PolynomialCandidate] = []
-    judged = judged_recipes(data, parts, forms_tried(delays, asked), asked)
-    for one in sorted(judged, key=lambda one: one.held_back)[:COMPARED]:
+    forms = forms_tried(delays, asked)
+    judged = sorted(judged_recipes(data, parts, forms, asked), key=lambda one: one.held_back)
+    first = [one for one in judged if one.recipe.form in forms][:COMPARED]
+    for one in first + [one for one in judged if one.recipe.form not in forms][:LARGER]:
         fit = one.recipe.fit(data)
         if fit is not None and not is_wild(fit, data):
             found.append(_candidate(fit, one.recipe.fit, one, data))
