@@ -49,8 +49,9 @@ def simulate(
         str | None,
         option(
             "PLANT",
-            "lumped (5.8 to 5.10, it sticks), reduced (5.14), circuit (the whole rig), or piezo-stack and "
-            "diaphragm-motor, which have a sine drive and the options marked so.",
+            "lumped (the paper's equations 5.8 to 5.10), reduced (equation 5.14), circuit (two chambers with valves: "
+            "take it to try diagnose on friction), or piezo-stack and diaphragm-motor, which have a sine drive and the "
+            "options marked so.",
             show_default="that of the rig file, else lumped",
         ),
     ] = None,

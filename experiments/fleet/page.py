@@ -23,8 +23,8 @@ SICK = ("over", "likely")
 COLUMNS: Sequence[Mapping[str, Any]] = (
     {"label": "actuator", "kind": "name", "width": 7.7},
     {"label": "state", "kind": "state", "width": 12.5, "words": STATES},
-    {"label": "found", "kind": "text", "width": 10.5},
-    {"label": "worst", "kind": "text", "width": 10.5},
+    {"label": "found", "kind": "text", "width": 9.8},
+    {"label": "worst", "kind": "text", "width": 11.2},
     {"label": "of the limit", "kind": "number", "width": 6.5, "unit": "%"},
     {"label": "outlook", "kind": "text", "width": 12},
     {"label": "logs left", "kind": "number", "width": 5.5},

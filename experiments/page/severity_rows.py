@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 
 from estimation.finding import Quantity
 from experiments.page.numbers import shop_unit
@@ -71,8 +72,8 @@ class SeverityRow:
 
     @property
     def limit_text(self) -> str:
-        """The limit with as many digits as matter; empty where there is none."""
-        return "" if self.limit is None else f"{self.limit:.3g}"
+        """The limit with as many digits as matter and no exponent; empty where there is none."""
+        return "" if self.limit is None else f"{Decimal(f'{self.limit:.3g}'):f}"
 
 
 def severity_row(name: str, words: str, one: Quantity, sound: float, limit: float | None) -> SeverityRow | None:

@@ -86,7 +86,7 @@
       width,
       height: (width < NARROW ? HEIGHT.narrow : HEIGHT.wide) + (last ? 36 : 0),
       legend: { show: false },
-      padding: [10, 24, 0, 0],
+      padding: [10, 24, last ? 0 : 8, 0], // room for half of the lowest number where no axis is below it
       cursor: { sync: { key: figure.group }, drag: { x: true, y: false } },
       scales: { x: { time: false } },
       axes: [

@@ -22,7 +22,7 @@
     }
     if (column.kind === "state") return element("td", { class: `fleet-${value}`, role: "cell" }, column.words[value]);
     if (column.kind === "name") {
-      return element("th", { scope: "row", role: "rowheader" }, link ? element("a", { href: link }, value) : value);
+      return element("th", { scope: "row", role: "rowheader", title: value }, link ? element("a", { href: link }, value) : value);
     }
     return element("td", { title: value, role: "cell", "data-head": column.label }, value);
   }

@@ -23,6 +23,12 @@
     return made;
   }
 
+  // The log's own message is for a terminal; here a log is looked into by dropping it again.
+  function advice(log) {
+    if (log.state !== "failed" || log.verb === "inspect") return [];
+    return [element("p", { class: "key-line" }, "To see what is in the file, choose inspect and drop it again.")];
+  }
+
   function stateWords(log) {
     if (log.state === "running") return `running, ${log.phase}`;
     return log.state;
@@ -51,7 +57,7 @@
       {},
       named,
       element("td", { "data-head": "state", class: log.state === "failed" ? "bad" : "" }, `${stateWords(log)} (${log.verb})`),
-      element("td", { "data-head": "verdict" }, log.message ?? ""),
+      element("td", { "data-head": "verdict" }, log.message ?? "", ...advice(log)),
       element("td", { "data-head": "compare" }, tick),
       element("td", { "data-head": "delete" }, remove),
     );
@@ -102,7 +108,7 @@
       older.hidden = logs.length >= total;
       comparing.disabled = ticked.size !== 2;
       if (!coming.size) {
-        status.textContent = total ? `${total} logs, ${counts.unfinished ?? 0} not finished yet.` : "No log yet.";
+        status.textContent = total ? `${total} ${total === 1 ? "log" : "logs"}, ${counts.unfinished ?? 0} not finished yet.` : "No log yet.";
       }
     } catch (error) {
       status.textContent = `The server does not answer: ${error.message}`;

@@ -1,6 +1,7 @@
 """A severity as a row of a page: in a reader's unit, or left out where the log does not tell it."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -28,6 +29,8 @@ def test_the_bar_reaches_from_zero_over_the_interval_to_the_limit() -> None:
     assert row.first <= 0.0
     assert row.last >= 10.0
     assert row.limit_text == "10"
+    assert replace(row, limit=1184.0).limit_text == "1180"
+    assert replace(row, limit=0.01234).limit_text == "0.0123"
     open_row = severity_row("added_friction", "added friction", Quantity(3.0, "N", (1.0, 5.0)), 0.0, None)
     assert open_row is not None
     assert open_row.limit_text == ""
