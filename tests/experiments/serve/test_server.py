@@ -130,6 +130,20 @@ def test_a_log_that_is_chosen_is_sent_worked_on_and_listed_and_two_are_compared(
     assert page.locator("h1").inner_text() == "No certain difference between the two logs."
 
 
+def test_a_log_that_failed_says_how_to_look_into_it_and_one_that_was_looked_into_does_not(
+    opened: Any, tmp_path: Path
+) -> None:
+    page = opened("home")
+    for verb, name in (("diagnose", "no log.csv"), ("inspect", "nothing.csv")):
+        (tmp_path / name).write_text("a,b\n1,2\n3,4\n" if verb == "diagnose" else "")
+        page.select_option("#verb", verb)
+        page.set_input_files("#file", str(tmp_path / name))
+    failed = page.locator("tr", has_text="no log.csv")
+    failed.locator("td", has_text="failed (diagnose)").wait_for(timeout=30_000)
+    assert "choose inspect and drop it again" in failed.inner_text()
+    assert page.get_by_text("choose inspect").count() == 1
+
+
 def test_the_live_view_shows_gauges_and_what_the_watch_tells(opened: Any) -> None:
     page = opened("live")
     assert page.locator(".gauges li").count() == 7
