@@ -81,7 +81,13 @@ def flow_forms() -> dict[str, Any]:
     told["ports"] = [
         flow.port_flows(pumped, leaked, dp, 0.01)
         for pumped in (-1e-5, 0.0, 1e-5)
-        for leaked, dp in ((2e-6, 1e6), (-2e-6, -1e6), (0.0, 0.0))
+        for leaked, dp in ((2e-6, 1e6), (-2e-6, -1e6), (0.0, 0.0), (1e-6, 0.5))
+    ]
+    seat = (ROD.accumulator_pressure - 2.0, ROD.accumulator_pressure + 0.5)
+    told["at their seats"] = [
+        flow.inner_flows(seat, ROD),
+        flow.inner_flows(seat[::-1], ROD, (1.0, 0.0)),
+        flow.chamber_rates(seat, flow.Delivery(0.0, 0.0, 0.0), ROD, by_mass=False),
     ]
     told["leaks"] = [flow.leaked_flow(dp, 1e-12, ROD) for dp in (-6e6, -1e6, 0.0, 3.4e6, 3.5e6)]
     told["relief"] = [
