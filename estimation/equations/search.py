@@ -98,11 +98,12 @@ def searched(
         If the equations run away from every start.
     """
     typical = spread(parts)
+    typical = np.where(typical > 0.0, typical, 1.0)
     first = np.where(np.isnan(noise), np.maximum(noise_of(parts), LEAST_NOISE * typical), noise)
     problem = Problem(equations, tuple(parts), "rk4", 1, first, robust)
     guesses = _guesses(problem, starts, seed)
     problem = stepped(problem, guesses[0])
-    rough = problem.with_noise(BALANCED * np.where(typical > 0.0, typical, 1.0))
+    rough = problem.with_noise(BALANCED * typical)
     ends = _descended(rough, guesses)
     if not _explained(problem, ends[0].theta, first):
         ends = sorted([*ends, _lengthened(rough, guesses[0])], key=lambda point: point.cost)
@@ -253,7 +254,7 @@ def _shown(problem: Problem, theta: Array, typical: Array) -> Array:
         size = [NORMAL_MAD * float(np.median(np.abs(row[kept]))) for row, kept in zip(errors, seen, strict=True)]
     else:
         size = [float(np.sqrt(np.mean(row[kept] ** 2) / free)) for row, kept in zip(errors, seen, strict=True)]
-    return np.maximum(size, LEAST_NOISE * np.where(typical > 0.0, typical, 1.0))
+    return np.maximum(size, LEAST_NOISE * typical)
 
 
 def _moved(problem: Problem, point: Point) -> float:
