@@ -184,11 +184,12 @@ def _quantities(problem: Problem, theta: Array, found: Covariance, samples: int)
     reach, rows = float(stdtrit(free, 0.975)), dict[str, Quantity]()
     for j, (name, one) in enumerate(zip(problem.names, problem.unknowns, strict=True)):
         unit, std = one.unit if name in problem.equations.parameters else _unit(problem, name), float(found.std[j])
-        if not np.isfinite(std):
+        low, high = (theta[j] + side * reach * std for side in (-1.0, 1.0))
+        with np.errstate(over="ignore"):
+            ends = (np.exp(low), np.exp(high)) if one.logarithmic else (low * one.size, high * one.size)
+        if not np.isfinite(ends).all():
             rows[name] = Quantity(None, unit)
             continue
-        low, high = (theta[j] + side * reach * std for side in (-1.0, 1.0))
-        ends = (np.exp(low), np.exp(high)) if one.logarithmic else (low * one.size, high * one.size)
         by_theta = values[j] if one.logarithmic else one.size
         rows[name] = Quantity(float(values[j]), unit, (float(ends[0]), float(ends[1])), float(by_theta * std))
     return rows
