@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.equations import search
+from estimation.equations import fit, search
 from estimation.equations.definition import Equations, Parameter
 from estimation.equations.problem import Part, Problem
 from estimation.fits.descent import Point
 from plant.arrays import Array
+from plant.log.record import Record
 from tests.numbers import Numbers, refused
 
 NUMBERS = Numbers(__file__)
@@ -44,17 +45,19 @@ def problem(**changes: Any) -> Problem:
 
 
 @contextmanager
-def watched(name: str, told: Callable[..., Any], instead: Callable[..., Any] | None = None) -> Iterator[list[Any]]:
+def watched(
+    name: str, told: Callable[..., Any], instead: Callable[..., Any] | None = None, place: Any = search
+) -> Iterator[list[Any]]:
     """Note what a function of the search is called with, and call it, or another in its place."""
     asked: list[Any] = []
-    real = getattr(search, name)
+    real = getattr(place, name)
 
     def spy(*args: Any, **kwargs: Any) -> Any:
         asked.append(told(*args, **kwargs))
         return (instead or real)(*args, **kwargs)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(search, name, spy)
+        patch.setattr(place, name, spy)
         yield asked
 
 
@@ -86,6 +89,15 @@ def descents() -> dict[str, Any]:
     with watched("descend", evaluations, lambda at, start, most, *_: [at(start) for _ in range(most)].pop()):
         told["not finished"] = search._finished(one, THETA)[1]
     return told
+
+
+@NUMBERS.case()
+def threads() -> dict[str, Any]:
+    """On how many threads matrices are multiplied: more make small ones slower."""
+    record = Record(0.05, {"push": PUSH, "way": problem().parts[0].measured[0]})
+    with watched("threadpool_limits", lambda **given: given, place=fit) as asked:
+        fit.fit_equations(MODEL, [record])
+    return {"fits": asked}
 
 
 @NUMBERS.case()

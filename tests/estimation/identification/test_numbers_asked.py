@@ -31,6 +31,7 @@ from estimation.identification.search import pole_search
 from estimation.identification.search.criterion import Structure
 from estimation.identification.search.experiments import Experiments, experiments_from
 from estimation.identification.state_space import choose, fit
+from estimation.identification.state_space import identify as identify_states
 from estimation.identification.state_space.joint import Joint
 from estimation.identification.state_space.problem import Problem, Size
 from plant.arrays import Array
@@ -285,6 +286,30 @@ def state_spaces() -> dict[str, Any]:
         choose.state_candidates([one], [1], 1)
     told["efforts"] = asked
     return told
+
+
+@NUMBERS.case()
+def threads() -> dict[str, Any]:
+    """On how many threads matrices are multiplied: more make small ones slower."""
+    told: dict[str, Any] = {}
+    whole = channels_from([U[:, None]], [answer()], 0.1, ("a",), "y")
+    for name, place, inner, call in (
+        ("free runs", identify, "_identified", lambda: identify.identify_channels(whole)),
+        ("state spaces", identify_states, "_identified", lambda: identify_states.identify_state_space([whole])),
+    ):
+        with (
+            watched(place, "threadpool_limits", lambda **given: given) as asked,
+            watched(place, inner, lambda *_: 0, _nothing),
+        ):
+            try:
+                call()
+            except StopIteration:
+                told[name] = asked
+    return told
+
+
+def _nothing(*_: Any) -> Any:
+    raise StopIteration
 
 
 @pytest.mark.parametrize("case", NUMBERS.cases)

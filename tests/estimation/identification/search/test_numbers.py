@@ -72,6 +72,8 @@ def banded_criterion() -> dict[str, Any]:
         for n_b, delay in ((2, 1), (1, 0), (3, 0), (1, 3)):
             explained, numerators = explained_power(rows, n_b, delay, omega, power, cross)
             told[f"{n_b} coefficients behind {delay}"] = [explained, numerators]
+        onto = np.array([0.0, 0.7])
+        told["a pole at a band"] = [*explained_power(np.array([[-1.0]]), 1, 0, onto, power[:2], cross[:2])]
         narrow = explained_power(rows, 3, 0, omega[:1], power[:1], cross[:1])
         told["one band"] = narrow[0]
         for most in (1, 2, 4, 25):
