@@ -158,7 +158,9 @@ def parts_of_continuous_fits() -> dict[str, Any]:
     held = continuous._Problem(data, 0.05, 1, 2, 0.12)
     values = np.array([0.01, 0.012, 0.2, 0.06])
     told: dict[str, Any] = {}
-    for name, problem, theta in (("free", free, np.array([*values, 2.4])), ("held", held, values)):
+    quick = np.array([1e-5, 1e-4, 0.02, 1e-4])
+    late = np.array([*values, 2.4])
+    for name, problem, theta in (("free", free, late), ("held", held, values), ("sampled quickly", held, quick)):
         jacobian, residual = problem.parts(theta)
         told[name] = {
             "discrete": [*problem.discrete(theta)],
