@@ -228,7 +228,8 @@ def flow_balance(blocks: ChannelBlocks, p: EhaParameters) -> FlowBalance | None:
     sizes = np.linalg.norm(columns, axis=0)
     if np.ptp(flow) == 0.0:
         return None
-    sizes[sizes == 0.0] = 1.0
+    absent = sizes == 0.0
+    sizes[absent] = 1.0
     scaled = columns / sizes
     inverse = np.linalg.pinv(scaled.T @ scaled)
     found = inverse @ (scaled.T @ flow)
@@ -236,7 +237,8 @@ def flow_balance(blocks: ChannelBlocks, p: EhaParameters) -> FlowBalance | None:
     left = float(np.var(rest))
     lasting = float(np.clip(alike(rest[1:], rest[:-1])[0], 0.0, 0.99))
     variance = left * (1.0 + lasting) / (1.0 - lasting)  # as many blocks fewer as neighbours repeat each other
-    value, std = found / sizes, np.sqrt(variance * np.diag(inverse)) / sizes
+    open_by = np.where(absent, np.inf, np.maximum(np.diag(inverse), 0.0))  # of what stands still nothing is known
+    value, std = found / sizes, np.sqrt(variance * open_by) / sizes
     told = [float(one[k]) for k in (0, 1) for one in (value, std)]
     moving = p.piston_area * float(np.std(piston)) / float(np.std(flow))
     return FlowBalance(told[0], told[1], told[2], told[3], 1.0 - left / float(np.var(flow)), moving)

@@ -126,7 +126,7 @@ def clock_facts(stamps: Any) -> ClockFacts | None:
     Returns
     -------
     ClockFacts or None
-        None where there are fewer than three stamps, or none increases.
+        None where there are fewer than three stamps, none increases, or they are too far apart for a number.
 
     Examples
     --------
@@ -143,15 +143,15 @@ def clock_facts(stamps: Any) -> ClockFacts | None:
         return None
     with np.errstate(over="ignore", invalid="ignore"):
         step = np.diff(time)
-        forward = step[step > 0.0]
-        if not len(forward) or not np.isfinite(forward).all():
+        forward, span = step[step > 0.0], float(time[-1] - time[0])
+        if not len(forward) or not np.isfinite(forward).all() or not np.isfinite(span):
             return None
         usual = usual_step(forward)
         near = forward[forward < 1.5 * usual]
         jitter = float(np.sqrt(np.mean((near / usual - 1.0) ** 2))) if len(near) else 0.0
     return ClockFacts(
         usual,
-        float(time[-1] - time[0]),
+        span,
         int(np.count_nonzero(forward >= 1.5 * usual)),
         int(np.count_nonzero(step == 0.0)),
         int(np.count_nonzero(step < 0.0)),

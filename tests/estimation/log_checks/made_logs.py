@@ -1,0 +1,39 @@
+"""Logs that are made in a millisecond: a piston's motion, the pressure that it takes, and the pump that feeds both."""
+
+import numpy as np
+
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
+PRESSURE, PORTS = "differential_pressure_pa", ("pressure_a_pa", "pressure_b_pa")
+HEALTHY = EhaParameters()
+T = 2e-3
+N = 1500
+
+
+def noise(size: float, count: int = N, seed: int = 5) -> Array:
+    return size * np.random.default_rng(seed).standard_normal(count)
+
+
+def made_log(count: int = N, *, leakage: float = 1.0, size: float = 1.0, noisy: float = 1.0) -> Record:
+    """Return a log of two sines of the piston, with the friction and leakage that its parameters say."""
+    p, t = HEALTHY, T * np.arange(count)
+    waves = ((0.03 * size, 7.0, 0.0), (0.015 * size, 24.0, 1.0))
+    velocity = sum((a * np.sin(w * t + s) for a, w, s in waves), np.zeros(count))
+    position = sum((-a / w * np.cos(w * t + s) for a, w, s in waves), np.zeros(count))
+    pressure = (p.friction_coulomb * np.tanh(velocity / 2e-3) + p.friction_linear * velocity) / p.piston_area
+    stored = p.chamber_volume / p.bulk_modulus * np.gradient(pressure, T)
+    net = p.piston_area * velocity + stored + leakage * p.leakage_coefficient * pressure
+    speed = (net + p.flow_bias * np.sign(net)) / p.pump_displacement
+    return Record(
+        T,
+        {
+            SPEED: speed + noise(0.05 * noisy, count, 1),
+            POSITION: np.round(position + noise(2e-6 * noisy, count, 2), 6) if noisy else position,
+            VELOCITY: velocity + noise(2e-4 * noisy, count, 3),
+            PRESSURE: pressure + noise(3e3 * noisy, count, 4),
+        },
+        start_time=0.25,
+    )
