@@ -181,20 +181,19 @@ def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[
     forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
     afar = log.taken_at(parameters.bulk_modulus)
 
-    def found(starts: Sequence[Mapping[str, float]], *, alone: bool = False) -> list[_Rough]:
-        first = _searched(forms[0], log, afar, starts, alone=alone)
-        return [first, *_others(forms[1:], log, afar, first, alone=alone)]
-
     if not log.gaps.size:
         guess, near = _guess(forms[0], afar, starts)
-        # in a wrong valley the whole log takes all steps that there are
-        if not near and _explained(usual := found(starts)):
-            return usual
-        led = found([guess], alone=True)
-        if _explained(led):
-            return led
-        starts = [*starts, led[0].values]
-    return found(starts)
+        if not near:  # in a wrong valley the whole log takes all steps that there are
+            first = _searched(forms[0], log, afar, starts, hopeful=True)
+            if _explains(first):
+                return [first, *_others(forms[1:], log, afar, first)]
+        first = _searched(forms[0], log, afar, [guess], alone=True)
+        others = _others(forms[1:], log, afar, first, alone=True)
+        if _explains(first) or _explains(others[0]):
+            return [first, *others]
+        starts = [*starts, first.values]
+    first = _searched(forms[0], log, afar, starts)
+    return [first, *_others(forms[1:], log, afar, first)]
 
 
 def _others(
@@ -205,9 +204,8 @@ def _others(
     return each(lambda form: _searched(form, log, afar, [first.values], alone=alone, wanted=wanted), forms)
 
 
-def _explained(found: Sequence[_Rough]) -> bool:
-    """Return whether a log is explained by volume or by mass; held chambers explain too much to count."""
-    return any(explained(one.problem, one.point) for one in found[:2])
+def _explains(one: _Rough) -> bool:
+    return explained(one.problem, one.point)
 
 
 def _guess(
@@ -251,6 +249,7 @@ def _searched(
     *,
     alone: bool = False,
     wanted: float = np.inf,
+    hopeful: bool = False,
 ) -> _Rough:
     """Return the best that is found from starts, at first with noise of position as it is at the rig's bulk modulus."""
     search = _search(log)
@@ -258,9 +257,11 @@ def _searched(
     guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in starts]
     bounds = flow_bounds(form, guesses, afar)
     if not log.passes_on:
-        point = roughly(problem, guesses, search, bounds, wanted)
+        point = roughly(problem, guesses, search, bounds, wanted, hopeful=hopeful)
         return _Rough(problem, point, bounds)
-    point = roughly(problem, guesses, search, bounds)
+    point = roughly(problem, guesses, search, bounds, hopeful=hopeful)
+    if np.isinf(point.cost):
+        return _Rough(problem, point, bounds)
     problem, modulus = problem.on(log), form.values(point.theta)["bulk_modulus"]
     guesses = [form.theta({STIFFNESS: 0.0, **start, "bulk_modulus": modulus}) for start in starts]
     bounds = flow_bounds(form, guesses, log)

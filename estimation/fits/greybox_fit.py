@@ -5,7 +5,7 @@ well the rig's own parameters are known. The last two are read off the fit's lin
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,7 +148,13 @@ def fit_greybox(
 
 
 def roughly(
-    problem: Problem, guesses: Sequence[Array], search: Search, bounds: tuple[Array, Array], wanted: float = np.inf
+    problem: Problem,
+    guesses: Sequence[Array],
+    search: Search,
+    bounds: tuple[Array, Array],
+    wanted: float = np.inf,
+    *,
+    hopeful: bool = False,
 ) -> Point:
     """Return the least cost that is found from several starts, with one model step a sample.
 
@@ -164,6 +170,8 @@ def roughly(
         Lowest and highest coordinates [dimensionless].
     wanted : float
         Cost above which the result is of no use [dimensionless], see `estimation.fits.descent.descend`.
+    hopeful : bool
+        Whether several starts are followed only if one explains the beginning; else the cost is infinite.
 
     Returns
     -------
@@ -180,7 +188,10 @@ def roughly(
 
     if len(guesses) > 1:
         screened = each(lambda guess: descended(guess, search.screened, search.screening), guesses)
-        guesses = [point.theta for point in sorted(screened, key=_cost)[: search.finalists]]
+        likely = sorted(screened, key=_cost)[: search.finalists]
+        if hopeful and not explained(problem.on(log.beginning(search.screened)), likely[0]):
+            return replace(likely[0], cost=np.inf)
+        guesses = [point.theta for point in likely]
     points: list[Point] = []
     for guess in guesses:
         length = LENGTHENED * search.screened

@@ -12,7 +12,21 @@ Strict = Annotated[float, Field(strict=True)]
 
 
 class RigEntries(BaseModel):
-    """What a rig file may hold."""
+    """What a rig file may hold.
+
+    Parameters
+    ----------
+    name, plant : str
+        What reports call the rig, and the kind of actuator.
+    measured : tuple of str
+        Entries that were measured on the bench.
+    parameters : dict
+        By name [SI]; `numbers_of` checks them.
+    uncertainty : dict
+        Relative standard deviation by parameter [fraction].
+    columns : dict
+        Foreign log columns by channel.
+    """
 
     model_config = ConfigDict(extra="forbid")
 

@@ -42,9 +42,9 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many starts each search had."""
     counts: list[int] = []
 
-    def counted(problem: object, guesses: Sequence[object], *others: object) -> object:
+    def counted(problem: object, guesses: Sequence[object], *others: object, **more: object) -> object:
         counts.append(len(guesses))
-        return roughly(problem, guesses, *others)  # pyright: ignore[reportArgumentType] -- as it came
+        return roughly(problem, guesses, *others, **more)  # pyright: ignore[reportArgumentType] -- as it came
 
     monkeypatch.setattr(flow_search, "roughly", counted)
     return counts
@@ -57,7 +57,7 @@ def test_a_log_that_the_likeliest_guess_explains_is_fitted_as_by_a_search_from_e
     log = seen(recorded(condition))
     quick = balanced(log, HEALTHY, STARTS)
     assert max(tried) == 1
-    monkeypatch.setattr(flow_search, "_explained", lambda _: False)
+    monkeypatch.setattr(flow_search, "_explains", lambda _: False)
     whole = balanced(log, HEALTHY, STARTS)
     assert max(tried) > len(STARTS)
     assert len(quick) == len(whole)

@@ -127,7 +127,7 @@ def first_guesses_of_the_flow_form() -> dict[str, Any]:
     log_of = seen(log(0.5))
     costs = FreedProblem.costs
     with patch.object(FreedProblem, "costs", autospec=True, side_effect=costs) as asked:
-        found = _guess(FLOW_FORM, log_of, flow_starts(PAPER, 2e8))
+        found, near = _guess(FLOW_FORM, log_of, flow_starts(PAPER, 2e8))
     guesses = np.array(asked.call_args.args[1])
     return {
         "count": len(guesses),
@@ -135,6 +135,7 @@ def first_guesses_of_the_flow_form() -> dict[str, Any]:
             sorted({round(float(one), 4) for one in guesses[:, i]}) for i in range(3)
         ],
         "found": {name: Roughly(value, 0.05) for name, value in found.items() if name != "speed_lead"},
+        "near": near,
         "samples": [_search(replace(log_of, sample_time=time)).screened for time in (1e-3, 3e-3)],
     }
 
