@@ -283,7 +283,7 @@ def circuit_scales(p: SimpleNamespace | CircuitParameters) -> NDArray[np.float64
     sliding = p.pump_displacement * rated / p.piston_area
     oil = squeezed / 60.0
     sizes = rated, 1.0, squeezed / p.piston_area, sliding / 3.0, oil, oil, oil
-    return np.array([float(np.mean(size)) for size in sizes])
+    return np.array([size if isinstance(size, float) else float(np.mean(size)) for size in sizes])
 
 
 _RATED_VOLTS = 4.0

@@ -213,6 +213,9 @@ def circuit_of(p: EhaParameters) -> CircuitParameters:
     )
 
 
+_NAMES = tuple(field.name for field in fields(CircuitParameters))
+
+
 def circuit_values(rows: Array) -> SimpleNamespace:
     """Return a circuit's parameters by name, from a row of them, or from rows of many circuits.
 
@@ -221,4 +224,4 @@ def circuit_values(rows: Array) -> SimpleNamespace:
     rows : ndarray, shape (..., parameters)
         Parameters in the order of the fields [SI].
     """
-    return SimpleNamespace(**{field.name: rows[..., i] for i, field in enumerate(fields(CircuitParameters))})
+    return SimpleNamespace(**{name: rows[..., i] for i, name in enumerate(_NAMES)})
