@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.identification.fit import continuous, instrumental, output_error, profile_interval
+from estimation.identification.fit import continuous, fitted, instrumental, output_error, profile_interval
 from estimation.identification.fit.arx import fit_arx
 from estimation.identification.fit.continuous import fit_continuous
 from estimation.identification.fit.fitted import Task, _require_effect, quality
@@ -15,6 +15,7 @@ from estimation.identification.fit.instrumental import fit_instrumental
 from estimation.identification.fit.output_error import fit_output_error
 from estimation.identification.fit.prediction_error import _acceptable, _starts, fit_armax, fit_box_jenkins
 from estimation.identification.fit.profile_interval import dc_gain_interval
+from estimation.identification.fit.residual_tests import ResidualTest
 from estimation.identification.fit.subspace import fit_subspace
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.criterion import Structure
@@ -95,6 +96,11 @@ def fits_of_every_structure() -> dict[str, Any]:
                 told[f"{kind}, {name}"] = told_of(fit(u, y, 0.01, covariance="auto"))
     u, y = records()["coloured"]
     told["coloured is asked"] = told_of(fit_output_error(u, y, 0.01, **FORM, covariance="coloured"))["covariance"]
+    for probability in (0.9e-3, 1.1e-3, 1.9e-3):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(fitted, "ljung_box", lambda _, p=probability: ResidualTest(1.0, 1, p))
+            model = fit_output_error(u, y, 0.01, **FORM, covariance="auto")
+        told[f"coloured with a probability of {probability:g}"] = told_of(model)["covariance"]
     told["white is asked"] = told_of(fit_output_error(u, y, 0.01, **FORM))["covariance"]
     return told
 

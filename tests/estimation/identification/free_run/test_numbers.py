@@ -153,6 +153,8 @@ def choices() -> dict[str, Any]:
     told["criteria"] = [one.bic, one.aic, one.held_back]
     late = fit_linear(Form(2, (2,), (2,)), data(lost=True))
     told["criteria of a dead time"] = choose_linear.candidate(late, data(lost=True)).bic
+    exact = choose_linear.candidate(replace(late, cost=0.0), data(lost=True))
+    told["criteria of what leaves nothing"] = [exact.bic, exact.aic]
     told["prices"] = [made(0.5, 0.0, late=k).price for k in (0, 1, 2)]
     told["delays"] = [
         choose_linear.estimate_delays(data(delay=k), most) for k, most in ((0, 20), (3, 20), (3, 2), (1, 9))

@@ -128,6 +128,7 @@ def products_that_are_chosen() -> dict[str, Any]:
     told["nothing more"] = polynomial_terms.one_more(one, np.array([[0, 0, -1]]), data()) is None
     told["pruned"] = len(choose_polynomial._pruned(grown(2), data()).terms)
     told["criterion"] = choose_polynomial._bic(replace(one, cost=3.0), data(lost=True))
+    told["criterion of what leaves nothing"] = choose_polynomial._bic(replace(one, cost=0.0), data())
     told["wild"] = [
         other_orders.is_wild(
             replace(one, theta=one.theta * np.where(np.arange(one.theta.size) == 4, size, 1.0)), data()
@@ -307,6 +308,8 @@ def bent_inputs() -> dict[str, Any]:
         }
         told[f"{kind}, run"] = [some(body.run(data().u[0], data().y[0]), 3), body.n_values]
         told[f"{kind}, run without outputs"] = some(body.run(data().u[0], np.full(90, np.nan)), 3)
+    exact = replace(found, linear=replace(found.linear, cost=0.0))
+    told["criterion of what leaves nothing"] = choose_hammerstein._bic(exact, data())
     ranked = [(float(k), np.array([float(k // 2)]), np.ones(2)) for k in range(12)]
     told["apart"] = [one[0] for one in hammerstein_fit._apart(ranked)]
     told["bases"] = [one.form.order for one in choose_hammerstein._bases(linear())]
