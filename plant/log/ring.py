@@ -23,7 +23,7 @@ from plant.arrays import Array
 from plant.errors import HydrostateError, LogError
 
 MAGIC, ROWS_AT, HEADER_AT = b"HYDRING1", 4096, 64
-COLUMNS_AT, SLOTS_AT, WRITTEN_AT, READ_AT, ENDED_AT, LENGTH_AT = 8, 12, 16, 24, 32, 36
+COLUMNS_AT, WRITTEN_AT, READ_AT, ENDED_AT, LENGTH_AT = 8, 16, 24, 32, 36
 
 PAUSE = 2e-3
 """Time between two looks where nothing is new [s]."""

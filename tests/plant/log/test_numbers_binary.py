@@ -75,7 +75,7 @@ def variables_of_mat_files() -> dict[str, Any]:
     def element(kind: int, data: bytes, order: str = "<") -> bytes:
         return struct.pack(f"{order}II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
 
-    def matrix(order: str, name: bytes, kind: int, body: bytes, shape: tuple[int, ...], flags: int = 0) -> bytes:
+    def matrix(order: str, name: bytes, kind: int, body: bytes, shape: tuple[int, ...], *, flags: int = 0) -> bytes:
         head = element(6, struct.pack(f"{order}II", kind | flags, 0), order) + element(
             5, struct.pack(f"{order}{len(shape)}i", *shape), order
         )
@@ -127,7 +127,7 @@ def variables_of_mat_files() -> dict[str, Any]:
                     6,
                     element(9, struct.pack("<d", 1.0)) + element(9, struct.pack("<d", 4.0)),
                     (1, 1),
-                    0x0800,
+                    flags=0x0800,
                 )
             )
         ),

@@ -200,7 +200,7 @@ def usual_sizes() -> dict[str, Any]:
         )
     ]
     told["measurable"] = [
-        edge(lambda one: or_refused(lambda: require_measurable({"x": np.array([0.0, -one])}, "a")), low, high)
+        edge(lambda one: or_refused(lambda: require_measurable({"x": np.array([0.0, -one])}, "a")) is None, low, high)
         for low, high in ((1e-33, 1e-28), (1e13, 1e17))
     ]
     told["of a few"] = [notes(position_m=np.arange(n) * 1.0, velocity_m_s=np.arange(n) * 900.0) for n in (2, 3, 9)]
