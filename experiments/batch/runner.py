@@ -1,5 +1,6 @@
 """`run_batch(plan, store, ...)`: every case that the store lacks is run, and kept as soon as its task is done."""
 
+import hashlib
 import platform
 import shutil
 import subprocess
@@ -17,6 +18,11 @@ from experiments.batch.part_store import PartStore
 from experiments.batch.series import Group
 from experiments.batch.work import Part, lost_task, run_task
 from plant.errors import HydrostateError
+
+ROOT = Path(__file__).resolve().parents[2]
+
+METHODS = ("plant", "estimation", "faults")
+"""Packages whose code makes the numbers of a row."""
 
 WORKER_ENDED = "the worker process ended while it ran this case, as when memory runs out"
 
@@ -194,14 +200,36 @@ def manifest_of(plan: Plan, source: str) -> Mapping[str, Any]:
         "machine": platform.machine(),
         "versions": {name: package_version(name) for name in packages},
         "commit": _commit(),
+        "sources": sources(ROOT),
     }
 
 
 def _commit() -> str | None:
     """Return the commit of the sources, None where they are not a git checkout."""
-    git, folder = shutil.which("git"), Path(__file__).resolve().parents[2]
-    if git is None or not (folder / ".git").exists():
+    git = shutil.which("git")
+    if git is None or not (ROOT / ".git").exists():
         return None
-    command = [git, "-C", str(folder), "rev-parse", "HEAD"]
+    command = [git, "-C", str(ROOT), "rev-parse", "HEAD"]
     found = subprocess.run(command, capture_output=True, text=True, check=False, timeout=10)  # noqa: S603 -- fixed words
     return found.stdout.strip() or None
+
+
+def sources(root: Path) -> str:
+    """Return a hash of the code that makes numbers, and of the numbers that ship with it: an edit changes no version.
+
+    Parameters
+    ----------
+    root : Path
+        Folder of the packages.
+
+    Returns
+    -------
+    str
+        Sixteen digits.
+    """
+    files = sorted(one for name in METHODS for kind in ("*.py", "*.json") for one in (root / name).rglob(kind))
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(f"{file.relative_to(root)}\0".encode())
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]

@@ -154,12 +154,16 @@ def run_plan(
 
 def _say_differences(old: Any, new: Any) -> None:
     """Say where kept rows were made by other software than what is to be made now."""
+    from experiments.batch.runner import METHODS
+
     if old is None:
         return
     then = old["versions"]
     changed = [f"{name} {then.get(name)}" for name, now in new["versions"].items() if then.get(name) != now]
     if old.get("commit") != new["commit"]:
         changed.append(f"commit {str(old.get('commit'))[:10]}")
+    elif old.get("sources") != new.get("sources"):
+        changed.append(f"other code in {', '.join(METHODS)}")
     if changed:
         note(f"rows that are kept may have been made with {', '.join(changed)}; --no-resume makes all of them again")
 

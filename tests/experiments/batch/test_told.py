@@ -1,10 +1,12 @@
 """What a batch says on standard error while it runs."""
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from experiments.batch.runner import sources
 from experiments.batch.study_file import parse_study
 from experiments.command import batch
 from plant.errors import HydrostateError
@@ -23,6 +25,28 @@ def test_kept_rows_of_other_software_are_said_with_what_made_them(said: list[str
     (one,) = said
     assert "numpy 1.0, commit 0123456789;" in one
     assert "scipy" not in one
+
+
+def test_kept_rows_of_code_that_was_edited_since_are_said(said: list[str]) -> None:
+    old = {"versions": {}, "commit": "a", "sources": "one"}
+    batch._say_differences(old, {**old, "sources": "two"})
+    (one,) = said
+    assert "other code in plant, estimation, faults; --no-resume" in one
+
+
+def test_an_edit_of_the_code_or_of_its_numbers_changes_the_hash_of_the_sources(tmp_path: Path) -> None:
+    law, numbers, page = (
+        tmp_path / name for name in ("plant/law.py", "faults/deep/widths.json", "experiments/page.py")
+    )
+    for file in (law, numbers, page):
+        file.parent.mkdir(parents=True)
+        file.write_text("1")
+    found = [sources(tmp_path)]
+    for file in (law, numbers, page):
+        file.write_text("2")
+        found.append(sources(tmp_path))
+    assert len(set(found)) == 3
+    assert found[-1] == found[-2]
 
 
 @pytest.mark.parametrize("old", [None, {"versions": {"numpy": "1.0"}, "commit": "a"}])
