@@ -278,6 +278,11 @@ def conclusions() -> dict[str, Any]:
         for given in (np.nan, 0.02, 0.0001):
             notes = conclude._misfits(this, theta, residuals, np.array([given]))
             told[f"misfits, {name}, {given:g}"] = [[str(note.code), _numbers(note.data)] for note in notes]
+    rows = [[np.cos(np.arccos(size) * np.arange(N))[None, :]] for size in (0.19, 0.24, 0.27, -0.27)]
+    told["correlated"] = [
+        any(note.code == "misfit_correlated" for note in conclude._misfits(this, theta, row, np.array([np.nan])))
+        for row in rows
+    ]
     rng = np.random.default_rng(3)
     told["followed"] = [
         conclude._followed(rng.standard_normal(N) + share * TORQUE, TORQUE, np.ones((N, 1)))
