@@ -10,7 +10,7 @@ from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.hammerstein_body import HammersteinBody
 from estimation.identification.free_run.linear_body import LinearBody as LinearBody
-from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, Variables, first_values, products
+from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, Variables, products
 from estimation.identification.state_space.body import StateSpaceBody as StateSpaceBody
 
 START_STEPS = 12
@@ -78,9 +78,17 @@ class PolynomialBody:
             Output, scaled.
         """
         data = Channels((), "", 1.0, (np.ascontiguousarray(u),), (y,))
-        runs, k = Runs(self.variables, self.terms, data, early=True), self.coefficients.size
-        known = runs.used
-        start = first_values(y, self.variables.n_start)
+        runs, early = (Runs(self.variables, self.terms, data, early=one) for one in (False, True))
+        first = self._begun(early, y)
+        begin = runs.begins[0] - self.variables.n_start
+        if not begin or np.count_nonzero(runs.used) <= 4 * self.variables.n_start:
+            return first
+        # what the inputs before the log did is forgotten: the state behind it is fitted for itself
+        return np.concatenate([first[:begin], self._begun(runs, y)[begin:]])
+
+    def _begun(self, runs: Runs, y: Array) -> Array:
+        """Return the run whose first outputs suit those that are there best; NaN from where it runs away."""
+        known, k, start = runs.used, self.coefficients.size, runs.start_values()
         best, cost = np.full(y.size, np.nan), np.inf
         for _ in range(START_STEPS if np.count_nonzero(known) > 4 * start.size else 1):
             ran = runs.run(np.concatenate([self.coefficients, start]))

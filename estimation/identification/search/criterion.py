@@ -184,13 +184,13 @@ def _fill_linear_columns(structure: Structure, f: Array, u: Array, numerator: Ar
     decayed = filtered([1.0], f, u)
     for k in range(structure.n_numerator):
         lag = structure.delay + k
-        numerator[lag:, k] = decayed[: u.size - lag]
+        numerator[lag:, k] = decayed[: max(u.size - lag, 0)]
     if structure.n_initial:
         pulse = np.zeros(u.size)
         pulse[0] = 1.0
         response = filtered([1.0], f, pulse)
         for k in range(structure.n_initial):
-            initial[k:, k] = response[: u.size - k]
+            initial[k:, k] = response[: max(u.size - k, 0)]
 
 
 def profile(structure: Structure, denominator: Array, u: Array, y: Array, used: BoolArray) -> tuple[float, Array]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.arrays import Array
+from estimation.identification.free_run.bodies import PolynomialBody
 from estimation.identification.free_run.choose_linear import BLOCKS, linear_candidates
 from estimation.identification.free_run.choose_polynomial import polynomial_candidates
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
@@ -127,6 +128,18 @@ def test_a_log_that_begins_in_motion_is_fitted_as_if_its_inputs_were_known_befor
         ends = [runs.run(theta + sign * step) for sign in (1.0, -1.0)]
         moved = (ends[0][0] - ends[1][0]) / 2e-6  # type: ignore[index]
         assert moved == pytest.approx(jacobian[:, k], abs=1e-5)
+
+
+def test_a_run_forgets_what_inputs_before_its_log_did() -> None:
+    data = late_product()
+    fit = Recipe(Form(1, (4,), (0,)), 2, 1e-8, (1e-6,)).fit(data)
+    assert fit is not None
+    body, begin = PolynomialBody.of(fit), 211
+    u, y = data.u[0][begin : begin + 40], data.y[0][begin : begin + 40]
+    error = body.run(u, y) - y
+    assert np.abs(error[2:]).max() < 0.04
+    assert np.abs(error[:2]).max() > 0.1  # inputs before the log are told by nothing, and outputs are not copied
+    assert np.isfinite(body.run(u, np.full(40, np.nan))).all()
 
 
 def test_lags_that_are_asked_for_do_not_grow() -> None:
