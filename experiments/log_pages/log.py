@@ -1,7 +1,7 @@
 """A log in the hands of a Python user: its channels, and the verbs that say what it holds."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -40,7 +40,7 @@ def refuse(message: str) -> NoReturn:
 
 
 @contextmanager
-def options_by_name() -> "Iterator[None]":
+def options_by_name() -> "Generator[None]":
     """Give options in errors the names that Python users know them by: ``start_std`` in place of ``--start-std``.
 
     Raises
