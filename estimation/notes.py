@@ -85,6 +85,10 @@ class EstimateCode(Code):
         "{channel} is {milliseconds:.1f} ms too {when} for the flow balance: a sensor or its filter lags, and this is "
         "not corrected for"
     )
+    PLAY_LEFT = (
+        "the pressure residuals look like those of an encoder with a play (backlash) of about {play_um:.1g} um, and how "
+        "the piston crosses it is not found: bulk modulus may be some percent too low"
+    )
     POSITION_RESIDUALS_LARGE = (
         "the position residuals are {ratio:.2f} times the sensors' noise: neither friction model explains how the "
         "piston starts and stops, and bulk modulus may be far off"

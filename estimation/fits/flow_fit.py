@@ -92,6 +92,10 @@ benchmark's validation split. A plain fit needs none: it fits each valve and the
 PLAY_STRUCTURE = 5e-3
 """The same where the encoder has a play, as what the piston does while it crosses that is not known; judged."""
 
+PLAY_SHOWN = 4.0
+"""Gain in log-likelihood from which residuals show a play of the encoder [dimensionless]: by chance each of three courses
+gains it in one log of 430, so one log in 140 at most is asked in vain."""
+
 SURER = 2.0
 """What a difference of log-likelihood between balances is divided by [dimensionless]: they leave out less than the
 motion form does. With `BY_MASS` the likeliest on 285 logs of our plants and of the open benchmark."""
@@ -161,19 +165,20 @@ def fit_flow(
     if asked:
         near = _near(swinging, starts, explains, in_motion=loaded or moving)
         near = [best.values, *near] if best is not swinging and explains(best) else near
-        paired = any(one not in ALWAYS_ASKED for one in asked)
+        paired = any(one not in (*ALWAYS_ASKED, PLAY) for one in asked)
+        homed = _homed_at_stop(log)
         by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
         strange = explain(log, parameters, near, explains, asked=asked, paired=paired, by_mass=by_mass)
         one = strange.fit
-        if explains(one) and one.cost < _wanted(strange.names, best, swinging, homed=_homed_at_stop(log)):
+        if _known(strange.names, one) and explains(one) and one.cost < _wanted(strange.names, best, swinging, homed=homed):
             bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
             left = PLAY_STRUCTURE if PLAY.name in strange.names else STRUCTURE
             believed = with_structure(strange.values, left)
-            return FormFit(believed, bound, one.chi_square[0], (), one.rig_slopes, strange)
+            return FormFit(believed, bound, one.chi_square[0], _play_left(one), one.rig_slopes, strange)
     value, std = found["bulk_modulus"]
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     believed = found if sure else with_structure(found, STRUCTURE)
-    reasons = _objections(best, log.passes_on)
+    reasons = (*_objections(best, log.passes_on), *_play_left(swinging))
     if BEGUN in asked and not reasons and not explains(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
     return FormFit(believed, std / value, best.chi_square[0], reasons, best.rig_slopes, remarks=remarks)
@@ -223,7 +228,9 @@ def _asked(
     zero = max(zeros)
     worn = delivery.gain > WORTH and delivery.size > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and zero.size > LEAST_ZERO
-    asked = tuple(one for one, worthwhile in ((DELIVERY, worn), (ENCODER_ZERO, shifted)) if worthwhile)
+    plays = swinging.play.gain > PLAY_SHOWN
+    tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays)
+    asked = tuple(one for one, worthwhile in tried if worthwhile)
     open_by = 0.0 if DELIVERY in asked else delivery.deviation
     remarks = (RigCode.WEAR_NOT_EXCLUDED.note(percent=200.0 * open_by),) if open_by > OPEN_DELIVERY else ()
     if not moving:
@@ -255,6 +262,18 @@ def _near(
     near = [fit.values, fed] if lost else [fit.values]
     held = (STIFFNESS, *CRACKS)
     return [*({name: value for name, value in one.items() if name not in held} for one in near), *usual]
+
+
+def _known(names: Sequence[str], fit: GreyBoxFit) -> bool:
+    """Return whether a play's fit leaves no more than the sensors' noise: what is left is how the piston crosses it."""
+    return PLAY.name not in names or fit.chi_square[0] <= DOUBTED
+
+
+def _play_left(fit: GreyBoxFit) -> tuple[Note, ...]:
+    """Return the objection to a fit whose residuals show a play that it does not have."""
+    if fit.play.gain <= PLAY_SHOWN:
+        return ()
+    return (EstimateCode.PLAY_LEFT.note(play_um=1e6 * fit.play.size),)
 
 
 def _beforehand(fit: GreyBoxFit) -> float:

@@ -15,6 +15,7 @@ from estimation.fits.descent import Point, descend
 from estimation.fits.drive_noise import drive_variance
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem, search_bounds
+from estimation.fits.play import NO_PLAY, POSITION, ShownPlay, shown_play
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
@@ -71,6 +72,8 @@ class GreyBoxFit:
     late : Mapping[str, tuple of float]
         By driving channel whose timing is asked: the time by which it seems to come late [s], and what bringing it
         forward would gain in log-likelihood, to first order [dimensionless].
+    play : ShownPlay
+        What the residuals say of a play of the encoder, where a fit was asked.
     """
 
     model: GreyBoxModel
@@ -82,6 +85,7 @@ class GreyBoxFit:
     autocorrelation: tuple[float, ...]
     rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
     late: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
+    play: ShownPlay = NO_PLAY
 
 
 @dataclass(frozen=True)
@@ -252,6 +256,7 @@ def concluded(
     errors, slopes = problem.linearised(theta)
     felt = np.flatnonzero(np.einsum("ij,ij->j", slopes, slopes) > LEAST_EFFECT**2)
     noise, rig, late = np.full(len(theta), np.inf), dict[str, Array](), dict[str, tuple[float, float]]()
+    play = NO_PLAY
     used = int(np.count_nonzero(errors))
     if len(felt) and used > len(theta):
         if len(felt) < len(theta):
@@ -263,13 +268,17 @@ def concluded(
         def response(shift: Array) -> Array:
             return bread @ (slopes.T @ shift.ravel())
 
+        def left(shift: Array) -> Array:
+            return shift - slopes @ response(shift)
+
         variance = np.diag(spread) + (NOISE_DOUBT * (bread @ problem.untilted(theta, errors)[felt])) ** 2
         variance = variance + (drive_variance(problem, theta, bread, slopes) if disturbed else 0.0)
         # the window's estimate need not be positive: then nothing is known
         noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))
         if disturbed and asked:
             rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in _rig_slopes(problem, theta, response)}
-            late = dict(_lateness(problem, theta, errors.ravel(), lambda shift: shift - slopes @ response(shift)))
+            late = dict(_lateness(problem, theta, errors.ravel(), left))
+            play = shown_play(problem, theta, errors.ravel(), left) if POSITION in problem.log.timed else NO_PLAY
     sizes = dict(model.linear)
     values = model.values(theta)
     unit = np.array([sizes.get(name, values[name]) for name in model.unknowns])
@@ -284,6 +293,7 @@ def concluded(
         std=dict(zip(model.unknowns, map(float, unit * noise), strict=True)),
         rig_slopes=slopes_si,
         late=late,
+        play=play,
         cost=point.cost,
         chi_square=tuple(map(float, squares / seen)),
         autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),

@@ -6,6 +6,10 @@ A log that the plain flow form explains is not asked. `estimation.fits.explain` 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from estimation.models.completed_flow import CRACKS
+from estimation.models.flow import STIFFNESS
+from estimation.models.wide_flow import CROSSED
+
 
 @dataclass(frozen=True)
 class Hypothesis:
@@ -63,7 +67,10 @@ START_LOAD = Hypothesis("start_load", ("start_pressure", "start_level"))
 BEGUN = replace(START_LOAD, from_first_sample=True)
 """The same of a log that begins under load or in motion."""
 
-PLAY = Hypothesis("position_play", ("position_play",), ({"position_play": 5e-5},))
+PLAY = Hypothesis(
+    "position_play", ("position_play", *CROSSED, *CRACKS, STIFFNESS), ({"position_play": 1e-5}, {"position_play": 5e-5})
+)
+"""What the plain fit found of make-up valves and accumulator has taken the play up, so they are sought again."""
 
 OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
 

@@ -1,15 +1,56 @@
-"""`side_of_play(position) -> Array`: at which end of its play an encoder was last pushed by the piston."""
+"""Play between the piston and its encoder: where the piston may be in it, and whether a fit's residuals show one.
+
+The encoder says at which end of its play it is while it moves. While it stands the piston may be anywhere in between:
+it turns and crosses, or springs back on its seals and comes again. So where it is has a few courses, of which a log
+chooses (`crossings`).
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
+from estimation.arrays import Array, BoolArray, IntArray
+from estimation.fits.greybox_problem import Problem
+from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import position_variance
-from plant.arrays import Array
 
 CELLS = 8.0
 """Width of the cells in which a reading is followed, in standard deviations of its noise [dimensionless]."""
 
 FINEST = 1e-9
 """Their least width [m]."""
+
+SMOOTHED = 2e-2
+"""Length over which pressure is averaged, by a Hann window [s]: its noise then moves no piston, and the quickest of
+crossings takes as long; judged."""
+
+STANDS = 0.02
+"""Time for which an encoder stands before the piston is taken to spring back [s]; judged. One that creeps stands from
+step to step."""
+
+NUDGE = 1e-6
+"""Play by which the residuals' answer to one is read off [m]."""
+
+POSITION = "position_m"
+
+
+class ShownPlay(NamedTuple):
+    """What a fit's residuals say of a play.
+
+    Parameters
+    ----------
+    size : float
+        By the likeliest course, to first order [m].
+    gain : float
+        In log-likelihood, Rao's score statistic over two; 0 where all courses ask for less than none [dimensionless].
+    """
+
+    size: float
+    gain: float
+
+
+NO_PLAY = ShownPlay(0.0, 0.0)
 
 
 def side_of_play(position: Array) -> Array:
@@ -34,19 +75,122 @@ def side_of_play(position: Array) -> Array:
     >>> side_of_play(out_and_back)[[0, 20, 30, 34, 60]].round(1).tolist()
     [0.0, 1.0, 0.9, -1.0, -1.0]
     """
+    return _crossed(_standings(position), lambda share: share**2)
+
+
+def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
+    """Return courses of the piston in its encoder's play.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n,)
+        The reading, without gaps [m].
+    pressure : ndarray, shape (n,)
+        Differential pressure [Pa]; NaN is missing.
+    sample_time : float
+        Seconds between samples [s].
+
+    Returns
+    -------
+    ndarray, shape (n, 4)
+        In the order of `estimation.models.wide_flow.COURSES`: `side_of_play`; then what is to be added to it where the piston follows pressure in
+        place of time, as one that is held by the stretch of its seals does; where it crosses at first, and not at last;
+        and where it springs back and comes again, by the share of the pressure that is lost meanwhile [dimensionless].
+    """
+    stands = _standings(position)
+    late, early = (_crossed(stands, crossed) for crossed in (lambda share: share**2, lambda share: share * (2 - share)))
+    force = _smoothed(bridged(pressure), round(SMOOTHED / sample_time))
+    before, after = force[stands.first], force[stands.last]
+    apart = np.where(after == before, 1.0, after - before)
+    followed = np.where(after == before, 1.0, ((force - before) / apart).clip(0.0, 1.0))
+    by_pressure = stands.side + (stands.next_side - stands.side) * np.where(stands.turns, followed, 0.0)
+    held = before + (after - before) * stands.share
+    lost = (stands.side * (force - held)).clip(max=0.0) / np.maximum(np.abs(held), np.finfo(float).tiny)
+    sprung = np.where(stands.turns | (stands.length * sample_time < STANDS), 0.0, stands.side * lost.clip(-2.0))
+    return np.column_stack([late, by_pressure - late, early - late, sprung])
+
+
+def shown_play(problem: Problem, theta: Array, errors: Array, left: Callable[[Array], Array]) -> ShownPlay:
+    """Return the play that a fit's residuals show.
+
+    A play is positive, so a course counts that asks for one. On a log without, a gain over 4.5 comes by chance in one
+    of 740 for each of three courses that are much alike.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem, position among its drives.
+    theta : ndarray, shape (unknowns,)
+        Its solution [dimensionless].
+    errors : ndarray, shape (blocks,)
+        The normalised residuals there [dimensionless].
+    left : callable
+        What the unknowns do not take up of a change of the residuals.
+
+    Returns
+    -------
+    ShownPlay
+        The likeliest course.
+    """
+    log, place = problem.log, problem.model.drives.index(POSITION)
+    rough = problem.on(log.coarsened())
+    courses = crossings(log.drives[:, place], log.measured[:, 0], log.sample_time)
+    sides = (0.0 * courses[:, 0], courses[:, 0], courses[:, 0] + courses[:, 1], courses[:, 0] + courses[:, 2])
+    beside = np.arange(log.drives.shape[1]) == place
+    known, *moved = rough.disturbed(theta, [log.drives + 0.5 * NUDGE * np.outer(side, beside) for side in sides])
+    found = NO_PLAY
+    for one in moved:
+        free = left((one - known).ravel() / NUDGE)
+        power, along = float(free @ free), -float(free @ errors)
+        if power > 0.0 and along > 0.0 and (gain := 0.5 * along**2 / power) > found.gain:
+            found = ShownPlay(along / power, gain)
+    return found
+
+
+class _Standings(NamedTuple):
+    """For each sample: the movements before and after, at which sides they left the play, and how far it is there."""
+
+    first: IntArray
+    last: IntArray
+    side: Array
+    next_side: Array
+
+    @property
+    def turns(self) -> BoolArray:
+        return self.side != self.next_side
+
+    @property
+    def length(self) -> IntArray:
+        return self.last - self.first
+
+    @property
+    def share(self) -> Array:
+        samples = np.arange(len(self.first))
+        return ((samples - self.first) / np.maximum(self.length, 1)).clip(0.0, 1.0)
+
+
+def _standings(position: Array) -> _Standings:
     cell = max(CELLS * position_variance(position) ** 0.5, FINEST)
     at = np.round(position / cell)
     steps = np.flatnonzero(np.diff(at)) + 1
     ways = np.sign(at[steps] - at[steps - 1])
     sure = np.flatnonzero(ways[1:] == ways[:-1]) + 1
-    if not len(sure):
-        return np.zeros(len(position))
-    places, ways = steps[sure], ways[sure]
-    turns = np.flatnonzero(np.diff(ways)) + 1  # the first movement each other way
-    known = np.concatenate([[0], places[:1], np.column_stack([places[turns - 1], places[turns]]).ravel()])
-    sides = np.concatenate([[0.0], ways[:1], np.column_stack([ways[turns - 1], ways[turns]]).ravel()])
-    samples = np.arange(len(position))
-    after = np.searchsorted(known, samples, side="right").clip(1, len(known) - 1)
-    first, last = known[after - 1], known[after]
-    crossed = ((samples - first) / np.maximum(last - first, 1)).clip(0.0, 1.0) ** 2
-    return sides[after - 1] + (sides[after] - sides[after - 1]) * crossed
+    # what is after the last movement ends with the log, at the side where it began
+    places = np.concatenate([[0], steps[sure], [len(position) - 1]])
+    sides = np.concatenate([[0.0], ways[sure], ways[sure][-1:] if len(sure) else [0.0]])
+    before = np.searchsorted(places[:-1], np.arange(len(position)), side="right") - 1
+    return _Standings(places[before], places[before + 1], sides[before], sides[before + 1])
+
+
+def _crossed(stands: _Standings, course: Callable[[Array], Array]) -> Array:
+    return stands.side + (stands.next_side - stands.side) * np.where(stands.turns, course(stands.share), 0.0)
+
+
+def _smoothed(values: Array, samples: int) -> Array:
+    """Return means under a Hann window of so many samples."""
+    if samples < 2:
+        return values
+    window = np.hanning(samples + 2 + samples % 2 - 1)[1:-1]
+    reach = len(window) // 2
+    padded = np.pad(values, (reach, len(window) - 1 - reach), mode="edge")
+    return np.convolve(padded, window / np.sum(window), mode="valid")

@@ -11,11 +11,11 @@ from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import search_bounds
 from estimation.fits.hypotheses import LIMITS, PRESUMED, Hypothesis
-from estimation.fits.play import side_of_play
+from estimation.fits.play import crossings
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
-from estimation.models.wide_flow import LINEAR, WIDE_FLOW_FORM, WideFlowParameters
+from estimation.models.wide_flow import COURSES, CROSSED, LINEAR, WIDE_FLOW_FORM, WideFlowParameters
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.solvers.steps import parameter_names, parameter_row
@@ -61,7 +61,7 @@ second valley, where all that the log shows is noise that the oil's stiffness ma
 def widened(
     log: GreyBoxLog, parameters: EhaParameters, found: Mapping[str, float] = MappingProxyType({})
 ) -> GreyBoxLog:
-    """Return a log as the wide flow form sees it: the share of the log, the rate of position and its side are drives.
+    """Return a log as the wide flow form sees it: the share of the log, the rate of position and courses of its play are drives.
 
     Parameters
     ----------
@@ -78,12 +78,13 @@ def widened(
         The log, with what is presumed.
     """
     samples, position = len(log.drives), log.drives[:, FLOW_FORM.drives.index(POSITION)]
+    courses = crossings(position, log.measured[:, 0], log.sample_time)
     rate = np.gradient(position) / log.sample_time
     known = {one.name: getattr(parameters, one.name) for one in fields(parameters)}
     return replace(
         log,
-        drives=np.column_stack([log.drives, np.arange(samples) / samples, rate, side_of_play(position)]),
-        drive_std=(*log.drive_std, 0.0, 0.0, 0.0),
+        drives=np.column_stack([log.drives, np.arange(samples) / samples, rate, courses]),
+        drive_std=(*log.drive_std, *(0.0 for _ in WIDE_FLOW_FORM.drives[len(log.drive_std) :])),
         parameters=parameter_row(
             WideFlowParameters(
                 **known,
@@ -91,7 +92,11 @@ def widened(
                 stated_pressure=usual_pressure(log, parameters),
             )
         ),
-        presumed={**log.presumed, **{name: (known[name], std) for name, std in PRESUMED.items()}},
+        presumed={
+            **log.presumed,
+            **{name: (known[name], std) for name, std in PRESUMED.items()},
+            **dict.fromkeys(CROSSED, (0.0, 1.0)),
+        },
     )
 
 
@@ -244,7 +249,7 @@ def delayed(log: GreyBoxLog, delays: Mapping[str, float]) -> GreyBoxLog:
             continue
         late = slice(-samples, None)
         if channel in FLOW_FORM.drives:
-            names = (channel, "position_rate", "side_of_play") if channel == POSITION else (channel,)
+            names = (channel, "position_rate", *COURSES) if channel == POSITION else (channel,)
             columns = [WIDE_FLOW_FORM.drives.index(name) for name in names]
             drives, measured = drives.copy(), measured.copy()
             drives[:-samples, columns] = log.drives[samples:, columns]

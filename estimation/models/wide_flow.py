@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
+from estimation.models.completed_flow import CRACKS, USUAL_CRACK
 from estimation.models.flow import STIFFNESS, delivered_flow, leaked_flow, port_flows
 from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
@@ -31,6 +32,12 @@ SHORTEST_LAG = 1e-6
 """Lag of a pressure sensor that has none [s]."""
 
 
+COURSES = ("side_of_play", "play_by_pressure", "play_at_once", "play_sprung")
+"""Courses of the piston in its encoder's play, see `estimation.fits.play.crossings`."""
+
+CROSSED = COURSES[1:]
+"""Parameters that say how far each of the others is followed in place of the first."""
+
 GROWTH = ("leakage_growth", "leakage_bend", "leakage_rise")
 """Parameters of a leakage that changes over the log, in the order of `grown_leakage`."""
 
@@ -43,6 +50,9 @@ class WideFlowParameters(FlowParameters):
     speed_lag: float = si(0.0, "s", "first-order lag of the motor's speed sensor", "fitted")
     position_lag: float = si(0.0, "s", "first-order lag of the encoder or of its filter", "fitted")
     position_play: float = si(0.0, "m", "play between the piston and the encoder", "fitted")
+    play_by_pressure: float = si(0.0, "1", "share of the play that is crossed as pressure turns", "fitted")
+    play_at_once: float = si(0.0, "1", "share of the play that is crossed at first", "fitted")
+    play_sprung: float = si(0.0, "1", "half plays that the piston springs back as pressure is lost", "fitted")
     pressure_offset: float = si(0.0, "Pa", "offset of the differential pressure", "fitted")
     pressure_drift: float = si(0.0, "Pa", "what that offset gains over the log, evenly", "fitted")
     position_zero: float = si(0.0, "m", "encoder's reading in the middle position", "fitted")
@@ -79,8 +89,9 @@ def _stiffness(pressure: Scalar, elapsed: Scalar, p: SimpleNamespace) -> Scalar:
 
 
 def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
-    speeds, (read, next_read), (begun, next_begun), (rate, next_rate), (side, next_side), step = drives
+    speeds, (read, next_read), (begun, next_begun), (rate, next_rate), *courses, step = drives
     p1, p2, behind, supply = state
+    (side, next_side) = _sides(courses, p)
     x = read + p.position_lag * rate + 0.5 * p.position_play * side
     next_x = next_read + p.position_lag * next_rate + 0.5 * p.position_play * next_side
     velocity, position = (next_x - x) / step, x + share * (next_x - x) - p.position_zero
@@ -105,6 +116,16 @@ def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Sc
     offset = p.pressure_offset + p.pressure_drift * elapsed
     lagging = rise - fall - (behind + offset) / (p.pressure_lag + SHORTEST_LAG)
     return rise, fall, lagging, -p.accumulator_stiffness * (into_1 + into_2)
+
+
+def _sides(courses: Any, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
+    """Return where in its encoder's play the piston is at the start and end of a step, from -1 to 1."""
+    late, by_pressure, at_once, sprung = courses
+    start, end = (
+        late[i] + p.play_by_pressure * by_pressure[i] + p.play_at_once * at_once[i] + p.play_sprung * sprung[i]
+        for i in (0, 1)
+    )
+    return maximum(minimum(start, 1.0), -1.0), maximum(minimum(end, 1.0), -1.0)
 
 
 def _ahead(p: SimpleNamespace) -> SimpleNamespace:
@@ -151,7 +172,7 @@ def _shown(state: tuple[Scalar, ...]) -> tuple[Scalar]:
 
 WIDE_FLOW_FORM = GreyBoxModel(
     name="wide_flow",
-    drives=("motor_speed_rad_s", "position_m", "elapsed", "position_rate", "side_of_play"),
+    drives=("motor_speed_rad_s", "position_m", "elapsed", "position_rate", *COURSES),
     outputs=("differential_pressure_pa",),
     unknowns=(),
     initial=_at_rest,
@@ -168,6 +189,7 @@ LINEAR = {
     "speed_lag": 1e-3,
     "position_lag": 1e-3,
     "position_play": 1e-5,
+    **dict.fromkeys(CROSSED, 1.0),
     "pressure_offset": 1e4,
     "pressure_drift": 1e4,
     "position_zero": 1e-2,
@@ -179,6 +201,7 @@ LINEAR = {
     "leakage_bend": 1.0,
     "leakage_rise": 1.0,
     "crack_pressure": 1e4,
+    **dict.fromkeys(CRACKS, USUAL_CRACK),
     "area_difference": 0.1,
     "volume_difference": 0.1,
     "pilot_share": 1.0,
