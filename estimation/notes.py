@@ -86,8 +86,8 @@ class EstimateCode(Code):
         "not corrected for"
     )
     PLAY_LEFT = (
-        "the pressure residuals look like those of an encoder with a play (backlash) of about {play_um:.1g} um, and how "
-        "the piston crosses it is not found: bulk modulus may be some percent too low"
+        "the piston moves where position_m stands, as with a play (backlash) of some {play_um:.1g} um, and how it "
+        "crosses that is not found: bulk modulus may be several percent too low"
     )
     POSITION_RESIDUALS_LARGE = (
         "the position residuals are {ratio:.2f} times the sensors' noise: neither friction model explains how the "

@@ -7,11 +7,11 @@ import numpy as np
 
 from estimation.finding import NORMAL_95
 from estimation.fits.explain import Explanation
-from estimation.fits.play import side_of_play
+from estimation.fits.play import crossings
 from estimation.log_checks.bridging import POSITION, bridged
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.sensor_check import PRESSURE
-from estimation.models.wide_flow import GROWTH, grown_leakage
+from estimation.models.wide_flow import CROSSED, GROWTH, grown_leakage
 from estimation.notes import RigCode
 from plant.arrays import Array
 from plant.components.oil import ATMOSPHERE
@@ -253,7 +253,9 @@ def set_right(log: CleanLog, found: Explanation) -> CleanLog:
     record, changed = log.record, dict[str, Array]()
     zero, play = value.get("position_zero", 0.0), value.get("position_play", 0.0)
     if zero or play:
-        changed[POSITION] = record[POSITION] - zero + 0.5 * play * side_of_play(bridged(record[POSITION]))
+        courses = crossings(bridged(record[POSITION]), record[PRESSURE], record.sample_time)
+        side = (courses @ [1.0, *(value.get(name, 0.0) for name in CROSSED)]).clip(-1.0, 1.0)
+        changed[POSITION] = record[POSITION] - zero + 0.5 * play * side
     elapsed = np.arange(len(record)) / len(record)
     late, drift = lateness(found, PRESSURE), value.get("pressure_drift", 0.0)
     offset = value.get("pressure_offset", 0.0) + drift * elapsed

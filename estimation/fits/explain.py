@@ -292,7 +292,7 @@ def _likeliest(log: GreyBoxLog, tried: Sequence[Iterable[_Tried]], known: float 
     known *= NEARLY_AS_GOOD
     first, *others = [_ranked(one) for one in tried]
     sets = [first, *sorted(others, key=lambda one: one[0].cost)[: FINALISTS - 1]]
-    carried = [[start for start in one[:CARRIED] if start.cost < NEARLY * one[0].cost] for one in sets]
+    carried = [[one[0], *(start for start in one[1:CARRIED] if start.cost < NEARLY * one[0].cost)] for one in sets]
     settled: list[_Tried] = []
     for one in carried:
         wanted = min((known, *(other.cost for other in settled))) + CLOSE

@@ -24,6 +24,7 @@ from estimation.fits.hypotheses import (
     START_LOAD,
     Hypothesis,
 )
+from estimation.fits.play import NO_PLAY, ShownPlay, sensed_play
 from estimation.fits.promises import promised, promised_each
 from estimation.fits.wide_problem import POSITION
 from estimation.models.completed_flow import CRACKS
@@ -92,9 +93,14 @@ benchmark's validation split. A plain fit needs none: it fits each valve and the
 PLAY_STRUCTURE = 5e-3
 """The same where the encoder has a play, as what the piston does while it crosses that is not known; judged."""
 
+PLAY_OPEN = 0.5
+"""Share of what a play puts bulk modulus off by that is left open, as the piston crosses by none of the courses that
+are tried; judged [fraction]. It puts it off by as much as the fit with a play differs from that without, or by what the
+piston yields unseen beside what the oil does."""
+
 PLAY_SHOWN = 4.0
-"""Gain in log-likelihood from which residuals show a play of the encoder [dimensionless]: by chance each of three courses
-gains it in one log of 430, so one log in 140 at most is asked in vain."""
+"""Gain in log-likelihood from which residuals show a play of the encoder [dimensionless]: by chance each of three
+courses gains it in one log of 430, so one log in 140 at most is asked in vain."""
 
 SURER = 2.0
 """What a difference of log-likelihood between balances is divided by [dimensionless]: they leave out less than the
@@ -103,6 +109,11 @@ motion form does. With `BY_MASS` the likeliest on 285 logs of our plants and of 
 BY_MASS = 2.0
 """Weight of the balance by mass before a log is seen, that of each other being 1 [dimensionless]: oil is denser under
 pressure, but simulators and textbooks balance volumes."""
+
+
+PLAY_SENSED = 2.7
+"""The same by a velocity sensor beside an encoder that stands: one log in 100 gains it by chance, and fewer seem to
+move by more than the encoder resolves, which is asked too [dimensionless]."""
 
 
 def fit_flow(
@@ -151,6 +162,7 @@ def fit_flow(
     lacking = [channel for channel in FLOW_CHANNELS if channel not in record]
     if lacking:
         raise LogError(f"the flow form needs {' and '.join(FLOW_CHANNELS)}, the record lacks {', '.join(lacking)}")
+    sensed = sensed_play(record)
     if variances is None:
         record, variances = without_strays(record)
     log = flow_log(record, parameters, uncertainties or {}, variances)
@@ -159,7 +171,7 @@ def fit_flow(
     best, found = min(fits, key=_cost), weighed(fits, SURER, [_beforehand(fit) for fit in fits])
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
     explains = partial(_explains, noisy=log.passes_on)
-    asked, remarks = _asked(log, parameters, swinging, best, loaded=loaded, moving=moving)
+    asked, remarks = _asked(log, parameters, swinging, best, sensed, loaded=loaded, moving=moving)
     if BEGUN in asked:  # so many valleys that one is believed only where sensors' noise is all that it leaves
         explains = partial(_explains_all, noisy=log.passes_on)
     if asked:
@@ -170,15 +182,20 @@ def fit_flow(
         by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
         strange = explain(log, parameters, near, explains, asked=asked, paired=paired, by_mass=by_mass)
         one = strange.fit
-        if _known(strange.names, one) and explains(one) and one.cost < _wanted(strange.names, best, swinging, homed=homed):
+        if (
+            _known(strange.names, one)
+            and explains(one)
+            and one.cost < _wanted(strange.names, best, swinging, homed=homed)
+        ):
             bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
-            left = PLAY_STRUCTURE if PLAY.name in strange.names else STRUCTURE
+            left = _play_structure(one, swinging, parameters, sensed) if PLAY.name in strange.names else STRUCTURE
             believed = with_structure(strange.values, left)
-            return FormFit(believed, bound, one.chi_square[0], _play_left(one), one.rig_slopes, strange)
+            unseen = NO_PLAY if PLAY.name in strange.names else sensed
+            return FormFit(believed, bound, one.chi_square[0], _play_left(one, unseen), one.rig_slopes, strange)
     value, std = found["bulk_modulus"]
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     believed = found if sure else with_structure(found, STRUCTURE)
-    reasons = (*_objections(best, log.passes_on), *_play_left(swinging))
+    reasons = (*_objections(best, log.passes_on), *_play_left(swinging, sensed))
     if BEGUN in asked and not reasons and not explains(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
     return FormFit(believed, std / value, best.chi_square[0], reasons, best.rig_slopes, remarks=remarks)
@@ -207,7 +224,14 @@ def _wanted(names: Sequence[str], best: GreyBoxFit, swinging: GreyBoxFit, *, hom
 
 
 def _asked(
-    log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, best: GreyBoxFit, *, loaded: bool, moving: bool
+    log: GreyBoxLog,
+    parameters: EhaParameters,
+    swinging: GreyBoxFit,
+    best: GreyBoxFit,
+    sensed: ShownPlay = NO_PLAY,
+    *,
+    loaded: bool,
+    moving: bool,
 ) -> tuple[tuple[Hypothesis, ...], tuple[Note, ...]]:
     """Return what a log is asked beside the plain form, given its likelier fit with volumes that swing, and its best.
 
@@ -228,7 +252,7 @@ def _asked(
     zero = max(zeros)
     worn = delivery.gain > WORTH and delivery.size > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and zero.size > LEAST_ZERO
-    plays = swinging.play.gain > PLAY_SHOWN
+    plays = bool(_play_left(swinging, sensed))
     tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays)
     asked = tuple(one for one, worthwhile in tried if worthwhile)
     open_by = 0.0 if DELIVERY in asked else delivery.deviation
@@ -269,11 +293,18 @@ def _known(names: Sequence[str], fit: GreyBoxFit) -> bool:
     return PLAY.name not in names or fit.chi_square[0] <= DOUBTED
 
 
-def _play_left(fit: GreyBoxFit) -> tuple[Note, ...]:
-    """Return the objection to a fit whose residuals show a play that it does not have."""
-    if fit.play.gain <= PLAY_SHOWN:
-        return ()
-    return (EstimateCode.PLAY_LEFT.note(play_um=1e6 * fit.play.size),)
+def _play_structure(fit: GreyBoxFit, plain: GreyBoxFit, p: EhaParameters, sensed: ShownPlay) -> float:
+    """Return the relative deviation of bulk modulus that the crossing of a play leaves open."""
+    modulus = fit.values["bulk_modulus"]
+    moved = abs(modulus / plain.values["bulk_modulus"] - 1.0)
+    yields = p.piston_area * sensed.yields * modulus / p.chamber_volume
+    return float(np.hypot(PLAY_STRUCTURE, PLAY_OPEN * max(moved, yields)))
+
+
+def _play_left(fit: GreyBoxFit, sensed: ShownPlay) -> tuple[Note, ...]:
+    """Return the objection to a fit whose residuals, or a velocity sensor, show a play that it does not have."""
+    shown = [one for one, least in ((fit.play, PLAY_SHOWN), (sensed, PLAY_SENSED)) if one.gain > least]
+    return (EstimateCode.PLAY_LEFT.note(play_um=1e6 * max(one.size for one in shown)),) if shown else ()
 
 
 def _beforehand(fit: GreyBoxFit) -> float:

@@ -14,6 +14,7 @@ from estimation.arrays import Array, BoolArray, IntArray
 from estimation.fits.greybox_problem import Problem
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import position_variance
+from plant.log.record import Record
 
 CELLS = 8.0
 """Width of the cells in which a reading is followed, in standard deviations of its noise [dimensionless]."""
@@ -32,7 +33,10 @@ step to step."""
 NUDGE = 1e-6
 """Play by which the residuals' answer to one is read off [m]."""
 
-POSITION = "position_m"
+FEWEST = 100
+"""Fewest samples in which an encoder stands that are compared with a velocity sensor's; judged [samples]."""
+
+POSITION, VELOCITY, PRESSURE = "position_m", "velocity_m_s", "differential_pressure_pa"
 
 
 class ShownPlay(NamedTuple):
@@ -44,10 +48,13 @@ class ShownPlay(NamedTuple):
         By the likeliest course, to first order [m].
     gain : float
         In log-likelihood, Rao's score statistic over two; 0 where all courses ask for less than none [dimensionless].
+    yields : float
+        How far the piston moves unseen, where that was sensed [m/Pa].
     """
 
     size: float
     gain: float
+    yields: float = 0.0
 
 
 NO_PLAY = ShownPlay(0.0, 0.0)
@@ -93,9 +100,10 @@ def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
     Returns
     -------
     ndarray, shape (n, 4)
-        In the order of `estimation.models.wide_flow.COURSES`: `side_of_play`; then what is to be added to it where the piston follows pressure in
-        place of time, as one that is held by the stretch of its seals does; where it crosses at first, and not at last;
-        and where it springs back and comes again, by the share of the pressure that is lost meanwhile [dimensionless].
+        In the order of `estimation.models.wide_flow.COURSES`: `side_of_play`; then what is to be added to it where the
+        piston follows pressure in place of time, as one that is held by the stretch of its seals does; where it crosses
+        at first, and not at last; and where it springs back and comes again, by the share of the pressure that is lost
+        meanwhile [dimensionless].
     """
     stands = _standings(position)
     late, early = (_crossed(stands, crossed) for crossed in (lambda share: share**2, lambda share: share * (2 - share)))
@@ -105,8 +113,9 @@ def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
     followed = np.where(after == before, 1.0, ((force - before) / apart).clip(0.0, 1.0))
     by_pressure = stands.side + (stands.next_side - stands.side) * np.where(stands.turns, followed, 0.0)
     held = before + (after - before) * stands.share
-    lost = (stands.side * (force - held)).clip(max=0.0) / np.maximum(np.abs(held), np.finfo(float).tiny)
-    sprung = np.where(stands.turns | (stands.length * sample_time < STANDS), 0.0, stands.side * lost.clip(-2.0))
+    most = np.abs(held)
+    lost = np.maximum(stands.side * (force - held), -2.0 * most).clip(max=0.0) / np.where(most == 0.0, 1.0, most)
+    sprung = np.where(stands.turns | (stands.length * sample_time < STANDS), 0.0, stands.side * lost)
     return np.column_stack([late, by_pressure - late, early - late, sprung])
 
 
@@ -137,7 +146,8 @@ def shown_play(problem: Problem, theta: Array, errors: Array, left: Callable[[Ar
     courses = crossings(log.drives[:, place], log.measured[:, 0], log.sample_time)
     sides = (0.0 * courses[:, 0], courses[:, 0], courses[:, 0] + courses[:, 1], courses[:, 0] + courses[:, 2])
     beside = np.arange(log.drives.shape[1]) == place
-    known, *moved = rough.disturbed(theta, [log.drives + 0.5 * NUDGE * np.outer(side, beside) for side in sides])
+    drives = [log.drives + 0.5 * NUDGE * np.where(beside, side[:, None], 0.0) for side in sides]
+    known, *moved = rough.disturbed(theta, drives)
     found = NO_PLAY
     for one in moved:
         free = left((one - known).ravel() / NUDGE)
@@ -145,6 +155,43 @@ def shown_play(problem: Problem, theta: Array, errors: Array, left: Callable[[Ar
         if power > 0.0 and along > 0.0 and (gain := 0.5 * along**2 / power) > found.gain:
             found = ShownPlay(along / power, gain)
     return found
+
+
+def sensed_play(record: Record) -> ShownPlay:
+    """Return the play that a velocity sensor shows: the piston yields to pressure while its encoder stands.
+
+    While the encoder stands its seals hold the piston, which moves with pressure. Without a play the encoder moves as
+    far as velocity says; in the play it does not move. A velocity that is made of the encoder's reading shows nothing.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+
+    Returns
+    -------
+    ShownPlay
+        How far the piston moves unseen, and what that gains in log-likelihood; none where the encoder sees half of it,
+        or could not resolve it.
+    """
+    if VELOCITY not in record:
+        return NO_PLAY
+    position = bridged(record[POSITION])
+    stands = _standings(position)
+    force = _smoothed(bridged(record[PRESSURE]), round(SMOOTHED / record.sample_time))
+    velocity, rate = record[VELOCITY], np.gradient(force) / record.sample_time
+    still = np.isfinite(velocity) & (stands.length * record.sample_time >= STANDS)
+    power = float(np.sum(rate[still] ** 2))
+    if np.count_nonzero(still) < FEWEST or power == 0.0:
+        return NO_PLAY
+    read = np.gradient(position) / record.sample_time
+    moved, seen = (float(rate[still] @ one[still]) / power for one in (velocity, read))
+    noise = float(np.var(velocity[still] - read[still] - (moved - seen) * rate[still]))
+    low, high = np.percentile(force[still], (5.0, 95.0))
+    unseen = (moved - seen) * float(high - low)
+    if unseen <= _cell(position) or 2.0 * seen >= moved or noise == 0.0:
+        return NO_PLAY
+    return ShownPlay(unseen, 0.5 * (moved - seen) ** 2 * power / noise, moved - seen)
 
 
 class _Standings(NamedTuple):
@@ -170,8 +217,7 @@ class _Standings(NamedTuple):
 
 
 def _standings(position: Array) -> _Standings:
-    cell = max(CELLS * position_variance(position) ** 0.5, FINEST)
-    at = np.round(position / cell)
+    at = np.round(position / _cell(position))
     steps = np.flatnonzero(np.diff(at)) + 1
     ways = np.sign(at[steps] - at[steps - 1])
     sure = np.flatnonzero(ways[1:] == ways[:-1]) + 1
@@ -180,6 +226,10 @@ def _standings(position: Array) -> _Standings:
     sides = np.concatenate([[0.0], ways[sure], ways[sure][-1:] if len(sure) else [0.0]])
     before = np.searchsorted(places[:-1], np.arange(len(position)), side="right") - 1
     return _Standings(places[before], places[before + 1], sides[before], sides[before + 1])
+
+
+def _cell(position: Array) -> float:
+    return max(CELLS * position_variance(position) ** 0.5, FINEST)
 
 
 def _crossed(stands: _Standings, course: Callable[[Array], Array]) -> Array:

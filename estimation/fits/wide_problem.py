@@ -61,7 +61,7 @@ second valley, where all that the log shows is noise that the oil's stiffness ma
 def widened(
     log: GreyBoxLog, parameters: EhaParameters, found: Mapping[str, float] = MappingProxyType({})
 ) -> GreyBoxLog:
-    """Return a log as the wide flow form sees it: the share of the log, the rate of position and courses of its play are drives.
+    """Return a log as the wide flow form sees it: share of the log, rate of position and courses of play are drives.
 
     Parameters
     ----------

@@ -32,3 +32,18 @@ def test_a_search_goes_on_while_it_gains_what_tells_hypotheses_apart(monkeypatch
 def test_a_search_that_gains_nothing_keeps_what_it_had_and_is_not_endless(monkeypatch: pytest.MonkeyPatch) -> None:
     assert ended([3.0 * CLOSE, 3.5 * CLOSE], monkeypatch) == (3.0 * CLOSE, 2)
     assert ended([-2.0 * CLOSE * i for i in range(ROUNDS + 3)], monkeypatch)[1] == ROUNDS
+
+
+def test_what_promises_most_is_settled_even_where_its_starts_are_not_what_it_says(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def tried(cost: float) -> Any:
+        return SimpleNamespace(cost=cost)
+
+    settled: list[float] = []
+    monkeypatch.setattr(explain, "_settled", lambda _, start, __: settled.append(start.cost) or start)
+    monkeypatch.setattr(explain, "_finished", lambda _, one: one)
+    nothing: Any = None
+    found = explain._likeliest(nothing, [[tried(np.inf), tried(np.inf)], [tried(9.0), tried(10.0), tried(90.0)]])  # pyright: ignore[reportPrivateUsage]
+    assert [one.cost for one in found] == [9.0]
+    assert settled == [np.inf, 9.0, 10.0]

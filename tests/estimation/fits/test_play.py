@@ -1,10 +1,30 @@
-"""Which way the piston last pushed its encoder, read off the encoder itself."""
+"""Where the piston may be in its encoder's play, and whether a log's residuals show one."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from estimation.fits.play import side_of_play
+from estimation.fits import flow_fit as module
+from estimation.fits.flow_fit import DOUBTED, PLAY_OPEN, PLAY_SENSED, PLAY_SHOWN, PLAY_STRUCTURE, fit_flow
+from estimation.fits.flow_search import balanced, flow_starts
+from estimation.fits.form_fit import FormFit
+from estimation.fits.hypotheses import PLAY, Hypothesis
+from estimation.fits.play import NO_PLAY, ShownPlay, crossings, sensed_play, side_of_play
+from estimation.fits.promises import Promise
+from estimation.notes import EstimateCode
+from faults.conditions import CONDITIONS, parameters_for
 from plant.arrays import Array
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import make_drive
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+from tests.estimation.fits.short_logs import PAPER, made_fit, seen
 
 QUANTUM = 1e-6
 
@@ -14,8 +34,7 @@ def read(position: Array) -> Array:
 
 
 def test_play_is_crossed_between_the_last_movement_one_way_and_the_first_one_back() -> None:
-    up = np.linspace(0.0, 1e-2, 500)
-    side = side_of_play(read(np.concatenate([up, np.full(50, 1e-2), up[::-1]])))
+    side = side_of_play(turned())
     assert side[10:490] == pytest.approx(1.0)
     assert side[560:] == pytest.approx(-1.0)
     assert side[525] == pytest.approx(0.5, abs=0.1)  # a quarter of the way in half of the time
@@ -31,3 +50,151 @@ def test_noise_of_a_piston_that_stands_or_moves_turns_nothing() -> None:
 
 def test_a_dead_encoder_is_at_no_side() -> None:
     assert not np.any(side_of_play(np.full(100, 0.3)))
+
+
+def turned() -> Array:
+    """Return a reading that goes up for 500 ms, stands for 50 ms and comes back."""
+    up = np.linspace(0.0, 1e-2, 500)
+    return read(np.concatenate([up, np.full(50, 1e-2), up[::-1]]))
+
+
+def test_a_piston_that_pressure_moves_crosses_while_pressure_turns() -> None:
+    position = turned()
+    pressure = np.where(np.arange(len(position)) < 510, 1e6, -1e6)  # turns when the encoder has stood for 10 ms
+    late, by_pressure, at_once, sprung = crossings(position, pressure, 1e-3).T
+    assert late == pytest.approx(side_of_play(position))
+    assert (late + by_pressure)[[499, 530, 560]] == pytest.approx([1.0, -1.0, -1.0], abs=0.02)
+    assert (late + by_pressure)[510] == pytest.approx(0.0, abs=0.2)
+    assert (late + at_once)[525] == pytest.approx(-0.5, abs=0.1)  # three quarters of the way in half of the time
+    assert not np.any(sprung)
+
+
+def test_a_piston_that_stops_and_goes_on_springs_back_by_the_share_of_the_pressure_that_is_lost() -> None:
+    up = np.linspace(0.0, 1e-2, 500)
+    position = read(np.concatenate([up, np.full(200, 1e-2), 1e-2 + up]))
+    pressure = np.where(np.abs(np.arange(len(position)) - 600) < 50, 2.5e5, 1e6)
+    pressure[595:605] = np.nan
+    late, by_pressure, at_once, sprung = crossings(position, pressure, 1e-3).T
+    assert late[10:] == pytest.approx(1.0)
+    assert not np.any(by_pressure[10:])
+    assert not np.any(at_once[10:])
+    assert sprung[600] == pytest.approx(-0.75, abs=0.01)
+    assert sprung[[400, 520, 680, 900]] == pytest.approx(0.0, abs=0.01)
+    back = crossings(-position, -pressure, 1e-3).T[3]
+    assert back == pytest.approx(-sprung)
+
+
+def test_without_a_movement_there_is_no_course() -> None:
+    assert not np.any(crossings(np.full(100, 0.3), np.linspace(0.0, 1e6, 100), 1e-3))
+
+
+@cache
+def logged(condition: str, drive: str, play: float) -> Record:
+    rng = np.random.default_rng(7)
+    true = circuit_of(parameters_for(CONDITIONS[condition]))
+    signal = make_drive(drive, 8.0, 1e-3, PAPER, rng)
+    record = simulate(CIRCUIT, signal, 1e-3, true, sensors=BENCH, rng=rng)
+    position = record["position_m"].copy()
+    for i in range(1, len(position)):
+        position[i] = min(max(position[i - 1], position[i] - 0.5 * play), position[i] + 0.5 * play)
+    return record.replace(position_m=position)
+
+
+def shown(record: Record) -> ShownPlay:
+    fits = balanced(seen(record), PAPER, flow_starts(PAPER, PAPER.bulk_modulus))
+    return max((fit.play for fit in fits), key=lambda one: one.gain)
+
+
+@pytest.mark.parametrize("condition", ["normal", "minor_leakage_major_friction"])
+def test_residuals_show_a_play_where_there_is_one_and_none_where_there_is_none(condition: str) -> None:
+    assert shown(logged(condition, "prbs", 0.0)).gain < PLAY_SHOWN
+    played = shown(logged(condition, "prbs", 5e-5))
+    assert played.gain > PLAY_SHOWN
+    assert played.size > 5e-6
+
+
+@pytest.mark.parametrize("condition", ["normal", "minor_leakage_major_friction", "major_leakage"])
+def test_a_play_is_taken_up_within_the_interval_or_shuts_the_gate(condition: str) -> None:
+    fit = fit_flow(logged(condition, "prbs", 5e-5), PAPER, PAPER.bulk_modulus)
+    value, std = fit.parameters["bulk_modulus"]
+    named = fit.explanation is not None and "position_play" in fit.explanation.names
+    left = [note for note in fit.reasons if note.code is EstimateCode.PLAY_LEFT]
+    assert named or left
+    assert fit.reasons or abs(value - PAPER.bulk_modulus) < 3.0 * std
+
+
+@pytest.mark.parametrize("drive", ["prbs", "multisine"])
+def test_a_velocity_sensor_shows_the_play_that_the_encoder_hides(drive: str) -> None:
+    played, sound = logged("normal", drive, 5e-5), logged("normal", drive, 0.0)
+    assert sensed_play(sound) == NO_PLAY
+    found = sensed_play(played)
+    assert found.gain > PLAY_SENSED
+    assert 5e-6 < found.size < 1e-4
+    by_encoder = np.gradient(played["position_m"]) / played.sample_time
+    assert sensed_play(played.replace(velocity_m_s=by_encoder)) == NO_PLAY
+    assert sensed_play(played.replace(velocity_m_s=None)) == NO_PLAY
+    some_missing = np.where(np.arange(len(played)) % 50 < 5, np.nan, played["velocity_m_s"])
+    assert sensed_play(played.replace(velocity_m_s=some_missing)).size == pytest.approx(found.size, rel=0.1)
+
+
+def test_a_coarse_encoder_has_no_play() -> None:
+    sound = logged("normal", "multisine", 0.0)
+    assert sensed_play(sound.replace(position_m=2e-5 * np.round(sound["position_m"] / 2e-5))) == NO_PLAY
+
+
+def test_an_encoder_that_never_stands_shows_none_to_a_velocity_sensor() -> None:
+    moving = np.linspace(0.0, 0.1, 1000)
+    channels = {"position_m": moving, "velocity_m_s": np.full(1000, 0.1), "differential_pressure_pa": 1e6 * moving}
+    assert sensed_play(Record(1e-3, channels)) == NO_PLAY
+    still = {**channels, "position_m": 0.0 * moving, "differential_pressure_pa": 0.0 * moving}
+    assert sensed_play(Record(1e-3, still)) == NO_PLAY
+
+
+def concluded(
+    monkeypatch: pytest.MonkeyPatch, plain: float, strange: float, chi: float = 1.0, record: Record | None = None
+) -> FormFit:
+    """Return what is told of a log whose plain fit shows a play by one gain, and that with a play by another."""
+    fit = replace(made_fit(500.0, 2e8, 1e5), play=ShownPlay(3e-5, plain))
+    played = replace(made_fit(100.0, 2.1e8, 1e5, chi=chi), play=ShownPlay(1e-5, strange))
+    values = {name: (value, played.std[name]) for name, value in played.values.items()}
+    explanation = SimpleNamespace(names=("position_play",), values=values, fit=played)
+
+    def explained(*_: Any, asked: Sequence[Hypothesis], paired: bool, **__: Any) -> Any:
+        assert asked == (PLAY,)
+        assert not paired
+        return explanation
+
+    monkeypatch.setattr(module, "balanced", lambda *_: [fit])
+    monkeypatch.setattr(module, "promised_each", lambda *_, **__: 2 * [Promise(0.0, 0.0, 0.01)])
+    monkeypatch.setattr(module, "explain", explained)
+    return fit_flow(record or logged("normal", "prbs", 0.0), PAPER, PAPER.bulk_modulus)
+
+
+def test_a_play_that_is_shown_is_asked_for_and_believed_where_no_more_than_noise_is_left(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    unseen, asked = concluded(monkeypatch, PLAY_SHOWN, 0.0), concluded(monkeypatch, PLAY_SHOWN + 0.1, 0.0)
+    assert unseen.explanation is None
+    assert not unseen.reasons
+    assert asked.explanation is not None
+    assert not asked.reasons
+    moved = 0.05  # of it a share is left open
+    assert asked.parameters["bulk_modulus"][1] == pytest.approx(
+        np.hypot(PLAY_STRUCTURE, PLAY_OPEN * moved) * 2.1e8, rel=0.01
+    )
+
+
+def test_a_play_that_is_shown_and_not_found_shuts_the_gate(monkeypatch: pytest.MonkeyPatch) -> None:
+    unexplained = concluded(monkeypatch, PLAY_SHOWN + 0.1, 0.0, chi=DOUBTED + 0.01)
+    assert unexplained.explanation is None
+    assert [(note.code, note.data["play_um"]) for note in unexplained.reasons] == [(EstimateCode.PLAY_LEFT, 30.0)]
+    another = concluded(monkeypatch, PLAY_SHOWN + 0.1, PLAY_SHOWN + 0.1)
+    assert [(note.code, note.data["play_um"]) for note in another.reasons] == [(EstimateCode.PLAY_LEFT, 10.0)]
+
+
+def test_a_play_that_a_velocity_sensor_shows_is_asked_for_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    record = logged("normal", "prbs", 5e-5)
+    assert concluded(monkeypatch, 0.0, 0.0, record=record).explanation is not None
+    (note,) = concluded(monkeypatch, 0.0, 0.0, chi=DOUBTED + 0.01, record=record).reasons
+    assert note.code is EstimateCode.PLAY_LEFT
+    assert note.data["play_um"] == pytest.approx(1e6 * sensed_play(record).size)
