@@ -57,6 +57,9 @@ have errors [dimensionless]."""
 CLOSE = 60.0
 """Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""
 
+NEVER = float(np.finfo(np.float64).max)
+"""Cost of a fit that is not what its hypotheses say, so that it is not believed [dimensionless]."""
+
 WORTH = 10.0
 """Gain in log-likelihood below which a hypothesis is not accepted [dimensionless]."""
 
@@ -263,10 +266,10 @@ def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
         done.append((_to_its_end(own, begun, start, *more), problem))
     done.sort(key=lambda one: one[0].cost)
     best = done[0][0]
-    count = [one for one in done if one[0].cost < best.cost + ALIKE]
+    count = [one for one in done if one[0].cost <= best.cost + ALIKE]
     first, *rivals = (concluded(problem, one.point, warned=False) for one, problem in count)
     if not best.meant:
-        first = replace(first, cost=np.inf)
+        first = replace(first, cost=NEVER)
     return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
 
 
@@ -298,4 +301,4 @@ def _likeliest(log: GreyBoxLog, tried: Sequence[Iterable[_Tried]], known: float 
         wanted = min((known, *(other.cost for other in settled))) + CLOSE
         settled.append(_ranked(_settled(log, start, wanted) for start in one)[0])
     best = min((known, *(one.cost for one in settled)))
-    return _ranked(_finished(log, one) for one in _ranked(settled) if one.cost < best + CLOSE)
+    return _ranked(_finished(log, one) for one in _ranked(settled) if one.cost <= best + CLOSE)

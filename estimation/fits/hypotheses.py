@@ -39,6 +39,8 @@ class Hypothesis:
         Size below which what is freed first is not what the hypothesis says [SI].
     from_mid_travel : bool
         Whether the search also begins with an encoder that reads zero in the middle of the log's travel.
+    beside : tuple of str
+        What is fitted along with it, but is nothing that it promises.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Hypothesis:
     from_first_sample: bool = False
     least: float = 0.0
     from_mid_travel: bool = False
+    beside: tuple[str, ...] = ()
 
 
 DELIVERY = Hypothesis("delivery", ("pump_displacement",))
@@ -67,8 +70,16 @@ START_LOAD = Hypothesis("start_load", ("start_pressure", "start_level"))
 BEGUN = replace(START_LOAD, from_first_sample=True)
 """The same of a log that begins under load or in motion."""
 
+LEAST_PLAY = 5e-6
+"""Least play that is one [m]; judged. With less it is valves and accumulator that explain a log, and something else is
+strange."""
+
 PLAY = Hypothesis(
-    "position_play", ("position_play", *CROSSED, *CRACKS, STIFFNESS), ({"position_play": 1e-5}, {"position_play": 5e-5})
+    "position_play",
+    ("position_play", *CROSSED),
+    ({"position_play": 1e-5}, {"position_play": 5e-5}),
+    beside=(*CRACKS, STIFFNESS),
+    least=LEAST_PLAY,
 )
 """What the plain fit found of make-up valves and accumulator has taken the play up, so they are sought again."""
 

@@ -135,7 +135,7 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedP
     FreedProblem
         The problem; relief is free where the log reaches its setting. A channel whose lag is free is not asked about.
     """
-    extra = [*(name for one in together for name in one.free), *more]
+    extra = [*(name for one in together for name in (*one.free, *one.beside)), *more]
     relieved = reaches_relief(log.measured, usual_values(log)["relief_pressure"])
     plain = relieving(FLOW_FORM) if relieved else FLOW_FORM
     held = {name for one in together for name in one.instead}

@@ -47,3 +47,5 @@ def test_what_promises_most_is_settled_even_where_its_starts_are_not_what_it_say
     found = explain._likeliest(nothing, [[tried(np.inf), tried(np.inf)], [tried(9.0), tried(10.0), tried(90.0)]])  # pyright: ignore[reportPrivateUsage]
     assert [one.cost for one in found] == [9.0]
     assert settled == [np.inf, 9.0, 10.0]
+    alone = explain._likeliest(nothing, [[tried(np.inf)]])  # pyright: ignore[reportPrivateUsage]
+    assert [one.cost for one in alone] == [np.inf]

@@ -313,7 +313,7 @@ def test_absent_additions_leave_the_plain_form() -> None:
     absent = WideFlowParameters()
     assert WIDE_FLOW_FORM.initial(absent)[0] == HEALTHY.accumulator_pressure
     now = 3e5, 2e5, 0.0, 2.8e5
-    drives = (50.0, 50.0), (0.01, 0.0101), (0.9, 0.9), (0.1, 0.1), (1.0, 1.0), 1e-3
+    drives = (50.0, 50.0), (0.01, 0.0101), (0.9, 0.9), (0.1, 0.1), (1.0, 1.0), *(3 * [(0.0, 0.0)]), 1e-3
     grown = WIDE_FLOW_FORM.rates(now, drives, replace(absent, leakage_growth=1.0), 0.0)
     plain = WIDE_FLOW_FORM.rates(now, drives, absent, 0.0)
     assert grown[0] < plain[0]
