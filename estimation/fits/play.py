@@ -14,6 +14,7 @@ from estimation.arrays import Array, BoolArray, IntArray
 from estimation.fits.greybox_problem import Problem
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import position_variance
+from estimation.log_checks.order import percentile
 from plant.log.record import Record
 
 CELLS = 8.0
@@ -187,8 +188,7 @@ def sensed_play(record: Record) -> ShownPlay:
     read = np.gradient(position) / record.sample_time
     moved, seen = (float(rate[still] @ one[still]) / power for one in (velocity, read))
     noise = float(np.var(velocity[still] - read[still] - (moved - seen) * rate[still]))
-    low, high = np.percentile(force[still], (5.0, 95.0))
-    unseen = (moved - seen) * float(high - low)
+    unseen = (moved - seen) * (percentile(force[still], 95.0) - percentile(force[still], 5.0))
     if unseen <= _cell(position) or 2.0 * seen >= moved or noise == 0.0:
         return NO_PLAY
     return ShownPlay(unseen, 0.5 * (moved - seen) ** 2 * power / noise, moved - seen)

@@ -49,7 +49,7 @@ def test_a_thread_is_waited_for_and_what_asked_to_be_called_at_the_exit_is(
         threading.Timer(0.05, go_on.set).start()
         raise SystemExit(1)
 
-    monkeypatch.setattr(cli, "app", command)
+    monkeypatch.setattr(cli, "app_for", lambda _: command)
     with pytest.raises(Ended):
         cli.main()
     assert order == ["sources trusted", "thread done", "exit functions", "end 1"]
@@ -59,7 +59,7 @@ def test_an_end_without_a_code_is_left_to_python(order: list[str], monkeypatch: 
     def command() -> None:
         raise SystemExit("words")
 
-    monkeypatch.setattr(cli, "app", command)
+    monkeypatch.setattr(cli, "app_for", lambda _: command)
     with pytest.raises(SystemExit, match="words"):
         cli.main()
     assert order == ["sources trusted"]
@@ -69,7 +69,7 @@ def test_the_users_own_count_of_threads_stands_and_one_is_the_default(
     order: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("OMP_NUM_THREADS")
-    monkeypatch.setattr(cli, "app", lambda: None)
+    monkeypatch.setattr(cli, "app_for", lambda _: lambda: None)
     cli.main()
     assert (os.environ["OMP_NUM_THREADS"], os.environ["MKL_NUM_THREADS"]) == ("1", "3")
     assert order == ["sources trusted"]

@@ -104,6 +104,9 @@ WIDE: dict[str, dict[str, float]] = {
     "plain": {},
     "offset and drift": {"pressure_offset": 3e4, "pressure_drift": 2e4, "pressure_lag": 1e-3},
     "late sensors": {"speed_lag": 2e-3, "position_lag": 1e-3, "position_play": 2e-4, "position_zero": 0.01},
+    "play crossed by pressure": {"position_play": 2e-4, "play_by_pressure": 0.7},
+    "play crossed at once": {"position_play": 2e-4, "play_at_once": 0.6},
+    "play sprung back": {"position_play": 2e-4, "play_by_pressure": -1.5, "play_sprung": 0.9},
     "air": {"air_softness": 300.0},
     "much air": {"air_softness": 3e9},
     "air that gets in": {"air_softness": 300.0, "air_onset": 0.39},
@@ -122,7 +125,8 @@ WIDE: dict[str, dict[str, float]] = {
 def wide_flow_form() -> dict[str, Any]:
     told: dict[str, Any] = {}
     base = asdict(wide_flow.WideFlowParameters()) | vars(ROD)
-    drives = ((90.0, 96.0), (0.01, 0.0103), (0.4, 0.402), (0.14, 0.15), (1.0, 0.8), 2e-3)
+    courses = ((1.0, 0.8), (0.2, -0.5), (-0.3, -0.1), (0.0, -1.5))
+    drives = ((90.0, 96.0), (0.01, 0.0103), (0.4, 0.402), (0.14, 0.15), *courses, 2e-3)
     for name, changes in WIDE.items():
         p = SimpleNamespace(**{**base, **changes})
         told[name] = {
