@@ -95,8 +95,8 @@ PLAY_STRUCTURE = 5e-3
 
 PLAY_OPEN = 0.5
 """Share of what a play puts bulk modulus off by that is left open, as the piston crosses by none of the courses that
-are tried; judged [fraction]. It puts it off by as much as the fit with a play differs from that without, or by what the
-piston yields unseen beside what the oil does."""
+are tried [fraction]: 0.2 covered too few training logs with a play. It puts it off by as much as the fit with a play
+differs from that without, or by what the piston yields unseen beside what the oil does."""
 
 PLAY_SHOWN = 4.0
 """Gain in log-likelihood from which residuals show a play of the encoder [dimensionless]: by chance each of three

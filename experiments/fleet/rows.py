@@ -12,7 +12,7 @@ from experiments.fleet.naming import UNNAMED, Named
 STATES: Mapping[str, str] = {
     "over": "past a limit",
     "likely": "probably past a limit",
-    "alarm": "growing towards a limit",
+    "alarm": "nearing a limit",
     "unknown": "no verdict",
     "open": "may be past a limit",
     "within": "within limits",

@@ -66,7 +66,7 @@ def test_logs_without_a_verdict_play_no_part() -> None:
 
 def test_the_page_of_an_actuator_shows_every_severity_with_its_forecast() -> None:
     page = actuator_page(actuator(GROWING), "../pages/last.html").replace("\N{NO-BREAK SPACE}", " ")
-    assert "<h1>P-1: growing towards a limit.</h1>" in page
+    assert "<h1>P-1: nearing a limit.</h1>" in page
     assert page.count('class="charts"') == 2
     assert 'href="../pages/last.html"' in page
     assert "Leakage: limit in" in page
