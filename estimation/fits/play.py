@@ -34,6 +34,9 @@ step to step."""
 NUDGE = 1e-6
 """Play by which the residuals' answer to one is read off [m]."""
 
+EDGE = 2
+"""How near to a movement the piston may have begun to move, within what the encoder resolves [samples]."""
+
 FEWEST = 100
 """Fewest samples in which an encoder stands that are compared with a velocity sensor's; judged [samples]."""
 
@@ -180,8 +183,12 @@ def sensed_play(record: Record) -> ShownPlay:
     position = bridged(record[POSITION])
     stands = _standings(position)
     force = _smoothed(bridged(record[PRESSURE]), round(SMOOTHED / record.sample_time))
-    velocity, rate = record[VELOCITY], np.gradient(force) / record.sample_time
-    still = np.isfinite(velocity) & (stands.length * record.sample_time >= STANDS)
+    # the encoder's rate is over two sample times, so velocity is averaged over them too
+    velocity, rate = (
+        np.convolve(record[VELOCITY], (0.25, 0.5, 0.25), mode="same"),
+        np.gradient(force) / record.sample_time,
+    )
+    still = np.isfinite(velocity) & (stands.length * record.sample_time >= STANDS) & (stands.away > EDGE)
     power = float(np.sum(rate[still] ** 2))
     if np.count_nonzero(still) < FEWEST or power == 0.0:
         return NO_PLAY
@@ -209,6 +216,11 @@ class _Standings(NamedTuple):
     @property
     def length(self) -> IntArray:
         return self.last - self.first
+
+    @property
+    def away(self) -> IntArray:
+        samples = np.arange(len(self.first))
+        return np.minimum(samples - self.first, self.last - samples)
 
     @property
     def share(self) -> Array:
