@@ -112,8 +112,9 @@ pressure, but simulators and textbooks balance volumes."""
 
 
 PLAY_SENSED = 2.7
-"""The same by a velocity sensor beside an encoder that stands: one log in 100 gains it by chance, and fewer seem to
-move by more than the encoder resolves, which is asked too [dimensionless]."""
+"""Gain from which a log is asked for a play because a velocity sensor moves beside an encoder that stands: one log in
+100 gains it by chance, and fewer seem to move by more than the encoder resolves, which is asked too. The check is shut
+from `PLAY_SHOWN` on, which one log in 400 gains by chance [dimensionless]."""
 
 
 def fit_flow(
@@ -252,7 +253,7 @@ def _asked(
     zero = max(zeros)
     worn = delivery.gain > WORTH and delivery.size > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and zero.size > LEAST_ZERO
-    plays = bool(_play_left(swinging, sensed))
+    plays = bool(_play_left(swinging, sensed)) or sensed.gain > PLAY_SENSED
     tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays)
     asked = tuple(one for one, worthwhile in tried if worthwhile)
     open_by = 0.0 if DELIVERY in asked else delivery.deviation
@@ -303,7 +304,7 @@ def _play_structure(fit: GreyBoxFit, plain: GreyBoxFit, p: EhaParameters, sensed
 
 def _play_left(fit: GreyBoxFit, sensed: ShownPlay) -> tuple[Note, ...]:
     """Return the objection to a fit whose residuals, or a velocity sensor, show a play that it does not have."""
-    shown = [one for one, least in ((fit.play, PLAY_SHOWN), (sensed, PLAY_SENSED)) if one.gain > least]
+    shown = [one for one in (fit.play, sensed) if one.gain > PLAY_SHOWN]
     return (EstimateCode.PLAY_LEFT.note(play_um=1e6 * max(one.size for one in shown)),) if shown else ()
 
 

@@ -127,6 +127,7 @@ def test_speeds_missing_at_reversals_do_not_bias_bulk_modulus() -> None:
     assert fit.reasons == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("condition", ["normal", "major_leakage_major_friction"])
 def test_a_drop_out_of_all_channels_costs_no_more_than_its_samples(condition: str) -> None:
     p = parameters_for(CONDITIONS[condition])

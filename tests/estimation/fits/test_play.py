@@ -202,7 +202,7 @@ def test_a_play_that_a_velocity_sensor_shows_is_asked_for_too(monkeypatch: pytes
 
 def test_a_play_too_small_to_be_one_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = logged("normal", "prbs", 0.0)
-    monkeypatch.setattr(module, "sensed_play", lambda _: ShownPlay(3e-5, PLAY_SENSED + 0.1))
+    monkeypatch.setattr(module, "sensed_play", lambda _: ShownPlay(3e-5, PLAY_SHOWN + 0.1))
     fit = fit_flow(sound, PAPER, PAPER.bulk_modulus)
     assert fit.explanation is None
     assert [note.code for note in fit.reasons] == [EstimateCode.PLAY_LEFT]

@@ -162,10 +162,10 @@ def test_what_an_absent_channel_costs_is_a_note_and_said_once_of_all_logs() -> N
     ("changed", "said"),
     [
         ({"piston_area": 2.0}, True),
-        ({"pump_displacement": 0.8}, True),
+        pytest.param({"pump_displacement": 0.8}, True, marks=pytest.mark.slow),
         ({"piston_area": 2.0, "friction_coulomb": 2.0}, False),
-        ({"piston_area": 1.05, "pump_displacement": 1.05}, False),
-        ({"chamber_volume": 2.0}, False),
+        pytest.param({"piston_area": 1.05, "pump_displacement": 1.05}, False, marks=pytest.mark.slow),
+        pytest.param({"chamber_volume": 2.0}, False, marks=pytest.mark.slow),
     ],
 )
 def test_another_pump_or_piston_with_the_papers_leakage_and_friction_is_noted(
