@@ -18,6 +18,7 @@ from estimation.fits.hypotheses import (
     HYPOTHESES,
     LATEST,
     LEAST_DELIVERY,
+    LEAST_PLAY,
     LEAST_ZERO,
     OFFSET,
     PLAY,
@@ -304,7 +305,7 @@ def _play_structure(fit: GreyBoxFit, plain: GreyBoxFit, p: EhaParameters, sensed
 
 def _play_left(fit: GreyBoxFit, sensed: ShownPlay) -> tuple[Note, ...]:
     """Return the objection to a fit whose residuals, or a velocity sensor, show a play that it does not have."""
-    shown = [one for one in (fit.play, sensed) if one.gain > PLAY_SHOWN]
+    shown = [one for one in (fit.play, sensed) if one.gain > PLAY_SHOWN and one.size > LEAST_PLAY]
     return (EstimateCode.PLAY_LEFT.note(play_um=1e6 * max(one.size for one in shown)),) if shown else ()
 
 
