@@ -103,6 +103,11 @@ PLAY_SHOWN = 4.0
 """Gain in log-likelihood from which residuals show a play of the encoder [dimensionless]: by chance each of three
 courses gains it in one log of 430, so one log in 140 at most is asked in vain."""
 
+PLAY_SENSED = 2.7
+"""Gain from which a log is asked for a play because a velocity sensor moves beside an encoder that stands: one log in
+100 gains it by chance, and fewer seem to move by more than the encoder resolves, which is asked too. The check is shut
+from `PLAY_SHOWN` on, which one log in 400 gains by chance [dimensionless]."""
+
 SURER = 2.0
 """What a difference of log-likelihood between balances is divided by [dimensionless]: they leave out less than the
 motion form does. With `BY_MASS` the likeliest on 285 logs of our plants and of the open benchmark."""
@@ -110,12 +115,6 @@ motion form does. With `BY_MASS` the likeliest on 285 logs of our plants and of 
 BY_MASS = 2.0
 """Weight of the balance by mass before a log is seen, that of each other being 1 [dimensionless]: oil is denser under
 pressure, but simulators and textbooks balance volumes."""
-
-
-PLAY_SENSED = 2.7
-"""Gain from which a log is asked for a play because a velocity sensor moves beside an encoder that stands: one log in
-100 gains it by chance, and fewer seem to move by more than the encoder resolves, which is asked too. The check is shut
-from `PLAY_SHOWN` on, which one log in 400 gains by chance [dimensionless]."""
 
 
 def fit_flow(

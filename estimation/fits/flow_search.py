@@ -180,7 +180,6 @@ def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[
     relieved = reaches_relief(log.measured, parameters.relief_pressure)
     forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
     afar = log.taken_at(parameters.bulk_modulus)
-
     if not log.gaps.size:
         guess, near = _guess(forms[0], afar, starts)
         if not near:  # in a wrong valley the whole log takes all steps that there are

@@ -15,7 +15,8 @@ from estimation.fits.descent import Point, descend
 from estimation.fits.drive_noise import drive_variance
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem, search_bounds
-from estimation.fits.play import NO_PLAY, POSITION, ShownPlay, shown_play
+from estimation.fits.play import NO_PLAY, ShownPlay, shown_play
+from estimation.log_checks.bridging import POSITION
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names

@@ -12,9 +12,11 @@ import numpy as np
 
 from estimation.arrays import Array, BoolArray, IntArray
 from estimation.fits.greybox_problem import Problem
-from estimation.log_checks.bridging import bridged
+from estimation.log_checks.bridging import POSITION, bridged
 from estimation.log_checks.measurement_noise import position_variance
 from estimation.log_checks.order import percentile
+from estimation.log_checks.outliers import VELOCITY
+from estimation.log_checks.sensor_check import PRESSURE
 from plant.log.record import Record
 
 CELLS = 8.0
@@ -40,8 +42,6 @@ EDGE = 2
 FEWEST = 100
 """Fewest samples in which an encoder stands that are compared with a velocity sensor's; judged [samples]."""
 
-POSITION, VELOCITY, PRESSURE = "position_m", "velocity_m_s", "differential_pressure_pa"
-
 
 class ShownPlay(NamedTuple):
     """What a fit's residuals say of a play.
@@ -64,33 +64,11 @@ class ShownPlay(NamedTuple):
 NO_PLAY = ShownPlay(0.0, 0.0)
 
 
-def side_of_play(position: Array) -> Array:
-    """Return at which end of its play an encoder is: 1 after it moved up, -1 after it moved down.
+def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
+    """Return courses of the piston in its encoder's play.
 
     Between the last movement one way and the first one back the piston turns, and crosses the play with the square of
     time, as under a constant force. Two steps the same way, from cell to cell, are a movement; one is noise.
-
-    Parameters
-    ----------
-    position : ndarray, shape (n,)
-        The reading, without gaps [m].
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        From -1 to 1; 0 before the first movement [dimensionless].
-
-    Examples
-    --------
-    >>> out_and_back = 30.0 - np.abs(30.0 - np.arange(61.0))
-    >>> side_of_play(out_and_back)[[0, 20, 30, 34, 60]].round(1).tolist()
-    [0.0, 1.0, 0.9, -1.0, -1.0]
-    """
-    return _crossed(_standings(position), lambda share: share**2)
-
-
-def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
-    """Return courses of the piston in its encoder's play.
 
     Parameters
     ----------
@@ -104,10 +82,18 @@ def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
     Returns
     -------
     ndarray, shape (n, 4)
-        In the order of `estimation.models.wide_flow.COURSES`: `side_of_play`; then what is to be added to it where the
-        piston follows pressure in place of time, as one that is held by the stretch of its seals does; where it crosses
-        at first, and not at last; and where it springs back and comes again, by the share of the pressure that is lost
-        meanwhile [dimensionless].
+        In the order of `estimation.models.wide_flow.COURSES`: at which end of its play the encoder is, 1 after it moved
+        up, -1 after it moved down, 0 before anything is known, and from the one to the other while it stands and the
+        piston crosses at last; then what is to be added to that where the piston follows pressure in place of time, as
+        one that is held by the stretch of its seals does; where it crosses at first, and not at last; and where it
+        springs back and comes again, by the share of the pressure that is lost meanwhile [dimensionless].
+
+    Examples
+    --------
+    >>> out_and_back = 30.0 - np.abs(30.0 - np.arange(61.0))
+    >>> late = crossings(out_and_back, np.zeros(61), 1e-3)[:, 0]
+    >>> late[[0, 20, 30, 34, 60]].round(1).tolist()
+    [0.0, 1.0, 0.9, -1.0, -1.0]
     """
     stands = _standings(position)
     late, early = (_crossed(stands, crossed) for crossed in (lambda share: share**2, lambda share: share * (2 - share)))

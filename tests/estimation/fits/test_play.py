@@ -14,19 +14,24 @@ from estimation.fits.flow_fit import DOUBTED, PLAY_OPEN, PLAY_SENSED, PLAY_SHOWN
 from estimation.fits.flow_search import balanced, flow_starts
 from estimation.fits.form_fit import FormFit
 from estimation.fits.hypotheses import PLAY, Hypothesis
-from estimation.fits.play import NO_PLAY, ShownPlay, crossings, sensed_play, side_of_play
+from estimation.fits.play import NO_PLAY, ShownPlay, crossings, sensed_play
 from estimation.fits.promises import Promise
 from estimation.notes import EstimateCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.arrays import Array
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
-from plant.eha.simulate import CIRCUIT, simulate
+from plant.eha.simulate import CIRCUIT, LUMPED, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 from tests.estimation.fits.short_logs import PAPER, made_fit, seen
 
 QUANTUM = 1e-6
+
+
+def side_of_play(position: Array) -> Array:
+    """Return the course that every log is asked for first: the piston crosses late."""
+    return crossings(position, np.zeros(len(position)), 1e-3)[:, 0]
 
 
 def read(position: Array) -> Array:
@@ -206,3 +211,25 @@ def test_a_play_too_small_to_be_one_is_not_believed(monkeypatch: pytest.MonkeyPa
     fit = fit_flow(sound, PAPER, PAPER.bulk_modulus)
     assert fit.explanation is None
     assert [note.code for note in fit.reasons] == [EstimateCode.PLAY_LEFT]
+
+
+@pytest.mark.parametrize(
+    ("shown", "sensed", "shut"),
+    [
+        (ShownPlay(6e-6, PLAY_SHOWN + 0.1), NO_PLAY, True),
+        (ShownPlay(6e-6, PLAY_SHOWN - 0.1), NO_PLAY, False),
+        (ShownPlay(4e-6, PLAY_SHOWN + 0.1), NO_PLAY, False),
+        (NO_PLAY, ShownPlay(6e-6, PLAY_SHOWN + 0.1), True),
+        (NO_PLAY, ShownPlay(6e-6, PLAY_SENSED + 0.1), False),
+    ],
+)
+def test_the_gate_is_shut_by_a_play_that_chance_seldom_shows_and_that_is_not_too_small(
+    shown: ShownPlay, sensed: ShownPlay, shut: bool
+) -> None:
+    assert bool(module._play_left(replace(made_fit(1.0, 2e8, 1e5), play=shown), sensed)) is shut
+
+
+def test_a_piston_that_begins_to_move_within_what_a_sound_encoder_resolves_shows_no_play() -> None:
+    p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(21)  # gained 7.4 at 500 Hz
+    record = simulate(LUMPED, make_drive("prbs", 10.0, 2e-3, p, rng), 2e-3, p, sensors=BENCH, rng=rng)
+    assert sensed_play(record).gain <= PLAY_SHOWN
