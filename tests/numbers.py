@@ -14,7 +14,7 @@ import json
 import math
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from plant.errors import HydrostateError
+from plant.notes import Note
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -161,6 +162,31 @@ def refused(call: Callable[[], Any]) -> str | None:
     except HydrostateError as error:
         return error.message
     return None
+
+
+def or_refused(call: Callable[[], Any]) -> Any:
+    """Return what is made, or the kind of error and the beginning of its sentence.
+
+    Parameters
+    ----------
+    call : callable
+        What is tried.
+    """
+    try:
+        return call()
+    except ValueError as error:  # ours are among them
+        return f"{type(error).__name__}: {str(error)[:90]}"
+
+
+def told(notes: Iterable[Note]) -> list[dict[str, Any]]:
+    """Return codes and data of notes.
+
+    Parameters
+    ----------
+    notes : iterable of Note
+        What was said.
+    """
+    return [{"code": str(one.code), **one.data} for one in notes]
 
 
 def warned(call: Callable[[], Any]) -> list[str]:

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant.errors import HydrostateError
 from plant.runs import (
     MOST_SAMPLES,
     checked_series,
@@ -21,7 +20,7 @@ from plant.runs import (
 from plant.unit_text import plain_unit
 from plant.units import LITRE_PER_MINUTE, RPM, conversion_to, converts, notes, require_number, require_numbers, si
 from tests.edges import edge
-from tests.numbers import Numbers
+from tests.numbers import Numbers, or_refused
 
 NUMBERS = Numbers(__file__)
 
@@ -33,13 +32,6 @@ class Rod:
     play: float = si(0.0, "m", "play", "judged")
     limit: float | None = si(None, "m", "limit", "judged")
     row: tuple[float, ...] = si((1.0, 2.0), "1", "row", "judged")
-
-
-def or_refused(made: Any) -> Any:
-    try:
-        return made()
-    except (HydrostateError, ValueError) as error:
-        return f"{type(error).__name__}: {str(error)[:50]}"
 
 
 def refused(made: Any) -> bool:

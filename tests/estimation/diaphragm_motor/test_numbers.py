@@ -26,10 +26,9 @@ from estimation.diaphragm_motor.track import Block, HealthyMaps, MotorTrack, hea
 from estimation.finding import Finding
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import BENCH_SENSORS, SAMPLE_TIME, motor_drive, simulate_motor
-from plant.errors import HydrostateError
 from plant.log.record import Record
 from tests.edges import edge
-from tests.numbers import Numbers
+from tests.numbers import Numbers, or_refused
 
 NUMBERS = Numbers(__file__)
 MOTOR = DiaphragmMotorParameters()
@@ -47,13 +46,6 @@ def log(*, worn: bool = True) -> Record:
         sensors=BENCH_SENSORS,
         rng=np.random.default_rng(3),
     )
-
-
-def or_refused(made: Any) -> Any:
-    try:
-        return made()
-    except HydrostateError as error:
-        return f"{type(error).__name__}: {str(error)[:70]}"
 
 
 @NUMBERS.case()

@@ -11,18 +11,10 @@ from estimation.diaphragm_motor.control import ControlledRun, VelocityController
 from estimation.diaphragm_motor.maps import PRESSURES, SWINGS, MotorMaps, average_run, motor_maps
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import BENCH_SENSORS
-from plant.errors import HydrostateError
-from tests.numbers import Numbers
+from tests.numbers import Numbers, or_refused
 
 NUMBERS = Numbers(__file__)
 MOTOR = DiaphragmMotorParameters()
-
-
-def or_refused(made: Any) -> Any:
-    try:
-        return made()
-    except HydrostateError as error:
-        return f"{type(error).__name__}: {str(error)[:70]}"
 
 
 AXES = (np.array([400.0, 480.0]), np.array([0.0, 100.0, 200.0]), np.array([0.0, 2e4, 6e4, 1e5]))

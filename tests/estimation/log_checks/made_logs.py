@@ -1,10 +1,15 @@
 """Logs that are made in a millisecond: a piston's motion, the pressure that it takes, and the pump that feeds both."""
 
+from typing import Any
+
 import numpy as np
 
+from estimation.log_checks import sensor_check
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
+from tests.edges import edge
+from tests.numbers import told
 
 SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
 PRESSURE, PORTS = "differential_pressure_pa", ("pressure_a_pa", "pressure_b_pa")
@@ -36,4 +41,38 @@ def made_log(count: int = N, *, leakage: float = 1.0, size: float = 1.0, noisy: 
             PRESSURE: pressure + noise(3e3 * noisy, count, 4),
         },
         start_time=0.25,
+    )
+
+
+ROWS = np.arange(N)
+LOG = made_log()
+
+
+def stands(values: Array, begin: int, count: int) -> Array:
+    """Return a channel that holds a value for so many samples."""
+    out = values.copy()
+    out[begin : begin + count] = out[begin]
+    return out
+
+
+def gone(values: Array, *rows: int) -> Array:
+    out = values.copy()
+    out[list(rows)] = np.nan
+    return out
+
+
+def accused(**change: Any) -> list[Any]:
+    return told(sensor_check.sensor_objections(LOG.replace(**change), HEALTHY))
+
+
+def names(**change: Any) -> list[str]:
+    return [f"{one['code']} {one['channel']}" for one in accused(**change)]
+
+
+def first_with(told_of: Any, low: int, high: int) -> int:
+    """Return the least whole number with which a verdict is another one than with the lowest."""
+    return (
+        int(np.ceil(float(edge(lambda one: told_of(int(one)), low, high + 0.5, 12)) - 0.5))
+        if told_of(low) != told_of(high)
+        else -1
     )

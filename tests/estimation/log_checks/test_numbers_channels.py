@@ -31,17 +31,13 @@ from tests.estimation.log_checks.made_logs import (
     made_log,
     noise,
 )
-from tests.numbers import Numbers
+from tests.numbers import Numbers, told
 
 NUMBERS = Numbers(__file__)
 WAVE = np.sin(0.31 * np.arange(60)) + 0.4 * np.sin(0.77 * np.arange(60))
 OTHER = np.cos(0.53 * np.arange(60) + 1.0)
 OTHER = OTHER - WAVE * float(OTHER @ WAVE) / float(WAVE @ WAVE)
 BALANCE = FlowBalance(1.0, 0.01, 1.0, 0.05, 0.98, 0.9)
-
-
-def told(notes: tuple[Note, ...]) -> list[Any]:
-    return [{"code": str(one.code), **one.data} for one in notes]
 
 
 def codes(notes: tuple[Note, ...]) -> list[str]:

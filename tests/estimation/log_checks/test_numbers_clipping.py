@@ -9,44 +9,23 @@ import pytest
 from estimation.log_checks import sensor_check
 from plant.arrays import Array
 from plant.log.record import Record
-from plant.notes import Note
 from tests.edges import edge
 from tests.estimation.log_checks.made_logs import (
     HEALTHY,
     PORTS,
     PRESSURE,
+    ROWS,
     SPEED,
     N,
     T,
-    made_log,
+    accused,
+    first_with,
+    names,
     noise,
 )
-from tests.numbers import Numbers
+from tests.numbers import Numbers, told
 
 NUMBERS = Numbers(__file__)
-ROWS = np.arange(N)
-LOG = made_log()
-
-
-def told(notes: tuple[Note, ...]) -> list[Any]:
-    return [{"code": str(one.code), **one.data} for one in notes]
-
-
-def accused(**change: Any) -> list[Any]:
-    return told(sensor_check.sensor_objections(LOG.replace(**change), HEALTHY))
-
-
-def names(**change: Any) -> list[str]:
-    return [f"{one['code']} {one['channel']}" for one in accused(**change)]
-
-
-def first_with(told_of: Any, low: int, high: int) -> int:
-    """Return the least whole number with which a verdict is another one than with the lowest."""
-    return (
-        int(np.ceil(float(edge(lambda one: told_of(int(one)), low, high + 0.5, 12)) - 0.5))
-        if told_of(low) != told_of(high)
-        else -1
-    )
 
 
 @NUMBERS.case()

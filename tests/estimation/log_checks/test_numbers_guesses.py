@@ -9,7 +9,6 @@ from estimation.log_checks import channel_guess
 from estimation.log_checks.channel_guess import guess_channels
 from plant.arrays import Array
 from plant.log.headings import Heading
-from plant.notes import Note
 from tests.edges import edge
 from tests.estimation.log_checks.made_logs import (
     HEALTHY,
@@ -21,13 +20,9 @@ from tests.estimation.log_checks.made_logs import (
     made_log,
     noise,
 )
-from tests.numbers import Numbers
+from tests.numbers import Numbers, told
 
 NUMBERS = Numbers(__file__)
-
-
-def told(notes: tuple[Note, ...]) -> list[Any]:
-    return [{"code": str(one.code), **one.data} for one in notes]
 
 
 def guesses(named: dict[str, Any], channels: tuple[str, ...] | None = None, stamped: tuple[str, ...] = ()) -> list[Any]:

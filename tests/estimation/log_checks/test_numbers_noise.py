@@ -16,26 +16,20 @@ from plant.log.record import Record
 from tests.edges import edge
 from tests.estimation.log_checks.made_logs import (
     HEALTHY,
+    LOG,
     POSITION,
     PRESSURE,
+    ROWS,
     SPEED,
     VELOCITY,
     N,
     T,
-    made_log,
+    gone,
     noise,
 )
 from tests.numbers import Numbers
 
 NUMBERS = Numbers(__file__)
-ROWS = np.arange(N)
-LOG = made_log()
-
-
-def gone(values: Array, *rows: int) -> Array:
-    out = values.copy()
-    out[list(rows)] = np.nan
-    return out
 
 
 @NUMBERS.case()

@@ -8,58 +8,27 @@ import pytest
 from estimation.log_checks import frozen_encoder, sensor_check
 from plant.arrays import Array
 from plant.log.record import Record
-from plant.notes import Note
 from tests.edges import edge
 from tests.estimation.log_checks.made_logs import (
     HEALTHY,
+    LOG,
     POSITION,
     PRESSURE,
+    ROWS,
     SPEED,
     VELOCITY,
     N,
     T,
-    made_log,
+    accused,
+    first_with,
+    gone,
+    names,
     noise,
+    stands,
 )
 from tests.numbers import Numbers
 
 NUMBERS = Numbers(__file__)
-ROWS = np.arange(N)
-LOG = made_log()
-
-
-def told(notes: tuple[Note, ...]) -> list[Any]:
-    return [{"code": str(one.code), **one.data} for one in notes]
-
-
-def stands(values: Array, begin: int, count: int) -> Array:
-    """Return a channel that holds a value for so many samples."""
-    out = values.copy()
-    out[begin : begin + count] = out[begin]
-    return out
-
-
-def gone(values: Array, *rows: int) -> Array:
-    out = values.copy()
-    out[list(rows)] = np.nan
-    return out
-
-
-def accused(**change: Any) -> list[Any]:
-    return told(sensor_check.sensor_objections(LOG.replace(**change), HEALTHY))
-
-
-def names(**change: Any) -> list[str]:
-    return [f"{one['code']} {one['channel']}" for one in accused(**change)]
-
-
-def first_with(told_of: Any, low: int, high: int) -> int:
-    """Return the least whole number with which a verdict is another one than with the lowest."""
-    return (
-        int(np.ceil(float(edge(lambda one: told_of(int(one)), low, high + 0.5, 12)) - 0.5))
-        if told_of(low) != told_of(high)
-        else -1
-    )
 
 
 @NUMBERS.case()

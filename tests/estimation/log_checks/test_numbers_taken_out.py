@@ -9,41 +9,24 @@ from estimation.log_checks import held, hum, outliers
 from estimation.log_checks.clean import clean_log
 from plant.arrays import Array
 from plant.log.record import Record
-from plant.notes import Note
 from tests.edges import edge
 from tests.estimation.log_checks.made_logs import (
     HEALTHY,
+    LOG,
     POSITION,
     PRESSURE,
+    ROWS,
     SPEED,
     VELOCITY,
     N,
     T,
-    made_log,
+    gone,
     noise,
+    stands,
 )
-from tests.numbers import Numbers
+from tests.numbers import Numbers, told
 
 NUMBERS = Numbers(__file__)
-ROWS = np.arange(N)
-LOG = made_log()
-
-
-def told(notes: tuple[Note, ...]) -> list[Any]:
-    return [{"code": str(one.code), **one.data} for one in notes]
-
-
-def stands(values: Array, begin: int, count: int) -> Array:
-    """Return a channel that holds a value for so many samples."""
-    out = values.copy()
-    out[begin : begin + count] = out[begin]
-    return out
-
-
-def gone(values: Array, *rows: int) -> Array:
-    out = values.copy()
-    out[list(rows)] = np.nan
-    return out
 
 
 @NUMBERS.case()

@@ -14,25 +14,17 @@ from estimation.piezo_stack.estimate import StackEstimate, covariance, estimate_
 from estimation.piezo_stack.finding import missed, stack_quantities
 from estimation.piezo_stack.runs import STACK_CHANNELS, prepared
 from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, changed, told
-from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.run import BENCH_SENSORS, simulate_stack, sine_drive
 from tests.edges import edge
-from tests.numbers import Numbers, Roughly
+from tests.numbers import Numbers, Roughly, or_refused
 
 NUMBERS = Numbers(__file__)
 HEALTHY = PiezoStackParameters(load_mass=10.0)
 WORN = replace(HEALTHY, chamber_leakage=4e-12, coulomb_friction=60.0)
 T = 1e-4
 DRIVE = sine_drive(275.0, 140.0, 0.012, T)
-
-
-def or_refused(made: Any) -> Any:
-    try:
-        return made()
-    except HydrostateError as error:
-        return f"{type(error).__name__}: {str(error)[:60]}"
 
 
 @cache

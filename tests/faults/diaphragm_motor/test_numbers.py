@@ -12,9 +12,8 @@ from faults.diaphragm_motor.diagnose import Match, MotorDiagnosis, diagnose_sign
 from faults.diaphragm_motor.faults import MOTOR_FAULTS, motor_with_fault
 from faults.diaphragm_motor.finding import severity_of
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
-from plant.errors import HydrostateError
 from tests.edges import edge
-from tests.numbers import Numbers
+from tests.numbers import Numbers, or_refused
 
 NUMBERS = Numbers(__file__)
 MOTOR = DiaphragmMotorParameters()
@@ -48,13 +47,6 @@ def motors_with_faults() -> dict[str, Any]:
         for one in (-15.1, -15.0, 18.0, 18.1)
     ]
     return told
-
-
-def or_refused(made: Any) -> Any:
-    try:
-        return made()
-    except HydrostateError as error:
-        return f"{type(error).__name__}: {str(error)[:50]}"
 
 
 def told_of(found: MotorDiagnosis) -> dict[str, Any]:

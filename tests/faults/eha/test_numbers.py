@@ -14,21 +14,13 @@ from faults.eha.isolability import Distances, condition_distances, structural_is
 from faults.eha.physical import THROTTLE_A, THROTTLE_B, aerated, drifted_relief, throttled, worn_pump
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.model import EhaParameters
-from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.sensors.sensors import PAPER
 from tests.edges import edge
-from tests.numbers import Numbers
+from tests.numbers import Numbers, or_refused
 
 NUMBERS = Numbers(__file__)
 P, CIRCUIT = EhaParameters(), CircuitParameters()
-
-
-def or_refused(made: Any) -> Any:
-    try:
-        return made()
-    except HydrostateError as error:
-        return f"{type(error).__name__}: {str(error)[:50]}"
 
 
 def differs(changed: Any, base: Any) -> dict[str, float]:

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from estimation.arrays import Array
-from plant.errors import HydrostateError
 from tests.edges import edge
-from tests.numbers import Numbers
+from tests.numbers import Numbers, or_refused
 
 pytest.importorskip("sklearn", reason="scikit-learn is not installed (extra learn)")
 
@@ -21,13 +20,6 @@ from faults.own_classes.groups import contiguous_blocks, folds
 from faults.own_classes.verdicts import Verdicts
 
 NUMBERS = Numbers(__file__)
-
-
-def or_refused(made: Any) -> Any:
-    try:
-        return made()
-    except (HydrostateError, ValueError) as error:
-        return f"{type(error).__name__}: {str(error)[:50]}"
 
 
 def run(seed: int, count: int = 61) -> Array:

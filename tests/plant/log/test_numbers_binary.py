@@ -1,8 +1,6 @@
 """What MAT files and HDF5 and rings hold byte by byte, kept in `numbers_binary.json`."""
 
 import struct
-import tempfile
-import zlib
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
@@ -12,28 +10,14 @@ import numpy as np
 import pytest
 import scipy.io
 
-from plant.errors import HydrostateError
 from plant.log import hdf5, ring
 from plant.log.mat import MOST_SPREAD, spread, tables_of
-from plant.log.mat_reader import DamagedMatError, read_variables
+from plant.log.mat_reader import read_variables
 from plant.log.ring import RingReader, RingWriter, ring_lines
 from tests.numbers import Numbers
+from tests.plant.log.made_files import in_a_file, or_refused
 
 NUMBERS = Numbers(__file__)
-
-
-def or_refused(made: Any) -> Any:
-    try:
-        return made()
-    except (HydrostateError, DamagedMatError, ValueError, zlib.error) as error:
-        return f"{type(error).__name__}: {str(error).rpartition('/')[2][:70]}"
-
-
-def in_a_file(content: bytes, of: Callable[[Path], Any], name: str = "log") -> Any:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / name
-        path.write_bytes(content)
-        return or_refused(lambda: of(path))
 
 
 def plain(value: Any) -> Any:

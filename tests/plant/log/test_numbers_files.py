@@ -1,8 +1,6 @@
 """What packed files and sheets and tables hold, kept in `numbers_files.json`."""
 
-import tempfile
 import zlib
-from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -10,35 +8,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant.errors import HydrostateError
 from plant.log import mdf, packed, tdms, xlsx
 from plant.log.arrow import from_arrow, to_arrow
 from plant.log.cells import number, numbers
 from plant.log.columns import Column
 from plant.log.csv_layout import layout_of_lines
 from plant.log.formats import format_of
-from plant.log.mat_reader import DamagedMatError
 from plant.log.packed import inflated, most_unpacked
 from plant.log.table import Table, table_of
 from plant.log.tables import gathered
 from tests.edges import edge
 from tests.numbers import Numbers
+from tests.plant.log.made_files import in_a_file, or_refused
 
 NUMBERS = Numbers(__file__)
-
-
-def or_refused(made: Any) -> Any:
-    try:
-        return made()
-    except (HydrostateError, DamagedMatError, ValueError, zlib.error) as error:
-        return f"{type(error).__name__}: {str(error).rpartition('/')[2][:70]}"
-
-
-def in_a_file(content: bytes, of: Callable[[Path], Any], name: str = "log") -> Any:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / name
-        path.write_bytes(content)
-        return or_refused(lambda: of(path))
 
 
 @NUMBERS.case()

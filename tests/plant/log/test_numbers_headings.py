@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant.errors import HydrostateError
 from plant.log import any_columns
 from plant.log.columns import check_columns, listed, parse_columns, resolve_columns
 from plant.log.guess import NAMES, guess_by_name, hint_of, missing_channels, points_by_name
@@ -13,16 +12,9 @@ from plant.log.headings import Heading, is_unit
 from plant.log.plausibility import LIMITS, implausible, require_measurable
 from plant.log.table import table_of
 from tests.edges import edge
-from tests.numbers import Numbers
+from tests.numbers import Numbers, or_refused
 
 NUMBERS = Numbers(__file__)
-
-
-def or_refused(made: Any) -> Any:
-    try:
-        return made()
-    except (HydrostateError, ValueError) as error:
-        return f"{type(error).__name__}: {str(error)[:90]}"
 
 
 @NUMBERS.case()

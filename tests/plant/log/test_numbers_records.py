@@ -6,36 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant.arrays import Array
-from plant.errors import HydrostateError
 from plant.log.checks import trusted
 from plant.log.inspection import clock_facts, inspect_table
 from plant.log.record import Record
 from plant.log.table import table_of
-from plant.notes import Note
-from tests.numbers import Numbers
+from tests.numbers import Numbers, or_refused, told
+from tests.plant.log.made_stamps import NOISE, TICKS, T, jittering
 
 NUMBERS = Numbers(__file__)
-T = 2e-3
-NOISE = np.random.default_rng(41).uniform(-1.0, 1.0, 60)
-TICKS = np.arange(60.0)
-
-
-def jittering(share: float, begin: float = 0.5, count: int = 60) -> Array:
-    """Return stamps that jitter by at most a share of the sample time."""
-    return begin + T * (TICKS + share * NOISE)[:count]
-
-
-def told(notes: tuple[Note, ...] | list[Note]) -> list[Any]:
-    return [{"code": str(one.code), **one.data} for one in notes]
-
-
-def or_refused(made: Any) -> Any:
-    """Return what is made, or how it is refused."""
-    try:
-        return made()
-    except HydrostateError as error:
-        return f"{type(error).__name__}: {str(error)[:60]}"
 
 
 @NUMBERS.case()

@@ -5,22 +5,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant.errors import HydrostateError
 from plant.log import csv_layout, layouts_seen
 from plant.log.csv_layout import layout_of_lines
 from plant.log.csv_stream import CsvStream
 from plant.log.stamps import is_stamp, read_stamps
 from plant.log.stream_source import Received, broker_of, stream_lines
-from tests.numbers import Numbers
+from tests.numbers import Numbers, or_refused
 
 NUMBERS = Numbers(__file__)
-
-
-def or_refused(made: Any) -> Any:
-    try:
-        return made()
-    except (HydrostateError, ValueError) as error:
-        return f"{type(error).__name__}: {str(error)[:90]}"
 
 
 @NUMBERS.case()

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant.errors import HydrostateError
 from plant.motor_paper.fractional import (
     caputo_from_rest,
     fractional_history,
@@ -44,7 +43,7 @@ from plant.motor_paper.vibration_model import (
 )
 from plant.motor_paper.vibration_run import forced_vibration, vibration_run
 from tests.edges import edge
-from tests.numbers import Numbers
+from tests.numbers import Numbers, or_refused
 
 NUMBERS = Numbers(__file__)
 PAPER = VibrationParameters()
@@ -57,13 +56,6 @@ VARIED = VibrationParameters(
     fractional_order=0.7,
 )
 FAST = VibrationParameters(fractional_damping=3.0, fractional_order=1.3)
-
-
-def or_refused(made: Any) -> Any:
-    try:
-        return made()
-    except HydrostateError as error:
-        return f"{type(error).__name__}: {str(error)[:60]}"
 
 
 @NUMBERS.case()

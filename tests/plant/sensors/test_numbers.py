@@ -6,11 +6,10 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.sensors.faults import Kind, SensorFault, with_fault
 from plant.sensors.sensors import SENSORS, Sensors, differentiated, drop_samples, measure, noise_variances
-from tests.numbers import Numbers
+from tests.numbers import Numbers, or_refused
 
 NUMBERS = Numbers(__file__)
 T = 1e-3
@@ -24,13 +23,6 @@ TRUTH = Record(
         "differential_pressure_pa": 3e5 * np.sin(0.3 * np.arange(N)),
     },
 )
-
-
-def or_refused(made: Any) -> Any:
-    try:
-        return made()
-    except HydrostateError as error:
-        return f"{type(error).__name__}: {str(error)[:60]}"
 
 
 @NUMBERS.case()
