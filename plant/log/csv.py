@@ -23,6 +23,9 @@ from plant.log.csv_layout import BLANKS, Layout, layout_of
 from plant.log.packed import opened, packing_of
 from plant.log.table import Table
 
+_BLOCK = 1 << 20
+"""Bytes that are unpacked at a time."""
+
 
 def open_csv(path: Path, metadata: str | None) -> Table:
     """Open a text log: a CSV, or the like with tabs, semicolons or blanks, plain or packed by gzip or zstd.
@@ -76,20 +79,27 @@ def write_csv(columns: Mapping[str, Array], file: BinaryIO, *, compressed: bool)
 
 
 @contextmanager
-def _text(path: Path, layout: Layout) -> Generator[TextIO]:
+def _text(path: Path, layout: Layout, errors: str = "replace") -> Generator[TextIO]:
     encoding = "utf-8-sig" if layout.encoding == "utf-8" else layout.encoding
-    with opened(path) as file, io.TextIOWrapper(file, encoding=encoding, errors="replace", newline=None) as text:
+    with opened(path) as file, io.TextIOWrapper(file, encoding=encoding, errors=errors, newline=None) as text:
         yield text
 
 
-@contextmanager
-def _bytes(path: Path) -> Generator[Any]:
-    """Open what pyarrow reads: the file itself where it can, since it reads that in parallel."""
+def _bytes(path: Path, layout: Layout) -> Any:
+    """Return what pyarrow reads: the file itself where it can, since it reads that in parallel; else its text in UTF-8.
+
+    No thread of pyarrow may call Python back: an error raised there, as of too large a file, ends or hangs the process.
+    """
+    if layout.encoding.startswith("utf-16"):
+        with _text(path, layout, errors="strict") as text:
+            return pa.BufferReader(text.read().encode())
     if packing_of(path) is None:
-        yield path
-        return
+        return path
+    content = bytearray()
     with opened(path) as file:
-        yield pa.PythonFile(cast(io.BufferedIOBase, file), mode="r")
+        while part := file.read(_BLOCK):
+            content += part
+    return pa.BufferReader(content)
 
 
 def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
@@ -97,22 +107,17 @@ def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Col
     wanted = [labels[column.position] for column in chosen]
     texts = {labels[place] for place in layout.stamped}
     kinds: dict[str, Any] = {one: pa.string() if one in texts else pa.float64() for one in wanted}
-    with _bytes(path) as source:
-        table = arrow_csv.read_csv(
-            source,
-            read_options=arrow_csv.ReadOptions(
-                column_names=labels,
-                skip_rows=layout.skipped,
-                encoding=layout.encoding if layout.encoding.startswith("utf-16") else "utf8",
-            ),
-            parse_options=arrow_csv.ParseOptions(delimiter=layout.delimiter),
-            convert_options=arrow_csv.ConvertOptions(
-                include_columns=wanted,
-                column_types=kinds,
-                null_values=list(MISSING),
-                decimal_point=layout.decimal_point,
-            ),
-        )
+    table = arrow_csv.read_csv(
+        _bytes(path, layout),
+        read_options=arrow_csv.ReadOptions(column_names=labels, skip_rows=layout.skipped),
+        parse_options=arrow_csv.ParseOptions(delimiter=layout.delimiter),
+        convert_options=arrow_csv.ConvertOptions(
+            include_columns=wanted,
+            column_types=kinds,
+            null_values=list(MISSING),
+            decimal_point=layout.decimal_point,
+        ),
+    )
     out: dict[Column, Array] = {}
     for column, label in zip(chosen, wanted, strict=True):
         if label in texts:

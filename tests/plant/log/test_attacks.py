@@ -99,7 +99,7 @@ def test_a_bomb_unpacks_to_a_limit_and_no_further(tmp_path: Path, kind: str) -> 
         pq.write_table(pa.table(columns), path, compression="zstd")
     # in a process of its own, whose peak is its own (tracing allocations crashes beside threads that read ahead)
     ended = subprocess.run(  # noqa: S603
-        [sys.executable, "-c", PEAK, str(path)], capture_output=True, text=True, check=True
+        [sys.executable, "-c", PEAK, str(path)], capture_output=True, text=True, check=True, timeout=120
     )
     grown, _, said = ended.stdout.partition(" ")
     assert re.search("it unpacks to more than .* MB, the most that is read of a packed file", said)
