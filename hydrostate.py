@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from estimation.equations.definition import Parameter as Parameter
     from estimation.finding import Finding as Finding
     from estimation.identification.model.linear_model import LinearModel as LinearModel
@@ -124,7 +126,7 @@ def actuators() -> Mapping[str, str]:
 
 
 def read(
-    path: "str | Path",
+    path: "str | Path | pd.DataFrame",
     *,
     rig: "Rig[Any] | str | Path | None" = None,
     columns: Mapping[str, str] | None = None,
@@ -139,9 +141,9 @@ def read(
 
     Parameters
     ----------
-    path : str or Path
+    path : str, Path or pandas.DataFrame
         Text, Parquet, Feather or MAT; with the extra ``bench`` also XLSX, TDMS, MDF and HDF5. `hydrostate inspect`
-        shows what a strange one holds.
+        shows what a strange one holds. Or a table, with ``time_s`` or its index as time: seconds or dates.
     rig : Rig, str or Path, optional
         The actuator, or its rig file; the paper's if not given.
     columns : Mapping[str, str], optional
@@ -173,24 +175,27 @@ def read(
     """
     from experiments.actuators import DEFAULT, actuator
     from experiments.command.logs import read_log
-    from experiments.log_pages.log import ANY
+    from experiments.log_pages.log import ANY, options_by_name
     from plant.errors import NoChannelError
     from plant.log.any_columns import read_any
+    from plant.log.frames import frame_table, is_frame
 
     kind = actuator(plant or DEFAULT)
     bench = _rig(rig, kind)
-    if not isinstance(path, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance] -- likewise
-        refuse(f"the path of a log is needed, got {path!r}")
+    if not isinstance(path, str | Path) and not is_frame(path):
+        refuse(f"the path of a log or a pandas.DataFrame is needed, got {path!r}"[:200])
     if columns is not None and not isinstance(columns, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         refuse(f"columns must be a mapping such as {{'position_m': 'POS_MM:mm'}}, got {columns!r}")
     others = [Path(one) for one in ([beside] if isinstance(beside, str | Path) else beside)]
     more: dict[str, Any] = {"sample_time": sample_time, "beside": others}
+    file = Path(path) if isinstance(path, str | Path) else frame_table(path)
     try:
-        return Log(read_log(Path(path), bench.columns, dict(columns or {}), kind.required, **more), bench, kind.name)
+        with options_by_name():
+            return Log(read_log(file, bench.columns, dict(columns or {}), kind.required, **more), bench, kind.name)
     except NoChannelError:
         if rig is not None or columns is not None or plant is not None or others:
             raise
-    return Log(read_any(path, sample_time=sample_time), bench, ANY)
+    return Log(read_any(file, sample_time=sample_time), bench, ANY)
 
 
 def load_model(path: "str | Path") -> "Relation":

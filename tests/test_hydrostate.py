@@ -45,6 +45,17 @@ def test_a_log_that_is_read_is_the_log_that_was_written(log: hs.Log, file: Path)
     assert len(again.between(1.0, 2.0)) == 1001
 
 
+def test_a_table_is_the_log_that_its_file_is(log: hs.Log, file: Path) -> None:
+    table = log.to_frame()
+    again = hs.read(table.rename(columns={"position_m": "POS"}), columns={"position_m": "POS"})
+    for channel in log.channels:
+        np.testing.assert_array_equal(again[channel], hs.read(file, columns={"position_m": "POS"})[channel])
+    assert again.sample_time == pytest.approx(log.sample_time)
+    with pytest.raises(hs.HydrostateError, match=r"^the table: .*a log without time is read with sample_time$"):
+        hs.read(table.reset_index(drop=True), plant="eha")
+    assert hs.read(table.reset_index(drop=True), sample_time=1e-3).diagnose().condition == "minor_leakage"
+
+
 def test_estimate_and_diagnosis_are_one_answer(log: hs.Log, verdict: hs.Answer) -> None:
     found = log.estimate()
     assert found.believed
@@ -76,7 +87,7 @@ def test_a_model_turns_into_python_controls(log: hs.Log) -> None:
 
 MISTAKES: dict[str, tuple[Callable[[hs.Log, Path], object], str]] = {
     "no such file": (lambda log, file: hs.read("none.csv"), "none.csv: there is no such file"),
-    "no path": (lambda log, file: hs.read(3), "the path of a log is needed, got 3"),  # type: ignore[arg-type]
+    "no path": (lambda log, file: hs.read(3), "the path of a log or a pandas.DataFrame is needed, got 3"),  # type: ignore[arg-type]
     "no such column": (
         lambda log, file: hs.read(file, columns={"position_m": "X"}),
         "name one of them as position_m=NAME",

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from plant.log.record import Record
+    from plant.log.table import Table
 
 T = TypeVar("T")
 
@@ -137,7 +138,7 @@ def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None) -> 
 
 
 def read_log(
-    path: Path,
+    path: "Path | Table",
     rig_columns: Mapping[str, str],
     columns: Mapping[str, str],
     required: Collection[str] | None = None,
@@ -152,6 +153,8 @@ def read_log(
 
     Parameters
     ----------
+    path : Path or Table
+        The log's file, or a log that is open.
     rig_columns, columns : Mapping[str, str]
         Foreign column by channel, from the rig file and from the command line.
     required : collection of str, optional
@@ -172,7 +175,7 @@ def read_log(
         If a column of the rig's is not in the log.
     """
     from plant.log.checks import REQUIRED
-    from plant.log.files import read_record
+    from plant.log.files import read_record, source_of
     from plant.log.plausibility import require_measurable
 
     wanted = REQUIRED if required is None else required
@@ -182,7 +185,7 @@ def read_log(
     if beside:
         more["beside"] = beside
     record = with_rig_columns(lambda given: read_record(path, columns=given, **more), rig_columns, columns)
-    require_measurable(record.channels, str(path))
+    require_measurable(record.channels, source_of(path))
     return record
 
 

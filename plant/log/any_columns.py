@@ -34,13 +34,15 @@ TIME_STEM = re.compile(rf"(?:t|time|timestamp|zeit)(?:_({'|'.join(one for one in
 """What a column of time is called, in lower case and without brackets: ``t``, ``time_ms``."""
 
 
-def read_any(path: str | Path, names: Sequence[str] | None = None, *, sample_time: float | None = None) -> Record:
+def read_any(
+    path: str | Path | Table, names: Sequence[str] | None = None, *, sample_time: float | None = None
+) -> Record:
     """Read columns of a log as they stand, without knowing what they are.
 
     Parameters
     ----------
-    path : str or Path
-        A log in any format that is read.
+    path : str, Path or Table
+        A log in any format that is read, or one that is open.
     names : sequence of str, optional
         Columns wanted; a name that is a known channel may stand in another unit, ``motor_speed_rpm`` for
         ``motor_speed_rad_s``. Every column that holds numbers unless told.
@@ -62,8 +64,8 @@ def read_any(path: str | Path, names: Sequence[str] | None = None, *, sample_tim
     LogWarning
         If something was mended, or there is no time.
     """
-    source = str(path)
-    table = _table(open_tables(Path(path)), names)
+    source, opened = (path.source, (path,)) if isinstance(path, Table) else (str(path), open_tables(Path(path)))
+    table = _table(opened, names)
     headings = cleaned(table.headings)
     time = None if sample_time is not None else _time_column(headings)
     columns = _every(table, headings) if names is None else _wanted(table, headings, names, source)

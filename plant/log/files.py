@@ -17,6 +17,7 @@ from plant.log.csv import write_csv
 from plant.log.formats import open_tables
 from plant.log.notes import LogCode
 from plant.log.record import Record
+from plant.log.table import Table
 from plant.log.tables import gathered
 from plant.notes import Note
 
@@ -25,7 +26,7 @@ SUFFIXES = {".csv": "csv", ".txt": "csv", ".gz": "csv", ".parquet": "parquet", "
 
 
 def read_record(
-    path: str | Path,
+    path: str | Path | Table,
     *,
     columns: Mapping[str, str] | None = None,
     required: Collection[str] = REQUIRED,
@@ -36,9 +37,10 @@ def read_record(
 
     Parameters
     ----------
-    path : str or Path
+    path : str, Path or Table
         Text with cells apart by commas, semicolons, tabs or blanks (also packed by gzip or zstd), Parquet, Feather or
         MAT; with the extra ``bench`` also XLSX, TDMS, MDF, HDF5 and MAT 7.3. The content says which, not the name.
+        Or one that is open, such as `plant.log.frames.frame_table` gives.
     columns : Mapping[str, str], optional
         Foreign columns by channel, with a unit where the file gives none and it is not SI:
         ``{"position_m": "POS_MM:mm"}``.
@@ -66,18 +68,27 @@ def read_record(
     LogWarning
         If samples were masked or resampled, a channel was left out, or a unit looks wrong.
     """
-    path = Path(path)
+    source = source_of(path)
     if sample_time is not None and not (math.isfinite(sample_time) and sample_time > 0.0):
-        raise LogError(f"sample_time must be positive and finite, got {sample_time!r}", str(path))
-    tables = [table for one in (path, *map(Path, beside)) for table in open_tables(one, _beside(one))]
-    found = gathered(tables, columns, required, str(path), sample_time)
+        raise LogError(f"sample_time must be positive and finite, got {sample_time!r}", source)
+    tables = [table for one in (path, *beside) for table in _opened(one)]
+    found = gathered(tables, columns, required, source, sample_time)
     document, notes = _document(next((one.metadata for one in tables if one.metadata), None))
     clock = None if beside else _clock(document)
-    checked = trusted(found.columns, source=str(path), required=required, clock=clock)
+    checked = trusted(found.columns, source=source, required=required, clock=clock)
     for note in (*notes, *found.notes, *checked.notes):
-        warnings.warn(LogWarning(note, str(path)), stacklevel=2)
+        warnings.warn(LogWarning(note, source), stacklevel=2)
     began = {} if found.began is None else {"began": found.began}
     return Record(checked.sample_time, checked.channels, {**began, **document.get("metadata", {})}, checked.start_time)
+
+
+def source_of(log: str | Path | Table) -> str:
+    """Return what messages call a log."""
+    return log.source if isinstance(log, Table) else str(log)
+
+
+def _opened(log: str | Path | Table) -> tuple[Table, ...]:
+    return (log,) if isinstance(log, Table) else open_tables(Path(log), _beside(Path(log)))
 
 
 def write_record(record: Record, path: str | Path) -> None:

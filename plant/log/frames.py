@@ -1,0 +1,88 @@
+"""Tables in memory, read as a log: a pandas DataFrame, or columns by name."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, TypeGuard
+
+import numpy as np
+
+from plant.errors import LogError
+from plant.log.any_columns import TIME_STEM
+from plant.log.columns import TIME
+from plant.log.table import Table, table_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SOURCE = "the table"
+"""What messages call a table that came from no file."""
+
+
+def is_frame(given: object) -> "TypeGuard[pd.DataFrame]":
+    """Return whether something is a pandas DataFrame, without importing pandas."""
+    return hasattr(given, "columns") and hasattr(given, "iloc") and hasattr(given, "index")
+
+
+def frame_table(given: "pd.DataFrame | Mapping[str, Any]") -> Table:
+    """Return a table in memory as an open log.
+
+    The index of a DataFrame is its time if it holds dates or floats, or has a name such as ``time_ms``, unless a column
+    is called time.
+
+    Parameters
+    ----------
+    given : pandas.DataFrame or Mapping[str, array_like]
+        Columns of one length, by name.
+
+    Returns
+    -------
+    Table
+        Ready for `plant.log.files.read_record`.
+
+    Raises
+    ------
+    LogError
+        If it has no columns or no rows, or their lengths differ.
+
+    Examples
+    --------
+    >>> [one.name for one in frame_table({"time_s": [0.0, 1.0], "position_m": [0.0, 0.1]}).headings]
+    ['time_s', 'position_m']
+    """
+    names = [str(name) for name in (given.columns if is_frame(given) else given)]
+    if len(set(names)) < len(names):
+        raise LogError(f"columns of different names are needed, got {', '.join(names)}", SOURCE)
+    values: dict[str, Any] = dict(zip(names, _columns(given), strict=True))
+    if is_frame(given) and not any(map(_is_time, names)):
+        values = {**_time(given.index), **values}
+    lengths = {name: np.size(one) for name, one in values.items()}
+    if not lengths or not max(lengths.values()):
+        raise LogError("columns with at least one row are needed, got an empty table", SOURCE)
+    if len(set(lengths.values())) > 1:
+        got = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        raise LogError(f"columns of one length are needed, got {got} samples", SOURCE)
+    return table_of(SOURCE, values)
+
+
+def _is_time(name: str) -> bool:
+    return TIME_STEM.fullmatch(name.lower()) is not None
+
+
+def _time(index: "pd.Index[Any]") -> dict[str, Any]:
+    """Return an index as a column of time; nothing where it only counts rows, as after rows were chosen."""
+    name = "" if index.name is None else str(index.name)
+    if index.dtype.kind in "iuf" and (_is_time(name) or index.dtype.kind == "f"):
+        return {name if _is_time(name) else TIME: _plain(index)}
+    return {TIME: _plain(index)} if index.dtype.kind == "M" else {}
+
+
+def _columns(given: Any) -> list[Any]:
+    if is_frame(given):
+        return [_plain(given.iloc[:, place]) for place in range(given.shape[1])]
+    return [np.asarray(one) for one in given.values()]
+
+
+def _plain(column: Any) -> Any:
+    """Return a column or an index of pandas as NumPy has it; dates in UTC."""
+    if getattr(column.dtype, "tz", None) is not None:
+        column = getattr(column, "dt", column).tz_convert(None)
+    return column.to_numpy()

@@ -1,0 +1,91 @@
+"""Tables in memory are read as the same log from a file is."""
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from plant.errors import LogError, LogWarning
+from plant.log.any_columns import read_any
+from plant.log.files import read_record
+from plant.log.frames import frame_table, is_frame
+
+TIME = 0.01 * np.arange(400)
+CHANNELS = {"motor_speed_rad_s": 90.0 + np.sin(TIME), "position_m": 0.01 * np.cos(TIME)}
+
+
+def table(index: Any = None) -> pd.DataFrame:
+    return pd.DataFrame(CHANNELS, index)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        pd.DataFrame({"time_s": TIME, **CHANNELS}),
+        {"time_s": TIME, **CHANNELS},
+        table(index=TIME),
+        table(index=pd.Index(TIME, name="time_s")),
+        table(index=pd.Index((1e3 * TIME).round().astype(int), name="time_ms")),
+        pd.DataFrame({"time_s": TIME, **CHANNELS}, index=TIME + 7.0),
+        pd.DataFrame({"time_s": TIME, **CHANNELS}, index=[f"row {k}" for k in range(400)]),
+    ],
+    ids=["columns", "mapping", "index", "named index", "milliseconds", "column before index", "index of text"],
+)
+def test_a_table_is_read_as_its_file_would_be(given: pd.DataFrame) -> None:
+    record = read_record(frame_table(given))
+    assert record.sample_time == pytest.approx(0.01, rel=1e-12)
+    np.testing.assert_allclose(record.time, TIME, atol=1e-12)
+    for name, values in CHANNELS.items():
+        np.testing.assert_array_equal(record[name], values)
+
+
+@pytest.mark.parametrize("zone", [None, "Europe/Paris"])
+@pytest.mark.parametrize("in_a_column", [False, True])
+def test_dates_are_time_and_say_when_the_log_began(zone: str | None, in_a_column: bool) -> None:
+    stamps = pd.Timestamp("2026-11-25T10:00", tz=zone) + pd.to_timedelta(TIME, unit="s")
+    given = table(index=stamps)
+    if in_a_column:
+        given = given.rename_axis("time_s").reset_index()
+    record = read_record(frame_table(given))
+    assert record.metadata["began"] == f"2026-11-25T{10 if zone is None else 9:02d}:00:00.000000Z"
+    np.testing.assert_allclose(record.time - record.time[0], TIME, atol=1e-9)
+
+
+def test_an_index_that_counts_rows_is_no_time() -> None:
+    chosen = pd.concat([table(), table()], ignore_index=True).iloc[::2]
+    with pytest.raises(LogError, match=r"^the table: column time_s is missing.* is read with --sample-time"):
+        read_record(frame_table(chosen))
+    with pytest.warns(LogWarning, match="no time column"):
+        assert read_any(frame_table(chosen)).sample_time == 1.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert read_any(frame_table(chosen), sample_time=0.01).sample_time == 0.01
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (pd.DataFrame(), "at least one row are needed, got an empty table"),
+        (table().iloc[:0], "at least one row are needed, got an empty table"),
+        ({}, "at least one row are needed, got an empty table"),
+        ({"a": [1.0, 2.0], "b": [1.0]}, "columns of one length are needed, got a 2, b 1 samples"),
+        (pd.concat([table(), table()], axis=1), "columns of different names are needed, got motor_speed_rad_s,"),
+    ],
+)
+def test_what_is_no_table_of_columns_is_refused(given: pd.DataFrame, said: str) -> None:
+    with pytest.raises(LogError, match=f"^the table: .*{said}"):
+        frame_table(given)
+
+
+def test_text_in_a_column_is_named() -> None:
+    given = pd.DataFrame({"time_s": TIME, **CHANNELS}).astype({"position_m": object})
+    given.loc[3, "position_m"] = "n/a?"
+    with pytest.raises(LogError, match=r"^the table: column 'position_m' must hold numbers, got 'n/a\?' in row 4"):
+        read_record(frame_table(given))
+
+
+def test_only_pandas_has_frames() -> None:
+    assert is_frame(table())
+    assert not any(is_frame(one) for one in (CHANNELS, np.zeros((3, 2)), "run.csv", None))
