@@ -1,11 +1,14 @@
 """When a limit is crossed: by Monte Carlo from what is believed now, settings drawn by their weight."""
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
-from faults.trend.kalman import Belief, Settings
+from faults.trend.kalman import Belief, Settings, paced
 from plant.arrays import Array
+
+Index: TypeAlias = "np.ndarray[tuple[int], np.dtype[np.int64]]"
 
 DRAWS = 1000
 """Futures that are drawn [count]."""
@@ -79,19 +82,31 @@ def crossing(belief: Belief, grid: Settings, rng: np.random.Generator, limit: fl
     bend, wander, jerk = grid.bend[chosen], grid.wander[chosen], grid.jerk[chosen]
     begin = 0.0
     for stride in STRIDES:
-        turn, half, drift, jolt = np.sqrt(stride) * rng.standard_normal((4, DRAWS))
+        turn, half, drift, jolt = rng.standard_normal((4, DRAWS))
         before, bowing = level, curvature
-        curvature = curvature + jerk * jolt
-        bowed = stride * bend * (0.5 * turn + half / np.sqrt(12.0))
-        level = level + stride * slope + stride**2 * (2.0 * bowing + curvature) / 6.0 + bowed + wander * drift
-        slope = slope + 0.5 * stride * (bowing + curvature) + bend * turn
+        curvature = curvature + np.sqrt(stride) * jerk * jolt
+        (rise, growth), (along, across, turned) = _paced(float(stride), grid, chosen)
+        bowed = bend * (along * turn + across * half) + np.sqrt(stride) * wander * drift
+        level = level + rise * slope + stride**2 * (2.0 * bowing + curvature) / 6.0 + bowed
+        slope = growth * slope + 0.5 * stride * (bowing + curvature) + bend * turned * turn
         share = np.clip((limit - before) / np.where(level > before, level - before, 1.0), 0.0, 1.0)
         gone = np.where(np.isinf(gone) & (level >= limit), begin + stride * share, gone)
         begin += stride
     return Crossing(np.sort(gone))
 
 
-def _drawn(belief: Belief, chosen: "np.ndarray[tuple[int], np.dtype[np.int64]]", rng: np.random.Generator) -> Array:
+def _paced(stride: float, grid: Settings, chosen: Index) -> tuple[Array, Array]:
+    """Return how slopes move on, shape (2, draws), and how two normal numbers bend them, shape (3, draws)."""
+    moves, noises = np.empty((len(grid.pace), 2)), np.empty((len(grid.pace), 3))
+    for pace, own in grid.by_pace:
+        moves[own], covariance = paced(stride, pace)
+        turned = np.sqrt(covariance[1, 1])
+        along = covariance[0, 1] / turned
+        noises[own] = along, np.sqrt(covariance[0, 0] - along**2), turned
+    return moves[chosen].T, noises[chosen].T
+
+
+def _drawn(belief: Belief, chosen: Index, rng: np.random.Generator) -> Array:
     """Return levels, slopes and curvatures, shape (3, draws), under the settings that were chosen."""
     sizes, axes = np.linalg.eigh(belief.covariance)
     roots = axes * np.sqrt(np.maximum(sizes, 0.0))[:, None, :]

@@ -3,14 +3,15 @@
 Level and slope follow the local linear trend (Durbin and Koopman, Time Series Analysis by State Space Methods, 2012,
 section 3.2), in continuous time so that logs need not be evenly spaced: over a time d the slope gains variance
 ``bend**2 d``, and the level ``wander**2 d + bend**2 d**3 / 3`` with covariance ``bend**2 d**2 / 2``. A third state, the
-curvature, lets growth speed up or come to rest; it gains variance ``jerk**2 d``. Each log brings its own measurement
+curvature, lets growth speed up or come to rest; it gains variance ``jerk**2 d``. Wear that feeds on itself grows
+exponentially: the slope then grows by ``pace`` times itself in a unit of time. Each log brings its own measurement
 variance, to which every setting adds ``scatter**2``. Values are on the scale on which the healthy actuator is 0 and the
 limit 1; the unit of time is the usual time between two logs, a count of logs.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from itertools import product
 
 import numpy as np
@@ -26,11 +27,20 @@ SLOPES = (0.005, 0.03)
 CURVATURES = ((0.0, 0.0), (1e-3, 4e-4))
 """Standard deviation of the curvature before the first log, and that which it gains in a step [1/log^2]."""
 
+PACES = (0.03, 0.1)
+"""Rate of exponential growth of the slope [1/log]: it doubles in 23 logs, or in 7."""
+
+PACED_BENDS = (0.0, 3e-3)
+"""Standard deviation that a slope gains in a step beside its exponential growth [1/log]."""
+
 WANDERS = (0.0, 0.005, 0.02)
 """Standard deviation that the level gains in a step by wandering [dimensionless]."""
 
 SCATTERS = (0.0, 0.01, 0.03, 0.1)
 """Standard deviation from log to log beyond each log's own [dimensionless]."""
+
+SMALLEST_GROWTH = 1e-4
+"""Relative growth in a step below which it is none [fraction]: what is left out is as large."""
 
 LEVEL = 1.0
 """Standard deviation of the level before the first log [dimensionless]."""
@@ -45,10 +55,11 @@ class Settings:
 
     Parameters
     ----------
-    slope, curvature, jerk, bend, wander, scatter : ndarray, shape (g,)
-        As `SLOPES`, `CURVATURES`, `BENDS`, `WANDERS` and `SCATTERS` say [each in its unit].
+    pace, slope, curvature, jerk, bend, wander, scatter : ndarray, shape (g,)
+        As `PACES`, `SLOPES`, `CURVATURES`, `BENDS`, `WANDERS` and `SCATTERS` say [each in its unit]; paces rise.
     """
 
+    pace: Array
     slope: Array
     curvature: Array
     jerk: Array
@@ -61,18 +72,33 @@ class Settings:
         """Whether a slope is believed at all."""
         return self.slope > 0.0
 
-    @property
+    @cached_property
+    def by_pace(self) -> tuple[tuple[float, slice], ...]:
+        """Each pace, and which settings have it."""
+        paces, first = np.unique(self.pace, return_index=True)
+        ends = [*first[1:], len(self.pace)]
+        return tuple((float(pace), slice(int(a), int(b))) for pace, a, b in zip(paces, first, ends, strict=True))
+
+    @cached_property
     def log_prior(self) -> Array:
-        """Logarithm of each setting's prior weight, half to each hypothesis [dimensionless]."""
-        counts = np.where(self.growing, np.sum(self.growing), np.sum(~self.growing))
-        return -np.log(2.0 * counts)
+        """Logarithm of each setting's prior weight, half to each hypothesis [dimensionless].
+
+        Ways of growing share the half of growth alike: steady, bending, curved, exponential.
+        """
+        kinds = [~self.growing, self.pace > 0.0, self.curvature > 0.0, self.bend > 0.0]
+        way = np.select(kinds, np.arange(len(kinds)), default=len(kinds))
+        _, place, counts = np.unique(way, return_inverse=True, return_counts=True)
+        ways = np.where(self.growing, len(np.unique(way[self.growing])), 1)
+        return -np.log(2.0 * ways * counts[place])
 
 
 @cache
 def settings() -> Settings:
     """Return the grid: every combination with a slope, and those without one."""
-    growth = [(slope, *curvature, bend) for slope, curvature, bend in product(SLOPES, CURVATURES, BENDS)]
-    grid = [(*one, *rest) for rest in product(WANDERS, SCATTERS) for one in (*growth, (0.0, 0.0, 0.0, 0.0))]
+    bent = [(0.0, slope, *curvature, bend) for slope, curvature, bend in product(SLOPES, CURVATURES, BENDS)]
+    paced = [(pace, slope, 0.0, 0.0, bend) for pace, slope, bend in product(PACES, SLOPES, PACED_BENDS)]
+    still = (0.0, 0.0, 0.0, 0.0, 0.0)
+    grid = [(*one, *rest) for one in (*bent, still, *paced) for rest in product(WANDERS, SCATTERS)]
     return Settings(*np.array(grid).T)
 
 
@@ -153,18 +179,49 @@ def moved(now: Belief, step: float, grid: Settings) -> Belief:
     step : float
         How much later [count].
     """
-    move, both, bent, jerked = _step(step)
-    gained = grid.bend[:, None] ** 2 * bent + grid.jerk[:, None] ** 2 * jerked
-    gained[:, 0] += grid.wander**2 * step
-    covariance = now.covariance.reshape(-1, 9) @ both.T + gained
-    return Belief(now.mean @ move.T, covariance.reshape(-1, 3, 3), now.evidence)
+    mean, covariance = np.empty_like(now.mean), np.empty_like(now.covariance)
+    for pace, own in grid.by_pace:
+        move, both, bent, jerked = _step(step, pace)
+        gained = grid.bend[own, None] ** 2 * bent + grid.jerk[own, None] ** 2 * jerked
+        gained[:, 0] += grid.wander[own] ** 2 * step
+        mean[own] = now.mean[own] @ move.T
+        covariance[own] = (now.covariance[own].reshape(-1, 9) @ both.T + gained).reshape(-1, 3, 3)
+    return Belief(mean, covariance, now.evidence)
 
 
-@lru_cache(maxsize=64)
-def _step(step: float) -> tuple[Array, Array, Array, Array]:
+@lru_cache(maxsize=192)
+def _step(step: float, pace: float) -> tuple[Array, Array, Array, Array]:
     """Return what moves means and covariances, rows one after the other, and what noise on slope and curvature adds."""
     move = np.array([[1.0, step, 0.5 * step**2], [0.0, 1.0, step], [0.0, 0.0, 1.0]])
-    return move, np.asarray(np.kron(move, move), dtype=np.float64), _gained(step, 2).ravel(), _gained(step, 3).ravel()
+    bent, jerked = _gained(step, 2), _gained(step, 3)
+    if pace:  # such settings have no curvature
+        move[:2, 1], bent[:2, :2] = paced(step, pace)
+    return move, np.asarray(np.kron(move, move), dtype=np.float64), bent.ravel(), jerked.ravel()
+
+
+def paced(step: float, pace: float) -> tuple[Array, Array]:
+    """Return what a slope of 1 becomes that grows by a pace, and what unit white noise on it brings in a time.
+
+    Parameters
+    ----------
+    step : float
+        The time [count].
+    pace : float
+        By how much of itself the slope grows in a unit of time, 0 included [1/log].
+
+    Returns
+    -------
+    ndarray, shape (2,)
+        Gain of the level, and the slope [count, dimensionless].
+    ndarray, shape (2, 2)
+        Covariance of level and slope.
+    """
+    if pace * step < SMALLEST_GROWTH:  # the limit of what follows, which is lost in the digits there
+        return np.array([step, 1.0]), _gained(step, 2)[:2, :2]
+    once, twice = np.expm1(pace * step) / pace, np.expm1(2.0 * pace * step) / (2.0 * pace)
+    # integrals of the squares and the product of expm1(pace t) / pace and exp(pace t) from 0 to the step
+    level, both = (twice - 2.0 * once + step) / pace**2, (twice - once) / pace
+    return np.array([once, 1.0 + pace * once]), np.array([[level, both], [both, twice]])
 
 
 def _gained(step: float, states: int) -> Array:

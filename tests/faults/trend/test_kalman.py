@@ -2,13 +2,23 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad_vec
+from scipy.linalg import expm
 
-from faults.trend.kalman import LEVEL, Settings, after, beliefs, first_belief, growth_evidence, moments, moved, settings
-
-
-def one_setting(**values: float) -> Settings:
-    names = ("slope", "curvature", "jerk", "bend", "wander", "scatter")
-    return Settings(*(np.array([values.get(name, 0.0)]) for name in names))
+from faults.trend.kalman import (
+    LEVEL,
+    PACES,
+    after,
+    beliefs,
+    first_belief,
+    growth_evidence,
+    moments,
+    moved,
+    paced,
+    settings,
+)
+from plant.arrays import Array
+from tests.faults.trend.one_setting import one_setting
 
 
 def test_without_process_noise_the_filter_is_bayesian_regression_on_a_line() -> None:
@@ -34,6 +44,41 @@ def test_two_steps_are_one_step_of_twice_the_time() -> None:
     once, twice = moved(now, 3.0, grid), moved(moved(now, 1.2, grid), 1.8, grid)
     assert np.allclose(once.mean, twice.mean)
     assert np.allclose(once.covariance, twice.covariance, rtol=1e-9, atol=1e-18)
+
+
+@pytest.mark.parametrize("pace", [0.0, 1e-6, *PACES, 0.7])
+@pytest.mark.parametrize("step", [0.5, 1.0, 8.0])
+def test_a_slope_that_feeds_on_itself_moves_as_its_equation_says(step: float, pace: float) -> None:
+    rates = np.array([[0.0, 1.0], [0.0, pace]])
+
+    def brought(after: float) -> Array:  # by noise on the slope a while ago
+        found = expm(rates * after)[:, 1]
+        return np.outer(found, found)
+
+    move, covariance = paced(step, pace)
+    # below a relative growth of 1e-4 in a step it is left out
+    assert move == pytest.approx(expm(rates * step)[:, 1], rel=1e-4 if pace * step < 1e-4 else 1e-12)
+    assert covariance == pytest.approx(quad_vec(brought, 0.0, step)[0], rel=1e-4 if pace * step < 1e-4 else 1e-6)
+
+
+def test_exponential_growth_is_followed_without_noise() -> None:
+    grid = one_setting(pace=0.1, slope=0.03)
+    times = np.arange(40.0)
+    level = 0.02 * np.expm1(0.1 * times)
+    *_, last = beliefs(times, level, np.full(40, 1e-4), grid)
+    later = moved(last, 15.0, grid)
+    assert later.mean[0, 0] == pytest.approx(0.02 * np.expm1(0.1 * 54.0), rel=1e-3)
+    assert later.mean[0, 1] == pytest.approx(0.002 * np.exp(0.1 * 54.0), rel=1e-3)
+
+
+def test_each_way_of_growing_has_the_same_share_of_the_prior() -> None:
+    grid = settings()
+    weights = first_belief(grid).weights(grid)
+    curved, bent = grid.curvature > 0.0, (grid.bend > 0.0) & (grid.pace == 0.0)
+    ways = [grid.pace > 0.0, curved, bent & ~curved, grid.growing & ~curved & (grid.bend == 0.0) & (grid.pace == 0.0)]
+    assert [weights[way].sum() for way in ways] == pytest.approx([0.125] * 4)
+    assert list(np.diff(grid.pace) >= 0.0) == [True] * (len(grid.pace) - 1)
+    assert sum(own.stop - own.start for _, own in grid.by_pace) == len(grid.pace)
 
 
 def test_covariances_stay_symmetric_and_positive() -> None:

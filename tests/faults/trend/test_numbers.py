@@ -22,6 +22,7 @@ from faults.trend.kalman import (
 )
 from faults.trend.trend import Series, Trend, first_logs_after, trends
 from plant.arrays import Array
+from tests.faults.trend.one_setting import one_setting
 from tests.numbers import Numbers
 
 NUMBERS = Numbers(__file__)
@@ -162,9 +163,7 @@ def jumps_of_a_series() -> dict[str, Any]:
 
 def held(mean: tuple[float, float, float], **chosen: float) -> tuple[Belief, Settings]:
     """Return a belief without doubt in one setting."""
-    grid = Settings(
-        *(np.array([chosen.get(name, 0.0)]) for name in ("slope", "curvature", "jerk", "bend", "wander", "scatter"))
-    )
+    grid = one_setting(**chosen)
     return Belief(np.array([mean]), np.zeros((1, 3, 3)), np.zeros(1)), grid
 
 
@@ -174,6 +173,8 @@ FUTURES: Mapping[str, tuple[tuple[float, float, float], dict[str, float]]] = {
     "curved": ((0.5, 0.0, 0.001), {}),
     "never": ((0.5, -0.01, 0.0), {}),
     "already": ((1.1, 0.0, 0.0), {}),
+    "exponential": ((0.5, 0.02, 0.0), {"pace": 0.05}),
+    "bending exponential": ((0.5, 0.01, 0.0), {"pace": 0.1, "bend": 0.003}),
     "bending": ((0.5, 0.02, 0.0), {"bend": 0.01}),
     "wandering": ((0.5, 0.02, 0.0), {"wander": 0.05}),
     "jerking": ((0.5, 0.02, 0.0), {"jerk": 0.0008}),

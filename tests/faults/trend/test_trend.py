@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from faults.trend.crossing import HORIZON, crossing
-from faults.trend.kalman import Settings, first_belief
+from faults.trend.kalman import first_belief, paced
 from faults.trend.trend import Series, Trend, trend_of, trends
 from plant.arrays import Array
+from tests.faults.trend.one_setting import one_setting
 
 
 def series_of(truth: Array, std: float = 0.04, seed: int = 0) -> Series:
@@ -109,7 +110,7 @@ def test_what_is_said_after_a_log_does_not_depend_on_later_logs() -> None:
 
 
 def test_a_known_slope_without_noise_crosses_at_a_known_time() -> None:
-    grid = Settings(*(np.array([value]) for value in (1e-9, 0.0, 0.0, 0.0, 0.0, 0.0)))
+    grid = one_setting(slope=1e-9)
     start = first_belief(grid)
     belief = replace(start, mean=np.array([[0.2, 0.05, 0.0]]), covariance=np.zeros((1, 3, 3)))
     found = crossing(belief, grid, np.random.default_rng(0))
@@ -122,9 +123,25 @@ def test_a_known_slope_without_noise_crosses_at_a_known_time() -> None:
 
 
 def test_a_constant_curvature_crosses_where_the_parabola_does() -> None:
-    grid = Settings(*(np.array([value]) for value in (1e-9, 0.0, 0.0, 0.0, 0.0, 0.0)))
+    grid = one_setting(slope=1e-9)
     belief = replace(first_belief(grid), mean=np.array([[0.0, 0.0, 0.02]]), covariance=np.zeros((1, 3, 3)))
     assert crossing(belief, grid, np.random.default_rng(0)).quantiles[2] == pytest.approx(10.0)
+
+
+def test_exponential_growth_crosses_where_its_exponential_does() -> None:
+    grid = one_setting(pace=0.05, slope=1e-9)
+    belief = replace(first_belief(grid), mean=np.array([[0.1, 0.01, 0.0]]), covariance=np.zeros((1, 3, 3)))
+    expected = np.log1p(0.9 * 0.05 / 0.01) / 0.05  # 0.1 + 0.01 expm1(0.05 t) / 0.05 = 1
+    assert crossing(belief, grid, np.random.default_rng(0)).quantiles == pytest.approx([expected] * 5, abs=0.02)
+
+
+def test_futures_of_exponential_growth_scatter_as_its_noise_says() -> None:
+    grid = one_setting(pace=0.1, slope=1e-9, bend=0.004)
+    belief = replace(first_belief(grid), mean=np.array([[0.0, 0.02, 0.0]]), covariance=np.zeros((1, 3, 3)))
+    rise, spread = paced(20.0, 0.1)
+    limit = 0.02 * rise[0] + 0.004 * np.sqrt(spread[0, 0])  # one standard deviation above the mean after 20 logs
+    found = crossing(belief, grid, np.random.default_rng(0), float(limit))
+    assert found.within(20.0) == pytest.approx(0.16, abs=0.05)
 
 
 @pytest.mark.parametrize(
