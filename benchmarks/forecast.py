@@ -110,7 +110,9 @@ def _all(tallies: dict[str, Tally], name: str) -> Iterator[float]:
 def main(arguments: list[str]) -> int:
     """Print the figures with their targets; return the count of misses."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--actuators", type=int, default=800, help="200 have no more than 270 forecasts, which are alike")
+    parser.add_argument(
+        "--actuators", type=int, default=800, help="200 have no more than 270 forecasts, which are alike"
+    )
     parser.add_argument("--seed", type=int, default=5)
     options = parser.parse_args(arguments)
     misses.clear()

@@ -89,6 +89,10 @@ class EstimateCode(Code):
         "the piston moves where position_m stands, as with a play (backlash) of some {play_um:.1g} um, and how it "
         "crosses that is not found: bulk modulus may be several percent too low"
     )
+    RIG_CONTRADICTED = (
+        "the piston moves as if the pump delivered {percent:.0f} % of its displacement, which no pump of this rig file "
+        "does: pump displacement, piston area, or the unit or scale of motor speed or position is wrong"
+    )
     POSITION_RESIDUALS_LARGE = (
         "the position residuals are {ratio:.2f} times the sensors' noise: neither friction model explains how the "
         "piston starts and stops, and bulk modulus may be far off"

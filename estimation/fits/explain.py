@@ -16,7 +16,7 @@ from estimation.fits.form_fit import weighed
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_log import GreyBoxLog
-from estimation.fits.hypotheses import HYPOTHESES, LATEST, Hypothesis
+from estimation.fits.hypotheses import HYPOTHESES, LATEST, LEAST_SHARE, MOST_SHARE, Hypothesis
 from estimation.fits.promises import balanced_by, promising
 from estimation.fits.wide_problem import (
     delayed,
@@ -29,8 +29,10 @@ from estimation.fits.wide_problem import (
 )
 from estimation.models.flow import STIFFNESS
 from estimation.models.wide_flow import GROWTH, grown_leakage
+from estimation.notes import EstimateCode
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
+from plant.notes import Note
 
 SCREENING, SETTLING, FINISHING = 7, 40, 12
 """Evaluations of the model for a start, for one that is carried on, and for the last, with short model steps."""
@@ -93,6 +95,19 @@ class Explanation:
     fit: GreyBoxFit
     rivals: int
     stated_pressure: float
+
+
+def contradicted(found: Explanation, parameters: EhaParameters) -> tuple[Note, ...]:
+    """Return the objection to an explanation by a flow that no pump of the rig file delivers.
+
+    Displacement, area and the scales of speed and position share one ratio; bulk modulus depends on which is wrong.
+    """
+    if "pump_displacement" not in found.values:
+        return ()
+    share = found.values["pump_displacement"][0] / parameters.pump_displacement
+    if LEAST_SHARE <= share <= MOST_SHARE:
+        return ()
+    return (EstimateCode.RIG_CONTRADICTED.note(percent=100.0 * share),)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from estimation.fits.explain import VANISHED, WORTH, explain
+from estimation.fits.explain import VANISHED, WORTH, contradicted, explain
 from estimation.fits.flow_log import flow_log, without_strays
 from estimation.fits.flow_search import MAKEUP_TRIED, balanced, flow_starts
 from estimation.fits.form_fit import FormFit, weighed, with_structure
@@ -192,7 +192,8 @@ def fit_flow(
             left = _play_structure(one, swinging, parameters, sensed) if PLAY.name in strange.names else STRUCTURE
             believed = with_structure(strange.values, left)
             unseen = NO_PLAY if PLAY.name in strange.names else sensed
-            return FormFit(believed, bound, one.chi_square[0], _play_left(one, unseen), one.rig_slopes, strange)
+            reasons = (*_play_left(one, unseen), *contradicted(strange, parameters))
+            return FormFit(believed, bound, one.chi_square[0], reasons, one.rig_slopes, strange)
     value, std = found["bulk_modulus"]
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     believed = found if sure else with_structure(found, STRUCTURE)

@@ -176,6 +176,10 @@ seldom measured; a pump that delivers less than its displacement is worn."""
 LEAST_DELIVERY = 1e-2
 """Relative change of the pump's delivery below which it is not freed: no rig file is surer [fraction]."""
 
+LEAST_SHARE, MOST_SHARE = 0.6, 1.25
+"""Shares of its displacement in the rig file that a pump may deliver, being worn, or displacement and area rounded
+[fraction]: the usual doubts of the two allow 1.07 (two deviations), and a pump is renewed before it delivers 0.6."""
+
 LEAST_ZERO = 0.5
 """Least reading of the encoder in the middle position that is sought, in its typical size of 10 mm: 5 mm change a
 chamber of the paper's actuator by a third of a percent [dimensionless]."""

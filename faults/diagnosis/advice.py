@@ -125,6 +125,8 @@ def _mended(doubts: list[Note]) -> tuple[Note, ...]:
         return (AdviceCode.CHECK_SENSOR.note(channels=" and ".join(accused)),)
     if work := tuple(one for one in map(_work_on, doubts) if one is not None):
         return work
+    if any(note.code == EstimateCode.RIG_CONTRADICTED for note in doubts):
+        return (AdviceCode.CHECK_RIG.note(),)
     if any(isinstance(note.code, EstimateCode) or note.code == AgainstCode.NONE_FITS for note in doubts):
         return (AdviceCode.FIT_DOUBTED.note(),)
     return (AdviceCode.CHECK_RIG.note(),)

@@ -9,6 +9,9 @@ import pytest
 
 from estimation.fits import explain
 from estimation.fits.explain import CLOSE, ROUNDS
+from plant.eha.model import EhaParameters
+
+HEALTHY = EhaParameters()
 
 
 def ended(costs: Sequence[float], monkeypatch: pytest.MonkeyPatch) -> tuple[float, int]:
@@ -49,3 +52,16 @@ def test_what_promises_most_is_settled_even_where_its_starts_are_not_what_it_say
     assert settled == [np.inf, 9.0, 10.0]
     alone = explain._likeliest(nothing, [[tried(np.inf)]])  # pyright: ignore[reportPrivateUsage]
     assert [one.cost for one in alone] == [np.inf]
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [(0.5, True), (0.59, True), (0.61, False), (0.8, False), (1.0, False), (1.24, False), (1.26, True), (2.0, True)],
+)
+def test_a_flow_that_no_worn_pump_and_no_rounded_rig_file_gives_is_objected_to(share: float, said: bool) -> None:
+    displacement = share * HEALTHY.pump_displacement
+    found: Any = SimpleNamespace(values={"pump_displacement": (displacement, 0.01 * displacement)})
+    objections = explain.contradicted(found, HEALTHY)
+    assert [note.data["percent"] for note in objections] == pytest.approx([100.0 * share] * said)
+    other: Any = SimpleNamespace(values={"pressure_offset": (1e5, 1e3)})
+    assert explain.contradicted(other, HEALTHY) == ()

@@ -49,6 +49,15 @@ def test_a_wandering_pressure_sensor_is_objected_to() -> None:
     assert ratio > 3.0
 
 
+def test_a_position_on_another_scale_is_objected_to() -> None:
+    record = log("minor_leakage", 14, duration=4.0)
+    doubled = {name: 2.0 * record[name] for name in ("position_m", "velocity_m_s")}
+    fit = fit_flow(record.replace(**doubled), HEALTHY, 2e8)
+    (percent,) = (note.data["percent"] for note in fit.reasons if note.code == EstimateCode.RIG_CONTRADICTED)
+    assert percent == pytest.approx(200.0, rel=0.02)
+    assert fit.parameters["bulk_modulus"][0] == pytest.approx(0.5 * HEALTHY.bulk_modulus, rel=0.02)
+
+
 def test_a_log_without_pressure_is_refused_with_what_it_lacks() -> None:
     with pytest.raises(LogError, match="lacks differential_pressure_pa"):
         fit_flow(log("normal", 13).replace(differential_pressure_pa=None), HEALTHY, 2e8)

@@ -136,6 +136,8 @@ def test_where_something_speaks_against_a_log_that_is_mended_first() -> None:
     for against in (residuals, AgainstCode.NONE_FITS.note(percent=90.0)):
         assert codes(advice_for(record, UNSURE, (against,), (), ALL)) == [AdviceCode.FIT_DOUBTED]
     assert codes(advice_for(record, UNSURE, (AgainstCode.OIL_SOFT.note(share=0.4),), (), ALL)) == [AdviceCode.CHECK_RIG]
+    contradicted = EstimateCode.RIG_CONTRADICTED.note(percent=200.0)
+    assert codes(advice_for(record, UNSURE, (contradicted, residuals), (), ALL)) == [AdviceCode.CHECK_RIG]
 
 
 def test_without_probabilities_nothing_is_said_to_be_decided() -> None:
