@@ -20,6 +20,10 @@ class SensorCode(Code):
         "{channel} has a new sample every {milliseconds:.3g} ms only and is repeated for {rows} rows; the repeated "
         "values were left out"
     )
+    FILTERED = (
+        "{channel} was filtered or averaged before it was logged: its noise is alike over {rows} rows, and one sample "
+        "in {rows} was used"
+    )
     OUTLIERS_LEFT_OUT = "{channel} has gross outliers in {count} of {total} samples; they were left out"
     SENSORS_DISAGREE = (
         "velocity_m_s and the slope of position_m differ by {difference_m_s:.2g} m/s: one of the two sensors is wrong"

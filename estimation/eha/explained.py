@@ -282,8 +282,17 @@ def _with_position(record: Record, moved: Array, behind: float) -> Mapping[str, 
 
 
 def _brought_forward(record: Record, channel: str, late: float) -> Array:
-    times = np.arange(len(record)) * record.sample_time
-    return np.interp(times + late, times, record[channel], right=np.nan)
+    """Return a channel as if it came on time; where it is sampled in some rows alone, each goes to its nearest row."""
+    values, rows = record[channel], np.arange(len(record))
+    there = np.flatnonzero(np.isfinite(values))
+    if len(there) in (0, 1, len(record)):
+        return np.interp(rows + late / record.sample_time, rows, values, right=np.nan)
+    began = there - late / record.sample_time
+    row = np.rint(began).astype(np.int64)
+    moved, slope = np.full(len(record), np.nan), np.gradient(values[there], there)
+    within = (row >= 0) & (row < len(record))
+    moved[row[within]] = (values[there] + slope * (row - began))[within]
+    return moved
 
 
 def rig_set_right(parameters: EhaParameters, found: Explanation) -> EhaParameters:

@@ -79,6 +79,34 @@ def gaps(values: Array) -> tuple[Array, NDArray[np.bool_]]:
     return n, n > WIDE * median(n) if len(n) else np.zeros(0, dtype=np.bool_)
 
 
+def filled(values: Array) -> tuple[Array, int]:
+    """Return a slow channel with straight lines between its samples, and every how many rows it has one.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        A channel [any unit]; NaN where missing.
+
+    Returns
+    -------
+    tuple of (ndarray, shape (n,), and int)
+        The channel, its gaps and ends still NaN; as it is where it has a sample in most rows.
+
+    Examples
+    --------
+    >>> gone = np.nan
+    >>> filled(np.array([1.0, gone, 3.0, gone, 5.0, gone, gone, gone, gone, 9.0, gone]))[0].tolist()
+    [1.0, 2.0, 3.0, 4.0, 5.0, nan, nan, nan, nan, 9.0, nan]
+    """
+    there = np.flatnonzero(np.isfinite(values))
+    if len(there) < 2 or (rows := int(median(np.diff(there).astype(np.float64)))) < 2:
+        return values, 1
+    between = np.interp(np.arange(len(values)), there, values[there], left=np.nan, right=np.nan)
+    open_rows = np.repeat(gaps(values)[1], np.diff(there)) & np.isnan(values[there[0] : there[-1]])
+    between[there[0] : there[-1]][open_rows] = np.nan
+    return between, rows
+
+
 def _per_sample(values: Array, each: Array, before: float, after: float) -> Array:
     """Return a value for each sample time, from one for each step between samples that are there, and for the ends."""
     present = np.flatnonzero(np.isfinite(values))

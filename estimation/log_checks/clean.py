@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from estimation.log_checks.channel_physics import channel_mistakes
+from estimation.log_checks.filtered import without_correlated_noise
 from estimation.log_checks.held import without_held
 from estimation.log_checks.hum import without_hum
 from estimation.log_checks.measurement_noise import measurement_variances
@@ -24,7 +25,7 @@ class CleanLog:
     Parameters
     ----------
     record : Record
-        The log, without repeated samples, gross outliers, clipped pressures and hum.
+        The log, without repeated samples, gross outliers, clipped pressures, hum, and samples of like noise.
     variances : Mapping[str, float]
         Measurement variance of each of its channels [SI squared].
     left_out : tuple of Note
@@ -83,6 +84,6 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     dead = any(note.data["channel"] == PRESSURE for note in objections)
     mistakes = channel_mistakes(sound.replace(**{PRESSURE: None}) if dead else sound, parameters)
     objections = () if mistakes else objections  # a sensor cannot be judged by channels of another meaning
-    return CleanLog(
-        sound, measurement_variances(sound, known), (*held, *outliers, *clipped, *hum), objections, mistakes
-    )
+    sound, filtered = without_correlated_noise(sound)
+    left_out = (*held, *outliers, *clipped, *hum, *filtered)
+    return CleanLog(sound, measurement_variances(sound, known), left_out, objections, mistakes)

@@ -36,6 +36,8 @@ class Sensor:
         Of a low-pass of second order, a Butterworth's; 0 passes all [Hz].
     hold : int
         Rows of the logger over which it repeats its last sample [samples].
+    average : int
+        Rows over which the logger averages what it reads, a moving average [samples].
     drift : float
         What the offset gains from the first row to the last, evenly [unit of the channel].
     play : float
@@ -50,6 +52,7 @@ class Sensor:
     delay: float = 0.0
     corner: float = 0.0
     hold: int = 1
+    average: int = 1
     drift: float = 0.0
     play: float = 0.0
 
@@ -76,6 +79,7 @@ class Sensor:
         sampled = np.interp(time - self.delay, fine, sensed)
         offset = self.offset + self.drift * np.linspace(0.0, 1.0, len(time))
         logged = self.gain * sampled + offset + self.noise * rng.standard_normal(len(time))
+        logged = _averaged(logged, self.average) if self.average > 1 else logged
         logged = self.quantum * np.round(logged / self.quantum) if self.quantum > 0.0 else logged
         rows = np.arange(len(time))
         return logged[rows - rows % self.hold]
@@ -95,6 +99,12 @@ def _passed(values: Array, corner: float) -> Array:
 
     over, under = butter(2, 2.0 * corner)
     return np.asarray(lfilter(over, under, values - values[0])) + values[0]
+
+
+def _averaged(values: Array, rows: int) -> Array:
+    """Return the mean over the last rows; before the first row, its own value counts."""
+    sums = np.cumsum(np.concatenate([np.full(rows, values[0]), values]))
+    return (sums[rows:] - sums[:-rows]) / rows
 
 
 def _followed(values: Array, play: float) -> Array:

@@ -90,6 +90,12 @@ LOGGERS = (
         named=r"\brepeat|\bheld\b|\bslow",
     ),
     Kind(
+        "pressure_averaged",
+        "differential pressure is a moving average over 2 to 6 ms",
+        lambda setup, rng: setup.with_sensor(PRESSURES, average=int(rng.integers(2, 7))),
+        named=r"\bfilter|\baverag",
+    ),
+    Kind(
         "position_held",
         "position comes every 2 to 5 ms and is repeated in between",
         lambda setup, rng: setup.with_sensor((POSITION, VELOCITY), hold=int(rng.integers(2, 6))),

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from estimation.arrays import IntArray
 from estimation.eha.explained import LEAKAGE_COURSE
-from estimation.log_checks.bridging import bridged
+from estimation.log_checks.bridging import bridged, filled
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
+from estimation.log_checks.sensor_check import PRESSURE
 from plant.arrays import Array
 from plant.errors import LogError
 from plant.log.record import Record
@@ -157,44 +158,50 @@ def blocks_of(record: Record) -> Blocks:
         raise LogError(
             f"a diagnosis needs a log of 8 blocks of {block * sample_time:g} s or more, got {record.duration:g} s"
         )
-    whole = {name: _pooled(record[name], pooled)[: count * block + 1] for name in record if name in _NEEDED}
+    slow, rows = filled(record[PRESSURE]) if PRESSURE in record else (None, 1)
+    given = record if slow is None or rows == 1 else record.replace(**{PRESSURE: slow})
+    whole = {name: _pooled(given[name], pooled)[: count * block + 1] for name in record if name in _NEEDED}
     if "position_m" in whole and np.any(np.isfinite(whole["position_m"])):
         velocity = np.diff(bridged(whole["position_m"])[::block]) / (block * sample_time)
     elif "velocity_m_s" in whole and np.any(np.isfinite(whole["velocity_m_s"])):
         velocity = _mean(whole["velocity_m_s"], block)
     else:
         raise LogError(f"velocity_m_s or position_m is needed; the log has {', '.join(record)}")
-    pressure = whole.get("differential_pressure_pa")
+    pressure = whole.get(PRESSURE)
     if pressure is not None:
         pressure = _mean(pressure, block)
         if not np.any(np.isfinite(pressure[round(SETTLING / (block * sample_time)) :])):
             pressure = None  # a sensor that was out for all of the stretch
-            del whole["differential_pressure_pa"]
+            del whole[PRESSURE]
     speed = bridged(whole["motor_speed_rad_s"])
     noise, course, begun = _noise(whole, block, sample_time), whole.get(LEAKAGE_COURSE), _begun(whole, velocity)
+    if (
+        pressure is not None and rows > 1
+    ):  # a block holds fewer samples, and lines between them have no noise of their own
+        noise[-1] = (measurement_variances(record, [PRESSURE])[PRESSURE] * rows / (block * pooled)) ** 0.5
     return Blocks(speed, sample_time, block, velocity, pressure, noise, course=course, begun=begun)
 
 
 def _begun(whole: Mapping[str, Array], velocity: Array) -> tuple[float, float] | None:
     """Return pressure and velocity at the start of a log that does not begin at rest."""
-    pressure = whole.get("differential_pressure_pa", np.zeros(1))
+    pressure = whole.get(PRESSURE, np.zeros(1))
     size = float(np.sqrt(np.nanmean(pressure**2)))
     return (float(pressure[0]), float(np.nan_to_num(velocity[0]))) if abs(pressure[0]) > LEAST_BEGUN * size else None
 
 
 def _noise(whole: Mapping[str, Array], block: int, sample_time: float) -> Array:
     """Return the white noise of the channels as it is left in the blocks."""
-    record, velocity, pressure = Record(sample_time, whole), "velocity_m_s", "differential_pressure_pa"
+    record, velocity = Record(sample_time, whole), "velocity_m_s"
     if "position_m" in whole:
         noise = [(2.0 * position_variance(whole["position_m"])) ** 0.5 / (block * sample_time)]
     else:
         noise = [(measurement_variances(record, [velocity])[velocity] / block) ** 0.5]
-    if pressure in whole:
-        noise.append((measurement_variances(record, [pressure])[pressure] / block) ** 0.5)
+    if PRESSURE in whole:
+        noise.append((measurement_variances(record, [PRESSURE])[PRESSURE] / block) ** 0.5)
     return np.array(noise)
 
 
-_NEEDED = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa", LEAKAGE_COURSE)
+_NEEDED = ("motor_speed_rad_s", "position_m", "velocity_m_s", PRESSURE, LEAKAGE_COURSE)
 
 
 def _pooled(values: Array, pooled: int) -> Array:

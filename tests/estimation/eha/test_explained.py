@@ -147,6 +147,21 @@ def test_a_log_is_set_right_by_what_its_sensors_were_off() -> None:
     )
 
 
+@pytest.mark.parametrize("late", [0.0, 0.4e-3, 1.3e-3, 3e-3])
+def test_a_late_pressure_that_comes_in_some_rows_alone_is_set_right_in_its_nearest_rows(late: float) -> None:
+    rows, time = np.arange(0, 200, 4), 1e-3 * np.arange(200)
+    true = np.sin(30.0 * time)
+    sampled = np.full(200, np.nan)
+    sampled[rows] = np.sin(30.0 * (time[rows] - late))
+    record = Record(1e-3, {"position_m": 0.1 * time, "differential_pressure_pa": sampled})
+    found = explanation(delay=late, pressure_offset=(0.0, 0.0))
+    after = set_right(CleanLog(record, {}, (), ()), found).record["differential_pressure_pa"]
+    there = np.flatnonzero(np.isfinite(after))
+    assert np.all(np.diff(there) == 4)
+    assert len(there) >= len(rows) - 1
+    assert after[there[1:-1]] == pytest.approx(true[there[1:-1]], abs=3e-4)  # ends have a slope of one side
+
+
 def test_a_course_of_leakage_is_one_at_the_end_and_never_nothing() -> None:
     found = explanation(leakage_growth=(1.0, 0.0), leakage_bend=(0.4, 0.0))
     course = set_right(clean(), found).record[LEAKAGE_COURSE]

@@ -58,6 +58,28 @@ def test_position_is_preferred_and_its_absence_borne() -> None:
         blocks_of(log.replace(velocity_m_s=None))
 
 
+@pytest.mark.parametrize("sample_time", [1e-4, 1e-3])
+@pytest.mark.parametrize("rows", [3, 6, 10])
+def test_a_pressure_that_comes_in_some_rows_alone_has_the_means_of_lines_between_them(
+    rows: int, sample_time: float
+) -> None:
+    time = sample_time * np.arange(round(3.0 / sample_time))
+    rng = np.random.default_rng(3)
+    smooth, sampled = 1e6 * np.sin(8.0 * time), np.full(len(time), np.nan)
+    sampled[::rows] = smooth[::rows] + 1e4 * rng.standard_normal(len(time[::rows]))
+    sampled[len(time) // 2 : len(time) // 2 + round(0.1 / sample_time)] = np.nan  # a real gap stays one
+    log = {"motor_speed_rad_s": np.cos(time), "position_m": 1e-2 * np.sin(time), "differential_pressure_pa": sampled}
+    blocks = blocks_of(Record(sample_time, log))
+    assert blocks.pressure is not None
+    there = np.isfinite(blocks.pressure)
+    assert 9 <= np.count_nonzero(~there[: len(there) - 2]) <= 12
+    centres = BLOCK * (np.arange(len(there)) + 0.5) - 0.5 * sample_time
+    off = (blocks.pressure - 1e6 * np.sin(8.0 * centres))[there]
+    assert blocks.noise[1] == pytest.approx(1e4 * (rows * sample_time / BLOCK) ** 0.5, rel=0.15)
+    # lines between samples that are a block apart have less noise in it than the samples
+    assert 0.6 * blocks.noise[1] < np.sqrt(np.mean(off**2)) < 1.25 * blocks.noise[1]
+
+
 def test_a_log_of_a_few_samples_is_refused() -> None:
     with pytest.raises(LogError, match=r"8 blocks of 0\.01 s or more, got 0\.049 s"):
         blocks_of(Record(1e-3, {"motor_speed_rad_s": SPEED[:50], "velocity_m_s": SPEED[:50]}))

@@ -15,13 +15,14 @@ from faults.notes import AdviceCode, AgainstCode, ClassCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
-from plant.eha.simulate import LUMPED, simulate
+from plant.eha.simulate import CIRCUIT, LUMPED, simulate
 from plant.errors import RigError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
 HEALTHY = EhaParameters()
 RIG = Rig("paper", HEALTHY)
+PRESSURE = "differential_pressure_pa"
 
 
 @cache
@@ -45,6 +46,20 @@ def test_a_plain_log_has_its_class_and_nothing_against_it() -> None:
     assert found.against == ()
     assert found.probabilities is not None
     assert found.severities["bulk_modulus"] == found.quantities["bulk_modulus"]
+
+
+@pytest.mark.parametrize("rows", [2, 5])
+def test_a_pressure_that_its_logger_averaged_is_believed_and_its_lag_found(rows: int) -> None:
+    p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(8)
+    record = simulate(CIRCUIT, make_drive("steps", 6.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    pressure = np.concatenate([np.full(rows - 1, record[PRESSURE][0]), record[PRESSURE]])
+    averaged = np.convolve(pressure, np.ones(rows) / rows, "valid")
+    found = diagnose_log(record.replace(**{PRESSURE: averaged}), RIG)
+    assert (found.outcome, found.condition, found.unknown) == (Outcome.OK, "minor_leakage", False)
+    assert found.quantities["bulk_modulus"].value == pytest.approx(HEALTHY.bulk_modulus, rel=0.005)
+    assert ClassCode.ONE_SCALE not in {note.code for note in found.all_notes}  # pressure plays its part
+    late = [note.data["late_ms"] for note in found.all_notes if note.code == RigCode.PRESSURE_LATE]
+    assert late == pytest.approx([0.5 * (rows - 1)], abs=0.3)
 
 
 def test_a_channel_with_a_wrong_sign_gives_no_probabilities_and_says_which_to_mend() -> None:

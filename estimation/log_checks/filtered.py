@@ -1,0 +1,134 @@
+"""Filtered pressure: noise that a filter or an averaging logger has made alike from sample to sample.
+
+A fit takes each sample's noise for its own. Where it is not, as many samples are left out as make it so: a fit then
+sees a slow sensor, and finds the filter's lag as any other.
+"""
+
+import numpy as np
+
+from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
+from estimation.log_checks.sensor_check import PRESSURE, PRESSURES
+from estimation.notes import SensorCode
+from plant.arrays import Array
+from plant.log.record import Record
+from plant.notes import Note
+
+WINDOW = 64
+"""Samples of a window of the spectrum [count]."""
+
+FEWEST_WINDOWS = 8
+"""Windows without a missing sample below which a spectrum is not judged [count]."""
+
+BANDS = (0.2, 0.3, 0.4, 0.5)
+"""Edges of the bands that are compared [cycles/sample]: in a log that is fast enough, the actuator is slower."""
+
+CHANCE, FLATTEST = 3.2, 0.9
+"""Noise is white if the least power of a band over the largest exceeds 1 less the first over the root of the count of
+windows, or the second where they are many [dimensionless]. White noise of 1 to 20 s at 1 kHz fails in 1 log of 1000; a
+correlation of 0.15 between neighbours shows in 20 s."""
+
+SLOWEST = 150.0
+"""Rate below which no sensor is made slower [Hz]."""
+
+MOST_ROWS = 40
+"""Rows over which noise may be alike [count]."""
+
+
+def without_correlated_noise(record: Record) -> tuple[Record, tuple[Note, ...]]:
+    """Return a log whose pressures have noise that is independent from sample to sample.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+
+    Returns
+    -------
+    tuple of (Record, tuple of Note)
+        The log, and a note for each channel that keeps one sample in several.
+    """
+    changed, notes = dict[str, Array](), list[Note]()
+    for name in PRESSURES:
+        if name not in record or measurement_variances(record, [name])[name] <= SMALLEST_VARIANCE[PRESSURE]:
+            continue  # a simulation without noise, whose spectrum is the actuator's
+        if (rows := independent_rows(record[name], record.sample_time)) == 1:
+            continue
+        values = np.full(len(record), np.nan)
+        values[::rows] = record[name][::rows]
+        changed[name] = values
+        notes.append(SensorCode.FILTERED.note(channel=name, rows=rows))
+    return (record.replace(**changed), tuple(notes)) if notes else (record, ())
+
+
+def independent_rows(values: Array, sample_time: float) -> int:
+    """Return every how many rows the noise of a channel is independent.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        The channel [any unit]; NaN where missing.
+    sample_time : float
+        Between rows [s].
+
+    Returns
+    -------
+    int
+        1 where it is in every row, or where no number of rows makes it so: then it is no noise that is alike.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(1).normal(0.0, 1.0, 20_003)
+    >>> averaged = np.convolve(noise, np.ones(4) / 4.0, "valid")
+    >>> independent_rows(noise, 1e-3), independent_rows(averaged, 1e-3)
+    (1, 5)
+    """
+    if is_white(values):
+        return 1
+    most = min(MOST_ROWS, int(1.0 / (SLOWEST * sample_time)))
+    rows = next((rows for rows in range(2, most) if is_white(values[::rows])), 0)
+    return rows + 1  # a spectrum of few windows leaves some correlation between samples unseen
+
+
+def is_white(values: Array) -> bool:
+    """Return whether the noise of a channel is white as far as its samples tell.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        The channel [any unit]; NaN where missing.
+    """
+    windows = _windows(values)
+    return len(windows) < FEWEST_WINDOWS or flatness(windows) > min(FLATTEST, 1.0 - CHANCE / len(windows) ** 0.5)
+
+
+def _windows(values: Array) -> Array:
+    """Return windows that overlap by half and miss no sample, shape (windows, `WINDOW`)."""
+    if len(values) < WINDOW:
+        return np.empty((0, WINDOW))
+    windows = np.lib.stride_tricks.sliding_window_view(values, WINDOW)[:: WINDOW // 2]
+    return windows[np.isfinite(windows).all(axis=1)]
+
+
+def flatness(windows: Array) -> float:
+    """Return the least power of a band of high frequency over the largest.
+
+    The power at a frequency is the usual one of all windows, so that none counts in which the actuator is struck.
+
+    Parameters
+    ----------
+    windows : ndarray, shape (windows, `WINDOW`)
+        Stretches of a channel [any unit].
+
+    Returns
+    -------
+    float
+        The ratio [dimensionless], 1 where there is no power.
+    """
+    line = np.linspace(-1.0, 1.0, WINDOW)
+    level = windows - np.mean(windows, axis=1, keepdims=True)
+    level -= np.outer(level @ line / (line @ line), line)
+    tapered = level * (0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(WINDOW) / WINDOW))
+    power = np.median(np.abs(np.fft.rfft(tapered, axis=1)) ** 2, axis=0)
+    place = np.searchsorted(BANDS, np.arange(len(power)) / WINDOW, side="right")
+    bands = [float(np.mean(power[place == band])) for band in range(1, len(BANDS))]
+    return min(bands) / max(bands) if max(bands) > 0.0 else 1.0

@@ -1,0 +1,114 @@
+"""Pressure that was filtered before it was logged keeps samples of independent noise; no other log is touched."""
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.clean import clean_log
+from estimation.log_checks.filtered import WINDOW, flatness, independent_rows, is_white, without_correlated_noise
+from estimation.notes import SensorCode
+from faults.conditions import CONDITIONS, parameters_for
+from plant.arrays import Array
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH, IDEAL, Sensors
+
+PRESSURE = "differential_pressure_pa"
+
+
+def log(drive: str, sensors: Sensors = BENCH, sample_time: float = 1e-3, seed: int = 4) -> Record:
+    rng = np.random.default_rng(seed)
+    p = parameters_for(CONDITIONS["minor_leakage"])
+    signal = make_drive(drive, 6.0, sample_time, p, rng)
+    return simulate(CIRCUIT, signal, sample_time, p, sensors=sensors, rng=rng)
+
+
+def averaged(values: Array, rows: int) -> Array:
+    """Return means over the last rows, as a logger's block average gives them."""
+    return np.convolve(np.concatenate([np.full(rows - 1, values[0]), values]), np.ones(rows) / rows, "valid")
+
+
+def lagged(values: Array, corner: float) -> Array:
+    """Return what an analogue filter of first order with a corner [cycles/sample] passes on."""
+    kept, out = np.exp(-2.0 * np.pi * corner), values.copy()
+    for row in range(1, len(values)):
+        out[row] = kept * out[row - 1] + (1.0 - kept) * values[row]
+    return out
+
+
+@pytest.mark.parametrize("sensors", [BENCH, IDEAL])
+@pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "chirp", "sine"])
+def test_no_sample_is_left_out_of_a_log_with_white_noise_or_none(drive: str, sensors: Sensors) -> None:
+    for sample_time in (1e-3, 1e-4):
+        record = log(drive, sensors, sample_time)
+        assert without_correlated_noise(record) == (record, ())
+
+
+@pytest.mark.parametrize("rows", [2, 3, 4, 5])
+@pytest.mark.parametrize("drive", ["steps", "multisine"])
+def test_an_averaged_pressure_keeps_samples_that_share_no_noise(drive: str, rows: int) -> None:
+    record = log(drive)
+    found, (note,) = without_correlated_noise(record.replace(**{PRESSURE: averaged(record[PRESSURE], rows)}))
+    assert note.code is SensorCode.FILTERED
+    assert note.data["channel"] == PRESSURE
+    kept = int(note.data["rows"])
+    assert rows <= kept <= 2 * rows + 1
+    there = np.flatnonzero(np.isfinite(found[PRESSURE]))
+    assert there.tolist() == list(range(0, len(record), kept))
+    assert np.array_equal(found[PRESSURE][there], averaged(record[PRESSURE], rows)[there])
+    assert all(np.array_equal(found[name], record[name]) for name in record if name != PRESSURE)
+
+
+@pytest.mark.parametrize(("corner", "least"), [(0.25, 2), (0.15, 3), (0.1, 4)])
+def test_noise_behind_a_filter_of_first_order_is_left_alike_by_a_tenth_at_most(corner: float, least: int) -> None:
+    noise = np.random.default_rng(7).standard_normal(20_000)
+    rows = independent_rows(lagged(noise, corner), 1e-3)
+    assert rows >= least
+    assert np.exp(-2.0 * np.pi * corner * rows) < 0.1
+
+
+def test_white_noise_is_seldom_taken_for_filtered() -> None:
+    rng = np.random.default_rng(8)
+    taken = [not is_white(rng.standard_normal(size)) for size in (1000, 2000, 5000, 10_000) for _ in range(250)]
+    assert sum(taken) <= 5
+
+
+@pytest.mark.parametrize("correlation", [0.2, -0.3])
+def test_a_correlation_that_the_check_would_object_to_shows_in_a_log_of_twenty_seconds(correlation: float) -> None:
+    noise = np.random.default_rng(9).standard_normal(20_001)
+    assert not is_white(noise[1:] + correlation / (1.0 + correlation**2) * 1.1 * noise[:-1])
+
+
+def test_what_no_distance_makes_independent_is_left_as_it_is() -> None:
+    walk = np.cumsum(np.random.default_rng(10).standard_normal(20_000))
+    assert not is_white(walk)
+    assert independent_rows(walk, 1e-3) == 1
+    struck = log("prbs")  # the actuator rings as fast as the samples that are left would come
+    assert without_correlated_noise(struck.replace(**{PRESSURE: averaged(struck[PRESSURE], 4)}))[1] == ()
+    assert independent_rows(averaged(np.random.default_rng(11).standard_normal(4000), 4), 0.01) == 1  # too slow a log
+
+
+def test_little_or_broken_data_is_no_evidence() -> None:
+    rng = np.random.default_rng(12)
+    short, broken = averaged(rng.standard_normal(200), 5), averaged(rng.standard_normal(8000), 5)
+    broken[::50] = np.nan  # no window is whole
+    assert is_white(short)
+    assert is_white(broken)
+    assert is_white(short[: WINDOW - 1])
+    assert flatness(np.zeros((9, WINDOW))) == 1.0
+
+
+def test_a_straight_line_in_a_window_is_no_noise() -> None:
+    windows = np.random.default_rng(13).standard_normal((40, WINDOW))
+    steep = windows + np.linspace(-1e6, 1e6, WINDOW)
+    assert flatness(steep) == pytest.approx(flatness(windows), rel=1e-6)
+
+
+def test_a_log_is_looked_at_with_its_filter_in_mind() -> None:
+    record = log("steps")
+    clean = clean_log(record.replace(**{PRESSURE: averaged(record[PRESSURE], 4)}), EhaParameters())
+    assert [note.code for note in clean.left_out] == [SensorCode.FILTERED]
+    # an average of four has half the noise
+    white = clean_log(record, EhaParameters()).variances[PRESSURE]
+    assert clean.variances[PRESSURE] == pytest.approx(white / 4.0, rel=0.25)
