@@ -113,7 +113,7 @@ def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]
 
 
 def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]) -> Sequence[GreyBoxFit]:
-    """Return the fits of the balances that count, the first by volume.
+    """Return the fits of the balances that count.
 
     Parameters
     ----------
@@ -127,11 +127,13 @@ def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mappin
     Returns
     -------
     sequence of GreyBoxFit
-        One at least. Rig slopes and lateness are told of the likeliest, and of the likeliest with volumes that swing.
+        One with volumes that swing at least. Rig slopes and lateness are told of the likeliest, and of the likeliest
+        with volumes that swing.
     """
     rough = _rough(log, parameters, starts)
     least = min(one.point.cost for one in rough)
-    likely = [one for one in rough if one is rough[0] or one.point.cost < least + RIVAL]
+    near = min((one for one in rough if not _held(one.problem)), key=lambda one: one.point.cost)
+    likely = [one for one in rough if one is near or one.point.cost < least + RIVAL]
 
     def finished(one: _Rough) -> tuple[Problem, Point]:
         problem, theta, bounds = _completed(one, log) if _plain(one) else (one.problem, one.point.theta, one.bounds)

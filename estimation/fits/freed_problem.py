@@ -16,6 +16,7 @@ from estimation.fits.descent import Point
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_loops import compile_kernel
 from estimation.fits.greybox_problem import OUTLIER, Problem, weighed
+from estimation.fits.normal_loops import fill_differences
 from estimation.fits.side_by_side import LANES, MANY, ResidualsRun, compile_side_by_side
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
@@ -100,9 +101,9 @@ class FreedProblem(Problem):
         if self.log.passes_on:  # each has a variance of its own
             return [self.at(theta) for theta in thetas]
         rows = np.vstack([self._rows(_nudged(theta), self.log.parameters) for theta in thetas])
-        found = self._residuals(rows, None, self._variances(thetas[0]))
+        found = self._residuals(rows, None, self._variances(thetas[0]))[..., : len(rows)]
         parts = np.split(found, len(thetas), axis=-1)
-        return [self._point(at, *weighed(*_differences(part))) for at, part in zip(thetas, parts, strict=True)]
+        return [self._point(at, *weighed(*_differences(part, len(at)))) for at, part in zip(thetas, parts, strict=True)]
 
     def costs(self, thetas: Sequence[Array]) -> Array:
         """Return the cost at several points, without slopes: eight points take as long as one with its slopes.
@@ -119,6 +120,7 @@ class FreedProblem(Problem):
         """
         points = np.array(thetas)
         errors = self._residuals(self._rows(points, self.log.parameters), None, self._variances(points[0]))
+        errors = errors[..., : len(points)]
         weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)
         misfit = np.einsum("ijk,ijk->k", (1.0 - 0.5 * weight) * weight * errors, errors)
         return misfit + 0.5 * (points - self.presumed) ** 2 @ self.prior
@@ -184,7 +186,7 @@ class FreedProblem(Problem):
         if self.log.gaps.size:  # what a gap leaves open only the other kernel follows
             return super().disturbed_together(theta, drives)
         rows = np.repeat(self._rows(theta[None], self.log.parameters), drives.shape[-1], axis=0)
-        return self._side_by_side(rows, drives, self._variances(theta))
+        return self._side_by_side(rows, drives, self._variances(theta))[..., : len(rows)]
 
     def _run(
         self,
@@ -203,7 +205,8 @@ class FreedProblem(Problem):
         own = drives is None and parameters is self.log.parameters
         here, columns = self._remembered(theta, variance) if own else (None, None)
         if here is None or columns is None:
-            here, columns = _differences(self._residuals(self._rows(_nudged(theta), parameters), drives, variance))
+            found = self._residuals(self._rows(_nudged(theta), parameters), drives, variance)
+            here, columns = _differences(found, len(theta))
             if own and len(here[0]) <= MOST_REMEMBERED:
                 self._last = [*self._last[-1:], (theta.copy(), variance, here, columns)]
         if errors.size:
@@ -229,7 +232,7 @@ class FreedProblem(Problem):
         return rows
 
     def _residuals(self, rows: Array, drives: Array | None, variance: Array) -> Array:
-        """Return the normalised residuals under some parameters, shape (outputs, blocks, rows)."""
+        """Return the normalised residuals under some parameters, shape (outputs, blocks, rows or more)."""
         # one run is cheaper alone, and what a gap leaves open only its kernel follows
         if len(rows) == 1 or self.log.gaps.size:
             return np.stack([self._alone(row, drives, variance) for row in rows], axis=-1)
@@ -239,13 +242,13 @@ class FreedProblem(Problem):
         return found[0] if len(found) == 1 else np.concatenate(found, axis=-1)
 
     def _side_by_side(self, rows: Array, drives: Array, variance: Array) -> Array:
-        """Return the normalised residuals of up to `MANY` runs, shape (outputs, blocks, runs)."""
+        """Return the normalised residuals of up to `MANY` runs, shape (outputs, blocks, lanes)."""
         lanes = LANES if len(rows) <= LANES else MANY
         found = self._room(lanes)
         filled = rows if len(rows) == lanes else np.concatenate([rows, np.repeat(rows[-1:], lanes - len(rows), axis=0)])
         with np.errstate(all="ignore"):  # a try that runs away is stepped back from
             self._kernel_of(lanes)(filled, drives, self.log.measured, *self._course(variance), found)
-        return found[..., : len(rows)]
+        return found
 
     def _kernel_of(self, lanes: int) -> ResidualsRun:
         if lanes not in self._kernels:
@@ -274,8 +277,8 @@ def _neighbours(unknowns: int) -> Array:
     return np.eye(unknowns + 1, unknowns, -1)
 
 
-def _differences(found: Array) -> tuple[Array, Array]:
+def _differences(found: Array, unknowns: int) -> tuple[Array, Array]:
     """Return the residuals at a point and their slopes, of the residuals there and at its neighbours."""
-    slopes = found[..., 1:] - found[..., :1]
-    slopes /= NUDGE
-    return found[..., 0], slopes
+    here, slopes = np.empty(found.shape[:2]), np.empty((*found.shape[:2], unknowns))
+    fill_differences(found, NUDGE, here, slopes)
+    return here, slopes

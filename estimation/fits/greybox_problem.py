@@ -1,14 +1,16 @@
 """The least-squares problem that a grey-box model and a log make."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.arrays import Array, IntArray
 from estimation.fits.descent import Point
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_loops import Kernel, compile_kernel
+from estimation.fits.normal_loops import fill_weighed
 from estimation.models.greybox import GreyBoxModel
 
 OUTLIER = 3.0
@@ -133,7 +135,9 @@ class Problem:
         """Return a point whose misfit is given, with what is known beforehand and a full matrix."""
         away = theta - self.presumed
         cost += 0.5 * float(self.prior @ away**2)
-        return Point(theta, cost, gradient + self.prior * away, gram + np.tril(gram, -1).T + np.diag(self.prior))
+        whole = gram + gram.T
+        np.fill_diagonal(whole, gram.diagonal() + self.prior)
+        return Point(theta, cost, gradient + self.prior * away, whole)
 
     def residuals(self, theta: Array, drives: Array | None = None, parameters: Array | None = None) -> Array:
         """Return the normalised residuals, predicted less measured.
@@ -329,8 +333,13 @@ def weighed(errors: Array, slopes: Array) -> tuple[float, Array, Array]:
     tuple of (float, ndarray of shape (unknowns,), ndarray of shape (unknowns, unknowns))
         As a kernel gives them.
     """
-    weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)
-    cost = float(np.sum((1.0 - 0.5 * weight) * weight * errors**2))
     columns = slopes.reshape(errors.size, -1)
-    bent = columns * np.where(weight < 1.0, STRAIGHT, 1.0).reshape(-1, 1)
-    return cost, (weight * errors).ravel() @ columns, np.tril(bent.T @ columns)
+    squares, pulling, bent = np.empty(errors.shape), np.empty(errors.size), np.empty(columns.shape)
+    fill_weighed(errors.ravel(), columns, OUTLIER, STRAIGHT, squares.ravel(), pulling, bent)
+    return float(np.sum(squares)), pulling @ columns, np.where(_lower(columns.shape[1]), bent.T @ columns, 0.0)
+
+
+@cache
+def _lower(unknowns: int) -> NDArray[np.bool_]:
+    """Return which places of a square matrix lie in its lower triangle."""
+    return np.tri(unknowns, dtype=np.bool_)

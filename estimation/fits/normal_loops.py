@@ -1,0 +1,63 @@
+"""What the normal equations of a fit are summed from, block by block, as plain loops that are compiled."""
+
+from estimation.arrays import Array
+from plant.compiled.native.loops import natively
+
+
+@natively()
+def fill_differences(found: Array, nudge: float, here: Array, slopes: Array) -> None:
+    """Fill in the residuals at a point and their slopes, of the residuals there and at its neighbours.
+
+    Parameters
+    ----------
+    found : ndarray, shape (outputs, blocks, lanes)
+        Residuals at the point, and at its neighbours one after another; what lanes are left count for nothing.
+    nudge : float
+        How far away the neighbours are [dimensionless].
+    here : ndarray, shape (outputs, blocks)
+        Room for the residuals at the point.
+    slopes : ndarray, shape (outputs, blocks, unknowns)
+        Room for their slopes.
+    """
+    for i in range(slopes.shape[0]):
+        for k in range(slopes.shape[1]):
+            value = found[i, k, 0]
+            here[i, k] = value
+            for j in range(slopes.shape[2]):
+                slopes[i, k, j] = (found[i, k, j + 1] - value) / nudge
+
+
+@natively()
+def fill_weighed(
+    errors: Array, slopes: Array, outlier: float, straight: float, squares: Array, pulling: Array, bent: Array
+) -> None:
+    """Fill in what cost, gradient and ``J'J`` are sums of; what is grossly off counts linearly (Huber 1964).
+
+    Parameters
+    ----------
+    errors : ndarray, shape (n,)
+        Normalised residuals [dimensionless].
+    slopes : ndarray, shape (n, unknowns)
+        Their derivatives [dimensionless].
+    outlier : float
+        Residual from which on they count linearly [dimensionless].
+    straight : float
+        Weight in ``J'J`` of one that does [dimensionless].
+    squares : ndarray, shape (n,)
+        Room for each residual's part of the cost.
+    pulling : ndarray, shape (n,)
+        Room for each residual as it counts in the gradient.
+    bent : ndarray, shape (n, unknowns)
+        Room for each one's slopes as they count in ``J'J``.
+    """
+    for k in range(errors.shape[0]):
+        value = errors[k]
+        weight = outlier / max(abs(value), outlier)
+        squares[k] = (1.0 - 0.5 * weight) * weight * (value * value)
+        pulling[k] = weight * value
+        if weight < 1.0:
+            for j in range(slopes.shape[1]):
+                bent[k, j] = slopes[k, j] * straight
+        else:
+            for j in range(slopes.shape[1]):
+                bent[k, j] = slopes[k, j]
