@@ -10,7 +10,7 @@ from plant.arrays import Array
 from plant.errors import LogWarning
 
 FEW_LAGS = 32
-"""Lags up to which an autocovariance is summed lag by lag, and not by a transform."""
+"""Lags up to which products with an autocovariance are summed lag by lag, and not by a transform [count]."""
 
 LARGEST_PART = 100_000
 """Rows of a Jacobian that are factored at a time."""
@@ -109,5 +109,9 @@ def _autocovariance(residual: Array, n_used: int, lags: int) -> Array:
 
 def _meat(columns: Array, autocovariance: Array) -> Array:
     """Return ``J'RJ``."""
+    if len(autocovariance) <= FEW_LAGS:
+        shifted = [columns[lag:].T @ columns[: len(columns) - lag] for lag in range(len(autocovariance))]
+        either = [shifted[0], *(one + one.T for one in shifted[1:])]
+        return np.tensordot(autocovariance, either, axes=1)
     kernel = np.concatenate([autocovariance[:0:-1], autocovariance])
     return np.column_stack([columns.T @ convolved(column, kernel) for column in columns.T])

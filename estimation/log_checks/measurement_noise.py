@@ -1,6 +1,7 @@
 """Measurement noise read off the log itself, not taken as published (errata E11)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from math import comb
 
 import numpy as np
@@ -19,6 +20,9 @@ well below any bench sensor, so that a noiseless simulation stays solvable."""
 
 NORMAL_MAD = 1.482602218505602
 """Standard deviation of a normal variable over its median absolute deviation."""
+
+MOST_REMEMBERED = 50_000
+"""Longest channel whose variance is remembered by its content [samples]: some 6 MB for the last sixteen."""
 
 ROUNDING = 1e-12
 """Share of a channel's largest value up to which a step is that of floating-point numbers [fraction]."""
@@ -52,10 +56,22 @@ def measurement_variances(record: Record, channels: Sequence[str]) -> Mapping[st
     >>> round(measurement_variances(log, ["velocity_m_s"])["velocity_m_s"] * 1e6, 1)
     1.0
     """
-    return {channel: _variance(channel, record[channel]) for channel in channels}
+    return {channel: _once(_variance, record[channel], channel) for channel in channels}
 
 
-def _variance(channel: str, values: Array) -> float:
+def _once(variance: Callable[..., float], values: Array, *more: str) -> float:
+    """Return a variance of a channel, which checks and fits ask one after another: once for all of them."""
+    if len(values) > MOST_REMEMBERED:
+        return variance(values, *more)
+    return _remembered(variance, np.ascontiguousarray(values, dtype=np.float64).tobytes(), *more)
+
+
+@lru_cache(maxsize=16)
+def _remembered(variance: Callable[..., float], content: bytes, *more: str) -> float:
+    return variance(np.frombuffer(content), *more)
+
+
+def _variance(values: Array, channel: str) -> float:
     values = values[np.isfinite(values)]  # a slow sensor has no three samples in a row
     bends = np.diff(values, n=2)
     smallest = max(SMALLEST_VARIANCE.get(channel, 0.0), _quantum(values) ** 2 / 12.0)
@@ -128,6 +144,10 @@ def position_variance(position: Array) -> float:
     >>> round(position_variance(walked) * 12e12, 3)
     1.0
     """
+    return _once(_position_variance, position)
+
+
+def _position_variance(position: Array) -> float:
     position = position[np.isfinite(position)]  # a slow sensor has no seven samples in a row
     bends, steps = np.diff(position, n=SMOOTH), np.abs(np.diff(position))
     moved = steps[steps > 0.0]
