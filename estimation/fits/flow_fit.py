@@ -31,6 +31,7 @@ from estimation.fits.wide_problem import POSITION
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
 from estimation.notes import EstimateCode, RigCode
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
 from plant.log.record import Record
@@ -247,7 +248,9 @@ def _asked(
     if not _explains(swinging, log.passes_on):
         return (BEGUN,) if moving else HYPOTHESES, ()
     by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
-    delivery, *zeros = promised_each(log, parameters, swinging.values, ALWAYS_ASKED, by_mass=by_mass)
+    delivery, *zeros = promised_each(
+        log, parameters, swinging.values, ALWAYS_ASKED, by_mass=by_mass, slopes=_slopes(swinging, log)
+    )
     shows_zero = best is swinging or _homed_at_stop(log)
     if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
         zeros.append(promised(log, parameters, best.values, ENCODER_ZERO))
@@ -266,6 +269,13 @@ def _asked(
     lost = swinging is best and not fed and swinging.chi_square[0] > DOUBTED
     begun = promised(log.coarsened(), parameters, swinging.values, START_LOAD, by_mass=by_mass)
     return (BEGUN, *asked) if lost or begun.gain > WORTH else asked, remarks
+
+
+def _slopes(fit: GreyBoxFit, log: GreyBoxLog) -> Mapping[str, Array]:
+    """Return the slopes of a fit's residuals by unknown, where the wide form has the same."""
+    if log.passes_on or log.gaps.size:  # noise that counts with the slopes, and gaps, are the fit's own
+        return {}
+    return dict(zip(fit.model.unknowns, fit.slopes.T, strict=False))
 
 
 def _near(

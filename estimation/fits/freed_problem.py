@@ -105,6 +105,32 @@ class FreedProblem(Problem):
         parts = np.split(found, len(thetas), axis=-1)
         return [self._point(at, *weighed(*_differences(part, len(at)))) for at, part in zip(thetas, parts, strict=True)]
 
+    def at_beside(self, theta: Array, known: Mapping[str, Array]) -> Point:
+        """Return the misfit at a point at which the slopes of some unknowns are known, for a fit has found them.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        known : Mapping[str, ndarray of shape (outputs * blocks,)]
+            Derivatives of the normalised residuals, by unknown [dimensionless].
+
+        Returns
+        -------
+        Point
+            As of `Problem.at`.
+        """
+        names = self.model.unknowns
+        asked = [place for place, name in enumerate(names) if name not in known]
+        rows = self._rows(_nudged(theta)[[0, *(1 + place for place in asked)]], self.log.parameters)
+        here, columns = _differences(self._residuals(rows, None, self._variances(theta)), len(asked))
+        slopes = np.empty((*here.shape, len(names)))
+        slopes[..., asked] = columns
+        for place, name in enumerate(names):
+            if name in known:
+                slopes[..., place] = known[name].reshape(here.shape)
+        return self._point(theta, *weighed(here, slopes))
+
     def costs(self, thetas: Sequence[Array]) -> Array:
         """Return the cost at several points, without slopes: eight points take as long as one with its slopes.
 

@@ -75,6 +75,8 @@ class GreyBoxFit:
         forward would gain in log-likelihood, to first order [dimensionless].
     play : ShownPlay
         What the residuals say of a play of the encoder, where a fit was asked.
+    slopes : ndarray, shape (outputs * blocks, unknowns)
+        Derivatives of the normalised residuals there [dimensionless].
     """
 
     model: GreyBoxModel
@@ -87,6 +89,7 @@ class GreyBoxFit:
     rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
     late: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
     play: ShownPlay = NO_PLAY
+    slopes: Array = field(default_factory=lambda: np.empty((0, 0)))
 
 
 @dataclass(frozen=True)
@@ -254,7 +257,8 @@ def concluded(
         The fit.
     """
     model, theta = problem.model, point.theta
-    errors, slopes = problem.linearised(theta)
+    errors, all_slopes = problem.linearised(theta)
+    slopes = all_slopes
     felt = np.flatnonzero(np.einsum("ij,ij->j", slopes, slopes) > LEAST_EFFECT**2)
     noise, rig, late = np.full(len(theta), np.inf), dict[str, Array](), dict[str, tuple[float, float]]()
     play = NO_PLAY
@@ -295,6 +299,7 @@ def concluded(
         rig_slopes=slopes_si,
         late=late,
         play=play,
+        slopes=all_slopes,
         cost=point.cost,
         chi_square=tuple(map(float, squares / seen)),
         autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),

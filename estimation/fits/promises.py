@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -70,6 +71,7 @@ def promised_each(
     asked: Sequence[Hypothesis],
     *,
     by_mass: bool = False,
+    slopes: Mapping[str, Array] = MappingProxyType({}),
 ) -> list[Promise]:
     """Return what each of several hypotheses promises by itself, from one evaluation; see `promised`.
 
@@ -85,6 +87,8 @@ def promised_each(
         What is asked; none holds an unknown of the plain form.
     by_mass : bool
         Whether the plain fit balances mass.
+    slopes : Mapping[str, ndarray of shape (blocks,)], optional
+        Derivatives of the plain fit's normalised residuals, by unknown; they need not be taken again [dimensionless].
 
     Returns
     -------
@@ -92,7 +96,7 @@ def promised_each(
         Their promises.
     """
     wide = widened(log, parameters, plain)
-    return _promises(balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, asked)
+    return _promises(balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, asked, slopes)
 
 
 def balanced_by(log: GreyBoxLog, mass: float) -> GreyBoxLog:
@@ -143,11 +147,16 @@ def promising(
 
 
 def _promises(
-    log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], asked: Sequence[Hypothesis]
+    log: GreyBoxLog,
+    together: tuple[Hypothesis, ...],
+    found: Mapping[str, float],
+    asked: Sequence[Hypothesis],
+    slopes: Mapping[str, Array] = MappingProxyType({}),
 ) -> list[Promise]:
     """Return what each hypothesis promises beside those that are taken, as `promised` does, from one evaluation."""
     problem = freed(log, (*together, *(replace(one, instead=()) for one in asked)))
-    point = problem.at(problem.model.theta({**usual_values(log), **found}))
+    theta = problem.model.theta({**usual_values(log), **found})
+    point = problem.at_beside(theta, slopes) if slopes else problem.at(theta)
     # an unknown at its bound promises what only the hypothesis in its place can keep
     held = {name for one in asked for name in one.instead}
     own = [name for name in freed(log, together).model.unknowns if name not in held]

@@ -3,6 +3,8 @@
 A tone is told by its line in the spectrum. One that motor speed or position has as well is motion, and stays.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from estimation.fits.convolution import smooth_length
@@ -80,10 +82,16 @@ def _lines(values: Array) -> Array:
     bends = np.diff(bridged(values), n=2)
     length = smooth_length(len(bends), (2, 3, 5))
     length += length % 2
-    power = np.abs(np.fft.rfft(bends * np.hanning(len(bends)), length)) ** 2
+    power = np.abs(np.fft.rfft(bends * _window(len(bends)), length)) ** 2
     parts = np.array_split(power, max(1, len(power) // NEARBY))
     usual = np.concatenate([np.full(len(part), median(part)) for part in parts])
     return power / np.maximum(usual, np.finfo(float).tiny)
+
+
+@lru_cache(maxsize=1)
+def _window(length: int) -> Array:
+    """Return a Hann window, kept for the next log of that length."""
+    return np.hanning(length)
 
 
 def _alone(frequencies: Array, lines: Array, place: int) -> bool:
