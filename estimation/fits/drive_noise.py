@@ -17,7 +17,9 @@ SAMPLES_KEPT = 50_000
 """Longest log whose draws are kept for the next one [samples]: 13 MB."""
 
 
-def drive_variance(problem: Problem, theta: Array, bread: Array, slopes: Array) -> Array | float:
+def drive_variance(
+    problem: Problem, theta: Array, bread: Array, slopes: Array, undisturbed: Array | None = None
+) -> Array | float:
     """Return the variance that noise of the driving channels adds to each fitted coordinate.
 
     Parameters
@@ -30,6 +32,8 @@ def drive_variance(problem: Problem, theta: Array, bread: Array, slopes: Array) 
         Inverse of ``J'J``, of the unknowns that are felt [dimensionless].
     slopes : ndarray, shape (outputs * blocks, felt)
         ``J``, the derivatives of the normalised residuals [dimensionless].
+    undisturbed : ndarray, shape (outputs, blocks), optional
+        The normalised residuals there with one model step a sample; run here if not given [dimensionless].
 
     Returns
     -------
@@ -39,8 +43,8 @@ def drive_variance(problem: Problem, theta: Array, bread: Array, slopes: Array) 
     log = problem.log
     if not any(spread > 0.0 for spread in log.drive_std):
         return 0.0
-    rough, samples, spread = problem.on(log.coarsened()), len(log.drives), np.array(log.drive_std)
-    undisturbed = rough.residuals(theta)
+    rough, samples, spread = problem.coarse, len(log.drives), np.array(log.drive_std)
+    undisturbed = rough.residuals(theta) if undisturbed is None else undisturbed
     if samples <= SAMPLES_KEPT:
         drives = spread[:, None] * _kept_draws(*log.drives.shape)
         drives += log.drives[..., None]

@@ -15,8 +15,8 @@ from estimation.fits.descent import Point, descend
 from estimation.fits.drive_noise import drive_variance
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem, search_bounds
+from estimation.fits.lateness import changes_beside, lateness
 from estimation.fits.play import NO_PLAY, ShownPlay, shown_play
-from estimation.log_checks.bridging import POSITION
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
@@ -40,9 +40,6 @@ EXPLAINED = 1.2
 NOISE_DOUBT = 0.2
 """Standard deviation of the share of a driving channel's noise that is counted with the slopes: its size is known to
 some percent, and it is white in theory alone [fraction]."""
-
-LATE_NUDGE = 1e-5
-"""Time by which a driving channel is brought forward to see what its timing does [s]."""
 
 RIG_NUDGE = 1e-3
 """Relative change of a rig parameter by which the fit's response to it is read off [fraction]."""
@@ -276,14 +273,17 @@ def concluded(
         def left(shift: Array) -> Array:
             return shift - slopes @ response(shift)
 
+        told = disturbed and asked
+        known, moved = changes_beside(problem, theta) if told else (None, [])
         variance = np.diag(spread) + (NOISE_DOUBT * (bread @ problem.untilted(theta, errors)[felt])) ** 2
-        variance = variance + (drive_variance(problem, theta, bread, slopes) if disturbed else 0.0)
+        variance = variance + (drive_variance(problem, theta, bread, slopes, known) if disturbed else 0.0)
         # the window's estimate need not be positive: then nothing is known
         noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))
-        if disturbed and asked:
+        if told:
             rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in _rig_slopes(problem, theta, response)}
-            late = dict(_lateness(problem, theta, errors.ravel(), left))
-            play = shown_play(problem, theta, errors.ravel(), left) if POSITION in problem.log.timed else NO_PLAY
+            timed = problem.log.timed
+            late = dict(lateness(timed, moved, errors.ravel(), left))
+            play = shown_play(moved[len(timed) :], errors.ravel(), left)
     sizes = dict(model.linear)
     values = model.values(theta)
     unit = np.array([sizes.get(name, values[name]) for name in model.unknowns])
@@ -318,31 +318,6 @@ def _rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Arra
     known, *shifted = problem.residuals_of(theta, [row, *nudged])
     for name, errors in zip(asked, shifted, strict=True):
         yield name, -response(errors - known) / RIG_NUDGE
-
-
-def _lateness(
-    problem: Problem, theta: Array, errors: Array, left: Callable[[Array], Array]
-) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Yield by how much each driving channel that is asked seems late, and what it is worth (Rao's score statistic).
-
-    ``left`` gives what the unknowns do not take up of a change of the residuals.
-    """
-    log = problem.log
-    if not log.timed:
-        return
-    rough = problem.on(log.coarsened())
-    reach = max(1, round(0.5 * log.block / log.sample_time))
-    padded = np.pad(log.drives, ((reach, reach), (0, 0)), mode="edge")
-    ahead = LATE_NUDGE * (padded[2 * reach :] - padded[: -2 * reach]) / (2 * reach * log.sample_time)
-    places = [problem.model.drives.index(channel) for channel in log.timed]
-    forward = [np.where(np.arange(log.drives.shape[1]) == place, ahead, 0.0) for place in places]
-    known, *shifted = rough.disturbed(theta, [log.drives + one for one in (0.0, *forward)])
-    for channel, moved in zip(log.timed, shifted, strict=True):
-        free = left((moved - known).ravel() / LATE_NUDGE)
-        power = float(free @ free)
-        if power > 0.0:
-            along = float(free @ errors)
-            yield channel, (-along / power, 0.5 * along**2 / power)
 
 
 def _spread_out(values: Array, places: NDArray[np.intp], length: int) -> Array:

@@ -97,6 +97,11 @@ class Problem:
         begins = np.arange(0, len(self.log.measured), self._block)
         return int(np.count_nonzero(np.logical_or.reduceat(np.isfinite(self.log.measured), begins, axis=0)))
 
+    @cached_property
+    def coarse(self) -> "Problem":
+        """The same problem with one model step a sample."""
+        return self.on(self.log.coarsened())
+
     def on(self, log: GreyBoxLog) -> "Problem":
         """Return the same problem of another log.
 

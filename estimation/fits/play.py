@@ -5,7 +5,7 @@ it turns and crosses, or springs back on its seals and comes again. So where it 
 chooses (`crossings`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -109,7 +109,27 @@ def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
     return np.column_stack([late, by_pressure - late, early - late, sprung])
 
 
-def shown_play(problem: Problem, theta: Array, errors: Array, left: Callable[[Array], Array]) -> ShownPlay:
+def crossed_drives(problem: Problem) -> list[Array]:
+    """Return the drives of a log under a small play, which the piston crosses by one course after another.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem, position among its drives.
+
+    Returns
+    -------
+    list of ndarray, shape (n, channels)
+        What `shown_play` asks the residuals under [SI].
+    """
+    log, place = problem.log, problem.model.drives.index(POSITION)
+    courses = crossings(log.drives[:, place], log.measured[:, 0], log.sample_time)
+    sides = (courses[:, 0], courses[:, 0] + courses[:, 1], courses[:, 0] + courses[:, 2])
+    beside = np.arange(log.drives.shape[1]) == place
+    return [log.drives + 0.5 * NUDGE * np.where(beside, side[:, None], 0.0) for side in sides]
+
+
+def shown_play(changes: Iterable[Array], errors: Array, left: Callable[[Array], Array]) -> ShownPlay:
     """Return the play that a fit's residuals show.
 
     A play is positive, so a course counts that asks for one. On a log without, a gain over 4.5 comes by chance in one
@@ -117,10 +137,8 @@ def shown_play(problem: Problem, theta: Array, errors: Array, left: Callable[[Ar
 
     Parameters
     ----------
-    problem : Problem
-        The problem, position among its drives.
-    theta : ndarray, shape (unknowns,)
-        Its solution [dimensionless].
+    changes : iterable of ndarray
+        By how much the normalised residuals change under the drives of `crossed_drives` [dimensionless].
     errors : ndarray, shape (blocks,)
         The normalised residuals there [dimensionless].
     left : callable
@@ -131,16 +149,9 @@ def shown_play(problem: Problem, theta: Array, errors: Array, left: Callable[[Ar
     ShownPlay
         The likeliest course.
     """
-    log, place = problem.log, problem.model.drives.index(POSITION)
-    rough = problem.on(log.coarsened())
-    courses = crossings(log.drives[:, place], log.measured[:, 0], log.sample_time)
-    sides = (0.0 * courses[:, 0], courses[:, 0], courses[:, 0] + courses[:, 1], courses[:, 0] + courses[:, 2])
-    beside = np.arange(log.drives.shape[1]) == place
-    drives = [log.drives + 0.5 * NUDGE * np.where(beside, side[:, None], 0.0) for side in sides]
-    known, *moved = rough.disturbed(theta, drives)
     found = NO_PLAY
-    for one in moved:
-        free = left((one - known).ravel() / NUDGE)
+    for change in changes:
+        free = left(change.ravel() / NUDGE)
         power, along = float(free @ free), -float(free @ errors)
         if power > 0.0 and along > 0.0 and (gain := 0.5 * along**2 / power) > found.gain:
             found = ShownPlay(along / power, gain)

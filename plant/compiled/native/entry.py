@@ -222,7 +222,7 @@ class Entry:
 
 
 def _through_object(array: Any) -> int:
-    """Return where an array's numbers lie: what NumPy's C interface keeps first in an array, behind Python's own head."""
+    """Return where an array's numbers lie: NumPy keeps that first in an array, behind Python's own head."""
     return _WORD.from_address(id(array) + object.__basicsize__).value
 
 

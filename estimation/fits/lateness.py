@@ -1,0 +1,72 @@
+"""Whether a driving channel comes late, by the residuals of a fit: Rao's score statistic."""
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from estimation.fits.greybox_problem import Problem
+from estimation.fits.play import crossed_drives
+from estimation.log_checks.bridging import POSITION
+from plant.arrays import Array
+
+LATE_NUDGE = 1e-5
+"""Time by which a driving channel is brought forward to see what its timing does [s]."""
+
+
+def changes_beside(problem: Problem, theta: Array) -> tuple[Array | None, list[Array]]:
+    """Return the residuals under the log's drives, with one model step a sample, and how others change them.
+
+    The others are each channel brought forward a little that is asked whether it comes late, and the courses of a play.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    theta : ndarray, shape (unknowns,)
+        Its solution [dimensionless].
+
+    Returns
+    -------
+    tuple of (ndarray of shape (outputs, blocks) or None, list of ndarray)
+        Normalised residuals, and changes of them, one a channel and then one a course; none where no channel is asked.
+    """
+    log = problem.log
+    if not log.timed:
+        return None, []
+    reach = max(1, round(0.5 * log.block / log.sample_time))
+    padded = np.pad(log.drives, ((reach, reach), (0, 0)), mode="edge")
+    ahead = LATE_NUDGE * (padded[2 * reach :] - padded[: -2 * reach]) / (2 * reach * log.sample_time)
+    places = [problem.model.drives.index(channel) for channel in log.timed]
+    forward = [log.drives + np.where(np.arange(log.drives.shape[1]) == place, ahead, 0.0) for place in places]
+    crossed = crossed_drives(problem) if POSITION in log.timed else []
+    known, *found = problem.coarse.disturbed(theta, [log.drives, *forward, *crossed])
+    return known, [one - known for one in found]
+
+
+def lateness(
+    timed: Sequence[str], changes: Sequence[Array], errors: Array, left: Callable[[Array], Array]
+) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Yield by how much each driving channel that is asked seems late, and what it is worth (Rao's score statistic).
+
+    Parameters
+    ----------
+    timed : sequence of str
+        The channels.
+    changes : sequence of ndarray
+        By how much each changes the normalised residuals, see `changes_beside`; more are passed over [dimensionless].
+    errors : ndarray, shape (outputs * blocks,)
+        The normalised residuals at the solution [dimensionless].
+    left : callable
+        What the unknowns do not take up of a change of the residuals.
+
+    Yields
+    ------
+    tuple of (str, tuple of float)
+        Channel; how late [s], and the gain in log-likelihood [dimensionless].
+    """
+    for channel, change in zip(timed, changes, strict=False):
+        free = left(change.ravel() / LATE_NUDGE)
+        power = float(free @ free)
+        if power > 0.0:
+            along = float(free @ errors)
+            yield channel, (-along / power, 0.5 * along**2 / power)
