@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.fits.covariance import FEW_LAGS, _autocovariance, automatic_lags, least_squares_covariance
+from estimation.fits.covariance import FEW_LAGS, _autocovariance, _meat, automatic_lags, least_squares_covariance
 from estimation.notes import EstimateCode
 from plant.errors import LogWarning
 
@@ -86,3 +86,12 @@ def test_what_is_not_determined_is_not_known_where_nobody_is_warned() -> None:
     column = np.random.default_rng(1).standard_normal(40)
     _, spread = least_squares_covariance(np.column_stack([column, column]), column, 40, 0, np.zeros(2), warned=False)
     assert np.all(np.isinf(spread))
+
+
+@pytest.mark.parametrize("lags", [1, 7, FEW_LAGS - 1, FEW_LAGS])
+def test_products_with_an_autocovariance_are_those_of_its_whole_matrix(lags: int) -> None:
+    rng = np.random.default_rng(8)
+    columns, known = rng.normal(size=(200, 3)), rng.normal(size=lags + 1)
+    apart = np.abs(np.subtract.outer(np.arange(200), np.arange(200)))
+    whole = np.where(apart <= lags, known[np.minimum(apart, lags)], 0.0)
+    np.testing.assert_allclose(_meat(columns, known), columns.T @ whole @ columns, rtol=1e-9, atol=1e-9)

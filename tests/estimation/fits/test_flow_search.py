@@ -112,6 +112,19 @@ def test_what_is_promised_together_is_promised_alone() -> None:
         assert tuple(told) == pytest.approx(tuple(promised(log, HEALTHY, plain, one)), rel=1e-4)
 
 
+def test_slopes_that_the_fit_has_found_promise_what_slopes_taken_anew_do() -> None:
+    log = seen(recorded("minor_friction"))
+    fit = by_mass(balanced(log, HEALTHY, STARTS))
+    slopes = dict(zip(fit.model.unknowns, fit.slopes.T, strict=True))
+    anew, known = (
+        promised_each(log, HEALTHY, fit.values, (DELIVERY, ENCODER_ZERO), by_mass=True, slopes=one)
+        for one in ({}, slopes)
+    )
+    for one, other in zip(anew, known, strict=True):
+        assert one.gain == pytest.approx(other.gain, rel=0.01, abs=1e-3)
+        assert one.deviation == pytest.approx(other.deviation, rel=1e-3)
+
+
 def test_make_up_valves_that_crack_apart_are_fitted_and_do_not_bias_bulk_modulus() -> None:
     machine = Machine(crack_a=3e3, crack_b=0.0, ripple=0.0)
     rng = np.random.default_rng(3)

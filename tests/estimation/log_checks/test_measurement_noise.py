@@ -102,3 +102,12 @@ def test_position_noise_of_about_a_quantum_is_not_taken_for_the_quantum_alone() 
 @pytest.mark.parametrize("position", [np.zeros(100), np.full(100, np.nan), np.arange(3.0)])
 def test_a_position_that_does_not_move_or_is_not_there_has_the_smallest_noise(position: np.ndarray) -> None:
     assert position_variance(position) == SMALLEST_VARIANCE["position_m"]
+
+
+def test_a_variance_is_that_of_the_channel_as_it_is_now() -> None:
+    noise = np.random.default_rng(2).normal(0.0, 1e-3, 2000)
+    one, other = (
+        measurement_variances(Record(1e-3, {"velocity_m_s": k * noise}), ["velocity_m_s"]) for k in (1.0, 2.0)
+    )
+    assert other["velocity_m_s"] == pytest.approx(4.0 * one["velocity_m_s"], rel=1e-9)
+    assert position_variance(2.0 * noise) == pytest.approx(4.0 * position_variance(noise), rel=1e-9)

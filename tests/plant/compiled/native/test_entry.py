@@ -137,3 +137,19 @@ def test_a_parameter_without_documentation_is_no_signature() -> None:
 
     with pytest.raises(ValueError, match=r"takes \['x', 'y'\], its documentation has \['x'\]"):
         signature_of(bare)
+
+
+def test_a_part_of_an_array_and_one_that_is_read_only_are_read_where_they_lie() -> None:
+    total = load_native("total_of_parts", TOTAL_OF_PARTS, {"total": signature("values : ndarray, shape (n,)")}).total
+    values = np.arange(10.0)
+    values.flags.writeable = False
+    assert (total(values[3:]), total(values[::3]), total(values[:0])) == (42.0, 18.0, 0.0)
+
+
+TOTAL_OF_PARTS = """
+def total(values):
+    result = 0.0
+    for value in values:
+        result += value
+    return result
+"""
