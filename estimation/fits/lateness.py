@@ -52,7 +52,7 @@ def lateness(
     ----------
     timed : sequence of str
         The channels.
-    changes : sequence of ndarray
+    changes : sequence of ndarray, shape (outputs, blocks)
         By how much each changes the normalised residuals, see `changes_beside`; more are passed over [dimensionless].
     errors : ndarray, shape (outputs * blocks,)
         The normalised residuals at the solution [dimensionless].

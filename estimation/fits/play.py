@@ -137,7 +137,7 @@ def shown_play(changes: Iterable[Array], errors: Array, left: Callable[[Array], 
 
     Parameters
     ----------
-    changes : iterable of ndarray
+    changes : iterable of ndarray, shape (outputs, blocks)
         By how much the normalised residuals change under the drives of `crossed_drives` [dimensionless].
     errors : ndarray, shape (blocks,)
         The normalised residuals there [dimensionless].
