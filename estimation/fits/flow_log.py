@@ -135,14 +135,16 @@ def flow_log(
     )
     swept = _swept_share(log.drives[:, FLOW_FORM.drives.index("position_m")], parameters)
     passed_on = swept * position_variance(record["position_m"]) ** 0.5
+    open_gaps = speed_gaps(record, parameters, variances["differential_pressure_pa"] ** 0.5)
     log = replace(
         log,
         noise=(replace(log.noise[0], passed_on=passed_on, passed_by="bulk_modulus"),),
         timed=FLOW_FORM.drives,
         drive_std=(log.drive_std[0], 0.0),  # the residuals hold position's
         # where the piston is within a gap of its position is not known, where it is after it is
+        drives=_balanced_across(open_gaps, record, log.drives, parameters),
         measured=np.where(_within_gaps(record["position_m"])[:, None], np.nan, log.measured),
-        gaps=speed_gaps(record, parameters, variances["differential_pressure_pa"] ** 0.5),
+        gaps=open_gaps,
         presumed={
             "case_leakage": (DRAIN_START * usual_leakage(parameters), PRESUMED_STD),
             "makeup_opening": (OPENING_START, PRESUMED_STD),
@@ -170,6 +172,29 @@ def _within_gaps(position: Array) -> NDArray[np.bool_]:
     within = np.isnan(position)
     within[present[0] : present[-1]] &= np.repeat(wide, apart.astype(np.int64))
     return within
+
+
+def _balanced_across(open_gaps: Array, record: Record, drives: Array, p: EhaParameters) -> Array:
+    """Return the drives with speeds in gaps at which the pump delivers what the piston sweeps, and oil yields and leaks.
+
+    That is known from the ends of a gap, at the rig's values well enough. Speeds on a straight line from end to end may
+    deliver so much less that a chamber of the model draws oil. No other valve lets it out again, so it would stay.
+    """
+    speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
+    out, pressure = drives.copy(), bridged(record["differential_pressure_pa"])
+    missing = np.isnan(record["motor_speed_rad_s"])
+    for first, behind, _ in open_gaps:
+        before, after = int(first) - 1, int(behind)
+        if before < 0 or missing[after]:
+            continue  # at an end of the log nothing is known of the other end of a gap
+        length = (after - before) * record.sample_time
+        swept = p.piston_area * (drives[after, position] - drives[before, position])
+        yielded = p.chamber_volume / p.bulk_modulus * (pressure[after] - pressure[before])
+        leaked = p.leakage_coefficient * 0.5 * (pressure[after] + pressure[before]) * length
+        wanted = (swept + yielded + leaked) / p.pump_displacement
+        line = float(np.trapezoid(drives[before : after + 1, speed], dx=record.sample_time))
+        out[before + 1 : after, speed] += (wanted - line) / ((after - before - 1) * record.sample_time)
+    return out
 
 
 def usual_leakage(p: EhaParameters) -> float:

@@ -137,3 +137,22 @@ def test_what_position_squeezes_is_the_slope_of_the_chambers_logarithms(differen
 
     slope = (squeezed(position + step) - squeezed(position - step)) / (2.0 * step)
     assert _swept_share(position, p) == pytest.approx(np.sqrt(np.mean(slope**2)), rel=1e-5)
+
+
+def test_in_a_gap_the_pump_delivers_what_the_piston_swept_and_the_oil_yielded() -> None:
+    p = circuit_of(HEALTHY)
+    rng = np.random.default_rng(31)
+    record = simulate(CIRCUIT, make_drive("prbs", 3.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    true = record["motor_speed_rad_s"]
+    reversals = np.flatnonzero(np.abs(np.diff(true)) > 50.0)
+    first = int(reversals[reversals > 500][0]) - 20
+    gap = slice(first, first + 100)
+    lost = {name: record[name].copy() for name in ("motor_speed_rad_s", "position_m", "differential_pressure_pa")}
+    for values in lost.values():
+        values[gap] = np.nan
+    seen = flow_log(*_sound(record.replace(**lost)))
+    assert len(seen.gaps) == 1
+    turned = float(np.sum(true[gap])) * 1e-3
+    line = float(np.sum(np.linspace(true[first - 1], true[first + 100], 102)[1:-1])) * 1e-3
+    delivered = float(np.sum(seen.drives[gap, 0])) * 1e-3
+    assert abs(delivered - turned) < 0.1 * abs(line - turned)
