@@ -10,7 +10,7 @@ import numpy as np
 from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
 from estimation.eha.named import NAMED
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide, without_number
-from estimation.eha.rig_share import fitted_responses, scaled_responses
+from estimation.eha.rig_share import fitted_responses, scaled_responses, with_wear
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
 from estimation.fits.flow_fit import FLOW_CHANNELS, REPORTED, fit_flow
@@ -319,11 +319,11 @@ def _with_rig(
     found: BulkModulusEstimate, parameters: EhaParameters, spreads: Mapping[str, Spread]
 ) -> BulkModulusEstimate:
     """Return an estimate with what is not known of the rig, by the laws of dimension where the fit did not say."""
+    found = replace(found, spreads=with_wear(spreads, found.remarks))
     if found.value is None or found.responses:
-        return replace(found, spreads=spreads)
+        return found
     values = {name: value for name, (value, _) in found.others.items()}
-    responses = scaled_responses(parameters, values, pressure=PRESSURE in found.channels)
-    return replace(found, responses=responses, spreads=spreads)
+    return replace(found, responses=scaled_responses(parameters, values, pressure=PRESSURE in found.channels))
 
 
 def _fitted(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEstimate:

@@ -13,13 +13,13 @@ How the ratio of the two flows acts on bulk modulus hangs on the drive; the laws
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
 from estimation.finding import NORMAL_95, Quantity
 from estimation.fits.form_fit import FormFit
-from estimation.notes import EstimateCode
+from estimation.notes import EstimateCode, RigCode
 from plant.eha.doubts import PRESSURE_GAIN, Spread
 from plant.eha.model import EhaParameters
 from plant.eha.steady_state import steady_state
@@ -30,6 +30,9 @@ Responses = Mapping[str, float]
 
 GAIN: Mapping[str, float] = MappingProxyType({"bulk_modulus": -1.0, "leakage_coefficient": 1.0})
 """Responses to the gain of the pressure sensor."""
+
+DELIVERY_ENTRY = "pump_displacement"
+"""The entry of a rig that a worn pump falls short of."""
 
 MOSTLY_RIG = 2.0
 """Ratio of the total interval to the one given the rig above which a note names the entry [dimensionless]."""
@@ -134,6 +137,43 @@ def with_total(
     if size is None and one.value > 0.0:
         low = max(low, min(one.ci95[0], 0.0))
     return replace(one, ci95_total=(low, high))
+
+
+def wear_left_open(remarks: Sequence[Note]) -> float:
+    """Return how far below its displacement the pump may deliver, where a log does not tell wear from leakage.
+
+    Parameters
+    ----------
+    remarks : sequence of Note
+        What a fit leaves open.
+
+    Returns
+    -------
+    float
+        Standard deviation of the logarithm [dimensionless]; zero where the log tells, or a worn pump was found.
+    """
+    said = [note.data["percent"] for note in remarks if note.code is RigCode.WEAR_NOT_EXCLUDED]
+    return 0.005 * float(said[0]) if said else 0.0
+
+
+def with_wear(spreads: Mapping[str, Spread], remarks: Sequence[Note]) -> Mapping[str, Spread]:
+    """Return how far each entry of a rig may be off, the pump's displacement downwards by wear that is left open.
+
+    Parameters
+    ----------
+    spreads : Mapping[str, Spread]
+        How far, as the rig file has it.
+    remarks : sequence of Note
+        What a fit leaves open.
+
+    Returns
+    -------
+    Mapping[str, Spread]
+        By entry.
+    """
+    down, up = spreads.get(DELIVERY_ENTRY, (0.0, 0.0))
+    worn = wear_left_open(remarks)
+    return {**spreads, DELIVERY_ENTRY: Spread(worn, up)} if worn > down else spreads
 
 
 def rig_notes(name: str, one: Quantity, responses: Responses, spreads: Mapping[str, Spread]) -> tuple[Note, ...]:

@@ -175,7 +175,7 @@ def _within_gaps(position: Array) -> NDArray[np.bool_]:
 
 
 def _balanced_across(open_gaps: Array, record: Record, drives: Array, p: EhaParameters) -> Array:
-    """Return the drives with speeds in gaps at which the pump delivers what the piston sweeps, and oil yields and leaks.
+    """Return the drives with speeds in gaps that deliver what the piston sweeps, and what the oil yields and leaks.
 
     That is known from the ends of a gap, at the rig's values well enough. Speeds on a straight line from end to end may
     deliver so much less that a chamber of the model draws oil. No other valve lets it out again, so it would stay.

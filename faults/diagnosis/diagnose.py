@@ -32,6 +32,7 @@ from faults.diagnosis.outside import faults_outside
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import limits_of, severities, severities_at, what_is_not_told, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
+from faults.diagnosis.wear import probabilities_over_wear
 from faults.eha.bank import mathematical_bank
 from faults.notes import ClassCode
 from plant.eha.model import EhaParameters
@@ -165,6 +166,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
         found = replace(found, notes=(*found.notes, _load(loaded)))
     if (stop := diagnosis.scoreboard.blocks.stop) is not None:
         found = replace(found, notes=(*found.notes, ClassCode.END_STOP.note(reach_mm=1e3 * stop)))
+    diagnosis = _whatever_the_pump_delivers(diagnosis, actuator_of(loaded), estimate)
     against = distinct((*doubts, *diagnosis.against))
     if against:  # nominal models alone are no judges of a circuit with another oil, but they say what is off
         against = distinct((*against, *verdict.against))
@@ -246,7 +248,15 @@ def _severities(
 ) -> Mapping[str, Quantity]:
     """Return how bad it is, with the bulk modulus that was estimated, and what is not known of the rig."""
     found = with_bulk_modulus(diagnosis.severity, estimate.quantity, actuator_of(healthy))
-    return with_totals(found, actuator_of(rig.parameters), rig.spreads, pressure=pressure)
+    return with_totals(found, actuator_of(rig.parameters), estimate.spreads, pressure=pressure)
+
+
+def _whatever_the_pump_delivers(diagnosis: Diagnosis, actuator: Actuator, estimate: BulkModulusEstimate) -> Diagnosis:
+    """Return a diagnosis with its classes weighed over what a pump may deliver, where a log does not tell that."""
+    found = probabilities_over_wear(diagnosis.scoreboard, actuator, estimate.remarks, shipped_calibration())
+    if found is None:
+        return diagnosis
+    return replace(diagnosis, condition=max(found, key=lambda name: found[name]), probabilities=found)
 
 
 def _without_class(found: Finding, log: CleanLog, scores: Scores, against: tuple[Note, ...]) -> Finding:

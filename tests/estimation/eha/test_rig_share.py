@@ -9,10 +9,10 @@ import pytest
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.eha.estimate import estimate_log
-from estimation.eha.rig_share import fitted_responses, scaled_responses, with_total
+from estimation.eha.rig_share import fitted_responses, scaled_responses, with_total, with_wear
 from estimation.finding import Quantity
 from estimation.fits.flow_fit import fit_flow
-from estimation.notes import EstimateCode
+from estimation.notes import EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.doubts import DOUBTS, PRESSURE_GAIN, Spread
 from plant.eha.drives import make_drive
@@ -169,3 +169,12 @@ def test_total_intervals_cover_where_rigs_are_as_wrong_as_they_are_said_to_be(lo
     assert len(covered) >= 0.8 * logs
     assert np.mean(covered) >= 0.85
     assert np.mean(given) <= 0.3
+
+
+def test_wear_that_is_not_excluded_opens_displacement_downwards_alone() -> None:
+    known = {"pump_displacement": Spread(0.03, 0.02), "chamber_volume": Spread.of(0.15)}
+    said = (RigCode.WEAR_NOT_EXCLUDED.note(percent=24.0),)
+    assert with_wear(known, said) == {**known, "pump_displacement": Spread(pytest.approx(0.12), 0.02)}
+    assert with_wear({}, said) == {"pump_displacement": Spread(pytest.approx(0.12), 0.0)}
+    assert with_wear(known, (RigCode.WEAR_NOT_EXCLUDED.note(percent=4.0),)) == known
+    assert with_wear(known, (RigCode.PUMP_WORN.note(percent=80.0, half_width=1.0),)) == known

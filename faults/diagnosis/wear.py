@@ -1,0 +1,56 @@
+"""Classes of a log that does not tell a worn pump from leakage: how much a pump delivers is integrated out.
+
+Where pressure is logged, the balance of flows says whether a log tells (`estimation.fits.flow_fit`). If not, a pump
+that delivers less leaves less leakage to the same log, and bulk modulus is larger by as much.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from estimation.eha.rig_share import DELIVERY_ENTRY, wear_left_open
+from estimation.fits.hypotheses import PRESUMED
+from faults.diagnosis.calibration import Calibration
+from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.class_regions import fit_classes
+from faults.diagnosis.evidence import Scoreboard, bounded
+from faults.diagnosis.outside import DELIVERIES
+from plant.notes import Note
+
+
+def probabilities_over_wear(
+    board: Scoreboard, actuator: Actuator, remarks: Sequence[Note], calibration: Calibration
+) -> Mapping[str, float] | None:
+    """Return the probability of each condition, whatever the pump delivers, where a log does not tell.
+
+    The conditions are scored again for pumps that deliver `DELIVERIES` of their displacement, and summed with what is
+    presumed of a pump before the log is seen: half a normal distribution of the logarithm, of deviation `PRESUMED`.
+
+    Parameters
+    ----------
+    board : Scoreboard
+        The evidences of a sound pump.
+    actuator : Actuator
+        The healthy actuator.
+    remarks : sequence of Note
+        What the balance of flows leaves open.
+    calibration : Calibration
+        Weights of the evidences.
+
+    Returns
+    -------
+    Mapping[str, float] or None
+        Probability by condition [probability]; None where wear is excluded, found, or not looked for.
+    """
+    if board.blocks.pressure is None or not wear_left_open(remarks):
+        return None
+    healthy, scores = actuator.circuit, [board.fits.scores]
+    for share in DELIVERIES:
+        worn = replace(healthy, pump_displacement=share * healthy.pump_displacement)
+        fits = fit_classes(board.blocks, replace(actuator, circuit=worn), start=board.fits.best.coordinates)
+        scores.append(fits.scores)
+    beforehand = -0.5 * (np.log([1.0, *DELIVERIES]) / PRESUMED[DELIVERY_ENTRY]) ** 2
+    summed = np.asarray(logsumexp(np.array(scores) + beforehand[:, None], axis=0), dtype=np.float64)
+    return replace(board, log_odds={**board.log_odds, "parameters": bounded(summed)}).probabilities(calibration)

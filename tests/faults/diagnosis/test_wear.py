@@ -1,0 +1,50 @@
+"""A log that does not tell a worn pump from leakage: its classes are weighed over what the pump may deliver."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.notes import RigCode
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.calibration import shipped_calibration
+from faults.diagnosis.diagnose import actuator_of
+from faults.diagnosis.evidence import Scoreboard, weigh
+from faults.diagnosis.wear import probabilities_over_wear
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.sensors.sensors import BENCH
+
+HEALTHY = EhaParameters()
+ACTUATOR = actuator_of(HEALTHY)
+OPEN = (RigCode.WEAR_NOT_EXCLUDED.note(percent=30.0),)
+BETWEEN = 0.4
+"""How far the leakage is from minor to major, in its logarithm [fraction]."""
+
+
+@pytest.fixture(scope="module")
+def board() -> Scoreboard:
+    minor, major = (parameters_for(CONDITIONS[name]) for name in ("minor_leakage", "major_leakage"))
+    between = {
+        name: getattr(minor, name) ** (1.0 - BETWEEN) * getattr(major, name) ** BETWEEN
+        for name in ("leakage_coefficient", "flow_bias")
+    }
+    worn = circuit_of(replace(minor, **between, pump_displacement=0.9 * minor.pump_displacement))
+    rng = np.random.default_rng(5)
+    drive = make_drive("prbs", 2.0, 1e-3, HEALTHY, rng)
+    return weigh(simulate(CIRCUIT, drive, 1e-3, worn, sensors=BENCH, rng=rng), ACTUATOR)
+
+
+def test_what_a_worn_pump_would_explain_is_not_all_leakage(board: Scoreboard) -> None:
+    sound = board.probabilities(shipped_calibration())
+    found = probabilities_over_wear(board, ACTUATOR, OPEN, shipped_calibration())
+    assert found is not None
+    assert sum(found.values()) == pytest.approx(1.0)
+    assert found["minor_leakage"] > 2.0 * sound["minor_leakage"] > 0.0
+    assert found["major_leakage"] < sound["major_leakage"]
+
+
+def test_classes_stay_where_the_log_tells_what_the_pump_delivers(board: Scoreboard) -> None:
+    assert probabilities_over_wear(board, ACTUATOR, (), shipped_calibration()) is None
