@@ -34,6 +34,10 @@ AT_STOP = 0.02
 ALLOWED = {"tolerance": 1e-4, "drive_tolerance": 2e-3}
 """Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_groups`: far below what counts."""
 
+LEAST_FLOW = 1e-3
+"""Least leakage at the relief setting, and least flow bias, over the rated pump flow [fraction]: a rig file may have
+none, and no logarithm begins at zero. Judged: no log tells so little from nothing."""
+
 COLUMN = {field.name: i for i, field in enumerate(fields(CircuitParameters))}
 
 
@@ -54,7 +58,9 @@ def coordinates_of(p: EhaParameters, rated: float) -> Array:
     """
     a1, a2, a3 = p.friction_quadratic, p.friction_linear, p.friction_coulomb
     forces = a3, a1 * rated**2, a3 + a2 * rated + a1 * rated**2
-    return np.log([p.leakage_coefficient, p.flow_bias, *forces, p.bulk_modulus, 1.0])
+    least = LEAST_FLOW * p.pump_displacement * p.rated_speed
+    leakage, bias = max(p.leakage_coefficient, least / p.relief_pressure), max(p.flow_bias, least)
+    return np.log([leakage, bias, *forces, p.bulk_modulus, 1.0])
 
 
 def parameter_rows(points: Array, rig: CircuitParameters, rated: float) -> Array:

@@ -220,3 +220,11 @@ def test_a_sensor_that_was_out_for_the_whole_stretch_is_none() -> None:
         assert blocks.noise.tolist() == blocks_of(log).noise.tolist()
     with pytest.raises(LogError, match="velocity_m_s or position_m is needed"):
         blocks_of(log.replace(velocity_m_s=np.full(3000, np.nan)))
+
+
+def test_a_rig_without_leakage_or_flow_bias_has_coordinates() -> None:
+    tight = replace(EhaParameters(), leakage_coefficient=0.0, flow_bias=0.0)
+    found = coordinates_of(tight, 0.1)
+    assert np.all(np.isfinite(found))
+    pumped = tight.pump_displacement * tight.rated_speed
+    assert np.exp(found[:2]) == pytest.approx([1e-3 * pumped / tight.relief_pressure, 1e-3 * pumped])
