@@ -2,7 +2,7 @@
 
 >>> import hydrostate as hs
 >>> log = hs.simulate("minor_leakage", duration=2.0, sample_time=1e-3, seed=7)
->>> log.channels
+>>> log.channels[:4]
 ('motor_speed_rad_s', 'position_m', 'velocity_m_s', 'differential_pressure_pa')
 
 `read` or `simulate` give a `Log`; `Log.estimate`, `Log.diagnose` and `Log.identify` say what it holds. What they return

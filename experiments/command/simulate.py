@@ -49,10 +49,10 @@ def simulate(
         str | None,
         option(
             "PLANT",
-            "lumped (the paper's equations 5.8 to 5.10), reduced (equation 5.14), circuit (two chambers with valves: "
-            "take it to try diagnose on friction), or piezo-stack and diaphragm-motor, which have a sine drive and the "
-            "options marked so.",
-            show_default="that of the rig file, else lumped",
+            "circuit (two chambers with valves), lumped (the paper's equations 5.8 to 5.10; under major friction "
+            "diagnose calls it unknown), reduced (equation 5.14), or piezo-stack and diaphragm-motor, which have a "
+            "sine drive and the options marked so.",
+            show_default="that of the rig file, else circuit",
         ),
     ] = None,
     condition: ConditionName = None,

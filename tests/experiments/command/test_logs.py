@@ -34,6 +34,7 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def hostile(folder: Path, good: Path) -> dict[str, Path]:
     """Write one file of every kind that must be refused, by a part of the sentence."""
     lines = good.read_text().splitlines()
+    others = ",0" * (lines[0].count(",") - 1)
     files = {
         "a header line is needed": b"",
         "at least 10 samples": (lines[0] + "\n").encode(),
@@ -41,8 +42,8 @@ def hostile(folder: Path, good: Path) -> dict[str, Path]:
         "unit 'parsnip' is unknown": "\n".join(
             [lines[0].replace("position_m", "position_parsnip"), *lines[1:]]
         ).encode(),
-        "must hold numbers, got 'oops'": "\n".join([*lines[:30], "0.029,oops,0,0,0", *lines[31:]]).encode(),
-        "must be finite": "\n".join([*lines[:30], "0.029,inf,0,0,0", *lines[31:]]).encode(),
+        "must hold numbers, got 'oops'": "\n".join([*lines[:30], "0.029,oops" + others, *lines[31:]]).encode(),
+        "must be finite": "\n".join([*lines[:30], "0.029,inf" + others, *lines[31:]]).encode(),
         "got binary data": bytes(range(256)),
     }
     paths: dict[str, Path] = {}

@@ -54,7 +54,7 @@ def steps(folder: Path) -> dict[str, Path]:
     paths = {suffix: folder / f"steps{suffix}" for suffix in (".csv", ".parquet", ".mat")}
     for path in paths.values():
         made = invoke(
-            *("simulate", "--condition", "minor_friction", "--drive", "steps", "--duration", 6),
+            *("simulate", "--plant", "lumped", "--condition", "minor_friction", "--drive", "steps", "--duration", 6),
             *("--sample-time", 1e-3, "--seed", 5, "--out", path),
         )
         assert made.exit_code == 0, made.output
@@ -99,7 +99,9 @@ def test_the_seed_alone_decides_a_run(folder: Path) -> None:
     runs: list[Any] = []
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         assert invoke(*arguments, folder / f"{name}.mat", "--seed", seed).exit_code == 0
-        runs.append(read_record(folder / f"{name}.mat")["position_m"])
+        record = read_record(folder / f"{name}.mat")
+        assert record.metadata["plant"] == "circuit"  # what diagnose explains in every condition
+        runs.append(record["position_m"])
     assert np.array_equal(runs[0], runs[1])
     assert not np.array_equal(runs[0], runs[2])
 
