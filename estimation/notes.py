@@ -97,6 +97,10 @@ class EstimateCode(Code):
         "the piston moves as if the pump delivered {percent:.0f} % of its displacement, which no pump of this rig file "
         "does: pump displacement, piston area, or the unit or scale of motor speed or position is wrong"
     )
+    TEETH_LEFT = (
+        "the pressure residuals go with the angle of the shaft, as where the teeth of the pump ({teeth} a turn) are "
+        "{percent:.0f} % in its flow, and they could not be taken up: bulk modulus may be a percent too low"
+    )
     POSITION_RESIDUALS_LARGE = (
         "the position residuals are {ratio:.2f} times the sensors' noise: neither friction model explains how the "
         "piston starts and stops, and bulk modulus may be far off"
@@ -172,6 +176,9 @@ class RigCode(Code):
     PUMP_WORN = (
         "the pump delivers {percent:.1f} ± {half_width:.1f} % of its displacement: it is worn, or displacement or "
         "piston area in the rig file is wrong"
+    )
+    PUMP_RIPPLES = (
+        "the teeth of the pump ({teeth} a turn) are {percent:.1f} ± {half_width:.1f} % in its flow; they were taken up"
     )
     WEAR_NOT_EXCLUDED = (
         "pump wear is not excluded: a pump that delivers up to {percent:.0f} % less would look like leakage at the "

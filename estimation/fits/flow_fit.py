@@ -27,6 +27,7 @@ from estimation.fits.hypotheses import (
 )
 from estimation.fits.play import NO_PLAY, ShownPlay, sensed_play
 from estimation.fits.promises import promised, promised_each
+from estimation.fits.toothed import toothed
 from estimation.fits.wide_problem import POSITION
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
@@ -130,7 +131,8 @@ def fit_flow(
 ) -> FormFit:
     """Fit the flow form to a log, balanced by volume, by mass, and by volume in held chambers, and weigh the three.
 
-    A log that it does not explain is asked what is strange about rig, oil or logger (`estimation.fits.explain`).
+    What a pump's teeth deliver is taken up first (`estimation.fits.toothed`). A log that it does not explain is asked
+    what is strange about rig, oil or logger (`estimation.fits.explain`).
     Gross outliers are taken out, and what the pump delivered while its speed is missing is read off the pressure after.
 
     Parameters
@@ -169,11 +171,12 @@ def fit_flow(
         record, variances = without_strays(record)
     log = flow_log(record, parameters, uncertainties or {}, variances)
     starts = flow_starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
-    fits = balanced(log, parameters, starts)
+    explains = partial(_explains, noisy=log.passes_on)
+    log, fits, teeth, teeth_left = toothed(log, lambda one: balanced(one, parameters, starts), explains)
     best, found = min(fits, key=_cost), weighed(fits, SURER, [_beforehand(fit) for fit in fits])
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
-    explains = partial(_explains, noisy=log.passes_on)
-    asked, remarks = _asked(log, parameters, swinging, best, sensed, loaded=loaded, moving=moving)
+    asked, open_ends = _asked(log, parameters, swinging, best, sensed, loaded=loaded, moving=moving)
+    remarks = (*teeth, *open_ends)
     if BEGUN in asked:  # so many valleys that one is believed only where sensors' noise is all that it leaves
         explains = partial(_explains_all, noisy=log.passes_on)
     if asked:
@@ -194,11 +197,11 @@ def fit_flow(
             believed = with_structure(strange.values, left)
             unseen = NO_PLAY if PLAY.name in strange.names else sensed
             reasons = (*_play_left(one, unseen), *contradicted(strange, parameters))
-            return FormFit(believed, bound, one.chi_square[0], reasons, one.rig_slopes, strange)
+            return FormFit(believed, bound, one.chi_square[0], reasons, one.rig_slopes, strange, teeth)
     value, std = found["bulk_modulus"]
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     believed = found if sure else with_structure(found, STRUCTURE)
-    reasons = (*_objections(best, log.passes_on), *_play_left(swinging, sensed))
+    reasons = (*_objections(best, log.passes_on), *_play_left(swinging, sensed)) or teeth_left
     if BEGUN in asked and not reasons and not explains(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
     return FormFit(believed, std / value, best.chi_square[0], reasons, best.rig_slopes, remarks=remarks)

@@ -91,6 +91,10 @@ class GreyBoxLog:
         Length over which residuals are averaged before they are squared [s].
     timed : tuple of str
         Driving channels of which a fit asks whether they come late.
+    counts : tuple of int
+        Counts of a pump's teeth that a fit asks for, see `estimation.fits.teeth`.
+    teeth : tuple of int
+        Those of them whose delivery the drives hold; how large it is stays open.
     """
 
     drives: Array
@@ -105,6 +109,8 @@ class GreyBoxLog:
     presumed: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
     block: float = BLOCK
     timed: tuple[str, ...] = ()
+    counts: tuple[int, ...] = ()
+    teeth: tuple[int, ...] = ()
 
     def beginning(self, samples: int) -> "GreyBoxLog":
         """Return the log's first part.

@@ -1,0 +1,178 @@
+"""When a pump's teeth are taken up, corrected, and left, by fits that are made up."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.fits import flow_fit as module
+from estimation.fits.flow_fit import fit_flow
+from estimation.fits.greybox_fit import GreyBoxFit
+from estimation.fits.greybox_log import GreyBoxLog
+from estimation.fits.promises import Promise
+from estimation.fits.teeth import COUNTS, ShownTeeth, Teeth
+from estimation.fits.toothed import (
+    BY_CHANCE,
+    LEAST_TEETH,
+    MOST_TEETH,
+    OVERTONE_WORTH,
+    ROUNDS,
+    SETTLED,
+    STANDS_OUT,
+    TEETH_WORTH,
+    toothed,
+)
+from estimation.notes import EstimateCode, RigCode
+from plant.notes import Note
+from tests.estimation.fits.short_logs import PAPER, log, made_fit, noted, seen
+
+
+def shown(count: int, gain: float, size: float = 0.1) -> ShownTeeth:
+    return ShownTeeth(Teeth(count, size, 0.0), gain, 0.01, np.zeros(2))
+
+
+def fit(cost: float, *teeth: ShownTeeth) -> GreyBoxFit:
+    return replace(made_fit(cost, 2e8, 1e5), teeth={one.teeth.count: one for one in teeth})
+
+
+Asked = tuple[tuple[int, ...], tuple[int, ...]]
+
+
+def told(*fits: GreyBoxFit) -> tuple[Callable[[GreyBoxLog], Sequence[GreyBoxFit]], list[Asked]]:
+    """Return what fits logs in turn, and the counts that each log asks for and holds."""
+    asked: list[Asked] = []
+
+    def fitted(one: GreyBoxLog) -> Sequence[GreyBoxFit]:
+        asked.append((one.counts, one.teeth))
+        return [fits[len(asked) - 1]]
+
+    return fitted, asked
+
+
+PLAIN = seen(log(0.2))
+
+
+def well(_: GreyBoxFit) -> bool:
+    return True
+
+
+def test_teeth_are_not_taken_up_where_the_log_stays_unexplained() -> None:
+    for explained in (True, False):
+        fitted, _ = told(fit(500.0, shown(12, 200.0)), fit(300.0, shown(12, 0.0)))
+        found = toothed(PLAIN, fitted, lambda one, said=explained: said and one.cost == 300.0)
+        assert bool(found.remarks) is explained
+        assert bool(found.left) is not explained
+
+
+def test_teeth_are_taken_up_and_corrected_until_nothing_is_left() -> None:
+    rounds = [fit(500.0, shown(12, 200.0, 0.10)), fit(300.0, shown(12, 5.0, 0.02)), fit(290.0, shown(12, 0.1, 0.001))]
+    fitted, asked = told(*rounds)
+    found = toothed(PLAIN, fitted, well)
+    assert asked == [(COUNTS, ()), ((12, 24), (12,)), ((12, 24), (12,))]
+    assert found.fits[0].cost == 290.0
+    assert noted(found.remarks) == [
+        {
+            "code": "pump_ripples",
+            "percent": pytest.approx(12.0),
+            "half_width": pytest.approx(1.96, abs=0.01),
+            "teeth": 12,
+        }
+    ]
+    assert not found.left
+    assert not np.array_equal(found.log.drives, PLAIN.drives)
+
+
+def test_corrections_end() -> None:
+    fitted, asked = told(fit(500.0, shown(12, 200.0)), *(fit(300.0, shown(12, SETTLED + 0.1, 0.01)) for _ in range(9)))
+    toothed(PLAIN, fitted, well)
+    assert len(asked) == 1 + ROUNDS
+
+
+@pytest.mark.parametrize(
+    ("teeth", "wanted"),
+    [
+        ([shown(12, TEETH_WORTH + 0.1)], True),
+        ([shown(12, TEETH_WORTH - 0.1)], False),
+        ([shown(12, 50.0, LEAST_TEETH + 0.001)], True),
+        ([shown(12, 50.0, LEAST_TEETH - 0.001)], False),
+        ([shown(12, 50.0), shown(13, BY_CHANCE + 39.9 / STANDS_OUT)], True),
+        ([shown(12, 50.0), shown(13, BY_CHANCE + 40.1 / STANDS_OUT)], False),
+        ([shown(13, 1.0), shown(12, 50.0), shown(6, 49.0)], True),  # each an overtone of the other
+        ([shown(6, 50.0), shown(12, 49.0)], True),
+        ([shown(12, 50.0), shown(18, 49.0)], False),
+        ([], False),
+    ],
+)
+def test_teeth_are_asked_for_by_gain_and_size_where_no_other_count_does_as_well(
+    teeth: list[ShownTeeth], wanted: bool
+) -> None:
+    settled = [fit(100.0, *(shown(one.teeth.count, 0.0) for one in teeth)) for _ in range(2)]
+    fitted, asked = told(fit(500.0, *teeth), *settled)
+    found = toothed(PLAIN, fitted, well)
+    assert bool(found.remarks) is wanted
+    assert len(asked) == 1 + wanted
+
+
+def test_an_overtone_is_taken_up_with_its_teeth_where_it_gains_enough() -> None:
+    for gain, held in ((OVERTONE_WORTH + 0.1, (12, 24)), (OVERTONE_WORTH - 0.1, (12,))):
+        rounds = fit(300.0, shown(12, 0.0), shown(24, gain, 0.05)), fit(290.0, shown(12, 0.0), shown(24, 0.0))
+        found = toothed(PLAIN, told(fit(500.0, shown(12, 200.0)), *rounds)[0], well)
+        assert found.log.teeth == held
+
+
+def left(notes: Sequence[Note]) -> list[tuple[object, object, object]]:
+    return [(note.code, note.data["teeth"], note.data["percent"]) for note in notes]
+
+
+def test_teeth_that_do_not_explain_the_log_or_do_not_stand_out_are_left() -> None:
+    useless, _ = told(fit(500.0, shown(12, 200.0)), fit(500.0 - TEETH_WORTH + 0.1, shown(12, 0.0)))
+    useful, _ = told(fit(500.0, shown(12, 200.0)), fit(500.0 - TEETH_WORTH - 0.1, shown(12, 0.0)))
+    several, _ = told(fit(500.0, shown(12, 50.0), shown(13, 40.0)))
+    unfelt, _ = told(fit(500.0, shown(12, 200.0)), fit(100.0))
+    for fitted in (useless, several, unfelt):
+        found = toothed(PLAIN, fitted, well)
+        assert left(found.left) == [(EstimateCode.TEETH_LEFT, 12, pytest.approx(10.0))]
+        assert not found.remarks
+        assert found.log is PLAIN
+    assert not toothed(PLAIN, useful, well).left
+    assert not toothed(PLAIN, told(fit(500.0, shown(12, 9.0), shown(13, 8.0)))[0], well).left
+
+
+def test_teeth_larger_than_any_are_not_believed_but_left() -> None:
+    for at_first, more, left_over in ((MOST_TEETH + 0.01, 0.0, True), (0.3, 0.12, True), (0.3, 0.08, False)):
+        first = fit(500.0, shown(12, 200.0, at_first))
+        fitted, asked = told(first, fit(300.0, shown(12, 5.0, more)), fit(290.0, shown(12, 0.0, 0.0)))
+        found = toothed(PLAIN, fitted, well)
+        assert bool(found.left) is left_over
+        assert bool(found.remarks) is not left_over
+        assert len(asked) == (1 if at_first > MOST_TEETH else 2 if left_over else 3)
+
+
+def test_a_log_with_gaps_in_its_speed_is_not_asked() -> None:
+    fitted, asked = told(fit(500.0, shown(12, 200.0)))
+    holey = replace(PLAIN, gaps=np.array([[3.0, 9.0, 1.0]]))
+    assert toothed(holey, fitted, well).log is holey
+    assert asked == [((), ())]
+
+
+@pytest.mark.parametrize(
+    ("chi", "code"), [(1.0, EstimateCode.TEETH_LEFT), (2.0, EstimateCode.PRESSURE_RESIDUALS_LARGE)]
+)
+def test_teeth_that_are_left_shut_the_gate_where_nothing_else_does(
+    monkeypatch: pytest.MonkeyPatch, chi: float, code: EstimateCode
+) -> None:
+    shows = replace(fit(500.0, shown(12, 50.0), shown(13, 40.0)), chi_square=(chi,))
+    monkeypatch.setattr(module, "balanced", lambda *_: [shows])
+    monkeypatch.setattr(module, "_asked", lambda *_, **__: ((), (RigCode.WEAR_NOT_EXCLUDED.note(percent=3.0),)))
+    found = fit_flow(log(0.2), PAPER, PAPER.bulk_modulus)
+    assert [note.code for note in found.reasons] == [code]
+    assert [note.code for note in found.remarks] == [RigCode.WEAR_NOT_EXCLUDED]
+
+
+def test_nothing_is_left_of_a_sound_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "balanced", lambda *_: [fit(500.0, shown(12, 3.0))])
+    monkeypatch.setattr(module, "promised_each", lambda *_, **__: 2 * [Promise(0.0, 0.0, 0.01)])
+    found = fit_flow(log(0.2), PAPER, PAPER.bulk_modulus)
+    assert not found.reasons
+    assert not found.remarks
