@@ -18,14 +18,13 @@ from estimation.fits.hypotheses import (
     HYPOTHESES,
     LATEST,
     LEAST_DELIVERY,
-    LEAST_PLAY,
     LEAST_ZERO,
     OFFSET,
     PLAY,
     START_LOAD,
     Hypothesis,
 )
-from estimation.fits.play import NO_PLAY, ShownPlay, sensed_play
+from estimation.fits.play import NO_PLAY, ShownPlay, play_left, sensed_play
 from estimation.fits.promises import promised, promised_each
 from estimation.fits.toothed import toothed
 from estimation.fits.wide_problem import POSITION
@@ -100,10 +99,6 @@ PLAY_OPEN = 0.5
 """Share of what a play puts bulk modulus off by that is left open, as the piston crosses by none of the courses that
 are tried [fraction]: 0.2 covered too few training logs with a play. It puts it off by as much as the fit with a play
 differs from that without, or by what the piston yields unseen beside what the oil does."""
-
-PLAY_SHOWN = 4.0
-"""Gain in log-likelihood from which residuals show a play of the encoder [dimensionless]: by chance each of three
-courses gains it in one log of 430, so one log in 140 at most is asked in vain."""
 
 PLAY_SENSED = 2.7
 """Gain from which a log is asked for a play because a velocity sensor moves beside an encoder that stands: one log in
@@ -196,12 +191,12 @@ def fit_flow(
             left = _play_structure(one, swinging, parameters, sensed) if PLAY.name in strange.names else STRUCTURE
             believed = with_structure(strange.values, left)
             unseen = NO_PLAY if PLAY.name in strange.names else sensed
-            reasons = (*_play_left(one, unseen), *contradicted(strange, parameters))
+            reasons = (*play_left(one.play, unseen), *contradicted(strange, parameters))
             return FormFit(believed, bound, one.chi_square[0], reasons, one.rig_slopes, strange, teeth)
     value, std = found["bulk_modulus"]
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     believed = found if sure else with_structure(found, STRUCTURE)
-    reasons = (*_objections(best, log.passes_on), *_play_left(swinging, sensed)) or teeth_left
+    reasons = (*_objections(best, log.passes_on), *play_left(swinging.play, sensed)) or teeth_left
     if BEGUN in asked and not reasons and not explains(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
     return FormFit(believed, std / value, best.chi_square[0], reasons, best.rig_slopes, remarks=remarks)
@@ -260,7 +255,7 @@ def _asked(
     zero = max(zeros)
     worn = delivery.gain > WORTH and delivery.size > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and zero.size > LEAST_ZERO
-    plays = bool(_play_left(swinging, sensed)) or sensed.gain > PLAY_SENSED
+    plays = bool(play_left(swinging.play, sensed)) or sensed.gain > PLAY_SENSED
     tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays)
     asked = tuple(one for one, worthwhile in tried if worthwhile)
     open_by = 0.0 if DELIVERY in asked else delivery.deviation
@@ -314,12 +309,6 @@ def _play_structure(fit: GreyBoxFit, plain: GreyBoxFit, p: EhaParameters, sensed
     moved = abs(modulus / plain.values["bulk_modulus"] - 1.0)
     yields = p.piston_area * sensed.yields * modulus / p.chamber_volume
     return float(np.hypot(PLAY_STRUCTURE, PLAY_OPEN * max(moved, yields)))
-
-
-def _play_left(fit: GreyBoxFit, sensed: ShownPlay) -> tuple[Note, ...]:
-    """Return the objection to a fit whose residuals, or a velocity sensor, show a play that it does not have."""
-    shown = [one for one in (fit.play, sensed) if one.gain > PLAY_SHOWN and one.size > LEAST_PLAY]
-    return (EstimateCode.PLAY_LEFT.note(play_um=1e6 * max(one.size for one in shown)),) if shown else ()
 
 
 def _beforehand(fit: GreyBoxFit) -> float:

@@ -12,12 +12,15 @@ import numpy as np
 
 from estimation.arrays import Array, BoolArray, IntArray
 from estimation.fits.greybox_problem import Problem
+from estimation.fits.hypotheses import LEAST_PLAY
 from estimation.log_checks.bridging import POSITION, bridged
 from estimation.log_checks.measurement_noise import position_variance
 from estimation.log_checks.order import percentile
 from estimation.log_checks.outliers import VELOCITY
 from estimation.log_checks.sensor_check import PRESSURE
+from estimation.notes import EstimateCode
 from plant.log.record import Record
+from plant.notes import Note
 
 CELLS = 8.0
 """Width of the cells in which a reading is followed, in standard deviations of its noise [dimensionless]."""
@@ -62,6 +65,11 @@ class ShownPlay(NamedTuple):
 
 
 NO_PLAY = ShownPlay(0.0, 0.0)
+
+
+PLAY_SHOWN = 4.0
+"""Gain in log-likelihood from which residuals show a play of the encoder [dimensionless]: by chance each of three
+courses gains it in one log of 430, so one log in 140 at most is asked in vain."""
 
 
 def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
@@ -156,6 +164,18 @@ def shown_play(changes: Iterable[Array], errors: Array, left: Callable[[Array], 
         if power > 0.0 and along > 0.0 and (gain := 0.5 * along**2 / power) > found.gain:
             found = ShownPlay(along / power, gain)
     return found
+
+
+def play_left(*shown: ShownPlay) -> tuple[Note, ...]:
+    """Return the objection to a fit that leaves a play which its residuals or a velocity sensor show.
+
+    Parameters
+    ----------
+    *shown : ShownPlay
+        What each of them shows.
+    """
+    large = [one.size for one in shown if one.gain > PLAY_SHOWN and one.size > LEAST_PLAY]
+    return (EstimateCode.PLAY_LEFT.note(play_um=1e6 * max(large)),) if large else ()
 
 
 def sensed_play(record: Record) -> ShownPlay:

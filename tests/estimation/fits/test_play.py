@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from estimation.fits import flow_fit as module
-from estimation.fits.flow_fit import DOUBTED, PLAY_OPEN, PLAY_SENSED, PLAY_SHOWN, PLAY_STRUCTURE, fit_flow
+from estimation.fits.flow_fit import DOUBTED, PLAY_OPEN, PLAY_SENSED, PLAY_STRUCTURE, fit_flow
 from estimation.fits.flow_search import balanced, flow_starts
 from estimation.fits.form_fit import FormFit
 from estimation.fits.hypotheses import PLAY, Hypothesis
-from estimation.fits.play import NO_PLAY, ShownPlay, crossings, sensed_play
+from estimation.fits.play import NO_PLAY, PLAY_SHOWN, ShownPlay, crossings, play_left, sensed_play
 from estimation.fits.promises import Promise
 from estimation.notes import EstimateCode
 from faults.conditions import CONDITIONS, parameters_for
@@ -226,7 +226,7 @@ def test_a_play_too_small_to_be_one_is_not_believed(monkeypatch: pytest.MonkeyPa
 def test_the_gate_is_shut_by_a_play_that_chance_seldom_shows_and_that_is_not_too_small(
     shown: ShownPlay, sensed: ShownPlay, shut: bool
 ) -> None:
-    assert bool(module._play_left(replace(made_fit(1.0, 2e8, 1e5), play=shown), sensed)) is shut
+    assert bool(play_left(shown, sensed)) is shut
 
 
 def test_a_piston_that_begins_to_move_within_what_a_sound_encoder_resolves_shows_no_play() -> None:
