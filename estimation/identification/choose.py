@@ -162,12 +162,13 @@ def compare_structures(
 
 
 def split_record(u: Signals, y: Signals) -> tuple[tuple[list[Array], list[Array]], tuple[list[Array], list[Array]]]:
-    """Return what is fitted and what is held back: the last third of a record, or of the experiments.
+    """Return what is fitted and what is held back: the last third of the experiments, or of each of two or one.
 
     Parameters
     ----------
     u, y : array_like of shape (n,), or a sequence of them
-        Input and output. A record shorter than `LEAST` samples is compared on itself.
+        Input and output. Of two experiments one shorter than `LEAST` samples is fitted alone; where all are, they are
+        compared on themselves.
 
     Returns
     -------
@@ -178,11 +179,18 @@ def split_record(u: Signals, y: Signals) -> tuple[tuple[list[Array], list[Array]
     if len(inputs) > 2:
         cut = len(inputs) - max(1, round(HELD_BACK * len(inputs)))
         return (inputs[:cut], outputs[:cut]), (inputs[cut:], outputs[cut:])
-    n = inputs[0].size
-    if n < LEAST:
+    long = [one.size >= LEAST for one in inputs]
+    if not any(long):
         return (inputs, outputs), (inputs, outputs)
-    cut = int(n * (1.0 - HELD_BACK))
-    return ([inputs[0][:cut]], [outputs[0][:cut]]), ([inputs[0][cut:]], [outputs[0][cut:]])
+    cuts = [int(one.size * (1.0 - HELD_BACK)) if enough else one.size for one, enough in zip(inputs, long, strict=True)]
+
+    def early(series: list[Array]) -> list[Array]:
+        return [one[:cut] for one, cut in zip(series, cuts, strict=True)]
+
+    def late(series: list[Array]) -> list[Array]:
+        return [one[cut:] for one, cut in zip(series, cuts, strict=True) if cut < one.size]
+
+    return (early(inputs), early(outputs)), (late(inputs), late(outputs))
 
 
 def fit_structure(name: str, u: Signals, y: Signals, sample_time: float, form: dict[str, Any]) -> LinearModel:

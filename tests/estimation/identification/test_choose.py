@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.identification.choose import STRUCTURES, choose_model
+from estimation.identification.choose import LEAST, STRUCTURES, choose_model, compare_structures, split_record
 from estimation.identification.model.recursion import filtered
 
 
@@ -20,3 +20,29 @@ def test_orders_from_one_to_four_are_compared_and_the_one_that_made_the_record_i
     assert list(choice.structures.index) == list(STRUCTURES)
     assert choice.model.denominator.size - 1 == order
     assert choice.model.structure == choice.structures["fit_percent"].idxmax()
+
+
+def test_of_two_experiments_each_is_fitted_and_held_back_and_a_short_one_is_fitted_alone() -> None:
+    rng = np.random.default_rng(4)
+    first, second, short = (rng.normal(size=n) for n in (2 * LEAST, 3 * LEAST, LEAST - 1))
+    fitted, kept = split_record([first, second], [-first, -second])
+    for whole, early, late in zip((first, second), fitted[0], kept[0], strict=True):
+        assert np.array_equal(np.concatenate([early, late]), whole)
+        assert late.size == pytest.approx(whole.size / 3.0, abs=1.0)
+    assert all(np.array_equal(u, -y) for u, y in zip([*fitted[0], *kept[0]], [*fitted[1], *kept[1]], strict=True))
+    fitted, kept = split_record([short, second], [-short, -second])
+    assert [one.size for one in fitted[1]] == [short.size, 2 * LEAST]
+    assert [one.size for one in kept[1]] == [LEAST]
+    fitted, kept = split_record([short, short], [-short, -short])
+    assert [one.size for one in (*fitted[0], *kept[0])] == [short.size] * 4
+
+
+def test_structures_are_compared_on_the_second_of_two_experiments_too() -> None:
+    rng = np.random.default_rng(5)
+    u = [rng.normal(size=300) for _ in range(2)]
+    y = [filtered([0.0, 0.5], [1.0, -0.8], one) + 0.02 * rng.normal(size=one.size) for one in u]
+    form = {"n_numerator": 1, "n_denominator": 1, "delay": 1}
+    right = compare_structures(u, y, 0.01, form, ("output-error",))["fit_percent"].iloc[0]
+    assert right > 90.0
+    other = [y[0], filtered([0.0, -0.5], [1.0, -0.8], u[1])]  # a plant that answers the other way
+    assert compare_structures(u, other, 0.01, form, ("output-error",))["fit_percent"].iloc[0] < 50.0
