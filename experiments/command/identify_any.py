@@ -168,7 +168,6 @@ def _response(data: "Channels", log: str, path: Path, outputs: int) -> dict[str,
 
 def entries(found: "Identified") -> dict[str, Any]:
     """Return what was identified by the names of the JSON contract."""
-    from estimation.identification.free_run.hammerstein_body import HammersteinBody
     from estimation.identification.free_run.identify import WARNED
     from estimation.identification.state_space.body import StateSpaceBody
 
@@ -199,8 +198,7 @@ def entries(found: "Identified") -> dict[str, Any]:
         result |= {"order": transfer[0][1].size - 1, "offset": model.offset, "dc_gain": {"value": gains}}
     elif isinstance(model.body, StateSpaceBody):
         result |= _state_space_entries(model, model.body)
-    if isinstance(model.body, HammersteinBody):
-        result["nonlinearity"] = model.body.nonlinearity(model.scaling)
+    result["nonlinearity"] = model.nonlinearity
     quality = found.quality
     result["message"] = clauses(
         [
@@ -329,7 +327,8 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
             values = ", ".join(
                 f"{name.replace('_', ' ')} {_with_interval(one)}" for name, one in bend.items() if name != "kind"
             )
-            yield f"{result['output']}: {bend['kind'].replace('-', ' ')} at {result['input']}, {values}"
+            place = "output" if "friction" in bend["kind"] else "input"
+            yield f"{result['output']}: {bend['kind'].replace('-', ' ')} at {result[place]}, {values}"
     yield (
         f"From {', '.join(results[0]['inputs'])}. Fits are of free runs: on the fitted logs, on blocks held back from "
         f"the fit, and on --validate. One-step fits, models and candidates are in --json and --out."

@@ -1,13 +1,13 @@
 """What runs free inside a model, in the data's scale: every kind of body by its name, and the polynomial one."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from estimation.arrays import Array, IntArray
-from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.data import Channels, Scaling
 from estimation.identification.free_run.hammerstein_body import HammersteinBody
 from estimation.identification.free_run.linear_body import LinearBody as LinearBody
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, Variables, products
@@ -50,17 +50,20 @@ class PolynomialBody:
         Variables that each term multiplies; -1 stands for 1.
     coefficients : ndarray, shape (k,)
         One a term.
+    friction : ndarray, shape (f,)
+        Values of the friction; empty where the output does not rub.
     """
 
     variables: Variables
     terms: IntArray
     coefficients: Array
+    friction: Array = field(default_factory=lambda: np.empty(0))
     kind: ClassVar[str] = "polynomial"
 
     @property
     def n_values(self) -> int:
         """Fitted coefficients."""
-        return self.coefficients.size
+        return self.coefficients.size + self.friction.size
 
     def run(self, u: Array, y: Array) -> Array:
         """Return the free run, its first outputs fitted to those that are there; NaN from where it runs away.
@@ -91,7 +94,7 @@ class PolynomialBody:
         known, k, start = runs.used, self.coefficients.size, runs.start_values()
         best, cost = np.full(y.size, np.nan), np.inf
         for _ in range(START_STEPS if np.count_nonzero(known) > 4 * start.size else 1):
-            ran = runs.run(np.concatenate([self.coefficients, start]))
+            ran = runs.run(np.concatenate([self.coefficients, start, self.friction]))
             if ran is None:
                 break
             left = (y - ran[0])[known]
@@ -99,7 +102,7 @@ class PolynomialBody:
             if not now < cost * (1.0 - 1e-6):
                 break
             best, cost = ran[0], now
-            moved = runs.sensitivities(*ran, self.terms, starts=True)[known][:, k:]
+            moved = runs.sensitivities(*ran, self.terms, starts=True)[known][:, k : k + start.size]
             if not np.isfinite(moved).all():
                 break
             start = start + np.linalg.lstsq(moved, left, rcond=None)[0]
@@ -121,8 +124,35 @@ class PolynomialBody:
             Output, scaled.
         """
         out = products(self.variables, self.terms, u, y) @ self.coefficients
+        if self.friction.size:
+            stay = np.concatenate([y[:1], y[:-1]]) if self.variables.friction == "position" else self.friction[2]
+            low, high = self.friction[:2]
+            out = np.where(out - stay > high, out - high, np.where(stay - out > low, out + low, stay + 0.0 * out))
         out[: self.variables.n_start] = np.nan
         return out
+
+    def nonlinearity(self, by: Scaling, sample_time: float) -> dict[str, Any] | None:
+        """Return the friction of an output that rubs: how fast it brakes what moves down and up, and where that rests.
+
+        Parameters
+        ----------
+        by : Scaling
+            Of the fitted data.
+        sample_time : float
+            Between samples [s].
+
+        Returns
+        -------
+        dict or None
+            Of a velocity ``below`` and ``above`` in its unit a second, of a position in its unit a second squared.
+        """
+        if not self.friction.size:
+            return None
+        moves = by.y_std / sample_time ** (2 if self.variables.friction == "position" else 1)
+        told = {"below": moves * self.friction[0], "above": moves * self.friction[1]}
+        told |= {"rest": by.y_mean + by.y_std * self.friction[2]} if self.friction.size > 2 else {}
+        values = {name: {"value": float(one), "std": None, "ci95": None} for name, one in told.items()}
+        return {"kind": f"{self.variables.friction}-friction", **values}
 
     def to_dict(self) -> dict[str, Any]:
         """Return JSON values."""
@@ -133,22 +163,28 @@ class PolynomialBody:
             "limits": one.limits.tolist(),
             "terms": [[int(v) for v in term if v >= 0] for term in self.terms],
             "values": self.coefficients.tolist(),
+            **({"friction": {"of": one.friction, "values": self.friction.tolist()}} if one.friction else {}),
         }
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> "PolynomialBody":
         """Return the body that `to_dict` wrote."""
         source, lag = (np.array(values[name], dtype=np.int64) for name in ("source", "lag"))
-        variables = Variables(source, lag, np.array(values["limits"], dtype=np.float64).reshape(-1, 2))
+        rub = values.get("friction", {"of": "", "values": []})
+        limits = np.array(values["limits"], dtype=np.float64).reshape(-1, 2)
+        variables = Variables(source, lag, limits, str(rub["of"]))
+        friction = np.array(rub["values"], dtype=np.float64)
+        if friction.size != variables.n_friction:
+            raise ValueError(f"friction of {variables.n_friction} values is needed, got {friction.size}")
         terms = np.full((len(values["terms"]), 3), -1, dtype=np.int64)
         for row, term in zip(terms, values["terms"], strict=True):
             row[: len(term)] = term
-        return cls(variables, terms, np.array(values["values"], dtype=np.float64))
+        return cls(variables, terms, np.array(values["values"], dtype=np.float64), friction)
 
     @classmethod
     def of(cls, fit: PolynomialFit) -> "PolynomialBody":
         """Return the body of a fit."""
-        return cls(fit.variables, fit.terms, fit.coefficients)
+        return cls(fit.variables, fit.terms, fit.coefficients, fit.friction)
 
 
 BODIES: Mapping[str, Any] = {one.kind: one for one in (LinearBody, PolynomialBody, HammersteinBody, StateSpaceBody)}

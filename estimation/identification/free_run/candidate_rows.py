@@ -45,6 +45,7 @@ def polynomial_row(one: PolynomialCandidate) -> dict[str, Any]:
         "structure": "narx",
         "order": one.fit.variables.n_start,
         "terms": int(np.count_nonzero(terms[:, 1] >= 0)),
+        **({"friction": one.fit.variables.friction} if one.fit.variables.friction else {}),
         "held_back_percent": 100.0 * (1.0 - one.held_back),
         "spread_percent": 100.0 * one.spread if np.isfinite(one.spread) else None,
         "bic": one.bic,

@@ -6,16 +6,18 @@ is offered must run well there, and its fits to different blocks must agree wher
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from estimation.identification.free_run.choose_linear import BLOCKS, Candidate, block_error, pooled
 from estimation.identification.free_run.data import Channels, blocks
 from estimation.identification.free_run.dense_polynomial import Asked, Judged, forms_tried, judged_recipes
-from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_fit import LinearFit, fit_linear
 from estimation.identification.free_run.other_orders import disagreement, is_wild
 from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs
 from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, one_more, without_term
+from estimation.identification.free_run.rubbing import continued, rubbing
 
 MOST_TERMS = 20
 """Products beside the linear terms."""
@@ -28,6 +30,9 @@ CLEARLY = 0.01
 
 HIGHEST_BASE = 4
 """Order of the linear model that products are added to."""
+
+HIGHEST_RUBBING, RUBS = 3, 0.1
+"""Order of a linear model whose output may rub, and share of the squared error that friction must explain."""
 
 BASES, SCREENED, KEPT = 6, 3, 2
 """Linear models that products are added to, how many products they are given first, and how many models go on."""
@@ -89,12 +94,37 @@ def polynomial_candidates(
 
 
 def _grown(linear: Sequence[Candidate], data: Channels) -> list[PolynomialCandidate]:
-    growths = [_Growth(base, whole, data) for base in _bases(linear) if (whole := begun(base.fit, data)) is not None]
+    growths = [
+        _Growth(whole, _from_linear(base.fit), data)
+        for base in _bases(linear)
+        if (whole := begun(base.fit, data)) is not None
+    ]
+    return [*_best_grown(growths, KEPT), *_best_grown(_rubbing(linear, data), 1)]
+
+
+def _best_grown(growths: Sequence["_Growth"], count: int) -> list[PolynomialCandidate]:
     screened = [growth for growth in growths if growth.advance(SCREENED)]
-    best = sorted(screened, key=lambda one: min(one.errors))[:KEPT]
+    best = sorted(screened, key=lambda one: min(one.errors))[:count]
     for growth in best:
         growth.advance(MOST_TERMS)
     return [growth.finished() for growth in best]
+
+
+def _from_linear(base: LinearFit) -> Callable[[Channels], PolynomialFit | None]:
+    return lambda part: begun(fit_linear(base.form, part, [base.f]), part)
+
+
+def _rubbing(linear: Sequence[Candidate], data: Channels) -> list["_Growth"]:
+    """Return growths from models whose output rubs, if friction explains much that linear models leave."""
+    found = list[_Growth]()
+    for base in _bases(linear):
+        if base.form.order > HIGHEST_RUBBING:
+            continue
+        for friction in ("velocity", "position")[: base.form.order]:
+            whole = rubbing(base.fit, friction, data)
+            if whole is not None and whole.cost < (1.0 - RUBS) * base.fit.cost:
+                found.append(_Growth(whole, partial(continued, whole), data))
+    return found
 
 
 def _dense(data: Channels, delays: tuple[int, ...], asked: Asked) -> list[PolynomialCandidate]:
@@ -137,11 +167,11 @@ def _bases(linear: Sequence[Candidate]) -> list[Candidate]:
 class _Growth:
     """Polynomial models of one base that grow on each block's data side by side."""
 
-    def __init__(self, base: Candidate, whole: PolynomialFit, data: Channels) -> None:
+    def __init__(self, whole: PolynomialFit, begin: Callable[[Channels], PolynomialFit | None], data: Channels) -> None:
         self.path, self.data = [whole], data
         self.masks = blocks(data, BLOCKS)
         self.parts = [data.without(mask) for mask in self.masks]
-        self.fits = [begun(fit_linear(base.form, part, [base.fit.f]), part) for part in self.parts]
+        self.fits = [begin(part) for part in self.parts]
         self.block_errors = [self._held_back()]
         self.history = [list(self.fits)]
 
@@ -179,7 +209,7 @@ class _Growth:
         parts = [part for part in self.history[count] if part is not None]
         spread = disagreement(parts, fit, self.data)
         bic = _bic(fit, self.data)
-        return PolynomialCandidate(fit, _settled(fit), errors[count], self.block_errors[count], spread, bic)
+        return PolynomialCandidate(fit, partial(continued, fit), errors[count], self.block_errors[count], spread, bic)
 
     def _held_back(self) -> tuple[float, ...]:
         target, errors = np.concatenate(self.data.y), list[float]()
@@ -189,16 +219,6 @@ class _Growth:
                 return (float("inf"),) * len(self.masks)
             errors.append(block_error(ran[0] - target, np.concatenate(mask) & np.isfinite(target)))
         return tuple(errors)
-
-
-def _settled(fit: PolynomialFit) -> Callable[[Channels], PolynomialFit | None]:
-    """Return how the products of a fit are fitted to other data."""
-
-    def refit(data: Channels) -> PolynomialFit | None:
-        runs = Runs(fit.variables, fit.terms, data)
-        return runs.fit(np.concatenate([fit.coefficients, runs.start_values()]), FINAL_STEPS)
-
-    return refit
 
 
 def _pruned(fit: PolynomialFit, data: Channels) -> PolynomialFit:

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.arrays import Array
-from estimation.identification.free_run.bodies import BODIES, Body, LinearBody, StateSpaceBody
+from estimation.identification.free_run.bodies import BODIES, Body, LinearBody, PolynomialBody, StateSpaceBody
 from estimation.identification.free_run.data import Scaling
+from estimation.identification.free_run.hammerstein_body import HammersteinBody
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -69,6 +70,15 @@ class FreeRunModel:
     def n_values(self) -> int:
         """Fitted coefficients."""
         return self.body.n_values
+
+    @property
+    def nonlinearity(self) -> dict[str, Any] | None:
+        """What bends the input or holds the output, by kind and values in the channels' units; None without it."""
+        if isinstance(self.body, HammersteinBody):
+            return self.body.nonlinearity(self.scaling)
+        if isinstance(self.body, PolynomialBody):
+            return self.body.nonlinearity(self.scaling, self.sample_time)
+        return None
 
     def simulate(self, u: ArrayLike, y: ArrayLike | None = None) -> Array:
         """Return the free run of the model.

@@ -24,6 +24,11 @@ TOLERANCE = 1e-8
 """Share of the cost that a further step may promise at the end."""
 
 
+FRICTIONS = {"": 0, "position": 2, "velocity": 3}
+"""What an output that rubs is, and how many values its friction has: what is taken off below and above, and, of a
+velocity, where it rests; a position rests where it was."""
+
+
 @dataclass(frozen=True, eq=False)
 class Variables:
     """The lagged signals that terms multiply.
@@ -34,11 +39,19 @@ class Variables:
         0 for the output, else the input's number from 1; and how many samples earlier.
     limits : ndarray, shape (v, 2)
         Ends at which each is held in products.
+    friction : str
+        One of `FRICTIONS`: dry friction takes a level off what the terms give, and holds the output within it.
     """
 
     source: IntArray
     lag: IntArray
     limits: Array
+    friction: str = ""
+
+    @property
+    def n_friction(self) -> int:
+        """Values of its friction."""
+        return FRICTIONS[self.friction]
 
     @property
     def ends(self) -> Array:
@@ -78,8 +91,8 @@ class PolynomialFit:
     ----------
     terms : ndarray of int, shape (k, 3)
         Variables that each term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
-    theta : ndarray, shape (k + n_start * logs,)
-        Coefficients, and the first outputs of each log.
+    theta : ndarray, shape (k + n_start * logs + n_friction,)
+        Coefficients, the first outputs of each log, and the values of the friction.
     cost : float
         Sum of squared residuals of the free run [dimensionless].
     """
@@ -93,6 +106,11 @@ class PolynomialFit:
     def coefficients(self) -> Array:
         """One a term."""
         return self.theta[: self.terms.shape[0]]
+
+    @property
+    def friction(self) -> Array:
+        """Values of the friction; empty where there is none."""
+        return self.theta[self.theta.size - self.variables.n_friction :]
 
 
 def variables_of(linear: LinearFit, data: Channels) -> tuple[Variables, IntArray, Array]:
@@ -167,7 +185,7 @@ class Runs:
         Returns
         -------
         tuple of ndarray and list of ndarray, or None
-            Shapes (n,), and (n, lags) of each log.
+            Shapes (n,), and (n, lags) of each log, a column more where the output rubs.
         """
         k, n = self.terms.shape[0], self.variables.n_start
         outs, slopes = list[Array](), list[Array]()
@@ -177,16 +195,16 @@ class Runs:
             out, begin = np.zeros(u.shape[0]), self.begins[index]
             out[: begin - n] = first_values(self.data.y[index], begin - n)
             out[begin - n : begin] = theta[k + index * n : k + (index + 1) * n]
-            slope = np.zeros((u.shape[0], n))
-            one, values = self.variables, theta[:k].copy()
-            if run_free(values, self.terms, one.source, one.lag, one.limits, ends, begin, u, out, slope) >= 0:
+            slope = np.zeros((u.shape[0], n + bool(self.variables.friction)))
+            one, values, rub = self.variables, theta[:k].copy(), theta[theta.size - self.variables.n_friction :].copy()
+            if run_free(values, self.terms, one.source, one.lag, one.limits, ends, begin, u, out, slope, rub) >= 0:
                 return None
             outs.append(out)
             slopes.append(slope)
         return np.concatenate(outs), slopes
 
     def sensitivities(self, output: Array, slopes: Sequence[Array], terms: IntArray, *, starts: bool) -> Array:
-        """Return the derivative of the free run by coefficients of terms, and by first values where wanted.
+        """Return the derivative of the free run by coefficients of terms, and by the other values where wanted.
 
         Parameters
         ----------
@@ -196,23 +214,32 @@ class Runs:
             Likewise, one a log.
         terms : ndarray of int, shape (k, d)
             Variables that each term multiplies; -1 stands for 1.
+        starts : bool
+            Whether first outputs and values of the friction are wanted.
 
         Returns
         -------
-        ndarray, shape (n, k) or (n, k + lags * logs)
+        ndarray, shape (n, k) or (n, k + lags * logs + friction)
             One column a value.
         """
         n, rows = self.variables.n_start, list[Array]()
-        place, count = 0, terms.shape[0]
+        place, count, last = 0, terms.shape[0], terms.shape[0] + n * len(slopes)
         for index, (u, slope) in enumerate(zip(self.data.u, slopes, strict=True)):
             part, begin = output[place : place + u.shape[0]], self.begins[index]
             place += u.shape[0]
-            direct = np.zeros((part.size, count + (n * len(slopes) if starts else 0)))
+            direct = np.zeros((part.size, last + self.variables.n_friction if starts else count))
             write_products(*_signals(self.variables, u, part), terms, direct)
             direct[:begin, :count] = 0.0
             if starts:
                 direct[begin - n + np.arange(n), count + index * n + np.arange(n)] = 1.0
-            carry(slope, begin, direct)
+            if self.variables.friction:
+                slips = slope[begin:, n]
+                direct[begin:, :count] *= np.abs(slips)[:, None]
+                if starts:
+                    direct[begin:, last] = slips < 0.0
+                    direct[begin:, last + 1] = -(slips > 0.0).astype(np.float64)
+                    direct[begin:, last + 2 :] = (slips == 0.0)[:, None]
+            carry(np.ascontiguousarray(slope[:, :n]), begin, direct)
             rows.append(direct)
         return np.concatenate(rows)
 
@@ -250,7 +277,12 @@ class Runs:
             least = reached
             return reached, gram, jacobian.T @ left + weight * values
 
-        cost, best = levenberg(at, theta, lambda _: True, tolerance=TOLERANCE, most_steps=steps)
+        rubbing = slice(theta.size - self.variables.n_friction, theta.size)
+
+        def acceptable(values: Array) -> bool:
+            return bool((values[rubbing][:2] >= 0.0).all())
+
+        cost, best = levenberg(at, theta, acceptable, tolerance=TOLERANCE, most_steps=steps)
         if not np.isfinite(cost):
             return None
         return PolynomialFit(self.variables, self.terms, best, cost - float(weight @ best**2))

@@ -18,6 +18,7 @@ def run_free(
     u: Array,
     out: Array,
     slope: Array,
+    rub: Array,
 ) -> int:
     """Write the output from a sample on, and its slope by its own past; return where it ran away, else -1.
 
@@ -40,9 +41,15 @@ def run_free(
     out : ndarray, shape (n,)
         Holds outputs before that sample; the others are written.
     slope : ndarray, shape (n, l)
-        Written: derivative of each output by the l before it.
+        Written: derivative of each output by the l before it; where the output rubs, the last column is 1 where
+        friction holds it back from above, -1 from below, and 0 where it holds it.
+    rub : ndarray, shape (f,)
+        What friction takes off the output below and above where it rests: at the third value, or of two where it was a
+        sample before; there it stays unless more than that moves it. None where nothing rubs.
     """
     n, n_start = out.size, slope.shape[1]
+    if rub.size > 0:
+        n_start -= 1
     z, held = limits[:, 0].copy(), limits[:, 0].copy()
     # where a slope by each variable goes: one place more takes those by inputs, and by outputs that are held
     single, inner, rates = source.copy(), source.copy(), np.zeros(n_start + 1)
@@ -77,6 +84,22 @@ def run_free(
                 rates[inner[c]] += first * held[b]
         if not abs(total) < 1e3:
             return t
+        if rub.size > 0:
+            stay = out[t - 1]
+            if rub.size > 2:
+                stay = rub[2]
+            slope[t, n_start] = 0.0
+            if total - stay > rub[1]:
+                total -= rub[1]
+                slope[t, n_start] = 1.0
+            elif stay - total > rub[0]:
+                total += rub[0]
+                slope[t, n_start] = -1.0
+            else:
+                total = stay
+                rates[:] = 0.0
+                if rub.size == 2:
+                    rates[0] = 1.0
         if total < ends[0] or total > ends[1]:
             total = min(max(total, ends[0]), ends[1])
             rates[:] = 0.0

@@ -201,7 +201,7 @@ def choices_of_polynomials() -> dict[str, Any]:
     )
     whole = polynomial_terms.begun(base.fit, data())
     assert whole is not None
-    growth = choose_polynomial._Growth(base, whole, data())
+    growth = choose_polynomial._Growth(whole, choose_polynomial._from_linear(base.fit), data())
     told["grows"] = growth.advance(2)
     told["growth"] = [Found(one, 1e-3) for one in growth.errors]
     done = growth.finished()

@@ -168,7 +168,7 @@ def ran(way: Callable[[Any], Any], theta: Array, limit: float, ends: tuple[float
     u, out, slope = rng.uniform(-1.0, 1.0, (60, 1)), np.zeros(60), np.zeros((60, 2))
     out[:2] = 0.1, -0.2
     limits = limit * np.array([[-1.0, 1.0]] * 3)
-    where = way(run_free)(theta, TERMS, SOURCE, LAG, limits, np.array(ends), 2, u, out, slope)
+    where = way(run_free)(theta, TERMS, SOURCE, LAG, limits, np.array(ends), 2, u, out, slope, np.empty(0))
     return where, out, slope
 
 

@@ -1,0 +1,150 @@
+"""Models whose output rubs: what dry friction holds stays, and friction that was planted is found again."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.arrays import Array
+from estimation.identification.free_run.bodies import PolynomialBody
+from estimation.identification.free_run.data import Channels, channels_from, scaled
+from estimation.identification.free_run.identify import Identified, identify_channels
+from estimation.identification.free_run.linear_fit import Form, fit_linear
+from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.polynomial_fit import Runs
+from estimation.identification.free_run.polynomial_kernel import run_free
+from estimation.identification.free_run.rubbing import continued, rubbing
+from plant.errors import HydrostateError
+
+FRICTION, STEP = 0.4, 0.02
+"""Deceleration by friction [m/s^2], and seconds between samples [s]."""
+
+NOISE = 0.005
+"""Deviation of the sensor's noise [m/s]."""
+
+
+def body(n: int, seed: int, friction: float = FRICTION) -> tuple[Array, Array]:
+    """Return force over mass and velocity of a body that really sticks, in a hundred steps a sample."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-1.5, 1.5, n // 20 + 1), 20)[:n]
+    y, v, fine = np.zeros(n), 0.0, STEP / 100.0
+    for t in range(n):
+        y[t] = v
+        for _ in range(100):
+            free = v + fine * (u[t] - 0.8 * v)
+            v = np.sign(free) * max(abs(free) - fine * friction, 0.0)
+    return u, y + NOISE * rng.normal(size=n)
+
+
+@cache
+def log(n: int = 700, seed: int = 1, friction: float = FRICTION) -> Channels:
+    u, y = body(n, seed, friction)
+    return channels_from([u[:, None]], [y], STEP, ["force"], "speed")
+
+
+@cache
+def found() -> Identified:
+    return identify_channels(log(), structure="auto")
+
+
+@pytest.mark.parametrize("way", [lambda loop: loop, lambda loop: loop.__wrapped__], ids=["compiled", "Python"])
+@pytest.mark.parametrize("rub", [[0.1, 0.2], [0.1, 0.2, 0.05]], ids=["position", "velocity"])
+def test_friction_takes_a_level_off_and_holds_what_moves_less(way: Callable[[Any], Any], rub: list[float]) -> None:
+    u = np.random.default_rng(3).uniform(-1.0, 1.0, (80, 1))
+    terms, values = np.array([[0, -1, -1], [1, -1, -1]]), np.array([0.6, 0.5])
+    out, slope, limits = np.zeros(80), np.zeros((80, 2)), np.array([[-9.0, 9.0]] * 2)
+    ends = np.array([-9.0, 9.0])
+    source, lag = np.array([0, 1]), np.array([1, 1])
+    assert way(run_free)(values, terms, source, lag, limits, ends, 1, u, out, slope, np.array(rub)) == -1
+    seen: set[int] = set()
+    for t in range(1, 80):
+        free = 0.6 * out[t - 1] + 0.5 * u[t - 1, 0]
+        rest = rub[2] if len(rub) == 3 else out[t - 1]
+        moved = free - rest
+        side = 1 if moved > 0.2 else -1 if moved < -0.1 else 0
+        assert out[t] == pytest.approx(rest if side == 0 else free - 0.2 if side == 1 else free + 0.1)
+        assert slope[t].tolist() == ([0.6, side] if side else [float(len(rub) == 2), 0.0])
+        seen.add(side)
+    assert seen == {-1, 0, 1}
+
+
+@pytest.mark.parametrize("friction", ["velocity", "position"])
+def test_sensitivities_are_the_derivatives_of_a_run_that_sticks(friction: str) -> None:
+    data, _ = scaled(log(200))
+    fit = rubbing(fit_linear(Form(2, (2,), (1,)), data), friction, data)
+    assert fit is not None
+    size = fit.theta.size - fit.variables.n_friction
+    fit = replace(fit, theta=np.concatenate([fit.theta[:size], np.array([0.012, 0.01, 0.0])[: fit.friction.size]]))
+    runs = Runs(fit.variables, fit.terms, data)
+    ran = runs.run(fit.theta)
+    assert ran is not None
+    slips = ran[1][0][2:, -1]
+    assert set(slips.tolist()) == {-1.0, 0.0, 1.0}
+    jacobian = runs.sensitivities(*ran, fit.terms, starts=True)
+    assert jacobian.shape[1] == fit.theta.size
+    for k in range(fit.theta.size):
+        step = np.zeros(fit.theta.size)
+        step[k] = 1e-8
+        ends = [runs.run(fit.theta + sign * step) for sign in (1.0, -1.0)]
+        moved = (ends[0][0] - ends[1][0]) / 2e-8  # type: ignore[index]
+        assert moved == pytest.approx(jacobian[:, k], abs=1e-4 * max(1.0, float(np.abs(jacobian[:, k]).max())))
+
+
+def test_friction_that_was_planted_is_found_and_runs_better_than_every_polynomial() -> None:
+    model = found().model
+    assert model.structure == "narx"
+    said = model.nonlinearity
+    assert said is not None
+    assert said["kind"] == "velocity-friction"
+    for side in ("below", "above"):
+        assert said[side]["value"] == pytest.approx(FRICTION, rel=0.1)
+    assert said["rest"]["value"] == pytest.approx(0.0, abs=0.02)
+    u, y = body(700, 2)
+    left = float(np.sqrt(np.mean((model.simulate(u, y) - y)[5:] ** 2)))
+    assert left < 2.0 * NOISE
+    assert {one.get("friction") for one in found().candidates} >= {None, "velocity"}
+
+
+def test_a_body_that_does_not_rub_is_given_no_friction() -> None:
+    plain = identify_channels(log(400, 1, 0.0), structure="auto", order=1, delay=1)
+    assert plain.model.structure == "output-error"
+    assert plain.model.nonlinearity is None
+    assert not any("friction" in one for one in plain.candidates)
+
+
+def test_a_fit_goes_on_with_other_data_from_where_it_is() -> None:
+    data, by = scaled(log())
+    fit = rubbing(fit_linear(Form(1, (1,), (1,)), data), "velocity", data)
+    assert fit is not None
+    masks = [np.arange(data.y[0].size) > 350]
+    part = continued(fit, data.without(masks))
+    assert part is not None
+    assert not np.array_equal(part.theta, fit.theta)
+    assert part.friction[:2] * by.y_std / STEP == pytest.approx([FRICTION, FRICTION], rel=0.1)
+
+
+def test_a_saved_model_that_rubs_runs_and_predicts_as_before() -> None:
+    model = found().model
+    u, y = body(300, 3)
+    again = FreeRunModel.from_dict(model.to_dict())
+    assert np.array_equal(again.simulate(u, y), model.simulate(u, y))
+    assert np.array_equal(again.predict(u, y), model.predict(u, y), equal_nan=True)
+    assert again.nonlinearity == model.nonlinearity
+    values = model.to_dict()
+    values["body"]["friction"]["values"] = [0.1]
+    with pytest.raises(HydrostateError, match="friction of 3 values is needed, got 1"):
+        FreeRunModel.from_dict(values)
+
+
+@pytest.mark.parametrize("friction", ["velocity", "position"])
+def test_the_prediction_of_one_step_sticks_as_the_run_does(friction: str) -> None:
+    data, _ = scaled(log(200))
+    fit = rubbing(fit_linear(Form(2, (2,), (1,)), data), friction, data)
+    assert fit is not None
+    body = PolynomialBody.of(fit)
+    u = data.u[0]
+    run = body.run(u, data.y[0])
+    assert body.one_step(u, run)[4:] == pytest.approx(run[4:], abs=1e-9)
