@@ -31,8 +31,9 @@ CLEARLY = 0.01
 HIGHEST_BASE = 4
 """Order of the linear model that products are added to."""
 
-HIGHEST_RUBBING, RUBS = 3, 0.1
-"""Order of a linear model whose output may rub, and share of the squared error that friction must explain."""
+HIGHEST_RUBBING, RUBBING_BASES, RUBS = 3, 2, 0.1
+"""Order of a linear model whose output may rub, models of each order, and share of the squared error that friction must
+explain."""
 
 BASES, SCREENED, KEPT = 6, 3, 2
 """Linear models that products are added to, how many products they are given first, and how many models go on."""
@@ -116,15 +117,17 @@ def _from_linear(base: LinearFit) -> Callable[[Channels], PolynomialFit | None]:
 
 def _rubbing(linear: Sequence[Candidate], data: Channels) -> list["_Growth"]:
     """Return growths from models whose output rubs, if friction explains much that linear models leave."""
-    found = list[_Growth]()
-    for base in _bases(linear):
-        if base.form.order > HIGHEST_RUBBING:
-            continue
-        for friction in ("velocity", "position")[: base.form.order]:
-            whole = rubbing(base.fit, friction, data)
-            if whole is not None and whole.cost < (1.0 - RUBS) * base.fit.cost:
-                found.append(_Growth(whole, partial(continued, whole), data))
-    return found
+    fits: list[PolynomialFit] = []
+    for order in range(1, HIGHEST_RUBBING + 1):
+        # what rubs may integrate: a time constant beyond the record is no doubt here
+        own = sorted((one for one in linear if one.form.order == order), key=lambda one: one.held_back)
+        for base in own[:RUBBING_BASES]:
+            for friction in ("velocity", "position")[:order]:
+                fit = rubbing(base.fit, friction, data)
+                if fit is not None and fit.cost < (1.0 - RUBS) * base.fit.cost:
+                    fits.append(fit)
+    best = sorted(fits, key=lambda one: _bic(one, data))[:KEPT]
+    return [_Growth(fit, partial(continued, fit), data) for fit in best]
 
 
 def _dense(data: Channels, delays: tuple[int, ...], asked: Asked) -> list[PolynomialCandidate]:

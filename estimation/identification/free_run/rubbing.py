@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.linear_fit import LinearFit
+from estimation.identification.free_run.linear_fit import LinearFit, Problem
 from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs, variables_of
 
 LEVELS = (0.02, 0.1, 0.3, 0.6)
@@ -29,14 +30,23 @@ def rubbing(linear: LinearFit, friction: str, data: Channels) -> PolynomialFit |
     """
     plain, terms, values = variables_of(linear, data)
     runs = Runs(replace(plain, friction=friction), terms, data)
+    begun = _first_outputs(linear, runs, data)
     put_in = float(np.abs([one.sum() for one in linear.numerators]).sum())
     found: list[PolynomialFit] = []
     for level in LEVELS:
         rub = np.array([level * put_in, level * put_in, 0.0])[: runs.variables.n_friction]
-        fit = runs.fit(np.concatenate([values, runs.start_values(), rub]), FINAL_STEPS)
+        fit = runs.fit(np.concatenate([values, begun, rub]), FINAL_STEPS)
         if fit is not None:
             found.append(fit)
     return min(found, key=lambda one: one.cost, default=None)
+
+
+def _first_outputs(linear: LinearFit, runs: Runs, data: Channels) -> Array:
+    """Return the outputs of the linear model that each log's run begins with: noise sends what integrates astray."""
+    problem, n = Problem(linear.form, data), runs.variables.n_start
+    output = problem.jacobian(linear.theta)[0]
+    places = zip(problem.bounds[:-1], runs.begins, strict=True)
+    return np.concatenate([output[int(first) + begin - n : int(first) + begin] for first, begin in places])
 
 
 def continued(fit: PolynomialFit, data: Channels) -> PolynomialFit | None:
