@@ -97,8 +97,10 @@ LATEST = 2e-2
 holds for one that is short beside what moves. In a log of another actuator the misfit may fall with every millisecond
 more, and the search for a delay would have no end."""
 
+PRESSURE_LATE = Hypothesis("pressure_late", ("pressure_lag",), ({"pressure_lag": 1e-3},), LATE_TRIED)
+
 HYPOTHESES = (
-    Hypothesis("pressure_late", ("pressure_lag",), ({"pressure_lag": 1e-3},), LATE_TRIED),
+    PRESSURE_LATE,
     Hypothesis(
         "speed_late",
         ("speed_lag",),

@@ -67,6 +67,15 @@ class ShownPlay(NamedTuple):
 NO_PLAY = ShownPlay(0.0, 0.0)
 
 
+PLAY_STRUCTURE = 5e-3
+"""Relative standard deviation of bulk modulus where the encoder has a play, as what the piston does while it crosses
+that is not known; judged [fraction]."""
+
+PLAY_OPEN = 0.5
+"""Share of what a play puts bulk modulus off by that is left open, as the piston crosses by none of the courses that
+are tried [fraction]: 0.2 covered too few training logs with a play. It puts it off by as much as the fit with a play
+differs from that without, or by what the piston yields unseen beside what the oil does."""
+
 PLAY_SHOWN = 4.0
 """Gain in log-likelihood from which residuals show a play of the encoder [dimensionless]: by chance each of three
 courses gains it in one log of 430, so one log in 140 at most is asked in vain."""
@@ -176,6 +185,19 @@ def play_left(*shown: ShownPlay) -> tuple[Note, ...]:
     """
     large = [one.size for one in shown if one.gain > PLAY_SHOWN and one.size > LEAST_PLAY]
     return (EstimateCode.PLAY_LEFT.note(play_um=1e6 * max(large)),) if large else ()
+
+
+def play_structure(moved: float, yields: float) -> float:
+    """Return the relative deviation of bulk modulus that the crossing of a play leaves open.
+
+    Parameters
+    ----------
+    moved : float
+        Relative difference of bulk modulus from a fit without the play [fraction].
+    yields : float
+        What the piston yields unseen, over what the oil does [fraction].
+    """
+    return float(np.hypot(PLAY_STRUCTURE, PLAY_OPEN * max(moved, yields)))
 
 
 def sensed_play(record: Record) -> ShownPlay:

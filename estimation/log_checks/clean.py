@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from estimation.log_checks.channel_physics import channel_mistakes
-from estimation.log_checks.filtered import without_correlated_noise
+from estimation.log_checks.filtered import independent_variance, without_correlated_noise
 from estimation.log_checks.held import without_held
 from estimation.log_checks.hum import without_hum
-from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
 from estimation.log_checks.outliers import without_gross_outliers
 from estimation.log_checks.sensor_check import PRESSURE, PRESSURES, sensor_objections, without_saturated
 from plant.eha.model import EhaParameters
@@ -86,4 +86,11 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     objections = () if mistakes else objections  # a sensor cannot be judged by channels of another meaning
     sound, filtered = without_correlated_noise(sound)
     left_out = (*held, *outliers, *clipped, *hum, *filtered)
-    return CleanLog(sound, measurement_variances(sound, known), left_out, objections, mistakes)
+    variances = {**measurement_variances(sound, known), **_thinned_variances(sound, filtered)}
+    return CleanLog(sound, variances, left_out, objections, mistakes)
+
+
+def _thinned_variances(record: Record, filtered: tuple[Note, ...]) -> Mapping[str, float]:
+    """Return the variances of channels of which one sample in several was kept."""
+    found = {name: independent_variance(record[name]) for name in (str(note.data["channel"]) for note in filtered)}
+    return {name: max(one, SMALLEST_VARIANCE[PRESSURE]) for name, one in found.items() if one is not None}

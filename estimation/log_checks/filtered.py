@@ -16,6 +16,8 @@ from plant.notes import Note
 WINDOW = 64
 """Samples of a window of the spectrum [count]."""
 
+_TAPER = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(WINDOW) / WINDOW)
+
 FEWEST_WINDOWS = 8
 """Windows without a missing sample below which a spectrum is not judged [count]."""
 
@@ -124,11 +126,42 @@ def flatness(windows: Array) -> float:
     float
         The ratio [dimensionless], 1 where there is no power.
     """
+    bands = _powers(windows)
+    return min(bands) / max(bands) if max(bands) > 0.0 else 1.0
+
+
+def independent_variance(values: Array) -> float | None:
+    """Return the variance of a channel's independent noise by its highest band, None where too few samples are there.
+
+    Second differences of samples that are far apart hold what the actuator does.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        The channel [any unit]; NaN where it has no sample.
+
+    Returns
+    -------
+    float or None
+        The variance [unit squared].
+
+    Examples
+    --------
+    >>> round(independent_variance(np.random.default_rng(1).normal(0.0, 3.0, 20_000)), 1)
+    9.0
+    """
+    windows = _windows(values[np.isfinite(values)])
+    if len(windows) < FEWEST_WINDOWS:
+        return None
+    # the median of an exponential variable, as a spectrum's power is one, is its mean times log 2
+    return _powers(windows)[-1] / float(np.log(2.0) * np.sum(_TAPER**2))
+
+
+def _powers(windows: Array) -> list[float]:
+    """Return the usual power of windows in each of the bands [unit squared]."""
     line = np.linspace(-1.0, 1.0, WINDOW)
     level = windows - np.mean(windows, axis=1, keepdims=True)
     level -= np.outer(level @ line / (line @ line), line)
-    tapered = level * (0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(WINDOW) / WINDOW))
-    power = np.median(np.abs(np.fft.rfft(tapered, axis=1)) ** 2, axis=0)
+    power = np.median(np.abs(np.fft.rfft(level * _TAPER, axis=1)) ** 2, axis=0)
     place = np.searchsorted(BANDS, np.arange(len(power)) / WINDOW, side="right")
-    bands = [float(np.mean(power[place == band])) for band in range(1, len(BANDS))]
-    return min(bands) / max(bands) if max(bands) > 0.0 else 1.0
+    return [float(np.mean(power[place == band])) for band in range(1, len(BANDS))]

@@ -93,6 +93,7 @@ LOGGERS = (
         "pressure_averaged",
         "differential pressure is a moving average over 2 to 6 ms",
         lambda setup, rng: setup.with_sensor(PRESSURES, average=int(rng.integers(2, 7))),
+        MAYBE,
         named=r"\bfilter|\baverag",
     ),
     Kind(

@@ -10,11 +10,20 @@ import numpy as np
 import pytest
 
 from estimation.fits import flow_fit as module
-from estimation.fits.flow_fit import DOUBTED, PLAY_OPEN, PLAY_SENSED, PLAY_STRUCTURE, fit_flow
+from estimation.fits.flow_fit import DOUBTED, PLAY_SENSED, fit_flow
 from estimation.fits.flow_search import balanced, flow_starts
 from estimation.fits.form_fit import FormFit
 from estimation.fits.hypotheses import PLAY, Hypothesis
-from estimation.fits.play import NO_PLAY, PLAY_SHOWN, ShownPlay, crossings, play_left, sensed_play
+from estimation.fits.play import (
+    NO_PLAY,
+    PLAY_OPEN,
+    PLAY_SHOWN,
+    PLAY_STRUCTURE,
+    ShownPlay,
+    crossings,
+    play_left,
+    sensed_play,
+)
 from estimation.fits.promises import Promise
 from estimation.notes import EstimateCode
 from faults.conditions import CONDITIONS, parameters_for
