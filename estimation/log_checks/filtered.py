@@ -6,7 +6,7 @@ sees a slow sensor, and finds the filter's lag as any other.
 
 import numpy as np
 
-from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
+from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE
 from estimation.log_checks.sensor_check import PRESSURE, PRESSURES
 from estimation.notes import SensorCode
 from plant.arrays import Array
@@ -51,10 +51,10 @@ def without_correlated_noise(record: Record) -> tuple[Record, tuple[Note, ...]]:
     """
     changed, notes = dict[str, Array](), list[Note]()
     for name in PRESSURES:
-        if name not in record or measurement_variances(record, [name])[name] <= SMALLEST_VARIANCE[PRESSURE]:
-            continue  # a simulation without noise, whose spectrum is the actuator's
-        if (rows := independent_rows(record[name], record.sample_time)) == 1:
+        if name not in record or (rows := independent_rows(record[name], record.sample_time)) == 1:
             continue
+        if (independent_variance(record[name]) or 0.0) <= SMALLEST_VARIANCE[PRESSURE]:
+            continue  # a simulation without noise, whose spectrum is the actuator's
         values = np.full(len(record), np.nan)
         values[::rows] = record[name][::rows]
         changed[name] = values
@@ -162,6 +162,7 @@ def _powers(windows: Array) -> list[float]:
     line = np.linspace(-1.0, 1.0, WINDOW)
     level = windows - np.mean(windows, axis=1, keepdims=True)
     level -= np.outer(level @ line / (line @ line), line)
-    power = np.median(np.abs(np.fft.rfft(level * _TAPER, axis=1)) ** 2, axis=0)
+    ordered = np.sort(np.abs(np.fft.rfft(level * _TAPER, axis=1)) ** 2, axis=0)
+    power = 0.5 * (ordered[(len(windows) - 1) // 2] + ordered[len(windows) // 2])  # np.median imports numpy.ma
     place = np.searchsorted(BANDS, np.arange(len(power)) / WINDOW, side="right")
     return [float(np.mean(power[place == band])) for band in range(1, len(BANDS))]

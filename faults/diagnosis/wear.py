@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import logsumexp
 
 from estimation.eha.rig_share import DELIVERY_ENTRY, wear_left_open
 from estimation.fits.hypotheses import PRESUMED
@@ -52,5 +51,5 @@ def probabilities_over_wear(
         fits = fit_classes(board.blocks, replace(actuator, circuit=worn), start=board.fits.best.coordinates)
         scores.append(fits.scores)
     beforehand = -0.5 * (np.log([1.0, *DELIVERIES]) / PRESUMED[DELIVERY_ENTRY]) ** 2
-    summed = np.asarray(logsumexp(np.array(scores) + beforehand[:, None], axis=0), dtype=np.float64)
+    summed = np.logaddexp.reduce(np.array(scores) + beforehand[:, None], axis=0)
     return replace(board, log_odds={**board.log_odds, "parameters": bounded(summed)}).probabilities(calibration)
