@@ -35,6 +35,7 @@ def hammerstein_row(one: HammersteinCandidate) -> dict[str, Any]:
         "delay": list(form.delays),
         "held_back_percent": 100.0 * (1.0 - one.held_back),
         "bic": one.bic,
+        "doubt": one.doubt or None,
     }
 
 

@@ -8,19 +8,20 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.free_run.bends import KINDS
 from estimation.identification.free_run.choose_linear import BLOCKS, CLEARLY, Candidate, block_error, pooled
-from estimation.identification.free_run.data import Channels, blocks
+from estimation.identification.free_run.data import Channels, Scaling, blocks
 from estimation.identification.free_run.hammerstein_fit import (
     HammersteinFit,
     HammersteinProblem,
     fit_hammerstein,
     refitted,
 )
+from estimation.identification.free_run.transfer_function import linear_model
 
 ORDERS = 4
 """Order of the linear part at most."""
 
-KEPT = 2
-"""Forms of each kind that are judged on blocks held back."""
+UNSCALED = Scaling(np.zeros(1), np.ones(1), 0.0, 1.0)
+"""Poles and zeros are the same in every scale."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,15 +34,18 @@ class HammersteinCandidate:
         Root-mean-square free-run error of the blocks held back, over the output's deviation [dimensionless].
     bic : float
         Information criterion of the free run [dimensionless].
+    doubt : str
+        ``cancelling`` where a pole of the linear part, slower than a block, is not told from a zero; empty otherwise.
     """
 
     fit: HammersteinFit
     held_back: float
     bic: float
+    doubt: str = ""
 
 
 def hammerstein_candidates(linear: Sequence[Candidate], data: Channels) -> list[HammersteinCandidate]:
-    """Return models of each kind behind linear ones of several orders, judged on blocks held back.
+    """Return models of each kind before linear ones of several orders, the best of each judged on blocks held back.
 
     Parameters
     ----------
@@ -56,26 +60,32 @@ def hammerstein_candidates(linear: Sequence[Candidate], data: Channels) -> list[
             denominators.setdefault(one.form.order, []).append(one.fit.f)
     found: list[HammersteinCandidate] = []
     for kind in KINDS:
-        fits = [
-            fit
-            for one in _bases(linear)
-            if (fit := fit_hammerstein(kind, one.form, data, denominators.get(one.form.order, [one.fit.f])))
+        best: dict[int, tuple[float, HammersteinFit]] = {}
+        for one in _bases(linear):
+            order = one.form.order
+            fit = fit_hammerstein(kind, one.form, data, denominators.get(order, [one.fit.f]))
+            if fit is not None and (order not in best or _bic(fit, data) < best[order][0]):
+                best[order] = _bic(fit, data), fit
+        found += [
+            HammersteinCandidate(fit, _held_back(fit, data), bic, _doubt(fit, data)) for bic, fit in best.values()
         ]
-        ranked = sorted(((_bic(fit, data), fit) for fit in fits), key=lambda pair: pair[0])[:KEPT]
-        found += [HammersteinCandidate(fit, _held_back(fit, data), bic) for bic, fit in ranked]
     return found
 
 
 def chosen_hammerstein(candidates: Sequence[HammersteinCandidate]) -> HammersteinCandidate:
     """Return the smallest candidate that does nearly as well on held-back blocks as the best.
 
+    A slow pole that a zero nearly cancels follows the drift of one record: a block held back lies between outputs that
+    pin it, and another record does not.
+
     Parameters
     ----------
     candidates : sequence of HammersteinCandidate
-        One at least.
+        One at least; where all are doubtful, one of them is returned.
     """
-    least = min(one.held_back for one in candidates)
-    near = [one for one in candidates if one.held_back <= (1.0 + CLEARLY) * least]
+    sound = [one for one in candidates if not one.doubt] or list(candidates)
+    least = min(one.held_back for one in sound)
+    near = [one for one in sound if one.held_back <= (1.0 + CLEARLY) * least]
     return min(near, key=lambda one: one.bic)
 
 
@@ -92,6 +102,14 @@ def _bases(linear: Sequence[Candidate]) -> list[Candidate]:
 def _bic(fit: HammersteinFit, data: Channels) -> float:
     n, p = data.n_samples, fit.theta.size
     return n * float(np.log(max(fit.cost, 1e-300) / n)) + p * float(np.log(n))
+
+
+def _doubt(fit: HammersteinFit, data: Channels) -> str:
+    """Return whether a pole of the linear part, slower than a block that is held back, is not told from a zero."""
+    bent, _ = HammersteinProblem(fit.kind, fit.linear.form, data).bent(fit.values, fit.starts)
+    slow = np.exp(-(BLOCKS + 1.0) / data.longest)
+    pairs = linear_model(fit.linear, bent, UNSCALED).cancellations
+    return "cancelling" if any(abs(one.pole) > slow for one in pairs) else ""
 
 
 def _held_back(fit: HammersteinFit, data: Channels) -> float:

@@ -10,12 +10,20 @@ import pytest
 from benchmarks.bent_inputs import PLANTED, Planted, logged
 from estimation.identification.free_run import choose_hammerstein
 from estimation.identification.free_run.bends import KINDS, play
-from estimation.identification.free_run.choose_hammerstein import ORDERS, _bases, hammerstein_candidates
+from estimation.identification.free_run.choose_hammerstein import (
+    ORDERS,
+    HammersteinCandidate,
+    _bases,
+    _doubt,
+    chosen_hammerstein,
+    hammerstein_candidates,
+)
+from estimation.identification.free_run.choose_linear import linear_candidates
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.hammerstein_body import HammersteinBody
-from estimation.identification.free_run.hammerstein_fit import HammersteinProblem, fit_hammerstein
+from estimation.identification.free_run.hammerstein_fit import HammersteinFit, HammersteinProblem, fit_hammerstein
 from estimation.identification.free_run.identify import Identified, identify_channels
-from estimation.identification.free_run.linear_fit import Form
+from estimation.identification.free_run.linear_fit import Form, LinearFit
 from estimation.identification.free_run.model import FreeRunModel
 from plant.errors import HydrostateError
 
@@ -158,6 +166,36 @@ def test_a_denominator_with_an_unbelievable_time_constant_is_no_start(monkeypatc
     given.clear()
     hammerstein_candidates([slow], data)
     assert given == [[-1.0]] * len(KINDS)  # it alone is better than none
+
+
+def test_the_best_of_each_kind_and_order_is_judged_so_that_a_smaller_one_may_do_better() -> None:
+    data = scaled(logged(PLANTED[0], 3))[0]
+    found = hammerstein_candidates(linear_candidates(data, [1, 2, 3], (1,)), data)
+    orders = {kind: [one.fit.linear.form.order for one in found if one.fit.kind == kind] for kind in KINDS}
+    assert orders == {kind: [1, 2, 3] for kind in KINDS}
+    assert chosen_hammerstein(found).fit.kind == "dead-zone"
+    assert chosen_hammerstein(found).fit.linear.form.order == 2  # that of the plant, though 3 fits no worse
+    assert found[2].fit.cost <= found[1].fit.cost
+
+
+@pytest.mark.parametrize(("pole", "doubt"), [(0.999, "cancelling"), (0.99, "")])
+def test_a_pole_too_slow_for_a_block_that_a_zero_cancels_is_doubtful(pole: float, doubt: str) -> None:
+    data = scaled(logged(PLANTED[0], 3))[0]
+    b, f = 0.3 * np.array([1.0, -pole]), np.convolve([1.0, -0.8], [1.0, -pole])
+    fit = HammersteinFit(
+        "dead-zone",
+        np.array([-0.4, 0.6]),
+        np.empty(0),
+        LinearFit(Form(2, (2,), (1,)), np.array([*b, *f[1:], 0, 0, 0]), 1),
+    )
+    assert _doubt(fit, data) == doubt
+
+
+def test_a_doubtful_bend_is_taken_only_where_every_one_is() -> None:
+    fit: Any = None
+    good, better = HammersteinCandidate(fit, 0.3, 2.0), HammersteinCandidate(fit, 0.2, 1.0, "cancelling")
+    assert chosen_hammerstein([good, better]) is good
+    assert chosen_hammerstein([better]) is better
 
 
 def test_where_no_bend_can_be_fitted_the_model_is_linear(monkeypatch: pytest.MonkeyPatch) -> None:
