@@ -196,6 +196,11 @@ def play_structure(moved: float, yields: float) -> float:
         Relative difference of bulk modulus from a fit without the play [fraction].
     yields : float
         What the piston yields unseen, over what the oil does [fraction].
+
+    Returns
+    -------
+    float
+        Standard deviation [fraction].
     """
     return float(np.hypot(PLAY_STRUCTURE, PLAY_OPEN * max(moved, yields)))
 
