@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -162,3 +163,20 @@ def test_the_noise_of_a_cleaned_log_is_measured_once(way: str, measured: list[tu
     measured.clear()
     estimate_clean(cleaned, HEALTHY, WAYS[way])
     assert measured == []
+
+
+@pytest.mark.parametrize(
+    ("chosen", "asked"),
+    [
+        ({}, False),
+        ({"method": "least-squares"}, False),
+        ({"form": "pressure"}, False),
+        ({"method": "ekf"}, True),
+        ({"tuned": True}, True),
+        ({"robust": "huber"}, True),
+        ({"states": ("bulk_modulus",)}, True),
+        ({"method": "ekf", "tuned": True}, True),
+    ],
+)
+def test_a_filter_is_asked_for_by_its_name_or_by_what_only_a_filter_does(chosen: dict[str, Any], asked: bool) -> None:
+    assert EstimateOptions(**chosen).filtering is asked

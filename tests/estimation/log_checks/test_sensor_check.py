@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.log_checks.sensor_check import _slid, holds, sensor_objections, without_saturated
+from estimation.log_checks.sensor_check import _frozen_velocity, _slid, holds, sensor_objections, without_saturated
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
@@ -55,6 +55,18 @@ def test_a_frozen_sensor_is_named(channel: str) -> None:
 def test_an_encoder_is_not_accused_by_a_velocity_that_froze(start: float) -> None:
     frozen = with_fault(run(), SensorFault(channel="velocity_m_s", kind="freeze", start=start))
     assert {note.data["channel"] for note in sensor_objections(frozen, RIG_PARAMETERS)} == {"velocity_m_s"}
+
+
+@pytest.mark.parametrize("said", [0.05, 0.08])
+def test_a_velocity_that_stands_is_held_against_the_encoder_from_its_first_sample_on(said: float) -> None:
+    time = 1e-3 * np.arange(6000)
+    steady = (time >= 2.0) & (time < 4.0)
+    true = np.where(steady, 0.05, 0.05 + 0.01 * np.sin(20.0 * (time - 2.0)))
+    position = 1e-6 * np.round(1e3 * np.cumsum(true))
+    position[2000:2500] = np.nan  # a drop-out as the steady motion begins
+    record = Record(1e-3, {"motor_speed_rad_s": 100.0 + time, "position_m": position})
+    found = _frozen_velocity(record.replace(velocity_m_s=np.where(steady, said, true)))
+    assert (found is not None) is (said != 0.05)
 
 
 def test_a_pressure_sensor_that_shows_nothing_is_named() -> None:

@@ -53,6 +53,19 @@ def test_no_step_is_longer_than_the_longest_and_short_ones_are_whole() -> None:
     assert np.abs(class_fit._step(log(), far, CENTRE, 1e-9 * PULL)).max() == pytest.approx(FARTHEST)
 
 
+@pytest.mark.parametrize("pulled", [1.0, 1e3])
+def test_a_whole_step_promises_half_of_what_its_slope_would_give(pulled: float) -> None:
+    pull = pulled * PULL
+    here = class_fit._at(log(), ACTUATOR, CENTRE, CENTRE + 0.4 * APART, pull)
+    information = here.information + pull
+    step = np.linalg.solve(information, class_fit._uphill(log(), here, CENTRE, pull))
+    promised = class_fit._promised(log(), here, CENTRE, pull, step)
+    assert promised == pytest.approx(0.5 * step @ information @ step)
+    for share in (0.5, 1.5):  # less is gained before it and beyond it
+        other = class_fit._promised(log(), here, CENTRE, pull, share * step)
+        assert other == pytest.approx((2.0 * share - share**2) * promised)
+
+
 def test_the_circuit_that_left_a_log_is_found() -> None:
     found = fit_freely(log(), ACTUATOR, next(iter(CONDITIONS)), gained=1e-3)
     assert found.cost < cost(CENTRE)

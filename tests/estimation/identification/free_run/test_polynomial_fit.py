@@ -113,6 +113,10 @@ def test_a_saved_model_simulates_as_before(tmp_path: object) -> None:
         load_models(path)
     with pytest.raises(HydrostateError, match="of format 'hydrostate-model'"):
         FreeRunModel.from_dict({"format": "other"})
+    entries = model.to_dict()
+    assert entries["version"] == 1, "a later version reads what an earlier one wrote"
+    with pytest.raises(HydrostateError, match="version 1 at most, is needed, got 'hydrostate-model', version 2"):
+        FreeRunModel.from_dict({**entries, "version": 2})
 
 
 def test_a_model_that_leaves_the_range_when_the_inputs_come_in_another_order_is_wild() -> None:
