@@ -11,6 +11,7 @@ from estimation.models.model import ProcessModel
 from estimation.trust.whiteness import (
     LAGS,
     SEGMENTS,
+    SETTLING,
     Whiteness,
     _autocorrelations,
     _explained,
@@ -165,6 +166,31 @@ def test_the_share_that_the_drive_explains_is_without_bias_in_so_few_segments(dr
         push, own = rng.standard_normal((2, SEGMENTS * 250))
         found.append(_explained(driven * push + own, push, 250))
     assert np.mean(found) == pytest.approx(share, abs=0.02)
+
+
+def test_a_pattern_of_quantisation_that_follows_the_drive_is_no_excess(linear: ProcessModel) -> None:
+    length, first = (SAMPLES - int(SETTLING * SAMPLES)) // SEGMENTS, int(SETTLING * SAMPLES)
+    frequency = 8.0 / (length * SAMPLE_TIME)
+    push, quantum = np.sin(2.0 * np.pi * frequency * TIME), 1e-5
+    residuals = white(12)
+    residuals[:, 0] += 0.8 * push
+
+    def excess(position: Array) -> tuple[float, float]:
+        log = Record(SAMPLE_TIME, {"motor_speed_rad_s": push, "position_m": position, "velocity_m_s": TIME})
+        estimate = Estimate(
+            linear, CHANNELS, TIME, np.zeros((SAMPLES, 3)), np.ones((SAMPLES, 3)), None, {}, 0.0,
+            residuals * quantum, np.full(residuals.shape, quantum**2),
+        )  # fmt: skip
+        repeated = float(np.mean(np.diff(position) == 0.0))
+        return whiteness(estimate, log)[0].excess, repeated
+
+    smooth, stepped = 6e-5 * push + 1e-9 * TIME, quantum * np.round(6e-5 * push / quantum)
+    (fine, never), (coarse, often) = excess(smooth), excess(stepped)
+    assert never < 0.01 < 0.3 < often
+    # all of the drive is in one line, which stands length / 2 times above white noise of its variance
+    driven = np.abs(np.fft.rfft(push[first:][: SEGMENTS * length].reshape(SEGMENTS, length), axis=1)) ** 2
+    share = float(np.max(np.mean(driven, axis=0)) / np.sum(np.mean(driven, axis=0)))
+    assert fine - coarse == pytest.approx(share * often / 12.0 * length / 2.0, rel=0.02)
 
 
 def test_where_nothing_is_driven_a_tenth_of_all_frequencies_counts(linear: ProcessModel) -> None:

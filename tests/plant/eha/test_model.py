@@ -11,7 +11,14 @@ from scipy.integrate import solve_ivp
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.compiled.elimination import eliminated_jacobian
 from plant.compiled.expression import symbol
-from plant.eha.model import EhaParameters, lumped_derivative, lumped_step, pressure_rate, reduced_derivative
+from plant.eha.model import (
+    EhaParameters,
+    _implicit_stage,
+    lumped_derivative,
+    lumped_step,
+    pressure_rate,
+    reduced_derivative,
+)
 from plant.errors import RigError
 from plant.solvers.steps import parameter_names, parameter_row, parameter_symbols
 from plant.solvers.trajectory import compile_trajectory
@@ -279,3 +286,18 @@ def test_the_steps_derivatives_are_those_of_its_values(state: tuple[float, float
             for i, size in enumerate((1e-2, 1e-2, 1e6)):
                 seen = (up[str(i)] - down[str(i)]) / (2.0 * d)
                 assert told[f"{i} {name}"] == pytest.approx(seen, rel=2e-5, abs=1e-9 * size / d), (i, name)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("velocity", [-0.3, 0.3])
+@pytest.mark.parametrize("beyond", [-5e4, -2e4, 2e4, 5e4])
+def test_a_long_stage_opens_the_relief_valve_where_the_pressure_after_it_says_so(
+    side: float, velocity: float, beyond: float
+) -> None:
+    p, h = EhaParameters(), 2e-3  # the piston's motion moves pressure by more than it lies from the setting
+    base = (0.0, side * velocity, side * (p.relief_pressure + beyond))
+    _, moves, pressure = _implicit_stage(base, 0.0, p, h)
+    relieved = p.relief_conductance * max(abs(pressure) - p.relief_pressure, 0.0) * np.sign(pressure)
+    flow = -p.leakage_coefficient * pressure - relieved - p.piston_area * moves
+    gained = h * p.bulk_modulus / p.chamber_volume * flow
+    assert pressure - base[2] == pytest.approx(gained, rel=1e-9, abs=1e-3)
