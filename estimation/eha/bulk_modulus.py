@@ -21,7 +21,7 @@ from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.log_checks.first_belief import START_STD, begins_in_motion, first_belief, first_load
 from estimation.log_checks.sensor_check import PRESSURE, PRESSURES
 from estimation.models.eha_forms import FORMS
-from estimation.notes import ChannelCode, SensorCode
+from estimation.notes import ChannelCode
 from estimation.trust.bounds import bulk_modulus_bound
 from estimation.trust.consistency import MISMATCH_NIS
 from plant.eha.doubts import Spread
@@ -237,16 +237,14 @@ def _fit(
 
     Whoever has chosen least squares gets it, whatever the log begins with.
     """
-    if form not in FITTED:
-        return None
     if form != "flow":
-        return FITTED[form][0](log.record, parameters, guess, {}, log.variances)
-    doubted = {name: max(one) for name, one in spreads.items()}
-    record, loaded = log.record, not chosen and first_load(log.record, log.variances) != 0.0
-    how = {"moving": begins_in_motion(record), "filtered": any(one.code == SensorCode.FILTERED for one in log.left_out)}
-    fit = fit_flow(record, parameters, guess, doubted, log.variances, loaded=loaded, **how)
-    explained = fit.explanation is not None and fit.bound <= LARGEST_BOUND
-    return fit if explained or not loaded else None  # a filter needs no state at rest
+        return FITTED[form][0](log.record, parameters, guess, {}, log.variances) if form in FITTED else None
+    doubted, record = {name: max(one) for name, one in spreads.items()}, log.record
+    loaded = not chosen and first_load(record, log.variances) != 0.0
+    how = {"loaded": loaded, "moving": begins_in_motion(record), "filtered": log.filtered}
+    fit = fit_flow(record, parameters, guess, doubted, log.variances, **how)
+    unexplained = fit.explanation is None or fit.bound > LARGEST_BOUND
+    return None if loaded and unexplained else fit  # a filter needs no state at rest
 
 
 def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusEstimate:

@@ -10,6 +10,7 @@ from estimation.log_checks.hum import without_hum
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
 from estimation.log_checks.outliers import without_gross_outliers
 from estimation.log_checks.sensor_check import PRESSURE, PRESSURES, sensor_objections, without_saturated
+from estimation.notes import SensorCode
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
@@ -41,6 +42,11 @@ class CleanLog:
     left_out: tuple[Note, ...]
     objections: tuple[Note, ...]
     mistakes: tuple[Note, ...] = ()
+
+    @property
+    def filtered(self) -> bool:
+        """Whether a pressure was filtered before it was logged."""
+        return any(note.code == SensorCode.FILTERED for note in self.left_out)
 
     def objections_to(self, channels: tuple[str, ...]) -> tuple[Note, ...]:
         """Return what speaks against the sensors of some channels.

@@ -248,13 +248,21 @@ def test_play_of_the_encoder_is_named_and_taken_up() -> None:
 
 def test_an_encoder_zero_need_be_no_likelier_than_held_volumes_and_anything_else_must() -> None:
     held, swinging = made_fit(100.0, 2e8, 1e6), made_fit(300.0, 2e8, 1e6)
-    wanted = partial(_wanted, homed=True)
+    wanted = partial(_wanted, homed=True, late=False)
     assert wanted(("encoder_zero",), held, swinging) == 100.0 + module.WORTH
     assert wanted(("encoder_zero",), held, held) == 100.0 - module.WORTH
-    assert _wanted(("encoder_zero",), held, swinging, homed=False) == 100.0 - module.WORTH
+    assert _wanted(("encoder_zero",), held, swinging, homed=False, late=False) == 100.0 - module.WORTH
     assert wanted(("position_play",), held, swinging) == 100.0 - module.WORTH
     assert wanted(("position_play", "position_late"), held, swinging) == -np.inf
     assert wanted(("volume",), held, swinging) == wanted(("encoder_zero", "air"), held, swinging) == 90.0
+
+
+def test_the_lag_of_a_filtered_pressure_is_believed_whatever_it_gains() -> None:
+    held, swinging = made_fit(100.0, 2e8, 1e6), made_fit(300.0, 2e8, 1e6)
+    wanted = partial(_wanted, best=held, swinging=swinging, homed=False)
+    assert wanted(("pressure_late",), late=True) == 100.0 + module.WORTH
+    assert wanted(("pressure_late",), late=False) == 100.0 - module.WORTH
+    assert wanted(("pressure_late", "air"), late=True) == wanted(("volume",), late=True) == 100.0 - module.WORTH
 
 
 @pytest.mark.parametrize("seed", [2, 3])
