@@ -13,6 +13,7 @@ from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide, 
 from estimation.eha.rig_share import fitted_responses, scaled_responses, with_wear
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
+from estimation.fits.explain import delivered
 from estimation.fits.flow_fit import FLOW_CHANNELS, REPORTED, fit_flow
 from estimation.fits.form_fit import FormFit
 from estimation.fits.motion_fit import MOTION_CHANNELS, fit_motion
@@ -300,10 +301,8 @@ def rigid_bound(log: CleanLog, parameters: EhaParameters) -> float:
 
 def _impossible_delivery(fit: FormFit, parameters: EhaParameters) -> Note | None:
     """Return a note where a log is explained by a pump that delivers what none can: its speed is in another unit."""
-    if fit.explanation is None or "pump_displacement" not in fit.explanation.values:
-        return None
-    share = fit.explanation.values["pump_displacement"][0] / parameters.pump_displacement
-    if share <= FARTHEST:
+    share = None if fit.explanation is None else delivered(fit.explanation, parameters)
+    if share is None or share <= FARTHEST:
         return None
     return ChannelCode.CHANNEL_UNIT.note(channel=SPEED, against=POSITION, factor=1.0 / share, slip=TURNS[RPM])
 

@@ -4,13 +4,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.arrays import Array
 from estimation.fits.averaged import averaged
 from estimation.fits.form_fit import LONGEST_STEP
 from estimation.fits.greybox_log import GreyBoxLog, greybox_log
-from estimation.log_checks.bridging import bridged, gaps
+from estimation.log_checks.bridging import bridged, within_gaps
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from estimation.log_checks.outliers import without_outliers
 from estimation.models.completed_flow import CRACKS
@@ -143,7 +142,7 @@ def flow_log(
         drive_std=(log.drive_std[0], 0.0),  # the residuals hold position's
         # where the piston is within a gap of its position is not known, where it is after it is
         drives=_balanced_across(open_gaps, record, log.drives, parameters),
-        measured=np.where(_within_gaps(record["position_m"])[:, None], np.nan, log.measured),
+        measured=np.where(within_gaps(record["position_m"])[:, None], np.nan, log.measured),
         gaps=open_gaps,
         presumed={
             "case_leakage": (DRAIN_START * usual_leakage(parameters), PRESUMED_STD),
@@ -163,15 +162,6 @@ def _swept_share(position: Array, p: EhaParameters) -> float:
     swept = [np.clip(area * side * position / volume, -FULLEST, FULLEST) for area, side in ((area_1, 1), (area_2, -1))]
     shares = area_1 / (1.0 + swept[0]) + area_2 / (1.0 + swept[1])
     return float(np.sqrt(np.mean(shares**2))) / volume
-
-
-def _within_gaps(position: Array) -> NDArray[np.bool_]:
-    """Return the samples in gaps of the position, and before its first and after its last."""
-    present = np.flatnonzero(np.isfinite(position))
-    apart, wide = gaps(position)
-    within = np.isnan(position)
-    within[present[0] : present[-1]] &= np.repeat(wide, apart.astype(np.int64))
-    return within
 
 
 def _balanced_across(open_gaps: Array, record: Record, drives: Array, p: EhaParameters) -> Array:

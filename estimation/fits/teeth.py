@@ -130,7 +130,7 @@ def shown_teeth(
     counts = _likeliest(problem, theta, errors, counts) if len(counts) > LIKELIEST else counts
     turned = _turned(log)
     waves = [Teeth(count, *parts) for count in counts for parts in ((NUDGE, 0.0), (0.0, NUDGE))]
-    known, *moved = problem.on(log.coarsened()).disturbed(
+    known, *moved = problem.coarse.disturbed(
         theta, [log.drives, *(_added(log, _delivered(one, turned, log.sample_time)) for one in waves)]
     )
     columns = (np.stack([one.ravel() for one in moved], axis=-1) - known.reshape(-1, 1)) / NUDGE

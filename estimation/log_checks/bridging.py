@@ -79,6 +79,26 @@ def gaps(values: Array) -> tuple[Array, NDArray[np.bool_]]:
     return n, n > WIDE * median(n) if len(n) else np.zeros(0, dtype=np.bool_)
 
 
+def within_gaps(values: Array) -> NDArray[np.bool_]:
+    """Return the samples in the gaps of a channel, and before its first and after its last.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        A channel with a sample at least [any unit]; NaN where missing.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        Whether a sample lies in one; none does between the samples of a slow channel.
+    """
+    present = np.flatnonzero(np.isfinite(values))
+    apart, wide = gaps(values)
+    within = np.isnan(values)
+    within[present[0] : present[-1]] &= np.repeat(wide, apart.astype(np.int64))
+    return within
+
+
 def filled(values: Array) -> tuple[Array, int]:
     """Return a slow channel with straight lines between its samples, and every how many rows it has one.
 
@@ -101,10 +121,7 @@ def filled(values: Array) -> tuple[Array, int]:
     there = np.flatnonzero(np.isfinite(values))
     if len(there) < 2 or (rows := int(median(np.diff(there).astype(np.float64)))) < 2:
         return values, 1
-    between = np.interp(np.arange(len(values)), there, values[there], left=np.nan, right=np.nan)
-    open_rows = np.repeat(gaps(values)[1], np.diff(there)) & np.isnan(values[there[0] : there[-1]])
-    between[there[0] : there[-1]][open_rows] = np.nan
-    return between, rows
+    return np.where(within_gaps(values), np.nan, bridged(values)), rows
 
 
 def _per_sample(values: Array, each: Array, before: float, after: float) -> Array:

@@ -175,9 +175,8 @@ def blocks_of(record: Record) -> Blocks:
             del whole[PRESSURE]
     speed = bridged(whole["motor_speed_rad_s"])
     noise, course, begun = _noise(whole, block, sample_time), whole.get(LEAKAGE_COURSE), _begun(whole, velocity)
-    if (
-        pressure is not None and rows > 1
-    ):  # a block holds fewer samples, and lines between them have no noise of their own
+    if pressure is not None and rows > 1:
+        # a block holds fewer samples, and the lines between them have no noise of their own
         noise[-1] = (measurement_variances(record, [PRESSURE])[PRESSURE] * rows / (block * pooled)) ** 0.5
     return Blocks(speed, sample_time, block, velocity, pressure, noise, course=course, begun=begun)
 

@@ -80,12 +80,13 @@ def crossing(belief: Belief, grid: Settings, rng: np.random.Generator, limit: fl
     level, slope, curvature = _drawn(belief, chosen, rng)
     gone = np.where(level >= limit, 0.0, np.inf)
     bend, wander, jerk = grid.bend[chosen], grid.wander[chosen], grid.jerk[chosen]
+    paces = {stride: _paced(stride, grid, chosen) for stride in set(STRIDES.tolist())}
     begin = 0.0
-    for stride in STRIDES:
+    for stride in STRIDES.tolist():
         turn, half, drift, jolt = rng.standard_normal((4, DRAWS))
         before, bowing = level, curvature
         curvature = curvature + np.sqrt(stride) * jerk * jolt
-        (rise, growth), (along, across, turned) = _paced(float(stride), grid, chosen)
+        (rise, growth), (along, across, turned) = paces[stride]
         bowed = bend * (along * turn + across * half) + np.sqrt(stride) * wander * drift
         level = level + rise * slope + stride**2 * (2.0 * bowing + curvature) / 6.0 + bowed
         slope = growth * slope + 0.5 * stride * (bowing + curvature) + bend * turned * turn

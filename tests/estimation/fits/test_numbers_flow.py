@@ -8,7 +8,7 @@ import pytest
 
 from estimation.fits.descent import Point, descend
 from estimation.fits.flow_fit import fit_flow
-from estimation.fits.flow_log import _swept_share, _within_gaps, speed_gaps, usual_leakage, without_strays
+from estimation.fits.flow_log import _swept_share, speed_gaps, usual_leakage, without_strays
 from estimation.fits.flow_search import balanced, flow_starts
 from estimation.fits.form_fit import FormFit
 from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, explained, fit_greybox
@@ -16,6 +16,7 @@ from estimation.fits.greybox_problem import Problem, search_bounds
 from estimation.fits.greybox_problem import weighed as sums_of
 from estimation.fits.hypotheses import HYPOTHESES, LIMITS
 from estimation.fits.wide_problem import flow_bounds, freed
+from estimation.log_checks.bridging import within_gaps
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM
 from tests.estimation.fits.short_logs import (
     PAPER,
@@ -49,7 +50,7 @@ def logs_of_the_flow_form() -> dict[str, Any]:
     told: dict[str, Any] = {
         "gaps of speed": speed_gaps(holey, PAPER, 3e3),
         "gaps that a quiet sensor feels": len(speed_gaps(holey, PAPER, 30.0)),
-        "within gaps of position": int(np.count_nonzero(_within_gaps(position))),
+        "within gaps of position": int(np.count_nonzero(within_gaps(position))),
         "swept share": [_swept_share(one, p) for one in (position[:40], np.array([0.0, 0.9])) for p in (PAPER, SINGLE)],
         "usual leakage [m^3/(s Pa)]": [usual_leakage(one) for one in (PAPER, replace(PAPER, leakage_coefficient=0.0))],
         "starts": flow_starts(PAPER, 4e8)[::5],
