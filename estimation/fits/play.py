@@ -116,12 +116,13 @@ def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
     late, early = (_crossed(stands, crossed) for crossed in (lambda share: share**2, lambda share: share * (2 - share)))
     force = _smoothed(bridged(pressure), round(SMOOTHED / sample_time))
     before, after = force[stands.first], force[stands.last]
-    apart = np.where(after == before, 1.0, after - before)
-    followed = np.where(after == before, 1.0, ((force - before) / apart).clip(0.0, 1.0))
-    by_pressure = stands.side + (stands.next_side - stands.side) * np.where(stands.turns, followed, 0.0)
+    turned = np.divide(force - before, after - before, out=np.ones_like(force), where=after != before)
+    followed = turned.clip(0.0, 1.0)
+    by_pressure = stands.side + (stands.next_side - stands.side) * followed
     held = before + (after - before) * stands.share
     most = np.abs(held)
-    lost = np.maximum(stands.side * (force - held), -2.0 * most).clip(max=0.0) / np.where(most == 0.0, 1.0, most)
+    below = np.maximum(stands.side * (force - held), -2.0 * most).clip(max=0.0)
+    lost = np.divide(below, most, out=below, where=below < 0.0)
     sprung = np.where(stands.turns | (stands.length * sample_time < STANDS), 0.0, stands.side * lost)
     return np.column_stack([late, by_pressure - late, early - late, sprung])
 
@@ -269,7 +270,7 @@ class _Standings(NamedTuple):
     @property
     def share(self) -> Array:
         samples = np.arange(len(self.first))
-        return ((samples - self.first) / np.maximum(self.length, 1)).clip(0.0, 1.0)
+        return (samples - self.first) / np.maximum(self.length, 1)
 
 
 def _standings(position: Array) -> _Standings:
@@ -289,7 +290,7 @@ def _cell(position: Array) -> float:
 
 
 def _crossed(stands: _Standings, course: Callable[[Array], Array]) -> Array:
-    return stands.side + (stands.next_side - stands.side) * np.where(stands.turns, course(stands.share), 0.0)
+    return stands.side + (stands.next_side - stands.side) * course(stands.share)
 
 
 def _smoothed(values: Array, samples: int) -> Array:

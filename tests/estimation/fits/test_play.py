@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.special import ndtr
 
 from estimation.fits import flow_fit as module
 from estimation.fits.flow_fit import DOUBTED, PLAY_SENSED, fit_flow
@@ -242,3 +243,10 @@ def test_a_piston_that_begins_to_move_within_what_a_sound_encoder_resolves_shows
     p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(21)  # gained 7.4 at 500 Hz
     record = simulate(LUMPED, make_drive("prbs", 10.0, 2e-3, p, rng), 2e-3, p, sensors=BENCH, rng=rng)
     assert sensed_play(record).gain <= PLAY_SHOWN
+
+
+def test_a_play_is_shown_by_chance_as_seldom_as_its_limit_says() -> None:
+    """The score statistic of a course that asks for more is the square of a normal deviate above zero."""
+    by_chance = float(ndtr(-((2.0 * PLAY_SHOWN) ** 0.5)))
+    assert 1.0 / by_chance == pytest.approx(430.0, rel=0.02)
+    assert 1.0 / (3.0 * by_chance) == pytest.approx(140.0, rel=0.03)

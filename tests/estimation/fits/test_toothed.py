@@ -176,3 +176,9 @@ def test_nothing_is_left_of_a_sound_log(monkeypatch: pytest.MonkeyPatch) -> None
     found = fit_flow(log(0.2), PAPER, PAPER.bulk_modulus)
     assert not found.reasons
     assert not found.remarks
+
+
+def test_teeth_are_asked_for_by_chance_as_seldom_as_their_limits_say() -> None:
+    """Twice the gain of a cosine and a sine is chi-square distributed with two degrees of freedom."""
+    assert np.exp(TEETH_WORTH) / len(COUNTS) == pytest.approx(1500.0, rel=0.03)
+    assert np.exp(OVERTONE_WORTH) == pytest.approx(150.0, rel=0.02)
