@@ -127,6 +127,17 @@ def gaps_that_are_bridged() -> dict[str, Any]:
             12.0,
             6,
         ),
+        "filled": [
+            [bridging.filled(values)[0], bridging.filled(values)[1]]
+            for values in (
+                speed[:14],
+                slow,
+                np.array([1.0, np.nan, 3.0]),
+                np.array([1.0, np.nan, 2.0, np.nan, np.nan, np.nan, np.nan, 3.0, np.nan]),
+                np.array([np.nan, 1.0]),
+                np.where(ROWS[:40] % 5 < 2, speed, np.nan),
+            )
+        ],
         "unknown angle [rad^2]": [bridging.unknown_angle(values, T) for values in (speed, slow)],
         "unknown path [m^2]": [bridging.unknown_path(values, T) for values in (speed, slow)],
         "of two and of one sample": [
