@@ -37,6 +37,10 @@ COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
 FACTORS = (2, 100)
 """By what constants are multiplied [dimensionless]; zero becomes one."""
 
+WHAT_IS_LEFT = "reshape"
+"""Method for which any negative length is the same: NumPy then takes what is left. To change the size of such a length
+plants no fault; its sign does."""
+
 SPARED = (ast.Raise, ast.Assert, ast.JoinedStr, ast.Import, ast.ImportFrom)
 """Statements and expressions that hold no formula: messages, imports."""
 
@@ -137,8 +141,25 @@ def _below(node: ast.AST) -> Iterator[_Edit]:
         for key, child in entries:
             if isinstance(child, ast.expr):
                 yield from _here(child, value if isinstance(value, list) else node, key)
-            if isinstance(child, ast.AST):
+            if isinstance(child, ast.AST) and not (_is_negative(child) and _is_length(node, name)):
                 yield from _below(child)
+
+
+def _is_length(call: ast.AST, name: str) -> bool:
+    """Return whether what stands in a field of a node is a length that an array is given by its method."""
+    match call:
+        case ast.Call(func=ast.Attribute(attr=method)):
+            return name == "args" and method == WHAT_IS_LEFT
+        case _:
+            return False
+
+
+def _is_negative(node: ast.AST) -> bool:
+    match node:
+        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int())):
+            return True
+        case _:
+            return False
 
 
 def _is_type_checking(node: ast.AST) -> bool:

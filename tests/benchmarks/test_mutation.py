@@ -3,6 +3,7 @@
 import ast
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks.mutants import draw
@@ -31,6 +32,8 @@ def faults(text: str) -> set[str]:
         ("y = a is None", {"y = a is not None"}),
         ("y = a and b", {"y = a or b"}),
         ("y = not a", {"y = a"}),
+        ("y = a.reshape(-1, 3)", {"y = a.reshape(1, 3)", "y = a.reshape(-1, 6)", "y = a.reshape(-1, 300)"}),
+        ("y = reshape(-1)", {"y = reshape(1)", "y = reshape(-2)", "y = reshape(-100)"}),
         ("@f\ndef g(x):\n    return x + a", {"@f\ndef g(x):\n    return x - a"}),
         ("def g(x=2):\n    return x", {"def g(x=4):\n    return x", "def g(x=200):\n    return x"}),
     ],
@@ -54,6 +57,14 @@ def test_each_fault_changes_one_thing(text: str, wanted: set[str]) -> None:
 )
 def test_what_is_no_formula_is_left_alone(text: str) -> None:
     assert count_mutants(text) == 0
+
+
+@pytest.mark.parametrize("length", [-1, -2, -100])
+def test_any_negative_length_is_what_is_left(length: int) -> None:
+    """So a fault in its size would be no fault."""
+    values = np.arange(12.0)
+    np.testing.assert_array_equal(values.reshape(length, 3), values.reshape(4, 3))
+    assert values[:0].reshape(3, length).shape == (3, 0)
 
 
 def test_every_file_of_the_packages_can_be_mutated_and_still_be_read() -> None:

@@ -37,7 +37,9 @@ COURSE = (
 )
 """An encoder that goes up, stands, goes on, stands for a moment, goes on, stands, comes back, stands, and creeps."""
 
-READING = 1e-6 * np.rint(1e6 * np.interp(SAMPLES, *zip(*COURSE, strict=True)))
+WHEN, WHERE = np.array(COURSE).T
+
+READING = 1e-6 * np.rint(1e6 * np.interp(SAMPLES, WHEN, WHERE))
 FORCE = 1e6 * np.sin(0.021 * SAMPLES + 0.4) + 3e5 * np.sin(0.11 * SAMPLES)
 
 
@@ -195,7 +197,7 @@ def teeth_in_residuals() -> dict[str, Any]:
     theta = usual(one)
     errors, slopes = one.linearised(theta)
     columns = slopes.reshape(-1, slopes.shape[-1])
-    bread = np.linalg.inv(columns.T @ columns + 1e-3 * np.eye(columns.shape[1]))
+    bread = np.linalg.inv(columns.T @ columns + 1e-3 * np.eye(columns.shape[1])).astype(np.float64)
     told: dict[str, Any] = {}
     for name, counts in {"few": (7, 12), "many": COUNTS}.items():
         shown = shown_teeth(one, theta, errors.ravel(), bread, columns, counts)
