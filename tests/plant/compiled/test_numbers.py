@@ -3,8 +3,11 @@
 That a kernel computes what its formula says is tested elsewhere; here stands with which operations it does.
 """
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
+from unittest.mock import MagicMock, patch
 
 import pytest
 
@@ -24,6 +27,10 @@ from plant.compiled.simplify import fused, share_ratios, share_reciprocals, simp
 from plant.compiled.source import lines_source, operations_source, symbols_in
 from plant.eha.circuit import circuit_derivative
 from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.model import EhaParameters, lumped_step
+from plant.solvers import adaptive_kernel, fixed_step_kernel
+from plant.solvers.adaptive_kernel import compile_adaptive
+from plant.solvers.fixed_step_kernel import compile_fixed_step
 from plant.solvers.steps import parameter_symbols
 from tests.numbers import Numbers
 from tests.plant.compiled.c99.test_loops import GIVEN, doubled, spread, work
@@ -143,6 +150,49 @@ def loops_for_machines() -> dict[str, Any]:
         module = Module(source)
         compiled = module.enter(name, tuple(argument.kind for argument in signature(takes)))
         told[name] = {"written": sorted(compiled.written), "text": module.ir().splitlines()}
+    return told
+
+
+def written(module: Any, compiled: Callable[[], Any]) -> tuple[str, Mapping[str, Any]]:
+    """Return the text of a kernel of processors with four lanes, and what it takes."""
+    found: list[Any] = []
+
+    def load(_: str, text: Callable[[], str], entries: Mapping[str, Any], *__: Any) -> Any:
+        found.extend([text(), entries])
+        return MagicMock()
+
+    with patch.multiple(module, load_native=load, native_width=lambda: 4):
+        compiled()
+    text, entries = found
+    return text, entries
+
+
+def unkept(cached: Any, given: tuple[Any, ...]) -> Callable[[], Any]:
+    return partial(cached.__wrapped__, *given)
+
+
+@NUMBERS.case()
+def kernels_of_plants() -> dict[str, Any]:
+    """How often each instruction stands in what machine code is made of."""
+    told: dict[str, Any] = {}
+    for lanes in (1, 8):
+        plant: Any = "lumped", lumped_step, 3, EhaParameters, lanes
+        adaptive: Any = "circuit", circuit_derivative, 7, CircuitParameters, lanes
+        for name, (text, entries) in {
+            "fixed steps": written(fixed_step_kernel, unkept(compile_fixed_step, plant)),
+            "controlled error": written(adaptive_kernel, unkept(compile_adaptive, adaptive)),
+        }.items():
+            module = Module(text)
+            for entry, takes in entries.items():
+                module.enter(entry, tuple(argument.kind for argument in takes))
+            words = Counter(word for line in module.ir().splitlines() for word in line.split())
+            told[f"{name}, {lanes} side by side"] = {
+                "lines": len(text.splitlines()),
+                "numbers": [line for line in text.splitlines() if line[:1].isupper() and "SLOTS" not in line],
+                "instructions": {
+                    word: count for word, count in sorted(words.items()) if word.strip("@").isalpha() and count > 1
+                },
+            }
     return told
 
 
