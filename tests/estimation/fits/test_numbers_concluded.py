@@ -1,0 +1,188 @@
+"""What is concluded from fits that are made up, and how far searches may go, kept in `numbers_concluded.json`."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+from estimation.fits import flow_fit
+from estimation.fits.explain import _Tried
+from estimation.fits.flow_fit import _explains_all, _homed_at_stop, _slopes, _wanted, fit_flow
+from estimation.fits.greybox_fit import GreyBoxFit
+from estimation.fits.hypotheses import BEGUN, HYPOTHESES
+from estimation.fits.motion_fit import _steps, unseen
+from estimation.fits.play import ShownPlay
+from estimation.fits.promises import Promise
+from estimation.fits.wide_problem import flow_bounds, freed, own_starts, widened
+from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
+from tests.edges import edge
+from tests.estimation.fits.short_logs import PAPER, SPEED, log, made_fit, noted, problem, seen, usual, wide
+from tests.numbers import Numbers, some
+
+NUMBERS = Numbers(__file__)
+
+
+def plain(cost: float, form: Any = FLOW_FORM, modulus: float = 2e8, **how: Any) -> GreyBoxFit:
+    made = made_fit(cost, modulus, 1e6, **how)
+    fed = "makeup_conductance"
+    return replace(made, model=form, values={**made.values, fed: 1e-9}, std={**made.std, fed: 1e-10})
+
+
+def concluded(fits: list[GreyBoxFit], strange: GreyBoxFit, *names: str, sensed: Any = None, **how: Any) -> Any:
+    """Return what is told of a log by its plain fits, and by one under hypotheses."""
+    values = {name: (value, strange.std[name]) for name, value in strange.values.items() if name in strange.std}
+    explanation = SimpleNamespace(names=names, values=values, fit=strange)
+    asked: list[Any] = []
+
+    def explained(*_: Any, asked: Any, paired: bool, by_mass: bool, **__: Any) -> Any:
+        calls.append([[one.name for one in asked], paired, by_mass])
+        return explanation
+
+    calls = asked
+    with patch.multiple(
+        flow_fit,
+        balanced=lambda *_: fits,
+        promised_each=lambda *_, **__: 2 * [Promise(40.0, 0.2, 0.05)],
+        promised=lambda *_, **__: Promise(0.0, 0.0, 0.05),
+        explain=explained,
+        contradicted=lambda *_: (),
+        sensed_play=lambda _: sensed or ShownPlay(0.0, 0.0),
+    ):
+        found = fit_flow(log(0.2), PAPER, 2e8, **how)
+    return {
+        "asked": calls,
+        "believed [Pa]": list(found.parameters["bulk_modulus"]),
+        "bound": found.bound,
+        "chi-square": found.chi_square,
+        "reasons": noted(found.reasons),
+        "remarks": noted(found.remarks),
+        "explained by": None if found.explanation is None else list(found.explanation.names),
+    }
+
+
+@NUMBERS.case()
+def conclusions_of_the_flow_form() -> dict[str, Any]:
+    strange = plain(100.0, modulus=2.1e8)
+    sensed = ShownPlay(3e-5, 9.0, 2e-10)
+    told: dict[str, Any] = {
+        f"delivery, {gain:g} better": concluded([plain(100.0 + gain)], strange, "delivery") for gain in (9.0, 11.0)
+    }
+    told |= {
+        "poorly explained": concluded([plain(500.0)], plain(100.0, chi=1.5), "delivery"),
+        "filtered": concluded([plain(105.0)], strange, "pressure_late", filtered=True),
+        "filtered, and more": concluded([plain(105.0)], strange, "pressure_late", "delivery", filtered=True),
+        "filtered, but": concluded([plain(89.0)], strange, "pressure_late", filtered=True),
+        "played": concluded([plain(200.0)], strange, "position_play", sensed=sensed),
+        "played less": concluded([plain(200.0)], strange, "position_play", sensed=ShownPlay(3e-5, 9.0, 1e-13)),
+        "played, poorly": concluded([plain(200.0)], plain(100.0, chi=1.15), "position_play", sensed=sensed),
+        "played, and more": concluded([plain(200.0)], strange, "position_play", "volume", sensed=sensed),
+        "a play is left": concluded([plain(200.0)], strange, "delivery", sensed=sensed),
+        "held volumes": concluded(
+            [plain(100.0, HELD_FLOW_FORM), plain(130.0), plain(128.0, MASS_FLOW_FORM)], strange, "delivery"
+        ),
+        "mass": concluded([plain(104.0), plain(100.0, MASS_FLOW_FORM, 2.02e8)], strange, "delivery"),
+        "nothing explains it": concluded([plain(900.0, chi=2.0)], plain(899.0, chi=2.0), "volume"),
+        "under load": concluded([plain(105.0, chi=1.15)], plain(90.0, chi=1.12), "start_load", loaded=True),
+        "under load, explained": concluded([plain(105.0, chi=1.15)], plain(90.0, chi=1.05), "start_load", loaded=True),
+    }
+    names = {"zero": ("encoder_zero",), "lag": ("pressure_late",), "play": ("position_play",), "two": ("volume", "air")}
+    best, swinging = plain(100.0, HELD_FLOW_FORM), plain(105.0)
+    told["wanted"] = {
+        f"{name}, homed: {homed}, late: {late}": _wanted(each, best, swinging, homed=homed, late=late)
+        for name, each in names.items()
+        for homed in (False, True)
+        for late in (False, True)
+    }
+    told["all explained up to"] = [
+        edge(lambda chi, noisy=noisy: _explains_all(plain(1.0, chi=chi), noisy), 0.5, 2.0, 20)
+        for noisy in (False, True)
+    ]
+    return told
+
+
+@NUMBERS.case()
+def encoders_that_were_homed() -> dict[str, Any]:
+    def homed(*read: float) -> bool:
+        drives = np.zeros((len(read), 2))
+        drives[:, FLOW_FORM.drives.index("position_m")] = read
+        one: Any = SimpleNamespace(drives=drives)
+        return _homed_at_stop(one)
+
+    return {
+        "beyond the stop": edge(lambda over: homed(0.1, 0.3, -over), 0.0, 0.05),
+        "beyond the other": edge(lambda over: homed(-0.1, -0.3, over), 0.0, 0.05),
+        "at first": edge(lambda begun: homed(begun, 0.3, 0.0), 0.0, 0.05),
+        "on both sides": homed(0.1, 0.2, -0.2),
+    }
+
+
+MOVED_BOUNDS = {"chamber_volume", "relief_conductance", "start_level", "position_zero"}
+"""Unknowns of which the log says how far they may go, or where they begin."""
+
+
+@NUMBERS.case()
+def bounds_and_starts_of_hypotheses() -> dict[str, Any]:
+    told: dict[str, Any] = {}
+    slow, noisy = wide(), widened(seen(log(0.5, position_noise=3e-5)), PAPER, {STIFFNESS: 3e7})
+    fast = replace(slow, drives=slow.drives * np.where(np.arange(slow.drives.shape[1]) == 0, 40.0, 1.0))
+    asked = [one for one in (BEGUN, *HYPOTHESES) if {*one.free} & MOVED_BOUNDS]
+    for name, base in {"slow": slow, "fast": fast, "noisy": noisy}.items():
+        for one in asked:
+            model = freed(base, (one,)).model
+            usual_size = model.values(np.zeros(len(model.unknowns)))
+            guesses = [model.theta({**usual_size, "bulk_modulus": size}) for size in (1e8, 4e8)]
+            bounds = zip(model.unknowns, *(each.tolist() for each in flow_bounds(model, guesses, base)), strict=True)
+            told[f"{one.name}{', begun' if one is BEGUN else ''}, {name}"] = {
+                "starts": [dict(start) for start in own_starts(base, one)],
+                "bounds": {unknown: pair for unknown, *pair in bounds},
+            }
+    values = {"meant": [], "cost": []}
+    for one in HYPOTHESES:
+        if one.least:
+            tried = [
+                _Tried((one,), SimpleNamespace(cost=3.0), {one.free[0]: share * one.least}, {})  # pyright: ignore[reportArgumentType]
+                for share in (0.99, -0.99, 1.0, -1.01)
+            ]
+            values["meant"].append([one.name, *(each.meant for each in tried)])
+            values["cost"].append([one.name, *(each.cost for each in tried)])
+    told |= values
+    return told
+
+
+@NUMBERS.case()
+def steps_of_the_form_of_motion() -> dict[str, Any]:
+    found = problem()
+    rng = np.random.default_rng(8)
+    path = np.cumsum(rng.normal(0.0, 1e-4, 600)) + 0.3
+    speed = 100.0 * np.sign(np.sin(0.02 * np.arange(600)))
+    told: dict[str, Any] = {
+        f"{step:g} s": np.flatnonzero(np.diff(_steps(np.column_stack([speed, path]), step)))
+        for step in (1e-3, 2e-3, 7e-3)
+    }
+    told["counts"] = [np.unique(_steps(np.column_stack([speed, path]), step)) for step in (1e-3, 2e-3, 7e-3)]
+    told["set off from [rad/s]"] = edge(
+        lambda jump: int(np.sum(_steps(np.column_stack([jump * (np.arange(80) > 40.0), np.arange(80.0)]), 1e-3))),
+        0.0,
+        99.0,
+    )
+    told["unseen"] = [
+        unseen(plain(1.0, chi=chi), samples) for chi in (0.9, 1.0, 1.05, 1.1, 1.3) for samples in (100, 20_000)
+    ]
+    theta = usual(found)
+    fit = replace(plain(1.0), slopes=found.slopes(theta))
+    gapped = replace(found.log, gaps=np.array([[1.0, 2.0, 3.0]]))
+    told["slopes that are known"] = {
+        "plain": {name: some(slope) for name, slope in _slopes(fit, found.log).items()},
+        "noisy": dict(_slopes(fit, seen(log(0.5, position_noise=3e-5)))),
+        "with gaps": dict(_slopes(fit, gapped)),
+    }
+    told["channels"] = [SPEED in found.log.timed]
+    return told
+
+
+@pytest.mark.parametrize("case", NUMBERS.cases)
+def test_numbers_stand(case: str) -> None:
+    NUMBERS.check(case)
