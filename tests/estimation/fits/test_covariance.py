@@ -52,6 +52,17 @@ def test_parameters_that_cannot_be_told_apart_are_warned_of() -> None:
     assert [one.message.note.code for one in caught] == [EstimateCode.NOT_DETERMINED]
 
 
+def test_the_warning_names_the_line_that_asked_for_the_fit() -> None:
+    column = np.random.default_rng(2).standard_normal(40)
+
+    def fitted() -> object:
+        return least_squares_covariance(np.column_stack([column, column]), column, 40, 0, NOTHING)
+
+    with pytest.warns(LogWarning) as caught:
+        fitted()
+    assert [one.filename for one in caught] == [__file__]
+
+
 def test_what_is_known_beforehand_tells_parameters_apart() -> None:
     rng = np.random.default_rng(3)
     column, noise = rng.standard_normal(4000), rng.standard_normal(4000)

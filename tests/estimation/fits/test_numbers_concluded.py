@@ -79,6 +79,15 @@ def conclusions_of_the_flow_form() -> dict[str, Any]:
         "played less": concluded([plain(200.0)], strange, "position_play", sensed=ShownPlay(3e-5, 9.0, 1e-13)),
         "played, poorly": concluded([plain(200.0)], plain(100.0, chi=1.15), "position_play", sensed=sensed),
         "played, and more": concluded([plain(200.0)], strange, "position_play", "volume", sensed=sensed),
+        "played, sensed by chance once in sixty logs": concluded(
+            [plain(200.0)], strange, "position_play", sensed=ShownPlay(3e-5, 2.3, 2e-11)
+        ),
+        "played, sensed by chance once in 140 logs": concluded(
+            [plain(200.0)], strange, "position_play", sensed=ShownPlay(3e-5, 3.1, 2e-11)
+        ),
+        "played, shown": concluded(
+            [replace(plain(200.0), play=ShownPlay(3e-5, 9.0))], strange, "position_play", sensed=ShownPlay(3e-5, 2.3)
+        ),
         "a play is left": concluded([plain(200.0)], strange, "delivery", sensed=sensed),
         "held volumes": concluded(
             [plain(100.0, HELD_FLOW_FORM), plain(130.0), plain(128.0, MASS_FLOW_FORM)], strange, "delivery"
@@ -131,7 +140,7 @@ def bounds_and_starts_of_hypotheses() -> dict[str, Any]:
     asked = [one for one in (BEGUN, *HYPOTHESES) if {*one.free} & MOVED_BOUNDS]
     for name, base in {"slow": slow, "fast": fast, "noisy": noisy}.items():
         for one in asked:
-            model = freed(base, (one,)).model
+            model = freed(base, (one,), STIFFNESS).model
             usual_size = model.values(np.zeros(len(model.unknowns)))
             guesses = [model.theta({**usual_size, "bulk_modulus": size}) for size in (1e8, 4e8)]
             bounds = zip(model.unknowns, *(each.tolist() for each in flow_bounds(model, guesses, base)), strict=True)
@@ -139,6 +148,9 @@ def bounds_and_starts_of_hypotheses() -> dict[str, Any]:
                 "starts": [dict(start) for start in own_starts(base, one)],
                 "bounds": {unknown: pair for unknown, *pair in bounds},
             }
+    dead = replace(slow, measured=0.0 * slow.measured)
+    told["of a dead sensor"] = [dict(start) for one in asked for start in own_starts(dead, one)]
+    told["presumed"] = {name: list(pair) for name, pair in slow.presumed.items()}
     values = {"meant": [], "cost": []}
     for one in HYPOTHESES:
         if one.least:

@@ -250,3 +250,4 @@ def test_a_play_is_shown_by_chance_as_seldom_as_its_limit_says() -> None:
     by_chance = float(ndtr(-((2.0 * PLAY_SHOWN) ** 0.5)))
     assert 1.0 / by_chance == pytest.approx(430.0, rel=0.02)
     assert 1.0 / (3.0 * by_chance) == pytest.approx(140.0, rel=0.03)
+    assert 1.0 / float(ndtr(-((2.0 * PLAY_SENSED) ** 0.5))) == pytest.approx(100.0, rel=0.02)
