@@ -187,9 +187,8 @@ def _steps(drives: Array, sample_time: float) -> NDArray[np.int64]:
     """Return the model steps up to each sample: short ones where the piston turns or is set off."""
     reach = max(1, round(5e-3 / sample_time))
     sums = np.cumsum(np.pad(drives[:, 1] - drives[0, 1], (reach + 1, reach), mode="symmetric"))
-    smooth = (sums[2 * reach + 1 :] - sums[: -2 * reach - 1]) / (2 * reach + 1)
-    velocity = np.gradient(smooth) / sample_time
-    turning = np.abs(velocity) < TURNING * np.sqrt(np.mean(velocity**2))
+    pace = np.gradient(sums[2 * reach + 1 :] - sums[: -2 * reach - 1])  # in proportion to the mean velocity
+    turning = np.abs(pace) < TURNING * np.sqrt(np.mean(pace**2))
     set_off = np.abs(np.diff(drives[:, 0], prepend=drives[0, 0])) > SET_OFF
     fine, coarse = (steps_a_sample(sample_time, step) for step in (FINEST_STEP, LONGEST_STEP))
     return np.where(turning | set_off, fine, coarse)

@@ -9,17 +9,21 @@ import numpy as np
 import pytest
 
 from estimation.fits import flow_fit
+from estimation.fits.descent import Point
 from estimation.fits.explain import _Tried
 from estimation.fits.flow_fit import _explains_all, _homed_at_stop, _slopes, _wanted, fit_flow
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.hypotheses import BEGUN, HYPOTHESES
-from estimation.fits.motion_fit import _steps, unseen
+from estimation.fits.motion_fit import _log, _starts, _steps, unseen
+from estimation.fits.motion_search import MOST_WORK, Begun, MotionSearch, explained, rough
 from estimation.fits.play import ShownPlay
 from estimation.fits.promises import Promise
 from estimation.fits.wide_problem import flow_bounds, freed, own_starts, widened
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
+from estimation.models.motion import MOTION_FORMS
+from plant.log.record import Record
 from tests.edges import edge
-from tests.estimation.fits.short_logs import PAPER, SPEED, log, made_fit, noted, problem, seen, usual, wide
+from tests.estimation.fits.short_logs import PAPER, POSITION, SPEED, log, made_fit, noted, problem, seen, usual, wide
 from tests.numbers import Numbers, some
 
 NUMBERS = Numbers(__file__)
@@ -193,6 +197,51 @@ def steps_of_the_form_of_motion() -> dict[str, Any]:
     }
     told["channels"] = [SPEED in found.log.timed]
     return told
+
+
+@NUMBERS.case()
+def searches_of_the_form_of_motion() -> dict[str, Any]:
+    rng = np.random.default_rng(5)
+    speed = 100.0 * np.sign(np.sin(0.02 * np.arange(400)))
+    path = np.cumsum(3e-7 * speed) + 1e-6 * rng.standard_normal(400)
+    search = MotionSearch.of(
+        MOTION_FORMS[0],
+        _log(Record(1e-3, {SPEED: speed, POSITION: path}), PAPER, {}, 1e-4),
+        _starts(PAPER, 2e8)[:3],
+    )
+    begun, theta = Begun(), search.guesses[0]
+    place = search.whole.model.unknowns.index("bulk_modulus")
+    counted: Any = SimpleNamespace(
+        log=SimpleNamespace(steps=np.array([3, 4])), at=lambda theta: theta, at_each=lambda thetas: thetas
+    )
+    work = list[int]()
+    for runs in (1, 5, 20):
+        begun.at_each(counted)(runs * [np.zeros(3)])
+        work.append(begun.work)
+    begun.at(counted)(np.zeros(7))
+    begun.at(counted)(np.zeros(8))
+
+    def point(cost: float, moved: float = 0.0) -> Point:
+        shifted = theta + moved * (np.arange(len(theta)) == place)
+        return Point(shifted, cost, np.zeros(len(theta)), np.eye(len(theta)))
+
+    return {
+        "work": [*work, begun.work],
+        "bounds": dict(zip(search.whole.model.unknowns, np.column_stack(search.bounds).tolist(), strict=True)),
+        "samples": [len(one.log.measured) for one in (search.whole, search.part, search.short)],
+        "one pit up to a cost of": edge(lambda cost: search.same_pit(point(cost), point(100.0)), 100.0, 200.0),
+        "from a cost of": edge(lambda cost: search.same_pit(point(cost), point(100.0)), 1.0, 100.0),
+        "up to a modulus of [log]": [
+            edge(lambda moved, way=way: search.same_pit(point(100.0, way * moved), point(100.0)), 0.0, 9.0)
+            for way in (1.0, -1.0)
+        ],
+        "rough": [
+            [one.log.noise[0].variance, one.log.noise[0].walk, int(np.sum(one.log.steps))]
+            for one in (rough(search.short, factors) for factors in ((1.0, 1.0), (4.0, 9.0)))
+        ],
+        "explained": explained(search.short),
+        "most work": MOST_WORK,
+    }
 
 
 @pytest.mark.parametrize("case", NUMBERS.cases)
