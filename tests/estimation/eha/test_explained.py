@@ -1,10 +1,12 @@
 """What explains a log is told in numbers that follow from what was fitted, and the log is set right by them."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from estimation.eha.bulk_modulus import _impossible_delivery
 from estimation.eha.explained import LEAKAGE_COURSE, WARMED, notes_of, rig_set_right, set_right
 from estimation.fits.explain import Explanation
 from estimation.log_checks.clean import CleanLog
@@ -53,6 +55,20 @@ def test_a_pump_that_delivers_far_less_is_worn(share: float, code: RigCode) -> N
     note = told("delivery", pump_displacement=(share * d, 0.01 * d))
     assert note.code is code
     assert data(note) == {"percent": 100.0 * share, "half_width": NORMAL}
+
+
+def test_a_pump_that_delivers_what_none_can_has_its_speed_in_another_unit() -> None:
+    """What is logged would have to be divided by as much as the pump seems to deliver too much."""
+    d = P.pump_displacement
+
+    def said(share: float) -> Note | None:
+        fit: Any = SimpleNamespace(explanation=explanation("delivery", pump_displacement=(share * d, 0.01 * d)))
+        return _impossible_delivery(fit, P)
+
+    note = said(9.5)
+    assert note is not None
+    assert note.data["factor"] == pytest.approx(1.0 / 9.5)
+    assert said(1.2) is None
 
 
 def test_volume_load_relief_and_check_valves_are_told_beside_the_rigs() -> None:

@@ -8,7 +8,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from estimation.fits import flow_fit
+from estimation.fits import flow_fit, motion_fit
 from estimation.fits.descent import Point
 from estimation.fits.explain import _Tried
 from estimation.fits.flow_fit import _explains_all, _homed_at_stop, _slopes, _wanted, fit_flow
@@ -241,6 +241,42 @@ def searches_of_the_form_of_motion() -> dict[str, Any]:
         ],
         "explained": explained(search.short),
         "most work": MOST_WORK,
+    }
+
+
+@NUMBERS.case()
+def conclusions_of_the_form_of_motion() -> dict[str, Any]:
+    def told(fits: list[GreyBoxFit], *others: float, size: float = 2e8) -> dict[str, Any]:
+        asked: list[Any] = []
+        with patch.multiple(
+            motion_fit,
+            _fitted=lambda _: (fits, others),
+            likeliest=lambda searches: searches,
+            MotionSearch=SimpleNamespace(of=lambda _, log, starts: asked.append((log, starts))),
+        ):
+            found = motion_fit.fit_motion(log(0.2), PAPER, size)
+        (seen_log, starts), *_ = asked
+        return {
+            "moduli of the starts [Pa]": sorted({float(one["bulk_modulus"]) for one in starts}),
+            "position [m]": some(seen_log.measured, 3),
+            "believed [Pa]": list(found.parameters["bulk_modulus"]),
+            "bound": found.bound,
+            "reasons": noted(found.reasons),
+        }
+
+    return {
+        "sure": told([plain(50.0)]),
+        "of an absurd guess": told([plain(50.0)], size=1.0),
+        "others lie elsewhere": told([plain(50.0)], 2.01e8, 1.97e8),
+        "two": told([plain(50.0), plain(51.0, modulus=2.02e8)]),
+        "poor": told([plain(500.0, chi=1.3)]),
+        "weakly held from [Pa]": edge(
+            lambda std: bool(told([replace(plain(50.0), std={**plain(50.0).std, "bulk_modulus": std})])["reasons"]),
+            1e5,
+            1e8,
+            12,
+        ),
+        "weakly held": told([replace(plain(50.0), std={**plain(50.0).std, "bulk_modulus": 5e6})]),
     }
 
 
