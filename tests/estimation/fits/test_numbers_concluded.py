@@ -86,7 +86,7 @@ def conclusions_of_the_flow_form() -> dict[str, Any]:
         "played, sensed by chance once in sixty logs": concluded(
             [plain(200.0)], strange, "position_play", sensed=ShownPlay(3e-5, 2.3, 2e-11)
         ),
-        "played, sensed by chance once in 140 logs": concluded(
+        "played, sensed by chance once in 160 logs": concluded(
             [plain(200.0)], strange, "position_play", sensed=ShownPlay(3e-5, 3.1, 2e-11)
         ),
         "played, shown": concluded(
