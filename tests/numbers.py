@@ -17,6 +17,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -190,17 +191,20 @@ def told(notes: Iterable[Note]) -> list[dict[str, Any]]:
 
 
 def warned(call: Callable[[], Any]) -> list[str]:
-    """Return the sentences that a call warns with.
+    """Return the sentences that a call warns with, and the file that they name where it is not the one that asked.
 
     Parameters
     ----------
     call : callable
-        What is tried.
+        What is tried: a function of a test that asks, or what is asked itself with its arguments.
     """
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         call()
-    return [str(one.message) for one in caught]
+    asked = call.__code__.co_filename if isinstance(call, FunctionType) else __file__
+    return [
+        str(one.message) if one.filename == asked else f"{one.message} (in {Path(one.filename).name})" for one in caught
+    ]
 
 
 def _plain(value: Any) -> Any:

@@ -183,7 +183,9 @@ def blocks_of(record: Record) -> Blocks:
 
 def _begun(whole: Mapping[str, Array], velocity: Array) -> tuple[float, float] | None:
     """Return pressure and velocity at the start of a log that does not begin at rest."""
-    pressure = whole.get(PRESSURE, np.zeros(1))
+    if PRESSURE not in whole:
+        return None
+    pressure = whole[PRESSURE]
     size = float(np.sqrt(np.nanmean(pressure**2)))
     return (float(pressure[0]), float(np.nan_to_num(velocity[0]))) if abs(pressure[0]) > LEAST_BEGUN * size else None
 

@@ -32,6 +32,10 @@ GAINED = 0.5
 PROMISING = 2e-3
 """Gain that a step must promise to be tried [dimensionless]: less moves nothing by a fifteenth of its deviation."""
 
+SHORTEST = 0.07
+"""Share of a step below which a trial that gains nothing is the last [fraction]: a whole step, 0.3,
+0.09 and 0.027 of it are tried."""
+
 LEAST_SCALE = 1e-3
 """Share of an output's root mean square that a residual counts as in any case [dimensionless]: no model is exact."""
 
@@ -266,12 +270,37 @@ def fit_freely(
             best, reach = there, 0.0
             if gain < gained:
                 break
-        else:  # of the parabola through both costs, with the slope here
-            curvature = (2.0 * promised * reach - gain) / reach**2
+        elif reach < SHORTEST or most_gained(promised, reach, gain) < PROMISING:
+            break
+        else:
             reach *= 0.3
-            if reach < 0.02 or promised**2 / curvature < PROMISING:
-                break
     return best
+
+
+def most_gained(promised: float, reach: float, gain: float) -> float:
+    """Return what a step gains at its best length, on the parabola through a trial of it.
+
+    Parameters
+    ----------
+    promised : float
+        What the whole step promises [dimensionless]: half of the slope here.
+    reach : float
+        Share of the step that was tried [fraction].
+    gain : float
+        What that gained [dimensionless], less than was promised.
+
+    Returns
+    -------
+    float
+        In log-posterior [dimensionless].
+
+    Examples
+    --------
+    >>> most_gained(4.0, 0.5, 2.0 * 4.0 * 0.5 - 4.0 * 0.5**2)  # as was promised
+    4.0
+    """
+    curvature = (2.0 * promised * reach - gain) / reach**2
+    return promised**2 / curvature
 
 
 def about(blocks: Blocks, actuator: Actuator, condition: str, fit: PointFit) -> PointFit:

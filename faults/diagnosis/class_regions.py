@@ -88,7 +88,7 @@ class ClassFits:
     nominal_scales: Array
     scores: Array
     spread: Array
-    lasting: float = 1.0
+    lasting: float
 
     @property
     def told(self) -> Array:

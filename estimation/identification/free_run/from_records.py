@@ -73,7 +73,10 @@ def channels_of(
     u, y = list[Array](), list[Array]()
     for record in records:
         for part in pieces(record, inputs) if split else [record]:
-            columns = [_on_clock(without_gaps(part[name], name), part.sample_time, wanted) for name in inputs]
+            whole = list[Array]()
+            for name in inputs:  # up to Python 3.11 a comprehension is a caller, and the warning would name this line
+                whole.append(without_gaps(part[name], name))
+            columns = [_on_clock(one, part.sample_time, wanted) for one in whole]
             answer = _on_clock(part[output], part.sample_time, wanted)
             if part.start_time > record.start_time:  # it may still answer, after a dead time, to what is not known
                 answer[: min(LONGEST_ANSWER, answer.size // 20)] = np.nan

@@ -91,6 +91,17 @@ def test_two_starts_that_explain_the_log_alike_and_lie_apart_are_told() -> None:
     assert other.data["value"] == pytest.approx(-fit.values["gain"], abs=1e-3)
 
 
+@pytest.mark.parametrize(("worse", "told"), [(1.5, True), (2.5, False)])
+def test_another_start_explains_a_log_as_well_within_two_of_log_likelihood(
+    found: EquationsFit, worse: float, told: bool
+) -> None:
+    solution = found.solution
+    mirror = -solution.point.theta  # the gain is squared, so that its sign is open
+    other = replace(solution, others=(mirror,), point=replace(solution.point, cost=solution.point.cost - worse))
+    notes = concluded(other, np.array([np.nan]))[0].notes
+    assert ("starts_disagree" in codes(notes)) is told
+
+
 def test_steps_that_are_too_long_and_a_search_that_did_not_settle_speak_against_a_fit(found: EquationsFit) -> None:
     given = np.array([np.nan])
     doubted = replace(found.solution, moved=1.01 * SETTLED, evaluations=EVALUATIONS)

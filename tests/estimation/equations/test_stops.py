@@ -29,6 +29,16 @@ def test_where_a_channel_stands(values: np.ndarray, noise: float, wanted: dict[s
     assert found == {end: pytest.approx(value, abs=0.005) for end, value in wanted.items()}
 
 
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e9])
+def test_whether_a_channel_stands_is_the_same_in_every_unit(unit: float) -> None:
+    values = unit * np.clip(np.sin(TIME), -0.7, 0.5)
+    ends = {(one.end, round(one.value / unit, 9)) for one in standing([values], 0.0)}
+    assert ends == {("least", -0.7), ("largest", 0.5)}
+    # three deviations of noise are a tenth of the range from 0.04 on: where it ends is hidden then
+    assert [one.end for one in standing([values], 0.039 * unit)] == ["largest"]
+    assert list(standing([values], 0.041 * unit)) == []
+
+
 def test_the_share_and_the_samples_are_those_that_stand() -> None:
     values = np.sin(TIME)
     values[values > 0.5] = 0.5

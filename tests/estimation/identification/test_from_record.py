@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from estimation.identification import LinearModel, identify_record
+from estimation.identification.from_record import record_signals
 from estimation.identification.notes import IdentificationCode
 from plant.errors import HydrostateError, LogError, LogWarning
 from plant.log.record import Record
@@ -81,6 +82,19 @@ def test_a_record_without_the_channels_is_refused(record: Record) -> None:
         identify_record(record.replace(velocity_m_s=None, other=record["velocity_m_s"]))
     with pytest.raises(LogError, match="3 samples of 'position_m'"):
         identify_record(Record(1e-3, {"motor_speed_rad_s": np.ones(2), "position_m": np.ones(2)}))
+
+
+def test_three_samples_of_position_have_a_velocity_and_what_is_made_up_is_told_to_who_asked() -> None:
+    short = Record(1e-3, {"motor_speed_rad_s": np.array([1.0, np.nan, 3.0]), "position_m": np.array([0.0, 1e-3, 4e-3])})
+    with pytest.warns(LogWarning) as caught:
+        u, y = record_signals(short)
+    assert u == pytest.approx([1.0, 2.0, 3.0])
+    assert y == pytest.approx([1.0, 2.0, 3.0])
+    said = {one.message.note.code: one.filename for one in caught}  # type: ignore[union-attr]
+    assert said == {
+        IdentificationCode.VELOCITY_DIFFERENTIATED: __file__,
+        IdentificationCode.INPUT_BRIDGED: __file__,
+    }
 
 
 def test_a_motor_at_constant_speed_is_refused(record: Record) -> None:

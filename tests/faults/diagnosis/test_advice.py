@@ -71,6 +71,12 @@ def test_gaps_slow_sensors_and_long_logs_hide_no_speed() -> None:
     assert speeds_held(staircase([40.0, 80.0] * 100, dwell=0.15)) == 2
 
 
+def test_a_slow_log_shows_a_speed_in_four_samples() -> None:
+    speed = np.tile(np.repeat([100.0, 60.0], 4), 5)
+    assert speeds_held(Record(0.05, {"motor_speed_rad_s": speed})) == 2
+    assert speeds_held(Record(0.05, {"motor_speed_rad_s": np.tile(np.repeat([100.0, 60.0], 2), 10)})) == 0
+
+
 def test_speeds_that_a_motor_creeps_through_are_more_than_one() -> None:
     ramp = np.linspace(0.0, 100.0, 20_000)
     assert speeds_held(Record(1e-3, {"motor_speed_rad_s": ramp})) == 2

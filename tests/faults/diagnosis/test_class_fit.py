@@ -11,7 +11,7 @@ from faults.conditions import CONDITIONS
 from faults.diagnosis import class_fit
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import parameter_rows, predicted
-from faults.diagnosis.class_fit import FARTHEST, LASTING, WEAK, Actuator, fit_freely, misfit
+from faults.diagnosis.class_fit import FARTHEST, LASTING, WEAK, Actuator, fit_freely, misfit, most_gained
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
@@ -51,6 +51,20 @@ def test_no_step_is_longer_than_the_longest_and_short_ones_are_whole() -> None:
     far = replace(here, slopes=here.slopes / 100.0, information=here.information / 1e4)
     assert class_fit._step(log(), here, CENTRE, PULL) == pytest.approx(whole)
     assert np.abs(class_fit._step(log(), far, CENTRE, 1e-9 * PULL)).max() == pytest.approx(FARTHEST)
+
+
+@pytest.mark.parametrize("bend", [0.5, 3.0, 40.0])
+@pytest.mark.parametrize("reach", [1.0, 0.3, 0.09])
+def test_what_a_shorter_step_gains_is_read_off_the_parabola_through_the_one_that_was_tried(
+    bend: float, reach: float
+) -> None:
+    promised = 1.5
+
+    def gained(share: float) -> float:
+        return 2.0 * promised * share - bend * share**2  # its slope where the step begins is twice what it promises
+
+    best = max(gained(share) for share in np.linspace(0.0, 4.0, 40_001))
+    assert most_gained(promised, reach, gained(reach)) == pytest.approx(best, rel=1e-6)
 
 
 @pytest.mark.parametrize("pulled", [1.0, 1e3])

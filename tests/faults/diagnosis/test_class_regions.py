@@ -195,7 +195,7 @@ def test_along_the_scale_of_pressure_motion_stays_and_pressure_grows_alike() -> 
 def test_a_log_that_says_nothing_leaves_the_weak_belief_and_one_that_says_all_leaves_none() -> None:
     nine = np.zeros(len(CONDITIONS))
     said = (
-        class_regions.ClassFits(fit(0), scale * np.eye(7), nine, np.zeros((9, 2)), nine, np.eye(7)).covariance
+        class_regions.ClassFits(fit(0), scale * np.eye(7), nine, np.zeros((9, 2)), nine, np.eye(7), 1.0).covariance
         for scale in (0.0, 1e9)
     )
     nothing, everything = said

@@ -1,11 +1,14 @@
 """A stop that no rig file names is found where the piston stands against it, and nowhere else."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS
+from faults.diagnosis import end_stop
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.class_fit import Actuator
@@ -63,6 +66,23 @@ def test_a_piston_that_the_drive_left_standing_met_no_stop() -> None:
     assert np.sum(gone > log.reach - NEAR) * log.block * log.sample_time > RESTS
     fits = fit_classes(log, ACTUATOR)
     assert stopped(log, fits, ACTUATOR) == (log, fits)
+
+
+@pytest.mark.parametrize(("shares", "sought"), [((0.055, 0.055), False), ((0.065, 0.01), True), ((0.01, 0.065), True)])
+def test_a_stop_is_sought_where_a_circuit_leaves_6_percent_of_an_output(
+    shares: tuple[float, float], sought: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = log_of(0.02)
+    left: Any = SimpleNamespace(best=SimpleNamespace(scales=np.array(shares) * log.sizes, fitted=log.outputs))
+    asked: list[float | None] = []
+
+    def fitted(blocks: Blocks, *_: Any) -> Any:
+        asked.append(blocks.stop)
+        return left
+
+    monkeypatch.setattr(end_stop, "fit_classes", fitted)
+    assert stopped(log, left, ACTUATOR) == (log, left)  # the stop gains nothing
+    assert asked == ([log.reach] if sought else [])
 
 
 def test_where_a_poor_fit_has_another_cause_a_stop_does_not_excuse_it() -> None:

@@ -197,6 +197,11 @@ def forecasts() -> dict[str, Any]:
     return told
 
 
+@NUMBERS.case()
+def futures_that_are_drawn() -> dict[str, Any]:
+    return {"count": len(crossing(*held((0.9, 0.02, 0.0)), np.random.default_rng(7)).steps)}
+
+
 @NUMBERS.case(relative=0.15)
 def cloud_of_a_belief() -> dict[str, Any]:
     covariance = np.array([[0.04, 0.01, 0.002], [0.01, 0.02, 0.004], [0.002, 0.004, 0.01]])

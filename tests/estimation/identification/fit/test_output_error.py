@@ -146,6 +146,7 @@ def test_too_high_an_order_on_clean_data_warns_that_coefficients_are_not_determi
     with pytest.warns(CovarianceWarning) as caught:
         fitted = fit_output_error(u, first_order.simulate(u), 1e-3, n_numerator=3, n_denominator=3)
     assert [one.message.note.code for one in caught] == [EstimateCode.NOT_DETERMINED]
+    assert caught[0].filename == __file__
     assert fitted.dc_gain == pytest.approx(1.0, rel=1e-6)
 
 

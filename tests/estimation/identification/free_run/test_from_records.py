@@ -64,8 +64,9 @@ def test_a_log_falls_into_a_bounded_number_of_parts() -> None:
 
 
 def test_outputs_next_to_a_gap_are_left_out_for_they_may_answer_what_is_not_known() -> None:
-    with pytest.warns(LogWarning):
+    with pytest.warns(LogWarning) as said:
         data = channels_of([log(binary(), slice(1000, 1010))], ["u"], "y", split=True)
+    assert {one.filename for one in said} == {__file__}  # it points at who asked
     assert [int(np.isnan(y).sum()) for y in data.y] == [0, 20]
     assert np.isnan(data.y[1][:20]).all()
 

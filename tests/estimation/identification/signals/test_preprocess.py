@@ -41,7 +41,9 @@ def test_filtering_both_keeps_a_linear_relation() -> None:
 def test_filtering_the_output_only_leaves_the_input_and_warns() -> None:
     with pytest.warns(LogWarning) as caught:
         u, y = zero_phase_filter(tone(100.0), tone(100.0), 1e-3, filter_input=False)
-    assert [one.message.note.code for one in caught] == [IdentificationCode.OUTPUT_ALONE_FILTERED]
+    assert [(one.message.note.code, one.filename) for one in caught] == [
+        (IdentificationCode.OUTPUT_ALONE_FILTERED, __file__)
+    ]
     np.testing.assert_array_equal(u, tone(100.0))
     assert np.abs(y[500:-500]).max() < 1e-6
 
