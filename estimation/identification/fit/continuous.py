@@ -87,8 +87,7 @@ class _Problem:
         """Return numerator, denominator, delay at one sample a unit of time."""
         n_b = self.n_zeros + 1
         late = self.dead_time / self.sample_time if self.dead_time is not None else values[-1]
-        a = np.concatenate([[1.0], values[n_b : n_b + self.n_poles]])
-        return held_input_model(values[:n_b], a, max(float(late), 0.0), 1.0)
+        return held_input_model(values[:n_b], values[n_b : n_b + self.n_poles], max(float(late), 0.0), 1.0)
 
     def parts(self, values: Array) -> tuple[Array, Array]:
         """Return Jacobian by continuous values and initial states, and the residual, initial states at their best."""

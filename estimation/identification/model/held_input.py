@@ -14,8 +14,8 @@ def held_input_model(
     ----------
     numerator : ndarray, shape (m + 1,)
         Descending powers of s, m no more than the denominator's degree.
-    denominator : ndarray, shape (n + 1,)
-        Monic, descending powers of s.
+    denominator : ndarray, shape (n,)
+        Descending powers of s behind the leading 1.
     dead_time : float
         Delay of the input [s].
     sample_time : float
@@ -32,18 +32,18 @@ def held_input_model(
 
     Examples
     --------
-    >>> b, f, delay = held_input_model(np.array([1.0]), np.array([1.0, 1.0]), 0.0, np.log(2.0))
+    >>> b, f, delay = held_input_model(np.array([1.0]), np.array([1.0]), 0.0, np.log(2.0))
     >>> b.round(9).tolist(), f.round(9).tolist(), delay
     ([0.0, 0.5], [1.0, -0.5], 1)
     """
-    n = denominator.size - 1
+    n = denominator.size
     padded = np.concatenate([np.zeros(n + 1 - numerator.size), numerator])
     through = padded[0]
     A = np.zeros((n, n))
-    A[0] = -denominator[1:]
+    A[0] = -denominator
     A[1:, :-1] = np.eye(n - 1)
     B = np.eye(n)[:, :1]
-    C = padded[1:] - through * denominator[1:]
+    C = padded[1:] - through * denominator
     whole = int(np.floor(dead_time / sample_time + 1e-9))
     part = max(dead_time - whole * sample_time, 0.0)
     late, new_gain = _held(A, B, sample_time - part)

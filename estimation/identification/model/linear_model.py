@@ -328,7 +328,7 @@ class LinearModel:
         T = self.sample_time if sample_time is None else sample_time
         if not self.continuous:
             raise HydrostateError("discretised() is for a model in continuous time, got one in discrete time")
-        b, f, delay = held_input_model(self.numerator, self.denominator, self.dead_time, T)
+        b, f, delay = held_input_model(self.numerator, self.denominator[1:], self.dead_time, T)
         return LinearModel(b, f, T, self.input_name, self.output_name, delay=delay)
 
     def step(self, duration: float) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.blocks import BLOCK, Blocks, blocks_of
-from faults.diagnosis.circuit_runs import coordinates_of, parameter_rows, predicted
+from faults.diagnosis.circuit_runs import COLUMN, _between_stops, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.class_fit import Actuator
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.model import EhaParameters
@@ -18,6 +18,7 @@ from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
 ACTUATOR = Actuator.of(EhaParameters())
+CENTRE = ACTUATOR.conditions[0]
 SPEED = 100.0 * np.sign(np.sin(np.arange(3000) * 2e-3))
 
 
@@ -37,6 +38,16 @@ def test_friction_opposes_motion_at_every_coordinate() -> None:
     names = list(CircuitParameters.__dataclass_fields__)
     a1, a2, a3 = (rows[:, names.index(f"friction_{part}")] for part in ("quadratic", "linear", "coulomb"))
     assert np.all(np.minimum(a2, 0.0) ** 2 < 4.0 * a1 * a3)
+
+
+@pytest.mark.parametrize(("beyond", "shown"), [(-0.025, False), (-0.015, True), (0.015, True), (0.025, False)])
+def test_a_piston_that_turned_within_two_percent_of_a_stop_met_it(beyond: float, shown: bool) -> None:
+    still = np.zeros(20)
+    still[5] = 0.03 * (1.0 + beyond) / 0.01  # out to beside a stop 30 mm away
+    log = Blocks(np.zeros(201), 1e-3, 10, still, None, np.ones(1))
+    (row,) = _between_stops(log, parameter_rows(CENTRE[None], replace(ACTUATOR.circuit, stroke=0.06), ACTUATOR.rated))
+    assert bool(row[COLUMN["stroke"]] == pytest.approx(0.06)) is shown
+    assert row[COLUMN["stroke"]] > 0.059
 
 
 @pytest.mark.parametrize("sample_time", [1e-4, 1e-3, 2e-3])

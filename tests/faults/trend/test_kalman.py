@@ -1,5 +1,7 @@
 """The trend's filter, against what is known in closed form and against its own claims."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad_vec
@@ -112,6 +114,16 @@ def test_growth_is_more_probable_with_a_slope_and_rest_is_not() -> None:
     *_, resting = beliefs(times, noise, stds, grid)
     assert growth_evidence(growing, grid) > 10.0
     assert growth_evidence(resting, grid) < 0.0
+
+
+@pytest.mark.parametrize("shared", [-1e4, 0.0, 1e4])
+def test_what_all_settings_explain_alike_weighs_for_none(shared: float) -> None:
+    grid = settings()
+    told = 3.0 * np.sin(np.arange(len(grid.slope)))
+    now = first_belief(grid)
+    found = replace(now, evidence=told + shared).weights(grid)
+    exact = np.exp(told + grid.log_prior)
+    assert found == pytest.approx(exact / exact.sum(), rel=1e-9)
 
 
 def test_weights_sum_to_one_and_half_of_the_prior_is_rest() -> None:

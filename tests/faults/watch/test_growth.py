@@ -30,5 +30,13 @@ def test_the_interval_is_wider_beside_oil_that_drifts() -> None:
     assert widths[1] > 1.2 * widths[0]
 
 
+def test_however_slowly_oil_drifts_the_interval_has_an_end() -> None:
+    rise = 0.07 + 3e-4 * np.maximum(ENDS - 1000.0, 0.0)
+    since, (low, high) = growth_time(rise + 0.01 * np.sin(ENDS / 200.0), ENDS)
+    assert low < 1000.0 < high
+    assert since - low < 200.0  # a fifth of what came before it
+    assert high - since < 200.0
+
+
 def test_too_few_levels_are_dated_no_closer_than_they_reach() -> None:
     assert growth_time(np.array([0.1, 0.4]), np.array([10.0, 20.0])) == (10.0, (10.0, 20.0))

@@ -81,6 +81,17 @@ def test_the_bandwidth_is_where_the_gain_is_three_decibels_down() -> None:
     assert first_order.bandwidth_hz == pytest.approx(-np.log(0.99) / (2e-3 * np.pi), rel=1e-3)
 
 
+@pytest.mark.parametrize("place", [0.05, 0.3, 0.71])
+def test_a_notch_of_a_hundredth_of_its_frequency_ends_the_band(place: float) -> None:
+    turn, inner = np.pi * place, 1.0 - 0.004 * place
+    notch = np.poly(np.exp([1j * turn, -1j * turn])).real
+    poles = np.poly(inner * np.exp([1j * turn, -1j * turn])).real
+    found = LinearModel(notch, poles, 1e-3, "u", "y").bandwidth_hz
+    assert found is not None
+    width = (1.0 - inner) * 500.0 / np.pi  # half of it, where the gain of a narrow notch has fallen by 3 dB
+    assert found == pytest.approx(500.0 * place - width, abs=0.2 * width)
+
+
 def test_a_model_that_does_not_roll_off_has_no_bandwidth() -> None:
     assert LinearModel([2.0, -1.0], [1.0, -0.5], 1e-3, "u", "y").bandwidth_hz is None
 

@@ -172,7 +172,7 @@ def held_inputs() -> dict[str, Any]:
         ("through, whole samples", [2.0, 1.0], [1.0, 4.0], 0.1),
         ("a hair below a sample", [5.0], [1.0, 4.0], 0.1 - 1e-12),
     ):
-        told[name] = [*held_input_model(np.array(b), np.array(a), late, 0.1)]
+        told[name] = [*held_input_model(np.array(b), np.array(a[1:]), late, 0.1)]
     return told
 
 

@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
+from estimation.arrays import Array
 from estimation.identification import LinearModel, dc_gain_interval, fit_output_error
+from estimation.identification.fit.profile_interval import _stretch
 from estimation.identification.model.uncertainty import _deviations, response_band
 from estimation.identification.notes import IdentificationCode
 from plant.errors import CovarianceWarning, HydrostateError
@@ -82,6 +84,20 @@ def test_where_nothing_cancels_the_profile_interval_is_that_of_the_covariance(
     assert not model.cancellations
     low, high = dc_gain_interval(model, u, y)
     assert high - low == pytest.approx(2.0 * 1.96 * model.dc_gain_std, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("gain", "white", "stretched"),
+    [(4.0, 1.0, 4.0), (1.0, 1.0, 1.0), (1.0, 0.0, 1.0), (np.nan, 1.0, 1.0), (1.0, np.nan, 1.0), (0.0, 0.0, 1.0)],
+)
+def test_an_interval_is_stretched_by_the_ratio_of_the_gain_s_variances(
+    gain: float, white: float, stretched: float
+) -> None:
+    def spread(variance: float) -> Array:
+        return np.array([[variance, 0.0], [0.0, 0.0]])
+
+    model = LinearModel([0.4], [1.0, -0.6], 0.02, "u", "y", covariance=spread(gain), covariance_white=spread(white))
+    assert _stretch(model) == pytest.approx(stretched)
 
 
 def test_a_profile_is_for_output_error_only(table6: dict[str, LinearModel]) -> None:

@@ -1,0 +1,57 @@
+"""Other orders of the inputs keep what was put in, and tell a model that leaves its range from one that keeps it."""
+
+import numpy as np
+import pytest
+
+from estimation.arrays import Array
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.other_orders import PIECES, REORDERED, disagreement, is_wild, reordered
+from estimation.identification.free_run.polynomial_fit import FARTHEST, PolynomialFit, Variables
+
+
+def channels(u: Array) -> Channels:
+    return Channels(("u",), "y", 1.0, (u[:, None],), (np.zeros(u.size),))
+
+
+def moves(gain: float, square: float = 0.0, level: float = 0.0) -> PolynomialFit:
+    """Return ``y = gain u[-1] + square u[-1]^2 + level``, of outputs that were seen from -1 to 1."""
+    limits = np.array([[-2.0, 2.0], [-9.0, 9.0]])
+    variables = Variables(np.array([0, 1]), np.array([1, 1]), limits)
+    terms = np.array([[1, -1, -1], [1, 1, -1], [-1, -1, -1]])
+    return PolynomialFit(variables, terms, np.array([gain, square, level, 0.0]), 0.0)
+
+
+def test_pieces_of_the_inputs_come_in_other_orders_some_of_them_backwards() -> None:
+    u = np.arange(200.0)
+    found = [one.u[0][:, 0] for one in reordered(channels(u))]
+    assert len(found) == REORDERED
+    backwards: list[float] = []
+    for k, one in enumerate(found):
+        assert np.array_equal(np.sort(one), u)
+        steps = np.diff(one)
+        breaks = int(np.count_nonzero(np.abs(steps) != 1.0))
+        assert PIECES[k % 2] // 2 <= breaks < PIECES[k % 2]
+        backwards.append(float(np.mean(steps == -1.0)))
+    assert 0.3 < np.mean(backwards) < 0.7
+
+
+def test_a_model_is_wild_where_it_is_held_in_more_than_three_samples_of_a_thousand() -> None:
+    low, high = moves(1.0).variables.around(FARTHEST)
+    quiet = np.zeros(1000)
+    for end in (low, high):
+        for count, wild in ((0, False), (2, False), (5, True)):
+            u = np.where(np.arange(1000) % 199 == 7, 1.01 * end, quiet)
+            u[np.flatnonzero(u)[count:]] = 0.0
+            assert is_wild(moves(1.0, 1e-9), channels(u)) is wild
+            assert not is_wild(moves(0.98, 1e-9), channels(u))
+    assert not is_wild(moves(1.0), channels(np.zeros(20)))  # a short record as well
+
+
+def test_fits_disagree_by_the_root_mean_square_of_what_is_between_them() -> None:
+    u = np.random.default_rng(0).uniform(-1.0, 1.0, 100)
+    whole = moves(0.5)
+    same = disagreement([whole, whole], whole, channels(u))
+    assert same == 0.0
+    apart = disagreement([moves(0.5, level=0.3), moves(0.5, level=-0.1)], whole, channels(u))
+    # the first sample is where both begin
+    assert apart == pytest.approx(np.sqrt(0.99 * (0.3**2 + 0.1**2) / 2.0))
