@@ -55,6 +55,24 @@ def test_arx_leaves_out_rows_that_miss_an_output(plant_30hz: LinearModel) -> Non
     assert (deviations(fitted, plant_30hz) < 3.0).all()
 
 
+@pytest.mark.parametrize(("n_b", "n_a", "delay"), [(4, 1, 0), (1, 3, 0), (2, 1, 3), (2, 2, 1)])
+def test_arx_is_least_squares_on_the_rows_whose_past_was_logged(n_b: int, n_a: int, delay: int) -> None:
+    rng = np.random.default_rng(6)
+    u = rng.standard_normal(90)
+    y = np.asarray(lfilter([0.4, 0.3, 0.2], [1.0, -0.7], u)) + 0.05 * rng.standard_normal(90)
+    y[50] = np.nan
+    rows, wanted = [], []
+    for t in range(max(n_a, delay + n_b - 1), 90):
+        row = [*(u[t - delay - k] for k in range(n_b)), *(-y[t - k] for k in range(1, n_a + 1))]
+        if np.isfinite([*row, y[t]]).all():
+            rows.append(row)
+            wanted.append(y[t])
+    exact = np.linalg.lstsq(np.array(rows), np.array(wanted), rcond=None)[0]
+    fitted = fit_arx(u, y, 1.0, n_numerator=n_b, n_denominator=n_a, delay=delay)
+    assert np.concatenate([fitted.free_numerator, fitted.denominator[1:]]) == pytest.approx(exact, rel=1e-9)
+    assert fitted.n_samples == len(rows)
+
+
 def test_armax_finds_the_noise_numerator(plant_30hz: LinearModel) -> None:
     u, y = record(plant_30hz, [1.0, -0.6], plant_30hz.denominator.tolist(), 0.1, 3)
     fitted = fit_armax(u, y, 1e-3, **FORM, n_c=1)

@@ -82,8 +82,8 @@ def test_the_bandwidth_is_where_the_gain_is_three_decibels_down() -> None:
 
 
 @pytest.mark.parametrize("place", [0.05, 0.3, 0.71])
-def test_a_notch_of_a_hundredth_of_its_frequency_ends_the_band(place: float) -> None:
-    turn, inner = np.pi * place, 1.0 - 0.004 * place
+def test_a_notch_as_wide_as_a_five_hundredth_of_half_the_sample_rate_ends_the_band(place: float) -> None:
+    turn, inner = np.pi * place, 0.997
     notch = np.poly(np.exp([1j * turn, -1j * turn])).real
     poles = np.poly(inner * np.exp([1j * turn, -1j * turn])).real
     found = LinearModel(notch, poles, 1e-3, "u", "y").bandwidth_hz
