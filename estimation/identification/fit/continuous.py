@@ -106,7 +106,7 @@ class _Problem:
             up = values.copy()
             up[k] += step
             other_b, other_f, _ = self.discrete(up)
-            known = np.pad(other_b, (0, max(b.size - other_b.size, 0)))[: b.size]
+            known = np.pad(other_b, (0, b.size))[: b.size]  # a dead time beyond a whole sample has one value more
             moved[: b.size - delay, k] = (known - b)[delay:] / step
             moved[b.size - delay :, k] = (other_f[1:] - f[1:]) / step
         return np.concatenate([jacobian[:, :n_main] @ moved, initial], axis=1), residual

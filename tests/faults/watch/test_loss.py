@@ -5,12 +5,14 @@ from faults.watch.loss import (
     ALIKE,
     ALLOWED,
     DELAYS,
+    FAST,
     KNOWN,
     LARGEST,
     LAST,
     LEARNT,
     LEAST_LEARNT,
     LIMIT,
+    LIVELY,
     OIL,
     OTHERS,
     RATIO,
@@ -55,6 +57,19 @@ def first_alarm(shares: np.ndarray, others: np.ndarray | None = None) -> int | N
         if judge_loss(told, float(SPANS_LEARNT + k), loss, levels):
             return k
     return None
+
+
+@pytest.mark.parametrize("size", [0.05, 1.0, 30.0])
+@pytest.mark.parametrize("place", [FAST, LIVELY])
+def test_a_drive_is_like_the_learnt_one_by_the_ratio_to_it(place: int, size: float) -> None:
+    loss = np.zeros(SEEN + 1)
+    loss[SPANS] = loss[WANTED] = SPANS_LEARNT
+    loss[FAST] = loss[LIVELY] = size
+    for ratio, alike in ((0.99, True), (1.01, False)):
+        for by in (ALIKE * ratio, 1.0 / (ALIKE * ratio)):
+            told = np.array([0.1, 0.1, 1.0, 1.0, size, size])
+            told[4 if place == FAST else 5] *= by
+            assert drive_is_alike(told, loss) is alike
 
 
 def test_oil_that_thins_by_almost_half_raises_no_alarm_in_a_day() -> None:
