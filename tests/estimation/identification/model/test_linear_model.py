@@ -81,15 +81,16 @@ def test_the_bandwidth_is_where_the_gain_is_three_decibels_down() -> None:
     assert first_order.bandwidth_hz == pytest.approx(-np.log(0.99) / (2e-3 * np.pi), rel=1e-3)
 
 
-@pytest.mark.parametrize("place", [0.05, 0.3, 0.71])
+@pytest.mark.parametrize("place", [0.05, 0.3])
 def test_a_notch_as_wide_as_a_five_hundredth_of_half_the_sample_rate_ends_the_band(place: float) -> None:
     turn, inner = np.pi * place, 0.997
     notch = np.poly(np.exp([1j * turn, -1j * turn])).real
     poles = np.poly(inner * np.exp([1j * turn, -1j * turn])).real
-    found = LinearModel(notch, poles, 1e-3, "u", "y").bandwidth_hz
+    falling = np.array([1.0, 0.5])  # 3 dB down at 0.54 of half the sample rate, by itself
+    found = LinearModel(np.convolve(notch, falling), poles, 1e-3, "u", "y").bandwidth_hz
     assert found is not None
     width = (1.0 - inner) * 500.0 / np.pi  # half of it, where the gain of a narrow notch has fallen by 3 dB
-    assert found == pytest.approx(500.0 * place - width, abs=0.2 * width)
+    assert 0.7 < (500.0 * place - found) / width < 1.6
 
 
 def test_a_model_that_does_not_roll_off_has_no_bandwidth() -> None:
