@@ -125,14 +125,15 @@ def cross_correlation_test(
     known = np.isfinite(values)
     known[:n_lags] = False
     absorbed = np.ones((values.size, 1)) if jacobian is None else np.asarray(jacobian, dtype=np.float64)
+    few = HydrostateError(f"a cross-correlation test over {n_lags} lags needs more samples, got {known.sum()}")
     freedom = int(known.sum()) - absorbed.shape[1]
-    rank, left = 0, np.empty((0, 0))
-    if freedom > 0:
-        columns = _without(absorbed[known], _unit(lagged(inputs, 0, n_lags + 1)[known]))
-        left, strength, _ = np.linalg.svd(columns, full_matrices=False)
-        rank = int(np.count_nonzero(strength > max(columns.shape) * np.finfo(float).eps * 1e2 * strength[0]))
+    if freedom <= 0:
+        raise few
+    columns = _without(absorbed[known], _unit(lagged(inputs, 0, n_lags + 1)[known]))
+    left, strength, _ = np.linalg.svd(columns, full_matrices=False)
+    rank = int(np.count_nonzero(strength > max(columns.shape) * np.finfo(float).eps * 1e2 * strength[0]))
     if freedom <= rank:
-        raise HydrostateError(f"a cross-correlation test over {n_lags} lags needs more samples, got {known.sum()}")
+        raise few
     remaining = values[known]
     if jacobian is None:
         remaining = remaining - remaining.mean()

@@ -32,8 +32,7 @@ def bandwidth(model: "LinearModel") -> float | None:
     def excess(frequency: float) -> float:
         return float(np.abs(model.response_gradient([frequency])[0][0]) - wanted)
 
-    # below the first step of the grid a root is wanted to a share of itself
-    return root_between(excess, float(grid[below[0] - 1]), float(grid[below[0]]), 2e-12 if below[0] > 1 else 0.0)
+    return root_between(excess, float(grid[below[0] - 1]), float(grid[below[0]]), 0.0)
 
 
 def bandwidth_std(model: "LinearModel") -> float | None:

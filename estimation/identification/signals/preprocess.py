@@ -141,7 +141,7 @@ def resample(x: ArrayLike, sample_time: float, new_sample_time: float) -> Array:
         smooth = bridged(values)
     step = float(round(ratio)) if abs(ratio - round(ratio)) * values.size < 0.5 * ratio and ratio > 1.0 else ratio
     position = step * np.arange(int(np.floor((values.size - 1) / step * (1.0 + np.finfo(float).eps))) + 1)
-    nearest = np.clip(np.rint(position).astype(np.intp), 0, values.size - 1)
+    nearest = np.rint(position).astype(np.intp)
     if step == round(step):
         return np.where(missing[nearest], np.nan, smooth[nearest])
     from scipy.interpolate import CubicSpline
