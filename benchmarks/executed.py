@@ -148,8 +148,12 @@ def _test(context: str) -> str:
 
 
 def _far(test: str, near: Sequence[str]) -> int:
-    """Return how far a test is from a file: its own test first, then its folder's."""
-    return next((i for i, place in enumerate(near) if test.startswith(place)), len(near))
+    """Return how far a test is from a file: its own tests and its folder's kept numbers, its folder's others, all others.
+
+    The first alike: among them a quick test comes before kept numbers of a whole search.
+    """
+    place = next((i for i, place in enumerate(near) if test.startswith(place)), len(near))
+    return max(place - (len(near) - 2), 0)
 
 
 def _body(statement: ast.stmt) -> list[ast.stmt]:
