@@ -148,7 +148,7 @@ def _test(context: str) -> str:
 
 
 def _far(test: str, near: Sequence[str]) -> int:
-    """Return how far a test is from a file: its own tests and its folder's kept numbers, its folder's others, all others.
+    """Return how far a test is from a file: its own and its folder's kept numbers, its folder's, all others.
 
     The first alike: among them a quick test comes before kept numbers of a whole search.
     """
