@@ -5,7 +5,11 @@ from typing import Any
 
 import pytest
 
-from faults.diaphragm_motor.finding import STANDING, MotorFaultCode, _against
+from estimation.finding import Outcome
+from faults.diaphragm_motor import finding
+from faults.diaphragm_motor.diagnose import Match
+from faults.diaphragm_motor.faults import HEALTHY
+from faults.diaphragm_motor.finding import STANDING, MotorFaultCode, _against, motor_fault_finding
 
 
 def diagnosis(velocity: float, *, unknown: bool) -> Any:
@@ -23,3 +27,46 @@ def test_a_nearest_fault_that_misses_and_a_rod_that_stands_are_told() -> None:
     assert misses == MotorFaultCode.NEAREST_MISSES.note(fault="valve_1_leak", chi_square=40.0, freedom=12)
     assert stands.code is MotorFaultCode.ROD_STANDS
     assert stands.data["velocity_mm_s"] == pytest.approx(-500.0 * STANDING)
+
+
+MATCHES = {name: Match(name, 0.5, 0.1, 9.0, 0.3) for name in (HEALTHY, "friction", "valve_1_leak", "load")}
+
+
+@pytest.mark.parametrize(
+    ("group", "unknown", "alike", "names", "measured", "others"),
+    [
+        ((HEALTHY,), False, (), [], [], "load"),
+        (("friction", HEALTHY), False, (HEALTHY,), ["friction"], ["friction"], "load"),
+        ((HEALTHY, "friction"), False, ("friction",), ["friction"], [], "load"),
+        (("valve_1_leak", "load"), False, ("load",), ["valve 1 leak", "load"], ["valve_1_leak"], ""),
+        (("friction", "valve_1_leak"), True, ("valve_1_leak",), [], [], ""),
+    ],
+)
+def test_a_finding_names_the_faults_of_the_nearest_and_measures_the_first(
+    group: tuple[str, ...],
+    unknown: bool,
+    alike: tuple[str, ...],
+    names: list[str],
+    measured: list[str],
+    others: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    matches = tuple(MATCHES[name] for name in group)
+    found = SimpleNamespace(
+        **vars(diagnosis(1.0, unknown=unknown))
+        | {"best": matches[0], "group": matches, "matches": tuple(MATCHES.values()), "lookalikes": (group[0], "load")}
+    )
+    monkeypatch.setattr(finding, "diagnose_motor", lambda *_, **__: found)
+    said: Any = motor_fault_finding(None, None)  # type: ignore[arg-type]
+    assert (said.condition, said.alike, list(said.quantities)) == (group[0], alike, measured)
+    assert [note.data["fault"] for note in said.faults] == names
+    assert all(
+        (note.data["severity"], note.data["unit"]) == (0.5, " N") for note in said.faults[:1] if "fr" in names[0]
+    )
+    assert said.probabilities == dict.fromkeys(MATCHES, 0.3)
+    assert (said.outcome, said.gate.passed, bool(said.against)) == (
+        (Outcome.MISMATCH, False, True) if unknown else (Outcome.OK, True, False)
+    )
+    assert [note.data["faults"] for note in said.not_told] == ([others] if others else [])
+    for one in said.quantities.values():
+        assert (one.value, one.ci95) == (0.5, pytest.approx((0.5 - 0.196, 0.5 + 0.196), abs=1e-4))
