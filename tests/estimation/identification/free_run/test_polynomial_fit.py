@@ -21,10 +21,8 @@ from estimation.identification.free_run.other_orders import is_wild
 from estimation.identification.free_run.polynomial_fit import Runs, products
 from estimation.identification.free_run.polynomial_kernel import run_free, write_products
 from estimation.identification.free_run.polynomial_terms import (
-    MOST_CANDIDATES,
     STEPS,
     TRIED,
-    _gains,
     begun,
     candidate_terms,
     one_more,
@@ -242,35 +240,6 @@ def test_a_rejected_step_is_not_asked_for_its_slopes(monkeypatch: pytest.MonkeyP
     lowering = [k for k, cost in enumerate(costs) if cost < min(costs[:k], default=np.inf)]
     assert asked == lowering
     assert len(asked) < len(costs)
-
-
-def test_the_gain_of_a_product_is_what_it_explains_beside_what_is_there() -> None:
-    rng = np.random.default_rng(5)
-    own, every, residual = rng.normal(size=(50, 4)), rng.normal(size=(50, 5)), rng.normal(size=50)
-    every[:, 3] = own @ [1.0, -2.0, 0.5, 3.0]
-    every[:, 4] = np.inf
-    without = residual - own @ np.linalg.lstsq(own, residual, rcond=None)[0]
-    for k, gain in enumerate(_gains(own, every, without)):
-        if k >= 3:
-            assert gain == 0.0
-            continue
-        both = np.column_stack([own, every[:, k]])
-        left = residual - both @ np.linalg.lstsq(both, residual, rcond=None)[0]
-        assert gain == pytest.approx(without @ without - left @ left)
-
-
-def test_of_many_signals_only_cubes_of_one_source_are_tried() -> None:
-    data, _ = scaled(log())
-    few = begun(fit_linear(Form(2, (1,), (1,)), data), data)
-    many = begun(fit_linear(Form(7, (7,), (1,)), data), data)
-    assert few is not None
-    assert many is not None
-    sources = many.variables.source
-    cubes = [term for term in candidate_terms(many.variables) if term.min() >= 0]
-    assert len(candidate_terms(many.variables)) <= MOST_CANDIDATES
-    assert cubes
-    assert all(len({int(sources[v]) for v in term}) == 1 for term in cubes)
-    assert any(len({int(few.variables.source[v]) for v in term}) == 2 for term in candidate_terms(few.variables))
 
 
 def test_a_fit_that_runs_away_is_wild_takes_no_product_and_predicts_nothing() -> None:
