@@ -13,7 +13,7 @@ SIZES = (60, 90)
 
 
 def logs(noise: float = 0.0) -> Channels:
-    """Return two logs of ``y = 1.2 y[-1] - 0.5 y[-2] + 0.3 u[-3] + 0.1 u[-4] + 0.2`` that begin in motion, under inputs that stood."""
+    """Return two logs of ``y = 1.2 y[-1] - 0.5 y[-2] + 0.3 u[-3] + 0.1 u[-4] + 0.2`` whose inputs stood before."""
     rng = np.random.default_rng(7)
     inputs, outputs = list[Array](), list[Array]()
     for n in SIZES:
