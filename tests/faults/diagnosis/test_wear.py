@@ -1,21 +1,29 @@
 """A log that does not tell a worn pump from leakage: its classes are weighed over what the pump may deliver."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from estimation.eha.rig_share import DELIVERY_ENTRY
+from estimation.fits.hypotheses import PRESUMED
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis import wear
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.diagnose import actuator_of
-from faults.diagnosis.evidence import Scoreboard, weigh
+from faults.diagnosis.evidence import Scoreboard, bounded, weigh
+from faults.diagnosis.outside import DELIVERIES
 from faults.diagnosis.wear import probabilities_over_wear
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.sensors.sensors import BENCH
+from tests.faults.diagnosis.short_logs import ACTUATOR as RIG
+from tests.faults.diagnosis.short_logs import OFF, blocks, log, made_classes
 
 HEALTHY = EhaParameters()
 ACTUATOR = actuator_of(HEALTHY)
@@ -48,3 +56,28 @@ def test_what_a_worn_pump_would_explain_is_not_all_leakage(board: Scoreboard) ->
 
 def test_classes_stay_where_the_log_tells_what_the_pump_delivers(board: Scoreboard) -> None:
     assert probabilities_over_wear(board, ACTUATOR, (), shipped_calibration()) is None
+
+
+def test_conditions_are_summed_over_pumps_by_what_is_presumed_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = blocks()
+    told = {"models": np.linspace(0.0, -6.0, 9), "parameters": np.linspace(-3.0, 0.0, 9)}
+    board = Scoreboard(told, one, made_classes(OFF, one), log(), None)
+    scores = {share: np.random.default_rng(round(10.0 * share)).normal(size=9) for share in DELIVERIES}
+    sound = RIG.circuit.pump_displacement
+
+    def fitted(_: Any, actuator: Any, start: Any) -> Any:
+        assert np.array_equal(start, board.fits.best.coordinates)
+        share = round(actuator.circuit.pump_displacement / sound, 6)
+        return SimpleNamespace(scores=scores[share])
+
+    monkeypatch.setattr(wear, "fit_classes", fitted)
+    found = probabilities_over_wear(board, RIG, OPEN, shipped_calibration())
+    likely = np.exp(board.fits.scores)
+    for share, score in scores.items():
+        likely = likely + np.exp(score) * np.exp(-(np.log(share) ** 2) / (2.0 * PRESUMED[DELIVERY_ENTRY] ** 2))
+    exact = replace(board, log_odds={**told, "parameters": bounded(np.log(likely))}).probabilities(
+        shipped_calibration()
+    )
+    assert found == pytest.approx(dict(exact))
+    without = replace(board, blocks=blocks(pressure=False))
+    assert probabilities_over_wear(without, RIG, OPEN, shipped_calibration()) is None
