@@ -1,0 +1,109 @@
+"""Which fault outside the nine conditions is named or not excluded, by what circuits gain, with their fits made up."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS
+from faults.diagnosis import outside
+from faults.diagnosis.circuit_runs import COORDINATES
+from faults.diagnosis.outside import faults_outside
+from faults.notes import AgainstCode, ClassCode
+from plant.eha.circuit_parameters import CircuitParameters
+from tests.faults.diagnosis.short_logs import ACTUATOR, blocks
+
+SOUND = ACTUATOR.circuit
+LOG = blocks(pressure=False)
+MAJOR = float(np.exp(ACTUATOR.conditions[list(CONDITIONS).index("major_leakage"), COORDINATES.index("leakage")]))
+Score = Callable[[CircuitParameters], float]
+
+
+def fits(score: float) -> Any:
+    return SimpleNamespace(scores=np.array([score - 9.0, score]), best=SimpleNamespace(coordinates=np.full(7, score)))
+
+
+def decided(monkeypatch: pytest.MonkeyPatch, score: Score) -> tuple[Any, Any, list[tuple[Any, bool]]]:
+    """Return what is said where each circuit explains the log so well, and which were fitted from which starts."""
+    asked: list[tuple[Any, bool]] = []
+
+    def fitted(_: Any, actuator: Any, *, runs: Any, start: Any = None) -> Any:  # noqa: ARG001  as it is called
+        asked.append((actuator.circuit, start is not None))
+        return fits(score(actuator.circuit))
+
+    monkeypatch.setattr(outside, "fit_classes", fitted)
+    monkeypatch.setattr(outside, "nominal_runs", lambda *_: np.zeros((9, 1, 1)))
+    monkeypatch.setattr(outside, "misfit", lambda *_: 0.0)
+    against, open_ = faults_outside(LOG, fits(0.0), ACTUATOR)
+    return against, open_, asked
+
+
+def worn(circuit: CircuitParameters) -> float:
+    return round(circuit.pump_displacement / SOUND.pump_displacement, 6)
+
+
+@pytest.mark.parametrize(("gain", "named"), [(3.9, False), (4.1, True)])
+def test_a_fault_is_named_from_a_gain_of_four(gain: float, named: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    against, open_, _ = decided(
+        monkeypatch, lambda one: gain if worn(one) == 0.9 else -30.0 if worn(one) < 0.9 else 0.0
+    )
+    if named:
+        assert [(note.code, note.data["percent"]) for note in against] == [
+            (AgainstCode.PUMP_DELIVERS_LESS, pytest.approx(90.0))
+        ]
+        assert open_ == ()
+    else:
+        assert against == ()
+        assert "worn pump" in open_[0].data["faults"]
+
+
+@pytest.mark.parametrize(("gain", "open_"), [(-2.9, True), (-3.1, False)])
+def test_a_fault_is_excluded_below_a_gain_of_minus_three(
+    gain: float, open_: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sound = {"makeup_conductance", "pump_case_leakage"}
+
+    def score(one: CircuitParameters) -> float:
+        same = all(
+            getattr(one, name) == getattr(SOUND, name) for name in SOUND.__dataclass_fields__ if name not in sound
+        )
+        return 0.0 if same and type(one) is type(SOUND) else gain if worn(one) == 0.7 else -9.0
+
+    against, found, _ = decided(monkeypatch, score)
+    assert against == ()
+    assert [(note.code, note.data["faults"]) for note in found] == (
+        [(ClassCode.NOT_EXCLUDED, "a worn pump")] if open_ else []
+    )
+
+
+@pytest.mark.parametrize(("rough", "thorough"), [(-19.9, True), (-20.1, False)])
+def test_a_worn_pump_is_sought_thoroughly_unless_a_rough_search_leaves_it_twenty_behind(
+    rough: float, thorough: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, _, asked = decided(monkeypatch, lambda one: rough if worn(one) < 1.0 else 0.0)
+    tries = {share: [begun for one, begun in asked if worn(one) == share] for share in (0.7, 0.8, 0.9)}
+    assert tries == dict.fromkeys((0.7, 0.8, 0.9), [True, False] if thorough else [True])
+
+
+def test_faults_are_tried_on_the_sound_circuit_that_explains_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    wide = 5.0 * SOUND.makeup_conductance
+
+    def score(one: CircuitParameters) -> float:
+        return 50.0 if one.makeup_conductance == wide and one.pump_case_leakage == 0.0 else 0.0
+
+    _, _, asked = decided(monkeypatch, score)
+    sound = [(one.makeup_conductance / SOUND.makeup_conductance, one.pump_case_leakage > 0.0) for one, _ in asked[:3]]
+    assert sound == [(1.0, False), (pytest.approx(5.0), True), (pytest.approx(5.0), False)]
+    faulty = [one for one, _ in asked[3:]]
+    assert all(one.pump_case_leakage == 0.0 and one.makeup_conductance == wide for one in faulty)
+    seats = {
+        (side, round(getattr(one, f"seat_leakage_{side}") / MAJOR, 6))
+        for one in faulty
+        for side in "ab"
+        if getattr(one, f"seat_leakage_{side}", 0.0) > 0.0
+    }
+    assert seats == {(side, size) for side in "ab" for size in (0.4, 1.0)}
+    shut = {side for one in faulty for side in "ab" if getattr(one, f"makeup_shut_{side}", 0.0) == 1.0}
+    assert shut == {"a", "b"}
