@@ -270,14 +270,14 @@ def fit_freely(
             best, reach = there, 0.0
             if gain < gained:
                 break
-        elif reach < SHORTEST or most_gained(promised, reach, gain) < PROMISING:
+        elif reach < SHORTEST or _most_gained(promised, reach, gain) < PROMISING:
             break
         else:
             reach *= 0.3
     return best
 
 
-def most_gained(promised: float, reach: float, gain: float) -> float:
+def _most_gained(promised: float, reach: float, gain: float) -> float:
     """Return what a step gains at its best length, on the parabola through a trial of it.
 
     Parameters
@@ -296,7 +296,7 @@ def most_gained(promised: float, reach: float, gain: float) -> float:
 
     Examples
     --------
-    >>> most_gained(4.0, 0.5, 2.0 * 4.0 * 0.5 - 4.0 * 0.5**2)  # as was promised
+    >>> _most_gained(4.0, 0.5, 2.0 * 4.0 * 0.5 - 4.0 * 0.5**2)  # as was promised
     4.0
     """
     curvature = (2.0 * promised * reach - gain) / reach**2

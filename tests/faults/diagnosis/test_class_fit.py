@@ -11,7 +11,7 @@ from faults.conditions import CONDITIONS
 from faults.diagnosis import class_fit
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import parameter_rows, predicted
-from faults.diagnosis.class_fit import FARTHEST, LASTING, WEAK, Actuator, fit_freely, misfit, most_gained
+from faults.diagnosis.class_fit import FARTHEST, LASTING, WEAK, Actuator, _most_gained, fit_freely, misfit
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
@@ -64,7 +64,7 @@ def test_what_a_shorter_step_gains_is_read_off_the_parabola_through_the_one_that
         return 2.0 * promised * share - bend * share**2  # its slope where the step begins is twice what it promises
 
     best = max(gained(share) for share in np.linspace(0.0, 4.0, 40_001))
-    assert most_gained(promised, reach, gained(reach)) == pytest.approx(best, rel=1e-6)
+    assert _most_gained(promised, reach, gained(reach)) == pytest.approx(best, rel=1e-6)
 
 
 @pytest.mark.parametrize("pulled", [1.0, 1e3])
