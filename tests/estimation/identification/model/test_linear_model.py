@@ -81,7 +81,7 @@ def test_the_bandwidth_is_where_the_gain_is_three_decibels_down() -> None:
     assert first_order.bandwidth_hz == pytest.approx(-np.log(0.99) / (2e-3 * np.pi), rel=1e-3)
 
 
-@pytest.mark.parametrize("place", [0.05, 0.3])
+@pytest.mark.parametrize("place", [0.05, 0.17, 0.3, 0.37])
 def test_a_notch_as_wide_as_a_five_hundredth_of_half_the_sample_rate_ends_the_band(place: float) -> None:
     turn, inner = np.pi * place, 0.997
     notch = np.poly(np.exp([1j * turn, -1j * turn])).real
