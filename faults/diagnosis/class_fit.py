@@ -280,24 +280,7 @@ def fit_freely(
 def _most_gained(promised: float, reach: float, gain: float) -> float:
     """Return what a step gains at its best length, on the parabola through a trial of it.
 
-    Parameters
-    ----------
-    promised : float
-        What the whole step promises [dimensionless]: half of the slope here.
-    reach : float
-        Share of the step that was tried [fraction].
-    gain : float
-        What that gained [dimensionless], less than was promised.
-
-    Returns
-    -------
-    float
-        In log-posterior [dimensionless].
-
-    Examples
-    --------
-    >>> _most_gained(4.0, 0.5, 2.0 * 4.0 * 0.5 - 4.0 * 0.5**2)  # as was promised
-    4.0
+    It begins with a slope of twice what the whole step promises, and has gained so much at a share ``reach`` of it.
     """
     curvature = (2.0 * promised * reach - gain) / reach**2
     return promised**2 / curvature
