@@ -5,6 +5,9 @@ SEED ?= 2024
 WORKERS ?= 2
 ORDER := $(or $(ORDER),$(shell date +%s))
 
+# Rewriting the tests and compiling the packages anew costs 10 s a worker and a part of every command that tests start.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: study papers test test-random test-slow coverage lint benchmark peers release docs lock clean
 
 # One stamp a kind of install: re-made when the pins or the project's metadata change. What a user runs is checked

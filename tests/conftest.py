@@ -1,5 +1,6 @@
 """What every test stands on: raising floating point, a hypothesis profile, a kernel cache, shared data."""
 
+import gc
 import os
 import shutil
 import socket
@@ -19,8 +20,16 @@ ROOT = Path(__file__).resolve().parents[1]
 os.environ["MPLBACKEND"] = "Agg"
 os.environ.setdefault("HYDROSTATE_CACHE", str(ROOT / ".pytest_cache" / "hydrostate-kernels"))
 
+gc.set_threshold(20_000, 20, 20)  # objects: a search each 700 takes a tenth of what reads or draws much
+
 settings.register_profile("ci", derandomize=True, deadline=None, max_examples=50, print_blob=False)
 settings.load_profile("ci")
+
+
+def pytest_collection_finish() -> None:
+    """Leave what was imported and collected, millions of objects, out of every later search for garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)
