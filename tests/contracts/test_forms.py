@@ -1,5 +1,7 @@
 """What every process model of `FORMS` and every filter of `METHODS` promises."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -29,8 +31,10 @@ ROUNDING = {METHODS["imm"]: 1e-9}
 RIG = EhaParameters()
 
 
+@cache
 def bench_log(parameters: EhaParameters = RIG) -> Record:
-    drive = sine(0.2, 1e-4, parameters.rated_speed, 5.0)
+    """One whole period, of 1000 samples."""
+    drive = sine(0.1, 1e-4, parameters.rated_speed, 10.0)
     return simulate(LUMPED, drive, 1e-4, parameters, sensors=BENCH, rng=np.random.default_rng(0))
 
 
