@@ -8,6 +8,7 @@ import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,6 +25,14 @@ gc.set_threshold(20_000, 20, 20)  # objects: a search each 700 takes a tenth of 
 
 settings.register_profile("ci", derandomize=True, deadline=None, max_examples=50, print_blob=False)
 settings.load_profile("ci")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Give a worker whole files, and those that stand on the same studies in one go."""
+    from tests.together import WholeFiles  # needs xdist
+
+    return WholeFiles(config, log) if config.getvalue("dist") == "loadfile" else None
 
 
 def pytest_collection_finish() -> None:

@@ -1,5 +1,6 @@
 """What a contributor and a user are promised: names that stay, versions that agree, an index, files that are valid."""
 
+import ast
 import importlib.util
 import json
 import re
@@ -11,6 +12,8 @@ from typing import Any
 
 import pytest
 import yaml
+
+from tests.together import SHOW_A_STUDY
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -106,3 +109,28 @@ def test_what_a_user_runs_is_locked_by_hashes_at_the_versions_of_the_constraints
 def normal(name: str) -> str:
     """Return a package's name as registries compare it."""
     return re.sub(r"[-_.]+", "-", name.strip()).lower()
+
+
+def test_files_that_show_a_study_go_to_one_worker() -> None:
+    folder = ROOT / "tests" / "experiments"
+    made = _fixtures(folder / "conftest.py") - {"browser"}
+    assert len(made) > 5
+    show = {file for file in folder.rglob("test_*.py") if made & (_asked(file) - _fixtures(file))}
+    assert {file.relative_to(ROOT).as_posix() for file in show} == SHOW_A_STUDY
+
+
+def _functions(file: Path) -> dict[str, ast.FunctionDef]:
+    tree = ast.parse(file.read_text("utf-8"))
+    return {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
+def _fixtures(file: Path) -> set[str]:
+    functions = _functions(file).items()
+    return {name for name, one in functions if any("fixture" in ast.unparse(by) for by in one.decorator_list)}
+
+
+def _asked(file: Path) -> set[str]:
+    """Return the names of fixtures and values that tests and fixtures of a file ask for."""
+    functions, made = _functions(file), _fixtures(file)
+    asking = [one for name, one in functions.items() if name in made or name.startswith("test_")]
+    return {argument.arg for one in asking for argument in one.args.args}

@@ -84,7 +84,7 @@ def test_what_cannot_be_exported_is_said_in_a_sentence(given: tuple[str, ...], s
 def test_an_identified_model_is_written_for_c_and_for_matlab(log: Path, tmp_path: Path) -> None:
     saved = tmp_path / "model.json"
     relation = ("--input", "motor_speed_rad_s", "--output", "differential_pressure_pa")
-    done = CliRunner().invoke(app, ["identify", str(log), *relation, "--out", str(saved)])
+    done = CliRunner().invoke(app, ["identify", str(log), *relation, "--order", "2", "--out", str(saved)])
     assert done.exit_code == 0, done.output
     done = export("model", saved, "--name", "pressure", "--out", tmp_path / "c", "--json")
     assert json.loads(done.stdout)[0]["files"] == ["pressure.h", "pressure.c", "example.c", "Makefile"]

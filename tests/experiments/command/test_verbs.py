@@ -55,7 +55,7 @@ def steps(folder: Path) -> dict[str, Path]:
     for path in paths.values():
         made = invoke(
             *("simulate", "--plant", "lumped", "--condition", "minor_friction", "--drive", "steps", "--duration", 6),
-            *("--sample-time", 1e-3, "--seed", 5, "--out", path),
+            *("--sample-time", 2e-3, "--seed", 5, "--out", path),
         )
         assert made.exit_code == 0, made.output
     return paths
@@ -151,7 +151,7 @@ def test_the_pressure_form_is_tuned_where_it_has_pressure_unless_told_otherwise(
 def test_both_engines_and_both_forms_can_be_chosen(folder: Path) -> None:
     path = folder / "reduced.parquet"
     made = invoke(
-        "simulate", "--plant", "reduced", "--drive", "sine", "--duration", 2, "--sensors", "paper", "-o", path
+        "simulate", "--plant", "reduced", "--drive", "sine", "--duration", 0.5, "--sensors", "paper", "-o", path
     )
     assert made.exit_code == 0
     ours, oracle = (

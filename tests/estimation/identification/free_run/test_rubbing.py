@@ -1,5 +1,6 @@
 """Models whose output rubs: what dry friction holds stays, and friction that was planted is found again."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -31,11 +32,11 @@ def body(n: int, seed: int, friction: float = FRICTION) -> tuple[Array, Array]:
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.uniform(-1.5, 1.5, n // 20 + 1), 20)[:n]
     y, v, fine = np.zeros(n), 0.0, STEP / 100.0
-    for t in range(n):
+    for t, force in enumerate(u.tolist()):
         y[t] = v
         for _ in range(100):
-            free = v + fine * (u[t] - 0.8 * v)
-            v = np.sign(free) * max(abs(free) - fine * friction, 0.0)
+            free = v + fine * (force - 0.8 * v)
+            v = math.copysign(max(abs(free) - fine * friction, 0.0), free)
     return u, y + NOISE * rng.normal(size=n)
 
 
