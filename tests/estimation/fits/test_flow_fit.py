@@ -42,7 +42,7 @@ def test_bulk_modulus_and_leakage_come_back_without_knowing_the_condition(condit
 
 
 def test_a_wandering_pressure_sensor_is_objected_to() -> None:
-    record = log("normal", 12, duration=4.0)
+    record = log("normal", 12, duration=2.0)
     drift = 2e5 * np.sin(np.linspace(0.0, 6.0, len(record)))  # an even drift would be found and taken off
     fit = fit_flow(record.replace(differential_pressure_pa=record["differential_pressure_pa"] + drift), HEALTHY, 2e8)
     (ratio,) = (note.data["ratio"] for note in fit.reasons if note.code == EstimateCode.PRESSURE_RESIDUALS_LARGE)

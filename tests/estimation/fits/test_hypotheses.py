@@ -331,6 +331,6 @@ def test_absent_additions_leave_the_plain_form() -> None:
 
 def test_a_worn_pump_that_passes_for_leakage_is_found_all_the_same() -> None:
     worn = replace(HEALTHY, pump_displacement=0.8 * HEALTHY.pump_displacement, leakage_coefficient=2e-11)
-    (note, *_) = notes_of(explained(log("multisine", 6.0, worn)), HEALTHY)
+    (note, *_) = notes_of(explained(log("multisine", 4.0, worn)), HEALTHY)
     assert note.code is RigCode.PUMP_WORN
     assert note.data["percent"] == pytest.approx(80.0, abs=2.0)

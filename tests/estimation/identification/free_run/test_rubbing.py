@@ -47,8 +47,8 @@ def log(n: int = 700, seed: int = 1, friction: float = FRICTION) -> Channels:
 
 
 @cache
-def found() -> Identified:
-    return identify_channels(log(), structure="auto")
+def found(order: int | None = 1, delay: int | None = 1) -> Identified:
+    return identify_channels(log(), structure="auto", order=order, delay=delay)
 
 
 @pytest.mark.parametrize("way", [lambda loop: loop, lambda loop: loop.__wrapped__], ids=["compiled", "Python"])
@@ -94,8 +94,13 @@ def test_sensitivities_are_the_derivatives_of_a_run_that_sticks(friction: str) -
         assert moved == pytest.approx(jacobian[:, k], abs=1e-4 * max(1.0, float(np.abs(jacobian[:, k]).max())))
 
 
-def test_friction_that_was_planted_is_found_and_runs_better_than_every_polynomial() -> None:
-    model = found().model
+@pytest.mark.parametrize(
+    "form", [pytest.param((1, 1), id="told"), pytest.param((None, None), marks=pytest.mark.slow, id="searched")]
+)
+def test_friction_that_was_planted_is_found_and_runs_better_than_every_polynomial(
+    form: tuple[int | None, int | None],
+) -> None:
+    model = found(*form).model
     assert model.structure == "narx"
     said = model.nonlinearity
     assert said is not None
@@ -106,7 +111,7 @@ def test_friction_that_was_planted_is_found_and_runs_better_than_every_polynomia
     u, y = body(700, 2)
     left = float(np.sqrt(np.mean((model.simulate(u, y) - y)[5:] ** 2)))
     assert left < 2.0 * NOISE
-    assert {one.get("friction") for one in found().candidates} >= {None, "velocity"}
+    assert {one.get("friction") for one in found(*form).candidates} >= {None, "velocity"}
 
 
 def test_a_body_that_does_not_rub_is_given_no_friction() -> None:
