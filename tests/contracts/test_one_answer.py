@@ -20,7 +20,7 @@ from plant.log.columns import parse_columns
 FEW = ("bench/run002.csv", "strange/makeup_check_stuck_shut/run002.csv", "strange/speed_sign_reversed/run001.csv")
 """A sound log, one of which the class alone is doubted, and one from which nothing follows."""
 
-ENOUGH = 2500
+ENOUGH = 1500
 """Samples from which the same follows of each of them [samples]."""
 
 
