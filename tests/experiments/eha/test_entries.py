@@ -173,7 +173,7 @@ def test_another_pump_or_piston_with_the_papers_leakage_and_friction_is_noted(
 ) -> None:
     paper = EhaParameters()
     rig = Rig(parameters=replace(paper, **{name: factor * getattr(paper, name) for name, factor in changed.items()}))
-    entries = diagnosis_entries(diagnose_log(log(), rig))
+    entries = diagnosis_entries(diagnose_log(log(duration=1.0), rig))
     assert (ClassCode.HEALTHY_OF_THE_PAPER in codes(entries)) == said
     assert any(str(ClassCode.HEALTHY_OF_THE_PAPER.note()) in line for line in costs([entries])) == said
 
