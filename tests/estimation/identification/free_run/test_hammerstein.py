@@ -125,11 +125,15 @@ def test_a_play_follows_at_half_its_width_and_stands_still_in_between() -> None:
     np.testing.assert_array_equal(slopes, [[0, 1], [-1, 0], [-1, 0], [1, 0], [1, 0], [1, 0]])
 
 
-def test_auto_takes_a_bend_where_it_is_better_than_every_other_on_blocks_held_back(planted: Planted) -> None:
-    found = identify_channels(logged(planted, 5), structure="auto", order=2, delay=1)
+@pytest.mark.parametrize(
+    "bent",
+    [pytest.param(one, id=one.kind, marks=() if one.kind == "saturation" else pytest.mark.slow) for one in PLANTED],
+)  # that each kind is found is asked above
+def test_auto_takes_a_bend_where_it_is_better_than_every_other_on_blocks_held_back(bent: Planted) -> None:
+    found = identify_channels(logged(bent, 5), structure="auto", order=2, delay=1)
     assert found.model.structure == "hammerstein"
     assert isinstance(found.model.body, HammersteinBody)
-    assert found.model.body.bend == planted.kind
+    assert found.model.body.bend == bent.kind
     rest = [row["held_back_percent"] for row in found.candidates if row["structure"] != "hammerstein"]
     assert found.held_back_percent > max(rest)
 
