@@ -31,7 +31,7 @@ def log(condition: str, seed: int, drive: str = "steps", duration: float = 10.0,
 @pytest.mark.parametrize("condition", CONDITIONS)
 def test_bulk_modulus_and_leakage_come_back_without_knowing_the_condition(condition: str) -> None:
     p = parameters_for(CONDITIONS[condition])
-    fit = fit_flow(log(condition, 11), HEALTHY, 4e8)
+    fit = fit_flow(log(condition, 11, duration=6.0), HEALTHY, 4e8)
     assert fit.parameters["bulk_modulus"][0] == pytest.approx(p.bulk_modulus, rel=0.005)
     leakage, std = fit.parameters["leakage_coefficient"]
     assert abs(leakage - p.leakage_coefficient) < 2.0 * std
