@@ -32,9 +32,9 @@ EVERY_CONDITION = pytest.mark.parametrize("name", CONDITIONS)
 
 @cache
 def bench_log(plant: str, drive: str, name: str, seed: int = 1) -> Record:
-    """Ten seconds at 10 kHz with the sensors of the bench."""
+    """Five seconds at 10 kHz with the sensors of the bench."""
     parameters, rng = parameters_for(CONDITIONS[name]), np.random.default_rng(seed)
-    speed = make_drive(drive, 10.0, 1e-4, parameters, rng)
+    speed = make_drive(drive, 5.0, 1e-4, parameters, rng)
     return simulate(PLANTS[plant], speed, 1e-4, parameters, sensors=BENCH, rng=rng)
 
 
