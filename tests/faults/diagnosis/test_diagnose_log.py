@@ -51,7 +51,7 @@ def test_a_plain_log_has_its_class_and_nothing_against_it() -> None:
 @pytest.mark.parametrize("rows", [2, 5])
 def test_a_pressure_that_its_logger_averaged_is_believed_and_its_lag_found(rows: int) -> None:
     p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(8)
-    record = simulate(CIRCUIT, make_drive("steps", 6.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    record = simulate(CIRCUIT, make_drive("steps", 3.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     pressure = np.concatenate([np.full(rows - 1, record[PRESSURE][0]), record[PRESSURE]])
     averaged = np.convolve(pressure, np.ones(rows) / rows, "valid")
     found = diagnose_log(record.replace(**{PRESSURE: averaged}), RIG)
