@@ -158,6 +158,10 @@ class RigCode(Code):
         "{channel} is {late_ms:.2f} ± {half_width_ms:.2f} ms late (lag or delay of its sensor or filter); this was "
         "corrected"
     )
+    INPUT_EARLY = (
+        "{channel} is {early_ms:.2f} ± {half_width_ms:.2f} ms ahead of position and pressure (a command in place of a "
+        "measurement, or a delay of both sensors); this was corrected"
+    )
     PRESSURE_OFFSET = (
         "differential_pressure_pa reads {offset_pa:.4g} ± {half_width_pa:.2g} Pa too much; the offset was subtracted"
     )

@@ -81,6 +81,11 @@ def _late(found: Explanation, _: EhaParameters) -> Note:
     return RigCode.PRESSURE_LATE.note(late_ms=1e3 * lateness(found, PRESSURE), half_width_ms=width)
 
 
+def _speed_early(found: Explanation, _: EhaParameters) -> Note:
+    width, early = 1e3 * _half_width(found, LAGS[SPEED]), -1e3 * lateness(found, SPEED)
+    return RigCode.INPUT_EARLY.note(channel=SPEED, early_ms=early, half_width_ms=width)
+
+
 def _input_late(channel: str) -> Callable[[Explanation, EhaParameters], Note]:
     def note(found: Explanation, _: EhaParameters) -> Note:
         width = 1e3 * _half_width(found, LAGS[channel])
@@ -102,7 +107,7 @@ def lateness(found: Explanation, channel: str) -> float:
     Returns
     -------
     float
-        Time [s].
+        Time [s], negative where it comes early.
     """
     return found.delays.get(channel, 0.0) + found.values.get(LAGS[channel], (0.0, 0.0))[0]
 
@@ -212,6 +217,7 @@ def _drains(side: str) -> Callable[[Explanation, EhaParameters], Note]:
 _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "pressure_late": _late,
     "speed_late": _input_late(SPEED),
+    "speed_early": _speed_early,
     "position_late": _input_late(POSITION),
     "pressure_offset": _offset,
     "pressure_drift": _drift,

@@ -254,9 +254,10 @@ def _settled(log: GreyBoxLog, tried: _Tried, wanted: float = np.inf) -> _Tried:
         best = min(best, _descended(early, best, revived, SETTLING, wanted=wanted), key=lambda one: one.cost)
     if len(tried.together[-1].delays) == 1:
         return best
-    channel = tried.together[-1].late
+    channel, early = tried.together[-1].late, min(tried.together[-1].delays) < 0.0
+    least, most = (-LATEST, 0.0) if early else (0.0, LATEST)
     for step in (FINEST_DELAY, -FINEST_DELAY):
-        while 0.0 <= (delay := best.delays.get(channel, 0.0) + step) <= LATEST:
+        while least <= (delay := best.delays.get(channel, 0.0) + step) <= most:
             moved = replace(best, delays={channel: delay})
             later = delayed(log, moved.delays).coarsened()
             moved = _descended(later, moved, best.point.theta, SETTLING, wanted=best.cost)

@@ -16,7 +16,6 @@ from estimation.fits.hypotheses import (
     DELIVERY,
     ENCODER_ZERO,
     HYPOTHESES,
-    LATEST,
     LEAST_DELIVERY,
     LEAST_ZERO,
     OFFSET,
@@ -25,6 +24,7 @@ from estimation.fits.hypotheses import (
     START_LOAD,
     Hypothesis,
 )
+from estimation.fits.lateness import most_late
 from estimation.fits.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
 from estimation.fits.promises import promised, promised_each
 from estimation.fits.toothed import toothed
@@ -57,10 +57,11 @@ LARGEST_AUTOCORRELATION = 0.1
 NOISY = (1.44, 0.3)
 """The same two where noise of position counts: it is known to a fifth, and an encoder's steps are not white."""
 
-LATE_WORTH, LEAST_LATE = 20.0, 2e-4
-"""Gain in log-likelihood [dimensionless] and time [s] from which speed or position is said to come late or early. On
+LATE_WORTH = 20.0
+"""Gain in log-likelihood from which speed or position is said to come late or early, if no hypothesis says more. On
 logs of 18 kinds of strange rigs, and on 18 of a foreign bench, the gain of a right explanation is 6 at most, and that
-of a position that lags by 3 ms is 390 to 2800."""
+of a position that lags by 3 ms is 390 to 2800. A log is asked from `WORTH` on: half a millisecond may gain 10, and move
+bulk modulus by seven deviations [dimensionless]."""
 
 LATE_SHARE = 0.25
 """Share of what a log leaves unexplained that this must take up to be named beside it [fraction]."""
@@ -252,7 +253,7 @@ def _asked(
         return (), ()
     if loaded:  # a sensor that reads too much looks loaded at rest
         return (BEGUN, OFFSET), ()
-    if not _explains(swinging, log.passes_on):
+    if not _explains(swinging, log.passes_on) or most_late(swinging.late)[2] > WORTH:
         return (BEGUN,) if moving else HYPOTHESES, ()
     by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
     delivery, *zeros = promised_each(
@@ -336,9 +337,9 @@ def _objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=fit.chi_square[0] ** 0.5))
     if abs(fit.autocorrelation[0]) > correlated:
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_CORRELATED.note(correlation=fit.autocorrelation[0]))
-    channel, (late, gain) = max(fit.late.items(), key=lambda one: one[1][1], default=("", (0.0, 0.0)))
+    channel, late, gain = most_late(fit.late)
     wanted = LATE_SHARE * fit.cost * (1.0 - 1.0 / fit.chi_square[0]) if reasons else 0.0
-    if LEAST_LATE < abs(late) < LATEST and gain > max(LATE_WORTH, wanted):
+    if gain > max(LATE_WORTH, wanted):
         when = "late" if late > 0.0 else "early"
         reasons.insert(0, EstimateCode.CHANNEL_LATE.note(channel=channel, milliseconds=1e3 * abs(late), when=when))
     return tuple(reasons)

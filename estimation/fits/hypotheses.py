@@ -24,7 +24,7 @@ class Hypothesis:
     starts : tuple of Mapping[str, float]
         First guesses [SI]; parameters that are not named start where they are absent.
     delays : tuple of float
-        Times by which a channel may come late beside its lag [s].
+        Times by which a channel may come late beside its lag, negative where early [s].
     late : str
         That channel.
     shares_of_peak : tuple of float
@@ -88,6 +88,10 @@ OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
 LATE_TRIED = (0.0, 2e-3, 5e-3, 9e-3)
 """Delays with which the search for a late channel begins [s]."""
 
+EARLY_TRIED = (-1e-3, -3e-3, -6e-3, -1e-2)
+"""The same of a speed that comes before the rest: it is delayed by whole milliseconds, and its lag takes back what that
+is too much [s]."""
+
 LEAST_ROD = 0.02
 """Least difference of a piston's areas over their sum that is a rod on one side [fraction]; judged. Chambers whose
 volumes alone differ look like an encoder that was homed elsewhere."""
@@ -106,6 +110,14 @@ HYPOTHESES = (
         ("speed_lag",),
         ({"speed_lag": 1e-3},),
         LATE_TRIED,
+        "motor_speed_rad_s",
+        instead=("speed_lead",),
+    ),
+    Hypothesis(  # position and pressure lag it alike, or it is what the motor was told
+        "speed_early",
+        ("speed_lag",),
+        ({"speed_lag": 2e-4},),
+        EARLY_TRIED,
         "motor_speed_rad_s",
         instead=("speed_lead",),
     ),

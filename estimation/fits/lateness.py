@@ -1,13 +1,17 @@
 """Whether a driving channel comes late, by the residuals of a fit: Rao's score statistic."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from estimation.fits.greybox_problem import Problem
+from estimation.fits.hypotheses import LATEST
 from estimation.fits.play import crossed_drives
 from estimation.log_checks.bridging import POSITION
 from plant.arrays import Array
+
+LEAST_LATE = 2e-4
+"""Time below which no channel is said to come late or early [s]."""
 
 LATE_NUDGE = 1e-5
 """Time by which a driving channel is brought forward to see what its timing does [s]."""
@@ -70,3 +74,21 @@ def lateness(
         if power > 0.0:
             along = float(free @ errors)
             yield channel, (-along / power, 0.5 * along**2 / power)
+
+
+def most_late(late: Mapping[str, tuple[float, float]]) -> tuple[str, float, float]:
+    """Return the driving channel whose timing explains most of what a fit leaves.
+
+    Parameters
+    ----------
+    late : Mapping[str, tuple of float]
+        By channel, how late it seems [s], and what that is worth, see `lateness`.
+
+    Returns
+    -------
+    tuple of (str, float, float)
+        Channel; how late [s], negative where it is early; and the gain in log-likelihood [dimensionless], zero where
+        no channel is asked, or the time is too short or too long to be believed.
+    """
+    channel, (behind, gain) = max(late.items(), key=lambda one: one[1][1], default=("", (0.0, 0.0)))
+    return channel, behind, gain if LEAST_LATE < abs(behind) < LATEST else 0.0

@@ -235,24 +235,28 @@ def delayed(log: GreyBoxLog, delays: Mapping[str, float]) -> GreyBoxLog:
     log : GreyBoxLog
         The log, widened.
     delays : Mapping[str, float]
-        How late channels come [s]; what is no drive is the output.
+        How late channels come [s]; what is no drive is the output. A drive may be early: its time is negative, and it
+        is put back.
 
     Returns
     -------
     GreyBoxLog
-        The log, its last outputs missing.
+        The log, its last outputs missing; its first where a drive is early.
     """
     measured, drives = log.measured, log.drives
     for channel, delay in delays.items():
         samples = round(delay / log.sample_time)
         if samples == 0:
             continue
-        late = slice(-samples, None)
+        late = slice(-samples, None) if samples > 0 else slice(None, -samples)
         if channel in FLOW_FORM.drives:
             names = (channel, "position_rate", *COURSES) if channel == POSITION else (channel,)
             columns = [WIDE_FLOW_FORM.drives.index(name) for name in names]
             drives, measured = drives.copy(), measured.copy()
-            drives[:-samples, columns] = log.drives[samples:, columns]
+            if samples > 0:
+                drives[:-samples, columns] = log.drives[samples:, columns]
+            else:
+                drives[-samples:, columns] = log.drives[:samples, columns]
             measured[late] = np.nan
         else:
             measured = np.vstack([measured[samples:], np.full_like(measured[late], np.nan)])
