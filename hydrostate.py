@@ -283,3 +283,9 @@ def _rig(rig: Any, kind: Any) -> "Rig[Any]":
             f"got {type(rig).__name__}"
         )
     return rig
+
+
+if __name__ == "__main__":  # python -m hydrostate
+    from experiments.cli import main
+
+    main()

@@ -69,6 +69,10 @@ class DriveError(HydrostateError):
     """A drive signal exceeds what the actuator can do, or its description is unusable."""
 
 
+class ModelError(HydrostateError, TypeError):
+    """The equations of a model ask for what cannot be differentiated and compiled; the message says what to write."""
+
+
 class LogWarning(UserWarning):
     """A log was accepted, with something the reader should know.
 

@@ -128,6 +128,13 @@ def test_importing_it_imports_nothing_heavy() -> None:
     assert done.stdout.strip() == "[]", done.stderr
 
 
+def test_the_module_runs_as_the_command() -> None:
+    command = [sys.executable, str(ROOT / "hydrostate.py"), "conditions", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - our own interpreter
+    assert done.returncode == 0, done.stderr
+    assert "minor_leakage" in done.stdout
+
+
 def test_a_foreign_package_of_the_same_name_is_named(tmp_path: Path) -> None:
     (tmp_path / "faults").mkdir()
     (tmp_path / "faults" / "__init__.py").write_text("")

@@ -75,13 +75,13 @@ def traced(
     name = f"{what} {getattr(function, '__name__', '')!r}"
     try:
         result = function(state, inputs, parameters)
-    except HydrostateError as error:
-        raise HydrostateError(f"{name}: {error.message}") from None
     except TypeError as error:
         said = str(error)
         if "Expression" in said:  # what math and float say of a symbol
             said = f"{said.replace('Expression', 'a symbol')}; it may call NumPy's {KNOWN}, and no function of math"
         raise HydrostateError(f"{name} cannot be traced: {said}") from error
+    except HydrostateError as error:
+        raise HydrostateError(f"{name}: {error.message}") from None
     except AttributeError as error:
         known = getattr(error.obj, "_fields", None)
         if known is None:

@@ -23,7 +23,7 @@ BLANK: dict[str, Any] = {
     "notes": [],
 }
 
-ALL_TOLD = "every quantity is told, and the model describes the log"
+ALL_TOLD = "every quantity is determined, and the model describes the log"
 
 
 def finding_entries(found: "Finding") -> dict[str, Any]:

@@ -8,6 +8,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+from plant.errors import ModelError
+
 Number: TypeAlias = float | int
 
 
@@ -26,7 +28,7 @@ class Expression:
 
     Raises
     ------
-    TypeError
+    ModelError
         If a model uses it as a truth value, compares it with ``==``, or raises it to a broken power.
     """
 
@@ -74,7 +76,7 @@ class Expression:
     def __pow__(self, exponent: "Expression | Number") -> "Expression":
         if isinstance(exponent, Expression) or exponent != int(exponent):
             got = "a symbol" if isinstance(exponent, Expression) else exponent
-            raise TypeError(
+            raise ModelError(
                 f"a model may raise to whole powers only, beside sqrt and exp, got {got}: write exp(power * log(x))"
             )
         result: Expression = ONE
@@ -104,7 +106,7 @@ class Expression:
         return node(">=", self, as_expression(other))
 
     def __eq__(self, other: object) -> bool:
-        raise TypeError("a model must compare with <, <=, > or >=, not with == or !=: its values are symbols here")
+        raise ModelError("a model must compare with <, <=, > or >=, not with == or !=: its values are symbols here")
 
     __hash__ = object.__hash__
 
@@ -119,7 +121,7 @@ class Expression:
         return chosen(function, arguments, options)
 
     def __bool__(self) -> bool:
-        raise TypeError("a model must choose with where(condition, a, b), not with if: its values are symbols here")
+        raise ModelError("a model must choose with where(condition, a, b), not with if: its values are symbols here")
 
 
 _NODES: dict[tuple[str, tuple[int, ...], float | str, tuple[int, ...]], Expression] = {}

@@ -11,6 +11,7 @@ import numpy as np
 
 from plant.compiled import functions
 from plant.compiled.expression import Expression
+from plant.errors import ModelError
 
 Function = Callable[..., Any]
 
@@ -89,7 +90,7 @@ def called(function: Any, method: str, arguments: Sequence[Any], options: Mappin
 
     Raises
     ------
-    TypeError
+    ModelError
         If it is none of `KNOWN`.
 
     Examples
@@ -99,7 +100,7 @@ def called(function: Any, method: str, arguments: Sequence[Any], options: Mappin
     ('sin', 'where')
     """
     if function not in UFUNCS or method != "__call__" or options:
-        raise TypeError(_refusal(function))
+        raise ModelError(_refusal(function))
     return UFUNCS[function](*map(_single, arguments))
 
 
@@ -115,11 +116,11 @@ def chosen(function: Any, arguments: Sequence[Any], options: Mapping[str, Any]) 
 
     Raises
     ------
-    TypeError
+    ModelError
         If it is none of `KNOWN`.
     """
     if function not in CHOICES or options:
-        raise TypeError(_refusal(function))
+        raise ModelError(_refusal(function))
     return CHOICES[function](*map(_single, arguments))
 
 
@@ -127,7 +128,7 @@ def _single(argument: Any) -> Any:
     """Return a number where NumPy has one of its own."""
     if isinstance(argument, np.ndarray):
         if argument.ndim:
-            raise TypeError(f"a model computes with single numbers, got an array of shape {argument.shape}")
+            raise ModelError(f"a model computes with single numbers, got an array of shape {argument.shape}")
         argument = argument.item()
     return argument.item() if isinstance(argument, np.generic) else argument
 

@@ -6,6 +6,7 @@ import pytest
 
 from experiments.command import terminal
 from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, guarded
+from plant.compiled.expression import symbol
 from plant.errors import HydrostateError
 
 
@@ -41,6 +42,15 @@ def test_the_traceback_is_printed_where_it_is_asked_for(
     monkeypatch.setenv("HYDROSTATE_DEBUG", "1")
     assert raising(ZeroDivisionError("by nothing")) == SOME_FAILED
     assert "Traceback" in capsys.readouterr().err
+
+
+def test_a_model_that_cannot_be_compiled_is_its_authors_slip_and_no_internal_error(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert guarded(lambda: symbol("x") ** 0.5) == USAGE
+    said = capsys.readouterr().err
+    assert "write exp(power * log(x))" in said
+    assert "internal error" not in said
 
 
 @pytest.mark.parametrize("values", [[], [1.0], [2.0, 2.0, 2.0]])
