@@ -35,7 +35,7 @@ class ChannelCode(Code):
 
     CHANNEL_REVERSED = (
         "{channel} has the wrong sign: compared with {against}, its correlation is {correlation:.2f}; give the column "
-        "with a minus before its unit (--columns CHANNEL=NAME:-UNIT)"
+        "with a minus before its unit (--columns CHANNEL=NAME:-UNIT, or NAME:-UNIT in the rig file)"
     )
     CHANNELS_SWAPPED = (
         "{channel} and {other} are swapped: the slope of the second is the first (correlation {correlation:.2f}); "
@@ -58,6 +58,10 @@ class GuessCode(Code):
     HAS_SLOPE = "column {column} is its slope (correlation {correlation:.3f})"
     IS_SLOPE = "it is the slope of column {column} (correlation {correlation:.3f})"
     FOLLOWS = "it follows the motion in column {column} (correlation {correlation:.2f})"
+    OPPOSES = (
+        "it goes against the motion in column {column} (correlation {correlation:.2f}): if its sensor is reversed, put a "
+        "minus before its unit"
+    )
     IS_DIFFERENCE = "it is the difference of columns {one} and {other}"
 
 

@@ -171,7 +171,7 @@ def _by_motion(points: dict[str, dict[int, float]], means: Mapping[int, Array], 
             why.setdefault((VELOCITY, first[1]), []).append(note)
         for correlation, other in found[1:] if second is not None else found:
             if _add(points, SPEED, other, RUNNER_UP):
-                note = GuessCode.FOLLOWS.note(column=place + 1, correlation=correlation)
+                note = _with_motion(place, correlation)
                 why.setdefault((SPEED, other), []).append(note)
 
 
@@ -190,8 +190,14 @@ def _by_pressure(points: dict[str, dict[int, float]], means: Mapping[int, Array]
             correlation = _alike(means[place], means[pump])
             if abs(correlation) > WEAKLY:
                 points[PRESSURE][place] += TREND
-                note = GuessCode.FOLLOWS.note(column=pump + 1, correlation=correlation)
+                note = _with_motion(pump, correlation)
                 why.setdefault((PRESSURE, place), []).append(note)
+
+
+def _with_motion(place: int, correlation: float) -> Note:
+    """Return that a column goes with the motion in that place, or against it, as one with the wrong sign does."""
+    code = GuessCode.FOLLOWS if correlation > 0.0 else GuessCode.OPPOSES
+    return code.note(column=place + 1, correlation=correlation)
 
 
 def _is_difference(means: Mapping[int, Array], place: int, one: int, other: int) -> bool:

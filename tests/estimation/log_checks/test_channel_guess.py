@@ -110,6 +110,14 @@ def test_a_pressure_that_goes_with_the_pump_says_so_and_one_that_does_not_says_n
     assert "follows" not in told(found["differential_pressure_pa"])
 
 
+def test_a_column_that_goes_against_the_motion_may_have_the_wrong_sign() -> None:
+    found = guesses(t__s=T, rpm=SWING, p__bar=-SWING - 0.5 * np.sin(9.0 * T))
+    assert "opposes" in told(found["differential_pressure_pa"])
+    assert "follows" not in told(found["differential_pressure_pa"])
+    found = guesses(t__s=T, way__mm=np.cumsum(SWING), A=SWING, B=-SWING - 0.5 * np.sin(5.0 * T))
+    assert "opposes" in told(found["motor_speed_rad_s"])
+
+
 @pytest.mark.parametrize(
     "dull",
     [np.zeros(3000), np.full(3000, 5.0), np.full(3000, 1e250), np.where(T < 0.1, T, np.nan)],
