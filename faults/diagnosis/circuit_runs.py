@@ -38,6 +38,11 @@ LEAST_FLOW = 1e-3
 """Least leakage at the relief setting, and least flow bias, over the rated pump flow [fraction]: a rig file may have
 none, and no logarithm begins at zero. Judged: no log tells so little from nothing."""
 
+LEAST_FORCE = 1e-3
+"""Least friction at rest, of its quadratic part and of the whole at rated velocity, over the force of the relief
+setting on the piston [fraction]: a rig file may have none, and no logarithm begins at zero. Judged: 5 N on the paper's
+actuator, of whose friction these are 436, 122 and 651 N."""
+
 COLUMN = {field.name: i for i, field in enumerate(fields(CircuitParameters))}
 
 
@@ -57,7 +62,8 @@ def coordinates_of(p: EhaParameters, rated: float) -> Array:
         In the order of `COORDINATES`.
     """
     a1, a2, a3 = p.friction_quadratic, p.friction_linear, p.friction_coulomb
-    forces = a3, a1 * rated**2, a3 + a2 * rated + a1 * rated**2
+    force = LEAST_FORCE * p.relief_pressure * p.piston_area
+    forces = (max(one, force) for one in (a3, a1 * rated**2, a3 + a2 * rated + a1 * rated**2))
     least = LEAST_FLOW * p.pump_displacement * p.rated_speed
     leakage, bias = max(p.leakage_coefficient, least / p.relief_pressure), max(p.flow_bias, least)
     return np.log([leakage, bias, *forces, p.bulk_modulus, 1.0])

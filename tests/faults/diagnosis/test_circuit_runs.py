@@ -239,3 +239,17 @@ def test_a_rig_without_leakage_or_flow_bias_has_coordinates() -> None:
     assert np.all(np.isfinite(found))
     pumped = tight.pump_displacement * tight.rated_speed
     assert np.exp(found[:2]) == pytest.approx([1e-3 * pumped / tight.relief_pressure, 1e-3 * pumped])
+
+
+@pytest.mark.parametrize(
+    "absent", [("quadratic",), ("coulomb",), ("quadratic", "linear"), ("quadratic", "coulomb", "linear")], ids=str
+)
+def test_a_rig_without_a_part_of_friction_has_coordinates_within_a_thousandth_of_the_relief_force(
+    absent: tuple[str, ...],
+) -> None:
+    p = replace(EhaParameters(), **{f"friction_{part}": 0.0 for part in absent})
+    least = 1e-3 * p.relief_pressure * p.piston_area
+    bent, rated = p.friction_quadratic * ACTUATOR.rated**2, p.friction_linear * ACTUATOR.rated
+    wanted = np.array([p.friction_coulomb, bent, p.friction_coulomb + rated + bent])
+    found = np.exp(coordinates_of(p, ACTUATOR.rated)[2:5])
+    np.testing.assert_allclose(found, np.maximum(wanted, least), rtol=1e-12)

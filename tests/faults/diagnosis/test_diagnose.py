@@ -61,6 +61,19 @@ def test_a_log_that_travels_150_to_200_mm_gets_its_class(condition: str, fastest
     assert (found.condition, found.against) == (condition, ())
 
 
+@pytest.mark.parametrize("condition", ["normal", "minor_leakage"])
+def test_an_actuator_whose_friction_is_all_coulombs_gets_its_class_and_severities(condition: str) -> None:
+    rig = replace(HEALTHY, friction_quadratic=0.0, friction_linear=0.0)
+    speed = 91.0 * np.repeat([0.48, 1.0, 0.72, -1.0, -0.56, -0.8], 1000)
+    record = simulate(
+        CIRCUIT, speed, 1e-3, parameters_for(CONDITIONS[condition], rig), sensors=BENCH, rng=np.random.default_rng(1)
+    )
+    found = diagnose_clean(clean_log(record, rig), Actuator.of(rig))
+    assert (found.condition, found.against) == (condition, ())
+    assert found.severity["added_friction"].covers(0.0)
+    assert all(one.value is not None for one in found.severity.values())
+
+
 @pytest.mark.slow
 @PRESSURES
 def test_severities_come_with_intervals_that_mostly_cover(population: list[Drawn], *, pressure: bool) -> None:
