@@ -59,8 +59,8 @@ class GuessCode(Code):
     IS_SLOPE = "it is the slope of column {column} (correlation {correlation:.3f})"
     FOLLOWS = "it follows the motion in column {column} (correlation {correlation:.2f})"
     OPPOSES = (
-        "it goes against the motion in column {column} (correlation {correlation:.2f}): if its sensor is reversed, put a "
-        "minus before its unit"
+        "it goes against the motion in column {column} (correlation {correlation:.2f}): if its sensor is reversed, put "
+        "a minus before its unit"
     )
     IS_DIFFERENCE = "it is the difference of columns {one} and {other}"
 

@@ -17,7 +17,7 @@ COULOMBS = st.floats(0.0, 1e3)
 def residual(v: float, push: float, resistance: float, quadratic: float, coulomb: float) -> float:
     """Force left over, relative to the largest force in the balance."""
     direction = np.sign(v)
-    left = resistance * v + quadratic * v * abs(v) + coulomb * direction - push
+    left = resistance * v + quadratic_friction(v, direction, quadratic, 0.0, coulomb) - push
     return left / max(abs(push), coulomb)
 
 

@@ -267,8 +267,11 @@ def test_the_lumped_step_agrees_with_an_event_driven_solution(condition: Conditi
 
 @pytest.mark.parametrize(
     "state",
-    [(3e-3, 0.02, 6e5), (-3e-3, -0.025, -6e5), (0.0, 0.0, 1e5), (0.01, 0.04, 4e6), (0.01, 0.0, -4e6)],
-    ids=["slides", "slides back", "sticks", "relieves", "relieves, held fast"],
+    [
+        *((3e-3, 0.02, 6e5), (-3e-3, -0.025, -6e5), (3e-3, 0.003, 2.9e5)),
+        *((0.0, 0.0, 1e5), (0.01, 0.04, 4e6), (0.01, 0.0, -4e6)),
+    ],
+    ids=["slides", "slides back", "creeps", "sticks", "relieves", "relieves, held fast"],
 )
 def test_the_steps_derivatives_are_those_of_its_values(state: tuple[float, float, float]) -> None:
     names = parameter_names(EhaParameters)
