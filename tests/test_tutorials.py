@@ -16,6 +16,9 @@ from tests.c_compiler import compiler
 ROOT = Path(__file__).resolve().parents[1]
 TUTORIALS = ROOT / "docs" / "tutorials"
 PAGES = sorted(path.stem for path in TUTORIALS.glob("*.md"))
+WORKED = {**{name: TUTORIALS / f"{name}.md" for name in PAGES}, "severities": ROOT / "docs" / "severities.md"}
+"""Pages whose blocks run: the tutorials, and the one that explains an interval."""
+
 FAST = ("your-log",)
 """Those that ask the two questions most users have; the others take the minutes of the slow tests."""
 
@@ -23,7 +26,7 @@ BLOCK = re.compile(r"```(sh|python)\n(.*?)```", re.DOTALL)
 
 
 def blocks(name: str) -> list[tuple[str, str]]:
-    return BLOCK.findall((TUTORIALS / f"{name}.md").read_text("utf-8"))
+    return BLOCK.findall(WORKED[name].read_text("utf-8"))
 
 
 def ran(kind: str, text: str, folder: Path) -> str:
@@ -46,7 +49,7 @@ def worked_through(name: str, folder: Path) -> str:
     "name",
     [
         pytest.param(name, marks=() if name in FAST else pytest.mark.slow)
-        for name in PAGES
+        for name in WORKED
         if name != "log-to-controller"
     ],
 )
@@ -66,7 +69,7 @@ def test_from_a_log_to_a_controller_with_the_same_numbers(tmp_path: Path) -> Non
     assert (tmp_path / "plant.fmu").is_file()
 
 
-@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("name", WORKED)
 def test_a_tutorial_uses_verbs_and_options_that_there_are_and_python_that_parses(name: str) -> None:
     options = json.loads((ROOT / "docs" / "interface.json").read_text("utf-8"))["options"]
     for kind, text in blocks(name):
