@@ -32,6 +32,15 @@ correlation of 0.15 between neighbours shows in 20 s."""
 SLOWEST = 150.0
 """Rate below which no sensor is made slower [Hz]."""
 
+SLOW = 0.25
+"""Share of the windows in which the motor counts as slow, those of least speed [fraction]: a drive of steps has it a
+third as fast there as at most, so 15 teeth at 1500 rpm pass 125 times a second."""
+
+NEARER = 0.5
+"""How far from white noise is at slow speed at most, over how far it is at all speeds [dimensionless]; judged."""
+
+SPEED = "motor_speed_rad_s"
+
 MOST_ROWS = 40
 """Rows over which noise may be alike [count]."""
 
@@ -55,6 +64,8 @@ def without_correlated_noise(record: Record) -> tuple[Record, tuple[Note, ...]]:
             continue
         if (independent_variance(record[name]) or 0.0) <= SMALLEST_VARIANCE[PRESSURE]:
             continue  # a simulation without noise, whose spectrum is the actuator's
+        if SPEED in record and is_white_when_slow(record[name], record[SPEED]):
+            continue  # the teeth of a pump that turns fast, and no filter: that one is there at any speed
         values = np.full(len(record), np.nan)
         values[::rows] = record[name][::rows]
         changed[name] = values
@@ -100,7 +111,39 @@ def is_white(values: Array) -> bool:
         The channel [any unit]; NaN where missing.
     """
     windows = _windows(values)
-    return len(windows) < FEWEST_WINDOWS or flatness(windows) > min(FLATTEST, 1.0 - CHANCE / len(windows) ** 0.5)
+    return len(windows) < FEWEST_WINDOWS or flatness(windows) > _white(len(windows))
+
+
+def is_white_when_slow(values: Array, speed: Array) -> bool:
+    """Return whether the noise of a channel is white while the motor turns slowly, and not at all speeds.
+
+    A filter or an average is there at any speed. The teeth of a pump are slower than the bands while it turns slowly.
+    A few windows show a filter less surely than all do, so they must also be nearer to white by `NEARER`.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        The channel [any unit]; NaN where missing.
+    speed : ndarray, shape (n,)
+        Speed of the motor [rad/s]; NaN where missing.
+    """
+    if len(values) < WINDOW:
+        return False
+    turned = np.mean(np.lib.stride_tricks.sliding_window_view(np.abs(speed), WINDOW)[:: WINDOW // 2], axis=1)
+    windows = np.lib.stride_tricks.sliding_window_view(values, WINDOW)[:: WINDOW // 2]
+    there = np.isfinite(turned) & np.isfinite(windows).all(axis=1)
+    if not np.any(there):
+        return False
+    slow = windows[there & (turned <= np.quantile(turned[there], SLOW))]
+    if len(slow) < FEWEST_WINDOWS:
+        return False
+    found = flatness(slow)
+    return found > _white(len(slow)) and 1.0 - found < NEARER * (1.0 - flatness(windows[there]))
+
+
+def _white(windows: int) -> float:
+    """Return the flatness above which noise in so many windows is white [dimensionless]."""
+    return min(FLATTEST, 1.0 - CHANCE / windows**0.5)
 
 
 def _windows(values: Array) -> Array:

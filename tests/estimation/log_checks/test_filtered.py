@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from estimation.log_checks.clean import clean_log
-from estimation.log_checks.filtered import WINDOW, flatness, independent_rows, is_white, without_correlated_noise
+from estimation.log_checks.filtered import (
+    WINDOW,
+    flatness,
+    independent_rows,
+    is_white,
+    is_white_when_slow,
+    without_correlated_noise,
+)
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.arrays import Array
@@ -78,6 +85,36 @@ def test_white_noise_is_seldom_taken_for_filtered() -> None:
 def test_a_correlation_that_the_check_would_object_to_shows_in_a_log_of_twenty_seconds(correlation: float) -> None:
     noise = np.random.default_rng(9).standard_normal(20_001)
     assert not is_white(noise[1:] + correlation / (1.0 + correlation**2) * 1.1 * noise[:-1])
+
+
+def turning(teeth: float, amplitude: float, rng: np.random.Generator) -> Record:
+    """Return 20 s of a pump at 30 to 100 % of 157 rad/s, whose teeth are in the pressure [Pa] with white noise."""
+    speed = 157.0 * np.repeat(rng.choice((-1.0, 1.0), 40) * rng.uniform(0.3, 1.0, 40), 500)
+    tones = amplitude * np.sin(teeth * np.cumsum(speed) * 1e-3)
+    return Record(1e-3, {"motor_speed_rad_s": speed, PRESSURE: 3.0 * speed + tones + rng.normal(0.0, 5e3, len(speed))})
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_teeth_of_a_fast_pump_are_no_filter_and_an_average_is_seen_beside_them(seed: int) -> None:
+    record = turning(13.0, 7e3, np.random.default_rng(seed))
+    assert independent_rows(record[PRESSURE], 1e-3) > 1
+    assert without_correlated_noise(record) == (record, ())
+    _, (note,) = without_correlated_noise(record.replace(**{PRESSURE: averaged(record[PRESSURE], 4)}))
+    assert note.code is SensorCode.FILTERED
+
+
+def test_noise_is_judged_where_the_motor_is_slow_and_not_where_little_is_there() -> None:
+    rng = np.random.default_rng(3)
+    white, speed = rng.normal(size=6400), np.repeat([9.0, 1.0, 5.0, 7.0], 1600)
+    alike, slowly = averaged(white, 3), speed == 1.0
+    assert is_white_when_slow(np.where(slowly, white, alike), speed)
+    assert is_white_when_slow(np.where(slowly, white, alike), -speed)
+    assert not is_white_when_slow(np.where(slowly, alike, white), speed)
+    assert not is_white_when_slow(alike, speed)
+    assert not is_white_when_slow(np.where(slowly, white, alike), np.full(6400, np.nan))
+    rising, few = np.arange(14.0 * WINDOW), slice(0, 14 * WINDOW)  # 27 windows, of which seven are slow
+    assert not is_white_when_slow(np.where(rising < 4 * WINDOW, white[few], alike[few]), rising)
+    assert not is_white_when_slow(white[: WINDOW - 1], speed[: WINDOW - 1])
 
 
 def test_what_no_distance_makes_independent_is_left_as_it_is() -> None:
