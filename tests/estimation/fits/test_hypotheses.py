@@ -23,41 +23,16 @@ from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters, grow
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
-from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
 from plant.eha.simulate import CIRCUIT, LUMPED, simulate
 from plant.log.record import Record
-from plant.sensors.sensors import BENCH, IDEAL, Sensors
+from plant.sensors.sensors import BENCH, IDEAL
 from tests.estimation.fits.short_logs import made_fit
+from tests.estimation.fits.strange_logs import HEALTHY, PRESSURE, explained, log
 
 if TYPE_CHECKING:
     from estimation.fits.greybox_fit import GreyBoxFit
     from estimation.fits.greybox_log import GreyBoxLog
-
-HEALTHY = EhaParameters()
-PRESSURE, SPEED = "differential_pressure_pa", "motor_speed_rad_s"
-
-
-def log(
-    drive: str = "multisine", duration: float = 4.0, parameters: EhaParameters = HEALTHY, sensors: Sensors = BENCH
-) -> Record:
-    rng = np.random.default_rng(5)
-    signal = make_drive(drive, duration, 1e-3, parameters, rng)
-    return simulate(CIRCUIT, signal, 1e-3, parameters, sensors=sensors, rng=rng)
-
-
-def explained(record: Record, rig: EhaParameters = HEALTHY) -> Explanation:
-    clean = clean_log(record, rig)
-    fit = fit_flow(clean.record, rig, rig.bulk_modulus, {}, clean.variances)
-    assert fit.explanation is not None, fit.reasons
-    assert not fit.reasons
-    value, std = fit.parameters["bulk_modulus"]
-    assert abs(value - HEALTHY.bulk_modulus) < max(4.0 * std, 0.005 * HEALTHY.bulk_modulus), (
-        value,
-        std,
-        fit.explanation,
-    )
-    return fit.explanation
 
 
 def lagging(lag: float) -> Record:
@@ -109,31 +84,6 @@ def test_a_late_speed_or_position_is_named_with_its_delay_and_brought_forward(ch
     mended = set_right(clean_log(given, HEALTHY), found).record[channel]
     there = np.isfinite(mended)
     assert np.std((mended - record[channel])[there]) < 0.2 * np.std((behind - record[channel])[there])
-
-
-def test_a_speed_ahead_of_position_and_pressure_is_named_with_its_time_and_put_back() -> None:
-    record = log()
-    ahead = np.concatenate([record[SPEED][3:], np.full(3, record[SPEED][-1])])
-    given = record.replace(**{SPEED: ahead})
-    found = explained(given)
-    assert found.names == ("speed_early",)
-    (note,) = notes_of(found, HEALTHY)
-    assert note.code is RigCode.INPUT_EARLY
-    assert note.data["early_ms"] == pytest.approx(3.0, abs=0.1)
-    back = set_right(clean_log(given, HEALTHY), found).record[SPEED]
-    assert np.std((back - record[SPEED])[:-3]) < 0.1 * np.std(ahead - record[SPEED])
-
-
-def test_half_a_millisecond_of_a_position_is_taken_up_where_it_shows() -> None:
-    record = log(duration=2.0)
-    rows = np.arange(len(record))
-    given = record.replace(position_m=np.interp(rows - 0.5, rows, record["position_m"]))
-    found = explained(given)
-    assert found.names == ("position_late",)
-    assert notes_of(found, HEALTHY)[0].data["late_ms"] == pytest.approx(0.5, abs=0.25)
-    fit = fit_flow(given, HEALTHY, HEALTHY.bulk_modulus)
-    value, std = fit.parameters["bulk_modulus"]
-    assert abs(value - HEALTHY.bulk_modulus) < 2.0 * std
 
 
 def test_a_velocity_from_a_late_encoder_comes_forward_with_it_and_one_of_its_own_stays() -> None:
