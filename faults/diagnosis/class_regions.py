@@ -307,3 +307,22 @@ def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Arra
     off = fit.coordinates - actuator.conditions
     weight = information @ np.linalg.inv(np.eye(len(information)) + WITHIN @ information)
     return -0.5 * np.einsum("ci,ij,cj->c", off, weight, off)
+
+
+def told_apart(spread: Array, actuator: Actuator) -> Array:
+    """Return how far a log tells each condition from each other: the log-likelihood ratio that it leads to expect.
+
+    Parameters
+    ----------
+    spread : ndarray, shape (7, 7)
+        Covariance of the coordinates for intervals, see `ClassFits`.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (9, 9)
+        Half the squared distance of their regions, each blurred by the log, in deviations [dimensionless].
+    """
+    between = actuator.conditions[:, None] - actuator.conditions
+    return 0.5 * np.einsum("abi,ij,abj->ab", between, np.linalg.inv(WITHIN + spread), between)

@@ -12,7 +12,7 @@ from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.calibration import Calibration
 from faults.diagnosis.circuit_runs import COORDINATES
 from faults.diagnosis.class_fit import Actuator
-from faults.diagnosis.class_regions import ClassFits, is_stuck
+from faults.diagnosis.class_regions import ClassFits, is_stuck, told_apart
 from faults.diagnosis.innovation_bank import innovation_scores
 from faults.diagnosis.onset import last_part
 from faults.diagnosis.rmse import score_transfer_functions
@@ -123,10 +123,38 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
     if library is not None:
         table = score_transfer_functions(record, library).by_condition
         found["transfer_functions"] = -SAMPLES * np.log([table[name] for name in CONDITIONS])
+    apart = told_apart(fits.spread, actuator)
+    found = {name: scores if name == "parameters" else within_reach(scores, apart) for name, scores in found.items()}
     if is_stuck(blocks, actuator):
         found = {name: friction_left_open(scores, blocks, actuator) for name, scores in found.items()}
     odds = {name: bounded(found[name]) for name in EVIDENCES if name in found}
     return Scoreboard(odds, blocks, fits, part.window, part.onset)
+
+
+def within_reach(scores: Array, apart: Array) -> Array:
+    """Return what nominal circuits say of the conditions, as far as the log tells one from the other.
+
+    They differ from the actuator in all that is fitted besides. What that leaves of a log is taken for friction or
+    leakage, where the log tells nothing of these.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (9,)
+        Log-likelihoods of the conditions [dimensionless].
+    apart : ndarray, shape (9, 9)
+        How far the log tells one condition from another, see `faults.diagnosis.class_regions.told_apart`.
+
+    Returns
+    -------
+    ndarray, shape (9,)
+        None lies farther below another than the two are told apart [dimensionless].
+
+    Examples
+    --------
+    >>> within_reach(np.array([0.0, -20.0]), np.array([[0.0, 3.0], [3.0, 0.0]])).tolist()
+    [0.0, -3.0]
+    """
+    return np.asarray(np.max(scores[:, None] - apart, axis=0), dtype=np.float64)
 
 
 def friction_left_open(scores: Array, blocks: Blocks, actuator: Actuator) -> Array:

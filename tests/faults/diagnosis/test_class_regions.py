@@ -9,7 +9,7 @@ from faults.conditions import CONDITIONS
 from faults.diagnosis import class_regions
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
-from faults.diagnosis.class_fit import Actuator, PointFit
+from faults.diagnosis.class_fit import WITHIN, Actuator, PointFit
 from faults.diagnosis.class_regions import (
     ALIKE,
     PRESSURE_SCALE,
@@ -19,6 +19,7 @@ from faults.diagnosis.class_regions import (
     lasting_misfit,
     region_scores,
     spread_of,
+    told_apart,
 )
 from plant.eha.model import EhaParameters
 
@@ -240,3 +241,17 @@ def test_from_a_circuit_that_explains_the_log_no_search_begins_elsewhere(monkeyp
     off = quick.best.coordinates - whole.best.coordinates
     assert float(off @ whole.best.information @ off) < 1.0
     assert np.argmax(quick.scores) == np.argmax(whole.scores)
+
+
+def test_conditions_are_told_apart_by_what_the_log_tells_of_that_in_which_they_differ() -> None:
+    sure, rubs = np.zeros((7, 7)), np.zeros((7, 7))
+    for name in ("friction_rest", "friction_quadratic", "friction_rated"):
+        rubs[COORDINATES.index(name), COORDINATES.index(name)] = 4.0
+    apart, unsure = told_apart(sure, ACTUATOR), told_apart(rubs, ACTUATOR)
+    normal, leaks, rubbing = (list(CONDITIONS).index(one) for one in ("normal", "minor_leakage", "minor_friction"))
+    assert np.array_equal(apart, apart.T)
+    assert not np.any(apart.diagonal())
+    assert unsure[normal, rubbing] < 2.0 < 10.0 < apart[normal, rubbing]
+    assert unsure[normal, leaks] == pytest.approx(apart[normal, leaks])
+    off = ACTUATOR.conditions[leaks] - ACTUATOR.conditions[normal]
+    assert apart[normal, leaks] == pytest.approx(0.5 * off @ np.linalg.solve(WITHIN, off))

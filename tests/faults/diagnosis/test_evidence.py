@@ -12,7 +12,7 @@ from faults.diagnosis.calibration import Calibration
 from faults.diagnosis.circuit_runs import COORDINATES
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import is_stuck
-from faults.diagnosis.evidence import FARTHEST, Scoreboard, bounded, friction_left_open, weigh
+from faults.diagnosis.evidence import FARTHEST, Scoreboard, bounded, friction_left_open, weigh, within_reach
 from faults.diagnosis.rmse import score_transfer_functions
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
@@ -137,3 +137,27 @@ def test_of_a_stuck_piston_every_evidence_leaves_the_friction_open() -> None:
         for level in ("none", "minor", "major"):
             alike = [i for i, one in enumerate(CONDITIONS.values()) if one.leakage == level]
             assert len({float(odds[i]) for i in alike}) < 3
+
+
+def test_nominal_circuits_say_no_more_than_the_log_tells_and_where_it_tells_all_they_say_all() -> None:
+    scores = np.array([-5.0, 0.0, -40.0])
+    apart = np.array([[0.0, 2.0, 60.0], [2.0, 0.0, 60.0], [60.0, 60.0, 0.0]])
+    assert within_reach(scores, apart).tolist() == [-2.0, 0.0, -40.0]
+    assert within_reach(scores, 1e9 * (1.0 - np.eye(3))).tolist() == scores.tolist()
+    # what cannot be told from the second best is no farther below it than the second best itself
+    chain = np.array([[0.0, 50.0, 1.0], [50.0, 0.0, 50.0], [1.0, 50.0, 0.0]])
+    assert within_reach(scores, chain).tolist() == [-5.0, 0.0, -6.0]
+    assert within_reach(np.array([-np.inf, 0.0]), np.array([[0.0, 3.0], [3.0, 0.0]])).tolist() == [-3.0, 0.0]
+
+
+def test_where_a_log_tells_no_condition_from_another_only_fitted_circuits_speak(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    record = driven("prbs", "normal")
+    told = weigh(record, ACTUATOR)
+    monkeypatch.setattr("faults.diagnosis.evidence.told_apart", lambda *_: np.zeros((9, 9)))
+    blind = weigh(record, ACTUATOR)
+    for name in ("models", "innovations"):
+        assert np.ptp(told.log_odds[name]) > 1.0
+        assert np.ptp(blind.log_odds[name]) == 0.0
+    assert blind.log_odds["parameters"] == pytest.approx(told.log_odds["parameters"])
