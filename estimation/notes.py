@@ -188,6 +188,9 @@ class RigCode(Code):
     PUMP_RIPPLES = (
         "the teeth of the pump ({teeth} a turn) are {percent:.1f} ± {half_width:.1f} % in its flow; they were taken up"
     )
+    SPEED_OFFSET = (
+        "motor_speed_rad_s reads {offset_rad_s:.3g} ± {half_width:.2g} rad/s too much; the offset was subtracted"
+    )
     WEAR_NOT_EXCLUDED = (
         "pump wear is not excluded: a pump that delivers up to {percent:.0f} % less would look like leakage at the "
         "speeds of this log, and bulk modulus would be lower by as much"

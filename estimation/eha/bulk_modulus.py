@@ -345,4 +345,5 @@ def _fitted(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEs
         others={name: found for name, found in fit.parameters.items() if known and name in REPORTED},
         explanation=fit.explanation,
         remarks=fit.remarks,
+        turning=fit.turning,
     )

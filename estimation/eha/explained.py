@@ -8,6 +8,7 @@ import numpy as np
 from estimation.finding import NORMAL_95
 from estimation.fits.explain import Explanation
 from estimation.fits.play import crossings
+from estimation.fits.teeth import EVENLY, Turning, delivering
 from estimation.log_checks.bridging import POSITION, bridged
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.sensor_check import PRESSURE
@@ -237,6 +238,28 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "port_a_drains": _drains("a"),
     "port_b_drains": _drains("b"),
 }
+
+
+def at_pump_speed(log: CleanLog, turning: Turning) -> CleanLog:
+    """Return a log at whose speed a pump without teeth delivers what this one does.
+
+    Parameters
+    ----------
+    log : CleanLog
+        The log.
+    turning : Turning
+        Teeth of the pump, and offset of the logged speed.
+
+    Returns
+    -------
+    CleanLog
+        The log itself where nothing was taken up.
+    """
+    if turning == EVENLY:
+        return log
+    record = log.record
+    speed = delivering(bridged(record[SPEED]), turning.teeth, turning.offset, record.sample_time)
+    return replace(log, record=record.replace(**{SPEED: speed}))
 
 
 def set_right(log: CleanLog, found: Explanation) -> CleanLog:

@@ -8,6 +8,7 @@ from estimation.eha.rig_share import Responses, rig_notes, with_total
 from estimation.filters.run import Estimate
 from estimation.finding import Gate, Outcome, Quantity, interval_95
 from estimation.fits.explain import Explanation
+from estimation.fits.teeth import EVENLY, Turning
 from estimation.notes import EstimateCode
 from estimation.tuning.tuning import Tuning
 from plant.eha.doubts import Spread
@@ -58,6 +59,8 @@ class BulkModulusEstimate:
     method : str
         How it was estimated: ``least-squares``, a filter of `estimation.filters.run.METHODS`, or a method of
         `estimation.eha.named.NAMED`.
+    turning : Turning
+        Teeth of the pump and offset of the speed that were taken up.
     """
 
     outcome: Outcome
@@ -77,6 +80,7 @@ class BulkModulusEstimate:
     explanation: Explanation | None = None
     remarks: tuple[Note, ...] = ()
     method: str = "least-squares"
+    turning: Turning = EVENLY
 
     @property
     def quantity(self) -> Quantity:

@@ -27,6 +27,7 @@ from estimation.fits.hypotheses import (
 from estimation.fits.lateness import most_late
 from estimation.fits.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
 from estimation.fits.promises import promised, promised_each
+from estimation.fits.teeth import Turning
 from estimation.fits.toothed import toothed
 from estimation.fits.wide_problem import POSITION
 from estimation.models.completed_flow import CRACKS
@@ -169,6 +170,7 @@ def fit_flow(
     starts = flow_starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
     explains = partial(_explains, noisy=log.passes_on)
     log, fits, teeth, teeth_left = toothed(log, lambda one: balanced(one, parameters, starts), explains)
+    turning = Turning(log.teeth, log.speed_offset)
     best, found = min(fits, key=_cost), weighed(fits, SURER, [_beforehand(fit) for fit in fits])
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
     asked, open_ends = _asked(log, parameters, swinging, best, sensed, loaded=loaded, moving=moving)
@@ -200,14 +202,14 @@ def fit_flow(
             believed = with_structure(strange.values, left)
             unseen = NO_PLAY if PLAY.name in strange.names else sensed
             reasons = (*play_left(one.play, unseen), *contradicted(strange, parameters))
-            return FormFit(believed, bound, one.chi_square[0], reasons, one.rig_slopes, strange, teeth)
+            return FormFit(believed, bound, one.chi_square[0], reasons, one.rig_slopes, strange, teeth, turning)
     value, std = found["bulk_modulus"]
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     believed = found if sure else with_structure(found, STRUCTURE)
     reasons = (*_objections(best, log.passes_on), *play_left(swinging.play, sensed)) or teeth_left
     if BEGUN in asked and not reasons and not explains(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
-    return FormFit(believed, std / value, best.chi_square[0], reasons, best.rig_slopes, remarks=remarks)
+    return FormFit(believed, std / value, best.chi_square[0], reasons, best.rig_slopes, None, remarks, turning)
 
 
 def _homed_at_stop(log: GreyBoxLog) -> bool:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from estimation.fits.greybox_fit import GreyBoxFit
+from estimation.fits.teeth import EVENLY, Turning
 from plant.notes import Note
 
 if TYPE_CHECKING:
@@ -43,6 +44,8 @@ class FormFit:
         What was added to the form to explain the log; None where nothing had to be.
     remarks : tuple of Note
         What the log leaves open, and is nothing against the fit.
+    turning : Turning
+        Teeth of the pump and offset of the speed that were taken up.
     """
 
     parameters: Mapping[str, tuple[float, float]]
@@ -52,6 +55,7 @@ class FormFit:
     rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
     explanation: "Explanation | None" = None
     remarks: tuple[Note, ...] = ()
+    turning: Turning = EVENLY
 
 
 def with_structure(found: Mapping[str, tuple[float, float]], structure: float) -> dict[str, tuple[float, float]]:

@@ -17,7 +17,7 @@ from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem, search_bounds
 from estimation.fits.lateness import changes_beside, lateness
 from estimation.fits.play import NO_PLAY, ShownPlay, shown_play
-from estimation.fits.teeth import ShownTeeth, shown_teeth
+from estimation.fits.teeth import NO_OFFSET, ShownOffset, ShownTeeth, shown_teeth
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
@@ -77,6 +77,8 @@ class GreyBoxFit:
         Derivatives of the normalised residuals there [dimensionless].
     teeth : Mapping[int, ShownTeeth]
         What they say of the pump's teeth, by their count in a turn, where a fit was asked.
+    speed_offset : ShownOffset
+        What they say of an offset of the logged speed, the same.
     """
 
     model: GreyBoxModel
@@ -91,6 +93,7 @@ class GreyBoxFit:
     play: ShownPlay = NO_PLAY
     slopes: Array = field(default_factory=lambda: np.empty((0, 0)))
     teeth: Mapping[int, ShownTeeth] = field(default_factory=dict[int, ShownTeeth])
+    speed_offset: ShownOffset = NO_OFFSET
 
 
 @dataclass(frozen=True)
@@ -262,7 +265,7 @@ def concluded(
     slopes = all_slopes
     felt = np.flatnonzero(np.einsum("ij,ij->j", slopes, slopes) > LEAST_EFFECT**2)
     noise, rig, late = np.full(len(theta), np.inf), dict[str, Array](), dict[str, tuple[float, float]]()
-    play, teeth = NO_PLAY, dict[int, ShownTeeth]()
+    play, teeth, offset = NO_PLAY, dict[int, ShownTeeth](), NO_OFFSET
     used = int(np.count_nonzero(errors))
     if len(felt) and used > len(theta):
         if len(felt) < len(theta):
@@ -281,9 +284,13 @@ def concluded(
         known, moved = changes_beside(problem, theta) if told else (None, [])
         variance = np.diag(spread) + (NOISE_DOUBT * (bread @ problem.untilted(theta, errors)[felt])) ** 2
         variance = variance + (drive_variance(problem, theta, bread, slopes, known) if disturbed else 0.0)
-        if disturbed and (counts := problem.log.counts if asked else problem.log.teeth):
-            teeth = shown_teeth(problem, theta, errors.ravel(), bread, slopes, counts)
-            variance = variance + sum(teeth[count].opened for count in problem.log.teeth if count in teeth)
+        held = [one.count for one in problem.log.teeth]
+        counts = problem.log.counts if asked else held
+        shifted = problem.log.speed_offset != 0.0
+        if (disturbed and counts) or shifted:
+            teeth, offset = shown_teeth(problem, theta, errors.ravel(), bread, slopes, counts)
+            variance = variance + sum(teeth[count].opened for count in held if count in teeth)
+            variance = variance + (offset.opened if shifted and not held else 0.0)
         # the window's estimate need not be positive: then nothing is known
         noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))
         if told:
@@ -308,6 +315,7 @@ def concluded(
         play=play,
         slopes=all_slopes,
         teeth=teeth,
+        speed_offset=offset,
         cost=point.cost,
         chi_square=tuple(map(float, squares / seen)),
         autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),

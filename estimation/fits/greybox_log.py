@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from estimation.models.greybox import GreyBoxModel
 from plant.log.record import Record
 from plant.runs import steps_a_sample
 from plant.solvers.steps import Parameters, parameter_row
+
+if TYPE_CHECKING:
+    from estimation.fits.teeth import Teeth
 
 BLOCK = 1e-3
 """Usual length over which residuals are averaged before they are squared [s]."""
@@ -93,8 +97,10 @@ class GreyBoxLog:
         Driving channels of which a fit asks whether they come late.
     counts : tuple of int
         Counts of a pump's teeth that a fit asks for, see `estimation.fits.teeth`.
-    teeth : tuple of int
-        Those of them whose delivery the drives hold; how large it is stays open.
+    teeth : tuple of Teeth
+        Those whose delivery the drives hold; how large it is stays open.
+    speed_offset : float
+        What was subtracted from motor speed [rad/s]; where it is not 0, it stays open too.
     """
 
     drives: Array
@@ -110,7 +116,8 @@ class GreyBoxLog:
     block: float = BLOCK
     timed: tuple[str, ...] = ()
     counts: tuple[int, ...] = ()
-    teeth: tuple[int, ...] = ()
+    teeth: tuple["Teeth", ...] = ()
+    speed_offset: float = 0.0
 
     def beginning(self, samples: int) -> "GreyBoxLog":
         """Return the log's first part.

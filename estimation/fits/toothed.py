@@ -7,13 +7,26 @@ from typing import NamedTuple
 from estimation.finding import NORMAL_95
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
-from estimation.fits.teeth import COUNTS, ShownTeeth, Teeth, with_teeth
+from estimation.fits.teeth import COUNTS, MOST_OFFSET, ShownTeeth, Teeth, with_teeth
 from estimation.notes import EstimateCode, RigCode
 from plant.notes import Note
 
 TEETH_WORTH = 10.0
 """Gain in log-likelihood from which a log is asked for a pump's teeth [dimensionless]: by chance the likeliest of all
 counts gains it in one log of 1500. Of 60 training logs without teeth none gains 6."""
+
+OFFSET_WORTH = 20.0
+"""Gain in log-likelihood from which an offset of speed is subtracted before teeth are looked for [dimensionless]."""
+
+OFFSET_SETTLED = 2.0
+"""Gain from which an offset that was subtracted is corrected [dimensionless]: two deviations."""
+
+KEPT = 0.5
+"""Share of its promise that an offset of speed must keep [fraction]: residuals answer it evenly, so that one keeps 0.8
+or more."""
+
+LEAST_OFFSET = 0.01
+"""Offset of speed from which it is told [rad/s]; judged: a tenth of a revolution a minute is what encoders drift by."""
 
 LEAST_TEETH = 0.03
 """Amplitude from which teeth are taken up, as a share of the flow [fraction]; judged. With less they put bulk modulus
@@ -44,7 +57,7 @@ class Toothed(NamedTuple):
     Parameters
     ----------
     log : GreyBoxLog
-        The log, its speed with the teeth that were taken up.
+        The log, its speed with the teeth that were taken up, and without its offset.
     fits : sequence of GreyBoxFit
         By every form that counts.
     remarks : tuple of Note
@@ -58,13 +71,21 @@ class Toothed(NamedTuple):
     remarks: tuple[Note, ...] = ()
     left: tuple[Note, ...] = ()
 
+    @property
+    def best(self) -> GreyBoxFit:
+        """The likeliest fit."""
+        return min(self.fits, key=lambda fit: fit.cost)
+
+
+Fitted = Callable[[GreyBoxLog], Sequence[GreyBoxFit]]
+
 
 def toothed(
     log: GreyBoxLog,
-    fitted: Callable[[GreyBoxLog], Sequence[GreyBoxFit]],
+    fitted: Fitted,
     explains: Callable[[GreyBoxFit], bool],
 ) -> Toothed:
-    """Return the fits of a log, with the pump's teeth where the log asks for them.
+    """Return the fits of a log, with the pump's teeth and an offset of its speed where the log asks for them.
 
     A log with gaps in its speed is not asked: the angle of its shaft is not known.
 
@@ -81,52 +102,86 @@ def toothed(
     Returns
     -------
     Toothed
-        The log, its fits, and a note on teeth that were taken up.
+        The log, its fits, and notes on what was taken up.
     """
     if log.gaps.size:
         return Toothed(log, fitted(log))
-    plain = found = Toothed(log, fitted(replace(log, counts=COUNTS)))
-    first = _asked_for(_best(plain.fits))
-    taken = [first] if first else []
+    plain = Toothed(log, fitted(replace(log, counts=COUNTS)))
+    shifted = _shifted(plain, fitted)
+    worth = plain.best.cost - TEETH_WORTH
+    for begun in (plain,) if shifted is None else (shifted, plain):
+        found = _with_teeth(log, begun, fitted)
+        if found is not None and found.best.cost < worth and explains(found.best):
+            return found
+        if begun is shifted and explains(begun.best) and begun.best.cost < plain.best.cost - OFFSET_WORTH:
+            offset = begun.log.speed_offset
+            told = _told_offset(offset, begun.best.speed_offset.std)
+            return begun._replace(log=replace(begun.log, counts=()), remarks=told)
+    return plain._replace(left=_left(plain.best))
+
+
+def _shifted(plain: Toothed, fitted: Fitted) -> Toothed | None:
+    """Return the fits of a log without what its speed is off by; None where residuals ask for none, or for much."""
+    found, log, offset, wanted = plain, plain.log, 0.0, OFFSET_WORTH
     for _ in range(ROUNDS):
-        if not taken or not _believable(taken):
+        likely = min(found.fits, key=lambda fit: fit.cost - fit.speed_offset.gain)  # each has an offset of its own
+        shown = likely.speed_offset
+        if shown.gain < wanted:
             break
-        held = with_teeth(replace(log, counts=(taken[0].count, 2 * taken[0].count)), taken)
-        fits = fitted(held)
-        left = _best(fits).teeth
+        offset, wanted = offset + shown.value, OFFSET_SETTLED
+        if abs(offset) > MOST_OFFSET:
+            return None
+        held = with_teeth(replace(log, counts=COUNTS), (), offset)
+        found = Toothed(held, fitted(held))
+        if shown.gain > OFFSET_WORTH and found.best.cost > likely.cost - KEPT * shown.gain:
+            return None
+    return None if found is plain else found
+
+
+def _with_teeth(log: GreyBoxLog, begun: Toothed, fitted: Fitted) -> Toothed | None:
+    """Return the fits with the teeth that others ask for, corrected until nothing is left; None if there are none."""
+    if (first := _asked_for(begun.best)) is None:
+        return None
+    found, taken, offset = None, [first.teeth], begun.log.speed_offset + first.offset
+    for _ in range(ROUNDS):
+        count = taken[0].count
+        if not _believable(taken, offset):
+            return None
+        tried = with_teeth(replace(log, counts=(count, 2 * count)), taken, offset)
+        held = Toothed(tried, fitted(tried))
+        left = held.best.teeth
         if any(one.count not in left for one in taken):
+            return found
+        if found is not None and held.best.cost > found.best.cost:  # an overtone that helps none
             break
-        found = Toothed(held, fits, (_told(taken[0], left[taken[0].count].std),))
-        taken = _corrected(taken, left)
-    best = _best(found.fits)
-    if _believable(taken) and best.cost < _best(plain.fits).cost - TEETH_WORTH and explains(best):
-        return found
-    return plain._replace(left=_left(_best(plain.fits)))
+        found = held._replace(remarks=_told(taken[0], offset, left[count]))
+        new = _corrected(taken, left)
+        if not new:
+            break
+        taken, offset = new, offset + (left[count].offset if offset != 0.0 else 0.0)
+    return found
 
 
-def _believable(teeth: Sequence[Teeth]) -> bool:
-    return all(one.amplitude < MOST_TEETH for one in teeth)
-
-
-def _best(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:
-    return min(fits, key=lambda fit: fit.cost)
+def _believable(teeth: Sequence[Teeth], offset: float) -> bool:
+    return abs(offset) <= MOST_OFFSET and all(one.amplitude < MOST_TEETH for one in teeth)
 
 
 def _shown(fit: GreyBoxFit) -> list[ShownTeeth]:
     """Return the teeth that a fit's residuals show, the likeliest first; none if its size does not matter."""
     ranked = sorted(fit.teeth.values(), key=lambda one: -one.gain)
-    matters = ranked and ranked[0].gain > TEETH_WORTH and ranked[0].teeth.amplitude > LEAST_TEETH
-    return ranked if matters else []
+    if not ranked or ranked[0].gain < TEETH_WORTH:
+        return []
+    return ranked if ranked[0].teeth.amplitude > LEAST_TEETH or ranked[0].offset != 0.0 else []
 
 
-def _asked_for(fit: GreyBoxFit) -> Teeth | None:
+def _asked_for(fit: GreyBoxFit) -> ShownTeeth | None:
     """Return the teeth that a fit's residuals ask for, if no other count does as well but their overtones."""
     if not (ranked := _shown(fit)):
         return None
     count = ranked[0].teeth.count
     apart = [one for one in ranked[1:] if one.teeth.count % count and count % one.teeth.count]
     other = max((one.gain - BY_CHANCE for one in apart), default=0.0)
-    return ranked[0].teeth if ranked[0].gain > TEETH_WORTH + STANDS_OUT * max(other, 0.0) else None
+    return ranked[0] if ranked[0].gain > TEETH_WORTH + STANDS_OUT * max(other, 0.0) else None
 
 
 def _left(fit: GreyBoxFit) -> tuple[Note, ...]:
@@ -137,17 +192,25 @@ def _left(fit: GreyBoxFit) -> tuple[Note, ...]:
 def _corrected(taken: Sequence[Teeth], left: Mapping[int, ShownTeeth]) -> list[Teeth]:
     """Return the teeth with what residuals still ask for; none where that matters no more."""
     held = {one.count for one in taken}
-    new = [one.teeth for one in left.values() if one.teeth.count not in held and one.gain > OVERTONE_WORTH]
+    near = all(left[count].gain < OVERTONE_WORTH for count in held)  # else their own phase may look like an overtone
+    new = [one.teeth for one in left.values() if near and one.teeth.count not in held and one.gain > OVERTONE_WORTH]
     if not new and all(left[count].gain < SETTLED for count in held):
         return []
-    known = [
-        Teeth(one.count, one.cosine + left[one.count].teeth.cosine, one.sine + left[one.count].teeth.sine)
-        for one in taken
+    by = {count: one.teeth for count, one in left.items()}
+    return [
+        *(Teeth(n, one.cosine + by[n].cosine, one.sine + by[n].sine) for one in taken for n in (one.count,)),
+        *new,
     ]
-    return [*known, *new]
 
 
-def _told(teeth: Teeth, std: float) -> Note:
-    return RigCode.PUMP_RIPPLES.note(
-        percent=100.0 * teeth.amplitude, half_width=100.0 * NORMAL_95 * std, teeth=teeth.count
+def _told(teeth: Teeth, offset: float, left: ShownTeeth) -> tuple[Note, ...]:
+    ripples = RigCode.PUMP_RIPPLES.note(
+        percent=100.0 * teeth.amplitude, half_width=100.0 * NORMAL_95 * left.std, teeth=teeth.count
     )
+    return (ripples, *_told_offset(offset, left.offset_std))
+
+
+def _told_offset(offset: float, std: float) -> tuple[Note, ...]:
+    if abs(offset) < LEAST_OFFSET:
+        return ()
+    return (RigCode.SPEED_OFFSET.note(offset_rad_s=offset, half_width=NORMAL_95 * std),)

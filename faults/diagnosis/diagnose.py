@@ -13,7 +13,7 @@ import numpy as np
 
 from estimation.eha.bulk_modulus import EstimateOptions
 from estimation.eha.estimate import estimated, explained, finding_of, refused
-from estimation.eha.explained import OUTSIDE, rig_set_right, set_right
+from estimation.eha.explained import OUTSIDE, at_pump_speed, rig_set_right, set_right
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Finding, Outcome, Quantity
 from estimation.identification.model.linear_model import LinearModel
@@ -138,6 +138,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     estimate = estimated(log, rig, EstimateOptions())[1] if seen is None else seen[1]
     found, strange = finding_of(log, estimate, rig), explained(estimate, rig.parameters)
     outside = tuple(note for note in strange if note.code in OUTSIDE)
+    log = at_pump_speed(log, estimate.turning)
     if estimate.explanation is not None:
         log = set_right(log, estimate.explanation)
         rig = replace(rig, parameters=rig_set_right(rig.parameters, estimate.explanation))

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from estimation.eha.bulk_modulus import _impossible_delivery
-from estimation.eha.explained import LEAKAGE_COURSE, WARMED, notes_of, rig_set_right, set_right
+from estimation.eha.explained import LEAKAGE_COURSE, WARMED, at_pump_speed, notes_of, rig_set_right, set_right
 from estimation.fits.explain import Explanation
+from estimation.fits.teeth import EVENLY, Teeth, Turning, delivering
 from estimation.log_checks.clean import CleanLog
 from estimation.notes import RigCode
 from plant.components.oil import ATMOSPHERE, effective_bulk_modulus
@@ -192,3 +193,16 @@ def test_the_rig_is_set_right_by_delivery_and_volume_alone() -> None:
     right = rig_set_right(P, found)
     assert (right.pump_displacement, right.chamber_volume, right.bulk_modulus) == (5e-7, 6e-5, P.bulk_modulus)
     assert rig_set_right(P, explanation()) == P
+
+
+def test_a_log_gets_the_speed_at_which_a_pump_without_teeth_delivers_the_same() -> None:
+    speed = np.linspace(20.0, 40.0, 200)
+    speed[7] = np.nan
+    log = CleanLog(Record(1e-3, {"motor_speed_rad_s": speed, "position_m": np.zeros(200)}), {}, (), ())
+    assert at_pump_speed(log, EVENLY) is log
+    teeth = (Teeth(11, 0.1, 0.02),)
+    found = at_pump_speed(log, Turning(teeth, 0.3)).record
+    wanted = delivering(np.linspace(20.0, 40.0, 200), teeth, 0.3, 1e-3)
+    assert found["motor_speed_rad_s"] == pytest.approx(wanted)
+    assert np.ptp(found["motor_speed_rad_s"] - np.linspace(20.0, 40.0, 200)) > 2.0
+    assert np.array_equal(found["position_m"], log.record["position_m"])

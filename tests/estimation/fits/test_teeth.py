@@ -44,7 +44,7 @@ def test_a_log_with_teeth_delivers_what_they_do_between_any_two_samples(cosine: 
     delivered = (cosine * np.sin(phase) - sine * np.cos(phase)) / 12
     assert added - added[0] == pytest.approx(delivered - delivered[0], abs=2e-4)
     assert np.ptp(delivered) > 0.01
-    assert log.teeth == (12,)
+    assert log.teeth == (Teeth(12, cosine, sine),)
 
 
 def test_teeth_of_which_too_few_samples_are_taken_deliver_none() -> None:
@@ -54,13 +54,20 @@ def test_teeth_of_which_too_few_samples_are_taken_deliver_none() -> None:
     assert np.ptp(with_teeth(bare(slower), [Teeth(12, 0.1, 0.0)]).drives[:, 0]) > 0.1 * slower[0]
 
 
+def test_an_offset_is_subtracted_before_the_angle_is_taken() -> None:
+    speed, teeth = np.linspace(-30.0, 30.0, 500), [Teeth(10, 0.1, 0.02)]
+    assert with_teeth(bare(speed + 0.4), teeth, 0.4).drives == pytest.approx(with_teeth(bare(speed), teeth).drives)
+    assert with_teeth(bare(speed), (), 0.4).drives[:, 0] == pytest.approx(speed - 0.4)
+    assert with_teeth(bare(speed), (), 0.4).speed_offset == 0.4
+
+
 def test_two_counts_of_teeth_add_up() -> None:
     speed = np.linspace(-30.0, 30.0, 500)
     one, other = Teeth(10, 0.1, 0.02), Teeth(20, -0.03, 0.05)
     together = with_teeth(bare(speed), [one, other])
     apart = [with_teeth(bare(speed), [each]).drives - speed[:, None] for each in (one, other)]
     assert together.drives - speed[:, None] == pytest.approx(sum(apart))
-    assert together.teeth == (10, 20)
+    assert together.teeth == (one, other)
 
 
 @cache
@@ -143,6 +150,52 @@ def test_bulk_modulus_with_teeth_is_what_it_would_be_without_and_is_off_where_th
 
 def test_overtones_go_with_the_teeth() -> None:
     found = toothed(seen(logged(0.1, overtone=0.15)), fits_of, lambda _: True)
-    assert found.log.teeth == (11, 22)
+    assert [one.count for one in found.log.teeth] == [11, 22]
     assert [note.data["teeth"] for note in found.remarks] == [11]
-    assert toothed(seen(logged(0.1)), fits_of, lambda _: True).log.teeth == (11,)
+    assert toothed(seen(logged(0.1)), fits_of, lambda _: True).log.teeth[0].count == 11
+
+
+OFFSET = 0.3
+
+
+def shifted(ripple: float) -> Record:
+    record = logged(ripple)
+    return record.replace(motor_speed_rad_s=record["motor_speed_rad_s"] + OFFSET)
+
+
+def test_teeth_whose_phase_an_offset_of_speed_turns_are_found_with_it_and_without_it_are_not() -> None:
+    held = with_teeth(replace(seen(shifted(0.1)), counts=COUNTS), (), 0.7 * OFFSET)  # a little is left
+    best = most(min(fits_of(held), key=lambda fit: fit.cost))
+    assert best.teeth.count == 11
+    assert best.offset == pytest.approx(0.3 * OFFSET, abs=0.3 * 2.0 * np.pi / (11 * 4.0))
+    asked = replace(held, counts=(11,))
+    alone = most(min(fits_of(asked), key=lambda fit: fit.cost))
+    assert alone.gain < 0.5 * best.gain
+
+
+def test_an_offset_is_read_off_the_residuals_and_leaves_more_open() -> None:
+    plain = replace(seen(shifted(0.0)), counts=COUNTS)
+    first = min(fits_of(plain), key=lambda fit: fit.cost)
+    assert first.speed_offset.gain > 100.0
+    assert first.speed_offset.value == pytest.approx(OFFSET, rel=0.3)
+    held = with_teeth(replace(plain, counts=()), (), OFFSET)
+    without, known = (min(fits_of(log), key=lambda fit: fit.cost) for log in (held, replace(held, speed_offset=0.0)))
+    assert abs(without.speed_offset.value) < 4.0 * without.speed_offset.std
+    added = without.std["bulk_modulus"] ** 2 - known.std["bulk_modulus"] ** 2
+    place = without.model.unknowns.index("bulk_modulus")
+    assert added == pytest.approx(without.speed_offset.opened[place] * without.values["bulk_modulus"] ** 2, rel=0.01)
+    assert added > 0.0
+
+
+@pytest.mark.parametrize("ripple", [0.0, 0.1])
+def test_bulk_modulus_is_as_good_with_an_offset_of_speed_as_without(ripple: float) -> None:
+    fitted = partial(fit_flow, parameters=PAPER, bulk_modulus=PAPER.bulk_modulus)
+    sound, off = fitted(logged(ripple)), fitted(shifted(ripple))
+    value, std = sound.parameters["bulk_modulus"]
+    assert off.parameters["bulk_modulus"][0] == pytest.approx(value, abs=0.5 * std)
+    assert not off.reasons
+    assert off.turning.offset == pytest.approx(OFFSET, abs=0.02)
+    assert bool(off.turning.teeth) == (ripple > 0.0)
+    note = next(note for note in off.remarks if note.code is RigCode.SPEED_OFFSET)
+    assert abs(note.data["offset_rad_s"] - OFFSET) < 1.5 * note.data["half_width"]
+    assert all(note.code is not RigCode.SPEED_OFFSET for note in sound.remarks)

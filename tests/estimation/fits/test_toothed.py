@@ -11,29 +11,36 @@ from estimation.fits.flow_fit import fit_flow
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.promises import Promise
-from estimation.fits.teeth import COUNTS, ShownTeeth, Teeth
+from estimation.fits.teeth import COUNTS, MOST_OFFSET, ShownOffset, ShownTeeth, Teeth
 from estimation.fits.toothed import (
     BY_CHANCE,
+    KEPT,
+    LEAST_OFFSET,
     LEAST_TEETH,
     MOST_TEETH,
+    OFFSET_SETTLED,
+    OFFSET_WORTH,
     OVERTONE_WORTH,
     ROUNDS,
     SETTLED,
     STANDS_OUT,
     TEETH_WORTH,
+    Toothed,
     toothed,
 )
 from estimation.notes import EstimateCode, RigCode
+from plant.arrays import Array
 from plant.notes import Note
 from tests.estimation.fits.short_logs import PAPER, log, made_fit, noted, seen
 
 
-def shown(count: int, gain: float, size: float = 0.1) -> ShownTeeth:
-    return ShownTeeth(Teeth(count, size, 0.0), gain, 0.01, np.zeros(2))
+def shown(count: int, gain: float, size: float = 0.1, offset: float = 0.0) -> ShownTeeth:
+    return ShownTeeth(Teeth(count, size, 0.0), gain, 0.01, np.zeros(2), offset, 1e-3)
 
 
-def fit(cost: float, *teeth: ShownTeeth) -> GreyBoxFit:
-    return replace(made_fit(cost, 2e8, 1e5), teeth={one.teeth.count: one for one in teeth})
+def fit(cost: float, *teeth: ShownTeeth, off: tuple[float, float] = (0.0, 0.0)) -> GreyBoxFit:
+    offset = ShownOffset(*off, 2e-3, np.zeros(2))
+    return replace(made_fit(cost, 2e8, 1e5), teeth={one.teeth.count: one for one in teeth}, speed_offset=offset)
 
 
 Asked = tuple[tuple[int, ...], tuple[int, ...]]
@@ -44,7 +51,7 @@ def told(*fits: GreyBoxFit) -> tuple[Callable[[GreyBoxLog], Sequence[GreyBoxFit]
     asked: list[Asked] = []
 
     def fitted(one: GreyBoxLog) -> Sequence[GreyBoxFit]:
-        asked.append((one.counts, one.teeth))
+        asked.append((one.counts, tuple(each.count for each in one.teeth)))
         return [fits[len(asked) - 1]]
 
     return fitted, asked
@@ -118,7 +125,7 @@ def test_an_overtone_is_taken_up_with_its_teeth_where_it_gains_enough() -> None:
     for gain, held in ((OVERTONE_WORTH + 0.1, (12, 24)), (OVERTONE_WORTH - 0.1, (12,))):
         rounds = fit(300.0, shown(12, 0.0), shown(24, gain, 0.05)), fit(290.0, shown(12, 0.0), shown(24, 0.0))
         found = toothed(PLAIN, told(fit(500.0, shown(12, 200.0)), *rounds)[0], well)
-        assert found.log.teeth == held
+        assert tuple(one.count for one in found.log.teeth) == held
 
 
 def left(notes: Sequence[Note]) -> list[tuple[object, object, object]]:
@@ -182,3 +189,99 @@ def test_teeth_are_asked_for_by_chance_as_seldom_as_their_limits_say() -> None:
     """Twice the gain of a cosine and a sine is chi-square distributed with two degrees of freedom."""
     assert np.exp(TEETH_WORTH) / len(COUNTS) == pytest.approx(1500.0, rel=0.03)
     assert np.exp(OVERTONE_WORTH) == pytest.approx(150.0, rel=0.02)
+
+
+def subtracted(found: Toothed) -> Array:
+    return PLAIN.drives[:, 0] - found.log.drives[:, 0]
+
+
+def test_an_offset_of_speed_is_subtracted_corrected_and_told_where_the_log_is_explained_without_it() -> None:
+    rounds = [
+        fit(900.0, off=(0.2, 500.0)),
+        fit(420.0, off=(0.04, 2.0 * OFFSET_SETTLED)),
+        fit(410.0, off=(0.01, 0.9 * OFFSET_SETTLED)),
+    ]
+    fitted, asked = told(*rounds)
+    found = toothed(PLAIN, fitted, lambda one: one.cost < 900.0)
+    assert asked == 3 * [(COUNTS, ())]
+    assert subtracted(found) == pytest.approx(0.24)
+    assert found.log.speed_offset == pytest.approx(0.24)
+    assert not found.log.counts  # hypotheses on this log do not look for teeth again
+    assert found.best.cost == 410.0
+    assert noted(found.remarks) == [
+        {
+            "code": "speed_offset",
+            "offset_rad_s": pytest.approx(0.24),
+            "half_width": pytest.approx(1.96 * 2e-3, rel=1e-3),
+        }
+    ]
+
+
+@pytest.mark.parametrize(
+    ("rounds", "explained"),
+    [
+        ([fit(900.0, off=(0.2, OFFSET_WORTH - 0.1))], True),
+        ([fit(900.0, off=(1.01 * MOST_OFFSET, 500.0))], True),
+        ([fit(900.0, off=(0.2, 500.0)), fit(900.0 - KEPT * 500.0 + 0.1)], True),
+        ([fit(900.0, off=(0.2, 500.0)), fit(900.0 - KEPT * 500.0 - 0.1)], False),
+    ],
+)
+def test_an_offset_that_gains_little_or_breaks_its_promise_or_leaves_the_log_unexplained_is_none(
+    rounds: list[GreyBoxFit], *, explained: bool
+) -> None:
+    found = toothed(PLAIN, told(*rounds)[0], lambda _: explained)
+    assert found.log is PLAIN
+    assert found.best.cost == 900.0
+    assert not found.remarks
+
+
+def test_the_offset_is_that_of_the_balance_which_is_likeliest_with_an_offset_of_its_own() -> None:
+    fits = [[fit(900.0, off=(0.2, 500.0))], [fit(400.0), fit(405.0, off=(0.05, 50.0))], [fit(410.0), fit(355.0)]]
+    found = toothed(PLAIN, lambda _: fits.pop(0), well)
+    assert subtracted(found) == pytest.approx(0.25)
+    assert found.best.cost == 355.0
+
+
+def test_a_small_offset_is_subtracted_and_not_told() -> None:
+    for size, said in ((0.9 * LEAST_OFFSET, False), (1.1 * LEAST_OFFSET, True)):
+        found = toothed(PLAIN, told(fit(900.0, off=(size, 500.0)), fit(400.0))[0], well)
+        assert subtracted(found) == pytest.approx(size)
+        assert bool(found.remarks) is said
+
+
+def test_teeth_are_looked_for_without_the_offset_and_tell_what_is_left_of_it() -> None:
+    rounds = [
+        fit(9000.0, off=(0.2, 8000.0)),
+        fit(600.0, shown(12, 90.0, 0.1, 0.03)),
+        fit(500.0, shown(12, 5.0, 0.02, 0.01)),
+        fit(490.0, shown(12, 0.0, 0.0, 0.0)),
+    ]
+    fitted, asked = told(*rounds)
+    found = toothed(PLAIN, fitted, lambda one: one.cost < 600.0)
+    assert asked == [(COUNTS, ()), (COUNTS, ()), ((12, 24), (12,)), ((12, 24), (12,))]
+    assert found.log.speed_offset == pytest.approx(0.24)
+    assert noted(found.remarks)[1] == {
+        "code": "speed_offset",
+        "offset_rad_s": pytest.approx(0.24),
+        "half_width": pytest.approx(1.96e-3, rel=1e-3),
+    }
+
+
+def test_teeth_however_small_that_tell_an_offset_are_taken_up() -> None:
+    for offset, wanted in ((0.1, True), (0.0, False)):
+        fits = fit(900.0, shown(12, 60.0, 0.5 * LEAST_TEETH, offset)), fit(800.0, shown(12, 0.0))
+        assert bool(toothed(PLAIN, told(*fits)[0], well).remarks) is wanted
+
+
+def test_overtones_are_asked_once_the_teeth_have_settled_and_dropped_where_they_help_none() -> None:
+    rounds = [
+        fit(900.0, shown(12, 200.0)),
+        fit(700.0, shown(12, OVERTONE_WORTH + 0.1), shown(24, 50.0)),
+        fit(690.0, shown(12, 0.0), shown(24, 50.0)),
+        fit(695.0, shown(12, 0.0), shown(24, 0.0)),
+    ]
+    fitted, asked = told(*rounds)
+    found = toothed(PLAIN, fitted, well)
+    assert [held for _, held in asked] == [(), (12,), (12,), (12, 24)]
+    assert found.best.cost == 690.0
+    assert len(found.log.teeth) == 1

@@ -62,6 +62,19 @@ def test_a_pressure_that_its_logger_averaged_is_believed_and_its_lag_found(rows:
     assert late == pytest.approx([0.5 * (rows - 1)], abs=0.3)
 
 
+def test_circuits_are_fitted_to_the_speed_without_its_offset() -> None:
+    speed = log()["motor_speed_rad_s"]
+    found, sound = diagnose_log(log().replace(motor_speed_rad_s=speed + 0.4), RIG), diagnose_log(log(), RIG)
+    (note,) = (note for note in found.all_notes if note.code == RigCode.SPEED_OFFSET)
+    assert note.data["offset_rad_s"] == pytest.approx(0.4, abs=0.03)
+    fitted, as_logged = (one.evidence.diagnosis.scoreboard.blocks.speed for one in (found, sound))
+    assert fitted == pytest.approx(as_logged, abs=0.03)
+    assert (found.condition, found.unknown) == (sound.condition, False)
+    for name in ("leakage_flow", "added_friction"):
+        low, high = sound.severities[name].ci95 or (np.nan, np.nan)
+        assert found.severities[name].value == pytest.approx(sound.severities[name].value, abs=0.3 * (high - low))
+
+
 def test_a_channel_with_a_wrong_sign_gives_no_probabilities_and_says_which_to_mend() -> None:
     record = log().replace(differential_pressure_pa=-log()["differential_pressure_pa"])
     found = diagnose_log(record, RIG)
