@@ -188,6 +188,10 @@ class RigCode(Code):
     PUMP_RIPPLES = (
         "the teeth of the pump ({teeth} a turn) are {percent:.1f} ± {half_width:.1f} % in its flow; they were taken up"
     )
+    MAKEUP_UNSEEN = (
+        "the make-up valve of side {side} never opened in this log: whether it is stuck shut is not told, and would be "
+        "by a drive that empties that side"
+    )
     SPEED_OFFSET = (
         "motor_speed_rad_s reads {offset_rad_s:.3g} ± {half_width:.2g} rad/s too much; the offset was subtracted"
     )

@@ -29,6 +29,7 @@ from estimation.fits.play import NO_PLAY, ShownPlay, play_left, play_structure, 
 from estimation.fits.promises import promised, promised_each
 from estimation.fits.teeth import Turning
 from estimation.fits.toothed import toothed
+from estimation.fits.valves_seen import valves_unseen
 from estimation.fits.wide_problem import POSITION
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
@@ -175,7 +176,7 @@ def fit_flow(
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
     asked, open_ends = _asked(log, parameters, swinging, best, sensed, loaded=loaded, moving=moving)
     asked = (PRESSURE_LATE, *asked) if filtered and PRESSURE_LATE not in asked else asked
-    remarks = (*teeth, *open_ends)
+    remarks = (*teeth, *open_ends, *valves_unseen(best))
     if BEGUN in asked:  # so many valleys that one is believed only where sensors' noise is all that it leaves
         explains = partial(_explains_all, noisy=log.passes_on)
     if asked:
