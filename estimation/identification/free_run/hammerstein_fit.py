@@ -10,8 +10,7 @@ from estimation.fits.covariance import automatic_lags, least_squares_covariance
 from estimation.identification.free_run.bends import KINDS
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem, fit_linear
-from estimation.identification.free_run.linear_kernel import decay_rows
-from estimation.identification.search.descent import stable
+from estimation.identification.free_run.linear_kernel import decay_rows, settles
 from estimation.identification.search.levenberg import levenberg
 
 TOLERANCE, MOST_STEPS = 1e-9, 60
@@ -133,9 +132,7 @@ class HammersteinProblem:
             return float(left @ left), kept.T @ kept, kept.T @ left
 
         def acceptable(theta: Array) -> bool:
-            return self.kind.may(self.input, theta[: self.n_bend]) and bool(
-                stable(theta[ahead + n_b : ahead + n_b + n])
-            )
+            return self.kind.may(self.input, theta[: self.n_bend]) and settles(theta[ahead + n_b : ahead + n_b + n])
 
         start = np.concatenate([values, starts, linear])
         cost, best = levenberg(at, start, acceptable, tolerance=TOLERANCE, most_steps=MOST_STEPS)

@@ -9,7 +9,7 @@ from estimation.arrays import Array, BoolArray
 from estimation.identification.fit.output_error import minimise
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.least_squares import least_squares
-from estimation.identification.free_run.linear_kernel import decay_rows
+from estimation.identification.free_run.linear_kernel import decay_rows, settles
 from estimation.identification.search.criterion import Structure, polynomial, stabilised
 from estimation.identification.search.descent import stable
 from estimation.identification.search.experiments import Experiments
@@ -202,7 +202,7 @@ class Problem:
         cost, best = levenberg(
             at,
             theta,
-            lambda values: stable(values[n_b : n_b + n] * stretched),
+            lambda values: settles(values[n_b : n_b + n]) and bool(stable(values[n_b : n_b + n] * stretched)),
             tolerance=TOLERANCE,
             most_steps=MOST_STEPS,
         )

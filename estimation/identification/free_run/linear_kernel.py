@@ -1,6 +1,9 @@
 """Series through one denominator side by side, each from the state that its level before the log has brought about."""
 
+import numpy as np
+
 from estimation.arrays import Array
+from estimation.identification.search.descent import stable
 from estimation.identification.search.jit import compiled
 
 
@@ -33,3 +36,28 @@ def decay_rows(f: Array, rows: Array, levels: Array, state: Array) -> None:
             for i in range(order):
                 state[i] = state[i + 1] - out * f[i + 1]
             rows[r, t] = out
+
+
+def settles(coefficients: Array) -> bool:
+    """Return whether a denominator has all its roots inside the unit circle, and a sum that is positive.
+
+    A run begins at rest: its level is divided by that sum, of which rounding may leave nothing beside roots near one.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (n,)
+        Behind the leading 1.
+
+    Returns
+    -------
+    bool
+        Whether a run can begin at rest.
+
+    Examples
+    --------
+    >>> settles(np.array([-0.9])), settles(np.array([-1.9999999999999947, 0.9999999999999947]))
+    (True, False)
+    """
+    whole = np.concatenate([[1.0], coefficients])
+    # NumPy sums eight values or more in another order than the loop above
+    return bool(stable(coefficients)) and min(float(whole.sum()), sum(whole.tolist())) > 0.0

@@ -11,9 +11,11 @@ from estimation.identification.free_run.choose_linear import _forms, candidate, 
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import Form, Problem, fit_linear
+from estimation.identification.free_run.linear_kernel import settles
 from estimation.identification.free_run.other_structures import adopt
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
+from estimation.identification.search.descent import stable
 from plant.errors import HydrostateError, LogWarning
 
 F = [1.0, -1.5, 0.7]
@@ -32,6 +34,18 @@ def plant(u: Array, seed: int, noise: float = 0.02, offset: float = 5.0) -> Arra
 def one_log(n: int = 600, seed: int = 1) -> Channels:
     u = 3.0 + steps(n, seed)
     return channels_from([u[:, None]], [plant(u, seed + 100)], 0.1, ["valve"], "level")
+
+
+def test_a_denominator_whose_sum_rounding_swallows_is_not_run() -> None:
+    data, _ = scaled(one_log(120))
+    problem = Problem(Form(2, (2,), (3,)), data)
+    swallowed = np.array([-1.9999999999999947, 0.9999999999999947])
+    assert stable(swallowed), "its roots are inside the circle"
+    with pytest.raises(ArithmeticError):
+        problem.jacobian(np.array([1.0, 1.0, *swallowed, 0.0, 0.0, 0.0]))
+    assert not settles(swallowed)
+    assert settles(np.array([-1.5, 0.7]))
+    assert not settles(np.array([-2.1, 1.1]))
 
 
 def test_sensitivities_are_the_derivatives_of_the_output() -> None:
