@@ -7,7 +7,14 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.free_run.bends import KINDS
-from estimation.identification.free_run.choose_linear import BLOCKS, CLEARLY, Candidate, block_error, pooled
+from estimation.identification.free_run.choose_linear import (
+    BLOCKS,
+    CLEARLY,
+    Candidate,
+    block_error,
+    pooled,
+    surely_better,
+)
 from estimation.identification.free_run.data import Channels, Scaling, blocks
 from estimation.identification.free_run.hammerstein_fit import (
     HammersteinFit,
@@ -20,6 +27,9 @@ from estimation.identification.free_run.transfer_function import linear_model
 ORDERS = 4
 """Order of the linear part at most."""
 
+BENT_MARGIN = 0.02
+"""Share by which a nonlinearity at the input must do better than none on what was held back."""
+
 UNSCALED = Scaling(np.zeros(1), np.ones(1), 0.0, 1.0)
 """Poles and zeros are the same in every scale."""
 
@@ -30,8 +40,8 @@ class HammersteinCandidate:
 
     Parameters
     ----------
-    held_back : float
-        Root-mean-square free-run error of the blocks held back, over the output's deviation [dimensionless].
+    block_errors : tuple of float
+        Root-mean-square free-run error of each block held back, over the output's deviation [dimensionless].
     bic : float
         Information criterion of the free run [dimensionless].
     doubt : str
@@ -39,9 +49,14 @@ class HammersteinCandidate:
     """
 
     fit: HammersteinFit
-    held_back: float
+    block_errors: tuple[float, ...]
     bic: float
     doubt: str = ""
+
+    @property
+    def held_back(self) -> float:
+        """Root mean square over the blocks [dimensionless]."""
+        return pooled(self.block_errors)
 
 
 def hammerstein_candidates(linear: Sequence[Candidate], data: Channels) -> list[HammersteinCandidate]:
@@ -89,6 +104,29 @@ def chosen_hammerstein(candidates: Sequence[HammersteinCandidate]) -> Hammerstei
     return min(near, key=lambda one: one.bic)
 
 
+def worthwhile(
+    candidates: Sequence[HammersteinCandidate], linear: Sequence[Candidate], best: Candidate, *, surely: bool
+) -> HammersteinCandidate | None:
+    """Return the candidate to take, if it is better than every linear model.
+
+    Parameters
+    ----------
+    linear : sequence of Candidate
+        Models without a nonlinearity.
+    best : Candidate
+        Of them, the one that is taken otherwise.
+    surely : bool
+        Whether it must beat that one by more than blocks scatter: nobody has asked for a nonlinearity.
+    """
+    if not candidates:
+        return None
+    taken = chosen_hammerstein(candidates)
+    bar = min(best.held_back, *(one.held_back for one in linear))
+    if not taken.held_back < (1.0 - BENT_MARGIN) * bar:
+        return None
+    return None if surely and not surely_better(taken.block_errors, best.block_errors) else taken
+
+
 def _bases(linear: Sequence[Candidate]) -> list[Candidate]:
     """Return the best linear model of each order, and that of the shortest dead time."""
     best: dict[tuple[int, int], Candidate] = {}
@@ -112,11 +150,11 @@ def _doubt(fit: HammersteinFit, data: Channels) -> str:
     return "cancelling" if any(abs(one.pole) > slow for one in pairs) else ""
 
 
-def _held_back(fit: HammersteinFit, data: Channels) -> float:
-    """Return the free-run error of blocks held back, each simulated by a fit to the others."""
+def _held_back(fit: HammersteinFit, data: Channels) -> tuple[float, ...]:
+    """Return the free-run error of each block held back, simulated by a fit to the others."""
     target, errors = np.concatenate(data.y), list[float]()
     for masks in blocks(data, BLOCKS):
         part = refitted(fit, data.without(masks))
         output = HammersteinProblem(fit.kind, fit.linear.form, data).jacobian(part.theta)[0]
         errors.append(block_error(output - target, np.concatenate(masks) & np.isfinite(target)))
-    return pooled(errors)
+    return tuple(errors)

@@ -126,6 +126,30 @@ def pooled(errors: Sequence[float]) -> float:
     return float(np.sqrt(np.mean(known))) if known else float("inf")
 
 
+def surely_better(errors: Sequence[float], others: Sequence[float]) -> bool:
+    """Return whether a model beats another on the same blocks by more than the blocks scatter: one standard error.
+
+    Parameters
+    ----------
+    errors, others : sequence of float
+        Root-mean-square errors of the model and of the other, one a block; NaN where one holds nothing [dimensionless].
+
+    Returns
+    -------
+    bool
+        Of one block alone, whether it is better there.
+
+    Examples
+    --------
+    >>> surely_better([1.0, 1.0, 1.0], [2.0, 2.1, 1.9]), surely_better([1.0, 1.0, 1.0], [0.9, 0.9, 2.0])
+    (True, False)
+    """
+    gains = np.square(others) - np.square(errors)
+    known = gains[~np.isnan(gains)]
+    scatter = float(known.std(ddof=1)) / np.sqrt(known.size) if known.size > 1 else 0.0
+    return known.size > 0 and bool(known.mean() > scatter)
+
+
 def candidate(fit: LinearFit, data: Channels) -> Candidate:
     """Return a fit with its held-back error, criteria, and what is doubtful in it."""
     # a dead time that was searched is one more value

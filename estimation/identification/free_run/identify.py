@@ -13,8 +13,8 @@ from estimation.identification.free_run.bodies import LinearBody, PolynomialBody
 from estimation.identification.free_run.candidate_rows import hammerstein_row, linear_row, polynomial_row
 from estimation.identification.free_run.choose_hammerstein import (
     HammersteinCandidate,
-    chosen_hammerstein,
     hammerstein_candidates,
+    worthwhile,
 )
 from estimation.identification.free_run.choose_linear import Candidate, chosen, linear_candidates
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate, polynomial_candidates
@@ -49,9 +49,6 @@ MOST_CHOSEN, MOST_FITTED = 10_000, 100_000
 
 CLEAR_MARGIN = 0.15
 """Share by which a nonlinear model must do better than the linear one on what was held back."""
-
-BENT_MARGIN = 0.02
-"""Share by which a nonlinearity at the input must do better than none on what was held back."""
 
 NEARLY_AS_GOOD = 0.02
 """Share of held-back error that is given up for a model without cancelling or undetermined parts."""
@@ -151,7 +148,7 @@ def _identified(
         return _adopted(structure, best, data, by, rows)
     bend = None
     if structure == "hammerstein" or (structure == "auto" and len(data.inputs) == 1):
-        bend = _worthwhile_bend(linear, best, whole, rows)
+        bend = _worthwhile_bend(linear, best, whole, rows, surely=structure == "auto")
     if structure == "hammerstein":
         if bend is not None:
             return _bent(bend, data, whole, rows)
@@ -196,18 +193,14 @@ def _fed_back(model: FreeRunModel, data: Channels) -> list[Note]:
 
 
 def _worthwhile_bend(
-    linear: Sequence[Candidate], best: Candidate, whole: Channels, rows: list[dict[str, Any]]
+    linear: Sequence[Candidate], best: Candidate, whole: Channels, rows: list[dict[str, Any]], *, surely: bool
 ) -> HammersteinCandidate | None:
     """Return the best model with a nonlinearity at its input, or None where none is better than every linear one."""
     if len(whole.inputs) > 1:
         raise HydrostateError(f"structure hammerstein takes one input, got {', '.join(whole.inputs)}: use narx")
     found = hammerstein_candidates(linear, section(whole, MOST_CHOSEN))
     rows += [hammerstein_row(one) for one in found]
-    if not found:
-        return None
-    taken = chosen_hammerstein(found)
-    bar = min(best.held_back, *(one.held_back for one in linear))
-    return taken if taken.held_back < (1.0 - BENT_MARGIN) * bar else None
+    return worthwhile(found, linear, best, surely=surely)
 
 
 def _bent(taken: HammersteinCandidate, data: Channels, whole: Channels, rows: list[dict[str, Any]]) -> Identified:

@@ -17,8 +17,9 @@ from estimation.identification.free_run.choose_hammerstein import (
     _doubt,
     chosen_hammerstein,
     hammerstein_candidates,
+    worthwhile,
 )
-from estimation.identification.free_run.choose_linear import linear_candidates
+from estimation.identification.free_run.choose_linear import linear_candidates, pooled
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.hammerstein_body import HammersteinBody
 from estimation.identification.free_run.hammerstein_fit import HammersteinFit, HammersteinProblem, fit_hammerstein
@@ -197,9 +198,45 @@ def test_a_pole_too_slow_for_a_block_that_a_zero_cancels_is_doubtful(pole: float
 
 def test_a_doubtful_bend_is_taken_only_where_every_one_is() -> None:
     fit: Any = None
-    good, better = HammersteinCandidate(fit, 0.3, 2.0), HammersteinCandidate(fit, 0.2, 1.0, "cancelling")
+    good, better = HammersteinCandidate(fit, (0.3,), 2.0), HammersteinCandidate(fit, (0.2,), 1.0, "cancelling")
     assert chosen_hammerstein([good, better]) is good
     assert chosen_hammerstein([better]) is better
+
+
+def bent(blocks: tuple[float, ...]) -> HammersteinCandidate:
+    fit: Any = None
+    return HammersteinCandidate(fit, blocks, 1.0)
+
+
+def straight(blocks: tuple[float, ...]) -> Any:
+    return SimpleNamespace(held_back=pooled(blocks), block_errors=blocks)
+
+
+def test_a_bend_that_nobody_asked_for_gains_more_than_blocks_scatter() -> None:
+    best = straight((0.3, 0.3, 0.3, 0.3))
+    even, chance = bent((0.28, 0.29, 0.28, 0.29)), bent((0.31, 0.32, 0.31, 0.10))
+    assert chance.held_back < even.held_back < 0.98 * best.held_back
+    for asked in (True, False):
+        assert worthwhile([even], [best], best, surely=not asked) is even
+        as_good = straight((0.285,) * 4)
+        assert worthwhile([even], [best, as_good], best, surely=not asked) is None
+        assert worthwhile([], [best], best, surely=not asked) is None
+    assert worthwhile([chance], [best], best, surely=True) is None  # it is better in one block of four
+    assert worthwhile([chance], [best], best, surely=False) is chance
+
+
+def test_auto_takes_a_bend_only_where_it_is_surely_better(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[bool] = []
+
+    def none(*_: Any, surely: bool) -> None:
+        asked.append(surely)
+
+    monkeypatch.setattr("estimation.identification.free_run.identify.worthwhile", none)
+    monkeypatch.setattr("estimation.identification.free_run.identify.hammerstein_candidates", lambda *_: [])
+    monkeypatch.setattr("estimation.identification.free_run.identify.polynomial_candidates", lambda *_: [])
+    for structure in ("auto", "hammerstein"):
+        identify_channels(logged(PLANTED[0], 1), structure=structure, order=2, delay=1)
+    assert asked == [True, False]
 
 
 def test_where_no_bend_can_be_fitted_the_model_is_linear(monkeypatch: pytest.MonkeyPatch) -> None:

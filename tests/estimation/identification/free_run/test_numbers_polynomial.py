@@ -313,8 +313,8 @@ def bent_inputs() -> dict[str, Any]:
     ranked = [(float(k), np.array([float(k // 2)]), np.ones(2)) for k in range(12)]
     told["apart"] = [one[0] for one in hammerstein_fit._apart(ranked)]
     told["bases"] = [one.form.order for one in choose_hammerstein._bases(linear())]
-    base = choose_hammerstein.HammersteinCandidate(found, 1.0, 3.0)
-    rows = [base, replace(base, held_back=1.009, bic=2.0), replace(base, held_back=1.011, bic=1.0)]
+    base = choose_hammerstein.HammersteinCandidate(found, (1.0,), 3.0)
+    rows = [base, replace(base, block_errors=(1.009,), bic=2.0), replace(base, block_errors=(1.011,), bic=1.0)]
     told["chosen"] = choose_hammerstein.chosen_hammerstein(rows).bic
     return told
 
