@@ -206,7 +206,8 @@ def _worthwhile_bend(
 def _bent(taken: HammersteinCandidate, data: Channels, whole: Channels, rows: list[dict[str, Any]]) -> Identified:
     """Return a model with a nonlinearity at its input, fitted to all data."""
     part = section(whole, MOST_FITTED)
-    fit = refitted(taken.fit, part)
+    # on the data of the comparison a further descent would lead to a model that no block has judged
+    fit = taken.fit if section(whole, MOST_CHOSEN) is whole else refitted(taken.fit, part)
     body = HammersteinBody.of(fit, deviations(fit, part))
     model = FreeRunModel(data.inputs, data.output, data.sample_time, "hammerstein", scaled(data)[1], body)
     quality = model.quality(data.u, data.y)

@@ -225,6 +225,21 @@ def test_a_bend_that_nobody_asked_for_gains_more_than_blocks_scatter() -> None:
     assert worthwhile([chance], [best], best, surely=False) is chance
 
 
+def test_the_bend_that_was_judged_is_the_one_that_is_given(monkeypatch: pytest.MonkeyPatch) -> None:
+    data, again = logged(PLANTED[0], 1), list[int]()
+
+    def refit(fit: HammersteinFit, part: Channels) -> HammersteinFit:
+        again.append(part.n_samples)
+        return fit
+
+    monkeypatch.setattr("estimation.identification.free_run.identify.refitted", refit)
+    identified(data)
+    assert again == []
+    monkeypatch.setattr("estimation.identification.free_run.identify.MOST_CHOSEN", data.n_samples - 1)
+    identified(data)
+    assert again == [data.n_samples]  # it was judged on less
+
+
 def test_auto_takes_a_bend_only_where_it_is_surely_better(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[bool] = []
 
