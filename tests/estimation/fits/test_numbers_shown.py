@@ -191,6 +191,10 @@ def replace_log(**changed: Any) -> Any:
     return one.on(replace(one.log, **changed))
 
 
+def sought(one: Any, theta: Any, errors: Any, counts: tuple[int, ...]) -> list[list[float]]:
+    return [[each.count, each.offset, each.price] for each in _likeliest(one, theta, errors, counts)]
+
+
 @NUMBERS.case()
 def teeth_in_residuals() -> dict[str, Any]:
     one = problem()
@@ -200,29 +204,29 @@ def teeth_in_residuals() -> dict[str, Any]:
     bread = np.linalg.inv(columns.T @ columns + 1e-3 * np.eye(columns.shape[1])).astype(np.float64)
     told: dict[str, Any] = {}
     for name, counts in {"few": (7, 12), "many": COUNTS}.items():
-        shown = shown_teeth(one, theta, errors.ravel(), bread, columns, counts)
+        shown, offset = shown_teeth(one, theta, errors.ravel(), bread, columns, counts)
         told[name] = {
             str(count): [*astuple(each.teeth), each.teeth.amplitude, each.gain, each.std, *some(each.opened)]
             for count, each in shown.items()
         }
+        told[f"{name}, offsets"] = [[each.offset, each.offset_std] for each in shown.values()]
+        told[f"{name}, offset of speed"] = [offset.value, offset.gain, offset.std, *some(offset.opened)]
     fast = one.on(replace(one.log, drives=one.log.drives * np.array([4.0, 1.0])[: one.log.drives.shape[1]]))
-    shown = shown_teeth(fast, theta, errors.ravel(), bread, columns, (5, 60))
-    told["felt of a fast pump"] = list(shown)
+    told["felt of a fast pump"] = list(shown_teeth(fast, theta, errors.ravel(), bread, columns, (5, 60))[0])
     leaks = one.model.unknowns.index("leakage_coefficient")
     rng = np.random.default_rng(6)
     made = [rng.normal(size=errors.size) for _ in range(6)]
-    told["likeliest"] = [list(_likeliest(one, theta, each, COUNTS)) for each in made]
+    told["likeliest"] = [sought(one, theta, each, COUNTS) for each in made]
     with patch.object(teeth, "LIKELIEST", len(COUNTS)):
-        told["ranks"] = [list(_likeliest(one, theta, each, COUNTS)) for each in made]
-        told["ranks of a fast pump"] = [list(_likeliest(fast, theta, each, COUNTS)) for each in made]
+        told["ranks"] = [sought(one, theta, each, COUNTS) for each in made]
+        told["ranks of a fast pump"] = [sought(fast, theta, each, COUNTS) for each in made]
         told["ranks of a leaky pump"] = [
-            list(_likeliest(one, theta + leaky * (np.arange(len(theta)) == leaks), made[0], COUNTS))
-            for leaky in (3.0, 5.0)
+            sought(one, theta + leaky * (np.arange(len(theta)) == leaks), made[0], COUNTS) for leaky in (3.0, 5.0)
         ]
-    told["likeliest of some"] = [list(_likeliest(one, theta, each, (9, 5, 14, 17))) for each in made[:3]]
+    told["likeliest of some"] = [sought(one, theta, each, (5, 9, 14, 17)) for each in made[:3]]
     speed = one.log.drives[:, 0]
-    told["likeliest of a fast pump"] = [list(_likeliest(fast, theta, each, COUNTS)) for each in made]
-    between, steps = _turned(one.log)
+    told["likeliest of a fast pump"] = [sought(fast, theta, each, COUNTS) for each in made]
+    between, steps = _turned(one.log.drives[:, 0], one.log.sample_time)
     told["turned"] = [between[:3], some(between, 9), steps[:3], some(steps, 9)]
     told["delivered"] = [
         some(_delivered(Teeth(count, *parts), (between, steps), one.log.sample_time), 9)
