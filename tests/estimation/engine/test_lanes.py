@@ -78,3 +78,18 @@ def test_every_sample_of_separate_logs_is_filtered_once(samples: int, monkeypatc
     lanes.run(kernel, np.zeros(1), nothing, nothing, np.zeros(1), samples, 1, 1, nothing)
     assert filtered == list(range(samples))
     assert max(laid) + lanes.ROWS == samples
+
+
+def test_a_product_of_variances_goes_into_its_own_lane_and_channel_once_it_is_large() -> None:
+    kernel: Any = SimpleNamespace(LANES=3, CHANNELS=2, PRODUCT=4)
+    work, logs = np.ones(4 + 3 * 2 + 1), np.zeros((2, 3))
+    large = {(0, 1): 2.0 * lanes.LARGE, (1, 2): 3.0 * lanes.LARGE}
+    for (channel, lane), product in large.items():
+        work[4 + 3 * channel + lane] = product
+    work[4 + 3 * 1 + 0] = 0.5 * lanes.LARGE
+    lanes.flush(kernel, work, logs)
+    wanted = np.zeros((2, 3))
+    for place, product in large.items():
+        wanted[place] = np.log(product)
+    assert logs == pytest.approx(wanted)
+    assert work.tolist() == [1.0] * 7 + [0.5 * lanes.LARGE] + [1.0] * 3

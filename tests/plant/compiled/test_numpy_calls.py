@@ -59,6 +59,13 @@ def test_whole_powers_and_comparisons_are_known_too() -> None:
     assert math.isclose(computed({"z": np.negative(X)}, x=2.0)["z"], -2.0)
 
 
+@pytest.mark.parametrize("comparison", [np.less, np.less_equal, np.greater, np.greater_equal])
+@pytest.mark.parametrize("value", [1.9, 2.0, 2.1])
+def test_a_comparison_of_numpy_is_itself_below_at_and_above(comparison: Any, value: float) -> None:
+    made = np.where(comparison(X, 2.0), 1.0, 0.0)
+    assert computed({"z": made}, x=value)["z"] == float(comparison(value, 2.0))
+
+
 @pytest.mark.parametrize(
     "call",
     [
