@@ -210,7 +210,8 @@ def fit_flow(
     reasons = (*_objections(best, log.passes_on), *play_left(swinging.play, sensed)) or teeth_left
     if BEGUN in asked and not reasons and not explains(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
-    return FormFit(believed, std / value, best.chi_square[0], reasons, best.rig_slopes, None, remarks, turning)
+    bound, chi_square = std / value, best.chi_square[0]
+    return FormFit(believed, bound, chi_square, reasons, best.rig_slopes, remarks=remarks, turning=turning)
 
 
 def _homed_at_stop(log: GreyBoxLog) -> bool:

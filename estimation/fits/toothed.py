@@ -196,9 +196,9 @@ def _corrected(taken: Sequence[Teeth], left: Mapping[int, ShownTeeth]) -> list[T
     new = [one.teeth for one in left.values() if near and one.teeth.count not in held and one.gain > OVERTONE_WORTH]
     if not new and all(left[count].gain < SETTLED for count in held):
         return []
-    by = {count: one.teeth for count, one in left.items()}
+    rest = [left[one.count].teeth for one in taken]
     return [
-        *(Teeth(n, one.cosine + by[n].cosine, one.sine + by[n].sine) for one in taken for n in (one.count,)),
+        *(Teeth(one.count, one.cosine + it.cosine, one.sine + it.sine) for one, it in zip(taken, rest, strict=True)),
         *new,
     ]
 

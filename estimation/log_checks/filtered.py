@@ -6,6 +6,7 @@ sees a slow sensor, and finds the filter's lag as any other.
 
 import numpy as np
 
+from estimation.log_checks.channel_physics import SPEED
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE
 from estimation.log_checks.sensor_check import PRESSURE, PRESSURES
 from estimation.notes import SensorCode
@@ -38,8 +39,6 @@ third as fast there as at most, so 15 teeth at 1500 rpm pass 125 times a second.
 
 NEARER = 0.5
 """How far from white noise is at slow speed at most, over how far it is at all speeds [dimensionless]; judged."""
-
-SPEED = "motor_speed_rad_s"
 
 MOST_ROWS = 40
 """Rows over which noise may be alike [count]."""
@@ -127,10 +126,7 @@ def is_white_when_slow(values: Array, speed: Array) -> bool:
     speed : ndarray, shape (n,)
         Speed of the motor [rad/s]; NaN where missing.
     """
-    if len(values) < WINDOW:
-        return False
-    turned = np.mean(np.lib.stride_tricks.sliding_window_view(np.abs(speed), WINDOW)[:: WINDOW // 2], axis=1)
-    windows = np.lib.stride_tricks.sliding_window_view(values, WINDOW)[:: WINDOW // 2]
+    turned, windows = np.mean(_cut(np.abs(speed)), axis=1), _cut(values)
     there = np.isfinite(turned) & np.isfinite(windows).all(axis=1)
     if not np.any(there):
         return False
@@ -146,11 +142,16 @@ def _white(windows: int) -> float:
     return min(FLATTEST, 1.0 - CHANCE / windows**0.5)
 
 
-def _windows(values: Array) -> Array:
-    """Return windows that overlap by half and miss no sample, shape (windows, `WINDOW`)."""
+def _cut(values: Array) -> Array:
+    """Return windows that overlap by half, shape (windows, `WINDOW`)."""
     if len(values) < WINDOW:
         return np.empty((0, WINDOW))
-    windows = np.lib.stride_tricks.sliding_window_view(values, WINDOW)[:: WINDOW // 2]
+    return np.lib.stride_tricks.sliding_window_view(values, WINDOW)[:: WINDOW // 2]
+
+
+def _windows(values: Array) -> Array:
+    """Return windows that miss no sample, shape (windows, `WINDOW`)."""
+    windows = _cut(values)
     return windows[np.isfinite(windows).all(axis=1)]
 
 

@@ -111,12 +111,19 @@ def worthwhile(
 
     Parameters
     ----------
+    candidates : sequence of HammersteinCandidate
+        Models with a nonlinearity at their input.
     linear : sequence of Candidate
         Models without a nonlinearity.
     best : Candidate
         Of them, the one that is taken otherwise.
     surely : bool
         Whether it must beat that one by more than blocks scatter: nobody has asked for a nonlinearity.
+
+    Returns
+    -------
+    HammersteinCandidate or None
+        None where the linear model is kept.
     """
     if not candidates:
         return None
