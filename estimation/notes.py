@@ -189,8 +189,8 @@ class RigCode(Code):
         "the teeth of the pump ({teeth} a turn) are {percent:.1f} ± {half_width:.1f} % in its flow; they were taken up"
     )
     MAKEUP_UNSEEN = (
-        "the make-up valve of side {side} never opened in this log: whether it is stuck shut is not told, and would be "
-        "by a drive that empties that side"
+        "the make-up valve of side {side} never opened, so the log does not tell whether it is stuck shut; a drive "
+        "that empties side {side} would"
     )
     SPEED_OFFSET = (
         "motor_speed_rad_s reads {offset_rad_s:.3g} ± {half_width:.2g} rad/s too much; the offset was subtracted"

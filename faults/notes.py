@@ -81,6 +81,10 @@ class AdviceCode(Code):
     CHECK_MAKEUP = "check the make-up valve of chamber {side}: poppet, seat and spring"
     CHECK_RELIEF = "check setting and seat of the relief valve; compare the setting with the rig file"
     FIND_AIR = "bleed the circuit and find where air gets in: rod seal, fittings, bladder of the accumulator"
+    BLEED = (
+        "bulk modulus is {percent:.0f} % below that of the healthy actuator: bleed the circuit and find where air gets "
+        "in, or correct chamber_volume in the rig file"
+    )
     FIT_DOUBTED = "the model does not follow this log: check units, signs and the rig file first"
     LOG_PRESSURE = "log differential pressure: leakage and friction are then known several times better"
     MOVE_PISTON = "use steps that move the piston: this log cannot show friction"

@@ -6,7 +6,7 @@ from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Finding, Outcome, Quantity
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.log_checks.sensor_check import PRESSURE
-from estimation.notes import EstimateCode
+from estimation.notes import EstimateCode, RigCode
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
 from plant.log.record import Record
@@ -25,6 +25,9 @@ NOT_THE_LOGS = {
 }
 """Reasons of a gate that speak against bulk modulus alone: the log holds too little of it, or it hangs on how the
 piston starts and stops, which decides no condition."""
+
+NOT_TOLD = frozenset({RigCode.MAKEUP_UNSEEN})
+"""Remarks of a fit that say what a log does not tell, and nothing of the numbers that it does."""
 
 
 def estimate_log(record: Record, rig: Rig, options: EstimateOptions = DEFAULT_OPTIONS) -> Finding:
@@ -98,6 +101,7 @@ def finding_of(log: CleanLog, found: BulkModulusEstimate, rig: Rig) -> Finding:
         gate=found.gate,
         channels=found.channels,
         notes=(*left_out(log, found), *absences(found), *explained(found, rig.parameters), *found.rig_notes),
+        not_told=tuple(note for note in found.remarks if note.code in NOT_TOLD),
         evidence=found,
     )
 
@@ -111,7 +115,7 @@ def _others(found: BulkModulusEstimate) -> dict[str, Quantity]:
 
 
 def explained(found: BulkModulusEstimate, parameters: EhaParameters) -> tuple[Note, ...]:
-    """Return what is strange about rig, oil or logger and explains a log, and what the log leaves open of the rig.
+    """Return what is strange about rig, oil or logger and explains a log, and what a fit remarks beside its numbers.
 
     Parameters
     ----------
@@ -126,7 +130,7 @@ def explained(found: BulkModulusEstimate, parameters: EhaParameters) -> tuple[No
         None for a plain log.
     """
     strange = () if found.explanation is None else notes_of(found.explanation, parameters)
-    return (*strange, *found.remarks)
+    return (*strange, *(note for note in found.remarks if note.code not in NOT_TOLD))
 
 
 def absences(found: BulkModulusEstimate) -> tuple[Note, ...]:

@@ -16,8 +16,8 @@ from estimation.fits.form_fit import weighed
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_log import GreyBoxLog
-from estimation.fits.hypotheses import HYPOTHESES, LATEST, LEAST_SHARE, MOST_SHARE, Hypothesis
-from estimation.fits.promises import balanced_by, promising
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LATEST, LEAST_SHARE, MOST_SHARE, Hypothesis
+from estimation.fits.promises import balanced_by, promised_beside, promising
 from estimation.fits.wide_problem import (
     delayed,
     flow_bounds,
@@ -87,6 +87,9 @@ class Explanation:
         How many other sets of hypotheses explain the log about as well.
     stated_pressure : float
         Absolute pressure that bulk modulus is stated at, where the oil holds air [Pa].
+    delivery_open : float
+        How well the log tells what the pump delivers beside them, as a standard deviation of the logarithm
+        [dimensionless]; zero where that is part of the explanation.
     """
 
     names: tuple[str, ...]
@@ -95,6 +98,7 @@ class Explanation:
     fit: GreyBoxFit
     rivals: int
     stated_pressure: float
+    delivery_open: float = 0.0
 
 
 def delivered(found: Explanation, parameters: EhaParameters) -> float | None:
@@ -219,7 +223,15 @@ def explain(
         value, std = values["leakage_coefficient"]
         values["leakage_coefficient"] = ended * value, ended * std
     names = tuple(one.name for one in best.together)
-    return Explanation(names, values, best.delays, best.fit, len(rivals), usual_pressure(log, parameters))
+    open_by = _delivery_open(wide, best)
+    return Explanation(names, values, best.delays, best.fit, len(rivals), usual_pressure(log, parameters), open_by)
+
+
+def _delivery_open(log: GreyBoxLog, best: _Tried) -> float:
+    """Return how well a log tells what the pump delivers beside what explains it; see `Explanation`."""
+    if DELIVERY.free[0] in best.values:
+        return 0.0
+    return promised_beside(delayed(log, best.delays), best.together, best.values, DELIVERY).deviation
 
 
 def _ranked(tried: Iterable[_Tried]) -> list[_Tried]:

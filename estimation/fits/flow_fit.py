@@ -25,15 +25,15 @@ from estimation.fits.hypotheses import (
     Hypothesis,
 )
 from estimation.fits.lateness import most_late
+from estimation.fits.left_open import valves_unseen, wear_open
 from estimation.fits.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
 from estimation.fits.promises import promised, promised_each
 from estimation.fits.teeth import Turning
 from estimation.fits.toothed import toothed
-from estimation.fits.valves_seen import valves_unseen
 from estimation.fits.wide_problem import POSITION
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
-from estimation.notes import EstimateCode, RigCode
+from estimation.notes import EstimateCode
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
@@ -67,10 +67,6 @@ bulk modulus by seven deviations [dimensionless]."""
 
 LATE_SHARE = 0.25
 """Share of what a log leaves unexplained that this must take up to be named beside it [fraction]."""
-
-OPEN_DELIVERY = 0.1
-"""Standard deviation of the logarithm of the pump's delivery from which a worn pump is not excluded
-[dimensionless]: one that delivers 80 % lies within two of it."""
 
 ZERO_WORTH = 30.0
 """Gain in log-likelihood that the slopes must promise before a log that the plain form explains is asked for its
@@ -203,7 +199,8 @@ def fit_flow(
             believed = with_structure(strange.values, left)
             unseen = NO_PLAY if PLAY.name in strange.names else sensed
             reasons = (*play_left(one.play, unseen), *contradicted(strange, parameters))
-            return FormFit(believed, bound, one.chi_square[0], reasons, one.rig_slopes, strange, teeth, turning)
+            remarks = (*teeth, *wear_open(strange.delivery_open))
+            return FormFit(believed, bound, one.chi_square[0], reasons, one.rig_slopes, strange, remarks, turning)
     value, std = found["bulk_modulus"]
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     believed = found if sure else with_structure(found, STRUCTURE)
@@ -272,8 +269,7 @@ def _asked(
     plays = bool(play_left(swinging.play, sensed)) or sensed.gain > PLAY_SENSED
     tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays)
     asked = tuple(one for one, worthwhile in tried if worthwhile)
-    open_by = 0.0 if DELIVERY in asked else delivery.deviation
-    remarks = (RigCode.WEAR_NOT_EXCLUDED.note(percent=200.0 * open_by),) if open_by > OPEN_DELIVERY else ()
+    remarks = () if DELIVERY in asked else wear_open(delivery.deviation)
     if not moving:
         return asked, remarks
     # chambers shut in far above the accumulator take no make-up for seconds, and a search from rest ends without any

@@ -99,6 +99,30 @@ def promised_each(
     return _promises(balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, asked, slopes)
 
 
+def promised_beside(
+    log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], one: Hypothesis
+) -> Promise:
+    """Return what one more hypothesis promises beside those that are taken.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    together : tuple of Hypothesis
+        What is taken already.
+    found : Mapping[str, float]
+        What the fit under them found [SI].
+    one : Hypothesis
+        What is asked.
+
+    Returns
+    -------
+    Promise
+        Its promise.
+    """
+    return _promises(log, together, found, (one,))[0]
+
+
 def balanced_by(log: GreyBoxLog, mass: float) -> GreyBoxLog:
     """Return a log whose wide form balances mass (1), or volume (0).
 

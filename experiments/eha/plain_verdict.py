@@ -7,6 +7,7 @@ from typing import Any
 from estimation.notes import RigCode
 from experiments.page.words import sentence
 from faults.conditions import CONDITIONS
+from faults.notes import AdviceCode
 
 SURE, LIKELY = 0.99, 0.8
 """Probabilities from which a verdict is called certain, and probable [probability]."""
@@ -56,7 +57,7 @@ def verdict(result: Mapping[str, Any]) -> str:
 
     Examples
     --------
-    >>> verdict({"condition": "normal", "unknown": False, "probabilities": {"normal": 1.0}, "severity": {}})
+    >>> verdict({"condition": "normal", "unknown": False, "notes": []})
     'The actuator is healthy: leakage and friction are normal.'
     """
     if result["unknown"]:
@@ -64,12 +65,18 @@ def verdict(result: Mapping[str, Any]) -> str:
     condition = CONDITIONS[result["condition"]]
     faults = [LEAKS.get(condition.leakage), RUBS.get(condition.friction)]
     wrong = " and ".join(one for one in faults if one)
+    if not wrong and _soft_oil(result):
+        return "The oil is softer than its limit; leakage and friction are normal."
     if not wrong:
         said = "is healthy: leakage and friction are normal"
     else:
         absent = [name for name, one in zip(("leakage", "friction"), faults, strict=True) if not one]
         said = f"{wrong}{''.join(f'; {name} is normal' for name in absent)}"
-    return f"The actuator {said}."
+    return f"The actuator {said}{'; its oil is softer than its limit' if _soft_oil(result) else ''}."
+
+
+def _soft_oil(result: Mapping[str, Any]) -> bool:
+    return any(one["code"] == str(AdviceCode.BLEED) for one in result["notes"])
 
 
 def _outside(result: Mapping[str, Any]) -> list[str]:
@@ -139,5 +146,5 @@ def what_to_do(result: Mapping[str, Any]) -> list[str]:
     if not result["unknown"]:
         condition = CONDITIONS[result["condition"]]
         work = WORK_ON_LEAKAGE.get(condition.leakage), WORK_ON_FRICTION.get(condition.friction)
-        found += [one for one in work if one] or ["Nothing needs repair."]
+        found += [one for one in work if one] or ([] if _soft_oil(result) else ["Nothing needs repair."])
     return [*found, *(sentence(one) for one in result["advice"])]

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from estimation.finding import Quantity
 from estimation.log_checks.sensor_check import PRESSURE
 from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
 from faults.notes import AdviceCode, AgainstCode, ClassCode
@@ -111,6 +112,29 @@ def advice_for(
             AdviceCode.LOG_LONGER.note(duration_s=record.duration) if short else AdviceCode.CONDITIONS_OPEN.note()
         )
     return tuple(found) or ((AdviceCode.NOTHING.note(),) if probabilities else ())
+
+
+def oil_advice(
+    severity: Mapping[str, Quantity], healthy: Mapping[str, float], limits: Mapping[str, float]
+) -> tuple[Note, ...]:
+    """Return what to do about oil that is softer than its limit, whatever the condition.
+
+    Parameters
+    ----------
+    severity : Mapping[str, Quantity]
+        How bad it is, by the names of `faults.diagnosis.severity.UNITS`.
+    healthy, limits : Mapping[str, float]
+        The same of the healthy actuator, and where it stops being sound [each in the same unit].
+
+    Returns
+    -------
+    tuple of Note
+        None where the interval given the rig reaches the limit.
+    """
+    modulus, sound = severity["bulk_modulus"], healthy["bulk_modulus"]
+    if modulus.value is None or modulus.ci95 is None or modulus.ci95[1] >= limits["bulk_modulus"]:
+        return ()
+    return (AdviceCode.BLEED.note(percent=100.0 * (1.0 - modulus.value / sound)),)
 
 
 def _mended(doubts: list[Note]) -> tuple[Note, ...]:

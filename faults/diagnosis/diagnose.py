@@ -20,7 +20,7 @@ from estimation.identification.model.linear_model import LinearModel
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.log_checks.sensor_check import PRESSURE
 from estimation.notes import RigCode
-from faults.diagnosis.advice import advice_for
+from faults.diagnosis.advice import advice_for, oil_advice
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import region_scores
@@ -171,17 +171,19 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     against = distinct((*doubts, *diagnosis.against))
     if against:  # nominal models alone are no judges of a circuit with another oil, but they say what is off
         against = distinct((*against, *verdict.against))
+    severity = _severities(diagnosis, estimate, healthy, rig, pressure=PRESSURE in scores.channels)
+    oil = oil_advice(severity, diagnosis.healthy, diagnosis.limits) if estimate.gate.passed and not against else ()
     return replace(
         found,
         condition=diagnosis.condition,
         probabilities=diagnosis.probabilities,
         unknown=bool(against),
         against=against,
-        severities=_severities(diagnosis, estimate, healthy, rig, pressure=PRESSURE in scores.channels),
+        severities=severity,
         healthy=diagnosis.healthy,
-        not_told=diagnosis.not_told,
+        not_told=(*diagnosis.not_told, *found.not_told),
         since=diagnosis.scoreboard.onset,
-        advice=advice_for(log.record, diagnosis.probabilities, against, diagnosis.not_told, scores.channels),
+        advice=(*oil, *advice_for(log.record, diagnosis.probabilities, against, diagnosis.not_told, scores.channels)),
         evidence=EhaEvidence(estimate, scores, diagnosis),
     )
 

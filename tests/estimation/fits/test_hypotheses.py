@@ -14,9 +14,10 @@ from estimation.eha.explained import notes_of, rig_set_right, set_right
 from estimation.fits import explain as module
 from estimation.fits.descent import Point
 from estimation.fits.explain import Explanation
-from estimation.fits.flow_fit import OPEN_DELIVERY, _near, _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
+from estimation.fits.flow_fit import _near, _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
 from estimation.fits.flow_search import MAKEUP_TRIED, flow_starts
 from estimation.fits.hypotheses import HYPOTHESES, LATEST
+from estimation.fits.left_open import OPEN_DELIVERY
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.first_belief import begins_in_motion, first_load
 from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters, grown_leakage
@@ -285,6 +286,10 @@ def test_wear_of_the_pump_is_not_excluded_by_a_log_at_one_speed() -> None:
     assert RigCode.WEAR_NOT_EXCLUDED in [note.code for note in found.notes]
     worn = found.evidence.spreads["pump_displacement"]
     assert worn.down > OPEN_DELIVERY > worn.up
+    pressure = np.roll(record["differential_pressure_pa"], 5)
+    pressure[:5] = pressure[5]
+    late = estimate_log(record.replace(differential_pressure_pa=pressure), Rig(HEALTHY))
+    assert {RigCode.WEAR_NOT_EXCLUDED, "pressure_late"} <= {note.code for note in late.notes}
     assert RigCode.WEAR_NOT_EXCLUDED not in [note.code for note in estimate_log(log("steps"), Rig(HEALTHY)).notes]
 
 

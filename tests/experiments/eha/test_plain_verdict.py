@@ -7,6 +7,7 @@ import pytest
 from estimation.notes import RigCode
 from experiments.eha.plain_verdict import sureness, verdict, what_to_do
 from faults.conditions import CONDITIONS
+from faults.notes import AdviceCode
 
 AMOUNT = {"velocity_lost": {"value": 28.4, "unit": "%", "ci95": [27.0, 30.0]}}
 
@@ -33,6 +34,13 @@ def test_every_condition_has_a_verdict_and_work_that_name_what_is_wrong(conditio
         assert (f"{level} {fault}" in verdict(result)) == (level != "none")
     assert ("Nothing needs repair." in what_to_do(result)) == (condition == "normal")
     assert what_to_do(result)[-1] == "Log again."
+
+
+def test_soft_oil_is_in_the_verdict_and_leaves_something_to_repair() -> None:
+    soft = {"notes": [AdviceCode.BLEED.note(percent=27.0).to_dict()]}
+    assert "softer than its limit; leakage and friction are normal" in verdict(said_of("normal", **soft))
+    assert verdict(said_of("minor_leakage", **soft)).endswith("; its oil is softer than its limit.")
+    assert what_to_do(said_of("normal", **soft)) == ["Log again."]
 
 
 def test_what_is_not_certain_is_not_called_certain() -> None:

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from estimation.finding import Quantity
 from estimation.notes import EstimateCode, RigCode, SensorCode
 from faults.conditions import CONDITIONS
-from faults.diagnosis.advice import advice_for, speeds_held
+from faults.diagnosis.advice import advice_for, oil_advice, speeds_held
 from faults.notes import AdviceCode, AgainstCode, ClassCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -176,3 +177,13 @@ def test_a_fault_outside_the_nine_is_worked_on_before_the_rig_file() -> None:
 )
 def test_each_fault_has_its_own_work(fault: Note, work: Note) -> None:
     assert advice_for(staircase([100.0]), SURE, (fault,), (), ALL) == (work,)
+
+
+@pytest.mark.parametrize(("ends", "percent"), [((1.4e8, 1.5e8), 27.5), ((1.6e8, 1.7e8), None), (None, None)])
+def test_soft_oil_is_to_be_bled_where_its_interval_lies_below_the_limit(
+    ends: tuple[float, float] | None, percent: float | None
+) -> None:
+    modulus = Quantity(None, "Pa") if ends is None else Quantity(0.5 * sum(ends), "Pa", ends)
+    said = oil_advice({"bulk_modulus": modulus}, {"bulk_modulus": 2e8}, {"bulk_modulus": 1.6e8})
+    assert codes(said) == ([] if percent is None else [AdviceCode.BLEED])
+    assert [note.data["percent"] for note in said] == ([] if percent is None else [pytest.approx(percent)])

@@ -1,11 +1,11 @@
-"""A make-up valve that never opened in a log is told of."""
+"""A make-up valve that never opened in a log is told of, and wear of the pump that a log does not exclude."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from estimation.fits.valves_seen import valves_unseen
+from estimation.fits.left_open import OPEN_DELIVERY, valves_unseen, wear_open
 from estimation.notes import RigCode
 from tests.estimation.fits.short_logs import made_fit
 
@@ -27,3 +27,8 @@ def test_one_valve_that_is_not_felt_beside_one_that_is(stds: dict[str, float], s
     said = valves_unseen(replace(fit, std={**fit.std, **stds}))
     assert [note.data["side"] for note in said] == sides
     assert all(note.code is RigCode.MAKEUP_UNSEEN for note in said)
+
+
+def test_wear_is_open_by_two_deviations_from_the_limit_on() -> None:
+    assert wear_open(OPEN_DELIVERY) == ()
+    assert [note.data["percent"] for note in wear_open(0.15)] == [pytest.approx(30.0)]
