@@ -18,6 +18,7 @@ from estimation.fits.hypotheses import (
     HYPOTHESES,
     LEAST_DELIVERY,
     LEAST_ZERO,
+    MAY_HIDE,
     OFFSET,
     PLAY,
     PRESSURE_LATE,
@@ -81,8 +82,8 @@ TOO_WIDE = 20.0
 """Conductance of the make-up valves, over that of the first guess, from which a search is begun with the guess too
 [dimensionless]."""
 
-ALWAYS_ASKED = (DELIVERY, ENCODER_ZERO)
-"""What a log that the plain form explains is asked all the same, where the slopes promise a gain: both may hide."""
+ALWAYS_ASKED = (DELIVERY, ENCODER_ZERO, *MAY_HIDE)
+"""What a log that the plain form explains is asked all the same, where the slopes promise a gain: each may hide."""
 
 MOST_ASKED = 50_000
 """A longer log is not asked what is strange about it: the answer takes minutes [samples]."""
@@ -257,18 +258,18 @@ def _asked(
     if not _explains(swinging, log.passes_on) or most_late(swinging.late)[2] > WORTH:
         return (BEGUN,) if moving else HYPOTHESES, ()
     by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
-    delivery, *zeros = promised_each(
+    delivery, zero, *hidden = promised_each(
         log, parameters, swinging.values, ALWAYS_ASKED, by_mass=by_mass, slopes=_slopes(swinging, log)
     )
     shows_zero = best is swinging or _homed_at_stop(log)
     if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
-        zeros.append(promised(log, parameters, best.values, ENCODER_ZERO))
-    zero = max(zeros)
+        zero = max(zero, promised(log, parameters, best.values, ENCODER_ZERO))
     worn = delivery.gain > WORTH and delivery.size > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and zero.size > LEAST_ZERO
     plays = bool(play_left(swinging.play, sensed)) or sensed.gain > PLAY_SENSED
     tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays)
     asked = tuple(one for one, worthwhile in tried if worthwhile)
+    asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > WORTH)
     remarks = () if DELIVERY in asked else wear_open(delivery.deviation)
     if not moving:
         return asked, remarks
