@@ -13,7 +13,7 @@ from estimation.fits.descent import Point
 from estimation.fits.explain import _Tried
 from estimation.fits.flow_fit import _explains_all, _homed_at_stop, _slopes, _wanted, fit_flow
 from estimation.fits.greybox_fit import GreyBoxFit
-from estimation.fits.hypotheses import BEGUN, HYPOTHESES
+from estimation.fits.hypotheses import BEGUN, HYPOTHESES, MAY_HIDE
 from estimation.fits.motion_fit import _log, _starts, _steps, unseen
 from estimation.fits.motion_search import MOST_WORK, Begun, MotionSearch, explained, rough
 from estimation.fits.play import ShownPlay
@@ -35,10 +35,12 @@ def plain(cost: float, form: Any = FLOW_FORM, modulus: float = 2e8, **how: Any) 
     return replace(made, model=form, values={**made.values, fed: 1e-9}, std={**made.std, fed: 1e-10})
 
 
-def concluded(fits: list[GreyBoxFit], strange: GreyBoxFit, *names: str, sensed: Any = None, **how: Any) -> Any:
+def concluded(
+    fits: list[GreyBoxFit], strange: GreyBoxFit, *names: str, sensed: Any = None, open_by: float = 0.0, **how: Any
+) -> Any:
     """Return what is told of a log by its plain fits, and by one under hypotheses."""
     values = {name: (value, strange.std[name]) for name, value in strange.values.items() if name in strange.std}
-    explanation = SimpleNamespace(names=names, values=values, fit=strange)
+    explanation = SimpleNamespace(names=names, values=values, fit=strange, delivery_open=open_by)
     asked: list[Any] = []
 
     def explained(*_: Any, asked: Any, paired: bool, by_mass: bool, **__: Any) -> Any:
@@ -49,7 +51,10 @@ def concluded(fits: list[GreyBoxFit], strange: GreyBoxFit, *names: str, sensed: 
     with patch.multiple(
         flow_fit,
         balanced=lambda *_: fits,
-        promised_each=lambda *_, **__: 2 * [Promise(40.0, 0.2, 0.05)],
+        promised_each=lambda *_, **__: [
+            *(2 * [Promise(40.0, 0.2, 0.05)]),
+            *(len(MAY_HIDE) * [Promise(0.0, 0.0, 0.05)]),
+        ],
         promised=lambda *_, **__: Promise(0.0, 0.0, 0.05),
         explain=explained,
         contradicted=lambda *_: (),
@@ -92,6 +97,7 @@ def conclusions_of_the_flow_form() -> dict[str, Any]:
         "played, shown": concluded(
             [replace(plain(200.0), play=ShownPlay(3e-5, 9.0))], strange, "position_play", sensed=ShownPlay(3e-5, 2.3)
         ),
+        "wear is left open": concluded([plain(200.0)], strange, "volume", open_by=0.12),
         "a play is left": concluded([plain(200.0)], strange, "delivery", sensed=sensed),
         "held volumes": concluded(
             [plain(100.0, HELD_FLOW_FORM), plain(130.0), plain(128.0, MASS_FLOW_FORM)], strange, "delivery"

@@ -11,7 +11,7 @@ import pytest
 from scipy.special import ndtr
 
 from estimation.fits import flow_fit as module
-from estimation.fits.flow_fit import DOUBTED, PLAY_SENSED, fit_flow
+from estimation.fits.flow_fit import ALWAYS_ASKED, DOUBTED, PLAY_SENSED, fit_flow
 from estimation.fits.flow_search import balanced, flow_starts
 from estimation.fits.form_fit import FormFit
 from estimation.fits.hypotheses import PLAY, Hypothesis
@@ -180,7 +180,7 @@ def concluded(
         return explanation
 
     monkeypatch.setattr(module, "balanced", lambda *_: [fit])
-    monkeypatch.setattr(module, "promised_each", lambda *_, **__: 2 * [Promise(0.0, 0.0, 0.01)])
+    monkeypatch.setattr(module, "promised_each", lambda *_, **__: len(ALWAYS_ASKED) * [Promise(0.0, 0.0, 0.01)])
     monkeypatch.setattr(module, "explain", explained)
     return fit_flow(record or logged("normal", "prbs", 0.0), PAPER, PAPER.bulk_modulus)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimation.fits import flow_fit as module
-from estimation.fits.flow_fit import fit_flow
+from estimation.fits.flow_fit import ALWAYS_ASKED, fit_flow
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.promises import Promise
@@ -179,7 +179,7 @@ def test_teeth_that_are_left_shut_the_gate_where_nothing_else_does(
 
 def test_nothing_is_left_of_a_sound_log(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "balanced", lambda *_: [fit(500.0, shown(12, 3.0))])
-    monkeypatch.setattr(module, "promised_each", lambda *_, **__: 2 * [Promise(0.0, 0.0, 0.01)])
+    monkeypatch.setattr(module, "promised_each", lambda *_, **__: len(ALWAYS_ASKED) * [Promise(0.0, 0.0, 0.01)])
     found = fit_flow(log(0.2), PAPER, PAPER.bulk_modulus)
     assert not found.reasons
     assert not found.remarks

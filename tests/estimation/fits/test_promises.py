@@ -1,0 +1,36 @@
+"""What is tried first, by what the slopes promise."""
+
+import pytest
+
+from estimation.fits.flow_search import flow_starts
+from estimation.fits.hypotheses import DELIVERY, MAKEUP_BLOCKED, OFFSET, Hypothesis
+from estimation.fits.promises import promised, promised_beside, promising
+from estimation.models.flow import STIFFNESS
+from tests.estimation.fits.short_logs import PAPER, log, seen, wide
+
+FOUND = {**flow_starts(PAPER, PAPER.bulk_modulus)[2], STIFFNESS: 3e7, "case_leakage": 4e-13}
+"""What a plain fit may have found [SI]."""
+
+
+@pytest.mark.parametrize(
+    ("asked", "first"),
+    [([MAKEUP_BLOCKED], [MAKEUP_BLOCKED]), ([MAKEUP_BLOCKED, OFFSET], [OFFSET])],
+    ids=["slopes promise nothing of any", "of one"],
+)
+def test_what_slopes_say_nothing_of_is_tried_first_where_nothing_else_is_asked(
+    asked: list[Hypothesis], first: list[Hypothesis]
+) -> None:
+    likely, others = promising(wide(), (), FOUND, asked)
+    assert likely == first
+    assert others == [each for each in asked if each not in first]
+
+
+def test_beside_nothing_a_hypothesis_promises_what_it_does_alone() -> None:
+    alone = promised(seen(log(0.5), chamber_volume=0.1), PAPER, FOUND, OFFSET)
+    assert promised_beside(wide(), (), FOUND, OFFSET) == pytest.approx(alone, rel=1e-6)
+
+
+def test_what_is_taken_already_leaves_less_to_tell() -> None:
+    known = {**FOUND, "pressure_offset": 1e3}
+    alone, beside = (promised_beside(wide(), taken, known, DELIVERY) for taken in ((), (OFFSET,)))
+    assert beside.deviation > alone.deviation
