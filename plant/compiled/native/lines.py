@@ -90,11 +90,9 @@ class Lines:
             case "where", [condition, a, b]:
                 return self._op(f"select {self._truth} {condition}, {kind} {a}, {kind} {b}")
             case "sign", [x]:
-                zero, minus, plus = (self._number(value) for value in (0.0, -1.0, 1.0))
-                above = self._op(f"fcmp ogt {kind} {x}, {zero}")
-                below = self._op(f"fcmp olt {kind} {x}, {zero}")
-                other = self._called("where", [below, minus, zero])
-                return self._called("where", [above, plus, other])
+                one = self._instruction("copysign", kind, [self._number(1.0), x])
+                apart = self._op(f"fcmp one {kind} {x}, {self._number(0.0)}")
+                return self._called("where", [apart, one, self._number(0.0)])
             case (("fma" | "sqrt" | "abs"), _):
                 return self._instruction("fabs" if name == "abs" else name, kind, given)
             case (("exp" | "log" | "tanh" | "sin" | "cos" | "atan"), [x]):
