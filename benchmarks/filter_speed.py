@@ -30,7 +30,7 @@ from benchmarks.peers.acceleration_form import coefficients
 from benchmarks.targets import Check, printed
 from estimation.engine.contract import FilterProblem
 from estimation.engine.kernels import LANES, compile_kernel
-from estimation.engine.layout import halves_of, layout
+from estimation.engine.layout import all_present, counting_missing, halves_of, layout
 from estimation.engine.runner import aligned, constant_row
 from estimation.filters.batch import filter_batch
 from estimation.filters.ekf import EKF, ekf
@@ -107,14 +107,14 @@ def scaled(problem: FilterProblem) -> tuple[tuple[float, float, float], Array, A
 def kernel_work(batch: list[FilterProblem]) -> Callable[[], None]:
     """Return our kernel's work alone, on logs that lie side by side already, as the C++ kernel's do."""
     places, first = layout(EKF, batch[0].model, batch[0].channels), batch[0]
-    kernel = compile_kernel(EKF, first.model, first.channels, LANES)
+    kernel = compile_kernel(EKF, first.model, first.channels, LANES, separate=False)
     blocks = [batch[i : i + LANES] for i in range(0, len(batch), LANES)]
     data: list[tuple[Array, Array]] = []
     for block in blocks:
         full = [*block, *[block[0]] * (LANES - len(block))]
         data.append((_lanes([one.drives for one in full]), _lanes([one.measured for one in full])))
     begin = np.concatenate([places.start(first.mean, first.covariance), constant_row(first, {})])
-    works = [aligned(len(kernel.SLOTS), LANES) for _ in blocks]
+    works = [aligned(kernel.LINES, LANES) for _ in blocks]
     track, logs = np.empty((1, first.model.width, LANES)), np.zeros((len(first.channels), LANES))
     count, nothing = len(first.measured), np.empty((0, 0))
 
@@ -257,9 +257,11 @@ def pressure_table(count: int, samples: int) -> Iterator[tuple[str, float]]:
 
 
 def operations() -> int:
-    """Return the arithmetic instructions of a filter-step of the acceleration form, constants hoisted."""
+    """Return the arithmetic instructions of a filter-step in lanes, no sample missing, on the acceleration form."""
     halves = halves_of(EKF, ACCELERATION_FORM, CHANNELS)
-    outputs = [*halves.predict.values(), *halves.update.values()]
+    update = all_present(counting_missing(halves.update))
+    kept = layout(EKF, ACCELERATION_FORM, CHANNELS).carried
+    outputs = [*halves.predict.values(), *(value for name, value in update.items() if name in kept)]
     return sum(item.operation in FUSED or item.operation in "+-*/" for item in ordered(outputs))
 
 

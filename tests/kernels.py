@@ -176,12 +176,14 @@ def stepped(
     return {one: values for one, values in found.items() if not np.all(np.isnan(values))}
 
 
-def on_memory(file: SimpleNamespace, *lines: FunctionType) -> Callable[[int, float], None]:
+def on_memory(file: SimpleNamespace, *lines: FunctionType) -> Callable[..., None]:
     """Lines of a kernel, one after the other, as an operation on numbers in memory, one at a time."""
 
-    def operation(address: int, j: float) -> None:
+    def operation(address: int, j: float, *others: int) -> None:
         def at(name: str) -> ctypes.c_double:
-            return ctypes.c_double.from_address(address + 8 * file.SLOTS[name])
+            slot = file.SLOTS[name]
+            place = address + 8 * slot if isinstance(slot, int) else others[slot[0]] + 8 * slot[1]
+            return ctypes.c_double.from_address(place)
 
         known, results = {"j": j}, dict[str, float]()
         for part in lines:

@@ -8,8 +8,8 @@ compute in plain IEEE arithmetic, fused where the lines say so: a filter gives t
 from functools import cache
 
 from estimation.engine import lanes as lanes_loop
-from estimation.engine.lanes import flush, keep, lay_side_by_side, run, steps, take
-from estimation.engine.layout import Halves, halves_of, layout
+from estimation.engine.lanes import flush, hold, keep, lay_side_by_side, run, steps, tally
+from estimation.engine.layout import Halves, all_present, counting_missing, halves_of, layout
 from estimation.engine.rule import Rule
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import ordered
@@ -18,7 +18,7 @@ from plant.compiled.native.machine import native_width
 from plant.compiled.native.operations import ROWS
 from plant.compiled.native.signature import signature
 from plant.compiled.paste import kernel_text, pasted
-from plant.compiled.source import lines_source, operations_source
+from plant.compiled.source import Slot, lines_source, operations_source
 
 LANES = 32
 """Filters side by side: as many as keep a vector unit busy; fewer leave it waiting, more do not help."""
@@ -46,22 +46,24 @@ def kernel_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...], la
     """
     halves, places = halves_of(rule, model, channels), layout(rule, model, channels)
     d, m, width = len(model.drives), len(channels), _width(halves, lanes)
-    begin = len(places.carried) + len(places.rows) + len(halves.constants)
     seen = [f"{x}{c}" for c in range(m) for x in "es"] if lanes == 1 else []
-    data = [*(f"a{i}" for i in range(d)), *(f"b{i}" for i in range(d)), *(f"y{c}" for c in range(m))]
-    names = (*places.carried, *places.rows, *halves.constants, *data, *seen)
-    slots = {name: lanes * i for i, name in enumerate(names)}
+    names = (*places.carried, *places.rows, *halves.constants, *(f"last{i}" for i in range(d)), *seen)
+    slots: dict[str, Slot] = {name: lanes * i for i, name in enumerate(names)}
+    data = [f"a{i}" for i in range(d)], [f"b{i}" for i in range(d)], [f"y{c}" for c in range(m)]
+    slots |= {name: (k, lanes * i) for k, group in enumerate(data) for i, name in enumerate(group)}
     line = 8 * lanes
-    sizes = {"LANES": lanes, "LINE": line, "WIDTH": width, "STATES": model.width, "DRIVES": d, "CHANNELS": m}
-    sizes |= {"BEFORE": line * begin, "AFTER": line * (begin + d), "SAMPLE": line * (begin + 2 * d)}
-    sizes |= {"PRODUCT": slots["product0"], "SEEN": begin + 2 * d + m}
+    sizes = {"LANES": lanes, "LINE": line, "LINES": len(names), "WIDTH": width}
+    sizes |= {"STATES": model.width, "DRIVES": d, "CHANNELS": m, "LAST": line * names.index("last0")}
+    sizes |= {x.upper(): lanes * names.index(f"{x}0") for x in ("count", "product")} | {"SEEN": len(names) - len(seen)}
     settings = {"FLUSH": lanes_loop.FLUSH, "LARGE": lanes_loop.LARGE, "AHEAD": lanes_loop.AHEAD, "ROWS": ROWS}
-    written = {"prepare": halves.constants, "predict": halves.predict, "update": halves.update}
+    update = counting_missing(halves.update)
+    written = {"prepare": halves.constants, "predict": halves.predict, "update": update, "whole": all_present(update)}
     lines = {name: lines_source(name, outputs) for name, outputs in written.items()}
     parts = (
         operations_source(lines, slots, width),
-        f"both_at = stepping(SLOTS, {width}, predict, update)\nmove = moving({width})",
-        pasted(take, keep, flush, constants={**sizes, **settings}, inlined=True),
+        f"both_at = stepping(SLOTS, {width}, predict, whole)\nmove = moving({width})\n"
+        f"complete_at = complete({width}, {m}, {line})",
+        pasted(hold, keep, flush, tally, constants={**sizes, **settings}, inlined=True),
         pasted(steps),
         *([pasted(lay_side_by_side, inlined=True), pasted(run)] if lanes > 1 else []),
     )
@@ -69,13 +71,17 @@ def kernel_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...], la
 
 
 @cache
-def compile_kernel(rule: Rule, model: ProcessModel, channels: tuple[str, ...], lanes: int = 1) -> NativeKernel:
+def compile_kernel(
+    rule: Rule, model: ProcessModel, channels: tuple[str, ...], lanes: int = 1, *, separate: bool = True
+) -> NativeKernel:
     """Generate and load the kernel that runs so many filters side by side.
 
     Parameters
     ----------
     lanes : int
         One, or `LANES`.
+    separate : bool
+        Whether several lanes filter separate logs, by ``run``; else logs that lie side by side already, by ``steps``.
 
     Returns
     -------
@@ -85,9 +91,9 @@ def compile_kernel(rule: Rule, model: ProcessModel, channels: tuple[str, ...], l
     track = f"ndarray, shape (rows, {model.width}{f', {lanes}' if lanes > 1 else ''})"
     logs, seen = f"ndarray, shape ({len(channels)}, {lanes})", "ndarray, shape (samples, seen)"
     results = f"results : tuple ({'; '.join((track, track, logs, seen, seen))})"
-    entries = {"steps": signature(f"{_STEPS}\n{results}")}
-    if lanes > 1:
-        entries["run"] = signature(f"{_RUN.format(lanes=lanes)}\n{results}")
+    takes = {"steps": _STEPS, "run": _RUN.format(lanes=lanes)}
+    entry = "run" if lanes > 1 and separate else "steps"  # what is entered at two places is compiled twice
+    entries = {entry: signature(f"{takes[entry]}\n{results}")}
     made_of = rule, model, channels, lanes
     return load_native(f"{rule.name}_{model.name}_{lanes}", lambda: kernel_source(*made_of), entries, made_of)
 

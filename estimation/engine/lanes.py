@@ -25,21 +25,30 @@ Results: TypeAlias = tuple[Array, Array, Array, Array, Array]
 """Track and its variance, logarithms of flushed products, residuals and their variances, to be filled."""
 
 
+Step: TypeAlias = Callable[[int, float, int, int, int], None]
+"""``step(address, j, before, after, sample)``, see `LanesKernel`."""
+
+
 class LanesKernel(Protocol):
     """What the kernel of a filter has, for one log or for logs side by side.
 
     Attributes
     ----------
-    LANES, LINE, WIDTH : int
-        Filters side by side, bytes of a line, and how many filters a step takes.
+    LANES, LINE, LINES, WIDTH : int
+        Filters side by side, bytes of a line, how many lines there are, and how many filters a step takes.
     STATES, DRIVES, CHANNELS : int
         Counts of the model's states and drives, and of measured channels.
-    BEFORE, AFTER, SAMPLE : int
-        Where the drives at the last sample and at this one and its measurements stand [bytes].
-    PRODUCT, SEEN : int
-        Where products of innovation variances stand, and a single filter's innovations and variances [numbers].
+    LAST : int
+        Where the drives at the last sample of the rows before stand [bytes].
+    COUNT, PRODUCT, SEEN : int
+        Where counts of samples and products of innovation variances stand, and a single filter's innovations and
+        variances [numbers].
     prepare_at, predict_at, update_at, both_at : callable
-        ``predict_at(address, j)``: take filters, from their first symbol on, through sub-step j; likewise the others.
+        ``predict_at(address, j, before, after, sample)``: take filters, from their first symbol on, through sub-step j
+        between the drives at two addresses; likewise the others. ``both_at`` predicts and updates by a sample of which
+        no filter misses a channel; ``update_at`` takes missing ones off the counts.
+    complete_at : callable
+        ``complete_at(sample)``: whether no filter misses a channel.
     move : callable
         ``move(source, target)``: copy as many numbers as a step takes.
     transpose : callable
@@ -48,19 +57,20 @@ class LanesKernel(Protocol):
 
     LANES: int
     LINE: int
+    LINES: int
     WIDTH: int
     STATES: int
     DRIVES: int
     CHANNELS: int
-    BEFORE: int
-    AFTER: int
-    SAMPLE: int
+    LAST: int
+    COUNT: int
     PRODUCT: int
     SEEN: int
-    prepare_at: Callable[[int, float], None]
-    predict_at: Callable[[int, float], None]
-    update_at: Callable[[int, float], None]
-    both_at: Callable[[int, float], None]
+    prepare_at: Step
+    predict_at: Step
+    update_at: Step
+    both_at: Step
+    complete_at: Callable[[int], bool]
     move: Callable[[int, int], None]
     transpose: Callable[[int, int, int, int, int], None]
 
@@ -86,14 +96,18 @@ def steps(
         kept = k == row * every
         for lane in range(0, line, 8 * kernel.WIDTH):
             here = slots + lane
-            take(kernel, here, drives + line * kernel.DRIVES * i + lane, measured + line * kernel.CHANNELS * i + lane)
+            after = drives + line * kernel.DRIVES * i + lane
+            before = after - line * kernel.DRIVES if i > first else here + kernel.LAST
+            sample = measured + line * kernel.CHANNELS * i + lane
+            whole = k > 0 and kernel.complete_at(sample)
             if k == 0:
-                kernel.prepare_at(here, 0.0)
-                kernel.update_at(here, 0.0)
+                kernel.prepare_at(here, 0.0, before, after, sample)
+            for j in range(0 if k == 0 else substeps - 1 if whole else substeps):
+                kernel.predict_at(here, float(j), before, after, sample)
+            if whole:
+                kernel.both_at(here, float(substeps - 1), before, after, sample)
             else:
-                for j in range(substeps - 1):
-                    kernel.predict_at(here, float(j))
-                kernel.both_at(here, float(substeps - 1))
+                kernel.update_at(here, 0.0, before, after, sample)
             if kept:
                 place = line * kernel.STATES * row + lane
                 keep(kernel, here, means + place, spreads + place)
@@ -104,17 +118,16 @@ def steps(
                 residuals[k, c], variances[k, c] = work[kernel.SEEN + 2 * c], work[kernel.SEEN + 2 * c + 1]
         if k % FLUSH == FLUSH - 1:
             flush(kernel, work, logs)
+    tally(kernel, work, end - first)
+    if end > first:
+        for lane in range(0, line, 8 * kernel.WIDTH):
+            hold(kernel, drives + line * kernel.DRIVES * (end - 1) + lane, slots + lane)
 
 
-def take(kernel: LanesKernel, here: int, drives: int, sample: int) -> None:
-    """Take a sample's drives and measurements in; the drives that were there become those before."""
-    line, before, after = kernel.LINE, here + kernel.BEFORE, here + kernel.AFTER
+def hold(kernel: LanesKernel, drives: int, here: int) -> None:
+    """Hold the last drives, with which the first sample of the next rows begins."""
     for c in range(kernel.DRIVES):
-        kernel.move(after + line * c, before + line * c)
-    for c in range(kernel.DRIVES):
-        kernel.move(drives + line * c, after + line * c)
-    for c in range(kernel.CHANNELS):
-        kernel.move(sample + line * c, here + kernel.SAMPLE + line * c)
+        kernel.move(drives + kernel.LINE * c, here + kernel.LAST + kernel.LINE * c)
 
 
 def keep(kernel: LanesKernel, here: int, mean: int, variance: int) -> None:
@@ -128,12 +141,23 @@ def keep(kernel: LanesKernel, here: int, mean: int, variance: int) -> None:
 
 def flush(kernel: LanesKernel, work: Array, logs: Array) -> None:
     """Take the logarithm of products of innovation variances that have become large."""
+    above = 0
+    for place in range(kernel.PRODUCT, kernel.PRODUCT + kernel.LANES * kernel.CHANNELS):
+        above += work[place] > LARGE
+    if above == 0:
+        return
     for lane in range(kernel.LANES):
         for c in range(kernel.CHANNELS):
             place = kernel.PRODUCT + kernel.LANES * c + lane
             if work[place] > LARGE:
                 logs[c, lane] += math.log(work[place])
                 work[place] = 1.0
+
+
+def tally(kernel: LanesKernel, work: Array, samples: int) -> None:
+    """Count samples; updates have taken those off that are missing."""
+    for place in range(kernel.COUNT, kernel.COUNT + kernel.LANES * kernel.CHANNELS):
+        work[place] += float(samples)
 
 
 def run(

@@ -14,7 +14,7 @@ from estimation.models.model import ProcessModel
 from plant.compiled.expression import ONE, ZERO, Expression, select, symbol, unary
 from plant.compiled.hoist import hoisted
 from plant.compiled.late_last import late_last
-from plant.compiled.simplify import fused, simplified
+from plant.compiled.simplify import Nodes, fused, rewritten, simplified
 from plant.compiled.source import CALLED, symbols_in
 from plant.errors import HydrostateError
 
@@ -180,3 +180,38 @@ def halves_of(rule: Rule, model: ProcessModel, channels: tuple[str, ...], *, sco
     predict, times = late_last(predict, dict.fromkeys(belief_names(model.width), 0.0))
     update, _ = late_last(update, times)
     return Halves(before | after, fused(predict), fused(update))
+
+
+def counting_missing(update: Outputs) -> Outputs:
+    """Return an update that takes missing samples off the sums ``count``; whoever runs it adds all samples up.
+
+    Where no sample is missing, the sums need not be touched.
+
+    Parameters
+    ----------
+    update : dict[str, Expression]
+        As `Halves` has it.
+    """
+    changed: Outputs = {}
+    for name, value in update.items():
+        present = unary("present", symbol(name.replace("count", "y")))
+        missing = select(present, ZERO, ONE)
+        changed[name] = symbol(name) - missing if name.startswith("count") else value
+    return changed
+
+
+def all_present(update: Outputs) -> Outputs:
+    """Return what an update computes where no sample is missing, to the same bits.
+
+    Parameters
+    ----------
+    update : dict[str, Expression]
+        As `counting_missing` gives it; rounding was settled before (`plant.compiled.simplify.fused`).
+    """
+
+    def chosen(item: Expression, new: Nodes) -> Expression | None:
+        if item.operation == "where" and item.arguments[0].operation == "present":
+            return new[id(item.arguments[1])]
+        return None
+
+    return rewritten({name: value for name, value in update.items() if not name.startswith("count")}, chosen)

@@ -96,7 +96,7 @@ def prepared(rule: Rule, lanes: Sequence[FilterProblem]) -> tuple[Layout, Native
     settings, rule = chosen_settings(first, rule.name, rule.settings), weighing(rule, first.robust)
     places = layout(rule, first.model, first.channels)
     kernel = compile_kernel(rule, first.model, first.channels, len(lanes))
-    carried, work = len(places.carried), aligned(len(kernel.SLOTS), len(lanes))
+    carried, work = len(places.carried), aligned(kernel.LINES, len(lanes))
     work[:carried] = places.start(np.array([one.mean for one in lanes]), np.array([one.covariance for one in lanes]))
     work[carried : carried + len(places.rows)] = constant_rows(lanes, settings)
     return places, kernel, work

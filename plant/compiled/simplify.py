@@ -76,7 +76,7 @@ def share_reciprocals(outputs: Mapping[str, Expression], fixed: Collection[str])
         serves = uses[id(below)] > 1 or id(below) in settled
         return new[id(above)] * (ONE / new[id(below)]) if serves else None
 
-    return _rewritten(outputs, shared)
+    return rewritten(outputs, shared)
 
 
 def share_ratios(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
@@ -119,7 +119,7 @@ def share_ratios(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
         first, second = (new[id(one)] for one in sorted(pair, key=lambda one: places[id(one)]))
         return new[id(item.arguments[0])] * (new[id(pair[1])] * (ONE / (first * second)))
 
-    return _rewritten(outputs, shared)
+    return rewritten(outputs, shared)
 
 
 def fused(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
@@ -162,10 +162,10 @@ def fused(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
         product, other = (new[id(item.arguments[i])] for i in (place, 1 - place))
         return node(kind, *product.arguments, other)
 
-    return _rewritten(outputs, joined)
+    return rewritten(outputs, joined)
 
 
-def _rewritten(
+def rewritten(
     outputs: Mapping[str, Expression], rule: Callable[[Expression, Nodes], Expression | None]
 ) -> dict[str, Expression]:
     """Put in every node's place what a rule makes of it, operands first; where it makes nothing, the same node."""

@@ -1,8 +1,12 @@
 """Writes an expression graph as straight lines of Python, for kernels."""
 
 from collections.abc import Mapping, Sequence
+from typing import TypeAlias
 
 from plant.compiled.expression import Expression, ordered
+
+Slot: TypeAlias = int | tuple[int, int]
+"""Where a number stands: so many numbers behind a step's address, or behind another address, by its place in a row."""
 
 CALLED = ("present", "sign", "sqrt", "exp", "log", "tanh", "sin", "cos", "atan", "ratios", "roots", "where", "fma")
 """Functions that lines call (`plant.compiled.native.lines`): no symbol may have their names."""
@@ -70,14 +74,14 @@ def function_source(
     return "\n    ".join([f"def {name}({takes}):", *lines, f"return {{{given}}}"])
 
 
-def operations_source(lines: Mapping[str, str], slots: Mapping[str, int], width: int) -> str:
+def operations_source(lines: Mapping[str, str], slots: Mapping[str, Slot], width: int) -> str:
     """Write lines and, as ``NAME_at``, each of them as an operation on numbers in memory.
 
     Parameters
     ----------
     lines : Mapping[str, str]
         Source of functions by their names, as `lines_source` gives it.
-    slots : Mapping[str, int]
+    slots : Mapping[str, Slot]
         Where the first of a symbol's numbers stands.
     width : int
         How many numbers of each are taken at a time.

@@ -4,10 +4,11 @@ import ast
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from plant.compiled.native.kinds import FLOAT, INT, NOTHING, Held, several
+from plant.compiled.native.kinds import BOOL, FLOAT, INT, NOTHING, Held, several
 from plant.compiled.native.lines import Lines, names_of, vector
 from plant.compiled.native.operators import convert
 from plant.compiled.native.scope import Scope
+from plant.compiled.source import Slot
 
 ROWS = 8
 """Samples of as many logs that `transpose` turns at a time."""
@@ -46,6 +47,8 @@ def operation_of(node: ast.Call, functions: Functions, constants: Mapping[str, o
             return stepping(value(slots), value(width), [lines(part) for part in parts])
         case "moving", [width]:
             return moving(value(width))
+        case "complete", [width, count, stride]:
+            return complete(value(width), value(count), value(stride))
         case "loading", [count]:
             return loading(value(count))
         case "advancing", [given, slots, part, _]:
@@ -56,12 +59,18 @@ def operation_of(node: ast.Call, functions: Functions, constants: Mapping[str, o
             return None
 
 
-def stepping(slots: Mapping[str, int], width: int, parts: Sequence[ast.FunctionDef]) -> Operation:
-    """Return ``step(address, j)``: lines one after the other, each from what stands and from those before.
+def stepping(slots: Mapping[str, Slot], width: int, parts: Sequence[ast.FunctionDef]) -> Operation:
+    """Return ``step(address, j, *others)``: lines one after the other, each from what stands and from those before.
 
-    It is a function of its own, for its lines are many and may be called from several places.
+    Numbers stand at the address, or at one of the others, see `plant.compiled.source.Slot`. It is a function of its
+    own, for its lines are many and may be called from several places.
     """
     kind = vector(width)
+
+    def pointer(scope: Scope, name: str) -> str:
+        slot = slots[name]
+        base, distance = ("at", slot) if isinstance(slot, int) else (f"other{slot[0]}", slot[1])
+        return place(scope, f"%{base}", 8 * distance)
 
     def body(scope: Scope) -> None:
         known = {"j": _spread(scope, "%j", width)}
@@ -69,22 +78,25 @@ def stepping(slots: Mapping[str, int], width: int, parts: Sequence[ast.FunctionD
         for part in parts:
             for name in names_of(part):
                 if name not in known:
-                    known[name] = scope.op(f"load {kind}, ptr {place(scope, '%at', 8 * slots[name])}, align 8")
+                    known[name] = scope.op(f"load {kind}, ptr {pointer(scope, name)}, align 8")
             found = Lines(scope, width, known).results(part)
             results |= found
             known |= found
         for name, register in results.items():
             if name in slots:
-                scope.line(f"store {kind} {register}, ptr {place(scope, '%at', 8 * slots[name])}, align 8")
+                scope.line(f"store {kind} {register}, ptr {pointer(scope, name)}, align 8")
         scope.line("ret void")
 
     made: list[str] = []
 
     def operation(scope: Scope, given: Sequence[Held]) -> Held:
+        others = [convert(scope, one, INT).parts[0] for one in given[2:]]
         if not made:
-            made.append(scope.program.separate("step", "i64 %at, double %j", body))
+            formal = ["i64 %at", "double %j", *(f"i64 %other{k}" for k in range(len(others)))]
+            made.append(scope.program.separate("step", ", ".join(formal), body))
         address, j = convert(scope, given[0], INT).parts[0], convert(scope, given[1], FLOAT).parts[0]
-        scope.line(f"call void @{made[0]}(i64 {address}, double {j})")
+        passed = [f"i64 {address}", f"double {j}", *(f"i64 {one}" for one in others)]
+        scope.line(f"call void @{made[0]}({', '.join(passed)})")
         return NONE
 
     return operation
@@ -107,6 +119,25 @@ def moving(width: int) -> Operation:
         source, target = (place(scope, one.parts[0], 0) for one in given)
         scope.line(f"store {kind} {scope.op(f'load {kind}, ptr {source}, align 8')}, ptr {target}, align 8")
         return NONE
+
+    return operation
+
+
+def complete(width: int, count: int, stride: int) -> Operation:
+    """Return ``complete(address)``: whether so many vectors, a stride in bytes apart, hold no NaN."""
+    kind, truths = vector(width), "i1" if width == 1 else f"<{width} x i1>"
+
+    def operation(scope: Scope, given: Sequence[Held]) -> Held:
+        address = given[0].parts[0]
+        found = [scope.op(f"load {kind}, ptr {place(scope, address, stride * k)}, align 8") for k in range(count)]
+        every = ""
+        for a, b in zip(found[::2], [*found[1::2], found[-1]], strict=False):  # an ordered pair has no NaN
+            ordered = scope.op(f"fcmp ord {kind} {a}, {b}")
+            every = scope.op(f"and {truths} {every}, {ordered}") if every else ordered
+        if width == 1:
+            return Held(BOOL, (every,))
+        bits = scope.op(f"bitcast {truths} {every} to i{width}")
+        return Held(BOOL, (scope.op(f"icmp eq i{width} {bits}, -1"),))
 
     return operation
 

@@ -5,7 +5,7 @@ import pytest
 
 from estimation.engine.kalman import scaled_step
 from estimation.engine.kernels import LANES, compile_kernel, kernel_source
-from estimation.engine.layout import halves_of
+from estimation.engine.layout import all_present, counting_missing, halves_of
 from estimation.filters.ekf import EKF, ekf, ekf_predict, ekf_update
 from estimation.filters.run import run_filter
 from estimation.models.eha_forms import ACCELERATION_FORM, FORMS, PRESSURE_FORM
@@ -44,6 +44,14 @@ def test_a_rule_is_the_same_straight_lines_for_one_filter_and_for_many() -> None
     lines = one.split("def prepare(")[1].split("SLOTS = ")[0]
     assert lines == many.split("def prepare(")[1].split("SLOTS = ")[0]
     assert not {"for", "if", "while"} & set(lines.split())
+
+
+def test_an_update_by_all_channels_asks_of_none_whether_it_is_there() -> None:
+    update = counting_missing(halves_of(EKF, ACCELERATION_FORM, CHANNELS).update)
+    whole = all_present(update)
+    assert update.keys() - whole.keys() == {"count0", "count1"}
+    assert "present" in {item.operation for item in ordered(update.values())}
+    assert "present" not in {item.operation for item in ordered(whole.values())}
 
 
 def test_the_same_model_and_channels_are_compiled_once() -> None:

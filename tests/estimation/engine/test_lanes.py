@@ -1,6 +1,7 @@
 """The loop of filters side by side is Python: run as it is written, it gives what its kernel gives, to the last bit."""
 
 import ctypes
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -34,9 +35,11 @@ def test_one_filter(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, kept:
     def in_python(*what: Any) -> SimpleNamespace:
         file = functions_of(text_of(monkeypatch, kernels, lambda: compile_kernel.__wrapped__(*what)))
         halves = {"prepare_at": [file.prepare], "predict_at": [file.predict], "update_at": [file.update]}
-        halves["both_at"] = [file.predict, file.update]
+        halves["both_at"] = [file.predict, file.whole]
         plain = SimpleNamespace(**{**vars(file), **{name: on_memory(file, *lines) for name, lines in halves.items()}})
         plain.move = lambda source, target: ctypes.memmove(target, source, 8)
+        sample = ctypes.c_double * len(names)
+        plain.complete_at = lambda address: not any(math.isnan(one) for one in sample.from_address(address))
         plain.steps = lambda *arguments: lanes.steps(plain, *arguments)
         return plain
 
@@ -78,6 +81,13 @@ def test_every_sample_of_separate_logs_is_filtered_once(samples: int, monkeypatc
     lanes.run(kernel, np.zeros(1), nothing, nothing, np.zeros(1), samples, 1, 1, nothing)
     assert filtered == list(range(samples))
     assert max(laid) + lanes.ROWS == samples
+
+
+def test_no_sample_leaves_what_is_carried_as_it_is() -> None:
+    kernel: Any = SimpleNamespace(LINE=8, WIDTH=1, DRIVES=1, LANES=1, CHANNELS=1, COUNT=2)
+    work, nothing = np.arange(4.0), np.empty((0, 1))
+    lanes.steps(kernel, work, 0, 0, 0, 0, 0, 1, 1, (nothing, nothing, nothing, nothing, nothing))
+    assert work.tolist() == [0.0, 1.0, 2.0, 3.0]
 
 
 def test_a_product_of_variances_goes_into_its_own_lane_and_channel_once_it_is_large() -> None:

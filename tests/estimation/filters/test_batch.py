@@ -87,6 +87,18 @@ def test_every_rule_does_so_on_every_form(form: str, rule: Rule, robust: str) ->
     assert_batch_is_alone(rule, problems(FORMS[form], 33, robust=robust))
 
 
+@pytest.mark.parametrize("substeps", [2, 5])
+def test_steps_between_samples_give_the_same_bits_alone_and_in_a_batch(linear: ProcessModel, substeps: int) -> None:
+    assert_batch_is_alone(EKF, [replace(one, substeps=substeps) for one in problems(linear, 40)])
+
+
+def test_samples_are_counted_but_for_missing_ones(linear: ProcessModel) -> None:
+    tasks = problems(linear, 40)
+    tasks[3] = replace(tasks[3], measured=np.nan_to_num(tasks[3].measured, nan=1e-3))
+    for task, trace in zip(tasks, filter_batch(tasks), strict=True):
+        assert trace.count.tolist() == np.sum(np.isfinite(task.measured), axis=0).tolist()
+
+
 def test_threads_change_no_bit_and_no_order(linear: ProcessModel) -> None:
     assert_batch_is_alone(SVSF, problems(linear, 100), workers=2)
 

@@ -52,6 +52,13 @@ def test_a_fused_product_is_rounded_once_and_what_is_no_number_is_seen(width: in
     assert found["c"] == [1.0 if x else 2.0 for x, _ in pairs]
 
 
+@pytest.mark.parametrize("width", [1, 2, 8])
+def test_the_sign_of_no_number_and_of_either_zero_is_zero(width: int) -> None:
+    numbers = np.array([np.nan, -0.0, 0.0, np.inf, -np.inf, 5e-324, -5e-324, -2.0])
+    found = stepped("def lines(x):\n    return {'a': 1.0 / sign(x)}", "lines", {"x": numbers}, "a", width)
+    assert found["a"].tolist() == [np.inf, np.inf, np.inf, 1.0, -1.0, 1.0, -1.0, -1.0]  # a zero of its own is positive
+
+
 def both(x: float, y: float, *, of_both: Callable[[tuple[float, float]], tuple[float, ...]]) -> tuple[float, ...]:
     return of_both((x, y))
 
@@ -90,6 +97,42 @@ def test_what_has_no_place_is_not_stored(width: int) -> None:
     found = stepped("def lines(x):\n    return {'a': x + 1.0, 'other': 2.0 * x}", "lines", {"x": X}, "a", width)
     assert found.keys() == {"a"}
     assert found["a"].tolist() == (X + 1.0).tolist()
+
+
+def sums(values: Any, others: Any, found: Any) -> None:
+    add(values.ctypes.data, 0.0, others.ctypes.data, found.ctypes.data)  # type: ignore[name-defined]  # noqa: F821
+
+
+@pytest.mark.parametrize("width", [1, 2, 8])
+def test_numbers_stand_at_other_addresses_too(width: int) -> None:
+    slots = {"a": 8, "b": (0, 16), "c": (1, 8)}
+    step = f"SLOTS = {slots}\n\nadd = stepping(SLOTS, {width}, lines)"
+    lines = "def lines(a, b):\n    return {'c': a - b}"
+    takes = {"sums": signature("values, others, found : ndarray, shape (24,)")}
+    kernel = load_native("sums", kernel_text("sums", lines, step, pasted(sums)), takes)
+    values, others, found = np.arange(24.0), np.arange(24.0) ** 2, np.zeros(24)
+    kernel.sums(values, others, found)
+    wanted = np.zeros(24)
+    wanted[8 : 8 + width] = values[8 : 8 + width] - others[16 : 16 + width]
+    assert found.tolist() == wanted.tolist()
+
+
+def whole(values: Any) -> bool:
+    return there(values.ctypes.data)  # type: ignore[name-defined, no-any-return]  # noqa: F821
+
+
+@pytest.mark.parametrize("width", [1, 2, 8])
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_one_number_that_is_missing_is_noticed_wherever_it_stands(width: int, count: int) -> None:
+    text = kernel_text("whole", f"there = complete({width}, {count}, 80)", pasted(whole))
+    kernel = load_native("whole", text, {"whole": signature("values : ndarray, shape (30,)")})
+    values = np.full(30, np.inf)
+    assert kernel.whole(values)
+    for place in range(30):
+        one = values.copy()
+        one[place] = np.nan
+        vector, number = divmod(place, 10)
+        assert kernel.whole(one) == (number >= width or vector >= count)
 
 
 def turned(places: Any, offset: int, rows: Any) -> None:
