@@ -30,7 +30,7 @@ from benchmarks.peers.acceleration_form import coefficients
 from benchmarks.targets import Check, printed
 from estimation.engine.contract import FilterProblem
 from estimation.engine.kernels import LANES, compile_kernel
-from estimation.engine.layout import all_present, counting_missing, halves_of, layout
+from estimation.engine.layout import all_present, at_sample, counting_missing, halves_of, layout
 from estimation.engine.runner import aligned, constant_row
 from estimation.filters.batch import filter_batch
 from estimation.filters.ekf import EKF, ekf
@@ -261,7 +261,7 @@ def operations() -> int:
     halves = halves_of(EKF, ACCELERATION_FORM, CHANNELS)
     update = all_present(counting_missing(halves.update))
     kept = layout(EKF, ACCELERATION_FORM, CHANNELS).carried
-    outputs = [*halves.predict.values(), *(value for name, value in update.items() if name in kept)]
+    outputs = [*at_sample(halves.predict).values(), *(value for name, value in update.items() if name in kept)]
     return sum(item.operation in FUSED or item.operation in "+-*/" for item in ordered(outputs))
 
 

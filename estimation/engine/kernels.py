@@ -9,7 +9,7 @@ from functools import cache
 
 from estimation.engine import lanes as lanes_loop
 from estimation.engine.lanes import flush, hold, keep, lay_side_by_side, run, steps, tally
-from estimation.engine.layout import Halves, all_present, counting_missing, halves_of, layout
+from estimation.engine.layout import Halves, all_present, at_sample, counting_missing, halves_of, layout
 from estimation.engine.rule import Rule
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import ordered
@@ -57,11 +57,12 @@ def kernel_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...], la
     sizes |= {x.upper(): lanes * names.index(f"{x}0") for x in ("count", "product")} | {"SEEN": len(names) - len(seen)}
     settings = {"FLUSH": lanes_loop.FLUSH, "LARGE": lanes_loop.LARGE, "AHEAD": lanes_loop.AHEAD, "ROWS": ROWS}
     update = counting_missing(halves.update)
-    written = {"prepare": halves.constants, "predict": halves.predict, "update": update, "whole": all_present(update)}
+    written = {"prepare": halves.constants, "predict": halves.predict, "update": update}
+    written |= {"onward": at_sample(halves.predict), "whole": all_present(update)}
     lines = {name: lines_source(name, outputs) for name, outputs in written.items()}
     parts = (
         operations_source(lines, slots, width),
-        f"both_at = stepping(SLOTS, {width}, predict, whole)\nmove = moving({width})\n"
+        f"both_at = stepping(SLOTS, {width}, onward, whole)\nmove = moving({width})\n"
         f"complete_at = complete({width}, {m}, {line})",
         pasted(hold, keep, flush, tally, constants={**sizes, **settings}, inlined=True),
         pasted(steps),

@@ -45,8 +45,8 @@ class LanesKernel(Protocol):
         variances [numbers].
     prepare_at, predict_at, update_at, both_at : callable
         ``predict_at(address, j, before, after, sample)``: take filters, from their first symbol on, through sub-step j
-        between the drives at two addresses; likewise the others. ``both_at`` predicts and updates by a sample of which
-        no filter misses a channel; ``update_at`` takes missing ones off the counts.
+        between the drives at two addresses; likewise the others. ``both_at`` takes the only step between two samples,
+        and the second one, of which no filter misses a channel; ``update_at`` takes missing ones off the counts.
     complete_at : callable
         ``complete_at(sample)``: whether no filter misses a channel.
     move : callable
@@ -99,13 +99,13 @@ def steps(
             after = drives + line * kernel.DRIVES * i + lane
             before = after - line * kernel.DRIVES if i > first else here + kernel.LAST
             sample = measured + line * kernel.CHANNELS * i + lane
-            whole = k > 0 and kernel.complete_at(sample)
+            whole = k > 0 and substeps == 1 and kernel.complete_at(sample)
             if k == 0:
                 kernel.prepare_at(here, 0.0, before, after, sample)
-            for j in range(0 if k == 0 else substeps - 1 if whole else substeps):
+            for j in range(0 if k == 0 or whole else substeps):
                 kernel.predict_at(here, float(j), before, after, sample)
             if whole:
-                kernel.both_at(here, float(substeps - 1), before, after, sample)
+                kernel.both_at(here, 0.0, before, after, sample)
             else:
                 kernel.update_at(here, 0.0, before, after, sample)
             if kept:

@@ -215,3 +215,27 @@ def all_present(update: Outputs) -> Outputs:
         return None
 
     return rewritten({name: value for name, value in update.items() if not name.startswith("count")}, chosen)
+
+
+def at_sample(predict: Outputs) -> Outputs:
+    """Return what a step of the model computes that begins at a sample, where sub-step ``j`` is 0; drives are finite.
+
+    Parameters
+    ----------
+    predict : dict[str, Expression]
+        As `Halves` has it.
+    """
+
+    def begun(item: Expression, new: Nodes) -> Expression | None:
+        given = [new[id(argument)] for argument in item.arguments]
+        match item.operation, given:
+            case "symbol", _ if item.value == "j":
+                return ZERO
+            case "*", [a, b] if a is ZERO or b is ZERO:
+                return ZERO
+            case "fma", [a, b, c] if a is ZERO or b is ZERO:
+                return c
+            case _:
+                return None
+
+    return rewritten(predict, begun)

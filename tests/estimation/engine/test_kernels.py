@@ -5,15 +5,19 @@ import pytest
 
 from estimation.engine.kalman import scaled_step
 from estimation.engine.kernels import LANES, compile_kernel, kernel_source
-from estimation.engine.layout import all_present, counting_missing, halves_of
+from estimation.engine.layout import all_present, at_sample, counting_missing, halves_of
+from estimation.engine.rule import Rule
 from estimation.filters.ekf import EKF, ekf, ekf_predict, ekf_update
 from estimation.filters.run import run_filter
+from estimation.filters.ukf import UKF
 from estimation.models.eha_forms import ACCELERATION_FORM, FORMS, PRESSURE_FORM
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
 from plant.compiled.expression import ONE, ZERO, ordered
+from plant.compiled.source import symbols_in
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
+from tests.kernels import computed
 
 CHANNELS = ("position_m", "velocity_m_s")
 
@@ -52,6 +56,18 @@ def test_an_update_by_all_channels_asks_of_none_whether_it_is_there() -> None:
     assert update.keys() - whole.keys() == {"count0", "count1"}
     assert "present" in {item.operation for item in ordered(update.values())}
     assert "present" not in {item.operation for item in ordered(whole.values())}
+
+
+@pytest.mark.parametrize("rule", [EKF, UKF], ids=lambda rule: rule.name)
+@pytest.mark.parametrize("model", FORMS.values(), ids=FORMS)
+def test_a_step_that_begins_at_a_sample_is_the_first_sub_step(model: ProcessModel, rule: Rule) -> None:
+    predict, rng = halves_of(rule, model, CHANNELS).predict, np.random.default_rng(3)
+    begins = at_sample(predict)
+    assert "j" in symbols_in(list(predict.values()))
+    assert "j" not in symbols_in(list(begins.values()))
+    values = {name: rng.uniform(0.5, 2.0) for name in symbols_in(list(predict.values()))}
+    values |= {name: 0.1 for name in values if name[0] == "P" and name[1] != name[3]}  # a covariance has a root
+    assert computed(begins, **values) == computed(predict, **{**values, "j": 0.0})
 
 
 def test_the_same_model_and_channels_are_compiled_once() -> None:

@@ -35,7 +35,7 @@ def test_one_filter(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, kept:
     def in_python(*what: Any) -> SimpleNamespace:
         file = functions_of(text_of(monkeypatch, kernels, lambda: compile_kernel.__wrapped__(*what)))
         halves = {"prepare_at": [file.prepare], "predict_at": [file.predict], "update_at": [file.update]}
-        halves["both_at"] = [file.predict, file.whole]
+        halves["both_at"] = [file.onward, file.whole]
         plain = SimpleNamespace(**{**vars(file), **{name: on_memory(file, *lines) for name, lines in halves.items()}})
         plain.move = lambda source, target: ctypes.memmove(target, source, 8)
         sample = ctypes.c_double * len(names)
