@@ -22,7 +22,7 @@ from plant.kept import read_kept, write_kept
 from plant.log.record import Record
 from plant.solvers.steps import parameter_row
 
-FORMAT = "hydrostate filter 1"
+FORMAT = "hydrostate filter 2"
 PRESSURE, CHAMBERS = "differential_pressure_pa", ("pressure_a_pa", "pressure_b_pa")
 
 SAME_RATE = 0.01
