@@ -28,7 +28,8 @@ from faults.diagnosis.class_fit import (
     nominal_runs,
     scales_of,
 )
-from faults.diagnosis.model_doubt import between_fits, doubt_of, seldom_known_slopes
+from faults.diagnosis.model_doubt import doubt_of, seldom_known_slopes
+from faults.diagnosis.rivals import behind, between_fits, creeps, explains, other_friction
 from plant.arrays import Array
 
 ROUGHLY_GAINED = 10.0
@@ -40,10 +41,6 @@ YIELDING = 5.0
 STRUCTURAL = 100.0
 """By how much a residual that no sensor makes widens what is believed [dimensionless], in variance: it lasts, and it is
 not what the derivatives say that it is."""
-
-NOISE_ALONE = 1.1
-"""Residuals over the sensors' noise, root mean square, up to which nothing else is left [dimensionless]: the noise is
-known to a twentieth. Searches from other conditions end at the same circuit then, or at one that explains much less."""
 
 AVERAGED = 10
 """Blocks over which residuals are averaged to see what lasts of them [dimensionless]: a tenth of a second."""
@@ -137,13 +134,17 @@ def fit_classes(
             fits.append(fit_freely(blocks, actuator, name, start, gained))
         elif about(blocks, actuator, name, fits[-1]).cost < fits[-1].cost:  # the same circuit is nearer to this one
             fits.append(fit_freely(blocks, actuator, name, fits[-1], gained))
-    stuck = is_stuck(blocks, actuator)
+    stuck, first = is_stuck(blocks, actuator), min(fits, key=lambda fit: fit.cost)
+    if start is None and blocks.pressure is not None and not stuck and creeps(blocks, first):
+        nearest = int(np.argmax(region_scores(first, believed_information(first, blocks), actuator)))
+        fits += other_friction(blocks, actuator, first, list(CONDITIONS)[nearest])
     known = [believed_information(fit, blocks, stuck=stuck) for fit in fits]
+    least = int(np.argmin([fit.cost for fit in fits]))
     scores = [
-        region_scores(fit, information, actuator) - misfit(blocks, fit.fitted) / LASTING
-        for fit, information in zip(fits, known, strict=True)
+        region_scores(fit, information, actuator) - worse
+        for fit, information, worse in zip(fits, known, behind(fits, fits[least], blocks), strict=True)
     ]
-    least, held = int(np.argmin([fit.cost for fit in fits])), np.max(scores, axis=0)
+    held = np.max(scores, axis=0) - misfit(blocks, fits[least].fitted) / LASTING
     centre = actuator.conditions[np.argmax(held)]
     best = fits[least] if blocks.pressure is not None else _scaled(fits[least], centre)
     # without pressure no balance of flows looks for another pump or other faults, so regions alone have to
@@ -155,24 +156,6 @@ def fit_classes(
         spread = doubt_of(best, seldom, blocks, actuator.conditions, held, seen) + between_fits(fits, best, blocks)
     errors = np.array([scales_of(blocks, run) for run in runs])
     return ClassFits(best, known[least], nominal, errors, held, spread, lasting)
-
-
-def explains(blocks: Blocks, fit: PointFit) -> bool:
-    """Return whether a circuit leaves the sensors' noise alone of a log.
-
-    Parameters
-    ----------
-    blocks : Blocks
-        The log.
-    fit : PointFit
-        The circuit fitted to it.
-
-    Returns
-    -------
-    bool
-        Whether no output's residuals are more than `NOISE_ALONE` times the noise.
-    """
-    return bool(np.all(fit.scales <= NOISE_ALONE * least_scales(blocks)))
 
 
 def _scaled(fit: PointFit, centre: Array) -> PointFit:

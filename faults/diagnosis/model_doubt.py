@@ -8,14 +8,14 @@ Statistical Orbit Determination, 2004, chapter 6). What is left of a log that no
 which a longer log does not average away; that is counted here, and once.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
 
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COLUMN, parameter_rows, predicted
-from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, misfit
+from faults.diagnosis.class_fit import WEAK, Actuator, PointFit
 from plant.arrays import Array
 
 SELDOM_KNOWN: Mapping[str, float] = MappingProxyType(
@@ -107,26 +107,3 @@ def doubt_of(fit: PointFit, seldom: Array, blocks: Blocks, centres: Array, odds:
     steps = (covariance @ (pulled + (centres - fit.coordinates) @ prior[:known]).T)[:known]
     shares = np.exp(odds - np.max(odds))
     return np.asarray(covariance[:known, :known] + (steps * shares / np.sum(shares)) @ steps.T, dtype=np.float64)
-
-
-def between_fits(fits: Sequence[PointFit], best: PointFit, blocks: Blocks) -> Array:
-    """Return what other ends of a search, which explain the log nearly as well, add to the doubt of the best.
-
-    Parameters
-    ----------
-    fits : sequence of PointFit
-        The ends of the search.
-    best : PointFit
-        The one that is told.
-    blocks : Blocks
-        The log.
-
-    Returns
-    -------
-    ndarray, shape (7, 7)
-        Second moment about the best [dimensionless]; none where the others explain much less.
-    """
-    worse = np.array([misfit(blocks, fit.fitted) - misfit(blocks, best.fitted) for fit in fits]) / LASTING
-    shares = np.exp(np.min(worse) - worse)
-    off = np.array([fit.coordinates - best.coordinates for fit in fits])
-    return np.asarray((off.T * shares / np.sum(shares)) @ off, dtype=np.float64)

@@ -131,6 +131,31 @@ def test_of_two_circuits_that_were_fitted_the_one_that_follows_the_log_decides(m
     assert int(np.argmin(found.nominal)) == 4
 
 
+def test_a_creeping_piston_is_tried_with_each_friction_and_named_by_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    log = blocks(pressure=True)
+    names, tried = list(CONDITIONS), list[tuple[str, bool]]()
+    runs = np.array([log.outputs * (1.0 if place == 0 else 50.0) for place in range(len(names))])
+
+    def fitted_from(_: Blocks, __: Actuator, condition: str, start: object = None, ___: float = 0.0) -> PointFit:
+        tried.append((condition, start is not None))
+        left = np.array([10.0 if condition == "normal" else 9.5, 1.0]) * log.noise
+        return replace(fit(names.index(condition), 1e-3), fitted=log.outputs - left, scales=left, cost=float(left[0]))
+
+    monkeypatch.setattr(class_regions, "nominal_runs", lambda *_: runs)
+    monkeypatch.setattr(class_regions, "fit_freely", fitted_from)
+    monkeypatch.setattr("faults.diagnosis.rivals.fit_freely", fitted_from)
+    found = fit_classes(log, ACTUATOR)
+    assert tried == [("normal", False), ("minor_friction", True), ("major_friction", True)]
+    alike = [names.index(name) for name in ("normal", "minor_friction", "major_friction")]
+    assert np.ptp(found.scores[alike]) < 0.5
+    assert np.max(np.delete(found.scores, alike)) < np.min(found.scores[alike]) - 3.0
+    rated = COORDINATES.index("friction_rated")
+    assert found.spread[rated, rated] > 0.5
+    tried.clear()
+    fit_classes(log, ACTUATOR, start=ACTUATOR.conditions[0])
+    assert tried == [("normal", True)]
+
+
 def test_what_lasts_over_a_tenth_of_a_second_counts_as_often_as_white_noise_would_shrink() -> None:
     log = blocks(pressure=True)
     least = np.maximum(log.noise, 1e-3 * np.abs(log.outputs[0]))

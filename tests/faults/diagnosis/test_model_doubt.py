@@ -7,8 +7,8 @@ import pytest
 
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
-from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, misfit
-from faults.diagnosis.model_doubt import LOOKS, SELDOM_KNOWN, between_fits, doubt_of, seldom_known_slopes
+from faults.diagnosis.class_fit import WEAK, Actuator, PointFit
+from faults.diagnosis.model_doubt import LOOKS, SELDOM_KNOWN, doubt_of, seldom_known_slopes
 from plant.eha.model import EhaParameters
 
 ACTUATOR = Actuator.of(EhaParameters())
@@ -122,15 +122,3 @@ def test_slopes_are_those_of_the_circuit_that_was_fitted() -> None:
         (moved,) = predicted(one, parameter_rows(CENTRE, other, ACTUATOR.rated)) - run
         told_of = 0.05 * slopes[list(SELDOM_KNOWN).index(name)] * (-1.0 if by is None else 1.0)
         assert np.all(np.std(told_of - moved, axis=0) < 0.05 * np.std(moved, axis=0)), name
-
-
-def test_ends_of_a_search_that_explain_alike_widen_and_worse_ones_do_not() -> None:
-    fit, one = told(1_410)
-    off = np.full(7, 0.3)
-    alike = replace(fit, coordinates=fit.coordinates + off)
-    assert misfit(one, alike.fitted) == misfit(one, fit.fitted)
-    np.testing.assert_allclose(between_fits([fit, alike], fit, one), 0.5 * np.outer(off, off), rtol=1e-12)
-    worse = replace(alike, fitted=fit.fitted + 2.0 * NOISE)
-    assert misfit(one, worse.fitted) > misfit(one, fit.fitted) + 10.0 * LASTING
-    assert np.all(between_fits([worse, fit], fit, one) < 1e-4)
-    assert np.all(between_fits([fit], fit, one) == 0.0)
