@@ -16,7 +16,7 @@ from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, severity
 from faults.diagnosis.blocks import Blocks, blocks_of
 from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
-from faults.diagnosis.class_fit import LASTING, STEP, WEAK, Actuator, PointFit, fit_freely
+from faults.diagnosis.class_fit import LASTING, SEALS, STEP, WEAK, Actuator, PointFit, fit_freely
 from faults.diagnosis.class_regions import ClassFits, region_scores
 from faults.notes import AgainstCode
 from plant.eha.circuit_parameters import CircuitParameters
@@ -37,6 +37,9 @@ YIELDING = 0.015
 """Share of the velocity at which the pump's whole flow would move the piston, root mean square, that may be left in any
 case where pressure is followed [dimensionless]: a piston that hardly moves yields on its seals, which no circuit
 describes to the last digit."""
+
+STICKS = math.exp(SEALS)
+"""How far seals may yield, over the rig's presliding displacement [dimensionless]: a standard deviation more, 54 um."""
 
 FARTHEST_OUT = 7.0
 """Least log-likelihood of the nearest condition's region, below its centre's [dimensionless]."""
@@ -91,7 +94,8 @@ def reasons_against(blocks: Blocks, fits: ClassFits, region: float, actuator: Ac
     list[Note]
         None for a log that fits.
     """
-    return [*unexplained(blocks, fits, actuator), *_biases(blocks, fits, actuator), *_outside(fits, region, actuator)]
+    left = [] if sticks_and_slips(blocks, fits.best, actuator) else unexplained(blocks, fits, actuator)
+    return [*left, *_biases(blocks, fits, actuator), *_outside(fits, region, actuator)]
 
 
 def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
@@ -150,6 +154,33 @@ def unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Not
         for name, share, limit, loud in zip(names, shares, UNEXPLAINED, heard, strict=False)
         if share > limit and loud
     ]
+
+
+def sticks_and_slips(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
+    """Return whether what a circuit leaves of the velocity is when a piston yields and jumps, and not how far.
+
+    Minor friction falls with speed, so that a piston pushed slowly sticks and slips: some twenty jumps a second, each
+    of a tenth of a millimetre. When one begins rests on seals that no circuit describes to the last digit, and the next
+    follows from it; how far the piston goes follows from pressure and flow. So where pressure is followed, and motion
+    over `EARLIER` to what seals may yield, jumps that come at other times speak against no condition.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks.
+    fit : PointFit
+        The circuit that explains it best.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    bool
+        Whether it is so; never without pressure, of which nothing then tells that the piston sticks.
+    """
+    if blocks.pressure is None or fit.scales[1] > max(UNEXPLAINED[1] * blocks.sizes[1], 2.0 * blocks.noise[1]):
+        return False
+    return EARLIER * _left_longer(blocks, fit) <= STICKS * actuator.circuit.presliding_displacement
 
 
 def _left_longer(blocks: Blocks, fit: PointFit) -> float:

@@ -13,8 +13,10 @@ from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of, parameter
 from faults.diagnosis.class_fit import Actuator, PointFit, scales_of
 from faults.diagnosis.class_regions import ClassFits, fit_classes, region_scores
 from faults.diagnosis.out_of_model import (
+    EARLIER,
     LEAST_BIAS,
     SOFT,
+    STICKS,
     UNEXPLAINED,
     YIELDING,
     reasons_against,
@@ -170,6 +172,31 @@ def test_a_piston_may_break_loose_some_blocks_sooner_if_it_goes_as_far_and_press
     assert slipping(2, pressure=False)
     assert slipping(2, far=1.5)
     assert slipping(20)
+
+
+def jumping(jump: float, *, pressure_left: float = 0.0, drift: float = 0.0, pressure: bool = True) -> bool:
+    """Return whether velocity accuses a circuit whose piston creeps where the log's jumps so far [m] every 40 ms."""
+    log, whole = healthy(), fitted(healthy(), ACTUATOR.conditions[0])
+    velocity = jump / 0.01 * (np.arange(len(log.velocity)) % 4 == 1)
+    seen = replace(log, velocity=velocity, pressure=log.pressure if pressure else None)
+    seen = seen if pressure else replace(seen, noise=NOISE[:1])
+    run = np.nan_to_num(seen.outputs).copy()
+    run[:, 0] = jump / 0.04 + drift
+    run[:, 1:] *= 1.0 + pressure_left
+    slopes = whole.best.slopes[..., : len(seen.noise)]
+    best = replace(whole.best, fitted=run, slopes=slopes, scales=scales_of(seen, run))
+    found = reasons_against(seen, replace(whole, best=best), 0.0, ACTUATOR)
+    return any(note.code is AgainstCode.UNEXPLAINED and note.data["channel"] == "velocity" for note in found)
+
+
+def test_a_piston_may_stick_and_slip_at_other_times_if_it_goes_as_far_and_pressure_is_followed() -> None:
+    yielded = STICKS * ACTUATOR.circuit.presliding_displacement
+    assert yielded == pytest.approx(54e-6, rel=0.01)
+    assert not jumping(1e-4)
+    assert jumping(3e-4)
+    assert jumping(1e-4, pressure_left=1.2 * UNEXPLAINED[1])
+    assert jumping(1e-4, drift=1.1 * yielded / EARLIER)
+    assert jumping(1e-4, pressure=False)
 
 
 def test_without_pressure_a_misfit_of_velocity_counts_however_small_and_so_does_one_that_lasts() -> None:
