@@ -57,9 +57,11 @@ class ClassCode(Code):
     NO_CIRCUIT = "no circuit can be fitted with this rig file, so there are scores but no probabilities: {reason}"
     NO_PROBABILITIES = "no probabilities: {reason}"
     LOAD_ON_ROD = (
-        "a constant load of {force_n:.3g} N holds the rod back, or differential_pressure_pa reads {pressure_pa:.3g} Pa "
-        "too much: the force balance cannot separate the two"
+        "a constant load of {force_n:.0f} N ({low:.0f} to {high:.0f}) holds the rod back, or differential_pressure_pa "
+        "reads {pressure_pa:.3g} Pa too much: the force balance cannot separate the two"
     )
+    SPRING_ON_ROD = "a spring of {value:.0f} N/m ({low:.0f} to {high:.0f}) on the rod; the rig file says {rig:.0f} N/m"
+    MASS_ON_ROD = "an inertia on the rod: {value:.3g} kg ({low:.3g} to {high:.3g}) move; the rig file says {rig:.3g} kg"
     END_STOP = "the piston ran into a stop {reach_mm:.0f} mm from where the log begins; the fit includes the stop"
     HEALTHY_OF_THE_PAPER = (
         "the rig file has a pump or piston of its own but the leakage and friction of the paper's actuator: the class "

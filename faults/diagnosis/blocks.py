@@ -63,6 +63,10 @@ class Blocks:
         How far from where the log begins the piston ran into a stop [m]; None where only the rig knows of stops.
     begun : tuple of float, or None
         Differential pressure [Pa] and velocity [m/s] with which the log begins; None at rest, and where it is not told.
+    opening : tuple of float, or None
+        The same, even if it is no more than noise: under a load a piston that begins without pressure is not at rest.
+    place : float
+        Position that the log begins with [m]; 0 where none is logged.
     """
 
     speed: Array
@@ -75,6 +79,8 @@ class Blocks:
     course: Array | None = None
     stop: float | None = None
     begun: tuple[float, float] | None = None
+    opening: tuple[float, float] | None = None
+    place: float = 0.0
 
     @cached_property
     def outputs(self) -> Array:
@@ -174,20 +180,41 @@ def blocks_of(record: Record) -> Blocks:
             pressure = None  # a sensor that was out for all of the stretch
             del whole[PRESSURE]
     speed = bridged(whole["motor_speed_rad_s"])
-    noise, course, begun = _noise(whole, block, sample_time), whole.get(LEAKAGE_COURSE), _begun(whole, velocity)
+    noise, course, opening = _noise(whole, block, sample_time), whole.get(LEAKAGE_COURSE), _opening(whole, velocity)
+    begun = opening if opening is not None and _pressed(opening[0], whole[PRESSURE]) else None
     if pressure is not None and rows > 1:
         # a block holds fewer samples, and the lines between them have no noise of their own
         noise[-1] = (measurement_variances(record, [PRESSURE])[PRESSURE] * rows / (block * pooled)) ** 0.5
-    return Blocks(speed, sample_time, block, velocity, pressure, noise, course=course, begun=begun)
+    return Blocks(
+        speed,
+        sample_time,
+        block,
+        velocity,
+        pressure,
+        noise,
+        course=course,
+        begun=begun,
+        opening=opening,
+        place=_place(whole),
+    )
 
 
-def _begun(whole: Mapping[str, Array], velocity: Array) -> tuple[float, float] | None:
-    """Return pressure and velocity at the start of a log that does not begin at rest."""
-    if PRESSURE not in whole:
+def _opening(whole: Mapping[str, Array], velocity: Array) -> tuple[float, float] | None:
+    """Return pressure and velocity at the start of a log."""
+    if PRESSURE not in whole or not np.isfinite(whole[PRESSURE][0]):
         return None
-    pressure = whole[PRESSURE]
-    size = float(np.sqrt(np.nanmean(pressure**2)))
-    return (float(pressure[0]), float(np.nan_to_num(velocity[0]))) if abs(pressure[0]) > LEAST_BEGUN * size else None
+    return float(whole[PRESSURE][0]), float(np.nan_to_num(velocity[0]))
+
+
+def _pressed(first: float, pressure: Array) -> bool:
+    """Return whether a log does not begin at rest, by its first pressure [Pa]."""
+    return abs(first) > LEAST_BEGUN * float(np.sqrt(np.nanmean(pressure**2)))
+
+
+def _place(whole: Mapping[str, Array]) -> float:
+    """Return the position with which a log begins, 0 where none is logged [m]."""
+    position = whole.get("position_m")
+    return 0.0 if position is None or not np.any(np.isfinite(position)) else float(bridged(position)[0])
 
 
 def _noise(whole: Mapping[str, Array], block: int, sample_time: float) -> Array:

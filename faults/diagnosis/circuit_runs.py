@@ -127,10 +127,10 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
     ndarray, shape (m, n, outputs)
         Mean velocity [m/s] over each block, and mean pressure [Pa] where it is logged.
     """
-    rows = _between_stops(blocks, rows)[None]
+    rows = _as_logged(blocks, rows)[None]
     if blocks.earlier is not None:
         until, before = blocks.earlier
-        before = as_wide(_between_stops(blocks, before[None])[0], rows.shape[-1])
+        before = as_wide(_as_logged(blocks, before[None])[0], rows.shape[-1])
         rows = _after(until, before, rows[0], len(blocks.speed))
     if blocks.course is not None:
         rows = rows * _drift(blocks.course, rows.shape[-1])[:, None, :]
@@ -155,10 +155,13 @@ def _after(until: int | IntArray, before: Array, rows: Array, samples: int) -> A
 
 
 def _starts(blocks: Blocks, rows: Array) -> Array:
-    """Return the states in which circuits begin, shape (m, states): at rest, or as the log does."""
+    """Return the states in which circuits begin, shape (m, states): at rest, or as the log does.
+
+    Under a load rest is at the pressure that holds it: a log that begins at another is in motion, and says which.
+    """
     p = circuit_values(rows)
-    begun = None if blocks.begun is None else under_pressure(*blocks.begun, p)
-    states = at_rest(p) if begun is None else begun
+    begun = blocks.opening if blocks.begun is None and np.any(p.load_force) else blocks.begun
+    states = at_rest(p) if begun is None else under_pressure(*begun, p)
     return np.stack(np.broadcast_arrays(*states, rows[:, 0])[:-1], axis=-1, dtype=np.float64)
 
 
@@ -171,6 +174,13 @@ def _drift(course: Array, width: int) -> Array:
 
 
 _LEAKAGES = ("leakage_coefficient", "pump_crossport_leakage", "pump_case_leakage", "cylinder_drain_leakage")
+
+
+def _as_logged(blocks: Blocks, rows: Array) -> Array:
+    """Return circuits as a log has them: positions are counted from where it begins, a spring is strained there."""
+    rows = _between_stops(blocks, rows)
+    rows[:, COLUMN["load_force"]] += rows[:, COLUMN["load_stiffness"]] * blocks.place
+    return rows
 
 
 def _between_stops(blocks: Blocks, rows: Array) -> Array:

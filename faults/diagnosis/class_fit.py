@@ -73,11 +73,14 @@ class Actuator:
         Its velocity at rated speed [m/s].
     conditions : ndarray, shape (9, 7)
         Coordinates of the nine nominal circuits, in the order of `CONDITIONS`.
+    load_doubt : float
+        Standard deviation of the constant force on its rod, where a log had to tell that [N]; 0 as the rig file has it.
     """
 
     circuit: CircuitParameters
     rated: float
     conditions: Array
+    load_doubt: float = 0.0
 
     @staticmethod
     def of(rig: EhaParameters) -> "Actuator":

@@ -28,7 +28,7 @@ from faults.diagnosis.class_fit import (
     nominal_runs,
     scales_of,
 )
-from faults.diagnosis.model_doubt import doubt_of, seldom_known_slopes
+from faults.diagnosis.model_doubt import doubt_of, seldom_known_slopes, spreads_of
 from faults.diagnosis.rivals import behind, between_fits, creeps, explains, other_friction
 from plant.arrays import Array
 
@@ -153,7 +153,8 @@ def fit_classes(
         spread = spread_of(best, known[least], blocks, centre)
     else:
         seen, seldom = _NO_FRICTION if stuck else np.ones(len(COORDINATES)), seldom_known_slopes(best, blocks, actuator)
-        spread = doubt_of(best, seldom, blocks, actuator.conditions, held, seen) + between_fits(fits, best, blocks)
+        spread = doubt_of(best, seldom, blocks, actuator.conditions, held, seen, spreads_of(actuator))
+        spread = spread + between_fits(fits, best, blocks)
     errors = np.array([scales_of(blocks, run) for run in runs])
     return ClassFits(best, known[least], nominal, errors, held, spread, lasting)
 

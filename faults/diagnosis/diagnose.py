@@ -25,7 +25,7 @@ from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import region_scores
 from faults.diagnosis.evidence import Scoreboard, weigh
-from faults.diagnosis.load import first_guesses, under_load
+from faults.diagnosis.load import Loaded, under_load
 from faults.diagnosis.models_verdict import models_verdict, ranked
 from faults.diagnosis.out_of_model import SOFT, reasons_against, sensors_disagree
 from faults.diagnosis.outside import faults_outside
@@ -158,13 +158,12 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
         return replace(found, evidence=EhaEvidence(estimate, scores, None))
     doubts = (*refused(estimate), *outside, *log.objections)
     try:
-        diagnosis, loaded = _diagnosed(log, rig.parameters, estimate, plain)
+        diagnosis, loaded, named = _diagnosed(log, rig.parameters, estimate, plain)
     except (RigError, LogError) as error:
         without = _without_class(found, log, scores, distinct((*doubts, *verdict.against)))
         said = ClassCode.NO_CIRCUIT if isinstance(error, RigError) else ClassCode.NO_PROBABILITIES
         return replace(without, notes=(*found.notes, said.note(reason=error.message)))
-    if loaded.load_force != rig.parameters.load_force:
-        found = replace(found, notes=(*found.notes, _load(loaded)))
+    found = replace(found, notes=(*found.notes, *named))
     if (stop := diagnosis.scoreboard.blocks.stop) is not None:
         found = replace(found, notes=(*found.notes, ClassCode.END_STOP.note(reach_mm=1e3 * stop)))
     diagnosis = _whatever_the_pump_delivers(diagnosis, actuator_of(loaded), estimate)
@@ -208,17 +207,17 @@ def _of_clean(log: CleanLog, parameters: EhaParameters) -> Diagnosis:
     return diagnose_clean(log, actuator_of(parameters))
 
 
-def _diagnosed(
-    log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain
-) -> tuple[Diagnosis, EhaParameters]:
+def _diagnosed(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain) -> Loaded:
     """Return a diagnosis, under a load where the flow balance holds and the force balance wants one."""
 
-    def of(tried: EhaParameters) -> Diagnosis:
+    def of(tried: EhaParameters, doubt: float) -> Diagnosis:
+        if doubt > 0.0:
+            return diagnose_clean(log, replace(actuator_of(tried), load_doubt=doubt))
         return plain.of(log, tried)
 
     if estimate.form != "flow" or not estimate.gate.passed:
-        return of(parameters), parameters
-    return under_load(of, first_guesses(log.record, parameters, estimate))
+        return Loaded(of(parameters, 0.0), parameters)
+    return under_load(of, parameters, estimate)
 
 
 def _healthy_of_the_paper(p: EhaParameters) -> tuple[Note, ...]:
@@ -227,10 +226,6 @@ def _healthy_of_the_paper(p: EhaParameters) -> tuple[Note, ...]:
     another = any(abs(getattr(p, name) / getattr(of_paper, name) - 1.0) > ANOTHER for name in PUMP_AND_PISTON)
     left = all(getattr(p, name) == getattr(of_paper, name) for name in HEALTHY)
     return (ClassCode.HEALTHY_OF_THE_PAPER.note(),) if another and left else ()
-
-
-def _load(p: EhaParameters) -> Note:
-    return ClassCode.LOAD_ON_ROD.note(force_n=p.load_force, pressure_pa=p.load_force / p.piston_area)
 
 
 def _another_oil(estimate: BulkModulusEstimate, healthy: EhaParameters) -> Note | None:

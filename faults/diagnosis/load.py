@@ -1,20 +1,23 @@
 """The load on the rod, where a log shows one: what moves the force balance and leaves the flow balance alone.
 
 A constant force on the rod shifts differential pressure by as much as a sensor's offset does, yet no oil leaks for an
-offset. So where the flow form explains a log, what shifts its pressures is a load.
+offset. So where the flow form explains a log, what shifts its pressures is a load. How large it is the force balance of
+the sliding piston tells, and a circuit fitted under it has to follow the log.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
 from estimation.eha.result import BulkModulusEstimate
-from estimation.log_checks.sensor_check import PRESSURE
-from faults.notes import AgainstCode
+from faults.diagnosis.blocks import Blocks
+from faults.diagnosis.class_fit import LASTING, misfit
+from faults.diagnosis.force_balance import LEAST, SURE, Loads, force_balance, friction_believed
+from faults.notes import AgainstCode, ClassCode
 from plant.eha.model import EhaParameters
-from plant.log.record import Record
+from plant.notes import Note
 
 if TYPE_CHECKING:
     from faults.diagnosis.diagnose import Diagnosis
@@ -25,14 +28,91 @@ LOADS_TRIED = 3
 ASKING = {AgainstCode.PRESSURE_BIAS, AgainstCode.UNEXPLAINED}
 """What speaks against a circuit that stands under another load than it is told."""
 
+TWO_SIDED = 1.96
+"""Half-width of a 95 % interval [dimensionless], in standard deviations."""
 
-def first_guesses(record: Record, parameters: EhaParameters, estimate: BulkModulusEstimate) -> Iterator[EhaParameters]:
-    """Yield the actuator under the loads that a log may show.
+
+class Loaded(NamedTuple):
+    """A diagnosis under the load that explains a log.
 
     Parameters
     ----------
-    record : Record
-        The log, with differential pressure.
+    diagnosis : Diagnosis
+        What the circuit under the load says.
+    parameters : EhaParameters
+        The actuator with its load; the rig file's where no load explains the log.
+    notes : tuple of Note
+        The loads by name.
+    """
+
+    diagnosis: "Diagnosis"
+    parameters: EhaParameters
+    notes: tuple[Note, ...] = ()
+
+
+Diagnosed: TypeAlias = Callable[[EhaParameters, float], "Diagnosis"]
+"""What the circuit fitted around an actuator says of a log, where the force on its rod is known so well [N]."""
+
+
+def under_load(diagnosed: Diagnosed, parameters: EhaParameters, estimate: BulkModulusEstimate) -> Loaded:
+    """Return a diagnosis under the load that explains a log.
+
+    Parameters
+    ----------
+    diagnosed : callable
+        ``diagnosed(parameters, std)``: what the circuit fitted around an actuator says of the log, where the constant
+        force on its rod has this standard deviation [N].
+    parameters : EhaParameters
+        The actuator, as its rig file has it.
+    estimate : BulkModulusEstimate
+        What the flow form found.
+
+    Returns
+    -------
+    Loaded
+        The diagnosis, and the actuator with its load; those of the rig file where no load explains the log.
+    """
+    first = diagnosed(parameters, 0.0)
+    blocks = first.scoreboard.blocks
+    seen = force_balance(blocks, parameters)
+    if seen is not None and seen.believed:
+        shown = with_loads(parameters, seen)
+        found = _followed(diagnosed, [shown], seen, parameters)
+        if found is not None and (_asks(first) or _better(found.diagnosis, first)):
+            return found
+    elif _asks(first) and _open(seen, blocks, parameters):
+        guesses = first_guesses(blocks, parameters, estimate)
+        found = _followed(diagnosed, guesses, seen, parameters)
+        if found is not None:
+            return found
+    return Loaded(first, parameters)
+
+
+def with_loads(p: EhaParameters, seen: Loads) -> EhaParameters:
+    """Return an actuator with the loads that are believed.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator, as its rig file has it.
+    seen : Loads
+        What the force balance shows beyond that.
+
+    Returns
+    -------
+    EhaParameters
+        It, with them.
+    """
+    return replace(p, **{name: getattr(p, name) + seen.of(name)[0] for name in seen.believed})
+
+
+def first_guesses(blocks: Blocks, parameters: EhaParameters, estimate: BulkModulusEstimate) -> Iterator[EhaParameters]:
+    """Yield the actuator under the loads that a log may show of which the force balance says nothing.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log, with pressure.
     parameters : EhaParameters
         The actuator, as its rig file has it.
     estimate : BulkModulusEstimate
@@ -41,43 +121,84 @@ def first_guesses(record: Record, parameters: EhaParameters, estimate: BulkModul
     Yields
     ------
     EhaParameters
-        As the rig file says; under the load that holds the log's first pressure, if it begins under one; under the load
-        that holds its mean pressure.
+        Under the load that holds the log's first pressure, if it begins under one; under the load that holds its mean
+        pressure.
     """
     found = {} if estimate.explanation is None else estimate.explanation.values
-    yield parameters
     if parameters.load_force == 0.0 and "start_pressure" in found:
         yield replace(parameters, load_force=found["start_pressure"][0] * parameters.piston_area)
-    yield replace(parameters, load_force=float(np.nanmean(record[PRESSURE])) * parameters.piston_area)
+    if blocks.pressure is not None:
+        yield replace(parameters, load_force=float(np.nanmean(blocks.pressure)) * parameters.piston_area)
 
 
-def under_load(
-    diagnosed: Callable[[EhaParameters], "Diagnosis"], guesses: Iterator[EhaParameters]
-) -> tuple["Diagnosis", EhaParameters]:
-    """Return a diagnosis under the load that explains a log.
-
-    Parameters
-    ----------
-    diagnosed : callable
-        ``diagnosed(parameters)``: what the circuit fitted around an actuator says of the log.
-    guesses : iterator of EhaParameters
-        The actuator, with the loads that are tried first [N].
-
-    Returns
-    -------
-    tuple of Diagnosis and EhaParameters
-        The diagnosis, and the actuator with its load; those of the rig file where no load explains the log.
-    """
-    tried: list[tuple[Diagnosis, EhaParameters]] = []
+def _followed(
+    diagnosed: Diagnosed,
+    guesses: Iterator[EhaParameters] | list[EhaParameters],
+    seen: Loads | None,
+    rig: EhaParameters,
+) -> Loaded | None:
+    """Return the first load under which a circuit follows the log, each corrected by the bias that is left of it."""
+    std = _force(seen, rig)[1]
     for guess in guesses:
         loaded = guess
         for _ in range(LOADS_TRIED):
-            tried.append((diagnosed(loaded), loaded))
-            against = tried[-1][0].against
-            if not any(note.code in ASKING for note in against):
-                return tried[-1]
-            biases = [float(note.data["bias_pa"]) for note in against if note.code is AgainstCode.PRESSURE_BIAS]
+            found = diagnosed(loaded, std if loaded.load_force != rig.load_force else 0.0)
+            if not _asks(found):
+                return _told(found, loaded, seen, rig)
+            biases = [float(note.data["bias_pa"]) for note in found.against if note.code is AgainstCode.PRESSURE_BIAS]
             if not biases:
                 break
             loaded = replace(loaded, load_force=loaded.load_force + biases[0] * loaded.piston_area)
-    return tried[0]
+    return None
+
+
+def _told(found: "Diagnosis", loaded: EhaParameters, seen: Loads | None, rig: EhaParameters) -> Loaded | None:
+    """Return a diagnosis with its loads by name; None where the force balance has them otherwise."""
+    more = loaded.load_force - rig.load_force
+    force, std = _force(seen, rig)
+    if seen is not None and more != 0.0 and abs(more - force) > SURE * std:
+        return None
+    notes: list[Note] = []
+    if more != 0.0:
+        ends = _ends(loaded.load_force, std)
+        bias = loaded.load_force / loaded.piston_area
+        notes.append(ClassCode.LOAD_ON_ROD.note(force_n=loaded.load_force, pressure_pa=bias, **ends))
+    for name, code in (("load_stiffness", ClassCode.SPRING_ON_ROD), ("moving_mass", ClassCode.MASS_ON_ROD)):
+        if seen is not None and getattr(loaded, name) != getattr(rig, name):
+            value = getattr(loaded, name)
+            notes.append(code.note(value=value, rig=getattr(rig, name), **_ends(value, seen.of(name)[1])))
+    return Loaded(found, loaded, tuple(notes))
+
+
+def _ends(value: float, std: float) -> dict[str, float]:
+    return {"low": value - TWO_SIDED * std, "high": value + TWO_SIDED * std}
+
+
+def _asks(found: "Diagnosis") -> bool:
+    return any(note.code in ASKING for note in found.against)
+
+
+def _better(found: "Diagnosis", first: "Diagnosis") -> bool:
+    """Return whether a circuit under a load follows a log better than one without, and no more speaks against it."""
+    (under, loaded), (free, without) = ((one.scoreboard.blocks, one.scoreboard.fits) for one in (found, first))
+    if len(found.against) > len(first.against):
+        return False
+    if not np.array_equal(under.counts, free.counts):
+        return True
+    return misfit(under, loaded.best.fitted) < misfit(free, without.best.fitted) - LASTING
+
+
+def _open(seen: Loads | None, blocks: Blocks, p: EhaParameters) -> bool:
+    """Return whether the force balance leaves room for a constant force that matters."""
+    if seen is None or blocks.pressure is None:
+        return True
+    size = p.piston_area * float(np.sqrt(np.nanmean(blocks.pressure**2)))
+    return SURE * seen.of("load_force")[1] > LEAST["load_force"] * size
+
+
+def _force(seen: Loads | None, p: EhaParameters) -> tuple[float, float]:
+    """Return the constant force and its standard deviation [N]; friction holds a piston that sticks either way."""
+    if seen is not None:
+        return seen.of("load_force")
+    rest, spread = (one[0] for one in friction_believed(p))
+    return 0.0, float(rest + spread)

@@ -40,8 +40,27 @@ LOOKS = 5.0
 """Independent looks that a log gives at a wrong model's error, however long it is [dimensionless]."""
 
 
+def spreads_of(actuator: Actuator) -> Array:
+    """Return how far off what is seldom known may be of an actuator.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Standard deviations of `SELDOM_KNOWN`, and of the force on its rod over itself where a log had to tell that.
+    """
+    spreads = list(SELDOM_KNOWN.values())
+    if actuator.load_doubt > 0.0:
+        spreads.append(actuator.load_doubt / max(abs(actuator.circuit.load_force), actuator.load_doubt))
+    return np.array(spreads)
+
+
 def seldom_known_slopes(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
-    """Return how the outputs answer `SELDOM_KNOWN`, by one run of circuits side by side.
+    """Return how the outputs answer `SELDOM_KNOWN` and the force on the rod, by one run of circuits side by side.
 
     Parameters
     ----------
@@ -54,23 +73,34 @@ def seldom_known_slopes(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Ar
 
     Returns
     -------
-    ndarray, shape (6, n, outputs)
-        Derivatives with respect to logarithms and shares [m/s, Pa].
+    ndarray, shape (m, n, outputs)
+        Derivatives with respect to logarithms and shares, in the order of `spreads_of` [m/s, Pa].
     """
     (row,) = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
-    rows = np.tile(row, (1 + len(SELDOM_KNOWN), 1))  # circuits that run side by side share their steps' errors
-    for nudged, name in zip(rows[1:], SELDOM_KNOWN, strict=True):
+    names = [*SELDOM_KNOWN, *(["load_force"] if actuator.load_doubt > 0.0 else [])]
+    rows = np.tile(row, (1 + len(names), 1))  # circuits that run side by side share their steps' errors
+    for nudged, name in zip(rows[1:], names, strict=True):
         at = COLUMN[name]
-        if name in _SHARES:
+        if name == "load_force":
+            nudged[at] += NUDGE * max(abs(row[at]), actuator.load_doubt)
+        elif name in _SHARES:
             nudged[at] += _SHARES[name] * NUDGE * row[COLUMN["leakage_coefficient"]]
         else:
             nudged[at] *= np.exp(NUDGE)
-    steps = np.array([NUDGE * _SHARES.get(name, 1.0) for name in SELDOM_KNOWN])
+    steps = np.array([NUDGE * _SHARES.get(name, 1.0) for name in names])
     runs = predicted(blocks, rows)
     return (runs[1:] - runs[0]) / steps[:, None, None]
 
 
-def doubt_of(fit: PointFit, seldom: Array, blocks: Blocks, centres: Array, odds: Array, seen: Array) -> Array:
+def doubt_of(
+    fit: PointFit,
+    seldom: Array,
+    blocks: Blocks,
+    centres: Array,
+    odds: Array,
+    seen: Array,
+    spreads: Array | None = None,
+) -> Array:
     """Return the second moment of a fit's error in its coordinates.
 
     Parameters
@@ -87,6 +117,8 @@ def doubt_of(fit: PointFit, seldom: Array, blocks: Blocks, centres: Array, odds:
         Log-likelihoods of the conditions [dimensionless], up to a constant.
     seen : ndarray, shape (7,)
         1 for what the log can tell, 0 for what it cannot, as friction of a piston that sticks.
+    spreads : ndarray, shape (m,), optional
+        Standard deviations of what is seldom known, see `spreads_of`; those of `SELDOM_KNOWN` if not given.
 
     Returns
     -------
@@ -101,7 +133,8 @@ def doubt_of(fit: PointFit, seldom: Array, blocks: Blocks, centres: Array, odds:
     slopes = np.where(blocks.seen, slopes / weight, 0.0).reshape(len(slopes), -1)
     prior = np.zeros((len(slopes), len(slopes)))
     prior[:known, :known] = np.linalg.inv(WEAK)
-    prior[known:, known:] = np.diag([sigma**-2.0 for sigma in SELDOM_KNOWN.values()])
+    spreads = np.array(list(SELDOM_KNOWN.values())) if spreads is None else spreads
+    prior[known:, known:] = np.diag(spreads**-2.0)
     covariance = np.linalg.inv(slopes @ slopes.T + prior)
     pulled = slopes @ np.where(blocks.seen, left / weight, 0.0).ravel()
     steps = (covariance @ (pulled + (centres - fit.coordinates) @ prior[:known]).T)[:known]
