@@ -220,8 +220,8 @@ def sensed_play(record: Record) -> ShownPlay:
     Returns
     -------
     ShownPlay
-        How far the piston moves unseen, and what that gains in log-likelihood; none where the encoder sees half of it,
-        or could not resolve it.
+        How far the piston moves unseen, and what that gains in log-likelihood; none where the encoder may see half of
+        it, or could not resolve it.
     """
     if VELOCITY not in record:
         return NO_PLAY
@@ -239,11 +239,21 @@ def sensed_play(record: Record) -> ShownPlay:
         return NO_PLAY
     read = np.gradient(position) / record.sample_time
     moved, seen = (float(rate[still] @ one[still]) / power for one in (velocity, read))
-    noise = float(np.var(velocity[still] - read[still] - (moved - seen) * rate[still]))
+    left = velocity - read - (moved - seen) * rate
+    noise, chance = float(np.var(left[still])), _lasting(left, still, max(1, round(SMOOTHED / record.sample_time)))
     unseen = (moved - seen) * (percentile(force[still], 95.0) - percentile(force[still], 5.0))
-    if unseen <= _cell(position) or 2.0 * seen >= moved or noise == 0.0:
+    if unseen <= _cell(position) or noise == 0.0 or moved - 2.0 * seen <= (chance / power) ** 0.5:
         return NO_PLAY
     return ShownPlay(unseen, 0.5 * (moved - seen) ** 2 * power / noise, moved - seen)
+
+
+def _lasting(left: Array, there: BoolArray, samples: int) -> float:
+    """Return the variance of what is left as it counts over so many samples: what was averaged is no longer white."""
+    parts = len(left) // samples
+    left, count = (
+        one[: parts * samples].reshape(parts, samples).sum(axis=1) for one in (np.where(there, left, 0.0), there)
+    )
+    return float(np.sum(left**2) / max(1, np.sum(count)))
 
 
 class _Standings(NamedTuple):

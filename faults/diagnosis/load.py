@@ -5,7 +5,7 @@ offset. So where the flow form explains a log, what shifts its pressures is a lo
 the sliding piston tells, and a circuit fitted under it has to follow the log.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
@@ -74,22 +74,19 @@ def under_load(diagnosed: Diagnosed, parameters: EhaParameters, estimate: BulkMo
     """
     first = diagnosed(parameters, 0.0)
     blocks = first.scoreboard.blocks
-    seen = force_balance(blocks, parameters)
-    if seen is not None and seen.believed:
-        shown = with_loads(parameters, seen)
-        found = _followed(diagnosed, [shown], seen, parameters)
-        if found is not None and (_asks(first) or _better(found.diagnosis, first)):
-            return found
-    elif _asks(first) and _open(seen, blocks, parameters):
-        guesses = first_guesses(blocks, parameters, estimate)
-        found = _followed(diagnosed, guesses, seen, parameters)
-        if found is not None:
-            return found
-    return Loaded(first, parameters)
+    seen, asks = force_balance(blocks, parameters), _asks(first)
+    names = () if seen is None else seen.sure if asks else seen.believed
+    guesses: Iterable[EhaParameters] = ()
+    if seen is not None and names:
+        guesses = [with_loads(parameters, seen, names)]
+    elif asks and _open(seen, blocks, parameters):
+        guesses = first_guesses(blocks, parameters, estimate, seen)
+    found = _followed(diagnosed, guesses, seen, parameters)
+    return found if found is not None and (asks or _better(found.diagnosis, first)) else Loaded(first, parameters)
 
 
-def with_loads(p: EhaParameters, seen: Loads) -> EhaParameters:
-    """Return an actuator with the loads that are believed.
+def with_loads(p: EhaParameters, seen: Loads, names: Sequence[str]) -> EhaParameters:
+    """Return an actuator with loads of the force balance.
 
     Parameters
     ----------
@@ -97,17 +94,21 @@ def with_loads(p: EhaParameters, seen: Loads) -> EhaParameters:
         The actuator, as its rig file has it.
     seen : Loads
         What the force balance shows beyond that.
+    names : sequence of str
+        Which of its loads.
 
     Returns
     -------
     EhaParameters
         It, with them.
     """
-    return replace(p, **{name: getattr(p, name) + seen.of(name)[0] for name in seen.believed})
+    return replace(p, **{name: getattr(p, name) + seen.of(name)[0] for name in names})
 
 
-def first_guesses(blocks: Blocks, parameters: EhaParameters, estimate: BulkModulusEstimate) -> Iterator[EhaParameters]:
-    """Yield the actuator under the loads that a log may show of which the force balance says nothing.
+def first_guesses(
+    blocks: Blocks, parameters: EhaParameters, estimate: BulkModulusEstimate, seen: Loads | None
+) -> Iterator[EhaParameters]:
+    """Yield the actuator under the loads that a log may show of which the force balance is not sure.
 
     Parameters
     ----------
@@ -117,13 +118,17 @@ def first_guesses(blocks: Blocks, parameters: EhaParameters, estimate: BulkModul
         The actuator, as its rig file has it.
     estimate : BulkModulusEstimate
         What the flow form found.
+    seen : Loads or None
+        What the force balance shows.
 
     Yields
     ------
     EhaParameters
-        Under the load that holds the log's first pressure, if it begins under one; under the load that holds its mean
-        pressure.
+        Under the likeliest constant force by that balance; under the load that holds the log's first pressure, if it
+        begins under one; under the load that holds its mean pressure.
     """
+    if seen is not None:
+        yield with_loads(parameters, seen, ["load_force"])
     found = {} if estimate.explanation is None else estimate.explanation.values
     if parameters.load_force == 0.0 and "start_pressure" in found:
         yield replace(parameters, load_force=found["start_pressure"][0] * parameters.piston_area)
@@ -133,7 +138,7 @@ def first_guesses(blocks: Blocks, parameters: EhaParameters, estimate: BulkModul
 
 def _followed(
     diagnosed: Diagnosed,
-    guesses: Iterator[EhaParameters] | list[EhaParameters],
+    guesses: Iterable[EhaParameters],
     seen: Loads | None,
     rig: EhaParameters,
 ) -> Loaded | None:
