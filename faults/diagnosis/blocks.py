@@ -64,7 +64,7 @@ class Blocks:
     begun : tuple of float, or None
         Differential pressure [Pa] and velocity [m/s] with which the log begins; None at rest, and where it is not told.
     opening : tuple of float, or None
-        The same, even if it is no more than noise: under a load a piston that begins without pressure is not at rest.
+        The same [Pa, m/s], if it is no more than noise too: under a load a piston without pressure is not at rest.
     place : float
         Position that the log begins with [m]; 0 where none is logged.
     """

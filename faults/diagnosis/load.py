@@ -165,18 +165,20 @@ def _told(found: "Diagnosis", loaded: EhaParameters, seen: Loads | None, rig: Eh
         return None
     notes: list[Note] = []
     if more != 0.0:
-        ends = _ends(loaded.load_force, std)
-        bias = loaded.load_force / loaded.piston_area
-        notes.append(ClassCode.LOAD_ON_ROD.note(force_n=loaded.load_force, pressure_pa=bias, **ends))
-    for name, code in (("load_stiffness", ClassCode.SPRING_ON_ROD), ("moving_mass", ClassCode.MASS_ON_ROD)):
-        if seen is not None and getattr(loaded, name) != getattr(rig, name):
-            value = getattr(loaded, name)
-            notes.append(code.note(value=value, rig=getattr(rig, name), **_ends(value, seen.of(name)[1])))
+        value, (low, high) = loaded.load_force, _ends(loaded.load_force, std)
+        bias = value / loaded.piston_area
+        notes.append(ClassCode.LOAD_ON_ROD.note(force_n=value, low=low, high=high, pressure_pa=bias))
+    if seen is not None and (value := loaded.load_stiffness) != rig.load_stiffness:
+        low, high = _ends(value, seen.of("load_stiffness")[1])
+        notes.append(ClassCode.SPRING_ON_ROD.note(value=value, low=low, high=high, rig=rig.load_stiffness))
+    if seen is not None and (value := loaded.moving_mass) != rig.moving_mass:
+        low, high = _ends(value, seen.of("moving_mass")[1])
+        notes.append(ClassCode.MASS_ON_ROD.note(value=value, low=low, high=high, rig=rig.moving_mass))
     return Loaded(found, loaded, tuple(notes))
 
 
-def _ends(value: float, std: float) -> dict[str, float]:
-    return {"low": value - TWO_SIDED * std, "high": value + TWO_SIDED * std}
+def _ends(value: float, std: float) -> tuple[float, float]:
+    return value - TWO_SIDED * std, value + TWO_SIDED * std
 
 
 def _asks(found: "Diagnosis") -> bool:

@@ -152,6 +152,21 @@ def test_a_velocity_sensor_shows_the_play_that_the_encoder_hides(drive: str) -> 
     assert sensed_play(played.replace(velocity_m_s=some_missing)).size == pytest.approx(found.size, rel=0.1)
 
 
+@pytest.mark.parametrize(("noise", "shows"), [(2e-4, False), (2e-5, True)])
+def test_an_encoder_that_sees_half_of_what_the_piston_yields_within_chance_has_no_play(
+    noise: float, shows: bool
+) -> None:
+    rng, time = np.random.default_rng(4), 1e-3 * np.arange(2000)
+    pressure = 1e6 * np.sin(2.0 * np.pi * time)
+    yields = 5e-12
+    channels = {
+        "position_m": 0.45 * yields * pressure + rng.normal(0.0, 3e-7, len(time)),
+        "velocity_m_s": yields * np.gradient(pressure, 1e-3) + rng.normal(0.0, noise, len(time)),
+        "differential_pressure_pa": pressure,
+    }
+    assert (sensed_play(Record(1e-3, channels)) != NO_PLAY) == shows
+
+
 def test_a_coarse_encoder_has_no_play() -> None:
     sound = logged("normal", "multisine", 0.0)
     assert sensed_play(sound.replace(position_m=2e-5 * np.round(sound["position_m"] / 2e-5))) == NO_PLAY

@@ -123,6 +123,29 @@ def test_a_circuit_begins_as_its_log_does_where_that_begins_under_pressure() -> 
     assert at_rest > 0.3
 
 
+def test_a_circuit_under_a_load_begins_where_its_log_does_and_strains_its_spring_there() -> None:
+    still, area = np.zeros(81 * 10), ACTUATOR.circuit.piston_area
+    blocks = Blocks(still, 1e-3, 10, np.zeros(80), np.zeros(80), np.ones(2))
+    loaded = replace(ACTUATOR.circuit, load_force=300.0)
+    sprung = replace(ACTUATOR.circuit, load_stiffness=2e4)
+
+    def first(one: Blocks, circuit: CircuitParameters) -> tuple[float, float]:
+        (found,) = predicted(one, parameter_rows(ACTUATOR.conditions[:1], circuit, ACTUATOR.rated))
+        return float(found[0, 0]), float(found[0, 1])
+
+    held = 300.0 / area
+    assert first(blocks, loaded)[1] == pytest.approx(held, rel=0.02)  # at rest
+    velocity, pressure = first(replace(blocks, opening=(0.0, -0.02)), replace(loaded, load_force=900.0))
+    assert velocity < -0.01  # it gives way until its oil is squeezed
+    assert pressure < 0.5 * 900.0 / area
+    assert first(replace(blocks, opening=(0.0, -0.02)), ACTUATOR.circuit) == first(blocks, ACTUATOR.circuit)
+    assert first(replace(blocks, place=0.015), sprung)[1] == pytest.approx(held, rel=0.02)
+    assert first(blocks, sprung)[1] == pytest.approx(0.0, abs=0.02 * held)
+    before = parameter_rows(ACTUATOR.conditions[:1], sprung, ACTUATOR.rated)[0]
+    earlier = replace(blocks, place=0.015, earlier=(400, before))
+    assert first(earlier, ACTUATOR.circuit)[1] == pytest.approx(held, rel=0.1)
+
+
 def test_a_log_that_begins_at_rest_begins_at_rest() -> None:
     log = simulate(CIRCUIT, SPEED, 1e-3, EhaParameters(), sensors=BENCH, rng=np.random.default_rng(1))
     assert blocks_of(log).begun is None
