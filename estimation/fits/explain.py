@@ -134,23 +134,31 @@ def contradicted(found: Explanation, parameters: EhaParameters) -> tuple[Note, .
 
 @dataclass(frozen=True, eq=False)
 class _Tried:
-    """A set of hypotheses with the best that was found under it."""
+    """A set of hypotheses with the best that was found under it; void if that is not what they say."""
 
     together: tuple[Hypothesis, ...]
     point: Point
     values: Mapping[str, float]
     delays: Mapping[str, float]
+    rig: Mapping[str, float]
     fits: tuple[GreyBoxFit, ...] = ()
     """Once it is finished: the likelier balance first, by volume or by mass, then the other one if it counts."""
+    void: bool = False
 
     @property
     def cost(self) -> float:
-        return self.point.cost if self.meant else np.inf
+        return self.point.cost if self.meant and not self.void else np.inf
 
     @property
     def meant(self) -> bool:
         """Whether what was found is what the hypotheses say, and no use of what they free beside."""
-        return all(not one.least or abs(self.values[one.free[0]]) >= one.least for one in self.together)
+        large = all(not one.least or abs(self.values[one.free[0]]) >= one.least for one in self.together)
+        return large and all(not one.lower or self.values[one.free[0]] < self.rig[one.free[0]] for one in self.together)
+
+    @property
+    def told(self) -> bool:
+        """Whether the log tells what should be lower than in the rig file, once it is finished."""
+        return all(not one.lower or np.isfinite(self.fits[0].std[one.free[0]]) for one in self.together)
 
     @property
     def fit(self) -> GreyBoxFit:
@@ -200,12 +208,12 @@ def explain(
     wide = balanced_by(widened(log, parameters, starts[0]), 1.0 if by_mass else 0.0)
     likely, others = promising(wide, (), starts[0], asked)
     finished = _likeliest(wide, [_screened(wide, (one,), starts) for one in likely])
-    if others and not accepted(finished[0].fit):
+    if others and not _explains(finished[0], accepted):
         known = finished[0].cost
         more = _likeliest(wide, [_screened(wide, (one,), starts, NEARLY * known) for one in others], known)
         finished = _ranked([*finished, *more])
     first = finished[0]
-    if paired and not accepted(first.fit):
+    if paired and not _explains(first, accepted):
         late = delayed(wide, first.delays)
         taken = {one.name for one in first.together}
         others = [one for one in HYPOTHESES if one.name not in taken]
@@ -234,6 +242,10 @@ def _delivery_open(log: GreyBoxLog, best: _Tried) -> float:
     return promised_beside(delayed(log, best.delays), best.together, best.values, DELIVERY).deviation
 
 
+def _explains(one: _Tried, accepted: Accepted) -> bool:
+    return not one.void and accepted(one.fit)
+
+
 def _ranked(tried: Iterable[_Tried]) -> list[_Tried]:
     return sorted(tried, key=lambda one: one.cost)
 
@@ -254,7 +266,7 @@ def _screened(
             guess = problem.model.theta({**absent, **start, **own})
             bounds = flow_bounds(problem.model, [guess], log)
             point = descend(problem.at, guess, SCREENING, bounds, radius=NEAR, wanted=wanted)
-            tried.append(_Tried(together, point, problem.model.values(point.theta), delays))
+            tried.append(_Tried(together, point, problem.model.values(point.theta), delays, absent))
         yield min(tried, key=lambda one: one.cost)
 
 
@@ -314,9 +326,8 @@ def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
     best = done[0][0]
     count = [one for one in done if one[0].cost <= best.cost + ALIKE]
     first, *rivals = (concluded(problem, one.point, warned=False) for one, problem in count)
-    if not best.meant:
-        first = replace(first, cost=NEVER)
-    return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
+    found = replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
+    return found if best.meant and found.told else replace(found, void=True, fits=(replace(first, cost=NEVER),))
 
 
 def _to_its_end(log: GreyBoxLog, tried: _Tried, start: Array, *more: str) -> _Tried:

@@ -41,6 +41,8 @@ class Hypothesis:
         Whether the search also begins with an encoder that reads zero in the middle of the log's travel.
     beside : tuple of str
         What is fitted along with it, but is nothing that it promises.
+    lower : bool
+        Whether what is freed first is lower than the rig file has it: else it is not what the hypothesis says.
     """
 
     name: str
@@ -55,6 +57,7 @@ class Hypothesis:
     least: float = 0.0
     from_mid_travel: bool = False
     beside: tuple[str, ...] = ()
+    lower: bool = False
 
 
 DELIVERY = Hypothesis("delivery", ("pump_displacement",))
@@ -153,7 +156,9 @@ HYPOTHESES = (
         tuple({"air_softness": 1e3, "air_onset": onset} for onset in (0.2, 0.5, 0.8)),
         far=True,
     ),
-    Hypothesis("relief_low", ("relief_pressure", "relief_conductance"), shares_of_peak=(0.6, 0.85), far=True),
+    Hypothesis(
+        "relief_low", ("relief_pressure", "relief_conductance"), shares_of_peak=(0.6, 0.85), far=True, lower=True
+    ),
     Hypothesis("leakage_growth", ("leakage_growth", "leakage_bend")),
     LEAKAGE_RISE,
     MAKEUP_BLOCKED,

@@ -1,6 +1,7 @@
 """Searches of a set of hypotheses, carried to their end."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,8 +9,11 @@ import numpy as np
 import pytest
 
 from estimation.fits import explain
-from estimation.fits.explain import CLOSE, ROUNDS
+from estimation.fits.descent import Point
+from estimation.fits.explain import CLOSE, NEVER, ROUNDS
+from estimation.fits.hypotheses import HYPOTHESES
 from plant.eha.model import EhaParameters
+from tests.estimation.fits.short_logs import made_fit
 
 HEALTHY = EhaParameters()
 
@@ -52,6 +56,37 @@ def test_what_promises_most_is_settled_even_where_its_starts_are_not_what_it_say
     assert settled == [np.inf, 9.0, 10.0]
     alone = explain._likeliest(nothing, [[tried(np.inf)]])  # pyright: ignore[reportPrivateUsage]
     assert [one.cost for one in alone] == [np.inf]
+
+
+def relieved(setting: float, **more: Any) -> Any:
+    """Return a relief valve that opens at this, where the rig file has 3 MPa."""
+    (relief,) = (one for one in HYPOTHESES if one.name == "relief_low")
+    values, point = {"relief_pressure": setting}, Point(np.zeros(1), 50.0, np.zeros(1), np.eye(1))
+    return explain._Tried((relief,), point, values, {}, {"relief_pressure": 3e6}, **more)  # pyright: ignore[reportPrivateUsage]
+
+
+def test_a_relief_valve_set_above_the_rig_files_is_not_set_low() -> None:
+    assert [relieved(setting).cost for setting in (2.9e6, 3e6, 4e6)] == [50.0, np.inf, np.inf]
+
+
+@pytest.mark.parametrize(("setting", "std", "void"), [(2e6, 1e3, False), (2e6, np.inf, True), (4e6, 1e3, True)])
+def test_what_is_set_above_the_rig_files_or_has_no_interval_is_void(
+    setting: float, std: float, void: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = SimpleNamespace(model=SimpleNamespace(theta=lambda _: np.zeros(1)))
+    fit = replace(made_fit(50.0, 2e8, 1e5), std={"bulk_modulus": 1e5, "relief_pressure": std})
+    monkeypatch.setattr(explain, "delayed", lambda log, _: log)
+    monkeypatch.setattr(explain, "balanced_by", lambda log, _: log)
+    monkeypatch.setattr(explain, "freed", lambda *_: problem)
+    monkeypatch.setattr(explain, "usual_values", lambda _: {})
+    monkeypatch.setattr(explain, "_to_its_end", lambda _, tried, *__: tried)
+    monkeypatch.setattr(explain, "concluded", lambda *_, **__: fit)
+    nothing: Any = None
+    found = explain._finished(nothing, relieved(setting))  # pyright: ignore[reportPrivateUsage]
+    assert found.cost == (np.inf if void else 50.0)
+    assert found.fit.cost == (NEVER if void else 50.0)
+    # a void set comes after any other, and what is left is asked though its residuals are no larger than the noise
+    assert explain._explains(found, lambda _: True) is not void  # pyright: ignore[reportPrivateUsage]
 
 
 @pytest.mark.parametrize(

@@ -141,7 +141,7 @@ def test_a_delay_is_sought_no_longer_than_a_sensor_may_have(monkeypatch: pytest.
     monkeypatch.setattr(module, "_descended", falling)
     monkeypatch.setattr(module, "_revived", lambda *_: None)
     monkeypatch.setattr(module, "delayed", lambda log, _: log)
-    begun = module._Tried((late,), Point(np.zeros(1), 1e3, np.zeros(1), np.eye(1)), {}, {})
+    begun = module._Tried((late,), Point(np.zeros(1), 1e3, np.zeros(1), np.eye(1)), {}, {}, {})
     found = module._settled(cast("GreyBoxLog", plain), begun)
     assert found.delays[late.late] == pytest.approx(LATEST, abs=1e-3)
 

@@ -165,7 +165,7 @@ def bounds_and_starts_of_hypotheses() -> dict[str, Any]:
     for one in HYPOTHESES:
         if one.least:
             tried = [
-                _Tried((one,), SimpleNamespace(cost=3.0), {one.free[0]: share * one.least}, {})  # pyright: ignore[reportArgumentType]
+                _Tried((one,), SimpleNamespace(cost=3.0), {one.free[0]: share * one.least}, {}, {})  # pyright: ignore[reportArgumentType]
                 for share in (0.99, -0.99, 1.0, -1.01)
             ]
             values["meant"].append([one.name, *(each.meant for each in tried)])
