@@ -62,6 +62,9 @@ CLOSE = 60.0
 NEVER = float(np.finfo(np.float64).max)
 """Cost of a fit that is not what its hypotheses say, so that it is not believed [dimensionless]."""
 
+LITTLE = 1e-3
+"""Share of the cost below which a gain tells nothing of what leaves far more than noise [fraction]; judged."""
+
 WORTH = 10.0
 """Gain in log-likelihood below which a hypothesis is not accepted [dimensionless]."""
 
@@ -154,11 +157,6 @@ class _Tried:
         """Whether what was found is what the hypotheses say, and no use of what they free beside."""
         large = all(not one.least or abs(self.values[one.free[0]]) >= one.least for one in self.together)
         return large and all(not one.lower or self.values[one.free[0]] < self.rig[one.free[0]] for one in self.together)
-
-    @property
-    def told(self) -> bool:
-        """Whether the log tells what should be lower than in the rig file, once it is finished."""
-        return all(not one.lower or np.isfinite(self.fits[0].std[one.free[0]]) for one in self.together)
 
     @property
     def fit(self) -> GreyBoxFit:
@@ -267,6 +265,7 @@ def _screened(
             bounds = flow_bounds(problem.model, [guess], log)
             point = descend(problem.at, guess, SCREENING, bounds, radius=NEAR, wanted=wanted)
             tried.append(_Tried(together, point, problem.model.values(point.theta), delays, absent))
+            wanted = min(wanted, NEARLY * tried[-1].cost)
         yield min(tried, key=lambda one: one.cost)
 
 
@@ -326,8 +325,9 @@ def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
     best = done[0][0]
     count = [one for one in done if one[0].cost <= best.cost + ALIKE]
     first, *rivals = (concluded(problem, one.point, warned=False) for one, problem in count)
-    found = replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
-    return found if best.meant and found.told else replace(found, void=True, fits=(replace(first, cost=NEVER),))
+    if best.meant and all(not one.lower or np.isfinite(first.std[one.free[0]]) for one in best.together):
+        return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
+    return replace(best, void=True, fits=(replace(first, cost=NEVER),))
 
 
 def _to_its_end(log: GreyBoxLog, tried: _Tried, start: Array, *more: str) -> _Tried:
@@ -338,7 +338,7 @@ def _to_its_end(log: GreyBoxLog, tried: _Tried, start: Array, *more: str) -> _Tr
         gained = best.cost - further.cost
         if gained > 0.0:
             best = further
-        if gained < CLOSE:
+        if gained < max(CLOSE, LITTLE * best.cost):
             break
     return best
 

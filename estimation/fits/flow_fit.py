@@ -167,7 +167,8 @@ def fit_flow(
     log = flow_log(record, parameters, uncertainties or {}, variances)
     starts = flow_starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
     explains = partial(_explains, noisy=log.passes_on)
-    log, fits, teeth, teeth_left = toothed(log, lambda one: balanced(one, parameters, starts), explains)
+    largest = NOISY[0] if log.passes_on else LARGEST_CHI_SQUARE
+    log, fits, teeth, teeth_left = toothed(log, lambda one: balanced(one, parameters, starts), explains, largest)
     turning = Turning(log.teeth, log.speed_offset)
     best, found = min(fits, key=_cost), weighed(fits, SURER, [_beforehand(fit) for fit in fits])
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)

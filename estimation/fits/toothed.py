@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from estimation.finding import NORMAL_95
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
@@ -43,6 +45,10 @@ out so is the count that is there, 13 times."""
 
 OVERTONE_WORTH = 5.0
 """Gain from which twice their count is taken up with them [dimensionless]: by chance one log in 150 gains it."""
+
+HOPE = 10.0
+"""How many times what residuals promise teeth or an offset of speed may gain at most, where they would have to explain
+a log that is not explained without [dimensionless]; judged: residuals answer both nearly evenly."""
 
 ROUNDS = 4
 """How often teeth are corrected at most [count]."""
@@ -84,6 +90,7 @@ def toothed(
     log: GreyBoxLog,
     fitted: Fitted,
     explains: Callable[[GreyBoxFit], bool],
+    largest: float = np.inf,
 ) -> Toothed:
     """Return the fits of a log, with the pump's teeth and an offset of its speed where the log asks for them.
 
@@ -98,6 +105,8 @@ def toothed(
     explains : callable
         ``explains(fit)``: whether a fit explains the log. Where it does not with teeth, something else is strange that
         they would hide: a pump that delivers 4 % more looked like teeth of 19 %.
+    largest : float
+        Mean squared normalised residual above which no fit explains a log [dimensionless].
 
     Returns
     -------
@@ -107,6 +116,8 @@ def toothed(
     if log.gaps.size:
         return Toothed(log, fitted(log))
     plain = Toothed(log, fitted(replace(log, counts=COUNTS)))
+    if not _hopeful(plain.fits, largest):
+        return plain._replace(left=_left(plain.best))
     shifted = _shifted(plain, fitted)
     worth = plain.best.cost - TEETH_WORTH
     for begun in (plain,) if shifted is None else (shifted, plain):
@@ -118,6 +129,15 @@ def toothed(
             told = _told_offset(offset, begun.best.speed_offset.std)
             return begun._replace(log=replace(begun.log, counts=()), remarks=told)
     return plain._replace(left=_left(plain.best))
+
+
+def _hopeful(fits: Sequence[GreyBoxFit], largest: float) -> bool:
+    """Return whether teeth or an offset of speed may explain a log that is left unexplained without."""
+    for fit in fits:
+        promised = max([fit.speed_offset.gain, *(one.gain for one in fit.teeth.values())])
+        if fit.chi_square[0] <= largest or HOPE * promised >= fit.cost * (1.0 - largest / fit.chi_square[0]):
+            return True
+    return False
 
 
 def _shifted(plain: Toothed, fitted: Fitted) -> Toothed | None:

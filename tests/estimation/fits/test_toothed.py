@@ -90,6 +90,22 @@ def test_teeth_are_taken_up_and_corrected_until_nothing_is_left() -> None:
     assert not np.array_equal(found.log.drives, PLAIN.drives)
 
 
+@pytest.mark.parametrize(("chi", "hopeless"), [(2.0, False), (1.2, False), (3.0, True)])
+@pytest.mark.parametrize("by_offset", [True, False])
+def test_a_log_that_neither_teeth_nor_an_offset_can_explain_is_fitted_once(
+    chi: float, hopeless: bool, by_offset: bool
+) -> None:
+    # it has to lose 500 of 1000 at a residual of 2, and 667 at 3, where 60 promised may gain ten times as much
+    off = (0.5, 60.0) if by_offset else (0.0, 0.0)
+    teeth = () if by_offset else (shown(12, 60.0),)
+    first = replace(fit(1000.0, *teeth, off=off), chi_square=(chi,))
+    fitted, asked = told(first, *(fit(900.0, shown(12, 0.0)) for _ in range(9)))
+    found = toothed(PLAIN, fitted, well, 1.2 if chi < 3.0 else 1.0)
+    assert (len(asked) == 1) is hopeless
+    assert hopeless is not bool(found.remarks)
+    assert bool(found.left) is (hopeless and not by_offset)
+
+
 def test_corrections_end() -> None:
     fitted, asked = told(fit(500.0, shown(12, 200.0)), *(fit(300.0, shown(12, SETTLED + 0.1, 0.01)) for _ in range(9)))
     toothed(PLAIN, fitted, well)
