@@ -13,7 +13,7 @@ from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide, 
 from estimation.eha.rig_share import fitted_responses, scaled_responses, with_wear
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
-from estimation.fits.explain import delivered
+from estimation.fits.delivery import delivered
 from estimation.fits.flow_fit import FLOW_CHANNELS, REPORTED, fit_flow
 from estimation.fits.form_fit import FormFit
 from estimation.fits.motion_fit import MOTION_CHANNELS, fit_motion

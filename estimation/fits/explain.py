@@ -16,7 +16,7 @@ from estimation.fits.form_fit import weighed
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_log import GreyBoxLog
-from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LATEST, LEAST_SHARE, MOST_SHARE, Hypothesis
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LATEST, Hypothesis
 from estimation.fits.promises import balanced_by, promised_beside, promising
 from estimation.fits.wide_problem import (
     delayed,
@@ -29,10 +29,8 @@ from estimation.fits.wide_problem import (
 )
 from estimation.models.flow import STIFFNESS
 from estimation.models.wide_flow import GROWTH, grown_leakage
-from estimation.notes import EstimateCode
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
-from plant.notes import Note
 
 SCREENING, SETTLING, FINISHING = 7, 40, 12
 """Evaluations of the model for a start, for one that is carried on, and for the last, with short model steps."""
@@ -104,37 +102,6 @@ class Explanation:
     delivery_open: float = 0.0
 
 
-def delivered(found: Explanation, parameters: EhaParameters) -> float | None:
-    """Return the share of its displacement in the rig file that the pump delivers.
-
-    Parameters
-    ----------
-    found : Explanation
-        What explains a log.
-    parameters : EhaParameters
-        What the rig file says.
-
-    Returns
-    -------
-    float or None
-        The share [fraction]; None where the delivery is no part of the explanation.
-    """
-    if "pump_displacement" not in found.values:
-        return None
-    return found.values["pump_displacement"][0] / parameters.pump_displacement
-
-
-def contradicted(found: Explanation, parameters: EhaParameters) -> tuple[Note, ...]:
-    """Return the objection to an explanation by a flow that no pump of the rig file delivers.
-
-    Displacement, area and the scales of speed and position share one ratio; bulk modulus depends on which is wrong.
-    """
-    share = delivered(found, parameters)
-    if share is None or LEAST_SHARE <= share <= MOST_SHARE:
-        return ()
-    return (EstimateCode.RIG_CONTRADICTED.note(percent=100.0 * share),)
-
-
 @dataclass(frozen=True, eq=False)
 class _Tried:
     """A set of hypotheses with the best that was found under it; void if that is not what they say."""
@@ -160,8 +127,6 @@ class _Tried:
 
     @property
     def fit(self) -> GreyBoxFit:
-        if not self.fits:
-            raise ValueError("only finished fits are compared")
         return self.fits[0]
 
 
@@ -205,13 +170,14 @@ def explain(
     """
     wide = balanced_by(widened(log, parameters, starts[0]), 1.0 if by_mass else 0.0)
     likely, others = promising(wide, (), starts[0], asked)
-    finished = _likeliest(wide, [_screened(wide, (one,), starts) for one in likely])
-    if others and not _explains(finished[0], accepted):
+    screened = [[*_screened(wide, (one,), starts)] for one in likely]
+    finished = _likeliest(wide, screened)
+    if others and (finished[0].void or not accepted(finished[0].fit)):
         known = finished[0].cost
-        more = _likeliest(wide, [_screened(wide, (one,), starts, NEARLY * known) for one in others], known)
+        more = _likeliest(wide, _nearing(wide, others, starts, _hopeful(starts, screened), known), known)
         finished = _ranked([*finished, *more])
     first = finished[0]
-    if paired and not _explains(first, accepted):
+    if paired and (first.void or not accepted(first.fit)):
         late = delayed(wide, first.delays)
         taken = {one.name for one in first.together}
         others = [one for one in HYPOTHESES if one.name not in taken]
@@ -240,10 +206,6 @@ def _delivery_open(log: GreyBoxLog, best: _Tried) -> float:
     return promised_beside(delayed(log, best.delays), best.together, best.values, DELIVERY).deviation
 
 
-def _explains(one: _Tried, accepted: Accepted) -> bool:
-    return not one.void and accepted(one.fit)
-
-
 def _ranked(tried: Iterable[_Tried]) -> list[_Tried]:
     return sorted(tried, key=lambda one: one.cost)
 
@@ -267,6 +229,31 @@ def _screened(
             tried.append(_Tried(together, point, problem.model.values(point.theta), delays, absent))
             wanted = min(wanted, NEARLY * tried[-1].cost)
         yield min(tried, key=lambda one: one.cost)
+
+
+def _hopeful(starts: Sequence[Mapping[str, float]], screened: Sequence[Sequence[_Tried]]) -> list[Mapping[str, float]]:
+    """Return the starts from which some of the hypotheses that came near ended near the best of their own."""
+    bests = [min(one.cost for one in each) for each in screened]
+    near = [each for each, best in zip(screened, bests, strict=True) if best <= NEARLY * min(bests)]
+    kept = [any(each[i].cost <= NEARLY * min(one.cost for one in each) for each in near) for i in range(len(starts))]
+    return [start for start, keep in zip(starts, kept, strict=True) if keep]
+
+
+def _nearing(
+    log: GreyBoxLog,
+    asked: Iterable[Hypothesis],
+    starts: Sequence[Mapping[str, float]],
+    hopeful: Sequence[Mapping[str, float]],
+    known: float,
+) -> Iterator[Sequence[_Tried]]:
+    """Yield hypotheses from their starts, those first of which slopes say nothing; none is followed far from the best.
+
+    Those begin from every start, the others from the ``hopeful`` ones.
+    """
+    for one in sorted(asked, key=lambda each: not each.far):
+        found = [*_screened(log, (one,), starts if one.far else hopeful, NEARLY * known)]
+        known = min(known, *(each.cost for each in found))
+        yield found
 
 
 def _settled(log: GreyBoxLog, tried: _Tried, wanted: float = np.inf) -> _Tried:
@@ -343,7 +330,7 @@ def _to_its_end(log: GreyBoxLog, tried: _Tried, start: Array, *more: str) -> _Tr
     return best
 
 
-def _likeliest(log: GreyBoxLog, tried: Sequence[Iterable[_Tried]], known: float = np.inf) -> list[_Tried]:
+def _likeliest(log: GreyBoxLog, tried: Iterable[Iterable[_Tried]], known: float = np.inf) -> list[_Tried]:
     """Return the likeliest of several sets of hypotheses, each tried from some starts, the best first.
 
     The first set is carried on in any case: a few steps from a start are no measure of what promises most. What cannot

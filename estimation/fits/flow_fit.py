@@ -5,7 +5,8 @@ from functools import partial
 
 import numpy as np
 
-from estimation.fits.explain import VANISHED, WORTH, contradicted, explain
+from estimation.fits.delivery import contradicted
+from estimation.fits.explain import VANISHED, WORTH, explain
 from estimation.fits.flow_log import flow_log, without_strays
 from estimation.fits.flow_search import MAKEUP_TRIED, balanced, flow_starts
 from estimation.fits.form_fit import FormFit, weighed, with_structure
@@ -199,18 +200,17 @@ def fit_flow(
                     moved, parameters.piston_area * sensed.yields * modulus / parameters.chamber_volume
                 )
             believed = with_structure(strange.values, left)
-            unseen = NO_PLAY if PLAY.name in strange.names else sensed
-            reasons = (*play_left(one.play, unseen), *contradicted(strange, parameters))
+            shown = play_left(one.play, NO_PLAY if PLAY.name in strange.names else sensed)
+            reasons = (*shown, *contradicted(strange, parameters))
             remarks = (*teeth, *wear_open(strange.delivery_open))
             return FormFit(believed, bound, one.chi_square[0], reasons, one.rig_slopes, strange, remarks, turning)
-    value, std = found["bulk_modulus"]
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     believed = found if sure else with_structure(found, STRUCTURE)
     reasons = (*_objections(best, log.passes_on), *play_left(swinging.play, sensed)) or teeth_left
     if BEGUN in asked and not reasons and not explains(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
-    bound, chi_square = std / value, best.chi_square[0]
-    return FormFit(believed, bound, chi_square, reasons, best.rig_slopes, remarks=remarks, turning=turning)
+    (value, std), chi = found["bulk_modulus"], best.chi_square[0]
+    return FormFit(believed, std / value, chi, reasons, best.rig_slopes, remarks=remarks, turning=turning)
 
 
 def _homed_at_stop(log: GreyBoxLog) -> bool:

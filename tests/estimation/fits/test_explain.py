@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from estimation.fits import explain
+from estimation.fits.delivery import contradicted
 from estimation.fits.descent import Point
 from estimation.fits.explain import CLOSE, NEVER, ROUNDS
 from estimation.fits.hypotheses import HYPOTHESES
@@ -85,8 +86,18 @@ def test_what_is_set_above_the_rig_files_or_has_no_interval_is_void(
     found = explain._finished(nothing, relieved(setting))  # pyright: ignore[reportPrivateUsage]
     assert found.cost == (np.inf if void else 50.0)
     assert found.fit.cost == (NEVER if void else 50.0)
-    # a void set comes after any other, and what is left is asked though its residuals are no larger than the noise
-    assert explain._explains(found, lambda _: True) is not void  # pyright: ignore[reportPrivateUsage]
+    assert found.void is void
+
+
+def test_starts_are_dropped_from_which_no_hypothesis_that_came_near_ended_near_its_best() -> None:
+    def each(*costs: float) -> Any:
+        return [SimpleNamespace(cost=cost) for cost in costs]
+
+    starts: Any = ["near", "near for one", "far", "near for what is far itself"]
+    screened = [each(100.0, 400.0, 500.0, 900.0), each(250.0, 700.0, 900.0, 900.0), each(950.0, 950.0, 950.0, 950.0)]
+    assert explain._hopeful(starts, screened) == ["near", "near for one"]  # pyright: ignore[reportPrivateUsage]
+    vain = [each(np.inf, np.inf, np.inf, np.inf)]
+    assert explain._hopeful(starts, vain) == starts  # pyright: ignore[reportPrivateUsage]
 
 
 @pytest.mark.parametrize(
@@ -96,7 +107,7 @@ def test_what_is_set_above_the_rig_files_or_has_no_interval_is_void(
 def test_a_flow_that_no_worn_pump_and_no_rounded_rig_file_gives_is_objected_to(share: float, said: bool) -> None:
     displacement = share * HEALTHY.pump_displacement
     found: Any = SimpleNamespace(values={"pump_displacement": (displacement, 0.01 * displacement)})
-    objections = explain.contradicted(found, HEALTHY)
+    objections = contradicted(found, HEALTHY)
     assert [note.data["percent"] for note in objections] == pytest.approx([100.0 * share] * said)
     other: Any = SimpleNamespace(values={"pressure_offset": (1e5, 1e3)})
-    assert explain.contradicted(other, HEALTHY) == ()
+    assert contradicted(other, HEALTHY) == ()
