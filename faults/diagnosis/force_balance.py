@@ -110,15 +110,22 @@ def force_balance(blocks: Blocks, p: EhaParameters) -> Loads | None:
     if np.count_nonzero(use) < FEWEST:
         return None
     v, dp, x, a = velocity[use], blocks.pressure[use], position[use], np.gradient(velocity, step)[use]
-    sums = 2.0 * (p.accumulator_pressure - ATMOSPHERE) + np.abs(dp)  # one chamber is held at the inner circuit's
-    push = p.piston_area * (dp + p.area_difference * sums) - p.moving_mass * a - p.load_force - p.load_stiffness * x
+    held = 2.0 * (p.accumulator_pressure - ATMOSPHERE)  # one chamber is at the inner circuit's pressure
+    push = (
+        p.piston_area * (dp + p.area_difference * (held + np.abs(dp)))
+        - p.moving_mass * a
+        - p.load_force
+        - p.load_stiffness * x
+    )
     columns = np.column_stack([np.ones(len(v)), x, a, np.sign(v), v, v * np.abs(v)])
     believed, spread = friction_believed(p)
     count = len(NAMES)
     found, covariance = _regressed(
         columns, push, np.append(np.zeros(count), believed), np.append(np.full(count, np.inf), spread)
     )
-    values, std = found[:count], np.hypot(np.sqrt(np.maximum(np.diag(covariance)[:count], 0.0)), [0.0, 0.0, LAGGING])
+    values, std = found[:count], np.sqrt(np.maximum(np.diag(covariance)[:count], 0.0))
+    # two unlike areas turn that pressure into a force, and nothing measures it
+    std = np.hypot(std, [p.piston_area * p.area_difference * held, 0.0, LAGGING])
     size = p.piston_area * float(np.sqrt(np.mean(dp**2)))
     forces = np.abs(values) * [1.0, float(np.std(x)), float(np.std(a))]
     return Loads(values, std, forces / max(size, np.finfo(np.float64).tiny))

@@ -88,6 +88,16 @@ def test_the_rigs_own_load_and_two_areas_are_no_finding() -> None:
     assert seen(replace(one, pressure=difference), rod).believed == ()
 
 
+def test_a_force_as_small_as_the_inner_circuits_on_two_unlike_areas_is_not_told() -> None:
+    rod = replace(PAPER, area_difference=0.2)
+    own = PAPER.piston_area * 0.2 * 2.0 * (PAPER.accumulator_pressure - ATMOSPHERE)
+    one = blocks_under(PAPER, to_and_fro(), force=own)
+    assert seen(one).sure == ("load_force",)
+    assert one.pressure is not None
+    assert seen(replace(one, pressure=one.pressure / (1.0 + 0.2 * np.sign(one.pressure))), rod).sure == ()
+    assert seen(one, rod).of("load_force")[1] == pytest.approx(own, rel=0.05)
+
+
 @pytest.mark.parametrize("condition", ["normal", "major_friction"])
 def test_of_a_piston_that_slides_one_way_friction_at_rest_is_left_open(condition: str) -> None:
     p = parameters_for(CONDITIONS[condition], PAPER)
