@@ -162,11 +162,11 @@ def promising(
     Returns
     -------
     tuple of list of Hypothesis
-        The `LIKELIEST`, and the others; all where the slopes promise nothing of any.
+        The `LIKELIEST`, and the others.
     """
     promises = _promises(log.coarsened(), together, found, asked)
     order = sorted(range(len(asked)), key=lambda i: -promises[i].gain)
-    likely = [asked[i] for i in order if not asked[i].far][:LIKELIEST] or list(asked)
+    likely = [asked[i] for i in order if not asked[i].far][:LIKELIEST]
     return likely, [one for one in asked if one not in likely]
 
 
