@@ -7,7 +7,7 @@ import numpy as np
 
 from estimation.fits.delivery import contradicted
 from estimation.fits.explain import VANISHED, WORTH, explain
-from estimation.fits.flow_log import flow_log, without_strays
+from estimation.fits.flow_log import carried, flow_log, without_strays
 from estimation.fits.flow_search import MAKEUP_TRIED, balanced, flow_starts
 from estimation.fits.form_fit import FormFit, weighed, with_structure
 from estimation.fits.greybox_fit import GreyBoxFit
@@ -173,6 +173,7 @@ def fit_flow(
     turning = Turning(log.teeth, log.speed_offset)
     best, found = min(fits, key=_cost), weighed(fits, SURER, [_beforehand(fit) for fit in fits])
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
+    log = carried(log, parameters, swinging.values)
     asked, open_ends = _asked(log, parameters, swinging, best, sensed, loaded=loaded, moving=moving)
     asked = (PRESSURE_LATE, *asked) if filtered and PRESSURE_LATE not in asked else asked
     remarks = (*teeth, *open_ends, *valves_unseen(best))

@@ -9,8 +9,9 @@ from estimation.arrays import Array
 from estimation.fits.averaged import averaged
 from estimation.fits.form_fit import LONGEST_STEP
 from estimation.fits.greybox_log import GreyBoxLog, greybox_log
+from estimation.fits.speed_course import straightened
 from estimation.log_checks.bridging import bridged, within_gaps
-from estimation.log_checks.measurement_noise import measurement_variances, position_variance
+from estimation.log_checks.measurement_noise import measurement_variances, position_variance, struck_variance
 from estimation.log_checks.outliers import without_outliers
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM
@@ -42,6 +43,9 @@ FELT_GAP = 0.1
 
 FELT_NOISE = 0.1
 """Noise of position matters to the slopes where it moves pressure by this share of the sensor's own [fraction]."""
+
+STRUCK = ("motor_speed_rad_s", "differential_pressure_pa")
+"""Channels that a binary drive strikes so often that second differences take its blows for noise."""
 
 NOISY_BLOCK = 5e-3
 """Length over which residuals are averaged then [s]: what they say of bulk modulus is slower, the noise is not. With 1
@@ -124,15 +128,19 @@ def flow_log(
     GreyBoxLog
         Averaged where it is faster than the form has use for.
     """
+    quiet = {name: min(variances[name], struck_variance(record[name])) for name in STRUCK}
     log = greybox_log(
         FLOW_FORM,
         record,
         flow_parameters(parameters),
         longest_step=LONGEST_STEP,
-        variances=variances,
+        variances={**variances, **quiet},
         uncertainties=uncertainties,
     )
-    swept = _swept_share(log.drives[:, FLOW_FORM.drives.index("position_m")], parameters)
+    speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
+    swept = _swept_share(log.drives[:, position], parameters)
+    drives = log.drives.copy()
+    drives[:, speed] = straightened(log.drives[:, speed])
     passed_on = swept * position_variance(record["position_m"]) ** 0.5
     open_gaps = speed_gaps(record, parameters, variances["differential_pressure_pa"] ** 0.5)
     log = replace(
@@ -141,7 +149,7 @@ def flow_log(
         timed=FLOW_FORM.drives,
         drive_std=(log.drive_std[0], 0.0),  # the residuals hold position's
         # where the piston is within a gap of its position is not known, where it is after it is
-        drives=_balanced_across(open_gaps, record, log.drives, parameters),
+        drives=_balanced_across(open_gaps, record, drives, parameters),
         measured=np.where(within_gaps(record["position_m"])[:, None], np.nan, log.measured),
         gaps=open_gaps,
         presumed={
@@ -153,6 +161,33 @@ def flow_log(
     log = averaged(log, LONGEST_STEP)
     felt = log.noise[0].passed_on * parameters.bulk_modulus > FELT_NOISE * log.noise[0].variance ** 0.5
     return replace(log, block=NOISY_BLOCK) if felt else log.taken_at(parameters.bulk_modulus)
+
+
+def carried(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float]) -> GreyBoxLog:
+    """Return a log with what noise of motor speed leaves in the chambers, as a random walk of pressure.
+
+    What a noisy speed is off by is oil that the model pumps, and it stays until it has leaked off. To squares of the
+    residuals a softer oil and a larger leakage then look better than the true ones, for they keep less of it.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    values : Mapping[str, float]
+        Bulk modulus and leakage coefficient, as a first fit has found them [SI].
+
+    Returns
+    -------
+    GreyBoxLog
+        The same log where the walk is not felt beside the pressure sensor's noise before the oil has leaked off.
+    """
+    (noise,), stiffness = log.noise, values["bulk_modulus"] / parameters.chamber_volume
+    walk = (stiffness * parameters.pump_displacement * log.drive_std[0]) ** 2 * log.sample_time
+    remembered = 0.5 / max(stiffness * values["leakage_coefficient"], 1.0 / (len(log.drives) * log.sample_time))
+    felt = walk * remembered > FELT_NOISE**2 * noise.variance
+    return replace(log, noise=(replace(noise, walk=walk),)) if felt else log
 
 
 def _swept_share(position: Array, p: EhaParameters) -> float:

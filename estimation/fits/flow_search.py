@@ -12,7 +12,7 @@ from math import ceil
 import numpy as np
 
 from estimation.fits.descent import Point, descend
-from estimation.fits.flow_log import DRAIN_START, LEAST_LEAKAGE, OPENING_START, usual_leakage
+from estimation.fits.flow_log import DRAIN_START, LEAST_LEAKAGE, OPENING_START, carried, usual_leakage
 from estimation.fits.form_fit import FAULTS_TRIED
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import NEAR_ENOUGH, GreyBoxFit, Search, concluded, explained, roughly
@@ -139,6 +139,7 @@ def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mappin
     near = min((one for one in rough if not _held(one.problem)), key=lambda one: one.point.cost)
     likely = [one for one in rough if one is near or one.point.cost < least + RIVAL]
     behind = [one for one in rough if not (_held(one.problem) or one in likely)]
+    log = carried(log, parameters, near.values)
     done = each(lambda one: _finished(one, log), likely)
     wanted = min(done, key=_cost)[1].cost
     done += each(lambda one: _finished(one, log, wanted), behind)
@@ -157,6 +158,7 @@ def _finished(one: _Rough, log: GreyBoxLog, wanted: float = np.inf) -> tuple[Pro
 
     A search that will not come down to the cost ``wanted`` ends early.
     """
+    one = replace(one, problem=one.problem.on(log))
     if not _plain(one):
         one = replace(one, point=descend(one.problem.at, one.point.theta, SETTLING, one.bounds, wanted=wanted))
         if not _plain(one):

@@ -147,6 +147,40 @@ def position_variance(position: Array) -> float:
     return _once(_position_variance, position)
 
 
+def struck_variance(values: Array) -> float:
+    """Return the variance of a channel's noise where a drive strikes it every few samples.
+
+    The ringing of stiff oil bends so sharply that second differences hold as much of it as of the noise; sixth ones,
+    of which the median counts, hold a tenth of that or less.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        The channel, in any unit; NaN where missing.
+
+    Returns
+    -------
+    float
+        Variance [unit of the channel squared]; infinite where more than half of the differences are none.
+
+    Examples
+    --------
+    >>> time = 1e-3 * np.arange(20_000)
+    >>> ringing = np.sin(2.0 * np.pi * 60.0 * time)
+    >>> noise = np.random.default_rng(1).normal(0.0, 0.01, 20_000)
+    >>> round(struck_variance(ringing + noise) * 1e4, 1)
+    1.0
+    """
+    return _once(_struck_variance, values)
+
+
+def _struck_variance(values: Array) -> float:
+    values = values[np.isfinite(values)]
+    bends = np.diff(values, n=SMOOTH)
+    deviation = _grouped_median(np.abs(bends), _step(values)) if len(bends) else 0.0
+    return (NORMAL_MAD * deviation) ** 2 / comb(2 * SMOOTH, SMOOTH) if deviation > 0.0 else np.inf
+
+
 def _position_variance(position: Array) -> float:
     position = position[np.isfinite(position)]  # a slow sensor has no seven samples in a row
     bends, steps = np.diff(position, n=SMOOTH), np.abs(np.diff(position))
