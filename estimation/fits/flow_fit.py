@@ -1,13 +1,14 @@
 """`fit_flow(record, parameters, ...) -> FormFit`: bulk modulus, leakage and flow bias of a log, by the flow form."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from estimation.fits.delivery import contradicted
 from estimation.fits.explain import VANISHED, WORTH, explain
-from estimation.fits.flow_log import carried, flow_log, without_strays
+from estimation.fits.flow_log import carried, flow_log, homed_at_stop, without_strays
 from estimation.fits.flow_search import MAKEUP_TRIED, balanced, flow_starts
 from estimation.fits.form_fit import FormFit, weighed, with_structure
 from estimation.fits.greybox_fit import GreyBoxFit
@@ -32,9 +33,8 @@ from estimation.fits.play import NO_PLAY, ShownPlay, play_left, play_structure, 
 from estimation.fits.promises import promised, promised_each
 from estimation.fits.teeth import Turning
 from estimation.fits.toothed import toothed
-from estimation.fits.wide_problem import POSITION
 from estimation.models.completed_flow import CRACKS
-from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
+from estimation.models.flow import HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
 from estimation.notes import EstimateCode
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -74,10 +74,6 @@ ZERO_WORTH = 30.0
 """Gain in log-likelihood that the slopes must promise before a log that the plain form explains is asked for its
 encoder's zero [dimensionless]. They promise 100 at least where one is off by 60 mm or more, 2.5 at most on logs of 30
 other kinds, and 14 on one of a play, which a zero would explain wrongly."""
-
-BESIDE_STOP = 0.02
-"""Share of its travel that an encoder homed at an end stop may read beyond the stop, which is soft; and what a log that
-begins in mid-stroke, at a reading of none, may read at first [fraction]."""
 
 TOO_WIDE = 20.0
 """Conductance of the make-up valves, over that of the first guess, from which a search is begun with the guess too
@@ -128,6 +124,7 @@ def fit_flow(
     What a pump's teeth deliver is taken up first (`estimation.fits.toothed`). A log that it does not explain is asked
     what is strange about rig, oil or logger (`estimation.fits.explain`).
     Gross outliers are taken out, and what the pump delivered while its speed is missing is read off the pressure after.
+    Where oil is so much stiffer than the rig file's that noise of position counts, a log is fitted anew from there.
 
     Parameters
     ----------
@@ -173,6 +170,10 @@ def fit_flow(
     turning = Turning(log.teeth, log.speed_offset)
     best, found = min(fits, key=_cost), weighed(fits, SURER, [_beforehand(fit) for fit in fits])
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
+    stiff = replace(parameters, bulk_modulus=swinging.values["bulk_modulus"])
+    if not log.passes_on and explains(swinging) and flow_log(record, stiff, uncertainties or {}, variances).passes_on:
+        more = {"loaded": loaded, "moving": moving, "filtered": filtered}
+        return fit_flow(record, stiff, stiff.bulk_modulus, uncertainties, variances, **more)
     log = carried(log, parameters, swinging.values)
     asked, open_ends = _asked(log, parameters, swinging, best, sensed, loaded=loaded, moving=moving)
     asked = (PRESSURE_LATE, *asked) if filtered and PRESSURE_LATE not in asked else asked
@@ -183,7 +184,7 @@ def fit_flow(
         near = _near(swinging, starts, explains, in_motion=loaded or moving)
         near = [best.values, *near] if best is not swinging and explains(best) else near
         paired = any(one not in (*ALWAYS_ASKED, PLAY) for one in asked)
-        homed = _homed_at_stop(log)
+        homed = homed_at_stop(log)
         by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
         strange = explain(log, parameters, near, explains, asked=asked, paired=paired, by_mass=by_mass)
         one = strange.fit
@@ -212,14 +213,6 @@ def fit_flow(
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
     (value, std), chi = found["bulk_modulus"], best.chi_square[0]
     return FormFit(believed, std / value, chi, reasons, best.rig_slopes, remarks=remarks, turning=turning)
-
-
-def _homed_at_stop(log: GreyBoxLog) -> bool:
-    """Return whether an encoder may have been homed at an end stop: it reads one sign only, and not zero at first."""
-    read = log.drives[:, FLOW_FORM.drives.index(POSITION)]
-    low, high = float(np.min(read)), float(np.max(read))
-    beside = BESIDE_STOP * (high - low)
-    return min(max(-low, 0.0), max(high, 0.0)) <= beside < abs(float(read[0]))
 
 
 def _wanted(names: Sequence[str], best: GreyBoxFit, swinging: GreyBoxFit, *, homed: bool, late: bool) -> float:
@@ -263,7 +256,7 @@ def _asked(
     delivery, zero, *hidden = promised_each(
         log, parameters, swinging.values, ALWAYS_ASKED, by_mass=by_mass, slopes=_slopes(swinging, log)
     )
-    shows_zero = best is swinging or _homed_at_stop(log)
+    shows_zero = best is swinging or homed_at_stop(log)
     if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
         zero = max(zero, promised(log, parameters, best.values, ENCODER_ZERO))
     worn = delivery.gain > WORTH and delivery.size > LEAST_DELIVERY
@@ -324,12 +317,12 @@ def _cost(fit: GreyBoxFit) -> float:
     return fit.cost
 
 
-def _explains(fit: GreyBoxFit, noisy: bool) -> bool:
-    return not _objections(fit, noisy)
-
-
 def _explains_all(fit: GreyBoxFit, noisy: bool) -> bool:
     return _explains(fit, noisy) and (noisy or fit.chi_square[0] <= DOUBTED)
+
+
+def _explains(fit: GreyBoxFit, noisy: bool) -> bool:
+    return not _objections(fit, noisy)
 
 
 def _objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:

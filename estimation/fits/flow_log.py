@@ -47,6 +47,10 @@ FELT_NOISE = 0.1
 STRUCK = ("motor_speed_rad_s", "differential_pressure_pa")
 """Channels that a binary drive strikes so often that second differences take its blows for noise."""
 
+BESIDE_STOP = 0.02
+"""Share of its travel that an encoder homed at an end stop may read beyond the stop, which is soft; and what a log that
+begins in mid-stroke, at a reading of none, may read at first [fraction]."""
+
 NOISY_BLOCK = 5e-3
 """Length over which residuals are averaged then [s]: what they say of bulk modulus is slower, the noise is not. With 1
 ms, 50 um of noise put bulk modulus of leaky actuators up to 4 % low, with 5 ms 2.5 %."""
@@ -188,6 +192,25 @@ def carried(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, flo
     remembered = 0.5 / max(stiffness * values["leakage_coefficient"], 1.0 / (len(log.drives) * log.sample_time))
     felt = walk * remembered > FELT_NOISE**2 * noise.variance
     return replace(log, noise=(replace(noise, walk=walk),)) if felt else log
+
+
+def homed_at_stop(log: GreyBoxLog) -> bool:
+    """Return whether an encoder may have been homed at an end stop: it reads one sign only, and not zero at first.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the flow form sees it.
+
+    Returns
+    -------
+    bool
+        Whether it may.
+    """
+    read = log.drives[:, FLOW_FORM.drives.index("position_m")]
+    low, high = float(np.min(read)), float(np.max(read))
+    beside = BESIDE_STOP * (high - low)
+    return min(max(-low, 0.0), max(high, 0.0)) <= beside < abs(float(read[0]))
 
 
 def _swept_share(position: Array, p: EhaParameters) -> float:

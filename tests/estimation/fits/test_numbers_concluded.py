@@ -11,7 +11,8 @@ import pytest
 from estimation.fits import flow_fit, motion_fit
 from estimation.fits.descent import Point
 from estimation.fits.explain import _Tried
-from estimation.fits.flow_fit import _explains_all, _homed_at_stop, _slopes, _wanted, fit_flow
+from estimation.fits.flow_fit import _explains_all, _slopes, _wanted, fit_flow
+from estimation.fits.flow_log import homed_at_stop
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.hypotheses import BEGUN, HYPOTHESES, MAY_HIDE
 from estimation.fits.motion_fit import _log, _starts, _steps, unseen
@@ -128,7 +129,7 @@ def encoders_that_were_homed() -> dict[str, Any]:
         drives = np.zeros((len(read), 2))
         drives[:, FLOW_FORM.drives.index("position_m")] = read
         one: Any = SimpleNamespace(drives=drives)
-        return _homed_at_stop(one)
+        return homed_at_stop(one)
 
     return {
         "beyond the stop": edge(lambda over: homed(0.1, 0.3, -over), 0.0, 0.05),

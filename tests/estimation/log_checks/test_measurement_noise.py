@@ -5,7 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances, position_variance
+from estimation.log_checks.measurement_noise import (
+    SMALLEST_VARIANCE,
+    measurement_variances,
+    position_variance,
+    struck_variance,
+)
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.simulate import LUMPED, simulate
@@ -111,3 +116,21 @@ def test_a_variance_is_that_of_the_channel_as_it_is_now() -> None:
     )
     assert other["velocity_m_s"] == pytest.approx(4.0 * one["velocity_m_s"], rel=1e-9)
     assert position_variance(2.0 * noise) == pytest.approx(4.0 * position_variance(noise), rel=1e-9)
+
+
+def test_blows_of_a_binary_drive_do_not_pass_for_noise() -> None:
+    rng = np.random.default_rng(3)
+    blows = np.zeros(15_000)
+    blows[::20] = rng.choice((-1.0, 1.0), 750)
+    time = 1e-3 * np.arange(200)
+    rung = np.exp(-40.0 * time) * np.sin(2.0 * np.pi * 60.0 * time)
+    struck = 1e5 * np.convolve(blows, rung)[:15_000] + rng.normal(0.0, 5e3, 15_000)
+    assert 0.9 * 25e6 < struck_variance(struck) < 1.2 * 25e6  # a blow is in seven differences of twenty
+    channel = "differential_pressure_pa"
+    assert measurement_variances(Record(1e-3, {channel: struck}), [channel])[channel] > 2.0 * 25e6
+    assert struck_variance(np.where(np.arange(15_000) % 40 == 7, np.nan, struck)) == pytest.approx(25e6, rel=0.3)
+
+
+@pytest.mark.parametrize("values", [np.zeros(100), np.arange(5.0), np.full(100, np.nan)])
+def test_a_channel_that_shows_no_noise_has_none_to_be_counted(values: np.ndarray) -> None:
+    assert struck_variance(values) == np.inf
