@@ -54,8 +54,8 @@ ROUGH_ENOUGH = 0.05
 the optimum off by more. With 0.3 logs of a sine, whose valleys are flat, took twice as many short steps after."""
 
 FINISHING = 60
-"""Evaluations with short model steps. Most searches end by themselves by the tenth. Where oil is stiff and a pump large,
-long model steps lead so far astray that 15 left 74 of log-likelihood, and bulk modulus 1.3 % off [count]."""
+"""Evaluations with short model steps. Most searches end by themselves by the tenth. Where oil is stiff and a pump is
+large, long model steps lead so far astray that 15 left 74 of log-likelihood, and bulk modulus 1.3 % off [count]."""
 
 SETTLING = 15
 """The same of a form that no more than long steps explain: it is then asked what is strange [count]."""
