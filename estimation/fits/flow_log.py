@@ -44,9 +44,6 @@ FELT_GAP = 0.1
 FELT_NOISE = 0.1
 """Noise of position matters to the slopes where it moves pressure by this share of the sensor's own [fraction]."""
 
-STRUCK = ("motor_speed_rad_s", "differential_pressure_pa")
-"""Channels that a binary drive strikes so often that second differences take its blows for noise."""
-
 BESIDE_STOP = 0.02
 """Share of its travel that an encoder homed at an end stop may read beyond the stop, which is soft; and what a log that
 begins in mid-stroke, at a reading of none, may read at first [fraction]."""
@@ -132,7 +129,8 @@ def flow_log(
     GreyBoxLog
         Averaged where it is faster than the form has use for.
     """
-    quiet = {name: min(variances[name], struck_variance(record[name])) for name in STRUCK}
+    pressure = "differential_pressure_pa"  # a motor's blows stay in its noise: so intervals hold its course
+    quiet = {pressure: min(variances[pressure], struck_variance(record[pressure]))}
     log = greybox_log(
         FLOW_FORM,
         record,
@@ -188,7 +186,9 @@ def carried(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, flo
         The same log where the walk is not felt beside the pressure sensor's noise before the oil has leaked off.
     """
     (noise,), stiffness = log.noise, values["bulk_modulus"] / parameters.chamber_volume
-    walk = (stiffness * parameters.pump_displacement * log.drive_std[0]) ** 2 * log.sample_time
+    speed = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
+    variance = min(log.drive_std[0] ** 2, struck_variance(speed))
+    walk = (stiffness * parameters.pump_displacement) ** 2 * variance * log.sample_time
     remembered = 0.5 / max(stiffness * values["leakage_coefficient"], 1.0 / (len(log.drives) * log.sample_time))
     felt = walk * remembered > FELT_NOISE**2 * noise.variance
     return replace(log, noise=(replace(noise, walk=walk),)) if felt else log

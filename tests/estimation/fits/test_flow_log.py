@@ -11,6 +11,7 @@ from estimation.fits.flow_fit import fit_flow
 from estimation.fits.flow_log import _swept_share, carried, flow_log, without_strays
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_problem import Problem
+from estimation.log_checks.measurement_noise import struck_variance
 from estimation.models.flow import FLOW_FORM, STIFFNESS
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import circuit_of
@@ -160,11 +161,14 @@ def test_in_a_gap_the_pump_delivers_what_the_piston_swept_and_the_oil_yielded() 
 
 def test_noise_of_speed_stays_where_oil_is_stiff_and_hardly_leaks() -> None:
     record, true = log("normal", 7)
-    seen = replace(flow_log(*_sound(record)), drive_std=(0.5, 0.0))
-    found = {"bulk_modulus": 5.0 * true, "leakage_coefficient": HEALTHY.leakage_coefficient}
-    stiff, stiffer = (carried(seen, HEALTHY, {**found, "bulk_modulus": times * true}).noise[0] for times in (5.0, 10.0))
-    kept = 5.0 * true / HEALTHY.chamber_volume * HEALTHY.pump_displacement * 0.5
-    assert stiff.walk == pytest.approx(kept**2 * seen.sample_time)
+    seen = flow_log(*_sound(record))
+    found = {"bulk_modulus": 50.0 * true, "leakage_coefficient": HEALTHY.leakage_coefficient}
+    stiff, stiffer = (
+        carried(seen, HEALTHY, {**found, "bulk_modulus": times * true}).noise[0] for times in (50.0, 100.0)
+    )
+    kept = 50.0 * true / HEALTHY.chamber_volume * HEALTHY.pump_displacement
+    noise = min(seen.drive_std[0] ** 2, struck_variance(seen.drives[:, 0]))
+    assert stiff.walk == pytest.approx(kept**2 * noise * seen.sample_time)
     assert stiffer.walk == pytest.approx(4.0 * stiff.walk)
     assert replace(stiff, walk=0.0) == seen.noise[0]
     assert carried(seen, HEALTHY, {**found, "leakage_coefficient": 1e4 * HEALTHY.leakage_coefficient}) is seen
