@@ -34,7 +34,7 @@ def test_a_speed_ahead_of_position_and_pressure_is_named_with_its_time_and_put_b
 
 
 def test_half_a_millisecond_of_a_position_is_taken_up_where_it_shows() -> None:
-    record = log(duration=2.0)
+    record = log(duration=3.0)
     rows = np.arange(len(record))
     given = record.replace(position_m=np.interp(rows - 0.5, rows, record["position_m"]))
     found = explained(given)
