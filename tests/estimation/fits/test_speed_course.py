@@ -19,7 +19,7 @@ def motor(asked: float, time: Array) -> tuple[Array, Array]:
 
 
 def test_a_motor_that_starts_at_its_largest_acceleration_has_turned_as_far_as_straight_lines_say() -> None:
-    speed, angle = motor(300.0, SAMPLE * np.arange(41))
+    speed, angle = motor(300.0, SAMPLE * np.arange(41.0))
     turned = [np.concatenate([[0.0], np.cumsum(0.5 * (s[1:] + s[:-1])) * SAMPLE]) for s in (speed, straightened(speed))]
     plainly, bent = (np.max(np.abs(one - angle)) for one in turned)
     assert plainly == pytest.approx(ACCELERATION * SAMPLE**2 / 12.0, rel=0.05)
