@@ -34,4 +34,6 @@ def straightened(speed: Array) -> Array:
     [0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 4.0]
     """
     bends = np.pad(np.diff(speed, n=2), 2) if len(speed) > 2 else np.zeros(len(speed) + 2)
-    return speed - np.median(np.stack([bends[:-2], bends[1:-1], bends[2:]]), axis=0) / 12.0
+    before, here, after = bends[:-2], bends[1:-1], bends[2:]
+    median = np.maximum(np.minimum(before, here), np.minimum(np.maximum(before, here), after))
+    return speed - median / 12.0
