@@ -175,9 +175,9 @@ def struck_variance(values: Array) -> float:
 
 
 def _struck_variance(values: Array) -> float:
-    values = values[np.isfinite(values)]
     bends = np.diff(values, n=SMOOTH)
-    deviation = _grouped_median(np.abs(bends), _step(values)) if len(bends) else 0.0
+    bends = bends[np.isfinite(bends)]  # a difference across a missing sample holds the ringing
+    deviation = _grouped_median(np.abs(bends), _step(values[np.isfinite(values)])) if len(bends) else 0.0
     return (NORMAL_MAD * deviation) ** 2 / comb(2 * SMOOTH, SMOOTH) if deviation > 0.0 else np.inf
 
 
