@@ -192,12 +192,12 @@ def counting_missing(update: Outputs) -> Outputs:
     update : dict[str, Expression]
         As `Halves` has it.
     """
-    changed: Outputs = {}
-    for name, value in update.items():
+
+    def counted(name: str) -> Expression:
         present = unary("present", symbol(name.replace("count", "y")))
-        missing = select(present, ZERO, ONE)
-        changed[name] = symbol(name) - missing if name.startswith("count") else value
-    return changed
+        return symbol(name) - select(present, ZERO, ONE)
+
+    return {name: counted(name) if name.startswith("count") else value for name, value in update.items()}
 
 
 def all_present(update: Outputs) -> Outputs:

@@ -171,7 +171,8 @@ def fit_flow(
     best, found = min(fits, key=_cost), weighed(fits, SURER, [_beforehand(fit) for fit in fits])
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
     stiff = replace(parameters, bulk_modulus=swinging.values["bulk_modulus"])
-    if not log.passes_on and explains(swinging) and flow_log(record, stiff, uncertainties or {}, variances).passes_on:
+    stiffer = not log.passes_on and stiff.bulk_modulus > parameters.bulk_modulus  # noise counts more in stiff oil alone
+    if stiffer and explains(swinging) and flow_log(record, stiff, uncertainties or {}, variances).passes_on:
         more = {"loaded": loaded, "moving": moving, "filtered": filtered}
         return fit_flow(record, stiff, stiff.bulk_modulus, uncertainties, variances, **more)
     log = carried(log, parameters, swinging.values)
@@ -317,12 +318,12 @@ def _cost(fit: GreyBoxFit) -> float:
     return fit.cost
 
 
-def _explains_all(fit: GreyBoxFit, noisy: bool) -> bool:
-    return _explains(fit, noisy) and (noisy or fit.chi_square[0] <= DOUBTED)
-
-
 def _explains(fit: GreyBoxFit, noisy: bool) -> bool:
     return not _objections(fit, noisy)
+
+
+def _explains_all(fit: GreyBoxFit, noisy: bool) -> bool:
+    return _explains(fit, noisy) and (noisy or fit.chi_square[0] <= DOUBTED)
 
 
 def _objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:

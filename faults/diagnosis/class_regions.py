@@ -140,9 +140,10 @@ def fit_classes(
         fits += other_friction(blocks, actuator, first, list(CONDITIONS)[nearest])
     known = [believed_information(fit, blocks, stuck=stuck) for fit in fits]
     least = int(np.argmin([fit.cost for fit in fits]))
+    worse = behind(fits, fits[least], blocks)
     scores = [
-        region_scores(fit, information, actuator) - worse
-        for fit, information, worse in zip(fits, known, behind(fits, fits[least], blocks), strict=True)
+        region_scores(fit, information, actuator) - lead
+        for fit, information, lead in zip(fits, known, worse, strict=True)
     ]
     held = np.max(scores, axis=0) - misfit(blocks, fits[least].fitted) / LASTING
     centre = actuator.conditions[np.argmax(held)]
@@ -154,7 +155,7 @@ def fit_classes(
     else:
         seen, seldom = _NO_FRICTION if stuck else np.ones(len(COORDINATES)), seldom_known_slopes(best, blocks, actuator)
         spread = doubt_of(best, seldom, blocks, actuator.conditions, held, seen, spreads_of(actuator))
-        spread = spread + between_fits(fits, best, blocks)
+        spread = spread + between_fits(fits, best, worse)
     errors = np.array([scales_of(blocks, run) for run in runs])
     return ClassFits(best, known[least], nominal, errors, held, spread, lasting)
 

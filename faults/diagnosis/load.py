@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 
 from estimation.eha.result import BulkModulusEstimate
+from estimation.finding import interval_95
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.class_fit import LASTING, misfit
 from faults.diagnosis.force_balance import LEAST, SURE, Loads, force_balance, friction_believed
@@ -27,9 +28,6 @@ LOADS_TRIED = 3
 
 ASKING = {AgainstCode.PRESSURE_BIAS, AgainstCode.UNEXPLAINED}
 """What speaks against a circuit that stands under another load than it is told."""
-
-TWO_SIDED = 1.96
-"""Half-width of a 95 % interval [dimensionless], in standard deviations."""
 
 
 class Loaded(NamedTuple):
@@ -165,20 +163,16 @@ def _told(found: "Diagnosis", loaded: EhaParameters, seen: Loads | None, rig: Eh
         return None
     notes: list[Note] = []
     if more != 0.0:
-        value, (low, high) = loaded.load_force, _ends(loaded.load_force, std)
+        value, (low, high) = loaded.load_force, interval_95(loaded.load_force, std)
         bias = value / loaded.piston_area
         notes.append(ClassCode.LOAD_ON_ROD.note(force_n=value, low=low, high=high, pressure_pa=bias))
     if seen is not None and (value := loaded.load_stiffness) != rig.load_stiffness:
-        low, high = _ends(value, seen.of("load_stiffness")[1])
+        low, high = interval_95(value, seen.of("load_stiffness")[1])
         notes.append(ClassCode.SPRING_ON_ROD.note(value=value, low=low, high=high, rig=rig.load_stiffness))
     if seen is not None and (value := loaded.moving_mass) != rig.moving_mass:
-        low, high = _ends(value, seen.of("moving_mass")[1])
+        low, high = interval_95(value, seen.of("moving_mass")[1])
         notes.append(ClassCode.MASS_ON_ROD.note(value=value, low=low, high=high, rig=rig.moving_mass))
     return Loaded(found, loaded, tuple(notes))
-
-
-def _ends(value: float, std: float) -> tuple[float, float]:
-    return value - TWO_SIDED * std, value + TWO_SIDED * std
 
 
 def _asks(found: "Diagnosis") -> bool:

@@ -99,7 +99,7 @@ def doubt_of(
     centres: Array,
     odds: Array,
     seen: Array,
-    spreads: Array | None = None,
+    spreads: Array,
 ) -> Array:
     """Return the second moment of a fit's error in its coordinates.
 
@@ -117,8 +117,8 @@ def doubt_of(
         Log-likelihoods of the conditions [dimensionless], up to a constant.
     seen : ndarray, shape (7,)
         1 for what the log can tell, 0 for what it cannot, as friction of a piston that sticks.
-    spreads : ndarray, shape (m,), optional
-        Standard deviations of what is seldom known, see `spreads_of`; those of `SELDOM_KNOWN` if not given.
+    spreads : ndarray, shape (m,)
+        Standard deviations of what is seldom known, see `spreads_of`.
 
     Returns
     -------
@@ -133,7 +133,6 @@ def doubt_of(
     slopes = np.where(blocks.seen, slopes / weight, 0.0).reshape(len(slopes), -1)
     prior = np.zeros((len(slopes), len(slopes)))
     prior[:known, :known] = np.linalg.inv(WEAK)
-    spreads = np.array(list(SELDOM_KNOWN.values())) if spreads is None else spreads
     prior[known:, known:] = np.diag(spreads**-2.0)
     covariance = np.linalg.inv(slopes @ slopes.T + prior)
     pulled = slopes @ np.where(blocks.seen, left / weight, 0.0).ravel()

@@ -138,7 +138,7 @@ def _roughness(blocks: Blocks, scales: Array, noise: Array) -> Array:
     return np.asarray(rough * np.maximum(1.0 - (noise / scales) ** 2, 0.0), dtype=np.float64)
 
 
-def between_fits(fits: Sequence[PointFit], best: PointFit, blocks: Blocks) -> Array:
+def between_fits(fits: Sequence[PointFit], best: PointFit, worse: Array) -> Array:
     """Return what other ends of a search, which explain the log nearly as well, add to the doubt of the best.
 
     Parameters
@@ -147,15 +147,14 @@ def between_fits(fits: Sequence[PointFit], best: PointFit, blocks: Blocks) -> Ar
         The ends of the search.
     best : PointFit
         The one that is told.
-    blocks : Blocks
-        The log.
+    worse : ndarray, shape (fits,)
+        How far each is behind that one, by `behind` [dimensionless].
 
     Returns
     -------
     ndarray, shape (7, 7)
         Second moment about the best [dimensionless]; none where the others explain much less.
     """
-    worse = behind(fits, best, blocks)
     shares = np.exp(np.min(worse) - worse)
     off = np.array([fit.coordinates - best.coordinates for fit in fits])
     return np.asarray((off.T * shares / np.sum(shares)) @ off, dtype=np.float64)

@@ -8,11 +8,12 @@ import pytest
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.class_fit import WEAK, Actuator, PointFit
-from faults.diagnosis.model_doubt import LOOKS, SELDOM_KNOWN, doubt_of, seldom_known_slopes
+from faults.diagnosis.model_doubt import LOOKS, SELDOM_KNOWN, doubt_of, seldom_known_slopes, spreads_of
 from plant.eha.model import EhaParameters
 
 ACTUATOR = Actuator.of(EhaParameters())
 CENTRE, SURE, ALL = ACTUATOR.conditions[:1], np.zeros(1), np.ones(7)
+SPREADS = spreads_of(ACTUATOR)
 NOISE = np.array([1e-4, 1e3])
 
 
@@ -37,7 +38,7 @@ def nothing_seldom(blocks: int) -> np.ndarray:
 
 def variances(blocks: int, share: float = 0.0) -> np.ndarray:
     fit, one = told(blocks, share)
-    return np.diag(doubt_of(fit, nothing_seldom(blocks), one, CENTRE, SURE, ALL))
+    return np.diag(doubt_of(fit, nothing_seldom(blocks), one, CENTRE, SURE, ALL, SPREADS))
 
 
 def test_noise_alone_averages_away_and_the_error_of_a_wrong_model_does_not() -> None:
@@ -57,7 +58,7 @@ def test_each_output_answers_for_its_own_error() -> None:
     velocity_off = replace(fit, scales=NOISE * [10.0, 1.0])
     both_off = replace(fit, scales=NOISE * 10.0)
     sure, less, least = (
-        doubt_of(one_fit, nothing_seldom(1_410), one, CENTRE, SURE, ALL)[0, 0]
+        doubt_of(one_fit, nothing_seldom(1_410), one, CENTRE, SURE, ALL, SPREADS)[0, 0]
         for one_fit in (fit, velocity_off, both_off)
     )
     assert less == pytest.approx(2.0 * sure, rel=0.1)  # pressure still tells all that it told
@@ -71,7 +72,7 @@ def test_what_is_seldom_known_widens_what_answers_like_it_as_far_as_the_log_leav
     alike[1] = fit.slopes[0]
     apart[1] = fit.slopes[0] * np.where(np.arange(blocks) % 2, 3.0, -1.0)[:, None]
     sure, open_, seen = (
-        np.sqrt(doubt_of(fit, seldom, one, CENTRE, SURE, ALL)[0, 0])
+        np.sqrt(doubt_of(fit, seldom, one, CENTRE, SURE, ALL, SPREADS)[0, 0])
         for seldom in (nothing_seldom(blocks), alike, apart)
     )
     assert open_ == pytest.approx(min(SELDOM_KNOWN["makeup_opening"], np.sqrt(WEAK[0, 0])), rel=0.3)
@@ -85,8 +86,10 @@ def test_what_the_log_says_of_what_is_seldom_known_counts_as_far_as_the_fit_went
     seldom[1] = fit.slopes[0] + fit.slopes[1] * 0.5
     rest = seldom[1] - fit.slopes[0]  # what is left once the first coordinate has given way, and the second may not
     given_way = replace(fit, slopes=fit.slopes * np.array([1, 0, 1, 1, 1, 1, 1])[:, None, None])
-    without = doubt_of(given_way, seldom, one, CENTRE, SURE, ALL)[0, 0]
-    strayed = doubt_of(replace(given_way, fitted=one.outputs - by * rest), seldom, one, CENTRE, SURE, ALL)[0, 0]
+    without = doubt_of(given_way, seldom, one, CENTRE, SURE, ALL, SPREADS)[0, 0]
+    strayed = doubt_of(replace(given_way, fitted=one.outputs - by * rest), seldom, one, CENTRE, SURE, ALL, SPREADS)[
+        0, 0
+    ]
     assert np.sqrt(strayed - without) == pytest.approx(by, rel=0.05)
 
 
@@ -98,7 +101,7 @@ def test_friction_of_a_piston_that_sticks_is_open_to_each_condition_that_is_as_l
     two = ACTUATOR.conditions[[0, 4]]
     apart = two[1, rated] - two[0, rated]
     alone, even, unlikely = (
-        doubt_of(fit, nothing_seldom(blocks), one, two, odds, hidden)
+        doubt_of(fit, nothing_seldom(blocks), one, two, odds, hidden, SPREADS)
         for odds in (np.array([0.0, -1e3]), np.zeros(2), np.array([0.0, -20.0]))
     )
     assert alone[rated, rated] == pytest.approx(WEAK[rated, rated], rel=1e-6)

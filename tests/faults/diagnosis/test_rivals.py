@@ -77,16 +77,20 @@ def test_without_pressure_and_of_a_circuit_that_ran_away_the_misfit_decides() ->
 def test_ends_of_a_search_that_explain_alike_widen_and_worse_ones_do_not() -> None:
     one, off = log(), np.full(7, 0.3)
     fit, alike = leaving(1.0, 1.0, one), leaving(1.0, 1.0, one, 0.3)
-    np.testing.assert_allclose(between_fits([fit, alike], fit, one), 0.5 * np.outer(off, off), rtol=1e-12)
-    assert np.all(between_fits([leaving(3.0, 3.0, one, 0.3), fit], fit, one) < 1e-4)
-    assert np.all(between_fits([fit], fit, one) == 0.0)
+
+    def added(fits: list[PointFit]) -> np.ndarray:
+        return between_fits(fits, fit, behind(fits, fit, one))
+
+    np.testing.assert_allclose(added([fit, alike]), 0.5 * np.outer(off, off), rtol=1e-12)
+    assert np.all(added([leaving(3.0, 3.0, one, 0.3), fit]) < 1e-4)
+    assert np.all(added([fit]) == 0.0)
 
 
 def test_friction_of_a_creeping_piston_is_as_open_as_the_circuits_that_follow_it_roughly_differ() -> None:
     one, off = log(), np.full(7, 0.3)
     fit, other = leaving(30.0, 1.0, one), leaving(33.0, 1.0, one, 0.3)
     assert misfit(one, other.fitted) - misfit(one, fit.fitted) > 5.0 * LASTING
-    assert np.all(between_fits([fit, other], fit, one) > 0.3 * np.outer(off, off))
+    assert np.all(between_fits([fit, other], fit, behind([fit, other], fit, one)) > 0.3 * np.outer(off, off))
 
 
 def test_a_piston_creeps_where_more_than_noise_and_a_share_of_its_velocity_is_left() -> None:
