@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
+from functools import lru_cache
 from math import isfinite
 from types import MappingProxyType
 from typing import Annotated, Literal, TypeAlias, get_args
@@ -170,6 +171,12 @@ def severity(leakage: float, friction: float, base: EhaParameters = PAPER_RIG) -
     """
     _require_severity("leakage severity", leakage)
     _require_severity("friction severity", friction)
+    return _at_severity(leakage, friction, base)
+
+
+@lru_cache(maxsize=256)
+def _at_severity(leakage: float, friction: float, base: EhaParameters) -> EhaParameters:
+    """Return the actuator as `severity` describes it; a batch asks for the same nine of one rig with every log."""
     leaking = _changed(base, LEAKAGE_TABLE, leakage, _leakage_scales(base))
     rubbing = _changed(base, FRICTION_TABLE, friction, _friction_scales(base))
     return replace(base, **leaking, **rubbing)
