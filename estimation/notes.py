@@ -241,5 +241,6 @@ class RigCode(Code):
     )
     CHECKS_CRACK = (
         "the make-up valves open {crack_pa:.3g} ± {half_width_pa:.2g} Pa below the accumulator pressure in the rig file"
+        " on average, that of port {side} {later_pa:.3g} ± {later_half_width_pa:.2g} Pa lower than the other"
     )
     EXPLAINED_OTHERWISE = "{count} other explanation(s) fit the log about as well; the interval includes them"

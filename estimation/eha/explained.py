@@ -203,8 +203,14 @@ def _blocked(found: Explanation, _: EhaParameters) -> Note:
 
 
 def _crack(found: Explanation, _: EhaParameters) -> Note:
-    value = found.values["crack_pressure"][0]
-    return RigCode.CHECKS_CRACK.note(crack_pa=value, half_width_pa=_half_width(found, "crack_pressure"))
+    mean, later = (found.values[name][0] for name in ("crack_pressure", "crack_difference"))
+    return RigCode.CHECKS_CRACK.note(
+        crack_pa=mean,
+        half_width_pa=_half_width(found, "crack_pressure"),
+        side="A" if later > 0.0 else "B",
+        later_pa=abs(later),
+        later_half_width_pa=_half_width(found, "crack_difference"),
+    )
 
 
 def _drains(side: str) -> Callable[[Explanation, EhaParameters], Note]:

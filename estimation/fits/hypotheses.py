@@ -169,7 +169,7 @@ HYPOTHESES = (
         tuple({"area_difference": differ, "volume_difference": differ, "pilot_share": 1.0} for differ in (-0.15, 0.15)),
         least=LEAST_ROD,
     ),
-    Hypothesis("checks_crack", ("crack_pressure",), ({"crack_pressure": 1e4},)),
+    Hypothesis("checks_crack", ("crack_pressure", "crack_difference"), ({"crack_pressure": 1e4},)),
     *PORTS_DRAIN,
 )
 """In no order: the log chooses."""
@@ -189,6 +189,7 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "air_onset": (0.0, 1.0),
     "leakage_growth": (-2.0, 2.0),
     "crack_pressure": (-1e5, 2e5),
+    "crack_difference": (-2e5, 2e5),
     "crack_a": (-2e4, 2e4),
     "crack_b": (-2e4, 2e4),
     "leakage_bend": (-4.0, 4.0),

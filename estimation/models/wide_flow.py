@@ -66,7 +66,8 @@ class WideFlowParameters(FlowParameters):
     leakage_growth: float = si(0.0, "1", "growth of leakage over the log, of its value halfway", "fitted")
     leakage_bend: float = si(0.0, "1", "part of that growth which goes with time squared", "fitted")
     leakage_rise: float = si(0.0, "1", "rise of the logarithm of leakage over the log", "fitted")
-    crack_pressure: float = si(0.0, "Pa", "drop at which the make-up valves crack", "fitted")
+    crack_pressure: float = si(0.0, "Pa", "drop at which the make-up valves crack, on average of the two", "fitted")
+    crack_difference: float = si(0.0, "Pa", "drop at which valve A cracks over that of valve B", "fitted")
     makeup_share_b: float = si(1.0, "1", "conductance of valve B over that of A", "fitted")
     drain_share_a: float = si(1.0, "1", "drain of port A over the case leakage", "fitted")
     drain_share_b: float = si(1.0, "1", "drain of port B over the case leakage", "fitted")
@@ -103,9 +104,9 @@ def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Sc
     grown = grown_leakage(elapsed, p.leakage_growth, p.leakage_bend, p.leakage_rise)
     leaked = leaked_flow(dp, p.leakage_coefficient * grown, p)
     opening, pilot, conductance = p.makeup_opening, p.pilot_share, p.makeup_conductance
-    cracking = supply - p.crack_pressure
-    fed_1 = make_up_flow(p1, p2, cracking - p.crack_a, conductance, opening, pilot)
-    fed_2 = make_up_flow(p2, p1, cracking - p.crack_b, p.makeup_share_b * conductance, opening, pilot)
+    cracking, later = supply - p.crack_pressure, 0.5 * p.crack_difference
+    fed_1 = make_up_flow(p1, p2, cracking - later - p.crack_a, conductance, opening, pilot)
+    fed_2 = make_up_flow(p2, p1, cracking + later - p.crack_b, p.makeup_share_b * conductance, opening, pilot)
     drain = p.case_leakage * grown
     into_1 = fed_1 - p.drain_share_a * drain * (p1 - supply)
     into_2 = fed_2 - p.drain_share_b * drain * (p2 - supply)
@@ -201,6 +202,7 @@ LINEAR = {
     "leakage_bend": 1.0,
     "leakage_rise": 1.0,
     "crack_pressure": 1e4,
+    "crack_difference": 1e4,
     **dict.fromkeys(CRACKS, USUAL_CRACK),
     "area_difference": 0.1,
     "volume_difference": 0.1,

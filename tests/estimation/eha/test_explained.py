@@ -93,7 +93,15 @@ def test_volume_load_relief_and_check_valves_are_told_beside_the_rigs() -> None:
         "half_width_pa": 1e4 * NORMAL,
         "rig_pa": P.relief_pressure,
     }
-    assert data(told("checks_crack", crack_pressure=(4e4, 1e3))) == {"crack_pa": 4e4, "half_width_pa": 1e3 * NORMAL}
+    for later, side in ((6e3, "A"), (-6e3, "B")):
+        cracked = told("checks_crack", crack_pressure=(4e4, 1e3), crack_difference=(later, 2e3))
+        assert data(cracked) == {
+            "crack_pa": 4e4,
+            "half_width_pa": 1e3 * NORMAL,
+            "side": side,
+            "later_pa": 6e3,
+            "later_half_width_pa": 2e3 * NORMAL,
+        }
 
 
 def test_air_is_told_at_atmospheric_pressure_with_the_oil_without_it() -> None:

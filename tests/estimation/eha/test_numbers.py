@@ -51,6 +51,7 @@ VALUES: dict[str, tuple[float, float]] = {
     "leakage_coefficient": (2e-11, 1e-12),
     "makeup_share_b": (0.1, 0.01),
     "crack_pressure": (2e4, 1e3),
+    "crack_difference": (-5e3, 5e2),
     "case_leakage": (4e-12, 1e-13),
     "drain_share_a": (0.7, 0.1),
     "drain_share_b": (0.3, 0.1),

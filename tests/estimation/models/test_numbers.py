@@ -116,6 +116,7 @@ WIDE: dict[str, dict[str, float]] = {
     "growing": {"leakage_growth": 0.8, "leakage_bend": 0.5},
     "rising": {"leakage_rise": 1.5},
     "shrinking to nothing": {"leakage_growth": 40.0},
+    "valves that open apart": {"crack_pressure": 2e4, "crack_difference": 9e3},
     "other valves": {"crack_pressure": 2e3, "makeup_share_b": 0.5, "drain_share_a": 0.7, "drain_share_b": 1.4},
     "by mass": {"by_mass": 1.0},
 }

@@ -1,0 +1,43 @@
+"""Make-up valves that open late, each at a pressure of its own, as springs and seats of real ones do."""
+
+import numpy as np
+import pytest
+
+from estimation.eha.explained import notes_of
+from estimation.fits.flow_fit import fit_flow
+from estimation.log_checks.clean import clean_log
+from estimation.notes import RigCode
+from experiments.open_benchmark.logger import PLAIN, Logger
+from experiments.open_benchmark.machine import Machine
+from experiments.open_benchmark.run import run
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+PAPER = EhaParameters()
+
+
+def logged(crack_a: float, crack_b: float) -> Record:
+    """Return four seconds of an actuator whose make-up valves open so far below the accumulator's pressure [Pa]."""
+    machine = Machine(crack_a=crack_a, crack_b=crack_b, quadratic=1.1e6, linear=0.0, coulomb=490.0)
+    time = 1e-3 * np.arange(4000)
+    course = np.ones((len(time), 5))
+    course[:, 0] = 110.0 * np.sin(2.0 * np.pi * time) + 60.0 * np.sin(5.2 * np.pi * time)
+    course[:, 3] = 0.0
+    frame = Logger().log(run(machine, course), np.random.default_rng(3))
+    return Record(1e-3, {name: frame[name].to_numpy() for name in PLAIN})
+
+
+@pytest.mark.parametrize(("crack_a", "crack_b", "late"), [(2.8e4, 1.2e4, "A"), (1.2e4, 2.8e4, "B")])
+def test_valves_that_open_apart_are_named_and_are_no_offset_of_the_pressure(
+    crack_a: float, crack_b: float, late: str
+) -> None:
+    clean = clean_log(logged(crack_a, crack_b), PAPER)
+    fit = fit_flow(clean.record, PAPER, PAPER.bulk_modulus, {}, clean.variances)
+    assert fit.explanation is not None
+    assert not fit.reasons
+    (note,) = notes_of(fit.explanation, PAPER)
+    assert note.code is RigCode.CHECKS_CRACK
+    assert note.data["side"] == late
+    assert note.data["later_pa"] == pytest.approx(1.6e4, abs=3e3)
+    value, std = fit.parameters["bulk_modulus"]
+    assert abs(value - Machine().bulk_modulus) < 3.0 * std
