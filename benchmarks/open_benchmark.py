@@ -16,7 +16,7 @@ from experiments.open_benchmark.folders import write_set
 from experiments.open_benchmark.kinds import KINDS, SPLITS, VERSION
 from experiments.open_benchmark.score import score_set, summary
 
-NONE_WANTED = ("silent_beta", "silent_class", "false_unknown")
+NONE_WANTED = ("silent_beta", "silent_class", "false_unknown", "false_since")
 """Counts that are wanted to be zero where pressure is logged."""
 
 

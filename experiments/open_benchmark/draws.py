@@ -106,5 +106,6 @@ def course_of(setup: Setup, rng: np.random.Generator) -> Array:
     demand = DRIVES[setup.drive](room, rng)
     if setup.forward_first:
         demand *= np.sign(demand[np.flatnonzero(demand)[0]])
-    columns = demand, change.viscosity**along, change.wear**along, change.air + change.late_air * entering, rough
+    wear = change.wear**along * np.where(along >= change.late_from, change.late_wear, 1.0)
+    columns = demand, change.viscosity**along, wear, change.air + change.late_air * entering, rough
     return np.stack(columns, axis=1)

@@ -97,6 +97,18 @@ FAULTY = (
         conditions=("normal",),
     ),
     Kind(
+        "leakage_sets_in",
+        "leakage jumps from none to major between 30 and 70 % of the log",
+        lambda setup, rng: setup.with_change(
+            late_wear=LEAKAGE_TABLE["major"].leakage_coefficient / setup.machine.leakage,
+            late_from=rng.uniform(0.3, 0.7),
+        ),
+        (UNKNOWN, "minor_leakage", "major_leakage"),
+        r"since [\d.]+ s|\bgrow",
+        conditions=("normal",),
+        severity=False,
+    ),
+    Kind(
         "oil_warms",
         "viscosity halves over the log",
         lambda setup, _: setup.with_change(viscosity=0.5),

@@ -69,6 +69,8 @@ def truth_of(made: Made, split: str, index: int) -> dict[str, Any]:
         "index": index,
         "condition": setup.condition,
         "named": named,
+        "steady": change.steady,
+        "since_s": "" if change.late_wear == 1.0 else setup.begins(change.late_from),
     }
 
 

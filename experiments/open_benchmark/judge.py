@@ -69,11 +69,14 @@ def judge_class(said: Entries, truth: Entries) -> dict[str, Any]:
     -------
     dict[str, Any]
         ``verdict`` is right, wrong, unknown, none or failed; ``right`` also where unknown is acceptable.
+        ``false_since``: a condition is said to have begun within a log that has one from end to end. ``since``: what did
+        begin is dated within its interval; None where nothing did.
     """
     accept, got = str(truth["accept"]).split(";"), said.get("condition")
+    dated = _dated(said, truth)
     if got is None:
         verdict = "none" if said["outcome"] == "not_observable" else "failed"
-        return {"verdict": verdict, "right": False, "silent_class": False, "false_unknown": False}
+        return {"verdict": verdict, "right": False, "silent_class": False, "false_unknown": False, **dated}
     unknown = bool(said.get("unknown"))
     sure = (said.get("probabilities") or {}).get(got, 0.0) > SURE
     verdict = "unknown" if unknown else "right" if got in accept else "wrong"
@@ -82,6 +85,16 @@ def judge_class(said: Entries, truth: Entries) -> dict[str, Any]:
         "right": ("unknown" if unknown else got) in accept,
         "silent_class": verdict == "wrong" and sure,
         "false_unknown": unknown and "unknown" not in accept,
+        **dated,
+    }
+
+
+def _dated(said: Entries, truth: Entries) -> dict[str, Any]:
+    """Return whether what is said of when a condition began is false, and whether it is right."""
+    ends, began = said.get("since_ci95_s"), str(truth.get("since_s", ""))
+    return {
+        "false_since": ends is not None and str(truth.get("steady", "")) == "True",
+        "since": (ends is not None and ends[0] <= float(began) <= ends[1]) if began else None,
     }
 
 

@@ -107,7 +107,7 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     lines: list[dict[str, Any]] = []
     for (name, pressure), part in pd.DataFrame(rows).groupby(["set", "pressure"], sort=False):
         sizes = 100.0 * part["error"].dropna().astype(float).abs()
-        told = part["named"].dropna()
+        told, since = part["named"].dropna(), part["since"].dropna()
         lines.append(
             {
                 "set": name,
@@ -126,6 +126,8 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
                 "false_unknown": int(part["false_unknown"].sum()),
                 "wrong": int(part["verdict"].isin(["wrong", "failed"]).sum()),
                 "silent_class": int(part["silent_class"].sum()),
+                "false_since": int(part["false_since"].sum()),
+                "since": f"{int(since.sum())}/{len(since)}" if len(since) else "-",
                 "named": f"{int(told.sum())}/{len(told)}" if len(told) else "-",
                 "severities_%": 100.0 * part["covered_severities"].sum() / max(1, part["severities"].sum()),
                 "seconds": part["seconds"].mean(),

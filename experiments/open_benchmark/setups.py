@@ -19,8 +19,10 @@ class Change:
         Over those at the start, at the end; both run evenly in their logarithm [dimensionless].
     air, late_air : float
         Entrained air at atmospheric pressure throughout, and from `late_from` on, a unit of oil [dimensionless].
+    late_wear : float
+        Leakage over that before, from `late_from` on, at once [dimensionless].
     late_from : float
-        Part of the log after which late air is in [fraction].
+        Part of the log after which late air is in, or late wear [fraction].
     bursts : int
         How often friction grips.
     grip : float
@@ -31,9 +33,15 @@ class Change:
     wear: float = 1.0
     air: float = 0.0
     late_air: float = 0.0
+    late_wear: float = 1.0
     late_from: float = 0.5
     bursts: int = 0
     grip: float = 1.0
+
+    @property
+    def steady(self) -> bool:
+        """Whether the actuator is the same from the first sample to the last."""
+        return self == Change(air=self.air, late_from=self.late_from, grip=self.grip)
 
 
 @dataclass(frozen=True)
@@ -106,3 +114,7 @@ class Setup:
     def with_change(self, **changes: Any) -> "Setup":
         """Return a setup over which something else changes."""
         return replace(self, change=replace(self.change, **changes))
+
+    def begins(self, share: float) -> float:
+        """Return the time at which what comes in after a share of the run is in the log [s]."""
+        return share * (self.duration + self.logger.begin) - self.logger.begin

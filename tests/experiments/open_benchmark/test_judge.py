@@ -56,6 +56,26 @@ def test_a_class_is_silent_if_it_is_wrong_and_sure(
     assert (row["verdict"], row["silent_class"], row["false_unknown"]) == (verdict, silent, false_unknown)
 
 
+@pytest.mark.parametrize(
+    ("ends", "steady", "began", "false", "dated"),
+    [
+        (None, True, "", False, None),
+        ([5.2, 5.3], True, "", True, None),
+        ([5.2, 5.3], False, "", False, None),
+        ([5.2, 5.3], False, "5.25", False, True),
+        ([5.2, 5.3], False, "5.35", False, False),
+        (None, False, "5.25", False, False),
+    ],
+)
+def test_a_condition_that_began_within_a_log_is_dated_and_one_that_did_not_is_not(
+    ends: list[float] | None, *, steady: bool, began: str, false: bool, dated: bool | None
+) -> None:
+    said = diagnosis("normal", 0.99) | {"since_ci95_s": ends}
+    row = judge_class(said, {"accept": "normal", "steady": steady, "since_s": began})
+    assert (row["false_since"], row["since"]) == (false, dated)
+    assert judge_class(said, {"accept": "normal"})["since"] is None  # sets of others do not say
+
+
 def test_a_cause_is_named_in_any_sentence() -> None:
     assert named("", {"message": "lag"}) is None
     assert named(r"\blag", {"message": "ok", "warnings": ["pressure lags by 2 ms"]}) is True

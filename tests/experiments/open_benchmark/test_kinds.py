@@ -96,6 +96,16 @@ def test_every_kind_is_written_and_read_back(kind: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("_short")
+def test_the_truth_says_whether_and_when_an_actuator_changes(tmp_path: Path) -> None:
+    told = {}
+    for kind in ("plain", "entrained_air", "leakage_sets_in", "oil_warms", "intermittent_friction"):
+        (told[kind],) = read_truth(write_set(kind, "validation", 1, tmp_path).parent).to_dict("records")
+    assert [kind for kind, row in told.items() if row["steady"]] == ["plain", "entrained_air"]
+    assert [kind for kind, row in told.items() if row["since_s"] != ""] == ["leakage_sets_in"]
+    assert 0.6 < told["leakage_sets_in"]["since_s"] < 1.4  # of two seconds
+
+
+@pytest.mark.usefixtures("_short")
 @pytest.mark.parametrize("kind", ["plain", "chamber_pressures", "single_rod"])
 def test_the_project_reads_what_was_written(kind: str, tmp_path: Path) -> None:
     write_set(kind, "validation", 1, tmp_path)
