@@ -14,10 +14,11 @@ from estimation.finding import Change
 from faults.conditions import CONDITIONS
 from faults.diagnosis.blocks import LONGEST, Blocks, blocks_of
 from faults.diagnosis.circuit_runs import parameter_rows, predicted
-from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, least_scales, misfit, nominal_runs
+from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, least_scales, nominal_runs
 from faults.diagnosis.class_regions import ClassFits, fit_classes, lasting_misfit
 from faults.diagnosis.end_stop import stopped
 from faults.diagnosis.out_of_model import unexplained
+from faults.diagnosis.rivals import behind
 from faults.watch.events import SLOW, Alarm
 from faults.watch.watch import LEAST_LEARNING, SLOWEST, watch_record
 from plant.arrays import Array
@@ -28,7 +29,7 @@ EDGE = 1.0
 """What a log must hold before a change and after it [s]."""
 
 GAIN = 10.0
-"""Log-likelihood that two circuits must gain on one, in `LASTING` blocks that count as one [dimensionless]."""
+"""Log-likelihood that two circuits must gain on one [dimensionless]."""
 
 LATE, EARLY = 0.8, 0.1
 """How much later, or earlier, than it came a change may be seen [s]."""
@@ -142,11 +143,10 @@ def find_onset(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Cha
     parts = part_of(blocks, 0, place), part_of(blocks, place, len(blocks.velocity))
     runs, start = nominal_runs(blocks, actuator), fits.best.coordinates
     found = [fit_classes(part, actuator, runs=runs, start=start) for part in parts]
-    gain = misfit(blocks, fits.best.fitted) - sum(
-        misfit(part, one.best.fitted) for part, one in zip(parts, found, strict=True)
-    )
+    # each part is compared by itself: noise or a model's error that changes with the motion is no other condition
+    gain = sum(float(behind([fits.best], one.best, part)[0]) for part, one in zip(parts, found, strict=True))
     first, last = (int(np.argmax(one.scores)) for one in found)
-    if gain < GAIN * LASTING or first == last:
+    if gain < GAIN or first == last:
         return None
     if unexplained(
         parts[0], found[0], actuator

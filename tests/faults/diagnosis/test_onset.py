@@ -10,6 +10,7 @@ from scipy.special import chdtri
 from benchmarks.population import TEST, draw_logs
 from benchmarks.watching import CircuitStream
 from estimation.log_checks.clean import clean_log
+from experiments.open_benchmark.kinds import make
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import onset
 from faults.diagnosis.blocks import Blocks
@@ -78,6 +79,25 @@ def test_a_log_in_one_condition_is_judged_whole() -> None:
     assert found.record is record
     assert found.blocks.earlier is None
     assert np.all(np.isfinite(found.blocks.velocity))
+
+
+def foreign(kind: str, index: int) -> Record:
+    """Return a log of the open benchmark, whose physics no circuit here shares."""
+    log = make(kind, "training", index).log
+    channels = {str(name): log[name].to_numpy() for name in log if name != "time_s"}
+    return clean_log(Record(1e-3, channels), HEALTHY).record
+
+
+@pytest.mark.parametrize("index", [7, 17])
+def test_a_piston_that_creeps_at_first_was_in_no_other_condition_then(index: int) -> None:
+    assert last_part(foreign("plain", index), ACTUATOR).onset is None
+
+
+def test_a_seal_that_gives_way_is_dated_on_another_actuator() -> None:
+    found = last_part(foreign("leakage_sets_in", 2), ACTUATOR)
+    assert found.onset is not None
+    assert found.onset.before == "normal"
+    assert found.onset.ci95[0] <= 4.684 <= found.onset.ci95[1]
 
 
 def with_bursts(*begins: float) -> Record:
