@@ -224,6 +224,10 @@ class RigCode(Code):
         "leakage grows by a factor of {factor:.2f} over the log, from {first:.3g} to {last:.3g} m^3/(s Pa): more than "
         "warming oil explains"
     )
+    LEAKAGE_STEPS = (
+        "leakage changes from {first:.3g} to {last:.3g} m^3/(s Pa) after {percent_of_log:.3g} % of the log, within "
+        "{within_percent:.2g} % of it"
+    )
     LEAKAGE_DRIFTS = (
         "leakage changes by a factor of {factor:.2f} over the log, from {first:.3g} to {last:.3g} m^3/(s Pa), as when "
         "the oil warms or cools; the condition is that at the end"

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.eha.changing_leakage import growth_note, leakage_over, step_note
 from estimation.finding import NORMAL_95
 from estimation.fits.explain import Explanation
 from estimation.fits.play import crossings
@@ -12,7 +13,7 @@ from estimation.fits.teeth import EVENLY, Turning, delivering
 from estimation.log_checks.bridging import POSITION, bridged
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.sensor_check import PRESSURE
-from estimation.models.wide_flow import CROSSED, GROWTH, grown_leakage
+from estimation.models.wide_flow import CROSSED, GROWTH
 from estimation.notes import RigCode
 from plant.arrays import Array
 from plant.components.oil import ATMOSPHERE
@@ -22,13 +23,6 @@ from plant.notes import Note
 
 WORN = 0.9
 """Delivery over the pump's displacement below which the pump counts as worn, and not the rig file as rounded."""
-
-WARMED = 3.0
-"""Factor up to which leakage follows the oil's viscosity and is no fault [dimensionless]: mineral oil thins to a third
-as it warms by some 25 K (ISO 3448 VG 46 between 40 and 65 degrees Celsius, about)."""
-
-LEAST_GROWN = 1e-3
-"""Least leakage over its value halfway [dimensionless]: a parabola may cross zero beyond what it was fitted to."""
 
 SPEED, VELOCITY = "motor_speed_rad_s", "velocity_m_s"
 
@@ -184,20 +178,6 @@ def _relief(found: Explanation, p: EhaParameters) -> Note:
     return RigCode.RELIEF_LOW.note(setting_pa=setting, half_width_pa=NORMAL_95 * std, rig_pa=p.relief_pressure)
 
 
-def _growth(found: Explanation, _: EhaParameters) -> Note:
-    begun, ended = _grown(found, np.array([0.0, 1.0]))
-    factor, last = float(ended / begun), found.values["leakage_coefficient"][0]
-    warmed = 1.0 / WARMED < factor < WARMED
-    return (RigCode.LEAKAGE_DRIFTS if warmed else RigCode.LEAKAGE_GROWS).note(
-        factor=factor, first=last / factor, last=last
-    )
-
-
-def _grown(found: Explanation, elapsed: Array) -> Array:
-    """Return leakage over its value halfway, at shares of the log."""
-    return np.maximum(grown_leakage(elapsed, *(found.values.get(name, (0.0, 0.0))[0] for name in GROWTH)), LEAST_GROWN)
-
-
 def _blocked(found: Explanation, _: EhaParameters) -> Note:
     return RigCode.MAKEUP_BLOCKED.note(side="B" if found.values["makeup_share_b"][0] < 1.0 else "A")
 
@@ -237,8 +217,9 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "air": _air,
     "air_midway": _air,
     "relief_low": _relief,
-    "leakage_growth": _growth,
-    "leakage_rise": _growth,
+    "leakage_growth": growth_note,
+    "leakage_rise": growth_note,
+    "leakage_step": step_note,
     "makeup_blocked": _blocked,
     "checks_crack": _crack,
     "port_a_drains": _drains("a"),
@@ -295,7 +276,7 @@ def set_right(log: CleanLog, found: Explanation) -> CleanLog:
     late, drift = lateness(found, PRESSURE), value.get("pressure_drift", 0.0)
     offset = value.get("pressure_offset", 0.0) + drift * elapsed
     if any(name in value for name in GROWTH):
-        grown = _grown(found, elapsed)
+        grown = leakage_over(found, elapsed)
         changed[LEAKAGE_COURSE] = grown / grown[-1]
     if late or np.any(offset):
         changed[PRESSURE] = _brought_forward(record, PRESSURE, late) - offset

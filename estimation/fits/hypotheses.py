@@ -39,6 +39,8 @@ class Hypothesis:
         Size below which what is freed first is not what the hypothesis says [SI].
     from_mid_travel : bool
         Whether the search also begins with an encoder that reads zero in the middle of the log's travel.
+    from_change : bool
+        Whether the search begins where lost flow says that leakage steps.
     beside : tuple of str
         What is fitted along with it, but is nothing that it promises.
     lower : bool
@@ -56,6 +58,7 @@ class Hypothesis:
     from_first_sample: bool = False
     least: float = 0.0
     from_mid_travel: bool = False
+    from_change: bool = False
     beside: tuple[str, ...] = ()
     lower: bool = False
 
@@ -107,6 +110,14 @@ more, and the search for a delay would have no end."""
 PRESSURE_LATE = Hypothesis("pressure_late", ("pressure_lag",), ({"pressure_lag": 1e-3},), LATE_TRIED)
 
 LEAKAGE_RISE = Hypothesis("leakage_rise", ("leakage_rise",))
+
+LEAKAGE_STEP = Hypothesis(
+    "leakage_step",
+    ("leakage_before", "step_at", "step_width"),
+    ({"leakage_before": -0.5},),
+    from_change=True,
+)
+"""A seal gives way within the log."""
 
 MAKEUP_BLOCKED = Hypothesis(
     "makeup_blocked",
@@ -162,6 +173,7 @@ HYPOTHESES = (
     ),
     Hypothesis("leakage_growth", ("leakage_growth", "leakage_bend")),
     LEAKAGE_RISE,
+    LEAKAGE_STEP,
     MAKEUP_BLOCKED,
     Hypothesis(
         "single_rod",
@@ -194,6 +206,9 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "crack_b": (-2e4, 2e4),
     "leakage_bend": (-4.0, 4.0),
     "leakage_rise": (-6.0, 6.0),
+    "leakage_before": (-0.99, 50.0),
+    "step_at": (0.0, 1.0),
+    "step_width": (2e-4, 0.05),
     "area_difference": (-0.6, 0.6),
     "volume_difference": (-0.6, 0.6),
     "pilot_share": (0.0, 10.0),

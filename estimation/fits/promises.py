@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.fits.greybox_log import GreyBoxLog
-from estimation.fits.hypotheses import Hypothesis
+from estimation.fits.hypotheses import LEAKAGE_STEP, Hypothesis
+from estimation.fits.leakage_step import likeliest_step
 from estimation.fits.wide_problem import freed, usual_values, widened
 from estimation.models.wide_flow import WideFlowParameters
 from plant.arrays import Array
@@ -17,6 +18,10 @@ from plant.solvers.steps import parameter_names
 
 LIKELIEST = 4
 """Hypotheses that are tried first, of which the slopes of the fit so far promise most."""
+
+STEPPED = 0.25
+"""Share that a step must explain of what one leakage leaves of the lost flow, to be tried first [fraction]; judged. A
+step that multiplies leakage is too large for slopes to promise it."""
 
 
 class Promise(NamedTuple):
@@ -165,7 +170,9 @@ def promising(
         The `LIKELIEST`, and the others.
     """
     promises = _promises(log.coarsened(), together, found, asked)
-    order = sorted(range(len(asked)), key=lambda i: -promises[i].gain)
+    stepped = LEAKAGE_STEP in asked and likeliest_step(log).share > STEPPED
+    gains = [np.inf if stepped and one is LEAKAGE_STEP else promises[i].gain for i, one in enumerate(asked)]
+    order = sorted(range(len(asked)), key=lambda i: -gains[i])
     likely = [asked[i] for i in order if not asked[i].far][:LIKELIEST]
     return likely, [one for one in asked if one not in likely]
 

@@ -11,6 +11,7 @@ from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import search_bounds
 from estimation.fits.hypotheses import LIMITS, PRESUMED, Hypothesis
+from estimation.fits.leakage_step import likeliest_step
 from estimation.fits.play import crossings
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
@@ -164,6 +165,8 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
         seen = log.measured[np.isfinite(log.measured[:, 0]), 0]
         begun = float(seen[0]) if len(seen) else 0.0
         return [{START_PRESSURE: begun, START_LEVEL: share * _shut_in(log)} for share in LEVELS_TRIED]
+    if one.from_change:
+        return [likeliest_step(log).first or one.starts[0]]
     if one.from_mid_travel:
         read = log.drives[:, WIDE_FLOW_FORM.drives.index(POSITION)]
         return [*one.starts, {POSITION_ZERO: 0.5 * float(np.min(read) + np.max(read))}]

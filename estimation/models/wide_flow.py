@@ -66,6 +66,9 @@ class WideFlowParameters(FlowParameters):
     leakage_growth: float = si(0.0, "1", "growth of leakage over the log, of its value halfway", "fitted")
     leakage_bend: float = si(0.0, "1", "part of that growth which goes with time squared", "fitted")
     leakage_rise: float = si(0.0, "1", "rise of the logarithm of leakage over the log", "fitted")
+    leakage_before: float = si(0.0, "1", "leakage before it stepped, over that after, less one", "fitted")
+    step_at: float = si(0.5, "1", "middle of that step, in lengths of the log", "fitted")
+    step_width: float = si(0.05, "1", "how long it takes, in lengths of the log", "fitted")
     crack_pressure: float = si(0.0, "Pa", "drop at which the make-up valves crack, on average of the two", "fitted")
     crack_difference: float = si(0.0, "Pa", "drop at which valve A cracks over that of valve B", "fitted")
     makeup_share_b: float = si(1.0, "1", "conductance of valve B over that of A", "fitted")
@@ -102,6 +105,7 @@ def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Sc
     dp = p1 - p2
     elapsed = begun + share * (next_begun - begun)
     grown = grown_leakage(elapsed, p.leakage_growth, p.leakage_bend, p.leakage_rise)
+    grown = grown * stepped_leakage(elapsed, p.leakage_before, p.step_at, p.step_width)
     leaked = leaked_flow(dp, p.leakage_coefficient * grown, p)
     opening, pilot, conductance = p.makeup_opening, p.pilot_share, p.makeup_conductance
     cracking, later = supply - p.crack_pressure, 0.5 * p.crack_difference
@@ -161,6 +165,26 @@ def grown_leakage(elapsed: Scalar, growth: Scalar, bend: Scalar, rise: Scalar) -
     return maximum(1.0 + (growth + bend * since) * since, 0.0) * fourth * fourth
 
 
+def stepped_leakage(elapsed: Scalar, before: Scalar, at: Scalar, width: Scalar) -> Scalar:
+    """Return leakage over what it is after a step, which a seal that gives way or a valve that sticks makes of it.
+
+    Parameters
+    ----------
+    elapsed : float, ndarray or Expression
+        Share of the log [fraction].
+    before : float or Expression
+        Leakage before the step over that after, less one [dimensionless].
+    at, width : float or Expression
+        Middle of the step, and how long it takes [fraction of the log].
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Dimensionless.
+    """
+    return 1.0 + before * (1.0 - minimum(maximum((elapsed - at) / width + 0.5, 0.0), 1.0))
+
+
 def _at_rest(p: SimpleNamespace) -> tuple[Scalar, ...]:
     held, supply = p.start_pressure, p.accumulator_pressure + p.start_level
     return supply + maximum(held, 0.0), supply + maximum(-held, 0.0), -p.pressure_offset, p.accumulator_pressure
@@ -201,6 +225,8 @@ LINEAR = {
     "leakage_growth": 1.0,
     "leakage_bend": 1.0,
     "leakage_rise": 1.0,
+    "leakage_before": 1.0,
+    "step_at": 0.1,
     "crack_pressure": 1e4,
     "crack_difference": 1e4,
     **dict.fromkeys(CRACKS, USUAL_CRACK),

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from estimation.eha.bulk_modulus import _impossible_delivery
-from estimation.eha.explained import LEAKAGE_COURSE, WARMED, at_pump_speed, notes_of, rig_set_right, set_right
+from estimation.eha.changing_leakage import WARMED
+from estimation.eha.explained import LEAKAGE_COURSE, at_pump_speed, notes_of, rig_set_right, set_right
 from estimation.fits.explain import Explanation
 from estimation.fits.teeth import EVENLY, Teeth, Turning, delivering
 from estimation.log_checks.clean import CleanLog
@@ -93,6 +94,9 @@ def test_volume_load_relief_and_check_valves_are_told_beside_the_rigs() -> None:
         "half_width_pa": 1e4 * NORMAL,
         "rig_pa": P.relief_pressure,
     }
+    stepped = {"leakage_coefficient": (6e-11, 0.0), "leakage_before": (-0.9, 0.0), "step_at": (0.4, 0.0)}
+    told_step = data(told("leakage_step", **stepped, step_width=(1e-3, 0.0)))
+    assert told_step == pytest.approx({"percent_of_log": 40.0, "within_percent": 0.1, "first": 6e-12, "last": 6e-11})
     for later, side in ((6e3, "A"), (-6e3, "B")):
         cracked = told("checks_crack", crack_pressure=(4e4, 1e3), crack_difference=(later, 2e3))
         assert data(cracked) == {

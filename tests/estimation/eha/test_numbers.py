@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from estimation.eha import explained
+from estimation.eha.changing_leakage import leakage_over
 from estimation.eha.explained import notes_of, rig_set_right, set_right
 from estimation.eha.rig_share import GAIN, rig_notes, scaled_responses, with_total
 from estimation.finding import Quantity
@@ -52,6 +53,9 @@ VALUES: dict[str, tuple[float, float]] = {
     "makeup_share_b": (0.1, 0.01),
     "crack_pressure": (2e4, 1e3),
     "crack_difference": (-5e3, 5e2),
+    "leakage_before": (-0.8, 0.01),
+    "step_at": (0.4, 1e-3),
+    "step_width": (1e-3, 1e-4),
     "case_leakage": (4e-12, 1e-13),
     "drain_share_a": (0.7, 0.1),
     "drain_share_b": (0.3, 0.1),
@@ -87,7 +91,7 @@ def what_explains_a_log() -> dict[str, Any]:
             notes_of(explanation(("makeup_blocked",), **(VALUES | {"makeup_share_b": (one, 0.0)})), P)[0].data["side"]
             for one in (0.5, 1.0, 3.0)
         ],
-        "least leakage": explained._grown(explanation((), leakage_growth=(5.0, 0.1)), np.array([0.0, 0.5, 1.0])),  # pyright: ignore[reportPrivateUsage]
+        "least leakage": leakage_over(explanation((), leakage_growth=(5.0, 0.1)), np.array([0.0, 0.5, 1.0])),
     }
 
 

@@ -111,7 +111,7 @@ def plan_of_explanations() -> dict[str, Any]:
     told: dict[str, Any] = {}
     short = seen(log(0.5))
     asked = [one for one in HYPOTHESES if one.name in ("pressure_late", "pressure_offset", "relief_low", "volume")]
-    promises = [promising.Promise(float(gain), 1.0, 1.0) for gain in range(20)]
+    promises = [promising.Promise(float(gain), 1.0, 1.0) for gain in range(len(HYPOTHESES))]
     costs = {
         "all alike": lambda _: 1000.0,
         "one is better": lambda k: 1000.0 - 10.0 * (k % 7 == 0),

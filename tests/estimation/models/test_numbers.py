@@ -115,6 +115,7 @@ WIDE: dict[str, dict[str, float]] = {
     "air from the beginning": {"air_softness": 300.0, "air_onset": 0.0},
     "growing": {"leakage_growth": 0.8, "leakage_bend": 0.5},
     "rising": {"leakage_rise": 1.5},
+    "stepping": {"leakage_before": -0.8, "step_at": 0.4, "step_width": 0.05},
     "shrinking to nothing": {"leakage_growth": 40.0},
     "valves that open apart": {"crack_pressure": 2e4, "crack_difference": 9e3},
     "other valves": {"crack_pressure": 2e3, "makeup_share_b": 0.5, "drain_share_a": 0.7, "drain_share_b": 1.4},

@@ -1,0 +1,78 @@
+"""Leakage that changes within a log, in notes: it drifts, grows, or steps."""
+
+import numpy as np
+
+from estimation.fits.explain import Explanation
+from estimation.models.wide_flow import GROWTH, grown_leakage
+from estimation.notes import RigCode
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+from plant.notes import Note
+
+WARMED = 3.0
+"""Factor up to which leakage follows the oil's viscosity and is no fault [dimensionless]: mineral oil thins to a third
+as it warms by some 25 K (ISO 3448 VG 46 between 40 and 65 degrees Celsius, about)."""
+
+LEAST_GROWN = 1e-3
+"""Least leakage over its value halfway [dimensionless]: a parabola may cross zero beyond what it was fitted to."""
+
+
+def growth_note(found: Explanation, _: EhaParameters) -> Note:
+    """Return what a leakage that changes all along is called: drifting as oil warms, or growing.
+
+    Parameters
+    ----------
+    found : Explanation
+        What explains the log.
+
+    Returns
+    -------
+    Note
+        With the factor of the change, and leakage at the start and the end [m^3/(s Pa)].
+    """
+    begun, ended = leakage_over(found, np.array([0.0, 1.0]))
+    factor, last = float(ended / begun), found.values["leakage_coefficient"][0]
+    warmed = 1.0 / WARMED < factor < WARMED
+    return (RigCode.LEAKAGE_DRIFTS if warmed else RigCode.LEAKAGE_GROWS).note(
+        factor=factor, first=last / factor, last=last
+    )
+
+
+def step_note(found: Explanation, _: EhaParameters) -> Note:
+    """Return what a leakage that steps is called.
+
+    Parameters
+    ----------
+    found : Explanation
+        What explains the log.
+
+    Returns
+    -------
+    Note
+        With when, and leakage before and after [m^3/(s Pa)].
+    """
+    last, before = found.values["leakage_coefficient"][0], found.values["leakage_before"][0]
+    return RigCode.LEAKAGE_STEPS.note(
+        percent_of_log=100.0 * found.values["step_at"][0],
+        within_percent=100.0 * found.values["step_width"][0],
+        first=last * (1.0 + before),
+        last=last,
+    )
+
+
+def leakage_over(found: Explanation, elapsed: Array) -> Array:
+    """Return leakage that changes all along, over its value halfway.
+
+    Parameters
+    ----------
+    found : Explanation
+        What explains the log.
+    elapsed : ndarray, shape (n,)
+        Shares of the log [fraction].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Dimensionless, positive.
+    """
+    return np.maximum(grown_leakage(elapsed, *(found.values.get(name, (0.0, 0.0))[0] for name in GROWTH)), LEAST_GROWN)
