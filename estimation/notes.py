@@ -177,6 +177,10 @@ class RigCode(Code):
     POSITION_PLAY = (
         "position_m follows the piston with a play (backlash) of about {play_um:.1g} um; the play was taken up"
     )
+    PLAY_NOT_EXCLUDED = (
+        "velocity_m_s moves with pressure while position_m stands, by chance or for a play (backlash) of some "
+        "{play_um:.1g} um: the interval of bulk modulus holds what that would do"
+    )
     AREA_TO_DISPLACEMENT = (
         "the ratio of pump displacement to piston area is {percent:.2f} ± {half_width:.2f} % of that in the rig file: "
         "one of the two is wrong, and the log does not tell which"

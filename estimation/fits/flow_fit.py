@@ -29,7 +29,15 @@ from estimation.fits.hypotheses import (
 )
 from estimation.fits.lateness import most_late
 from estimation.fits.left_open import valves_unseen, wear_open
-from estimation.fits.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
+from estimation.fits.play import (
+    NO_PLAY,
+    PLAY_SENSED,
+    ShownPlay,
+    play_left,
+    play_structure,
+    play_untaken,
+    sensed_play,
+)
 from estimation.fits.promises import promised, promised_each
 from estimation.fits.teeth import Turning
 from estimation.fits.toothed import toothed
@@ -93,11 +101,6 @@ benchmark's validation split. A plain fit needs none: it fits each valve and the
 FILTERED = 1e-3
 """The same of a log whose pressure was filtered: the filter is fitted as a lag of first order. 16 training logs with a
 moving average of 2 to 6 ms have their bulk modulus 0.1 % too low."""
-
-PLAY_SENSED = 2.7
-"""Gain from which a log is asked for a play because a velocity sensor moves beside an encoder that stands: one log in
-100 gains it by chance, and fewer seem to move by more than the encoder resolves, which is asked too. The check is shut
-from `PLAY_SHOWN` on, which one log in 400 gains by chance [dimensionless]."""
 
 SURER = 2.0
 """What a difference of log-likelihood between balances is divided by [dimensionless]: they leave out less than the
@@ -179,6 +182,8 @@ def fit_flow(
     asked, open_ends = _asked(log, parameters, swinging, best, sensed, loaded=loaded, moving=moving)
     asked = (PRESSURE_LATE, *asked) if filtered and PRESSURE_LATE not in asked else asked
     remarks = (*teeth, *open_ends, *valves_unseen(best))
+    softer = parameters.piston_area * sensed.yields / parameters.chamber_volume
+    untaken, play = play_untaken(sensed, softer * swinging.values["bulk_modulus"])
     if BEGUN in asked:  # so many valleys that one is believed only where sensors' noise is all that it leaves
         explains = partial(_explains_all, noisy=log.passes_on)
     if asked:
@@ -195,25 +200,23 @@ def fit_flow(
             and one.cost < _wanted(strange.names, best, swinging, homed=homed, late=filtered)
         ):
             bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
-            left = FILTERED if filtered else STRUCTURE
+            left, open_play = float(np.hypot(FILTERED if filtered else STRUCTURE, untaken)), play
             if PLAY.name in strange.names:
                 modulus = one.values["bulk_modulus"]
                 moved = abs(modulus / swinging.values["bulk_modulus"] - 1.0)
-                left = play_structure(
-                    moved, parameters.piston_area * sensed.yields * modulus / parameters.chamber_volume
-                )
+                left, open_play = play_structure(moved, softer * modulus), ()
             believed = with_structure(strange.values, left)
             shown = play_left(one.play, NO_PLAY if PLAY.name in strange.names else sensed)
             reasons = (*shown, *contradicted(strange, parameters))
-            remarks = (*teeth, *wear_open(strange.delivery_open))
+            remarks = (*teeth, *wear_open(strange.delivery_open), *open_play)
             return FormFit(believed, bound, one.chi_square[0], reasons, one.rig_slopes, strange, remarks, turning)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
-    believed = found if sure else with_structure(found, STRUCTURE)
+    believed = with_structure(found, float(np.hypot(0.0 if sure else STRUCTURE, untaken)))
     reasons = (*_objections(best, log.passes_on), *play_left(swinging.play, sensed)) or teeth_left
     if BEGUN in asked and not reasons and not explains(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
     (value, std), chi = found["bulk_modulus"], best.chi_square[0]
-    return FormFit(believed, std / value, chi, reasons, best.rig_slopes, remarks=remarks, turning=turning)
+    return FormFit(believed, std / value, chi, reasons, best.rig_slopes, remarks=(*remarks, *play), turning=turning)
 
 
 def _wanted(names: Sequence[str], best: GreyBoxFit, swinging: GreyBoxFit, *, homed: bool, late: bool) -> float:

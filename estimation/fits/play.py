@@ -18,7 +18,7 @@ from estimation.log_checks.measurement_noise import position_variance
 from estimation.log_checks.order import percentile
 from estimation.log_checks.outliers import VELOCITY
 from estimation.log_checks.sensor_check import PRESSURE
-from estimation.notes import EstimateCode
+from estimation.notes import EstimateCode, RigCode
 from plant.log.record import Record
 from plant.notes import Note
 
@@ -33,8 +33,7 @@ SMOOTHED = 2e-2
 crossings takes as long; judged."""
 
 STANDS = 0.02
-"""Time for which an encoder stands before the piston is taken to spring back [s]; judged. One that creeps stands from
-step to step."""
+"""Time for which an encoder stands before the piston is taken to spring back [s]; judged: one may creep in steps."""
 
 NUDGE = 1e-6
 """Play by which the residuals' answer to one is read off [m]."""
@@ -79,6 +78,13 @@ differs from that without, or by what the piston yields unseen beside what the o
 PLAY_SHOWN = 4.0
 """Gain in log-likelihood from which residuals show a play of the encoder [dimensionless]: by chance each of three
 courses gains it in one log of 430, so one log in 140 at most is asked in vain."""
+
+
+PLAY_SENSED = 2.7
+"""Gain from which a log is asked for a play because a velocity sensor moves beside an encoder that stands, and from
+which its interval holds one that no fit took up: one log in 100 gains it by chance, and fewer seem to move by more than
+the encoder resolves, which is asked too. The check is shut from `PLAY_SHOWN` on, which one log in 400 gains by chance
+[dimensionless]."""
 
 
 def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
@@ -206,6 +212,28 @@ def play_structure(moved: float, yields: float) -> float:
     return float(np.hypot(PLAY_STRUCTURE, PLAY_OPEN * max(moved, yields)))
 
 
+def play_untaken(sensed: ShownPlay, yields: float) -> tuple[float, tuple[Note, ...]]:
+    """Return what a play leaves open that a velocity sensor may show and no fit took up: all that the piston yields.
+
+    Parameters
+    ----------
+    sensed : ShownPlay
+        What the sensor shows.
+    yields : float
+        What the piston yields unseen, over what the oil does [fraction].
+
+    Returns
+    -------
+    tuple of (float, tuple of Note)
+        Relative deviation of bulk modulus, zero for what is as seldom by chance as in one log of 100 [fraction]; and a
+        remark, if the gate is not shut for it.
+    """
+    if sensed.gain <= PLAY_SENSED:
+        return 0.0, ()
+    said = () if play_left(sensed) else (RigCode.PLAY_NOT_EXCLUDED.note(play_um=1e6 * sensed.size),)
+    return float(np.hypot(PLAY_STRUCTURE, yields)), said
+
+
 def sensed_play(record: Record) -> ShownPlay:
     """Return the play that a velocity sensor shows: the piston yields to pressure while its encoder stands.
 
@@ -220,8 +248,8 @@ def sensed_play(record: Record) -> ShownPlay:
     Returns
     -------
     ShownPlay
-        How far the piston moves unseen, and what that gains in log-likelihood; none where the encoder may see half of
-        it, or could not resolve it.
+        How far the piston moves unseen, and what that gains in log-likelihood, the size of noise unknown; none where
+        the encoder may see half of it, or the piston moves by less in most of its standings than it resolves.
     """
     if VELOCITY not in record:
         return NO_PLAY
@@ -239,21 +267,30 @@ def sensed_play(record: Record) -> ShownPlay:
         return NO_PLAY
     read = np.gradient(position) / record.sample_time
     moved, seen = (float(rate[still] @ one[still]) / power for one in (velocity, read))
-    left = velocity - read - (moved - seen) * rate
-    noise, chance = float(np.var(left[still])), _lasting(left, still, max(1, round(SMOOTHED / record.sample_time)))
-    unseen = (moved - seen) * (percentile(force[still], 95.0) - percentile(force[still], 5.0))
-    if unseen <= _cell(position) or noise == 0.0 or moved - 2.0 * seen <= (chance / power) ** 0.5:
+    left, together = velocity - read - (moved - seen) * rate, max(1, round(SMOOTHED / record.sample_time))
+    chance = _lasting(left, still, together)
+    if chance == 0.0 or moved - 2.0 * seen <= (chance / power) ** 0.5:
         return NO_PLAY
-    return ShownPlay(unseen, 0.5 * (moved - seen) ** 2 * power / noise, moved - seen)
+    here, standing = force[still], stands.first[still]
+    at_once = here - (np.bincount(standing, here) / np.maximum(np.bincount(standing), 1))[standing]
+    if (moved - seen) * _spread(at_once) <= max(_cell(position), LEAST_PLAY):
+        return NO_PLAY
+    looks = np.count_nonzero(still) / together
+    gain = 0.5 * looks * np.log1p((moved - seen) ** 2 * power / chance / looks)
+    return ShownPlay((moved - seen) * _spread(here), float(gain), moved - seen)
 
 
 def _lasting(left: Array, there: BoolArray, samples: int) -> float:
-    """Return the variance of what is left as it counts over so many samples: what was averaged is no longer white."""
+    """Return the variance of what is left as it counts over so many samples: what was averaged is not white."""
     parts = len(left) // samples
     left, count = (
         one[: parts * samples].reshape(parts, samples).sum(axis=1) for one in (np.where(there, left, 0.0), there)
     )
     return float(np.sum(left**2) / max(1, np.sum(count)))
+
+
+def _spread(values: Array) -> float:
+    return percentile(values, 95.0) - percentile(values, 5.0)
 
 
 class _Standings(NamedTuple):

@@ -89,11 +89,14 @@ def models_verdict(scores: Scores, record: Record) -> ModelsVerdict:
     ratio = margin(scores)
     if math.isnan(ratio):
         return ModelsVerdict(Outcome.DIVERGED, (ClassCode.MODELS_DIVERGED.note(),), ())
-    if ratio < TOLD_APART:
-        return ModelsVerdict(Outcome.NOT_OBSERVABLE, (ClassCode.MODELS_ALIKE.note(),), ())
     unexplained = min(scores.by_condition.values())
     if len(scores.channels) == 1:
         size = float(np.sqrt(np.nanmean(measured_velocity(record) ** 2)))
         unexplained = unexplained / size if size > 0.0 else 0.0
     poor = unexplained > POOR_FIT
+    if poor:  # far from a log two unlike models may err alike
+        finite = [score for score in scores.by_condition.values() if math.isfinite(score)]
+        ratio = max(finite) / min(finite)
+    if ratio < TOLD_APART:
+        return ModelsVerdict(Outcome.NOT_OBSERVABLE, (ClassCode.MODELS_ALIKE.note(),), ())
     return ModelsVerdict(Outcome.OK, (), (AgainstCode.NONE_FITS.note(percent=100.0 * unexplained),) if poor else ())

@@ -60,3 +60,19 @@ def test_a_best_model_that_leaves_more_than_half_of_the_signal_fits_none(
     assert [note.code for note in found.against] == ([AgainstCode.NONE_FITS] if said else [])
     if said:
         assert found.against[0].data["percent"] == pytest.approx(55.0)
+
+
+@pytest.mark.parametrize(
+    ("least", "rest", "outcome"),
+    [
+        ((0.8, 0.8001), 0.95, Outcome.OK),
+        ((0.8, 0.8001), 0.8002, Outcome.NOT_OBSERVABLE),
+        ((0.3, 0.3001), 0.95, Outcome.NOT_OBSERVABLE),
+        ((0.8, 0.8001), math.inf, Outcome.NOT_OBSERVABLE),
+    ],
+)
+def test_where_no_model_fits_only_errors_of_all_that_are_alike_tell_none_apart(
+    least: tuple[float, float], rest: float, outcome: Outcome
+) -> None:
+    """Under a load, two unlike models left 77.6 % each, and the others 80 to 96 %."""
+    assert models_verdict(scored(*least, channels=2, rest=rest), RECORD).outcome is outcome
