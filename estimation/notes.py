@@ -192,6 +192,10 @@ class RigCode(Code):
     PUMP_RIPPLES = (
         "the teeth of the pump ({teeth} a turn) are {percent:.1f} ± {half_width:.1f} % in its flow; they were taken up"
     )
+    MAKEUP_BENDS = (
+        "the make-up valves let in less than in proportion to a large drop, as an orifice does: half as much a pascal "
+        "at {drop_pa:.2g} Pa; this was taken up"
+    )
     MAKEUP_UNSEEN = (
         "the make-up valve of side {side} never opened, so the log does not tell whether it is stuck shut; a drive "
         "that empties side {side} would"

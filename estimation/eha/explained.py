@@ -13,6 +13,7 @@ from estimation.fits.teeth import EVENLY, Turning, delivering
 from estimation.log_checks.bridging import POSITION, bridged
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.sensor_check import PRESSURE
+from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import CROSSED, GROWTH
 from estimation.notes import RigCode
 from plant.arrays import Array
@@ -173,6 +174,10 @@ def _air(found: Explanation, _: EhaParameters) -> Note:
     return RigCode.AIR_ENTRAINED.note(**said, stated_pa=stated, liquid_pa=liquid)
 
 
+def _bends(found: Explanation, _: EhaParameters) -> Note:
+    return RigCode.MAKEUP_BENDS.note(drop_pa=3.0 / found.values[BEND][0])
+
+
 def _relief(found: Explanation, p: EhaParameters) -> Note:
     setting, std = found.values["relief_pressure"]
     return RigCode.RELIEF_LOW.note(setting_pa=setting, half_width_pa=NORMAL_95 * std, rig_pa=p.relief_pressure)
@@ -221,6 +226,7 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "leakage_rise": growth_note,
     "leakage_step": step_note,
     "makeup_blocked": _blocked,
+    "makeup_bends": _bends,
     "checks_crack": _crack,
     "port_a_drains": _drains("a"),
     "port_b_drains": _drains("b"),

@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.fits.delivery import contradicted
 from estimation.fits.explain import VANISHED, WORTH, explain
-from estimation.fits.flow_log import carried, flow_log, homed_at_stop, without_strays
+from estimation.fits.flow_log import carried, flow_log, homed_at_stop, outruns_pump, without_strays
 from estimation.fits.flow_search import MAKEUP_TRIED, balanced, flow_starts
 from estimation.fits.form_fit import FormFit, weighed, with_structure
 from estimation.fits.greybox_fit import GreyBoxFit
@@ -20,6 +20,7 @@ from estimation.fits.hypotheses import (
     HYPOTHESES,
     LEAST_DELIVERY,
     LEAST_ZERO,
+    MAKEUP_BENDS,
     MAY_HIDE,
     OFFSET,
     PLAY,
@@ -41,8 +42,9 @@ from estimation.fits.play import (
 from estimation.fits.promises import promised, promised_each
 from estimation.fits.teeth import Turning
 from estimation.fits.toothed import toothed
-from estimation.models.completed_flow import CRACKS
-from estimation.models.flow import HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
+from estimation.models.completed_flow import CRACKS, balances_mass
+from estimation.models.flow import HELD_FLOW_FORM, STIFFNESS
+from estimation.models.inner_circuit import BEND
 from estimation.notes import EstimateCode
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -191,7 +193,7 @@ def fit_flow(
         near = [best.values, *near] if best is not swinging and explains(best) else near
         paired = any(one not in (*ALWAYS_ASKED, PLAY) for one in asked)
         homed = homed_at_stop(log)
-        by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
+        by_mass = balances_mass(swinging.model)
         strange = explain(log, parameters, near, explains, asked=asked, paired=paired, by_mass=by_mass)
         one = strange.fit
         if (
@@ -255,8 +257,9 @@ def _asked(
     if loaded:  # a sensor that reads too much looks loaded at rest
         return (BEGUN, OFFSET), ()
     if not _explains(swinging, log.passes_on) or most_late(swinging.late)[2] > WORTH:
-        return (BEGUN,) if moving else HYPOTHESES, ()
-    by_mass = swinging.model.rates is MASS_FLOW_FORM.rates
+        pulled = (MAKEUP_BENDS,) if outruns_pump(log, parameters) else ()
+        return (BEGUN,) if moving else (*HYPOTHESES, *pulled), ()
+    by_mass = balances_mass(swinging.model)
     delivery, zero, *hidden = promised_each(
         log, parameters, swinging.values, ALWAYS_ASKED, by_mass=by_mass, slopes=_slopes(swinging, log)
     )
@@ -304,7 +307,7 @@ def _near(
     usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
     lost = fit.values["makeup_conductance"] > TOO_WIDE * MAKEUP_TRIED[0]
     near = [fit.values, fed] if lost else [fit.values]
-    held = (STIFFNESS, *CRACKS)
+    held = (STIFFNESS, *CRACKS, BEND)
     return [*({name: value for name, value in one.items() if name not in held} for one in near), *usual]
 
 
@@ -314,7 +317,7 @@ def _known(names: Sequence[str], fit: GreyBoxFit) -> bool:
 
 
 def _beforehand(fit: GreyBoxFit) -> float:
-    return BY_MASS if fit.model.rates is MASS_FLOW_FORM.rates else 1.0
+    return BY_MASS if balances_mass(fit.model) else 1.0
 
 
 def _cost(fit: GreyBoxFit) -> float:

@@ -12,7 +12,7 @@ from math import ceil
 import numpy as np
 
 from estimation.fits.descent import Point, descend
-from estimation.fits.flow_log import DRAIN_START, LEAST_LEAKAGE, OPENING_START, carried, usual_leakage
+from estimation.fits.flow_log import DRAIN_START, LEAST_LEAKAGE, OPENING_START, carried, outruns_pump, usual_leakage
 from estimation.fits.form_fit import FAULTS_TRIED
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import NEAR_ENOUGH, GreyBoxFit, Search, concluded, explained, roughly
@@ -139,10 +139,10 @@ def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mappin
     near = min((one for one in rough if not _held(one.problem)), key=lambda one: one.point.cost)
     likely = [one for one in rough if one is near or one.point.cost < least + RIVAL]
     behind = [one for one in rough if not (_held(one.problem) or one in likely)]
-    log = carried(log, parameters, near.values)
-    done = each(lambda one: _finished(one, log), likely)
+    log, bent = carried(log, parameters, near.values), outruns_pump(log, parameters)
+    done = each(lambda one: _finished(one, log, bent=bent), likely)
     wanted = min(done, key=_cost)[1].cost
-    done += each(lambda one: _finished(one, log, wanted), behind)
+    done += each(lambda one: _finished(one, log, wanted, bent=bent), behind)
     best = min(done, key=_cost)
     swinging = min((one for one in done if not _held(one[0])), key=_cost)
     least = best[1].cost
@@ -153,17 +153,18 @@ def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mappin
     return each(told, done)
 
 
-def _finished(one: _Rough, log: GreyBoxLog, wanted: float = np.inf) -> tuple[Problem, Point]:
+def _finished(one: _Rough, log: GreyBoxLog, wanted: float = np.inf, *, bent: bool) -> tuple[Problem, Point]:
     """Return where short model steps lead; what they alone explain is completed as well, for long ones have errors.
 
-    A search that will not come down to the cost ``wanted`` ends early.
+    A search that will not come down to the cost ``wanted`` ends early. Make-up valves that must let in more than the
+    pump delivers are orifices (``bent``).
     """
     one = replace(one, problem=one.problem.on(log))
     if not _plain(one):
         one = replace(one, point=descend(one.problem.at, one.point.theta, SETTLING, one.bounds, wanted=wanted))
         if not _plain(one):
             return one.problem, one.point
-    problem, theta, bounds = _completed(one, log)
+    problem, theta, bounds = _completed(one, log, bent=bent)
     return problem, descend(problem.at, theta, FINISHING, bounds, wanted=wanted)
 
 
@@ -184,9 +185,9 @@ def _plain(one: _Rough) -> bool:
     return not _held(one.problem) and not one.problem.log.gaps.size and explained(one.problem, one.point)
 
 
-def _completed(one: _Rough, log: GreyBoxLog) -> tuple[Problem, Array, tuple[Array, Array]]:
+def _completed(one: _Rough, log: GreyBoxLog, *, bent: bool) -> tuple[Problem, Array, tuple[Array, Array]]:
     """Return the problem with what matters to the last digits alone, where its search begins, and its bounds."""
-    problem = FreedProblem.of(completed(one.problem.model), one.problem.log)
+    problem = FreedProblem.of(completed(one.problem.model, bent=bent), one.problem.log)
     theta = np.append(one.point.theta, np.zeros(len(problem.model.unknowns) - len(one.point.theta)))
     lowest, highest = flow_bounds(problem.model, [theta], log)
     known = len(one.point.theta)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import STIFFNESS
+from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import CROSSED
 
 
@@ -88,6 +89,12 @@ PLAY = Hypothesis(
     least=LEAST_PLAY,
 )
 """What the plain fit found of make-up valves and accumulator has taken the play up, so they are sought again."""
+
+LEAST_BEND = 1e-6
+"""Least bend of the make-up valves' flow that is one [1/Pa]; judged: at 10 bar they let in half as much a pascal."""
+
+MAKEUP_BENDS = Hypothesis("makeup_bends", (BEND,), ({BEND: 3e-5},), least=LEAST_BEND, beside=CRACKS)
+"""Wide open, a make-up valve is an orifice. Asked where a load pulls the piston faster than the pump feeds it."""
 
 OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
 
@@ -202,6 +209,7 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "leakage_growth": (-2.0, 2.0),
     "crack_pressure": (-1e5, 2e5),
     "crack_difference": (-2e5, 2e5),
+    BEND: (0.0, 1e-3),
     "crack_a": (-2e4, 2e4),
     "crack_b": (-2e4, 2e4),
     "leakage_bend": (-4.0, 4.0),

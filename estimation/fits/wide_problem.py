@@ -16,6 +16,7 @@ from estimation.fits.play import crossings
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
+from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import COURSES, CROSSED, LINEAR, WIDE_FLOW_FORM, WideFlowParameters
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -71,7 +72,8 @@ def widened(
     parameters : EhaParameters
         The actuator.
     found : Mapping[str, float], optional
-        What the plain form found; of it `STIFFNESS` and `CRACKS` are held, as they would take up what is strange [SI].
+        What the plain form found; of it `STIFFNESS`, `CRACKS` and `BEND` are held, as they would take up what is
+        strange [SI].
 
     Returns
     -------
@@ -89,7 +91,7 @@ def widened(
         parameters=parameter_row(
             WideFlowParameters(
                 **known,
-                **{name: found.get(name, 0.0) for name in (STIFFNESS, *CRACKS)},
+                **{name: found.get(name, 0.0) for name in (STIFFNESS, *CRACKS, BEND)},
                 stated_pressure=usual_pressure(log, parameters),
             )
         ),

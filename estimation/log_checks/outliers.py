@@ -128,12 +128,19 @@ def exchanges(count: int) -> tuple[tuple[int, int], ...]:
 
 
 def _within_range(seen: Array, noise: float) -> Array:
-    """Return a channel without those of its first and last samples that lie a range beyond all that others show."""
+    """Return a channel without those of its first and last samples that lie a range beyond all that others show.
+
+    One that its neighbours lead to is none: a log may begin at rest, and show the speed that the motor comes to.
+    """
     inner = seen[ENDS:-ENDS]
     low, high = float(np.nanmin(inner)), float(np.nanmax(inner))
     reach = high - low + GROSS * noise
-    for end in (seen[:ENDS], seen[-ENDS:]):
-        end[(end < low - reach) | (end > high + reach)] = np.nan
+    for end in (seen[: ENDS + 2][::-1], seen[-ENDS - 2 :]):
+        for at in range(2, ENDS + 2):
+            before, step = end[at - 1] - end[at - 2], end[at] - end[at - 1]
+            led = before * step > 0.0 and abs(step) <= BENDS * abs(before)
+            if not led and not low - reach <= end[at] <= high + reach:
+                end[at] = np.nan
     return seen
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
+from estimation.models.inner_circuit import inner_flows
 from plant.compiled.functions import Scalar, absolute, maximum, sign, where
-from plant.components.check_valve import make_up_flow
 from plant.components.oil import ATMOSPHERE
 from plant.components.valves import pumped_flow
 from plant.eha.circuit import chamber_volumes
@@ -74,6 +74,7 @@ def chamber_rates(
     *,
     by_mass: bool,
     cracks: tuple[Scalar, Scalar] = (0.0, 0.0),
+    bend: Scalar = 0.0,
 ) -> tuple[Scalar, Scalar]:
     """Return how fast the chamber pressures change (equations 5.1 to 5.4 with errata E2, E8 and E17).
 
@@ -97,6 +98,8 @@ def chamber_rates(
         Whether flows are balanced by mass rather than by volume.
     cracks : tuple of float or Expression
         Drops at which the make-up valves leave their seats [Pa].
+    bend : float or Expression
+        See `inner_flows` [1/Pa].
 
     Returns
     -------
@@ -109,7 +112,7 @@ def chamber_rates(
     area_1, area_2 = piston_areas(p)
     volume_1, volume_2 = chamber_volumes(position, p)
     dp = p1 - p2
-    into_1, into_2 = inner_flows(pressures, p, cracks)
+    into_1, into_2 = inner_flows(pressures, p, cracks, bend)
     at_1, at_2 = port_flows(pumped, leaked_flow(dp, p.leakage_coefficient, p), dp, dp / beta if by_mass else 0.0)
     stiffness_1 = beta - (p1 - ATMOSPHERE) if by_mass else beta
     stiffness_2 = beta - (p2 - ATMOSPHERE) if by_mass else beta
@@ -117,34 +120,6 @@ def chamber_rates(
         stiffness_1 * (at_1 - area_1 * velocity + into_1) / volume_1,
         stiffness_2 * (area_2 * velocity - at_2 + into_2) / volume_2,
     )
-
-
-def inner_flows(
-    pressures: tuple[Scalar, Scalar], p: SimpleNamespace, cracks: tuple[Scalar, Scalar] = (0.0, 0.0)
-) -> tuple[Scalar, Scalar]:
-    """Return what the inner circuit feeds into each chamber through its make-up valve, less the drain.
-
-    Parameters
-    ----------
-    pressures : tuple of float or Expression
-        Absolute, of both chambers [Pa].
-    p : namespace
-        As `chamber_rates` needs them.
-    cracks : tuple of float or Expression
-        Drops at which the make-up valves leave their seats [Pa].
-
-    Returns
-    -------
-    tuple of float or Expression
-        Flows [m^3/s].
-    """
-    supply = p.accumulator_pressure
-    into_1, into_2 = (
-        make_up_flow(chamber, other, supply - crack, p.makeup_conductance, p.makeup_opening, p.pilot_share)
-        - p.case_leakage * (chamber - supply)
-        for chamber, other, crack in zip(pressures, pressures[::-1], cracks, strict=True)
-    )
-    return into_1, into_2
 
 
 def leaked_flow(dp: Scalar, leakage: Scalar, p: SimpleNamespace) -> Scalar:
@@ -192,7 +167,13 @@ def port_flows(pumped: Scalar, leaked: Scalar, dp: Scalar, swelling: Scalar) -> 
 
 
 def flow_rates(
-    state: tuple[Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar, *, by_mass: bool = False
+    state: tuple[Scalar, Scalar],
+    drives: Any,
+    p: SimpleNamespace,
+    share: Scalar,
+    *,
+    by_mass: bool = False,
+    bend: Scalar = 0.0,
 ) -> tuple[Scalar, Scalar]:
     """Return the rates of the flow form: both flows are measured.
 
@@ -208,13 +189,16 @@ def flow_rates(
         How far into the step [fraction].
     by_mass : bool
         See `chamber_rates`.
+    bend : float or Expression
+        See `inner_flows` [1/Pa].
 
     Returns
     -------
     tuple of float or Expression
         Rates [Pa/s].
     """
-    return chamber_rates(state, _delivery(drives, p, share), p, by_mass=by_mass, cracks=(p.crack_a, p.crack_b))
+    cracks = p.crack_a, p.crack_b
+    return chamber_rates(state, _delivery(drives, p, share), p, by_mass=by_mass, cracks=cracks, bend=bend)
 
 
 def _delivery(drives: Any, p: SimpleNamespace, share: Scalar) -> Delivery:
@@ -224,7 +208,13 @@ def _delivery(drives: Any, p: SimpleNamespace, share: Scalar) -> Delivery:
 
 
 def fed_rates(
-    state: tuple[Scalar, Scalar, Scalar], drives: Any, p: SimpleNamespace, share: Scalar, *, by_mass: bool
+    state: tuple[Scalar, Scalar, Scalar],
+    drives: Any,
+    p: SimpleNamespace,
+    share: Scalar,
+    *,
+    by_mass: bool,
+    bend: Scalar = 0.0,
 ) -> tuple[Scalar, Scalar, Scalar]:
     """Return the rates of both chambers and of the inner circuit that feeds them.
 
@@ -240,6 +230,8 @@ def fed_rates(
         How far into the step [fraction].
     by_mass : bool
         See `chamber_rates`.
+    bend : float or Expression
+        See `inner_flows` [1/Pa].
 
     Returns
     -------
@@ -248,9 +240,9 @@ def fed_rates(
     """
     p1, p2, supply = state
     fed = SimpleNamespace(**{**vars(p), "accumulator_pressure": supply})
-    into_1, into_2 = inner_flows((p1, p2), fed, (p.crack_a, p.crack_b))
+    into_1, into_2 = inner_flows((p1, p2), fed, (p.crack_a, p.crack_b), bend)
     pushed_back = -p.accumulator_stiffness * (into_1 + into_2)
-    return *flow_rates((p1, p2), drives, fed, share, by_mass=by_mass), pushed_back
+    return *flow_rates((p1, p2), drives, fed, share, by_mass=by_mass, bend=bend), pushed_back
 
 
 def _by_mass(state: Any, drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, Scalar, Scalar]:

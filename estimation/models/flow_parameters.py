@@ -16,6 +16,9 @@ class FlowParameters(EhaParameters):
     accumulator_stiffness: float = si(
         0.0, "Pa/m^3", "rise of the inner circuit's pressure per volume pushed back into it", "fitted"
     )
+    makeup_bend: float = si(
+        0.0, "1/Pa", "inverse of the drop from which a make-up valve's flow goes with its root", "fitted"
+    )
     crack_a: float = si(0.0, "Pa", "drop at which the make-up valve of chamber A leaves its seat", "fitted")
     crack_b: float = si(0.0, "Pa", "the same of chamber B", "fitted")
 

@@ -12,6 +12,7 @@ from estimation.models.completed_flow import CRACKS, USUAL_CRACK
 from estimation.models.flow import STIFFNESS, delivered_flow, leaked_flow, port_flows
 from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
+from estimation.models.inner_circuit import BEND, USUAL_BEND, narrowed
 from plant.compiled.functions import Scalar, maximum, minimum, where
 from plant.components.check_valve import make_up_flow
 from plant.components.oil import ATMOSPHERE
@@ -109,8 +110,11 @@ def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Sc
     leaked = leaked_flow(dp, p.leakage_coefficient * grown, p)
     opening, pilot, conductance = p.makeup_opening, p.pilot_share, p.makeup_conductance
     cracking, later = supply - p.crack_pressure, 0.5 * p.crack_difference
-    fed_1 = make_up_flow(p1, p2, cracking - later - p.crack_a, conductance, opening, pilot)
-    fed_2 = make_up_flow(p2, p1, cracking + later - p.crack_b, p.makeup_share_b * conductance, opening, pilot)
+    from_1, from_2 = cracking - later - p.crack_a, cracking + later - p.crack_b
+    conductance_1 = narrowed(from_1 - p1, conductance, p.makeup_bend)
+    conductance_2 = narrowed(from_2 - p2, p.makeup_share_b * conductance, p.makeup_bend)
+    fed_1 = make_up_flow(p1, p2, from_1, conductance_1, opening, pilot)
+    fed_2 = make_up_flow(p2, p1, from_2, conductance_2, opening, pilot)
     drain = p.case_leakage * grown
     into_1 = fed_1 - p.drain_share_a * drain * (p1 - supply)
     into_2 = fed_2 - p.drain_share_b * drain * (p2 - supply)
@@ -230,6 +234,7 @@ LINEAR = {
     "crack_pressure": 1e4,
     "crack_difference": 1e4,
     **dict.fromkeys(CRACKS, USUAL_CRACK),
+    BEND: USUAL_BEND,
     "area_difference": 0.1,
     "volume_difference": 0.1,
     "pilot_share": 1.0,

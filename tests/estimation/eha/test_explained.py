@@ -106,6 +106,7 @@ def test_volume_load_relief_and_check_valves_are_told_beside_the_rigs() -> None:
             "later_pa": 6e3,
             "later_half_width_pa": 2e3 * NORMAL,
         }
+    assert data(told("makeup_bends", makeup_bend=(5e-5, 1e-5))) == {"drop_pa": 6e4}
 
 
 def test_air_is_told_at_atmospheric_pressure_with_the_oil_without_it() -> None:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from estimation.fits import flow_search
-from estimation.fits.flow_log import flow_log
+from estimation.fits.flow_fit import fit_flow
+from estimation.fits.flow_log import flow_log, outruns_pump
 from estimation.fits.flow_search import balanced, flow_starts
 from estimation.fits.greybox_fit import GreyBoxFit, roughly
 from estimation.fits.greybox_log import GreyBoxLog
@@ -14,7 +15,7 @@ from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.flow import MASS_FLOW_FORM
 from experiments.open_benchmark.logger import PLAIN, Logger
 from experiments.open_benchmark.machine import Machine
-from experiments.open_benchmark.run import run
+from experiments.open_benchmark.run import TICK, run
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -137,3 +138,38 @@ def test_make_up_valves_that_crack_apart_are_fitted_and_do_not_bias_bulk_modulus
     assert fit.values["crack_a"] - fit.values["crack_b"] == pytest.approx(3e3, abs=1e3)
     assert abs(fit.values["bulk_modulus"] - machine.bulk_modulus) < 2.0 * fit.std["bulk_modulus"]
     assert fit.std["bulk_modulus"] < 2e-3 * machine.bulk_modulus
+
+
+def pulled(load: float) -> Record:
+    """Return a log of the open benchmark's actuator whose motor goes to full speed at once, under a load on its rod."""
+    rng = np.random.default_rng(8)
+    machine = Machine(load=load, loop_gain=0.0)
+    course = np.zeros((round(3.0 / TICK), 5))
+    course[:, 0] = HEALTHY.rated_speed
+    course[len(course) // 2 :, 0] = -0.5 * HEALTHY.rated_speed
+    course[:, [1, 2, 4]] = 1.0
+    logged = Logger(channels=PLAIN).log(run(machine, course), rng)
+    return Record(1e-3, {name: logged[name].to_numpy() for name in PLAIN})
+
+
+def test_make_up_valves_are_orifices_where_a_load_pulls_the_piston_faster_than_the_pump_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    free, loaded = seen(pulled(0.0)), seen(pulled(1.5e3))
+    assert not outruns_pump(free, HEALTHY)
+    assert outruns_pump(loaded, HEALTHY)
+    assert all("makeup_bend" not in fit.values for fit in balanced(free, HEALTHY, STARTS))
+    bent = min(balanced(loaded, HEALTHY, STARTS), key=lambda fit: fit.cost)
+    assert bent.values["makeup_bend"] > 1e-5
+    assert bent.values["bulk_modulus"] == pytest.approx(Machine().bulk_modulus, rel=0.004)
+    monkeypatch.setattr(flow_search, "outruns_pump", lambda *_: False)
+    assert min(fit.cost for fit in balanced(loaded, HEALTHY, STARTS)) > bent.cost + 30.0
+
+
+def test_what_the_orifices_of_make_up_valves_leave_is_put_on_no_sensor() -> None:
+    """A log of 3 s was refused, and some of 10 s passed with a speed 4 ms late and bulk modulus 2 % low."""
+    fit = fit_flow(pulled(2.2e3), HEALTHY, HEALTHY.bulk_modulus)
+    assert not fit.reasons
+    assert fit.explanation is not None
+    assert fit.explanation.names == ("makeup_bends",)
+    assert fit.parameters["bulk_modulus"][0] == pytest.approx(Machine().bulk_modulus, rel=0.004)

@@ -75,6 +75,18 @@ def test_an_outlier_at_an_end_is_found_there(place: int) -> None:
     assert np.flatnonzero(np.isnan(without_outliers(position))).tolist() == [place % len(position)]
 
 
+@pytest.mark.parametrize("backward", [False, True])
+def test_a_motor_that_goes_from_rest_to_the_one_speed_of_its_log_begins_with_no_outlier(backward: bool) -> None:
+    """One that a load holds at its full speed had its first two samples left out, 0 and 22 rad/s."""
+    rng = np.random.default_rng(3)
+    speed = np.full(2000, 125.6) + rng.normal(0.0, 0.05, 2000)
+    speed[:9] = [0.0, 22.0, 43.8, 65.0, 81.4, 93.4, 102.0, 108.5, 113.1]
+    log = speed[::-1].copy() if backward else speed
+    assert not np.any(np.isnan(without_outliers(log, 0.05)))
+    log[-1 if backward else 0] = -400.0
+    assert np.flatnonzero(np.isnan(without_outliers(log, 0.05))).tolist() == [1999 if backward else 0]
+
+
 def test_missing_samples_stay_missing_and_are_not_counted() -> None:
     record = log("normal", "steps")
     speed = record["motor_speed_rad_s"].copy()

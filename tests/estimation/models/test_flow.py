@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimation.models.completed_flow import completed
+from estimation.models.completed_flow import balances_mass, completed
 from estimation.models.flow import (
     FLOW_FORM,
     HELD_FLOW_FORM,
@@ -15,6 +15,7 @@ from estimation.models.flow import (
     flow_rates,
     relieving,
 )
+from estimation.models.greybox import GreyBoxModel
 from plant.components.oil import ATMOSPHERE
 from plant.eha.model import PARAMETER_NAMES, EhaParameters
 
@@ -75,6 +76,22 @@ def test_an_accumulator_without_gas_to_spare_gives_way_by_volume_as_by_mass() ->
     assert by_volume[2] == by_mass[2] != 0.0
     fed = values(accumulator_pressure=2.6e5, case_leakage=1e-13)
     assert by_volume[:2] == FLOW_FORM.rates(state[:2], drives, fed, 0.0)
+
+
+@pytest.mark.parametrize("form", [FLOW_FORM, MASS_FLOW_FORM])
+def test_a_make_up_valve_that_is_an_orifice_feeds_half_as_much_a_pascal_where_its_flow_has_bent(
+    form: GreyBoxModel,
+) -> None:
+    state, drives = (2e5, 1.2e6, 2.6e5), ((60.0, 60.0), (0.0, 1e-4), 1e-3)
+    flat, bent = (
+        completed(form, bent=True).rates(state, drives, values(accumulator_stiffness=1e8, makeup_bend=bend), 0.0)
+        for bend in (0.0, 3.0 / 6e4)
+    )
+    assert flat == completed(form).rates(state, drives, values(accumulator_stiffness=1e8), 0.0)
+    assert bent[2] == pytest.approx(0.5 * flat[2], rel=1e-12)  # all that the inner circuit loses is what they feed
+    assert bent[1] == flat[1]
+    assert completed(form, bent=True).unknowns.count("makeup_bend") == 1
+    assert balances_mass(completed(form, bent=True)) == balances_mass(form) == (form is MASS_FLOW_FORM)
 
 
 def test_two_chambers_without_make_up_are_the_lumped_capacitance() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.models import chambers, completed_flow, eha_forms, flow, motion, wide_flow
+from estimation.models import chambers, completed_flow, eha_forms, flow, inner_circuit, motion, wide_flow
 from estimation.models.augment import AUGMENTABLE, augmented, augmented_prior
 from estimation.models.flow_parameters import FlowParameters, flow_parameters
 from estimation.models.gaussian import Gaussian
@@ -85,8 +85,8 @@ def flow_forms() -> dict[str, Any]:
     ]
     seat = (ROD.accumulator_pressure - 2.0, ROD.accumulator_pressure + 0.5)
     told["at their seats"] = [
-        flow.inner_flows(seat, ROD),
-        flow.inner_flows(seat[::-1], ROD, (1.0, 0.0)),
+        inner_circuit.inner_flows(seat, ROD),
+        inner_circuit.inner_flows(seat[::-1], ROD, (1.0, 0.0)),
         flow.chamber_rates(seat, flow.Delivery(0.0, 0.0, 0.0), ROD, by_mass=False),
     ]
     told["leaks"] = [flow.leaked_flow(dp, 1e-12, ROD) for dp in (-6e6, -1e6, 0.0, 3.4e6, 3.5e6)]

@@ -1,0 +1,69 @@
+"""What the inner circuit feeds into the chambers: make-up valves, orifices once they are wide open, less the drains."""
+
+from types import SimpleNamespace
+
+from plant.compiled.functions import Scalar, maximum, sqrt
+from plant.components.check_valve import make_up_flow
+
+BEND, USUAL_BEND = "makeup_bend", 1e-4
+"""Inverse of the drop from which the flow of a make-up valve goes with its root, and its typical size [1/Pa]."""
+
+
+def inner_flows(
+    pressures: tuple[Scalar, Scalar],
+    p: SimpleNamespace,
+    cracks: tuple[Scalar, Scalar] = (0.0, 0.0),
+    bend: Scalar = 0.0,
+) -> tuple[Scalar, Scalar]:
+    """Return what the inner circuit feeds into each chamber through its make-up valve, less the drain.
+
+    Parameters
+    ----------
+    pressures : tuple of float or Expression
+        Absolute, of both chambers [Pa].
+    p : namespace
+        As `estimation.models.flow.chamber_rates` needs them.
+    cracks : tuple of float or Expression
+        Drops at which the make-up valves leave their seats [Pa].
+    bend : float or Expression
+        Inverse of the drop from which their flow bends, see `narrowed` [1/Pa].
+
+    Returns
+    -------
+    tuple of float or Expression
+        Flows [m^3/s].
+    """
+    supply, opening, pilot = p.accumulator_pressure, p.makeup_opening, p.pilot_share
+    into_1, into_2 = (
+        make_up_flow(chamber, other, seat, narrowed(seat - chamber, p.makeup_conductance, bend), opening, pilot)
+        - p.case_leakage * (chamber - supply)
+        for chamber, other, seat in zip(pressures, pressures[::-1], [supply - crack for crack in cracks], strict=True)
+    )
+    return into_1, into_2
+
+
+def narrowed(drop: Scalar, conductance: Scalar, bend: Scalar) -> Scalar:
+    """Return what a make-up valve lets through a pascal, which falls with the root of a large drop, as an orifice's.
+
+    Parameters
+    ----------
+    drop : float or Expression
+        Pressure of the inner circuit less that of the chamber [Pa].
+    conductance : float or Expression
+        The same at a small drop [m^3/(s Pa)].
+    bend : float or Expression
+        Inverse of the drop from which it falls; 0 where it does not [1/Pa].
+
+    Returns
+    -------
+    float or Expression
+        Conductance [m^3/(s Pa)].
+
+    Examples
+    --------
+    >>> narrowed(6e4, 1e-9, 0.0), float(narrowed(6e4, 1e-9, 5e-5)), float(narrowed(-6e4, 1e-9, 5e-5))
+    (1e-09, 5e-10, 1e-09)
+    """
+    if isinstance(bend, float) and bend == 0.0:
+        return conductance
+    return conductance / sqrt(1.0 + bend * maximum(drop, 0.0))
