@@ -56,6 +56,7 @@ VALUES: dict[str, tuple[float, float]] = {
     "leakage_before": (-0.8, 0.01),
     "step_at": (0.4, 1e-3),
     "step_width": (1e-3, 1e-4),
+    "makeup_bend": (5e-5, 1e-5),
     "case_leakage": (4e-12, 1e-13),
     "drain_share_a": (0.7, 0.1),
     "drain_share_b": (0.3, 0.1),
