@@ -106,8 +106,8 @@ class EstimateCode(Code):
         "{percent:.0f} % in its flow, and they could not be taken up: bulk modulus may be a percent too low"
     )
     POSITION_RESIDUALS_LARGE = (
-        "the position residuals are {ratio:.2f} times the sensors' noise: neither friction model explains how the "
-        "piston starts and stops, and bulk modulus may be far off"
+        "the position residuals are {ratio:.2f} times the sensors' noise ({motion_percent:.2g} % of the motion): "
+        "neither friction model explains how the piston starts and stops, and bulk modulus may be far off"
     )
     FRICTION_LAWS_DISAGREE = (
         "two friction models explain the log equally well, but put bulk modulus at {least_pa:.3g} and at {most_pa:.3g} "

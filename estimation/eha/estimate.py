@@ -26,6 +26,10 @@ NOT_THE_LOGS = {
 """Reasons of a gate that speak against bulk modulus alone: the log holds too little of it, or it hangs on how the
 piston starts and stops, which decides no condition."""
 
+LARGEST_SHARE = 0.06
+"""Share of the motion that a fit without pressure may leave where anything is concluded from the log [fraction]: as
+much as means over 0.1 s may differ from a circuit's (`faults.diagnosis.out_of_model`)."""
+
 NOT_TOLD = frozenset({RigCode.MAKEUP_UNSEEN})
 """Remarks of a fit that say what a log does not tell, and nothing of the numbers that it does."""
 
@@ -167,10 +171,17 @@ def refused(found: BulkModulusEstimate) -> tuple[Note, ...]:
     Returns
     -------
     tuple of Note
-        Reasons of its gate; none where it passed, or where they speak against bulk modulus alone. A log that is nothing
-        like what the model does is refused for all of them.
+        Reasons of its gate; none where it passed, or where they speak against bulk modulus alone. A log of which the
+        model leaves much of the motion, however fine the encoder, is refused for all of them.
     """
     if found.form not in FITTED:
         return ()
-    spared = {EstimateCode.BOUND_TOO_WIDE} if found.outcome is Outcome.MISMATCH else NOT_THE_LOGS
+    spared = {EstimateCode.BOUND_TOO_WIDE} if _moves_otherwise(found) else NOT_THE_LOGS
     return tuple(note for note in found.gate.reasons if note.code not in spared)
+
+
+def _moves_otherwise(found: BulkModulusEstimate) -> bool:
+    """Return whether the piston moves in another way than the model's, by much of its motion and not of the noise."""
+    large = [note for note in found.gate.reasons if note.code == EstimateCode.POSITION_RESIDUALS_LARGE]
+    share = max((float(note.data["motion_percent"]) for note in large), default=float("inf"))
+    return found.outcome is Outcome.MISMATCH and share > 100.0 * LARGEST_SHARE

@@ -130,7 +130,7 @@ def fit_motion(
     apart = max((abs(float(np.log(other / value))) for other in others), default=0.0)
     bound, moved = float(np.hypot(std / value, apart)), unseen(best, len(log.measured)) * std / value
     believed = with_structure(found, float(np.linalg.norm([STRUCTURE, apart, moved])))
-    reasons = _objections(fits, best, others)
+    reasons = _objections(fits, best, others, share_of_motion(best, log))
     if not reasons and moved > MOST_MOVED:
         reasons = (EstimateCode.WEAKLY_HELD.note(percent=100.0 * moved, noise_percent=100.0 * std / value),)
     return FormFit(believed, bound, best.chi_square[0], reasons, best.rig_slopes)
@@ -163,6 +163,31 @@ def unseen(fit: GreyBoxFit, samples: int) -> float:
     """
     shown = float(np.clip(fit.chi_square[0], 1.0, EXPLAINED) - 1.0) * samples
     return float(np.sqrt(1.0 + shown + np.sqrt(2.0 * samples)))
+
+
+def share_of_motion(fit: GreyBoxFit, log: GreyBoxLog) -> float:
+    """Return the residuals over the motion, in the time over which a residual is told from drift.
+
+    Measured speed has noise, which is a random walk of position: what is older than ``sqrt(variance / walk)`` is
+    forgotten. How many times the encoder's noise a residual is says how fine the encoder is, not how wrong the model.
+
+    Parameters
+    ----------
+    fit : GreyBoxFit
+        The fit.
+    log : GreyBoxLog
+        Its log.
+
+    Returns
+    -------
+    float
+        Root mean square over that of the motion [fraction]; infinite where nothing moves.
+    """
+    (noise,), position = log.noise, log.measured[:, 0]
+    kept = np.sqrt(noise.variance / max(noise.walk * log.sample_time, np.finfo(float).tiny))
+    samples = int(np.clip(kept, 1, len(position) // 2))
+    moved = float(np.sqrt(np.nanmean((position[samples:] - position[:-samples]) ** 2)))
+    return float(np.sqrt(fit.chi_square[0] * noise.variance)) / moved if moved > 0.0 else float("inf")
 
 
 def _log(record: Record, p: EhaParameters, uncertainties: Mapping[str, float], speed_variance: float) -> GreyBoxLog:
@@ -264,10 +289,11 @@ def _rescaled(problem: FreedProblem, best: Point, search: MotionSearch) -> tuple
     return rescaled(problem, best, way)
 
 
-def _objections(fits: list[GreyBoxFit], best: GreyBoxFit, others: list[float]) -> tuple[Note, ...]:
+def _objections(fits: list[GreyBoxFit], best: GreyBoxFit, others: list[float], share: float) -> tuple[Note, ...]:
     reasons: list[Note] = []
     if best.chi_square[0] > EXPLAINED:
-        reasons.append(EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5))
+        large = {"ratio": best.chi_square[0] ** 0.5, "motion_percent": 100.0 * share}
+        reasons.append(EstimateCode.POSITION_RESIDUALS_LARGE.note(**large))
     values = [fit.values["bulk_modulus"] for fit in fits if fit.cost < best.cost + ALIKE]
     if disagree(values):
         reasons.append(EstimateCode.FRICTION_LAWS_DISAGREE.note(least_pa=min(values), most_pa=max(values)))

@@ -28,11 +28,12 @@ from faults.diagnosis.evidence import Scoreboard, weigh
 from faults.diagnosis.load import Loaded, under_load
 from faults.diagnosis.models_verdict import models_verdict, ranked
 from faults.diagnosis.out_of_model import SOFT, reasons_against, sensors_disagree
-from faults.diagnosis.outside import faults_outside
+from faults.diagnosis.outside import Outside, faults_outside
+from faults.diagnosis.rivals import doubts_left
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import limits_of, severities, severities_at, what_is_not_told, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
-from faults.diagnosis.wear import probabilities_over_wear
+from faults.diagnosis.wear import probabilities_over_wear, summed_over_wear
 from faults.eha.bank import mathematical_bank
 from faults.notes import ClassCode
 from plant.eha.model import EhaParameters
@@ -167,7 +168,8 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     if (stop := diagnosis.scoreboard.blocks.stop) is not None:
         found = replace(found, notes=(*found.notes, ClassCode.END_STOP.note(reach_mm=1e3 * stop)))
     diagnosis = _whatever_the_pump_delivers(diagnosis, actuator_of(loaded), estimate)
-    against = distinct((*doubts, *diagnosis.against))
+    board = diagnosis.scoreboard
+    against = distinct((*doubts_left(doubts, board.blocks, board.fits.best), *diagnosis.against))
     if against:  # nominal models alone are no judges of a circuit with another oil, but they say what is off
         against = distinct((*against, *verdict.against))
     severity = _severities(diagnosis, estimate, healthy, rig, pressure=PRESSURE in scores.channels)
@@ -301,23 +303,24 @@ def diagnose_clean(
     numbers = shipped_calibration() if calibration is None else calibration
     board = weigh(log.record, actuator, library)
     pressure = board.blocks.pressure is not None
-    probabilities = board.probabilities(numbers)
     region = float(np.max(region_scores(board.fits.best, board.fits.told, actuator)))
     against = (
         *log.objections,
         *sensors_disagree(board.window, board.blocks),
         *reasons_against(board.blocks, board.fits, region, actuator),
     )
-    others, not_excluded = ((), ()) if against else faults_outside(board.blocks, board.fits, actuator)
+    others = Outside() if against else faults_outside(board.blocks, board.fits, actuator)
+    worn = others.worn
+    probabilities = board.probabilities(numbers) if worn is None else summed_over_wear(board, worn, numbers)
     found = severities(board.fits, actuator, numbers.widths(pressure))
     return Diagnosis(
         max(probabilities, key=lambda name: probabilities[name]),
         probabilities,
-        (*against, *others),
+        (*against, *others.against),
         found,
         severities_at(actuator.conditions[0], actuator),
         limits_of(actuator),
-        (*what_is_not_told(board.fits, found, pressure=pressure), *not_excluded),
+        (*what_is_not_told(board.fits, found, pressure=pressure), *others.open),
         board,
     )
 

@@ -8,6 +8,7 @@ fault does, so the sound circuit is first chosen among some that differ in that.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +34,9 @@ HOPELESS = 20.0
 """Log-likelihood below the sound circuit at which a rough search leaves a fault [dimensionless]: a thorough one gained
 up to 26 on it, but few."""
 
+WORN = "a worn pump"
+"""What that fault is called."""
+
 DELIVERIES = (0.7, 0.8, 0.9)
 """Shares of its displacement that a worn pump delivers [dimensionless]."""
 
@@ -41,6 +45,25 @@ SEATS = (0.4, 1.0)
 
 WIDER = 5.0
 """By how much wider make-up valves are tried [dimensionless]: no rig file knows them."""
+
+
+class Outside(NamedTuple):
+    """What is said of faults outside the nine conditions.
+
+    Parameters
+    ----------
+    against : tuple of Note
+        The fault that a log shows, which speaks against all nine.
+    open : tuple of Note
+        The faults that it does not tell.
+    worn : ndarray, shape (1 + pumps, 9), optional
+        How well each condition holds it with a sound pump, then with one that delivers each of `DELIVERIES`:
+        log-likelihoods [dimensionless]; None where a worn pump is excluded.
+    """
+
+    against: tuple[Note, ...] = ()
+    open: tuple[Note, ...] = ()
+    worn: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +91,7 @@ class _Fault:
     elsewhere: bool
 
 
-def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[tuple[Note, ...], tuple[Note, ...]]:
+def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outside:
     """Return the fault outside the nine conditions that a log without pressure shows, and those that it does not tell.
 
     Parameters
@@ -82,19 +105,20 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple
 
     Returns
     -------
-    tuple of tuple of Note
-        What speaks against all nine; and what is not told. Both are empty with pressure, and where the piston sticks.
+    Outside
+        What is said of them; nothing with pressure, and where the piston sticks.
     """
     if blocks.pressure is not None or is_stuck(blocks, actuator):
-        return (), ()
+        return Outside()
     runs = nominal_runs(blocks, actuator)
     sound = _sound(blocks, fits, actuator, runs)
-    gains: dict[str, float] = {}
+    gains, worn = dict[str, float](), [sound.fits.scores]
     found: tuple[float, _Fault, _Tried] | None = None
     for fault in _faults(sound.actuator):
         tried = _with(fault, blocks, sound, runs)
         gain = tried.score - sound.score
         gains[fault.name] = max(gain, gains.get(fault.name, gain))
+        worn += [tried.fits.scores] if fault.name == WORN else []
         if found is None or gain > found[0]:
             found = gain, fault, tried
     if found is not None and found[0] > GAIN:
@@ -103,9 +127,10 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple
         again = fit_classes(blocks, sound.actuator, runs=runs, start=tried.fits.best.coordinates)
         gains[fault.name] = tried.score - max(sound.score, float(np.max(again.scores)))
         if gains[fault.name] > GAIN:
-            return (fault.note,), ()
+            return Outside((fault.note,))
     open_ = [name for name, gain in gains.items() if gain > NOT_EXCLUDED]
-    return (), (ClassCode.NOT_EXCLUDED.note(faults=", ".join(open_)),) if open_ else ()
+    note = (ClassCode.NOT_EXCLUDED.note(faults=", ".join(open_)),) if open_ else ()
+    return Outside((), note, np.array(worn) if WORN in open_ else None)
 
 
 def _with(fault: _Fault, blocks: Blocks, sound: _Tried, runs: Array) -> _Tried:
@@ -137,7 +162,7 @@ def _faults(actuator: Actuator) -> Iterator[_Fault]:
     sound = actuator.circuit
     for share in DELIVERIES:
         worn = replace(sound, pump_displacement=share * sound.pump_displacement)
-        yield _Fault(AgainstCode.PUMP_DELIVERS_LESS.note(percent=100.0 * share), "a worn pump", worn, elsewhere=True)
+        yield _Fault(AgainstCode.PUMP_DELIVERS_LESS.note(percent=100.0 * share), WORN, worn, elsewhere=True)
     major = actuator.conditions[list(CONDITIONS).index("major_leakage"), COORDINATES.index("leakage")]
     for side in "ab":
         stuck = one_sided(sound, **{f"makeup_shut_{side}": 1.0})

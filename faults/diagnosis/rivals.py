@@ -10,12 +10,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from estimation.notes import EstimateCode
 from faults.conditions import CONDITIONS
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES
 from faults.diagnosis.class_fit import LASTING, Actuator, PointFit, fit_freely, least_scales, scales_of
 from faults.diagnosis.model_doubt import LOOKS
 from plant.arrays import Array
+from plant.notes import Note
 
 NOISE_ALONE = 1.1
 """Residuals over the sensors' noise, root mean square, up to which nothing else is left [dimensionless]: the noise is
@@ -64,6 +66,30 @@ def creeps(blocks: Blocks, fit: PointFit) -> bool:
     """
     left, size = float(fit.scales[0]), float(blocks.sizes[0])
     return left > max(NOISE_ALONE * float(least_scales(blocks)[0]), ROUGHLY * size)
+
+
+def doubts_left(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[Note, ...]:
+    """Return what speaks against a log where a circuit follows its piston: no fit of motion that ended far from it.
+
+    The fit of motion without pressure has many minima too. It knows no more of the piston than the circuit does, so it
+    says nothing against a log of which that leaves little.
+
+    Parameters
+    ----------
+    doubts : sequence of Note
+        What speaks against the log before a circuit was fitted.
+    blocks : Blocks
+        The log.
+    fit : PointFit
+        The circuit that explains it best.
+
+    Returns
+    -------
+    tuple of Note
+        All of them where it creeps.
+    """
+    far = () if creeps(blocks, fit) else (EstimateCode.POSITION_RESIDUALS_LARGE,)
+    return tuple(note for note in doubts if note.code not in far)
 
 
 def other_friction(blocks: Blocks, actuator: Actuator, best: PointFit, condition: str) -> list[PointFit]:

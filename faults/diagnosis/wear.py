@@ -1,7 +1,8 @@
 """Classes of a log that does not tell a worn pump from leakage: how much a pump delivers is integrated out.
 
-Where pressure is logged, the balance of flows says whether a log tells (`estimation.fits.flow_fit`). If not, a pump
-that delivers less leaves less leakage to the same log, and bulk modulus is larger by as much.
+Where pressure is logged, the balance of flows says whether a log tells (`estimation.fits.flow_fit`). Without it,
+circuits with a worn pump do (`faults.diagnosis.outside`). If a log does not tell, a pump that delivers less leaves less
+leakage to it, and bulk modulus is larger by as much.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,6 +17,7 @@ from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.evidence import Scoreboard, bounded
 from faults.diagnosis.outside import DELIVERIES
+from plant.arrays import Array
 from plant.notes import Note
 
 
@@ -24,8 +26,7 @@ def probabilities_over_wear(
 ) -> Mapping[str, float] | None:
     """Return the probability of each condition, whatever the pump delivers, where a log does not tell.
 
-    The conditions are scored again for pumps that deliver `DELIVERIES` of their displacement, and summed with what is
-    presumed of a pump before the log is seen: half a normal distribution of the logarithm, of deviation `PRESUMED`.
+    The conditions are scored again for pumps that deliver `DELIVERIES` of their displacement; see `summed_over_wear`.
 
     Parameters
     ----------
@@ -41,7 +42,7 @@ def probabilities_over_wear(
     Returns
     -------
     Mapping[str, float] or None
-        Probability by condition [probability]; None where wear is excluded, found, or not looked for.
+        Probability by condition [probability]; None where wear is excluded or found, and without pressure.
     """
     if board.blocks.pressure is None or not wear_left_open(remarks):
         return None
@@ -50,6 +51,30 @@ def probabilities_over_wear(
         worn = replace(healthy, pump_displacement=share * healthy.pump_displacement)
         fits = fit_classes(board.blocks, replace(actuator, circuit=worn), start=board.fits.best.coordinates)
         scores.append(fits.scores)
+    return summed_over_wear(board, np.array(scores), calibration)
+
+
+def summed_over_wear(board: Scoreboard, scores: Array, calibration: Calibration) -> Mapping[str, float]:
+    """Return the probability of each condition, summed over what a pump may deliver.
+
+    Pumps count by what is presumed of one before the log is seen: half a normal distribution of the logarithm of what
+    it delivers over its displacement, of deviation `PRESUMED`.
+
+    Parameters
+    ----------
+    board : Scoreboard
+        The evidences of a sound pump.
+    scores : ndarray, shape (1 + pumps, 9)
+        How well each condition holds the log with a sound pump, then with one that delivers each of `DELIVERIES`:
+        log-likelihoods [dimensionless].
+    calibration : Calibration
+        Weights of the evidences.
+
+    Returns
+    -------
+    Mapping[str, float]
+        Probability by condition [probability].
+    """
     beforehand = -0.5 * (np.log([1.0, *DELIVERIES]) / PRESUMED[DELIVERY_ENTRY]) ** 2
-    summed = np.logaddexp.reduce(np.array(scores) + beforehand[:, None], axis=0)
+    summed = np.logaddexp.reduce(scores + beforehand[:, None], axis=0)
     return replace(board, log_odds={**board.log_odds, "parameters": bounded(summed)}).probabilities(calibration)

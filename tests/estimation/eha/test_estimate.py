@@ -106,15 +106,17 @@ def refused_with(form: str, outcome: Outcome, *reasons: Note) -> list[str]:
 
 def test_without_pressure_a_fit_that_is_near_speaks_against_bulk_modulus_alone() -> None:
     near, laws = (
-        EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=1.9),
+        EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=1.9, motion_percent=9.0),
         EstimateCode.FRICTION_LAWS_DISAGREE.note(least_pa=1e8, most_pa=2e8),
     )
     froze = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.0, begin_s=0.0, length_s=1.0)
     wide = EstimateCode.BOUND_TOO_WIDE.note(percent=5.0)
     assert refused_with("motion", Outcome.OK, near, laws) == []
     assert refused_with("motion", Outcome.NOT_OBSERVABLE, froze, wide, near) == [SensorCode.SENSOR_FROZE]
-    far = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=38.0)
+    far = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=38.0, motion_percent=6.1)
     assert refused_with("motion", Outcome.MISMATCH, wide, far) == [EstimateCode.POSITION_RESIDUALS_LARGE]
+    fine = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=38.0, motion_percent=5.9)  # of a fine encoder
+    assert refused_with("motion", Outcome.MISMATCH, wide, fine) == []
     large = EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=1.9)
     assert refused_with("flow", Outcome.OK, large) == [EstimateCode.PRESSURE_RESIDUALS_LARGE]
 

@@ -8,7 +8,7 @@ from estimation.fits import motion_fit, motion_search
 from estimation.fits.descent import Point, descend
 from estimation.fits.form_fit import FormFit
 from estimation.fits.greybox_fit import GreyBoxFit
-from estimation.fits.greybox_log import GreyBoxLog
+from estimation.fits.greybox_log import GreyBoxLog, OutputNoise
 from estimation.fits.motion_fit import fit_motion
 from estimation.fits.motion_search import Begun, Ended, MotionSearch, likeliest
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
@@ -22,6 +22,7 @@ from plant.eha.simulate import PLANTS, simulate
 from plant.errors import LogError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
+from tests.estimation.fits.short_logs import made_fit
 
 HEALTHY = EhaParameters()
 
@@ -79,6 +80,18 @@ def test_a_shaken_position_is_not_explained() -> None:
     (large,) = (note for note in fit.reasons if note.code == EstimateCode.POSITION_RESIDUALS_LARGE)
     assert large.data["ratio"] == pytest.approx(fit.chi_square**0.5)
     assert large.data["ratio"] > 10.0
+    assert large.data["motion_percent"] > 10.0
+
+
+def test_residuals_are_compared_with_how_far_the_piston_goes_while_noise_of_speed_is_remembered() -> None:
+    still = seen(Record(1e-3, {"motor_speed_rad_s": np.ones(1000), "position_m": np.zeros(1000)}))
+    moving = replace(still, measured=4e-5 * np.arange(1000.0)[:, None], noise=(OutputNoise(2.56e-12, 1e-11),))
+    moving.measured[500] = np.nan
+    fit = made_fit(1.0, 2e8, 1e6, chi=100.0)
+    assert motion_fit.share_of_motion(fit, moving) == pytest.approx(1.6e-5 / (16.0 * 4e-5))
+    surer = replace(moving, noise=(OutputNoise(2.56e-12, 0.0),))  # then all that was moved counts, half the log here
+    assert motion_fit.share_of_motion(fit, surer) == pytest.approx(1.6e-5 / (500.0 * 4e-5))
+    assert motion_fit.share_of_motion(fit, still) == np.inf
 
 
 def test_a_long_log_is_searched_on_its_beginning_and_ends_on_the_whole(
@@ -206,19 +219,19 @@ def found(bulk_modulus: float, cost: float = 50.0, chi_square: float = 1.0) -> G
 
 def test_friction_laws_that_explain_a_log_alike_and_disagree_are_objected_to() -> None:
     fits = [found(2.0e8), found(2.3e8, 50.0 + 0.9 * motion_fit.ALIKE)]
-    (note,) = motion_fit._objections(fits, fits[0], [])
+    (note,) = motion_fit._objections(fits, fits[0], [], 0.01)
     assert note.code == EstimateCode.FRICTION_LAWS_DISAGREE
     assert note.data == {"least_pa": 2.0e8, "most_pa": 2.3e8}
     worse = found(2.3e8, 50.0 + 1.1 * motion_fit.ALIKE)
-    assert motion_fit._objections([fits[0], worse], fits[0], []) == ()
+    assert motion_fit._objections([fits[0], worse], fits[0], [], 0.01) == ()
 
 
 def test_another_optimum_far_from_the_best_is_objected_to() -> None:
     best = found(2.0e8)
-    (note,) = motion_fit._objections([best], best, [1.8e8, 2.01e8])
+    (note,) = motion_fit._objections([best], best, [1.8e8, 2.01e8], 0.01)
     assert note.code == EstimateCode.FORCES_ON_ANY_SCALE
     assert note.data == {"least_pa": 1.8e8, "most_pa": 2.01e8}
-    assert motion_fit._objections([best], best, [1.98e8, 2.01e8]) == ()
+    assert motion_fit._objections([best], best, [1.98e8, 2.01e8], 0.01) == ()
 
 
 @pytest.mark.parametrize("near", [True, False])
@@ -299,7 +312,7 @@ def test_the_other_law_is_not_fitted_where_no_number_is_told(
     fits, others = motion_fit._fitted(ended)
     assert len(fits) == (1 if disagreeing else 2)
     assert others == ([9e7] if disagreeing else [])
-    assert bool(motion_fit._objections(fits, fits[0], others)) == disagreeing
+    assert bool(motion_fit._objections(fits, fits[0], others, 0.01)) == disagreeing
 
 
 def test_what_nothing_explains_is_fitted_by_one_law_and_not_to_the_last_digit(

@@ -259,7 +259,7 @@ def objections_to_a_motion_fit() -> dict[str, Any]:
         ("laws disagree, but one is worse", fits(1.0, 2.11e8, 15.1), []),
         ("any scale", fits(1.0, 2e8, 11.0), [1.88e8]),
     ):
-        told[name] = noted(motion_fit._objections(made, made[0], others))
+        told[name] = noted(motion_fit._objections(made, made[0], others, 0.0125))
     return told
 
 

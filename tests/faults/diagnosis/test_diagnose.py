@@ -11,11 +11,13 @@ from benchmarks.scores import calibration_error, share_interval
 from estimation.log_checks.clean import clean_log
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis import diagnose
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.diagnose import Diagnosis, diagnose_clean
 from faults.diagnosis.evidence import EVIDENCES
+from faults.diagnosis.outside import Outside
 from faults.diagnosis.severity import severities_at
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.drives import make_drive
@@ -158,6 +160,21 @@ def test_intervals_and_probabilities_are_those_of_the_calibration(*, pressure: b
     undecided = diagnose_clean(log, ACTUATOR, calibration=stretched(1.0, 0.0)).probabilities
     assert list(undecided.values()) == pytest.approx([1.0 / len(CONDITIONS)] * len(CONDITIONS))
     assert once.probabilities[once.condition] > 0.5
+
+
+def test_without_pressure_classes_are_summed_over_what_a_pump_may_deliver(monkeypatch: pytest.MonkeyPatch) -> None:
+    speed = 90.0 * np.repeat([0.48, 1.0, -1.0, -0.56], 700)
+    record = simulate(CIRCUIT, speed, 1e-3, HEALTHY, sensors=BENCH, rng=np.random.default_rng(1))
+    sound = diagnosed(record, pressure=False)
+    place, other = (list(CONDITIONS).index(name) for name in (sound.condition, "major_leakage"))
+    worn = np.full((4, 9), -30.0)
+    worn[0, place], worn[2, other] = 0.0, 3.0  # a pump at 80 % explains the log better, in another condition
+    monkeypatch.setattr(diagnose, "faults_outside", lambda *_: Outside(worn=worn))
+    found = diagnosed(record, pressure=False)
+    assert sound.probabilities[sound.condition] > 0.99
+    assert 0.05 < found.probabilities[sound.condition] < 0.9
+    assert found.probabilities["major_leakage"] > 0.1
+    assert sum(found.probabilities.values()) == pytest.approx(1.0)
 
 
 def test_a_sure_classifier_that_is_always_right_has_no_calibration_error() -> None:

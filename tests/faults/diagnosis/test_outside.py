@@ -44,8 +44,9 @@ def log_of(circuit: CircuitParameters = SOUND, condition: str = "minor_friction"
 
 def said(blocks: Blocks) -> tuple[list[tuple[Code, dict[str, object]]], str]:
     """Return what speaks against all nine, and the faults that are not excluded."""
-    against, open_ = faults_outside(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
+    against, open_, worn = faults_outside(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
     assert [note.code for note in open_] in ([], [ClassCode.NOT_EXCLUDED])
+    assert (worn is not None) == any("worn pump" in note.data["faults"] for note in open_)
     return [(note.code, dict(note.data)) for note in against], "".join(str(note.data["faults"]) for note in open_)
 
 
@@ -97,13 +98,13 @@ def test_with_pressure_and_where_the_piston_sticks_nothing_is_asked(monkeypatch:
     fits = [fit_classes(blocks, ACTUATOR) for blocks in (seen, still)]
     monkeypatch.setattr(outside, "fit_classes", lambda *_, **__: pytest.fail("a circuit was fitted"))
     for blocks, one in zip((seen, still), fits, strict=True):
-        assert faults_outside(blocks, one, ACTUATOR) == ((), ())
+        assert faults_outside(blocks, one, ACTUATOR) == ((), (), None)
 
 
 def test_a_gain_that_the_sound_circuit_makes_up_when_asked_again_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     blocks = log_of(FAULTS["pump"][0])
     fits = fit_classes(blocks, ACTUATOR)
-    assert faults_outside(blocks, fits, ACTUATOR)[0]
+    assert faults_outside(blocks, fits, ACTUATOR).against
     fit, worn = outside.fit_classes, FAULTS["pump"][0].pump_displacement
     ended: list[np.ndarray] = []
 
@@ -115,7 +116,7 @@ def test_a_gain_that_the_sound_circuit_makes_up_when_asked_again_is_none(monkeyp
         return replace(found, scores=found.scores + 1e3) if again else found
 
     monkeypatch.setattr(outside, "fit_classes", as_good)
-    assert not faults_outside(blocks, fits, ACTUATOR)[0]
+    assert not faults_outside(blocks, fits, ACTUATOR).against
 
 
 def test_a_diagnosis_without_pressure_says_what_a_valve_that_is_stuck_shut_does() -> None:

@@ -10,7 +10,7 @@ import pytest
 from faults.conditions import CONDITIONS
 from faults.diagnosis import outside
 from faults.diagnosis.circuit_runs import COORDINATES
-from faults.diagnosis.outside import faults_outside
+from faults.diagnosis.outside import Outside, faults_outside
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import CircuitParameters
 from tests.faults.diagnosis.short_logs import ACTUATOR, blocks
@@ -27,6 +27,11 @@ def fits(score: float) -> Any:
 
 def decided(monkeypatch: pytest.MonkeyPatch, score: Score) -> tuple[Any, Any, list[tuple[Any, bool]]]:
     """Return what is said where each circuit explains the log so well, and which were fitted from which starts."""
+    found, asked = looked(monkeypatch, score)
+    return found.against, found.open, asked
+
+
+def looked(monkeypatch: pytest.MonkeyPatch, score: Score) -> tuple[Outside, list[tuple[Any, bool]]]:
     asked: list[tuple[Any, bool]] = []
 
     def fitted(_: Any, actuator: Any, *, runs: Any, start: Any = None) -> Any:  # noqa: ARG001  as it is called
@@ -36,8 +41,7 @@ def decided(monkeypatch: pytest.MonkeyPatch, score: Score) -> tuple[Any, Any, li
     monkeypatch.setattr(outside, "fit_classes", fitted)
     monkeypatch.setattr(outside, "nominal_runs", lambda *_: np.zeros((9, 1, 1)))
     monkeypatch.setattr(outside, "misfit", lambda *_: 0.0)
-    against, open_ = faults_outside(LOG, fits(0.0), ACTUATOR)
-    return against, open_, asked
+    return faults_outside(LOG, fits(0.0), ACTUATOR), asked
 
 
 def worn(circuit: CircuitParameters) -> float:
@@ -76,6 +80,20 @@ def test_a_fault_is_excluded_below_a_gain_of_minus_three(
     assert [(note.code, note.data["faults"]) for note in found] == (
         [(ClassCode.NOT_EXCLUDED, "a worn pump")] if open_ else []
     )
+
+
+@pytest.mark.parametrize(("best", "open_"), [(-2.9, True), (-3.1, False)])
+def test_what_worn_pumps_leave_of_the_conditions_is_told_where_they_are_not_excluded(
+    best: float, open_: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scores = {1.0: 0.0, 0.7: -8.0, 0.8: best, 0.9: -5.0}
+    found, _ = looked(monkeypatch, lambda one: scores[worn(one)] if type(one) is type(SOUND) else 1.0)
+    assert "a make-up valve that leaks" in found.open[0].data["faults"]
+    if open_:
+        assert found.worn is not None
+        assert found.worn.tolist() == [[score - 9.0, score] for score in (0.0, -8.0, best, -5.0)]
+    else:
+        assert found.worn is None
 
 
 @pytest.mark.parametrize(("rough", "thorough"), [(-19.9, True), (-20.1, False)])

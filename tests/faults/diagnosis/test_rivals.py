@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimation.notes import EstimateCode, SensorCode
 from faults.conditions import CONDITIONS
 from faults.diagnosis import rivals
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES
 from faults.diagnosis.class_fit import LASTING, Actuator, PointFit, misfit
 from faults.diagnosis.model_doubt import LOOKS
-from faults.diagnosis.rivals import NOISE_ALONE, ROUGHLY, behind, between_fits, creeps, other_friction
+from faults.diagnosis.rivals import NOISE_ALONE, ROUGHLY, behind, between_fits, creeps, doubts_left, other_friction
 from plant.eha.model import EhaParameters
 
 ACTUATOR = Actuator.of(EhaParameters())
@@ -122,3 +123,11 @@ def test_each_other_level_of_friction_is_tried_at_the_leakage_and_the_force_at_r
         nominal = ACTUATOR.conditions[list(CONDITIONS).index(name)]
         np.testing.assert_array_equal(start[sliding], nominal[sliding])
         np.testing.assert_array_equal(np.delete(start, sliding), np.delete(best.coordinates, sliding))
+
+
+def test_a_fit_of_motion_that_ended_far_off_is_no_doubt_of_a_piston_that_a_circuit_follows() -> None:
+    one, size = log(pressure=False), SIZES[0] / NOISE[0]
+    far = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=40.0, motion_percent=20.0)
+    froze = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.0, begin_s=0.0, length_s=1.0)
+    for share, left in ((0.9, (froze,)), (1.1, (far, froze))):
+        assert doubts_left((far, froze), one, leaving(share * ROUGHLY * size, 1.0, one)) == left
