@@ -81,22 +81,24 @@ def first_load(record: Record, variances: Mapping[str, float] | None = None) -> 
     return first if abs(first) > AT_REST + 5.0 * noise else 0.0
 
 
-def begins_in_motion(record: Record) -> bool:
+def begins_in_motion(record: Record, share: float = TURNING) -> bool:
     """Return whether the motor turns when a log begins: then its chambers need not stand at the accumulator's pressure.
 
     Parameters
     ----------
     record : Record
         The log.
+    share : float
+        Share of the log's motor speed, root mean square, from which the motor turns [fraction].
 
     Returns
     -------
     bool
-        Whether the first motor speed is more than `TURNING` of the log's, by root mean square.
+        Whether the first motor speed is more.
     """
     speed = record["motor_speed_rad_s"]
     first = abs(_first(record, "motor_speed_rad_s"))
-    return first > 0.0 and first > TURNING * float(np.sqrt(np.nanmean(speed**2)))
+    return first > 0.0 and first > share * float(np.sqrt(np.nanmean(speed**2)))
 
 
 def _first(record: Record, channel: str) -> float:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from estimation.arrays import IntArray
 from estimation.eha.explained import LEAKAGE_COURSE
 from estimation.log_checks.bridging import bridged, filled
+from estimation.log_checks.first_belief import begins_in_motion
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from estimation.log_checks.sensor_check import PRESSURE
 from plant.arrays import Array
@@ -25,6 +26,14 @@ BLOCK = 0.01
 
 SETTLING = 0.1
 """Time at the start that does not count [s]: the circuit starts at rest, a log need not."""
+
+FORGOTTEN = 1.0
+"""The same where a log begins in motion and no pressure says with what [s]: what a stuck piston holds leaks away in
+about that time, ``V / (beta L)`` of the healthy actuator."""
+
+STIRRED = 0.05
+"""Share of a log's motor speed, root mean square, from which its first one is that of a machine that runs [fraction]: a
+motor passes through zero, and noise of logs that begin at rest is some 0.001."""
 
 LONGEST = 30.0
 """Longest stretch of a log that is simulated [s]."""
@@ -67,6 +76,8 @@ class Blocks:
         The same [Pa, m/s], if it is no more than noise too: under a load a piston without pressure is not at rest.
     place : float
         Position that the log begins with [m]; 0 where none is logged.
+    settling : float
+        Time at the start that does not count [s].
     """
 
     speed: Array
@@ -81,6 +92,7 @@ class Blocks:
     begun: tuple[float, float] | None = None
     opening: tuple[float, float] | None = None
     place: float = 0.0
+    settling: float = SETTLING
 
     @cached_property
     def outputs(self) -> Array:
@@ -116,7 +128,7 @@ class Blocks:
     @property
     def first(self) -> int:
         """First block that counts."""
-        return round(SETTLING / (self.block * self.sample_time))
+        return round(self.settling / (self.block * self.sample_time))
 
 
 def root_mean_square(values: Array) -> Array:
@@ -196,7 +208,15 @@ def blocks_of(record: Record) -> Blocks:
         begun=begun,
         opening=opening,
         place=_place(whole),
+        settling=_settling(record, whole),
     )
+
+
+def _settling(record: Record, whole: Mapping[str, Array]) -> float:
+    """Return the time at the start of a log that does not count [s]: a fifth of it at most."""
+    if PRESSURE in whole or not begins_in_motion(record, STIRRED):
+        return SETTLING
+    return float(np.clip(0.2 * record.duration, SETTLING, FORGOTTEN))
 
 
 def _opening(whole: Mapping[str, Array], velocity: Array) -> tuple[float, float] | None:

@@ -1,0 +1,54 @@
+"""Without pressure, what a piston began with is waited for until it is forgotten."""
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.blocks import FORGOTTEN, SETTLING, blocks_of
+from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.class_regions import fit_classes
+from faults.diagnosis.rivals import creeps
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import RIG
+
+HEALTHY, PRESSURE = EhaParameters(), "differential_pressure_pa"
+
+
+def running(seconds: float, first: float) -> Record:
+    """Return a log cut out of a test of major friction, which begins with a motor speed [rad/s]."""
+    rng = np.random.default_rng(3)
+    speed = np.concatenate([[0.0], make_drive("steps", 12.0, 2e-3, HEALTHY, rng)])
+    log = simulate(CIRCUIT, speed, 2e-3, parameters_for(CONDITIONS["major_friction"]), sensors=RIG, rng=rng)
+    place = int(np.argmin(np.abs(log["motor_speed_rad_s"][1000:2000] - first))) + 1000 if first else 0
+    return log.slice(place, place + round(seconds / 2e-3))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "first", "pressure", "settling"),
+    [
+        (6.0, 60.0, False, FORGOTTEN),
+        (3.0, 60.0, False, 0.6),
+        (6.0, 0.0, False, SETTLING),
+        (6.0, 60.0, True, SETTLING),
+    ],
+)
+def test_a_beginning_in_motion_does_not_count_where_no_pressure_says_with_what(
+    seconds: float, first: float, pressure: bool, settling: float
+) -> None:
+    log = running(seconds, first)
+    blocks = blocks_of(log if pressure else log.replace(**{PRESSURE: None}))
+    assert blocks.settling == pytest.approx(settling, rel=2e-3)
+    assert blocks.first == round(blocks.settling / 0.01)
+    assert len(blocks.seen) == len(blocks.velocity) - blocks.first
+
+
+def test_a_circuit_from_rest_follows_a_running_test_once_its_beginning_is_forgotten() -> None:
+    actuator, blocks = Actuator.of(HEALTHY), blocks_of(running(6.0, 60.0).replace(**{PRESSURE: None}))
+    fits = fit_classes(blocks, actuator)
+    assert list(CONDITIONS)[int(np.argmax(fits.scores))] == "major_friction"
+    assert not creeps(blocks, fits.best)
+    begun = blocks.velocity - fits.best.fitted[:, 0]
+    assert np.sqrt(np.mean(begun[: blocks.first] ** 2)) > 3.0 * fits.best.scales[0]
