@@ -130,11 +130,32 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
     rows = _as_logged(blocks, rows)[None]
     if blocks.earlier is not None:
         until, before = blocks.earlier
+        if isinstance(until, int) and until % blocks.block == 0 and blocks.course is None:
+            brought, place = _brought(blocks, rows.shape[-1])
+            gone_on = _run(blocks, np.repeat(place, rows.shape[1], axis=0), rows, until)
+            return np.concatenate([np.repeat(brought, rows.shape[1], axis=0), gone_on], axis=1)
         before = as_wide(_as_logged(blocks, before[None])[0], rows.shape[-1])
         rows = _after(until, before, rows[0], len(blocks.speed))
     if blocks.course is not None:
         rows = rows * _drift(blocks.course, rows.shape[-1])[:, None, :]
-    groups = circuit_groups(_starts(blocks, rows[0]), blocks.speed, rows, blocks.sample_time, **ALLOWED)
+    return _run(blocks, _starts(blocks, rows[0]), rows)
+
+
+@lru_cache(maxsize=2)
+def _brought(blocks: Blocks, width: int) -> tuple[Array, Array]:
+    """Return what the circuit before a change shows up to it, and the states that it leaves, each of one circuit.
+
+    All that are tried after it begin there, so it is run once.
+    """
+    until, before = blocks.earlier or (0, np.empty(0))
+    rows = as_wide(_as_logged(blocks, before[None])[0], width)[None, None]
+    (states,) = circuit_groups(_starts(blocks, rows[0]), blocks.speed[: until + 1], rows, blocks.sample_time, **ALLOWED)
+    return _outputs(blocks, states, rows), np.ascontiguousarray(states[-1].T)
+
+
+def _run(blocks: Blocks, starts: Array, rows: Array, since: int = 0) -> Array:
+    """Return what circuits do from a sample on, in which they are at some states, shape (m, blocks, outputs)."""
+    groups = circuit_groups(starts, blocks.speed[since:], rows, blocks.sample_time, **ALLOWED)
     found, first = list[Array](), 0
     for states in groups:
         last = first + states.shape[2]

@@ -1,11 +1,13 @@
 """Circuits by coordinates, and a log in blocks."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis import circuit_runs
 from faults.diagnosis.blocks import BLOCK, Blocks, blocks_of
 from faults.diagnosis.circuit_runs import COLUMN, _between_stops, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.class_fit import Actuator
@@ -172,6 +174,29 @@ def test_an_earlier_circuit_runs_up_to_its_sample() -> None:
     np.testing.assert_array_equal(both[:48], before[:48])
     assert both[-10:] == pytest.approx(velocity_of(plain, rows)[-10:], rel=1e-3)
     assert np.abs(both[-10:] - before[-10:]).min() > 1e-3
+
+
+def test_an_earlier_circuit_is_run_once_for_all_that_are_tried_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain, rows = healthy_blocks()
+    place, asked = list(CONDITIONS).index("major_leakage"), list[int]()
+    (leaking,) = parameter_rows(ACTUATOR.conditions[[place]], ACTUATOR.circuit, ACTUATOR.rated)
+    original = circuit_runs.circuit_groups
+
+    def counted(starts: np.ndarray, speed: np.ndarray, *more: Any, **how: Any) -> Any:
+        asked.append(len(speed))
+        return original(starts, speed, *more, **how)
+
+    monkeypatch.setattr(circuit_runs, "circuit_groups", counted)
+    changed = replace(plain, earlier=(500, leaking))
+    (first,), (again,) = predicted(changed, rows), predicted(changed, rows)
+    assert asked == [501, 301, 301]
+    np.testing.assert_array_equal(first, again)
+    (whole,) = predicted(replace(plain, earlier=(np.array([500]), leaking)), rows)  # at each sample its own circuit
+    size = np.abs(whole).max(axis=0)
+    assert np.all(np.abs(first - whole) < (2e-4, 1e-2) * size)  # whose long steps smooth the pressure as it changes
+    (between,) = predicted(replace(plain, earlier=(503, leaking)), rows)  # the change is no end of a block
+    assert asked[-1] == 801
+    assert np.all(np.abs(between - first)[:49] < (2e-4, 1e-3) * size)
 
 
 def test_each_circuit_may_have_another_before_it_up_to_a_sample_of_its_own() -> None:
