@@ -47,6 +47,10 @@ class ClassCode(Code):
     )
     LEAKAGE_AND_BIAS_ALIKE = "the log does not separate the leakage coefficient from the flow bias"
     VELOCITY_LOST_TOLD = "the log does determine the velocity lost: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
+    OIL_STIFFER_CLASS = (
+        "without pressure, the circuit that fits has {ratio:.2g} times the bulk modulus in the rig file (another oil, "
+        "or a wrong rig file); the conditions were compared around that"
+    )
     NOT_EXCLUDED = (
         "without differential_pressure_pa, other faults are not excluded: {faults} would explain the log about as well"
     )

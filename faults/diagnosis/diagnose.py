@@ -21,6 +21,7 @@ from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.log_checks.sensor_check import PRESSURE
 from estimation.notes import RigCode
 from faults.diagnosis.advice import advice_for, oil_advice
+from faults.diagnosis.another_oil import whatever_the_oil
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import region_scores
@@ -210,13 +211,15 @@ def _of_clean(log: CleanLog, parameters: EhaParameters) -> Diagnosis:
 
 
 def _diagnosed(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain) -> Loaded:
-    """Return a diagnosis, under a load where the flow balance holds and the force balance wants one."""
+    """Return a diagnosis, under a load where the flow balance holds and the force balance wants one; in stiff oil."""
 
     def of(tried: EhaParameters, doubt: float) -> Diagnosis:
         if doubt > 0.0:
             return diagnose_clean(log, replace(actuator_of(tried), load_doubt=doubt))
         return plain.of(log, tried)
 
+    if estimate.form == "motion":
+        return whatever_the_oil(of, parameters)
     if estimate.form != "flow" or not estimate.gate.passed:
         return Loaded(of(parameters, 0.0), parameters)
     return under_load(of, parameters, estimate)
