@@ -12,7 +12,7 @@ import numpy as np
 
 from estimation.notes import EstimateCode
 from faults.conditions import CONDITIONS
-from faults.diagnosis.blocks import Blocks
+from faults.diagnosis.blocks import SETTLING, Blocks
 from faults.diagnosis.circuit_runs import COORDINATES
 from faults.diagnosis.class_fit import LASTING, Actuator, PointFit, fit_freely, least_scales, scales_of
 from faults.diagnosis.model_doubt import LOOKS
@@ -69,10 +69,9 @@ def creeps(blocks: Blocks, fit: PointFit) -> bool:
 
 
 def doubts_left(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[Note, ...]:
-    """Return what speaks against a log where a circuit follows its piston: no fit of motion that ended far from it.
+    """Return what speaks against a log: no fit of motion from rest where the log does not begin at rest.
 
-    The fit of motion without pressure has many minima too. It knows no more of the piston than the circuit does, so it
-    says nothing against a log of which that leaves little.
+    A circuit, whose beginning does not count, says how the piston moves.
 
     Parameters
     ----------
@@ -86,10 +85,11 @@ def doubts_left(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[
     Returns
     -------
     tuple of Note
-        All of them where it creeps.
+        All of them where the log begins at rest, and where the circuit does not follow the piston.
     """
-    far = () if creeps(blocks, fit) else (EstimateCode.POSITION_RESIDUALS_LARGE,)
-    return tuple(note for note in doubts if note.code not in far)
+    if blocks.settling == SETTLING or creeps(blocks, fit):
+        return tuple(doubts)
+    return tuple(note for note in doubts if note.code != EstimateCode.POSITION_RESIDUALS_LARGE)
 
 
 def other_friction(blocks: Blocks, actuator: Actuator, best: PointFit, condition: str) -> list[PointFit]:
