@@ -61,6 +61,30 @@ class Candidate:
         """Size of the model."""
         return self.fit.form
 
+    def outlasts_block(self, data: Channels) -> bool:
+        """Return whether a time constant is longer than a block that is held back.
+
+        What such a pole does in a block is pinned by the outputs on both sides, so blocks do not miss it where it
+        follows the drift of one record.
+
+        Parameters
+        ----------
+        data : Channels
+            That it was judged on.
+        """
+        return slowest_pole(self.fit.f) > np.exp(-(BLOCKS + 1.0) / data.longest)
+
+
+def slowest_pole(f: Array) -> float:
+    """Return the largest modulus of the roots of a denominator; zero where it has none.
+
+    Parameters
+    ----------
+    f : ndarray, shape (order + 1,)
+        Monic.
+    """
+    return float(np.abs(np.roots(f)).max()) if f.size > 1 else 0.0
+
 
 def held_back_blocks(fit: LinearFit, data: Channels) -> tuple[float, ...]:
     """Return the root-mean-square free-run error of each block held back, simulated by a fit to the others.
@@ -167,7 +191,7 @@ def doubt_of(fit: LinearFit, data: Channels) -> str:
     gained = n * float(np.log(spread / max(fit.cost, 1e-300 * spread)))
     if gained < fit.theta.size * float(np.log(n)):
         return "no_fit"
-    radius = float(np.abs(np.roots(fit.f)).max()) if fit.form.order else 0.0
+    radius = slowest_pole(fit.f)
     if radius >= 1.0 or (radius > 0.0 and -1.0 / np.log(radius) > data.longest):
         return "time_constant"
     return ""

@@ -16,7 +16,7 @@ from estimation.identification.free_run.choose_hammerstein import (
     hammerstein_candidates,
     worthwhile,
 )
-from estimation.identification.free_run.choose_linear import Candidate, chosen, linear_candidates
+from estimation.identification.free_run.choose_linear import Candidate, chosen, linear_candidates, surely_better
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate, polynomial_candidates
 from estimation.identification.free_run.data import Channels, Scaling, scaled
 from estimation.identification.free_run.dense_polynomial import Asked
@@ -161,7 +161,8 @@ def _identified(
         better = min(polynomial, key=lambda one: (one.price, one.held_back), default=None)
         if better is None and structure == "narx":
             raise HydrostateError(f"no polynomial model of {data.output!r} runs free without growing beyond bounds")
-        taken = better is not None and (structure == "narx" or not sound or _clearly_better(better, best))
+        straight = min([best, *(one for one in linear if not one.doubt)], key=lambda one: one.held_back)
+        taken = better is not None and (structure == "narx" or not sound or _clearly_better(better, straight))
         if bend is not None and not (taken and better is not None and better.price < bend.held_back):
             return _bent(bend, data, whole, rows)
         if taken and better is not None:
@@ -248,6 +249,7 @@ def _believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) ->
     passed = [one for one in candidates if one.doubt == "time_constant" and one.held_back < best.held_back]
     if passed:
         notes.append(IdentificationCode.SLOW_MODELS_PASSED_OVER.note(count=len(passed), duration_s=data.duration))
+    beyond = list(notes)
     simpler = [
         one for one in candidates if not one.doubt and one is not best and one.form.n_values <= best.form.n_values
     ]
@@ -258,6 +260,12 @@ def _believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) ->
             taken = min(clean, key=lambda one: one.price)
             notes.append(IdentificationCode.SIMPLER_MODEL_TAKEN.note(order=best.form.order, taken=taken.form.order))
             best = taken
+    # a block lies between outputs that pin a slower pole to the drift of this record: it has to win by more than chance
+    quick = [one for one in candidates if not (one.doubt or one.fit.bounded or one.outlasts_block(data))]
+    if quick and best.outlasts_block(data):
+        taken, said = _believable(quick, data, by)
+        if not surely_better(best.block_errors, taken.block_errors):
+            return taken, [*beyond, *said]
     return best, notes
 
 

@@ -1,0 +1,97 @@
+"""A pole slower than a block that is held back is taken only where it wins by more than such blocks scatter."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.arrays import Array
+from estimation.identification.free_run.choose_linear import (
+    BLOCKS,
+    Candidate,
+    candidate,
+    chosen,
+    linear_candidates,
+    slowest_pole,
+)
+from estimation.identification.free_run.data import Channels, channels_from, scaled
+from estimation.identification.free_run.identify import _believable
+from estimation.identification.free_run.linear_fit import Form, LinearFit, fit_linear
+from estimation.identification.model.recursion import filtered
+from estimation.identification.notes import IdentificationCode
+
+N = 600
+
+
+def steps(seed: int, hold: int = 8) -> Array:
+    return np.repeat(np.random.default_rng(seed).normal(size=N // hold + 1), hold)[:N]
+
+
+def channels(y: Array, u: Array) -> Channels:
+    return channels_from([u[:, None]], [y], 1.0, ["u"], "y")
+
+
+@pytest.fixture(scope="module")
+def plain() -> tuple[Channels, Candidate]:
+    u = steps(1)
+    y = filtered([0.0, 0.3], [1.0, -0.7], u) + 0.05 * np.random.default_rng(2).normal(size=N)
+    data = scaled(channels(y, u))[0]
+    return data, candidate(fit_linear(Form(1, (1,), (1,)), data), data)
+
+
+def with_pole(one: Candidate, pole: float, errors: tuple[float, ...], doubt: str = "") -> Candidate:
+    theta = one.fit.theta.copy()
+    theta[1] = -pole
+    fit = LinearFit(one.fit.form, theta, one.fit.cost)
+    return replace(one, fit=fit, held_back=float(np.sqrt(np.mean(np.square(errors)))), block_errors=errors, doubt=doubt)
+
+
+def test_a_block_ends_before_a_slow_pole_has_decayed(plain: tuple[Channels, Candidate]) -> None:
+    data, one = plain
+    edge = np.exp(-(BLOCKS + 1) / N)
+    assert not with_pole(one, edge - 1e-4, (0.1,)).outlasts_block(data)
+    assert with_pole(one, edge + 1e-4, (0.1,)).outlasts_block(data)
+    assert slowest_pole(np.array([1.0, 0.2, -0.35])) == pytest.approx(0.7)
+    assert slowest_pole(np.ones(1)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("slow", "taken"),
+    [
+        ((0.08, 0.08, 0.08, 0.08), "slow"),  # better in every block alike
+        ((0.05, 0.05, 0.05, 0.11), "slow"),  # better by more than one standard error
+        ((0.03, 0.09, 0.10, 0.115), "quick"),  # as much better, in one block
+        ((0.1005, 0.1005, 0.1005, 0.1005), "quick"),
+    ],
+)
+def test_a_slow_pole_wins_by_more_than_blocks_scatter(
+    plain: tuple[Channels, Candidate], slow: tuple[float, ...], taken: str
+) -> None:
+    data, one = plain
+    models = {"quick": with_pole(one, 0.7, (0.1,) * 4), "slow": with_pole(one, 0.998, slow)}
+    models["slow"] = replace(models["slow"], bic=one.bic - 100.0)
+    _, by = scaled(data)
+    assert _believable(list(models.values()), data, by)[0] is models[taken]
+    # where nothing quicker may be taken, the slow one is
+    doubted = replace(models["quick"], doubt="no_fit")
+    assert _believable([doubted, models["slow"]], data, by)[0] is models["slow"]
+
+
+def test_what_lies_beyond_the_record_is_still_told(plain: tuple[Channels, Candidate]) -> None:
+    data, one = plain
+    beyond = with_pole(one, 0.9999, (0.09,) * 4, "time_constant")
+    slow, quick = with_pole(one, 0.998, (0.07, 0.1, 0.1, 0.115)), with_pole(one, 0.7, (0.1,) * 4)
+    found, notes = _believable([beyond, slow, quick], data, scaled(data)[1])
+    assert found is quick
+    assert [note.code for note in notes] == [IdentificationCode.SLOW_MODELS_PASSED_OVER]
+
+
+def test_the_drift_of_one_record_is_not_taken_for_a_slow_pole() -> None:
+    rng = np.random.default_rng(9)
+    u = np.repeat(rng.normal(size=51), 8)[:400]
+    y = filtered([0.0, 0.3], [1.0, -0.7], u)
+    drift = filtered([1.0], [1.0, -0.98], rng.normal(size=400))
+    data, by = scaled(channels(y + 0.25 * y.std() / drift.std() * drift, u))
+    candidates = linear_candidates(data, [1, 2, 3], (1,))
+    assert chosen(candidates).outlasts_block(data), "held-back blocks alone want the slow pole"
+    assert _believable(candidates, data, by)[0].fit.f == pytest.approx([1.0, -0.7], abs=0.03)
