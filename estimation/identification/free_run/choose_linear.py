@@ -76,12 +76,17 @@ class Candidate:
 
 
 def slowest_pole(f: Array) -> float:
-    """Return the largest modulus of the roots of a denominator; zero where it has none.
+    """Return the largest modulus of the roots of a denominator.
 
     Parameters
     ----------
     f : ndarray, shape (order + 1,)
         Monic.
+
+    Returns
+    -------
+    float
+        Distance from the origin; zero where there is no root [dimensionless].
     """
     return float(np.abs(np.roots(f)).max()) if f.size > 1 else 0.0
 
