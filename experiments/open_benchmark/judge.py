@@ -69,8 +69,8 @@ def judge_class(said: Entries, truth: Entries) -> dict[str, Any]:
     -------
     dict[str, Any]
         ``verdict`` is right, wrong, unknown, none or failed; ``right`` also where unknown is acceptable.
-        ``false_since``: a condition is said to have begun within a log that has one from end to end. ``since``: what did
-        begin is dated within its interval; None where nothing did.
+        ``false_since``: a condition is said to have begun within a log that has one from end to end.
+        ``since``: what did begin is dated within its interval; None where nothing did.
     """
     accept, got = str(truth["accept"]).split(";"), said.get("condition")
     dated = _dated(said, truth)
