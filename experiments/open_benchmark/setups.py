@@ -116,5 +116,16 @@ class Setup:
         return replace(self, change=replace(self.change, **changes))
 
     def begins(self, share: float) -> float:
-        """Return the time at which what comes in after a share of the run is in the log [s]."""
+        """Return the time in the log at which something comes in.
+
+        Parameters
+        ----------
+        share : float
+            When it comes, of the run [fraction].
+
+        Returns
+        -------
+        float
+            Time since the first sample [s].
+        """
         return share * (self.duration + self.logger.begin) - self.logger.begin
