@@ -238,7 +238,8 @@ class RigCode(Code):
     )
     LEAKAGE_DRIFTS = (
         "leakage changes by a factor of {factor:.2f} over the log, from {first:.3g} to {last:.3g} m^3/(s Pa), as when "
-        "the oil warms or cools; the condition is that at the end"
+        "the oil warms or cools; severities are those at the end, and the condition holds wherever in between the rig "
+        "file's oil stands"
     )
     MAKEUP_BLOCKED = "the make-up valve of chamber {side} lets almost no oil in: it is stuck shut"
     PORT_DRAINS = (

@@ -25,6 +25,7 @@ from faults.diagnosis.another_oil import whatever_the_oil
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import region_scores
+from faults.diagnosis.drift import over_drift
 from faults.diagnosis.evidence import Scoreboard, weigh
 from faults.diagnosis.load import Loaded, under_load
 from faults.diagnosis.models_verdict import models_verdict, ranked
@@ -34,7 +35,7 @@ from faults.diagnosis.rivals import doubts_left
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import limits_of, severities, severities_at, what_is_not_told, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
-from faults.diagnosis.wear import probabilities_over_wear, summed_over_wear
+from faults.diagnosis.wear import summed_over_wear, whatever_the_pump_delivers
 from faults.eha.bank import mathematical_bank
 from faults.notes import ClassCode
 from plant.eha.model import EhaParameters
@@ -160,7 +161,8 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
         return replace(found, evidence=EhaEvidence(estimate, scores, None))
     doubts = (*refused(estimate), *outside, *log.objections)
     try:
-        diagnosis, loaded, named = _diagnosed(log, rig.parameters, estimate, plain)
+        judged = partial(_judged, parameters=rig.parameters, estimate=estimate, plain=plain)
+        diagnosis, _, named = over_drift(judged, log, strange)
     except (RigError, LogError) as error:
         without = _without_class(found, log, scores, distinct((*doubts, *verdict.against)))
         said = ClassCode.NO_CIRCUIT if isinstance(error, RigError) else ClassCode.NO_PROBABILITIES
@@ -168,7 +170,6 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     found = replace(found, notes=(*found.notes, *named))
     if (stop := diagnosis.scoreboard.blocks.stop) is not None:
         found = replace(found, notes=(*found.notes, ClassCode.END_STOP.note(reach_mm=1e3 * stop)))
-    diagnosis = _whatever_the_pump_delivers(diagnosis, actuator_of(loaded), estimate)
     board = diagnosis.scoreboard
     against = distinct((*doubts_left(doubts, board.blocks, board.fits.best), *diagnosis.against))
     if against:  # nominal models alone are no judges of a circuit with another oil, but they say what is off
@@ -208,6 +209,13 @@ class _Plain(NamedTuple):
 
 def _of_clean(log: CleanLog, parameters: EhaParameters) -> Diagnosis:
     return diagnose_clean(log, actuator_of(parameters))
+
+
+def _judged(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain) -> Loaded:
+    """Return the same with its classes weighed over what a pump may deliver, where the log does not tell that."""
+    found = _diagnosed(log, parameters, estimate, plain)
+    actuator = actuator_of(found.parameters)
+    return found._replace(diagnosis=whatever_the_pump_delivers(found.diagnosis, actuator, estimate.remarks))
 
 
 def _diagnosed(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain) -> Loaded:
@@ -252,14 +260,6 @@ def _severities(
     """Return how bad it is, with the bulk modulus that was estimated, and what is not known of the rig."""
     found = with_bulk_modulus(diagnosis.severity, estimate.quantity, actuator_of(healthy))
     return with_totals(found, actuator_of(rig.parameters), estimate.spreads, pressure=pressure)
-
-
-def _whatever_the_pump_delivers(diagnosis: Diagnosis, actuator: Actuator, estimate: BulkModulusEstimate) -> Diagnosis:
-    """Return a diagnosis with its classes weighed over what a pump may deliver, where a log does not tell that."""
-    found = probabilities_over_wear(diagnosis.scoreboard, actuator, estimate.remarks, shipped_calibration())
-    if found is None:
-        return diagnosis
-    return replace(diagnosis, condition=max(found, key=lambda name: found[name]), probabilities=found)
 
 
 def _without_class(found: Finding, log: CleanLog, scores: Scores, against: tuple[Note, ...]) -> Finding:

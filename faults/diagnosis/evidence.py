@@ -116,10 +116,11 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
     part = last_part(record, actuator)
     record, blocks, fits = part.record, part.blocks, part.fits
     found = {
-        "models": -SAMPLES * np.sum(np.log(fits.nominal_scales), axis=1),
-        "innovations": innovation_scores(record, actuator.circuit) / blocks.block,
+        "models": models_scores(fits),
         "parameters": fits.scores,
     }
+    if blocks.course is None:  # filters know no leakage that drifts
+        found["innovations"] = innovation_scores(record, actuator.circuit) / blocks.block
     if library is not None:
         table = score_transfer_functions(record, library).by_condition
         found["transfer_functions"] = -SAMPLES * np.log([table[name] for name in CONDITIONS])
@@ -129,6 +130,22 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
         found = {name: friction_left_open(scores, blocks, actuator) for name, scores in found.items()}
     odds = {name: bounded(found[name]) for name in EVIDENCES if name in found}
     return Scoreboard(odds, blocks, fits, part.window, part.onset)
+
+
+def models_scores(fits: ClassFits) -> Array:
+    """Return how well the nominal circuit of each condition explains a log.
+
+    Parameters
+    ----------
+    fits : ClassFits
+        The fit.
+
+    Returns
+    -------
+    ndarray, shape (9,)
+        Log-likelihoods [dimensionless] up to a constant of the log.
+    """
+    return np.asarray(-SAMPLES * np.sum(np.log(fits.nominal_scales), axis=1), dtype=np.float64)
 
 
 def within_reach(scores: Array, apart: Array) -> Array:

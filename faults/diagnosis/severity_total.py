@@ -8,6 +8,7 @@ how alike actuators of one kind are, which the interval given the rig holds alre
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from estimation.eha.rig_share import Responses, with_total
 from estimation.finding import Quantity
@@ -27,7 +28,7 @@ def with_totals(
     Parameters
     ----------
     found : Mapping[str, Quantity]
-        Severities, by the names of `faults.diagnosis.severity.UNITS`.
+        Severities, by the names of `faults.diagnosis.severity.UNITS`; a total that one has already is held too.
     actuator : Actuator
         The healthy actuator.
     spreads : Mapping[str, Spread]
@@ -44,7 +45,15 @@ def with_totals(
     if lost is None:
         return found
     laws, whole = _laws(lost, actuator, pressure=pressure), _whole(found, actuator)
-    return {**found, **{name: with_total(found[name], law, spreads, whole.get(name)) for name, law in laws.items()}}
+    totals = {name: with_total(found[name], law, spreads, whole.get(name)) for name, law in laws.items()}
+    return {**found, **{name: _holding(found[name].ci95_total, one) for name, one in totals.items()}}
+
+
+def _holding(ends: tuple[float, float] | None, one: Quantity) -> Quantity:
+    """Return a quantity whose total interval holds another, too."""
+    if ends is None or one.ci95_total is None:
+        return one
+    return replace(one, ci95_total=(min(ends[0], one.ci95_total[0]), max(ends[1], one.ci95_total[1])))
 
 
 def _laws(lost: float, actuator: Actuator, *, pressure: bool) -> Mapping[str, Responses]:

@@ -7,18 +7,45 @@ leakage to it, and bulk modulus is larger by as much.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from estimation.eha.rig_share import DELIVERY_ENTRY, wear_left_open
 from estimation.fits.hypotheses import PRESUMED
-from faults.diagnosis.calibration import Calibration
+from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.evidence import Scoreboard, bounded
 from faults.diagnosis.outside import DELIVERIES
 from plant.arrays import Array
 from plant.notes import Note
+
+if TYPE_CHECKING:
+    from faults.diagnosis.diagnose import Diagnosis
+
+
+def whatever_the_pump_delivers(diagnosis: "Diagnosis", actuator: Actuator, remarks: Sequence[Note]) -> "Diagnosis":
+    """Return a diagnosis with its classes weighed over what a pump may deliver, where a log does not tell that.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        With a sound pump.
+    actuator : Actuator
+        The healthy actuator.
+    remarks : sequence of Note
+        What the balance of flows leaves open.
+
+    Returns
+    -------
+    Diagnosis
+        The same where wear is excluded or found, and without pressure; see `probabilities_over_wear`.
+    """
+    found = probabilities_over_wear(diagnosis.scoreboard, actuator, remarks, shipped_calibration())
+    if found is None:
+        return diagnosis
+    return replace(diagnosis, condition=max(found, key=lambda name: found[name]), probabilities=found)
 
 
 def probabilities_over_wear(
