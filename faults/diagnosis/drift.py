@@ -96,7 +96,7 @@ def weighed(found: Sequence["Diagnosis"], calibration: Calibration) -> Mapping[s
 
 
 def _evidence(board: Scoreboard, calibration: Calibration) -> float:
-    """Return how well the conditions together hold a log, with the weights of the evidences."""
+    """Return how well the conditions together hold a log, with the weights of the evidences that know its drift."""
     weights = calibration.weights(board.blocks.pressure is not None)
     best = {"parameters": float(np.max(board.fits.scores)), "models": float(np.max(models_scores(board.fits)))}
     below = np.sum([weights[name] * board.log_odds[name] for name in best], axis=0)

@@ -117,10 +117,9 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
     record, blocks, fits = part.record, part.blocks, part.fits
     found = {
         "models": models_scores(fits),
+        "innovations": innovation_scores(record, actuator.circuit) / blocks.block,
         "parameters": fits.scores,
     }
-    if blocks.course is None:  # filters know no leakage that drifts
-        found["innovations"] = innovation_scores(record, actuator.circuit) / blocks.block
     if library is not None:
         table = score_transfer_functions(record, library).by_condition
         found["transfer_functions"] = -SAMPLES * np.log([table[name] for name in CONDITIONS])
