@@ -22,7 +22,7 @@ from estimation.fits.hypotheses import (
     LEAST_ZERO,
     MAKEUP_BENDS,
     MAY_HIDE,
-    OFFSET,
+    OFFSET_AT_REST,
     PLAY,
     PRESSURE_LATE,
     START_LOAD,
@@ -255,7 +255,7 @@ def _asked(
     if len(log.drives) > MOST_ASKED:
         return (), ()
     if loaded:  # a sensor that reads too much looks loaded at rest
-        return (BEGUN, OFFSET), ()
+        return (BEGUN, OFFSET_AT_REST), ()
     if not _explains(swinging, log.passes_on) or most_late(swinging.late)[2] > WORTH:
         pulled = (MAKEUP_BENDS,) if outruns_pump(log, parameters) else ()
         return (BEGUN,) if moving else (*HYPOTHESES, *pulled), ()

@@ -35,7 +35,8 @@ class Hypothesis:
     far : bool
         Whether what it adds is so far from its absence that the slope there says nothing of it.
     from_first_sample : bool
-        Whether the search begins with the differential pressure that the log begins with, and with several levels.
+        Whether the search begins with the differential pressure that the log begins with, and a load's with several
+        levels.
     least : float
         Size below which what is freed first is not what the hypothesis says [SI].
     from_mid_travel : bool
@@ -97,6 +98,9 @@ MAKEUP_BENDS = Hypothesis("makeup_bends", (BEND,), ({BEND: 3e-5},), least=LEAST_
 """Wide open, a make-up valve is an orifice. Asked where a load pulls the piston faster than the pump feeds it."""
 
 OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
+
+OFFSET_AT_REST = replace(OFFSET, from_first_sample=True)
+"""The same of a log that begins at rest with a differential pressure: the offset is then that, or there is a load."""
 
 LATE_TRIED = (0.0, 2e-3, 5e-3, 9e-3)
 """Delays with which the search for a late channel begins [s]."""

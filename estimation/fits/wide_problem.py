@@ -166,6 +166,8 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
     if one.from_first_sample:
         seen = log.measured[np.isfinite(log.measured[:, 0]), 0]
         begun = float(seen[0]) if len(seen) else 0.0
+        if START_PRESSURE not in one.free:
+            return [{one.free[0]: begun}]
         return [{START_PRESSURE: begun, START_LEVEL: share * _shut_in(log)} for share in LEVELS_TRIED]
     if one.from_change:
         return [likeliest_step(log).first or one.starts[0]]

@@ -7,7 +7,7 @@ import pytest
 
 from estimation.fits import freed_problem
 from estimation.fits.greybox_log import greybox_log
-from estimation.fits.hypotheses import BEGUN, ENCODER_ZERO, HYPOTHESES, Hypothesis
+from estimation.fits.hypotheses import BEGUN, ENCODER_ZERO, HYPOTHESES, OFFSET_AT_REST, Hypothesis
 from estimation.fits.wide_problem import POSITION_ZERO, flow_bounds, freed, own_starts, usual_values, widened
 from estimation.models.flow import FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
@@ -37,6 +37,13 @@ def test_an_encoder_is_first_taken_to_read_zero_in_mid_travel() -> None:
     drives[:, 1] = np.linspace(0.1, 0.16, len(drives))
     last = own_starts(replace(moved, drives=drives), ENCODER_ZERO)[-1]
     assert last[POSITION_ZERO] == pytest.approx(0.13)
+
+
+def test_an_offset_at_rest_is_first_taken_to_be_what_the_sensor_reads_there() -> None:
+    log = wide()
+    measured = np.full_like(log.measured, 1e5)
+    measured[0] = np.nan
+    assert list(own_starts(replace(log, measured=measured), OFFSET_AT_REST)) == [{"pressure_offset": 1e5}]
 
 
 @pytest.mark.parametrize("opening", [1e2, 1e4])
