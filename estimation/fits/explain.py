@@ -312,7 +312,8 @@ def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
     best = done[0][0]
     count = [one for one in done if one[0].cost <= best.cost + ALIKE]
     first, *rivals = (concluded(problem, one.point, warned=False) for one, problem in count)
-    if best.meant and all(not one.lower or np.isfinite(first.std[one.free[0]]) for one in best.together):
+    found = ((one, one.free[0]) for one in best.together)
+    if best.meant and all(one.told(best.values[name], first.std.get(name, 0.0)) for one, name in found):
         return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
     return replace(best, void=True, fits=(replace(first, cost=NEVER),))
 

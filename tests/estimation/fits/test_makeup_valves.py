@@ -5,6 +5,7 @@ import pytest
 
 from estimation.eha.explained import notes_of
 from estimation.fits.flow_fit import fit_flow
+from estimation.fits.hypotheses import HYPOTHESES
 from estimation.log_checks.clean import clean_log
 from estimation.notes import RigCode
 from experiments.open_benchmark.logger import PLAIN, Logger
@@ -41,3 +42,17 @@ def test_valves_that_open_apart_are_named_and_are_no_offset_of_the_pressure(
     assert note.data["later_pa"] == pytest.approx(1.6e4, abs=3e3)
     value, std = fit.parameters["bulk_modulus"]
     assert abs(value - Machine().bulk_modulus) < 3.0 * std
+
+
+def test_a_valve_that_never_opens_tells_no_drop() -> None:
+    """A valve stuck shut was said to open 1e5 ± 2e8 Pa late, and the log to be healthy."""
+    (cracks,) = (one for one in HYPOTHESES if one.name == "checks_crack")
+    assert cracks.told(2e4, 1e3)
+    assert not cracks.told(1e5, 2.4e8)
+    assert not cracks.told(1e5, np.inf)
+
+
+def test_a_valve_that_is_stuck_shut_does_not_crack_late() -> None:
+    clean = clean_log(logged(1e3, 2.7e5), PAPER)
+    fit = fit_flow(clean.record, PAPER, PAPER.bulk_modulus, {}, clean.variances)
+    assert fit.explanation is None or "checks_crack" not in fit.explanation.names
