@@ -220,9 +220,10 @@ def _screened(
     absent = usual_values(log)
     asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
     problems = [(delays, freed(delayed(log, delays).coarsened(), together)) for delays in asked]
+    begun = list(product(problems, own_starts(log, together[-1])))
     for start in starts:
         tried: list[_Tried] = []
-        for (delays, problem), own in product(problems, own_starts(log, together[-1])):
+        for (delays, problem), own in begun:
             guess = problem.model.theta({**absent, **start, **own})
             bounds = flow_bounds(problem.model, [guess], log)
             point = descend(problem.at, guess, SCREENING, bounds, radius=NEAR, wanted=wanted)
