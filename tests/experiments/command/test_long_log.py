@@ -1,5 +1,4 @@
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -17,16 +16,21 @@ from plant.sensors.sensors import BENCH
 COMMAND = Path(sys.executable).parent / "hydrostate"
 
 
+# A process that is started counts what the one that started it held until then. So a small process starts the command,
+# and reports the most memory of its only child.
+BETWEEN = """
+import resource, subprocess, sys
+subprocess.run(sys.argv[1:], check=True)
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, file=sys.stderr)
+"""
+
+
 def finding_and_peak(verb: str, path: Path) -> tuple[dict[str, object], int]:
     """What `hydrostate VERB` finds in a log, and the most memory that this one process held in bytes."""
-    process = subprocess.Popen([COMMAND, verb, path, "--json"], stdout=subprocess.PIPE)  # noqa: S603 - our own command
-    assert process.stdout is not None
-    with process.stdout:
-        (finding,) = json.load(process.stdout)
-    _, status, used = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    assert process.returncode == 0
-    return finding, used.ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    command = [sys.executable, "-c", BETWEEN, COMMAND, verb, path, "--json"]
+    run = subprocess.run(command, capture_output=True, check=True, text=True)  # noqa: S603 - our own command
+    (finding,) = json.loads(run.stdout)
+    return finding, int(run.stderr.split()[-1]) * (1 if sys.platform == "darwin" else 1024)
 
 
 @pytest.mark.slow
