@@ -212,10 +212,10 @@ def _of_clean(log: CleanLog, parameters: EhaParameters) -> Diagnosis:
 
 
 def _judged(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain) -> Loaded:
-    """Return the same with its classes weighed over what a pump may deliver, where the log does not tell that."""
+    """Return the same with what the balance of flows says of the pump."""
     found = _diagnosed(log, parameters, estimate, plain)
     actuator = actuator_of(found.parameters)
-    return found._replace(diagnosis=whatever_the_pump_delivers(found.diagnosis, actuator, estimate.remarks))
+    return found._replace(diagnosis=whatever_the_pump_delivers(found.diagnosis, actuator, estimate))
 
 
 def _diagnosed(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain) -> Loaded:

@@ -1,8 +1,10 @@
-"""Classes of a log that does not tell a worn pump from leakage: how much a pump delivers is integrated out.
+"""The balance of flows judges the pump, and where a log does not tell what it delivers, that is integrated out.
 
-Where pressure is logged, the balance of flows says whether a log tells (`estimation.fits.flow_fit`). Without it,
-circuits with a worn pump do (`faults.diagnosis.outside`). If a log does not tell, a pump that delivers less leaves less
-leakage to it, and bulk modulus is larger by as much.
+Where pressure is logged, the balance says what the pump delivers, or that the log does not tell
+(`estimation.fits.flow_fit`). It follows the oil to the sensors' noise, and a circuit follows the piston to a few
+percent: what a circuit says of the pump beside a balance that holds is what it leaves of friction. Without pressure,
+circuits with a worn pump are compared (`faults.diagnosis.outside`). If a log does not tell, a pump that delivers less
+leaves less leakage to it, and bulk modulus is larger by as much.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from estimation.eha.result import BulkModulusEstimate
 from estimation.eha.rig_share import DELIVERY_ENTRY, wear_left_open
 from estimation.fits.hypotheses import PRESUMED
 from faults.diagnosis.calibration import Calibration, shipped_calibration
@@ -18,6 +21,7 @@ from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.evidence import Scoreboard, bounded
 from faults.diagnosis.outside import DELIVERIES
+from faults.notes import AgainstCode
 from plant.arrays import Array
 from plant.notes import Note
 
@@ -25,27 +29,49 @@ if TYPE_CHECKING:
     from faults.diagnosis.diagnose import Diagnosis
 
 
-def whatever_the_pump_delivers(diagnosis: "Diagnosis", actuator: Actuator, remarks: Sequence[Note]) -> "Diagnosis":
-    """Return a diagnosis with its classes weighed over what a pump may deliver, where a log does not tell that.
+def whatever_the_pump_delivers(
+    diagnosis: "Diagnosis", actuator: Actuator, estimate: BulkModulusEstimate
+) -> "Diagnosis":
+    """Return a diagnosis with what the balance of flows says of the pump.
 
     Parameters
     ----------
     diagnosis : Diagnosis
-        With a sound pump.
+        Of a circuit alone.
     actuator : Actuator
-        The healthy actuator.
-    remarks : sequence of Note
-        What the balance of flows leaves open.
+        The healthy actuator, with a pump that delivers what the balance found.
+    estimate : BulkModulusEstimate
+        The balance, and what it leaves open.
 
     Returns
     -------
     Diagnosis
-        The same where wear is excluded or found, and without pressure; see `probabilities_over_wear`.
+        Where the balance tells what the pump delivers, without the circuit's doubt of it; where it leaves that open,
+        with classes weighed over it (`probabilities_over_wear`); else, and without pressure, the same.
     """
-    found = probabilities_over_wear(diagnosis.scoreboard, actuator, remarks, shipped_calibration())
+    if pump_told(estimate):
+        against = tuple(note for note in diagnosis.against if note.code is not AgainstCode.PUMP_OFF)
+        return replace(diagnosis, against=against)
+    found = probabilities_over_wear(diagnosis.scoreboard, actuator, estimate.remarks, shipped_calibration())
     if found is None:
         return diagnosis
     return replace(diagnosis, condition=max(found, key=lambda name: found[name]), probabilities=found)
+
+
+def pump_told(estimate: BulkModulusEstimate) -> bool:
+    """Return whether the balance of flows tells what the pump delivers.
+
+    Parameters
+    ----------
+    estimate : BulkModulusEstimate
+        Of a log.
+
+    Returns
+    -------
+    bool
+        Whether it is a balance, holds, and does not leave wear open.
+    """
+    return estimate.form == "flow" and estimate.gate.passed and not wear_left_open(estimate.remarks)
 
 
 def probabilities_over_wear(

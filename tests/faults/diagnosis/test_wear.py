@@ -8,19 +8,24 @@ import numpy as np
 import pytest
 
 from estimation.eha.rig_share import DELIVERY_ENTRY
+from estimation.finding import Gate
 from estimation.fits.hypotheses import PRESUMED
 from estimation.notes import RigCode
+from experiments.open_benchmark.kinds import make
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import wear
 from faults.diagnosis.calibration import shipped_calibration
-from faults.diagnosis.diagnose import actuator_of
+from faults.diagnosis.diagnose import Diagnosis, actuator_of, diagnose_log
 from faults.diagnosis.evidence import Scoreboard, bounded, weigh
 from faults.diagnosis.outside import DELIVERIES
-from faults.diagnosis.wear import probabilities_over_wear
+from faults.diagnosis.wear import probabilities_over_wear, whatever_the_pump_delivers
+from faults.notes import AgainstCode
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
 from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 from tests.faults.diagnosis.short_logs import ACTUATOR as RIG
 from tests.faults.diagnosis.short_logs import OFF, blocks, log, made_classes
@@ -81,3 +86,46 @@ def test_conditions_are_summed_over_pumps_by_what_is_presumed_of_them(monkeypatc
     assert found == pytest.approx(dict(exact))
     without = replace(board, blocks=blocks(pressure=False))
     assert probabilities_over_wear(without, RIG, OPEN, shipped_calibration()) is None
+
+
+def said(**changed: Any) -> Any:
+    return SimpleNamespace(**{"form": "flow", "gate": Gate(passed=True, reasons=()), "remarks": (), **changed})
+
+
+@pytest.mark.parametrize(
+    ("estimate", "kept"),
+    [
+        (said(), []),
+        (said(form="motion"), [AgainstCode.PUMP_OFF]),
+        (said(gate=Gate(passed=False, reasons=())), [AgainstCode.PUMP_OFF]),
+    ],
+)
+def test_a_balance_that_holds_knows_the_pump_better_than_a_circuit(
+    board: Scoreboard, estimate: Any, kept: list[AgainstCode]
+) -> None:
+    others = AgainstCode.OUTSIDE_CONDITIONS
+    against = (AgainstCode.PUMP_OFF.note(percent=-15.0), others.note())
+    found = board.probabilities(shipped_calibration())
+    diagnosis = Diagnosis("minor_leakage", found, against, {}, {}, {}, (), board)
+    judged = whatever_the_pump_delivers(diagnosis, ACTUATOR, estimate)
+    assert [note.code for note in judged.against] == [*kept, others]
+    assert judged.probabilities == found
+
+
+def test_a_circuit_may_doubt_the_pump_where_the_balance_leaves_wear_open(board: Scoreboard) -> None:
+    found = board.probabilities(shipped_calibration())
+    off = AgainstCode.PUMP_OFF.note(percent=-15.0)
+    judged = whatever_the_pump_delivers(
+        Diagnosis("minor_leakage", found, (off,), {}, {}, {}, (), board), ACTUATOR, said(remarks=OPEN)
+    )
+    assert judged.against == (off,)
+    assert judged.probabilities != found
+
+
+@pytest.mark.slow
+def test_a_plain_log_of_another_law_of_friction_is_not_laid_to_the_pump() -> None:
+    made = make("plain", "training", 100)
+    channels = {name: made.log[name].to_numpy() for name in made.setup.logger.channels}
+    finding = diagnose_log(Record(1e-3, channels), Rig())
+    assert finding.condition == made.setup.condition == "major_friction"
+    assert finding.against == ()
