@@ -15,7 +15,7 @@ import numpy as np
 
 from estimation.eha.result import BulkModulusEstimate
 from estimation.eha.rig_share import DELIVERY_ENTRY, wear_left_open
-from estimation.fits.hypotheses import PRESUMED
+from estimation.fits.hypotheses import OFFSET, PRESUMED
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import fit_classes
@@ -24,6 +24,9 @@ from faults.diagnosis.outside import DELIVERIES
 from faults.notes import AgainstCode
 from plant.arrays import Array
 from plant.notes import Note
+
+OFFSETS = {OFFSET.name, "pressure_drift"}
+"""Hypotheses that an offset of the speed may pass for."""
 
 if TYPE_CHECKING:
     from faults.diagnosis.diagnose import Diagnosis
@@ -49,17 +52,16 @@ def whatever_the_pump_delivers(
         Where the balance tells what the pump delivers, without the circuit's doubt of it; where it leaves that open,
         with classes weighed over it (`probabilities_over_wear`); else, and without pressure, the same.
     """
-    if pump_told(estimate):
-        against = tuple(note for note in diagnosis.against if note.code is not AgainstCode.PUMP_OFF)
-        return replace(diagnosis, against=against)
+    if known := known_of_flow(estimate):
+        return replace(diagnosis, against=tuple(note for note in diagnosis.against if note.code not in known))
     found = probabilities_over_wear(diagnosis.scoreboard, actuator, estimate.remarks, shipped_calibration())
     if found is None:
         return diagnosis
     return replace(diagnosis, condition=max(found, key=lambda name: found[name]), probabilities=found)
 
 
-def pump_told(estimate: BulkModulusEstimate) -> bool:
-    """Return whether the balance of flows tells what the pump delivers.
+def known_of_flow(estimate: BulkModulusEstimate) -> frozenset[AgainstCode]:
+    """Return what the balance of flows knows better than a circuit.
 
     Parameters
     ----------
@@ -68,10 +70,14 @@ def pump_told(estimate: BulkModulusEstimate) -> bool:
 
     Returns
     -------
-    bool
-        Whether it is a balance, holds, and does not leave wear open.
+    frozenset of AgainstCode
+        What the pump delivers, if this is a balance that holds and does not leave wear open; and whether motor speed is
+        offset, unless an offset of the pressure, which leaks as much, was found in its place. None else.
     """
-    return estimate.form == "flow" and estimate.gate.passed and not wear_left_open(estimate.remarks)
+    if estimate.form != "flow" or not estimate.gate.passed or wear_left_open(estimate.remarks):
+        return frozenset()
+    names = estimate.explanation.names if estimate.explanation is not None else ()
+    return frozenset({AgainstCode.PUMP_OFF} if OFFSETS & set(names) else {AgainstCode.PUMP_OFF, AgainstCode.SPEED_BIAS})
 
 
 def probabilities_over_wear(

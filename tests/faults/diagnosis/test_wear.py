@@ -88,23 +88,31 @@ def test_conditions_are_summed_over_pumps_by_what_is_presumed_of_them(monkeypatc
     assert probabilities_over_wear(without, RIG, OPEN, shipped_calibration()) is None
 
 
-def said(**changed: Any) -> Any:
-    return SimpleNamespace(**{"form": "flow", "gate": Gate(passed=True, reasons=()), "remarks": (), **changed})
+def said(*names: str, **changed: Any) -> Any:
+    explanation = SimpleNamespace(names=names) if names else None
+    plain = {"form": "flow", "gate": Gate(passed=True, reasons=()), "remarks": (), "explanation": explanation}
+    return SimpleNamespace(**{**plain, **changed})
+
+
+PUMP, SPEED = AgainstCode.PUMP_OFF, AgainstCode.SPEED_BIAS
 
 
 @pytest.mark.parametrize(
     ("estimate", "kept"),
     [
         (said(), []),
-        (said(form="motion"), [AgainstCode.PUMP_OFF]),
-        (said(gate=Gate(passed=False, reasons=())), [AgainstCode.PUMP_OFF]),
+        (said("encoder_zero"), []),
+        (said("pressure_offset"), [SPEED]),
+        (said("pressure_late", "pressure_drift"), [SPEED]),
+        (said(form="motion"), [PUMP, SPEED]),
+        (said(gate=Gate(passed=False, reasons=())), [PUMP, SPEED]),
     ],
 )
-def test_a_balance_that_holds_knows_the_pump_better_than_a_circuit(
+def test_a_balance_that_holds_knows_pump_and_speed_better_than_a_circuit(
     board: Scoreboard, estimate: Any, kept: list[AgainstCode]
 ) -> None:
     others = AgainstCode.OUTSIDE_CONDITIONS
-    against = (AgainstCode.PUMP_OFF.note(percent=-15.0), others.note())
+    against = (PUMP.note(percent=-15.0), SPEED.note(bias_rad_s=4.7), others.note())
     found = board.probabilities(shipped_calibration())
     diagnosis = Diagnosis("minor_leakage", found, against, {}, {}, {}, (), board)
     judged = whatever_the_pump_delivers(diagnosis, ACTUATOR, estimate)
