@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from operator import attrgetter
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from estimation.fits.hypotheses import (
     OFFSET_AT_REST,
     PLAY,
     PRESSURE_LATE,
+    SPEED_LATE,
     START_LOAD,
     Hypothesis,
 )
@@ -39,14 +41,14 @@ from estimation.fits.play import (
     play_untaken,
     sensed_play,
 )
-from estimation.fits.promises import promised, promised_each
+from estimation.fits.promises import promised, promised_each, slopes_of
+from estimation.fits.speed_instead import speed_instead
 from estimation.fits.teeth import Turning
 from estimation.fits.toothed import toothed
 from estimation.models.completed_flow import CRACKS, balances_mass
 from estimation.models.flow import HELD_FLOW_FORM, STIFFNESS
 from estimation.models.inner_circuit import BEND
 from estimation.notes import EstimateCode
-from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
 from plant.log.record import Record
@@ -85,6 +87,9 @@ ZERO_WORTH = 30.0
 encoder's zero [dimensionless]. They promise 100 at least where one is off by 60 mm or more, 2.5 at most on logs of 30
 other kinds, and 14 on one of a play, which a zero would explain wrongly."""
 
+FARTHEST_LEAD = 0.99
+"""Lead of the motor on the line between samples from which its speed may lag instead [sample times]: one is most."""
+
 TOO_WIDE = 20.0
 """Conductance of the make-up valves, over that of the first guess, from which a search is begun with the guess too
 [dimensionless]."""
@@ -112,6 +117,8 @@ BY_MASS = 2.0
 """Weight of the balance by mass before a log is seen, that of each other being 1 [dimensionless]: oil is denser under
 pressure, but simulators and textbooks balance volumes."""
 
+_cost = attrgetter("cost")
+
 
 def fit_flow(
     record: Record,
@@ -123,6 +130,7 @@ def fit_flow(
     loaded: bool = False,
     moving: bool = False,
     filtered: bool = False,
+    speed_offset: float = 0.0,
 ) -> FormFit:
     """Fit the flow form to a log, balanced by volume, by mass, and by volume in held chambers, and weigh the three.
 
@@ -150,6 +158,8 @@ def fit_flow(
         Whether the motor turns when it begins: both chambers may then stand at any pressure.
     filtered : bool
         Whether the pressure was filtered: it is then late, and by how much is fitted whatever that gains.
+    speed_offset : float
+        First guess of how much the logged speed exceeds the shaft's [rad/s].
 
     Returns
     -------
@@ -167,19 +177,22 @@ def fit_flow(
     sensed = sensed_play(record)
     if variances is None:
         record, variances = without_strays(record)
+    how = {"loaded": loaded, "moving": moving, "filtered": filtered}
+    again = partial(fit_flow, record, uncertainties=uncertainties, variances=variances, **how)
     log = flow_log(record, parameters, uncertainties or {}, variances)
     starts = flow_starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
     explains = partial(_explains, noisy=log.passes_on)
     largest = NOISY[0] if log.passes_on else LARGEST_CHI_SQUARE
-    log, fits, teeth, teeth_left = toothed(log, lambda one: balanced(one, parameters, starts), explains, largest)
+    unturned, fitted = log, partial(balanced, parameters=parameters, starts=starts)
+    log, fits, teeth, teeth_left = toothed(unturned, fitted, explains, largest, speed_offset)
     turning = Turning(log.teeth, log.speed_offset)
-    best, found = min(fits, key=_cost), weighed(fits, SURER, [_beforehand(fit) for fit in fits])
+    beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in fits]
+    best, found = min(fits, key=_cost), weighed(fits, SURER, beforehand)
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
     stiff = replace(parameters, bulk_modulus=swinging.values["bulk_modulus"])
     stiffer = not log.passes_on and stiff.bulk_modulus > parameters.bulk_modulus  # noise counts more in stiff oil alone
     if stiffer and explains(swinging) and flow_log(record, stiff, uncertainties or {}, variances).passes_on:
-        more = {"loaded": loaded, "moving": moving, "filtered": filtered}
-        return fit_flow(record, stiff, stiff.bulk_modulus, uncertainties, variances, **more)
+        return again(stiff, stiff.bulk_modulus, speed_offset=speed_offset)
     log = carried(log, parameters, swinging.values)
     asked, open_ends = _asked(log, parameters, swinging, best, sensed, loaded=loaded, moving=moving)
     asked = (PRESSURE_LATE, *asked) if filtered and PRESSURE_LATE not in asked else asked
@@ -201,6 +214,9 @@ def fit_flow(
             and explains(one)
             and one.cost < _wanted(strange.names, best, swinging, homed=homed, late=filtered)
         ):
+            place = (strange.values, parameters.pump_displacement, one.cost - WORTH)
+            if not speed_offset and (turned := speed_instead(unturned, fitted, *place)):
+                return again(parameters, bulk_modulus, speed_offset=turned)
             bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
             left, open_play = float(np.hypot(FILTERED if filtered else STRUCTURE, untaken)), play
             if PLAY.name in strange.names:
@@ -217,8 +233,8 @@ def fit_flow(
     reasons = (*_objections(best, log.passes_on), *play_left(swinging.play, sensed)) or teeth_left
     if BEGUN in asked and not reasons and not explains(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
-    (value, std), chi = found["bulk_modulus"], best.chi_square[0]
-    return FormFit(believed, std / value, chi, reasons, best.rig_slopes, remarks=(*remarks, *play), turning=turning)
+    (value, std), remarks = found["bulk_modulus"], (*remarks, *play)
+    return FormFit(believed, std / value, best.chi_square[0], reasons, best.rig_slopes, None, remarks, turning)
 
 
 def _wanted(names: Sequence[str], best: GreyBoxFit, swinging: GreyBoxFit, *, homed: bool, late: bool) -> float:
@@ -261,7 +277,7 @@ def _asked(
         return (BEGUN,) if moving else (*HYPOTHESES, *pulled), ()
     by_mass = balances_mass(swinging.model)
     delivery, zero, *hidden = promised_each(
-        log, parameters, swinging.values, ALWAYS_ASKED, by_mass=by_mass, slopes=_slopes(swinging, log)
+        log, parameters, swinging.values, ALWAYS_ASKED, by_mass=by_mass, slopes=slopes_of(swinging, log)
     )
     shows_zero = best is swinging or homed_at_stop(log)
     if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
@@ -269,7 +285,8 @@ def _asked(
     worn = delivery.gain > WORTH and delivery.size > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and zero.size > LEAST_ZERO
     plays = bool(play_left(swinging.play, sensed)) or sensed.gain > PLAY_SENSED
-    tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays)
+    behind = swinging.values.get("speed_lead", 0.0) > FARTHEST_LEAD * log.sample_time
+    tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays), (SPEED_LATE, behind)
     asked = tuple(one for one, worthwhile in tried if worthwhile)
     asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > WORTH)
     remarks = () if DELIVERY in asked else wear_open(delivery.deviation)
@@ -280,13 +297,6 @@ def _asked(
     lost = swinging is best and not fed and swinging.chi_square[0] > DOUBTED
     begun = promised(log.coarsened(), parameters, swinging.values, START_LOAD, by_mass=by_mass)
     return (BEGUN, *asked) if lost or begun.gain > WORTH else asked, remarks
-
-
-def _slopes(fit: GreyBoxFit, log: GreyBoxLog) -> Mapping[str, Array]:
-    """Return the slopes of a fit's residuals by unknown, where the wide form has the same."""
-    if log.passes_on or log.gaps.size:  # noise that counts with the slopes, and gaps, are the fit's own
-        return {}
-    return dict(zip(fit.model.unknowns, fit.slopes.T, strict=False))
 
 
 def _near(
@@ -314,14 +324,6 @@ def _near(
 def _known(names: Sequence[str], fit: GreyBoxFit) -> bool:
     """Return whether a play's fit leaves no more than the sensors' noise: what is left is how the piston crosses it."""
     return PLAY.name not in names or fit.chi_square[0] <= DOUBTED
-
-
-def _beforehand(fit: GreyBoxFit) -> float:
-    return BY_MASS if balances_mass(fit.model) else 1.0
-
-
-def _cost(fit: GreyBoxFit) -> float:
-    return fit.cost
 
 
 def _explains(fit: GreyBoxFit, noisy: bool) -> bool:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import LEAKAGE_STEP, Hypothesis
 from estimation.fits.leakage_step import likeliest_step
@@ -208,3 +209,24 @@ def _promises(
         place = names.index(one.free[0])
         promises.append(Promise(gain - before, float(abs(moved[place])), float(variances[place]) ** 0.5))
     return promises
+
+
+def slopes_of(fit: GreyBoxFit, log: GreyBoxLog) -> Mapping[str, Array]:
+    """Return the slopes of a plain fit's residuals, where the wide form has the same.
+
+    Parameters
+    ----------
+    fit : GreyBoxFit
+        The fit.
+    log : GreyBoxLog
+        Its log.
+
+    Returns
+    -------
+    Mapping[str, ndarray]
+        By unknown, shape (samples,) [dimensionless]; none where noise counts with them, or speed has gaps: they are the
+        fit's own then.
+    """
+    if log.passes_on or log.gaps.size:
+        return {}
+    return dict(zip(fit.model.unknowns, fit.slopes.T, strict=False))

@@ -91,6 +91,7 @@ def toothed(
     fitted: Fitted,
     explains: Callable[[GreyBoxFit], bool],
     largest: float = np.inf,
+    offset: float = 0.0,
 ) -> Toothed:
     """Return the fits of a log, with the pump's teeth and an offset of its speed where the log asks for them.
 
@@ -107,6 +108,8 @@ def toothed(
         they would hide: a pump that delivers 4 % more looked like teeth of 19 %.
     largest : float
         Mean squared normalised residual above which no fit explains a log [dimensionless].
+    offset : float
+        First guess of how much the logged speed exceeds the shaft's [rad/s].
 
     Returns
     -------
@@ -115,10 +118,14 @@ def toothed(
     """
     if log.gaps.size:
         return Toothed(log, fitted(log))
-    plain = Toothed(log, fitted(replace(log, counts=COUNTS)))
+    guessed = with_teeth(log, (), offset) if offset else log
+    plain = Toothed(guessed, fitted(replace(guessed, counts=COUNTS)))
     if not _hopeful(plain.fits, largest):
         return plain._replace(left=_left(plain.best))
-    shifted = _shifted(plain, fitted)
+    shifted = _shifted(log, plain, fitted)
+    if offset:
+        plain, shifted = shifted or plain, None
+        plain = plain._replace(remarks=_told_offset(plain.log.speed_offset, plain.best.speed_offset.std))
     worth = plain.best.cost - TEETH_WORTH
     for begun in (plain,) if shifted is None else (shifted, plain):
         found = _with_teeth(log, begun, fitted)
@@ -140,16 +147,16 @@ def _hopeful(fits: Sequence[GreyBoxFit], largest: float) -> bool:
     return False
 
 
-def _shifted(plain: Toothed, fitted: Fitted) -> Toothed | None:
+def _shifted(log: GreyBoxLog, plain: Toothed, fitted: Fitted) -> Toothed | None:
     """Return the fits of a log without what its speed is off by; None where residuals ask for none, or for much."""
-    found, log, offset, wanted = plain, plain.log, 0.0, OFFSET_WORTH
+    found, offset, wanted = plain, plain.log.speed_offset, OFFSET_SETTLED if plain.log.speed_offset else OFFSET_WORTH
     for _ in range(ROUNDS):
         likely = min(found.fits, key=lambda fit: fit.cost - fit.speed_offset.gain)  # each has an offset of its own
         shown = likely.speed_offset
         if shown.gain < wanted:
             break
         offset, wanted = offset + shown.value, OFFSET_SETTLED
-        if abs(offset) > MOST_OFFSET:
+        if abs(offset - plain.log.speed_offset) > MOST_OFFSET:
             return None
         held = with_teeth(replace(log, counts=COUNTS), (), offset)
         found = Toothed(held, fitted(held))
@@ -165,7 +172,7 @@ def _with_teeth(log: GreyBoxLog, begun: Toothed, fitted: Fitted) -> Toothed | No
     found, taken, offset = None, [first.teeth], begun.log.speed_offset + first.offset
     for _ in range(ROUNDS):
         count = taken[0].count
-        if not _believable(taken, offset):
+        if not _believable(taken, offset - begun.log.speed_offset):
             return None
         tried = with_teeth(replace(log, counts=(count, 2 * count)), taken, offset)
         held = Toothed(tried, fitted(tried))

@@ -7,7 +7,7 @@ import pytest
 
 from estimation.fits.flow_fit import fit_flow
 from estimation.fits.flow_log import speed_gaps
-from estimation.notes import EstimateCode
+from estimation.notes import EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
@@ -56,6 +56,21 @@ def test_a_position_on_another_scale_is_objected_to() -> None:
     (percent,) = (note.data["percent"] for note in fit.reasons if note.code == EstimateCode.RIG_CONTRADICTED)
     assert percent == pytest.approx(200.0, rel=0.02)
     assert fit.parameters["bulk_modulus"][0] == pytest.approx(0.5 * HEALTHY.bulk_modulus, rel=0.02)
+
+
+def test_an_offset_of_speed_does_not_pass_for_one_of_pressure() -> None:
+    rng = np.random.default_rng(3)
+    p = circuit_of(parameters_for(CONDITIONS["major_leakage_major_friction"]))
+    record = simulate(CIRCUIT, make_drive("steps", 5.0, 2e-3, p, rng), 2e-3, p, sensors=BENCH, rng=rng)
+    fit = fit_flow(record.replace(motor_speed_rad_s=record["motor_speed_rad_s"] - 2.0), HEALTHY, 2e8)
+    assert fit.turning.offset == pytest.approx(-2.0, abs=0.05)
+    assert fit.explanation is None
+    assert RigCode.SPEED_OFFSET in [note.code for note in fit.remarks]
+    high = record.replace(differential_pressure_pa=record["differential_pressure_pa"] + 2e4)
+    fit = fit_flow(high, HEALTHY, 2e8)
+    assert fit.turning.offset == 0.0
+    assert fit.explanation is not None
+    assert fit.explanation.values["pressure_offset"][0] == pytest.approx(2e4, rel=0.05)
 
 
 def test_a_log_without_pressure_is_refused_with_what_it_lacks() -> None:

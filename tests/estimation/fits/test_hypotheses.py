@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from estimation.eha.estimate import estimate_log
 from estimation.eha.explained import notes_of, rig_set_right, set_right
 from estimation.fits import explain as module
+from estimation.fits import flow_fit
 from estimation.fits.descent import Point
 from estimation.fits.explain import Explanation
 from estimation.fits.flow_fit import _near, _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
@@ -42,6 +43,21 @@ def lagging(lag: float) -> Record:
     share = 1.0 - np.exp(-record.sample_time / lag)
     noise = BENCH.pressure_noise * np.random.default_rng(6).standard_normal(len(true))
     return record.replace(**{PRESSURE: lfilter([share], [1.0, share - 1.0], true) + noise})
+
+
+def test_a_speed_that_lags_by_little_more_than_a_sample_is_no_lead_of_the_motor(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    record = log()
+    share, speed = 1.0 - np.exp(-1.0 / 1.6), record["motor_speed_rad_s"]
+    lagged = record.replace(motor_speed_rad_s=speed[0] + lfilter([share], [1.0, share - 1.0], speed - speed[0]))
+    found = explained(lagged)
+    assert found.names == ("speed_late",)
+    lag, std = found.values["speed_lag"]
+    assert 1.0 < lag / record.sample_time < 1.6  # half a sample of it is how lines between samples follow steps
+    assert std < 0.02 * lag
+    monkeypatch.setattr(flow_fit, "FARTHEST_LEAD", np.inf)
+    assert fit_flow(lagged, HEALTHY, HEALTHY.bulk_modulus).explanation is None
 
 
 def late(record: Record, samples: int) -> Record:

@@ -11,14 +11,14 @@ import pytest
 from estimation.fits import flow_fit, motion_fit
 from estimation.fits.descent import Point
 from estimation.fits.explain import _Tried
-from estimation.fits.flow_fit import _explains_all, _slopes, _wanted, fit_flow
+from estimation.fits.flow_fit import _explains_all, _wanted, fit_flow
 from estimation.fits.flow_log import homed_at_stop
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.hypotheses import BEGUN, HYPOTHESES, MAY_HIDE
 from estimation.fits.motion_fit import _log, _starts, _steps, unseen
 from estimation.fits.motion_search import MOST_WORK, Begun, MotionSearch, explained, rough
 from estimation.fits.play import ShownPlay
-from estimation.fits.promises import Promise
+from estimation.fits.promises import Promise, slopes_of
 from estimation.fits.wide_problem import flow_bounds, freed, own_starts, widened
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
 from estimation.models.motion import MOTION_FORMS
@@ -198,9 +198,9 @@ def steps_of_the_form_of_motion() -> dict[str, Any]:
     fit = replace(plain(1.0), slopes=found.slopes(theta))
     gapped = replace(found.log, gaps=np.array([[1.0, 2.0, 3.0]]))
     told["slopes that are known"] = {
-        "plain": {name: some(slope) for name, slope in _slopes(fit, found.log).items()},
-        "noisy": dict(_slopes(fit, seen(log(0.5, position_noise=3e-5)))),
-        "with gaps": dict(_slopes(fit, gapped)),
+        "plain": {name: some(slope) for name, slope in slopes_of(fit, found.log).items()},
+        "noisy": dict(slopes_of(fit, seen(log(0.5, position_noise=3e-5)))),
+        "with gaps": dict(slopes_of(fit, gapped)),
     }
     told["channels"] = [SPEED in found.log.timed]
     return told

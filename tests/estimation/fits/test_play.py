@@ -242,7 +242,7 @@ def concluded(
         assert not paired
         return explanation
 
-    monkeypatch.setattr(module, "balanced", lambda *_: [fit])
+    monkeypatch.setattr(module, "balanced", lambda *_, **__: [fit])
     monkeypatch.setattr(module, "promised_each", lambda *_, **__: len(ALWAYS_ASKED) * [Promise(0.0, 0.0, 0.01)])
     monkeypatch.setattr(module, "explain", explained)
     return fit_flow(record or logged("normal", "prbs", 0.0), PAPER, PAPER.bulk_modulus)

@@ -186,7 +186,7 @@ def test_teeth_that_are_left_shut_the_gate_where_nothing_else_does(
     monkeypatch: pytest.MonkeyPatch, chi: float, code: EstimateCode
 ) -> None:
     shows = replace(fit(500.0, shown(12, 50.0), shown(13, 40.0)), chi_square=(chi,))
-    monkeypatch.setattr(module, "balanced", lambda *_: [shows])
+    monkeypatch.setattr(module, "balanced", lambda *_, **__: [shows])
     monkeypatch.setattr(module, "_asked", lambda *_, **__: ((), (RigCode.WEAR_NOT_EXCLUDED.note(percent=3.0),)))
     found = fit_flow(log(0.2), PAPER, PAPER.bulk_modulus)
     assert [note.code for note in found.reasons] == [code]
@@ -194,7 +194,7 @@ def test_teeth_that_are_left_shut_the_gate_where_nothing_else_does(
 
 
 def test_nothing_is_left_of_a_sound_log(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "balanced", lambda *_: [fit(500.0, shown(12, 3.0))])
+    monkeypatch.setattr(module, "balanced", lambda *_, **__: [fit(500.0, shown(12, 3.0))])
     monkeypatch.setattr(module, "promised_each", lambda *_, **__: len(ALWAYS_ASKED) * [Promise(0.0, 0.0, 0.01)])
     found = fit_flow(log(0.2), PAPER, PAPER.bulk_modulus)
     assert not found.reasons
@@ -256,6 +256,18 @@ def test_the_offset_is_that_of_the_balance_which_is_likeliest_with_an_offset_of_
     found = toothed(PLAIN, lambda _: fits.pop(0), well)
     assert subtracted(found) == pytest.approx(0.25)
     assert found.best.cost == 355.0
+
+
+@pytest.mark.parametrize("left", [0.9 * OFFSET_SETTLED, 1.1 * OFFSET_SETTLED])
+def test_a_first_guess_of_the_offset_is_corrected_and_told_however_large(left: float) -> None:
+    settled = left < OFFSET_SETTLED
+    fitted, asked = told(fit(420.0, off=(0.04, left)), fit(419.0))
+    found = toothed(PLAIN, fitted, well, offset=3.0 * MOST_OFFSET)
+    assert len(asked) == (1 if settled else 2)
+    offset = 3.0 * MOST_OFFSET + (0.0 if settled else 0.04)
+    assert subtracted(found) == pytest.approx(offset)
+    (note,) = found.remarks
+    assert note.data["offset_rad_s"] == found.log.speed_offset == pytest.approx(offset)
 
 
 def test_a_small_offset_is_subtracted_and_not_told() -> None:
