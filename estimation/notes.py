@@ -28,6 +28,9 @@ class SensorCode(Code):
     SENSORS_DISAGREE = (
         "velocity_m_s and the slope of position_m differ by {difference_m_s:.2g} m/s: one of the two sensors is wrong"
     )
+    VELOCITY_OFFSET = (
+        "{channel} reads {offset_m_s:.2g} m/s too much, by what position_m gains; the offset was subtracted"
+    )
 
 
 class ChannelCode(Code):

@@ -10,6 +10,7 @@ from estimation.log_checks.hum import without_hum
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
 from estimation.log_checks.outliers import without_gross_outliers
 from estimation.log_checks.sensor_check import PRESSURE, PRESSURES, sensor_objections, without_saturated
+from estimation.log_checks.velocity_offset import without_velocity_offset
 from estimation.notes import SensorCode
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -26,7 +27,8 @@ class CleanLog:
     Parameters
     ----------
     record : Record
-        The log, without repeated samples, gross outliers, clipped pressures, hum, and samples of like noise.
+        The log, without repeated samples, gross outliers, clipped pressures, hum, an offset of its velocity sensor, and
+        samples of like noise.
     variances : Mapping[str, float]
         Measurement variance of each of its channels [SI squared].
     left_out : tuple of Note
@@ -85,13 +87,14 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     if PRESSURE in sound:
         sound, clipped = without_saturated(sound, parameters)
     sound, hum = without_hum(sound)
+    sound, offset = without_velocity_offset(sound)
     known = [name for name in dict.fromkeys((*CLEANED, *PRESSURES)) if name in sound]
     objections = sensor_objections(sound, parameters)
     dead = any(note.data["channel"] == PRESSURE for note in objections)
     mistakes = channel_mistakes(sound.replace(**{PRESSURE: None}) if dead else sound, parameters)
     objections = () if mistakes else objections  # a sensor cannot be judged by channels of another meaning
     sound, filtered = without_correlated_noise(sound)
-    left_out = (*held, *outliers, *clipped, *hum, *filtered)
+    left_out = (*held, *outliers, *clipped, *hum, *offset, *filtered)
     variances = {**measurement_variances(sound, known), **_thinned_variances(sound, filtered)}
     return CleanLog(sound, variances, left_out, objections, mistakes)
 

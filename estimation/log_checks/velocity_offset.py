@@ -1,0 +1,80 @@
+"""`without_velocity_offset(record)`: a velocity sensor that does not read zero at rest, by how far the piston went."""
+
+import numpy as np
+
+from estimation.notes import SensorCode
+from plant.arrays import Array
+from plant.log.record import Record
+from plant.notes import Note
+
+POSITION, VELOCITY = "position_m", "velocity_m_s"
+
+PARTS = 16
+"""Parts of a log over which mean velocity is compared with what position gained [count]."""
+
+LEAST_PARTS = 8
+"""Parts that must hold both channels [count]."""
+
+CERTAIN = 6.0
+"""Standard errors from which an offset is believed [dimensionless]: with 14 degrees of freedom, one log in 30,000."""
+
+MATTERS = 0.01
+"""Share of the velocity's root mean square from which an offset is subtracted [fraction]; judged: class and severities
+are not that exact."""
+
+MOST_SAMPLES_OFF = 0.2
+"""Share of a part's samples that may be missing [fraction]."""
+
+
+def without_velocity_offset(record: Record) -> tuple[Record, tuple[Note, ...]]:
+    """Return a log without the offset of its velocity sensor, where position tells one.
+
+    Over each part of the log the mean velocity is ``offset + gain * (what position gained) / (its time)``. A wrong gain
+    is thus no offset, and nothing is done about it.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+
+    Returns
+    -------
+    tuple of (Record, tuple of Note)
+        The log, and what was subtracted; the same log and none where a channel is missing, or where the offset is too
+        small to matter or not certain.
+    """
+    if POSITION not in record or VELOCITY not in record:
+        return record, ()
+    position, velocity = record[POSITION], record[VELOCITY]
+    size = float(np.sqrt(np.nanmean(velocity**2))) if np.any(np.isfinite(velocity)) else 0.0
+    gained, mean = _compared(position, velocity, record.sample_time)
+    if len(mean) < LEAST_PARTS or size == 0.0:
+        return record, ()
+    sides = np.column_stack([np.ones(len(gained)), gained])
+    if np.linalg.matrix_rank(sides) < sides.shape[1]:  # a piston that stands tells no gain, and needs none
+        sides = sides[:, :1]
+    found = np.linalg.lstsq(sides, mean, rcond=None)[0]
+    left = mean - sides @ found
+    variance = float(left @ left) / (len(mean) - sides.shape[1])
+    error = float(np.sqrt(variance * np.linalg.inv(sides.T @ sides)[0, 0]))
+    offset = float(found[0])
+    if abs(offset) <= max(CERTAIN * error, MATTERS * size):
+        return record, ()
+    note = SensorCode.VELOCITY_OFFSET.note(channel=VELOCITY, offset_m_s=offset)
+    return record.replace(**{VELOCITY: velocity - offset}), (note,)
+
+
+def _compared(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array]:
+    """Return what position gains a second, and mean velocity, over each part that holds enough of both [m/s]."""
+    gained: list[float] = []
+    means: list[float] = []
+    there = np.isfinite(position) & np.isfinite(velocity)
+    for part in np.array_split(np.arange(len(position)), PARTS):
+        rows = part[there[part]]
+        if len(rows) < max(2, (1.0 - MOST_SAMPLES_OFF) * len(part)):
+            continue
+        first, last = rows[0], rows[-1]
+        between = velocity[rows]
+        gained.append(float(position[last] - position[first]) / ((last - first) * sample_time))
+        means.append(float(np.mean(0.5 * (between[1:] + between[:-1]))))
+    return np.array(gained), np.array(means)
