@@ -23,6 +23,10 @@ class AgainstCode(Code):
         "a make-up valve of chamber {side} that is stuck shut explains the log better than any of the nine conditions"
     )
     MAKEUP_LEAKS = "a make-up valve that leaks explains the log better than any of the nine conditions"
+    RELIEF_EARLY = (
+        "a relief valve that opens early, so that the pump's flow escapes under load, explains the log better than any "
+        "of the nine conditions"
+    )
     SPEED_BIAS = "motor speed reads wrong by {bias_rad_s:+.3g} rad/s"
     PRESSURE_BIAS = "differential pressure reads wrong by {bias_pa:+.3g} Pa"
     OIL_SOFT = "the oil's bulk modulus is {share:.2f} times that in the rig file: air in the oil, or a soft hose"

@@ -186,7 +186,8 @@ def share_of_motion(fit: GreyBoxFit, log: GreyBoxLog) -> float:
     (noise,), position = log.noise, log.measured[:, 0]
     kept = np.sqrt(noise.variance / max(noise.walk * log.sample_time, np.finfo(float).tiny))
     samples = int(np.clip(kept, 1, len(position) // 2))
-    moved = float(np.sqrt(np.nanmean((position[samples:] - position[:-samples]) ** 2)))
+    steps = position[samples:] - position[:-samples]
+    moved = float(np.sqrt(np.nanmean(steps**2))) if np.any(np.isfinite(steps)) else 0.0
     return float(np.sqrt(fit.chi_square[0] * noise.variance)) / moved if moved > 0.0 else float("inf")
 
 

@@ -167,7 +167,7 @@ def _work_on(fault: Note) -> Note | None:
             return AdviceCode.CHECK_MAKEUP.note(side=fault.data["side"])
         case AgainstCode.MAKEUP_LEAKS:
             return AdviceCode.CHECK_MAKEUP.note(side="A or B")
-        case RigCode.RELIEF_LOW:
+        case RigCode.RELIEF_LOW | AgainstCode.RELIEF_EARLY:
             return AdviceCode.CHECK_RELIEF.note()
         case RigCode.AIR_ENTERS:
             return AdviceCode.FIND_AIR.note()

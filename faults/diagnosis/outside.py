@@ -1,21 +1,23 @@
 """Faults outside the nine conditions, without pressure: does one explain the log better than any of the nine.
 
-Where pressure is logged, the balance of flows looks for a worn pump and for make-up valves that stick or leak. Without,
-circuits with each of them are laid beside those without, and each is weighed over the regions of all nine conditions
-(`class_regions`): the logarithm of a Bayes factor. What no rig file knows of a sound circuit may explain more than a
-fault does, so the sound circuit is first chosen among some that differ in that.
+Where pressure is logged, the balance of flows looks for a worn pump, for make-up valves that stick or leak and for a
+relief valve that is set low. Without, circuits with each of them are laid beside those without, and each is weighed
+over the regions of all nine conditions (`class_regions`): the logarithm of a Bayes factor. What no rig file knows of a
+sound circuit may explain more than a fault does, so the sound circuit is first chosen among some that differ in that.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
+from estimation.eha.rig_share import DELIVERY_ENTRY
+from estimation.fits.hypotheses import PRESUMED
 from faults.conditions import CONDITIONS
 from faults.diagnosis.blocks import Blocks
-from faults.diagnosis.circuit_runs import COORDINATES
-from faults.diagnosis.class_fit import Actuator, misfit, nominal_runs
+from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
+from faults.diagnosis.class_fit import Actuator, PointFit, misfit, nominal_runs
 from faults.diagnosis.class_regions import ClassFits, fit_classes, is_stuck
 from faults.notes import AgainstCode, ClassCode
 from plant.arrays import Array
@@ -37,11 +39,21 @@ up to 26 on it, but few."""
 WORN = "a worn pump"
 """What that fault is called."""
 
+EARLY = "a relief valve that opens early"
+"""What that one is called."""
+
 DELIVERIES = (0.7, 0.8, 0.9)
 """Shares of its displacement that a worn pump delivers [dimensionless]."""
 
+WELL_WORN = 0.8
+"""Share up to which a pump is a worn one whatever the rig file's displacement is worth [dimensionless]: an entry may be
+off by 5 %, and what is presumed of wear has a deviation of 15 %."""
+
 SEATS = (0.4, 1.0)
 """Leakage past the seat of a make-up valve, over all the leakage of an actuator with major leakage [dimensionless]."""
+
+SETTINGS = (0.75, 0.9)
+"""Settings of a relief valve, over the largest pressure that the sound circuit comes to in the log [dimensionless]."""
 
 WIDER = 5.0
 """By how much wider make-up valves are tried [dimensionless]: no rig file knows them."""
@@ -112,25 +124,96 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
         return Outside()
     runs = nominal_runs(blocks, actuator)
     sound = _sound(blocks, fits, actuator, runs)
-    gains, worn = dict[str, float](), [sound.fits.scores]
+    gains, worn = dict[str, float](), list[_Tried]()
     found: tuple[float, _Fault, _Tried] | None = None
-    for fault in _faults(sound.actuator):
+    for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best, sound.actuator)):
         tried = _with(fault, blocks, sound, runs)
         gain = tried.score - sound.score
         gains[fault.name] = max(gain, gains.get(fault.name, gain))
-        worn += [tried.fits.scores] if fault.name == WORN else []
+        worn += [tried] if fault.name == WORN else []
         if found is None or gain > found[0]:
             found = gain, fault, tried
-    if found is not None and found[0] > GAIN:
+    likely = odds_of_wear([one.score for one in worn], sound.score) > 0.0
+    if found is not None and (found[0] > GAIN or likely):
         # a search may end short of the best: the sound circuit is asked again from where the faulty one ended
         _, fault, tried = found
         again = fit_classes(blocks, sound.actuator, runs=runs, start=tried.fits.best.coordinates)
-        gains[fault.name] = tried.score - max(sound.score, float(np.max(again.scores)))
+        best = max(sound.score, float(np.max(again.scores)))
+        gains[fault.name] = tried.score - best
         if gains[fault.name] > GAIN:
             return Outside((fault.note,))
-    open_ = [name for name, gain in gains.items() if gain > NOT_EXCLUDED]
+        if odds_of_wear([one.score for one in worn], best) > 0.0:
+            return Outside((_delivering(DELIVERIES[int(np.argmax([one.score for one in worn]))]),))
+    # a setting just under the largest pressure leaves no trace: no log excludes it, and saying so tells nothing
+    open_ = [name for name, gain in gains.items() if gain > NOT_EXCLUDED and name != EARLY]
     note = (ClassCode.NOT_EXCLUDED.note(faults=", ".join(open_)),) if open_ else ()
-    return Outside((), note, np.array(worn) if WORN in open_ else None)
+    scores = [sound.fits.scores, *(one.fits.scores for one in worn)]
+    return Outside((), note, np.array(scores) if WORN in open_ else None)
+
+
+def odds_of_wear(scores: Sequence[float], sound: float) -> float:
+    """Return how much likelier a log makes a well worn pump than a sound one, with what is presumed of wear.
+
+    Wear is common, so it need not gain what a rare fault must; what is presumed of it before a log is seen is that of
+    `faults.diagnosis.wear.summed_over_wear`.
+
+    Parameters
+    ----------
+    scores : sequence of float
+        How well pumps that deliver each of `DELIVERIES` explain a log [dimensionless].
+    sound : float
+        The same of a sound pump [dimensionless].
+
+    Returns
+    -------
+    float
+        Logarithm of the ratio of pumps that deliver `WELL_WORN` at most to sound ones [dimensionless].
+
+    Examples
+    --------
+    >>> odds_of_wear([-9.0, 0.0, 9.0], 0.0) < 0.0 < odds_of_wear([-9.0, 2.0, 0.0], 0.0)
+    True
+    """
+    well = np.array(DELIVERIES) <= WELL_WORN
+    return float(np.logaddexp.reduce((np.array(scores) - sound + presumed_of_wear(DELIVERIES))[well]))
+
+
+def presumed_of_wear(shares: Sequence[float]) -> Array:
+    """Return the log-likelihoods of what pumps deliver before a log is seen.
+
+    Parameters
+    ----------
+    shares : sequence of float
+        What they deliver over their displacement [dimensionless].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Half a normal distribution of the logarithm of deviation `PRESUMED`, 0 for a sound pump [dimensionless].
+    """
+    return np.asarray(-0.5 * (np.log(shares) / PRESUMED[DELIVERY_ENTRY]) ** 2, dtype=np.float64)
+
+
+def largest_pressure(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float:
+    """Return the largest pressure that a fitted circuit comes to in a log without pressure.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    fit : PointFit
+        The circuit.
+    actuator : Actuator
+        The actuator around it.
+
+    Returns
+    -------
+    float
+        Mean over a block [Pa].
+    """
+    seen = replace(blocks, pressure=np.zeros(len(blocks.velocity)))
+    rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
+    return float(np.max(np.abs(predicted(seen, rows)[0, blocks.first :, 1])))
 
 
 def _with(fault: _Fault, blocks: Blocks, sound: _Tried, runs: Array) -> _Tried:
@@ -157,12 +240,19 @@ def _sound(blocks: Blocks, fits: ClassFits, actuator: Actuator, runs: Array) -> 
     return max(tried, key=lambda one: one.score)
 
 
-def _faults(actuator: Actuator) -> Iterator[_Fault]:
-    """Yield the faults that are looked for."""
+def _delivering(share: float) -> Note:
+    return AgainstCode.PUMP_DELIVERS_LESS.note(percent=100.0 * share)
+
+
+def _faults(actuator: Actuator, pressure: float) -> Iterator[_Fault]:
+    """Yield the faults that are looked for, where the sound circuit comes to a pressure [Pa]."""
     sound = actuator.circuit
     for share in DELIVERIES:
         worn = replace(sound, pump_displacement=share * sound.pump_displacement)
-        yield _Fault(AgainstCode.PUMP_DELIVERS_LESS.note(percent=100.0 * share), WORN, worn, elsewhere=True)
+        yield _Fault(_delivering(share), WORN, worn, elsewhere=True)
+    for share in SETTINGS:
+        early = replace(sound, relief_pressure=share * pressure)
+        yield _Fault(AgainstCode.RELIEF_EARLY.note(), EARLY, early, elsewhere=False)
     major = actuator.conditions[list(CONDITIONS).index("major_leakage"), COORDINATES.index("leakage")]
     for side in "ab":
         stuck = one_sided(sound, **{f"makeup_shut_{side}": 1.0})

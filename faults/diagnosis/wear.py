@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from estimation.eha.result import BulkModulusEstimate
-from estimation.eha.rig_share import DELIVERY_ENTRY, wear_left_open
-from estimation.fits.hypotheses import OFFSET, PRESUMED
+from estimation.eha.rig_share import wear_left_open
+from estimation.fits.hypotheses import OFFSET
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.evidence import Scoreboard, bounded
-from faults.diagnosis.outside import DELIVERIES
+from faults.diagnosis.outside import DELIVERIES, presumed_of_wear
 from faults.notes import AgainstCode
 from plant.arrays import Array
 from plant.notes import Note
@@ -134,6 +134,5 @@ def summed_over_wear(board: Scoreboard, scores: Array, calibration: Calibration)
     Mapping[str, float]
         Probability by condition [probability].
     """
-    beforehand = -0.5 * (np.log([1.0, *DELIVERIES]) / PRESUMED[DELIVERY_ENTRY]) ** 2
-    summed = np.logaddexp.reduce(scores + beforehand[:, None], axis=0)
+    summed = np.logaddexp.reduce(scores + presumed_of_wear([1.0, *DELIVERIES])[:, None], axis=0)
     return replace(board, log_odds={**board.log_odds, "parameters": bounded(summed)}).probabilities(calibration)

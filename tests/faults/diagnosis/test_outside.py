@@ -14,7 +14,7 @@ from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.diagnose import diagnose_clean
-from faults.diagnosis.outside import faults_outside
+from faults.diagnosis.outside import DELIVERIES, faults_outside, largest_pressure, odds_of_wear
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.model import EhaParameters
@@ -55,6 +55,7 @@ FAULTS = {
     "valve A": (one_sided(SOUND, makeup_shut_a=1.0), AgainstCode.MAKEUP_STUCK),
     "valve B": (one_sided(SOUND, makeup_shut_b=1.0), AgainstCode.MAKEUP_STUCK),
     "seat A": (one_sided(SOUND, seat_leakage_a=0.6 * MAJOR), AgainstCode.MAKEUP_LEAKS),
+    "relief": (replace(SOUND, relief_pressure=5.5e5), AgainstCode.RELIEF_EARLY),
 }
 
 
@@ -91,6 +92,31 @@ def test_a_valve_that_never_had_to_open_is_not_excluded_and_a_worn_pump_is_where
     assert not against
     assert "stuck shut" in open_
     assert "worn pump" not in open_
+
+
+@pytest.mark.parametrize("shares", [(-9.0, -4.0, 3.9), (0.0, 0.0, 3.9), (3.0, 1.0, 0.0), (-9.0, 1.2, 1.0)], ids=str)
+def test_a_pump_that_is_well_worn_need_only_be_likelier_than_a_sound_one(shares: tuple[float, ...]) -> None:
+    less, well = np.exp(np.array(shares) - 0.5 * (np.log(DELIVERIES) / 0.15) ** 2), np.array([1.0, 1.0, 0.0])
+    assert odds_of_wear(np.array(shares) - 5.0, -5.0) == pytest.approx(np.log(less @ well))
+
+
+def test_what_a_worn_pump_gains_may_be_less_than_what_a_rare_fault_must(monkeypatch: pytest.MonkeyPatch) -> None:
+    blocks = log_of(FAULTS["pump"][0])
+    fits = fit_classes(blocks, ACTUATOR)
+    monkeypatch.setattr(outside, "GAIN", 1e9)
+    (note,) = faults_outside(blocks, fits, ACTUATOR).against
+    assert (note.code, note.data["percent"]) == (AgainstCode.PUMP_DELIVERS_LESS, pytest.approx(80.0))
+    valve = log_of(FAULTS["valve A"][0])
+    assert not faults_outside(valve, fit_classes(valve, ACTUATOR), ACTUATOR).against
+
+
+def test_a_relief_valve_that_opens_just_before_the_largest_pressure_is_not_said_to_be_not_excluded() -> None:
+    blocks = log_of()
+    fits = fit_classes(blocks, ACTUATOR)
+    pressure = largest_pressure(blocks, fits.best, ACTUATOR)
+    seen = np.abs(log_of(pressure=True).outputs[blocks.first :, 1])
+    assert pressure == pytest.approx(np.max(seen), rel=0.1)
+    assert "relief" not in said(blocks)[1]
 
 
 def test_with_pressure_and_where_the_piston_sticks_nothing_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
