@@ -31,6 +31,10 @@ class AgainstCode(Code):
     PRESSURE_BIAS = "differential pressure reads wrong by {bias_pa:+.3g} Pa"
     OIL_SOFT = "the oil's bulk modulus is {share:.2f} times that in the rig file: air in the oil, or a soft hose"
     OIL_STIFF = "the oil's bulk modulus is {share:.2f} times that in the rig file: another oil, or a wrong rig file"
+    OIL_SOFTENS = (
+        "at about {at_s:.1f} s the oil's bulk modulus fell to {share:.2f} of what it was before: air got in, which is "
+        "none of the nine conditions"
+    )
     OUTSIDE_CONDITIONS = "the actuator that fits best is in none of the nine conditions, nor between them"
     BETWEEN_CONDITIONS = (
         "between the nine conditions: leakage {leakage:.2f} and friction {friction:.2f}, where 1 is minor and 2 is "

@@ -169,7 +169,7 @@ def _work_on(fault: Note) -> Note | None:
             return AdviceCode.CHECK_MAKEUP.note(side="A or B")
         case RigCode.RELIEF_LOW | AgainstCode.RELIEF_EARLY:
             return AdviceCode.CHECK_RELIEF.note()
-        case RigCode.AIR_ENTERS:
+        case RigCode.AIR_ENTERS | AgainstCode.OIL_SOFTENS:
             return AdviceCode.FIND_AIR.note()
         case _:
             return None

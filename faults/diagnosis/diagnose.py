@@ -308,7 +308,7 @@ def diagnose_clean(
     pressure = board.blocks.pressure is not None
     region = float(np.max(region_scores(board.fits.best, board.fits.told, actuator)))
     against = (
-        *log.objections,
+        *(*log.objections, *board.against),
         *sensors_disagree(board.window, board.blocks),
         *reasons_against(board.blocks, board.fits, region, actuator),
     )

@@ -18,6 +18,7 @@ from faults.diagnosis.onset import last_part
 from faults.diagnosis.rmse import score_transfer_functions
 from plant.arrays import Array
 from plant.log.record import Record
+from plant.notes import Note
 
 EVIDENCES = ("transfer_functions", "models", "innovations", "parameters")
 """The evidences, in the order of the scoreboard's rows."""
@@ -49,6 +50,8 @@ class Scoreboard:
         The stretch of the log that was looked at.
     onset : Change or None
         When the condition began, which alone is judged; None if it did so before the log.
+    against : tuple of Note
+        What changed within the log and is no change of condition.
     """
 
     log_odds: Mapping[str, Array]
@@ -56,6 +59,7 @@ class Scoreboard:
     fits: ClassFits
     window: Record
     onset: Change | None
+    against: tuple[Note, ...] = ()
 
     def choice(self, evidence: str) -> str:
         """Return the condition that one evidence alone names.
@@ -128,7 +132,7 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
     if is_stuck(blocks, actuator):
         found = {name: friction_left_open(scores, blocks, actuator) for name, scores in found.items()}
     odds = {name: bounded(found[name]) for name in EVIDENCES if name in found}
-    return Scoreboard(odds, blocks, fits, part.window, part.onset)
+    return Scoreboard(odds, blocks, fits, part.window, part.onset, part.against)
 
 
 def models_scores(fits: ClassFits) -> Array:

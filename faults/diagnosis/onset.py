@@ -7,22 +7,25 @@ Where that is much, both are fitted; it is a change if they are in different con
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from estimation.finding import Change
 from faults.conditions import CONDITIONS
 from faults.diagnosis.blocks import LONGEST, Blocks, blocks_of
-from faults.diagnosis.circuit_runs import parameter_rows, predicted
+from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, least_scales, nominal_runs
 from faults.diagnosis.class_regions import ClassFits, fit_classes, lasting_misfit
 from faults.diagnosis.end_stop import stopped
 from faults.diagnosis.out_of_model import unexplained
 from faults.diagnosis.rivals import behind
+from faults.notes import AgainstCode
 from faults.watch.events import SLOW, Alarm
 from faults.watch.watch import LEAST_LEARNING, SLOWEST, watch_record
 from plant.arrays import Array
 from plant.log.record import Record
+from plant.notes import Note
 from plant.solvers.adaptive import LANES
 
 EDGE = 1.0
@@ -30,6 +33,13 @@ EDGE = 1.0
 
 GAIN = 10.0
 """Log-likelihood that two circuits must gain on one [dimensionless]."""
+
+SOFTENED = 30.0
+"""The same where both are in one condition, from which the oil is asked whether it softened [dimensionless]: steady
+training logs of the open benchmark gain up to 27, those into which air gets 95 to 126."""
+
+ONE_SIDED = 1.645
+"""Deviations by which bulk modulus must have fallen then [dimensionless]: one chance in twenty, beside that gain."""
 
 LATE, EARLY = 0.8, 0.1
 """How much later, or earlier, than it came a change may be seen [s]."""
@@ -57,6 +67,8 @@ class LastPart:
         Circuits fitted to them.
     onset : Change or None
         When the condition began; None if it did so before the log.
+    against : tuple of Note
+        What changed within the log and is no change of condition.
     """
 
     window: Record
@@ -64,6 +76,34 @@ class LastPart:
     blocks: Blocks
     fits: ClassFits
     onset: Change | None
+    against: tuple[Note, ...] = ()
+
+
+class Parted(NamedTuple):
+    """A log in two parts, of which each is fitted by itself.
+
+    Parameters
+    ----------
+    place : int
+        First block of the second.
+    parts : list of Blocks
+        Both.
+    fits : list of ClassFits
+        Circuits fitted to each.
+    gain : float
+        Log-likelihood that they gain on one circuit for all [dimensionless].
+    """
+
+    place: int
+    parts: list[Blocks]
+    fits: list[ClassFits]
+    gain: float
+
+    @property
+    def conditions(self) -> tuple[int, int]:
+        """Places of the conditions in which the parts are."""
+        first, last = (int(np.argmax(one.scores)) for one in self.fits)
+        return first, last
 
 
 def last_part(record: Record, actuator: Actuator) -> LastPart:
@@ -97,9 +137,10 @@ def last_part(record: Record, actuator: Actuator) -> LastPart:
 def _last_of(window: Record, actuator: Actuator) -> LastPart:
     blocks = blocks_of(window)
     blocks, fits = stopped(blocks, fit_classes(blocks, actuator), actuator)
-    found = find_onset(blocks, fits, actuator)
+    two = parted(blocks, fits, actuator)
+    found = None if two is None else find_onset(blocks, two, actuator)
     if found is None:
-        return LastPart(window, window, blocks, fits, None)
+        return LastPart(window, window, blocks, fits, None, () if two is None else softened(two))
     onset, blocks, fits = found
     rest = window.slice(round(onset.since / window.sample_time), None)
     ends = onset.ci95[0] + window.start_time, onset.ci95[1] + window.start_time
@@ -118,8 +159,8 @@ def _about_alarms(record: Record, actuator: Actuator) -> Iterator[Record]:
         yield record.slice(first, first + round(LONGEST / record.sample_time) + 1)
 
 
-def find_onset(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Change, Blocks, ClassFits] | None:
-    """Return when the condition changed, and the part of the log after that.
+def parted(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Parted | None:
+    """Return a log in two parts, where two circuits one after the other may explain it much better than one.
 
     Parameters
     ----------
@@ -132,32 +173,74 @@ def find_onset(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Cha
 
     Returns
     -------
+    Parted or None
+        Both parts; None where one circuit will do.
+    """
+    place = likeliest_split(blocks, fits.best)
+    if place is None:
+        return None
+    parts = [part_of(blocks, 0, place), part_of(blocks, place, len(blocks.velocity))]
+    runs, start = nominal_runs(blocks, actuator), fits.best.coordinates
+    found = [fit_classes(part, actuator, runs=runs, start=start) for part in parts]
+    # each part is compared by itself: noise or a model's error that changes with the motion is no other condition
+    gain = sum(float(behind([fits.best], one.best, part)[0]) for part, one in zip(parts, found, strict=True))
+    return Parted(place, parts, found, gain)
+
+
+def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change, Blocks, ClassFits] | None:
+    """Return when the condition changed, and the part of the log after that.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    two : Parted
+        Its parts.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
     tuple of Change, Blocks and ClassFits, or None
         The change, the log with all before it taken as missing, and the circuits that fit the rest, which go on from
         where the circuit before had brought the piston; None for a log in one condition throughout, and where no
         circuit follows what came before.
     """
-    place = likeliest_split(blocks, fits.best)
-    if place is None:
+    (before, after), (first, last) = two.fits, two.conditions
+    if two.gain < GAIN or first == last:
         return None
-    parts = part_of(blocks, 0, place), part_of(blocks, place, len(blocks.velocity))
-    runs, start = nominal_runs(blocks, actuator), fits.best.coordinates
-    found = [fit_classes(part, actuator, runs=runs, start=start) for part in parts]
-    # each part is compared by itself: noise or a model's error that changes with the motion is no other condition
-    gain = sum(float(behind([fits.best], one.best, part)[0]) for part, one in zip(parts, found, strict=True))
-    first, last = (int(np.argmax(one.scores)) for one in found)
-    if gain < GAIN or first == last:
+    if unexplained(two.parts[0], before, actuator):  # what comes and goes has no last condition, but a quiet stretch
         return None
-    if unexplained(
-        parts[0], found[0], actuator
-    ):  # what comes and goes has no last condition, only a last quiet stretch
-        return None
-    before = parameter_rows(found[0].best.coordinates[None], actuator.circuit, actuator.rated)[0]
-    low, best, high = _when(blocks, before, found[1].best.coordinates, place, actuator)
+    row = parameter_rows(before.best.coordinates[None], actuator.circuit, actuator.rated)[0]
+    low, best, high = _when(blocks, row, after.best.coordinates, two.place, actuator)
     step = blocks.block * blocks.sample_time
     onset = Change(best * step, (low * step, high * step), list(CONDITIONS)[first])
-    rest = replace(part_of(blocks, best, len(blocks.velocity)), earlier=(best * blocks.block, before))
+    rest = replace(part_of(blocks, best, len(blocks.velocity)), earlier=(best * blocks.block, row))
     return onset, rest, fit_classes(rest, actuator)
+
+
+def softened(two: Parted) -> tuple[Note, ...]:
+    """Return a note where the oil of a log without pressure softened: air got in, which no condition has.
+
+    Parameters
+    ----------
+    two : Parted
+        The log in two parts.
+
+    Returns
+    -------
+    tuple of Note
+        None with pressure, from which the flow balance tells it.
+    """
+    first, last = two.conditions
+    if two.parts[0].pressure is not None or first != last or two.gain < SOFTENED:
+        return ()
+    at = COORDINATES.index("bulk_modulus")
+    fallen = float(two.fits[1].best.coordinates[at] - two.fits[0].best.coordinates[at])
+    if fallen > -ONE_SIDED * float(np.sqrt(sum(one.spread[at, at] for one in two.fits))):
+        return ()
+    begun = two.place * two.parts[0].block * two.parts[0].sample_time
+    return (AgainstCode.OIL_SOFTENS.note(share=float(np.exp(fallen)), at_s=begun),)
 
 
 def part_of(blocks: Blocks, begin: int, end: int) -> Blocks:

@@ -171,6 +171,7 @@ def test_a_fault_outside_the_nine_is_worked_on_before_the_rig_file() -> None:
         (AgainstCode.PUMP_DELIVERS_LESS.note(percent=80.0), AdviceCode.CHECK_PUMP.note()),
         (AgainstCode.MAKEUP_STUCK.note(side="B"), AdviceCode.CHECK_MAKEUP.note(side="B")),
         (AgainstCode.MAKEUP_LEAKS.note(), AdviceCode.CHECK_MAKEUP.note(side="A or B")),
+        (AgainstCode.OIL_SOFTENS.note(share=0.7, at_s=9.1), AdviceCode.FIND_AIR.note()),
         (AgainstCode.RELIEF_EARLY.note(), AdviceCode.CHECK_RELIEF.note()),
         (RigCode.PRESSURE_OFFSET.note(offset_pa=1e5, half_width_pa=1e3), AdviceCode.CHECK_RIG.note()),
     ],

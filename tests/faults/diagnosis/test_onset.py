@@ -13,12 +13,24 @@ from estimation.log_checks.clean import clean_log
 from experiments.open_benchmark.kinds import make
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import onset
-from faults.diagnosis.blocks import Blocks
+from faults.diagnosis.blocks import Blocks, blocks_of
 from faults.diagnosis.class_fit import Actuator, PointFit
+from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.diagnose import Diagnosis, diagnose_clean
-from faults.diagnosis.onset import MOST_ALARMS, LastPart, last_part, likeliest_split, part_of
+from faults.diagnosis.onset import (
+    MOST_ALARMS,
+    SOFTENED,
+    LastPart,
+    find_onset,
+    last_part,
+    likeliest_split,
+    part_of,
+    parted,
+    softened,
+)
 from faults.diagnosis.out_of_model import unexplained
 from faults.eha.inject import abrupt
+from faults.notes import AgainstCode
 from faults.watch.events import Alarm, Event, Ready
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
@@ -70,6 +82,20 @@ def test_a_log_is_judged_from_where_its_condition_changed(condition: str, *, pre
     assert found.blocks.earlier[0] * 2e-3 == pytest.approx(2.2, abs=0.02)
     assert np.flatnonzero(np.isfinite(found.blocks.velocity))[0] == pytest.approx(220, abs=2)
     assert list(CONDITIONS)[int(np.argmax(found.fits.scores))] == condition
+
+
+def test_without_pressure_oil_that_softens_within_a_log_is_in_no_condition() -> None:
+    blocks = blocks_of(foreign("air_midway", 703).replace(differential_pressure_pa=None))
+    two = parted(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
+    assert two is not None
+    (note,) = softened(two)
+    assert note.code == AgainstCode.OIL_SOFTENS
+    assert note.data["share"] < 0.8
+    assert 8.0 < note.data["at_s"] < 12.0
+    assert not softened(two._replace(fits=two.fits[::-1])), "oil that stiffens"
+    assert not softened(two._replace(gain=0.99 * SOFTENED))
+    assert not softened(two._replace(parts=[replace(one, pressure=one.velocity) for one in two.parts]))
+    assert find_onset(blocks, two, ACTUATOR) is None
 
 
 def test_a_log_in_one_condition_is_judged_whole() -> None:
