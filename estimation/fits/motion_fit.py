@@ -120,7 +120,7 @@ def fit_motion(
     if "position_m" not in record:
         raise LogError("the motion form needs position_m, the record lacks it")
     noise = (variances or measurement_variances(record, ("motor_speed_rad_s",)))["motor_speed_rad_s"]
-    log = _log(record, parameters, uncertainties or {}, noise)
+    log = motion_log(record, parameters, uncertainties or {}, noise)
     starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
     ended = likeliest([MotionSearch.of(form, log, starts) for form in MOTION_FORMS])
     fits, others = _fitted(ended)
@@ -130,7 +130,7 @@ def fit_motion(
     apart = max((abs(float(np.log(other / value))) for other in others), default=0.0)
     bound, moved = float(np.hypot(std / value, apart)), unseen(best, len(log.measured)) * std / value
     believed = with_structure(found, float(np.linalg.norm([STRUCTURE, apart, moved])))
-    reasons = _objections(fits, best, others, share_of_motion(best, log))
+    reasons = _objections(fits, best, others, share_of_motion(best.chi_square[0], log))
     if not reasons and moved > MOST_MOVED:
         reasons = (EstimateCode.WEAKLY_HELD.note(percent=100.0 * moved, noise_percent=100.0 * std / value),)
     return FormFit(believed, bound, best.chi_square[0], reasons, best.rig_slopes)
@@ -165,7 +165,7 @@ def unseen(fit: GreyBoxFit, samples: int) -> float:
     return float(np.sqrt(1.0 + shown + np.sqrt(2.0 * samples)))
 
 
-def share_of_motion(fit: GreyBoxFit, log: GreyBoxLog) -> float:
+def share_of_motion(chi_square: float, log: GreyBoxLog) -> float:
     """Return the residuals over the motion, in the time over which a residual is told from drift.
 
     Measured speed has noise, which is a random walk of position: what is older than ``sqrt(variance / walk)`` is
@@ -173,8 +173,8 @@ def share_of_motion(fit: GreyBoxFit, log: GreyBoxLog) -> float:
 
     Parameters
     ----------
-    fit : GreyBoxFit
-        The fit.
+    chi_square : float
+        Mean squared normalised residual of a fit [dimensionless].
     log : GreyBoxLog
         Its log.
 
@@ -188,10 +188,30 @@ def share_of_motion(fit: GreyBoxFit, log: GreyBoxLog) -> float:
     samples = int(np.clip(kept, 1, len(position) // 2))
     steps = position[samples:] - position[:-samples]
     moved = float(np.sqrt(np.nanmean(steps**2))) if np.any(np.isfinite(steps)) else 0.0
-    return float(np.sqrt(fit.chi_square[0] * noise.variance)) / moved if moved > 0.0 else float("inf")
+    return float(np.sqrt(chi_square * noise.variance)) / moved if moved > 0.0 else float("inf")
 
 
-def _log(record: Record, p: EhaParameters, uncertainties: Mapping[str, float], speed_variance: float) -> GreyBoxLog:
+def motion_log(
+    record: Record, p: EhaParameters, uncertainties: Mapping[str, float], speed_variance: float
+) -> GreyBoxLog:
+    """Return a log as the motion form is fitted to it.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with position.
+    p : EhaParameters
+        The actuator.
+    uncertainties : Mapping[str, float]
+        Relative standard deviation of its parameters [fraction].
+    speed_variance : float
+        Measurement variance of motor speed [rad^2/s^2].
+
+    Returns
+    -------
+    GreyBoxLog
+        Its beginning of at most `MOST_SAMPLES`, averaged to `SHORTEST_SAMPLE`.
+    """
     block = samples_a_block(record.sample_time, SHORTEST_SAMPLE)
     sample_time = block * record.sample_time
     speed, position = (block_means(record[name], block)[:MOST_SAMPLES] for name in ("motor_speed_rad_s", "position_m"))

@@ -27,11 +27,11 @@ from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import region_scores
 from faults.diagnosis.drift import over_drift
 from faults.diagnosis.evidence import Scoreboard, weigh
+from faults.diagnosis.failed_search import doubts_after
 from faults.diagnosis.load import Loaded, under_load
 from faults.diagnosis.models_verdict import models_verdict, ranked
 from faults.diagnosis.out_of_model import SOFT, reasons_against, sensors_disagree
 from faults.diagnosis.outside import Outside, faults_outside
-from faults.diagnosis.rivals import doubts_left
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import limits_of, severities, severities_at, what_is_not_told, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
@@ -162,7 +162,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     doubts = (*refused(estimate), *outside, *log.objections)
     try:
         judged = partial(_judged, parameters=rig.parameters, estimate=estimate, plain=plain)
-        diagnosis, _, named = over_drift(judged, log, strange)
+        diagnosis, around, named = over_drift(judged, log, strange)
     except (RigError, LogError) as error:
         without = _without_class(found, log, scores, distinct((*doubts, *verdict.against)))
         said = ClassCode.NO_CIRCUIT if isinstance(error, RigError) else ClassCode.NO_PROBABILITIES
@@ -170,8 +170,8 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     found = replace(found, notes=(*found.notes, *named))
     if (stop := diagnosis.scoreboard.blocks.stop) is not None:
         found = replace(found, notes=(*found.notes, ClassCode.END_STOP.note(reach_mm=1e3 * stop)))
-    board = diagnosis.scoreboard
-    against = distinct((*doubts_left(doubts, board.blocks, board.fits.best), *diagnosis.against))
+    left = doubts_after(doubts, estimate, log, around, diagnosis.scoreboard)
+    against = distinct((*left, *diagnosis.against))
     if against:  # nominal models alone are no judges of a circuit with another oil, but they say what is off
         against = distinct((*against, *verdict.against))
     severity = _severities(diagnosis, estimate, healthy, rig, pressure=PRESSURE in scores.channels)

@@ -22,7 +22,6 @@ from plant.eha.simulate import PLANTS, simulate
 from plant.errors import LogError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
-from tests.estimation.fits.short_logs import made_fit
 
 HEALTHY = EhaParameters()
 
@@ -36,7 +35,7 @@ def short_log(seconds: float, seed: int = 1, sample_time: float = 1e-3) -> Recor
 
 
 def seen(record: Record, speed_variance: float = 1e-4) -> GreyBoxLog:
-    return motion_fit._log(record, HEALTHY, {}, speed_variance)
+    return motion_fit.motion_log(record, HEALTHY, {}, speed_variance)
 
 
 def heard(record: Record) -> GreyBoxLog:
@@ -87,11 +86,13 @@ def test_residuals_are_compared_with_how_far_the_piston_goes_while_noise_of_spee
     still = seen(Record(1e-3, {"motor_speed_rad_s": np.ones(1000), "position_m": np.zeros(1000)}))
     moving = replace(still, measured=4e-5 * np.arange(1000.0)[:, None], noise=(OutputNoise(2.56e-12, 1e-11),))
     moving.measured[500] = np.nan
-    fit = made_fit(1.0, 2e8, 1e6, chi=100.0)
-    assert motion_fit.share_of_motion(fit, moving) == pytest.approx(1.6e-5 / (16.0 * 4e-5))
+    assert motion_fit.share_of_motion(100.0, moving) == pytest.approx(1.6e-5 / (16.0 * 4e-5))
     surer = replace(moving, noise=(OutputNoise(2.56e-12, 0.0),))  # then all that was moved counts, half the log here
-    assert motion_fit.share_of_motion(fit, surer) == pytest.approx(1.6e-5 / (500.0 * 4e-5))
-    assert motion_fit.share_of_motion(fit, still) == np.inf
+    assert motion_fit.share_of_motion(100.0, surer) == pytest.approx(1.6e-5 / (500.0 * 4e-5))
+    assert motion_fit.share_of_motion(100.0, still) == np.inf
+    gone = replace(moving, measured=np.where(np.arange(1000)[:, None] % 16 == 0, moving.measured, np.nan))
+    gone.measured[::16][1:] = np.nan
+    assert motion_fit.share_of_motion(100.0, gone) == np.inf
 
 
 def test_a_long_log_is_searched_on_its_beginning_and_ends_on_the_whole(

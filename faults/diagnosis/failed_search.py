@@ -1,0 +1,94 @@
+"""What speaks against a log before circuits are fitted, and whether the fitted circuit takes it back.
+
+Without pressure a log is refused if the fit of motion leaves much of the motion. Its search may have failed, though: a
+circuit that follows the log has values for all that the motion form leaves open, and with these it follows the log too.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from estimation.eha.estimate import NOT_THE_LOGS
+from estimation.eha.result import BulkModulusEstimate
+from estimation.fits.motion_values import share_at
+from estimation.log_checks.clean import CleanLog
+from estimation.notes import EstimateCode
+from faults.diagnosis.circuit_runs import COLUMN, parameter_rows
+from faults.diagnosis.class_fit import Actuator, PointFit
+from faults.diagnosis.evidence import Scoreboard
+from faults.diagnosis.out_of_model import UNEXPLAINED
+from faults.diagnosis.rivals import doubts_left
+from plant.eha.model import EhaParameters
+from plant.notes import Note
+
+LESS = 0.5
+"""Share of what a search left of the motion up to which the circuit's values show that it failed [fraction]: where it
+did not, they leave 0.9 to 1.1 times as much."""
+
+ALIKE = (
+    "bulk_modulus",
+    "leakage_coefficient",
+    "flow_bias",
+    "makeup_conductance",
+    "friction_quadratic",
+    "friction_linear",
+    "friction_coulomb",
+)
+"""Parameters that a circuit and the motion form share."""
+
+LEAST_DRAIN = 1e-3
+"""Least share of the leakage that drains to the inner circuit [fraction]: no logarithm begins at zero."""
+
+
+def doubts_after(
+    doubts: Sequence[Note], estimate: BulkModulusEstimate, log: CleanLog, healthy: EhaParameters, board: Scoreboard
+) -> tuple[Note, ...]:
+    """Return what still speaks against a log once a circuit is fitted.
+
+    Parameters
+    ----------
+    doubts : sequence of Note
+        What speaks against it before.
+    estimate : BulkModulusEstimate
+        Whose gate gave some of them.
+    log : CleanLog
+        The log.
+    healthy : EhaParameters
+        The actuator around which the circuit was fitted.
+    board : Scoreboard
+        The circuit that explains the log best.
+
+    Returns
+    -------
+    tuple of Note
+        Those of `faults.diagnosis.rivals.doubts_left`; none that rest on a fit of motion whose search failed, if the
+        motion form leaves no more at the circuit's values than a circuit may.
+    """
+    left = doubts_left(doubts, board.blocks, board.fits.best)
+    large = next((note for note in left if note.code is EstimateCode.POSITION_RESIDUALS_LARGE), None)
+    if large is None or estimate.form != "motion":
+        return left
+    values = values_of(board.fits.best, Actuator.of(healthy))
+    share = share_at(log.record, healthy, values, log.variances["motor_speed_rad_s"])
+    failed = share <= min(UNEXPLAINED[0], LESS * float(large.data["motion_percent"]) / 100.0)
+    return tuple(note for note in left if note.code not in NOT_THE_LOGS) if failed else left
+
+
+def values_of(fit: PointFit, actuator: Actuator) -> Mapping[str, float]:
+    """Return the motion form's unknowns as a fitted circuit has them.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The circuit.
+    actuator : Actuator
+        The actuator around it.
+
+    Returns
+    -------
+    Mapping[str, float]
+        By the names of `estimation.models.motion.UNKNOWNS` [SI].
+    """
+    (row,) = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
+    circuit = {name: float(row[column]) for name, column in COLUMN.items()}
+    drain = max(circuit["pump_case_leakage"], LEAST_DRAIN * circuit["leakage_coefficient"])
+    stiffness = circuit["friction_coulomb"] / circuit["presliding_displacement"]
+    return {name: circuit[name] for name in ALIKE} | {"case_leakage": drain, "bristle_stiffness": stiffness}

@@ -1,0 +1,69 @@
+"""A fit of motion whose search failed speaks against no log that the motion form follows at the circuit's values."""
+
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from estimation.eha.result import BulkModulusEstimate
+from estimation.finding import Gate, Outcome
+from estimation.log_checks.clean import CleanLog
+from estimation.models.motion import UNKNOWNS
+from estimation.notes import EstimateCode, SensorCode
+from faults.conditions import CONDITIONS
+from faults.diagnosis import failed_search
+from faults.diagnosis.circuit_runs import coordinates_of
+from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.evidence import Scoreboard
+from faults.diagnosis.failed_search import doubts_after, values_of
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from tests.faults.diagnosis.test_rivals import leaving, log
+
+PAPER = EhaParameters()
+ACTUATOR = Actuator.of(PAPER)
+FAR = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=40.0, motion_percent=20.0)
+LAWS = EstimateCode.FRICTION_LAWS_DISAGREE.note(least_pa=1e8, most_pa=2e8)
+FROZE = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.0, begin_s=0.0, length_s=1.0)
+
+
+def left(monkeypatch: pytest.MonkeyPatch, share: float, form: str = "motion") -> tuple[Any, ...]:
+    """Return what is left of three doubts, where the circuit's values leave a share of the motion."""
+    one = log(pressure=False)
+    fits = cast("Any", type("Fits", (), {"best": leaving(1.0, 1.0, one)}))
+    board = Scoreboard({}, one, fits, Record(1e-3, {"motor_speed_rad_s": np.zeros(2)}), None)
+    estimate = BulkModulusEstimate(
+        Outcome.MISMATCH, None, None, 1.0, Gate(False, (FAR, LAWS)), form, ("position_m",), {}, {}
+    )
+    clean = cast("CleanLog", type("Log", (), {"record": board.window, "variances": {"motor_speed_rad_s": 1e-4}}))
+    monkeypatch.setattr(failed_search, "share_at", lambda *_: share)
+    return doubts_after((FAR, LAWS, FROZE), estimate, clean, PAPER, board)
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.09, False), (0.11, True), (np.inf, True), (np.nan, True)])
+def test_a_search_failed_where_the_circuits_values_leave_half_as_much(
+    monkeypatch: pytest.MonkeyPatch, share: float, *, kept: bool
+) -> None:
+    assert left(monkeypatch, share) == ((FAR, LAWS, FROZE) if kept else (FROZE,))
+
+
+def test_however_badly_it_failed_no_more_is_left_than_a_circuit_may(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(failed_search, "LESS", 100.0)
+    assert left(monkeypatch, 0.11) == (FROZE,)
+    assert left(monkeypatch, 0.13) == (FAR, LAWS, FROZE)
+
+
+def test_a_fit_with_pressure_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert left(monkeypatch, 0.0, "flow") == (FAR, LAWS, FROZE)
+
+
+def test_a_circuit_has_values_for_what_the_motion_form_leaves_open() -> None:
+    at = list(CONDITIONS).index("normal")
+    one = log(pressure=False)
+    fit = leaving(1.0, 1.0, one)
+    values = values_of(fit, ACTUATOR)
+    assert set(values) == set(UNKNOWNS) - {"speed_lead", "bristle_damping"}
+    assert values["leakage_coefficient"] == pytest.approx(PAPER.leakage_coefficient)
+    assert values["friction_linear"] == pytest.approx(PAPER.friction_linear)
+    assert values["bristle_stiffness"] == pytest.approx(PAPER.friction_coulomb / 2e-5)
+    np.testing.assert_allclose(ACTUATOR.conditions[at], coordinates_of(PAPER, ACTUATOR.rated))
