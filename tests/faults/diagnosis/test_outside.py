@@ -97,7 +97,7 @@ def test_a_valve_that_never_had_to_open_is_not_excluded_and_a_worn_pump_is_where
 @pytest.mark.parametrize("shares", [(-9.0, -4.0, 3.9), (0.0, 0.0, 3.9), (3.0, 1.0, 0.0), (-9.0, 1.2, 1.0)], ids=str)
 def test_a_pump_that_is_well_worn_need_only_be_likelier_than_a_sound_one(shares: tuple[float, ...]) -> None:
     less, well = np.exp(np.array(shares) - 0.5 * (np.log(DELIVERIES) / 0.15) ** 2), np.array([1.0, 1.0, 0.0])
-    assert odds_of_wear(np.array(shares) - 5.0, -5.0) == pytest.approx(np.log(less @ well))
+    assert odds_of_wear([one - 5.0 for one in shares], -5.0) == pytest.approx(np.log(less @ well))
 
 
 def test_what_a_worn_pump_gains_may_be_less_than_what_a_rare_fault_must(monkeypatch: pytest.MonkeyPatch) -> None:
