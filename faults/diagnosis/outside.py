@@ -141,10 +141,11 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
             found = gain, fault, tried
     likely = odds_of_wear([one.score for one in worn], sound.score) > math.log(LIKELIER)
     if found is not None and (found[0] > GAIN or likely):
-        # a search may end short of the best: the sound circuit is asked again from where the faulty one ended
+        # a search may end short of the best: the sound circuit is asked again from where the faulty one ended, and anew
         _, fault, tried = found
-        again = fit_classes(blocks, sound.actuator, runs=runs, start=tried.fits.best.coordinates)
-        best = max(sound.score, float(np.max(again.scores)))
+        starts = (tried.fits.best.coordinates, None)
+        again = [fit_classes(blocks, sound.actuator, runs=runs, start=start).scores for start in starts]
+        best = max(sound.score, float(np.max(again)))
         gains[fault.name] = tried.score - best
         if gains[fault.name] > GAIN:
             return Outside((fault.note,))

@@ -127,7 +127,10 @@ def test_with_pressure_and_where_the_piston_sticks_nothing_is_asked(monkeypatch:
         assert faults_outside(blocks, one, ACTUATOR) == ((), (), None)
 
 
-def test_a_gain_that_the_sound_circuit_makes_up_when_asked_again_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("anew", [False, True], ids=["from where the faulty one ended", "anew"])
+def test_a_gain_that_the_sound_circuit_makes_up_when_asked_again_is_none(
+    monkeypatch: pytest.MonkeyPatch, *, anew: bool
+) -> None:
     blocks = log_of(FAULTS["pump"][0])
     fits = fit_classes(blocks, ACTUATOR)
     assert faults_outside(blocks, fits, ACTUATOR).against
@@ -138,7 +141,10 @@ def test_a_gain_that_the_sound_circuit_makes_up_when_asked_again_is_none(monkeyp
         found = fit(blocks, actuator, **how)
         if actuator.circuit.pump_displacement == worn:
             ended.append(found.best.coordinates)
-        again = ended and np.array_equal(how.get("start", np.zeros(0)), ended[-1])
+        if actuator.circuit.pump_displacement != SOUND.pump_displacement or not ended:
+            return found
+        begun = how.get("start")
+        again = begun is None if anew else begun is not None and np.array_equal(begun, ended[-1])
         return replace(found, scores=found.scores + 1e3) if again else found
 
     monkeypatch.setattr(outside, "fit_classes", as_good)
