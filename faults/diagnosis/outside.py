@@ -48,7 +48,7 @@ DELIVERIES = (0.7, 0.8, 0.9)
 
 LIKELIER = 3.0
 """How many times likelier than a sound pump a well worn one must be to be believed [dimensionless]: evidence is called
-substantial from there on (Jeffreys, Theory of Probability, 1961, appendix B). Of 14 sound training logs under major
+substantial from there on (Jeffreys, Theory of Probability, 1961, appendix B). Of 16 sound training logs under major
 leakage and friction none comes to more than 1.4; of 10 with a worn pump 7 come to 5 and more."""
 
 WELL_WORN = 0.8
@@ -256,7 +256,7 @@ def _faults(actuator: Actuator, pressure: float) -> Iterator[_Fault]:
     for share in DELIVERIES:
         worn = replace(sound, pump_displacement=share * sound.pump_displacement)
         yield _Fault(_delivering(share), WORN, worn, elsewhere=True)
-    for share in SETTINGS:
+    for share in SETTINGS if 0.0 < pressure < math.inf else ():
         early = replace(sound, relief_pressure=share * pressure)
         yield _Fault(AgainstCode.RELIEF_EARLY.note(), EARLY, early, elsewhere=False)
     major = actuator.conditions[list(CONDITIONS).index("major_leakage"), COORDINATES.index("leakage")]

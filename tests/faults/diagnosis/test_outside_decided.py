@@ -31,7 +31,9 @@ def decided(monkeypatch: pytest.MonkeyPatch, score: Score) -> tuple[Any, Any, li
     return found.against, found.open, asked
 
 
-def looked(monkeypatch: pytest.MonkeyPatch, score: Score) -> tuple[Outside, list[tuple[Any, bool]]]:
+def looked(
+    monkeypatch: pytest.MonkeyPatch, score: Score, pressure: float = 1e6
+) -> tuple[Outside, list[tuple[Any, bool]]]:
     asked: list[tuple[Any, bool]] = []
 
     def fitted(_: Any, actuator: Any, *, runs: Any, start: Any = None) -> Any:  # noqa: ARG001  as it is called
@@ -41,6 +43,7 @@ def looked(monkeypatch: pytest.MonkeyPatch, score: Score) -> tuple[Outside, list
     monkeypatch.setattr(outside, "fit_classes", fitted)
     monkeypatch.setattr(outside, "nominal_runs", lambda *_: np.zeros((9, 1, 1)))
     monkeypatch.setattr(outside, "misfit", lambda *_: 0.0)
+    monkeypatch.setattr(outside, "largest_pressure", lambda *_: pressure)
     return faults_outside(LOG, fits(0.0), ACTUATOR), asked
 
 
@@ -103,6 +106,16 @@ def test_a_worn_pump_is_sought_thoroughly_unless_a_rough_search_leaves_it_twenty
     _, _, asked = decided(monkeypatch, lambda one: rough if worn(one) < 1.0 else 0.0)
     tries = {share: [begun for one, begun in asked if worn(one) == share] for share in (0.7, 0.8, 0.9)}
     assert tries == dict.fromkeys((0.7, 0.8, 0.9), [True, False] if thorough else [True])
+
+
+@pytest.mark.parametrize(
+    ("pressure", "settings"), [(1e6, {7.5e5, 9e5}), (0.0, set()), (np.nan, set()), (np.inf, set())]
+)
+def test_a_relief_valve_is_tried_below_the_largest_pressure_if_there_is_one(
+    pressure: float, settings: set[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, asked = looked(monkeypatch, lambda _: 0.0, pressure)
+    assert {round(one.relief_pressure, 3) for one, _ in asked} - {SOUND.relief_pressure} == settings
 
 
 def test_faults_are_tried_on_the_sound_circuit_that_explains_most(monkeypatch: pytest.MonkeyPatch) -> None:
