@@ -15,7 +15,7 @@ from estimation.fits.flow_fit import _explains_all, _wanted, fit_flow
 from estimation.fits.flow_log import homed_at_stop
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.hypotheses import BEGUN, HYPOTHESES, MAY_HIDE
-from estimation.fits.motion_fit import _log, _starts, _steps, unseen
+from estimation.fits.motion_fit import _starts, _steps, motion_log, unseen
 from estimation.fits.motion_search import MOST_WORK, Begun, MotionSearch, explained, rough
 from estimation.fits.play import ShownPlay
 from estimation.fits.promises import Promise, slopes_of
@@ -213,7 +213,7 @@ def searches_of_the_form_of_motion() -> dict[str, Any]:
     path = np.cumsum(3e-7 * speed) + 1e-6 * rng.standard_normal(400)
     search = MotionSearch.of(
         MOTION_FORMS[0],
-        _log(Record(1e-3, {SPEED: speed, POSITION: path}), PAPER, {}, 1e-4),
+        motion_log(Record(1e-3, {SPEED: speed, POSITION: path}), PAPER, {}, 1e-4),
         _starts(PAPER, 2e8)[:3],
     )
     begun, theta = Begun(), search.guesses[0]

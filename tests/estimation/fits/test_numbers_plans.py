@@ -20,7 +20,7 @@ from estimation.fits.descent import Point
 from estimation.fits.flow_search import flow_starts
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.hypotheses import HYPOTHESES
-from estimation.fits.motion_fit import _fitted, _log, _starts
+from estimation.fits.motion_fit import _fitted, _starts, motion_log
 from estimation.fits.motion_search import MotionSearch, likeliest
 from estimation.models.motion import MOTION_FORMS
 from plant.arrays import Array
@@ -83,7 +83,7 @@ def plan_of_the_form_of_motion() -> dict[str, Any]:
     long = Record(
         1e-3, {"motor_speed_rad_s": speed, "position_m": np.cumsum(3e-7 * speed) + 1e-6 * rng.standard_normal(samples)}
     )
-    whole = _log(long, PAPER, {}, 1e-4)
+    whole = motion_log(long, PAPER, {}, 1e-4)
     told: dict[str, Any] = {}
     for name, cost in (
         ("nothing comes close", lambda k: 1e7 + k),

@@ -18,7 +18,7 @@ from estimation.fits.form_fit import weighed, with_structure
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, PRESUMED
-from estimation.fits.motion_fit import _log, _starts, _steps
+from estimation.fits.motion_fit import _starts, _steps, motion_log
 from estimation.fits.motion_search import MotionSearch
 from estimation.fits.promises import Promise, promised
 from estimation.fits.wide_problem import delayed, freed, own_starts, usual_values
@@ -210,8 +210,8 @@ def the_motion_form() -> dict[str, Any]:
     record = log(0.5)
     speed = record[SPEED].copy()
     speed[100:104] = np.nan
-    found = _log(record.replace(motor_speed_rad_s=speed), WORN, {"chamber_volume": 0.1}, 1e-4)
-    fast = _log(log(0.3, 1e-4), PAPER, {}, 1e-4)
+    found = motion_log(record.replace(motor_speed_rad_s=speed), WORN, {"chamber_volume": 0.1}, 1e-4)
+    fast = motion_log(log(0.3, 1e-4), PAPER, {}, 1e-4)
     told: dict[str, Any] = {
         "drives": found.drives[[3, 101, -1]],
         "measured [m]": found.measured[[3, 101, -1], 0],
@@ -235,7 +235,7 @@ def the_motion_form() -> dict[str, Any]:
     long = {name: np.zeros(31000) for name in (SPEED, "position_m")}
     long[SPEED][::2] = 1.0
     long["position_m"][::3] = 1e-6
-    told["samples of a long log"] = len(_log(Record(1e-3, long), PAPER, {}, 1e-4).drives)
+    told["samples of a long log"] = len(motion_log(Record(1e-3, long), PAPER, {}, 1e-4).drives)
     for form in MOTION_FORMS:
         one = FreedProblem(form, found, UNKNOWNS, LINEAR)
         point = one.at(one.model.theta(_starts(WORN, 2e8)[0]))
