@@ -1,19 +1,20 @@
 """What ships, on the open benchmark: a line a kind of log, with pressure and without.
 
 Logs are made of the split that is asked for; ``--folder`` scores sets that are there. Silent errors and false unknowns
-are wanted to be none with pressure. A log without pressure takes long, so few of them are scored.
+are wanted to be none with pressure. A log without pressure takes long, so few of them are scored. ``--pairs`` scores
+logs in which two kinds are at once, drawn at random: log k is number k of its pair.
 """
 
 import argparse
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from experiments.open_benchmark.folders import write_set
-from experiments.open_benchmark.kinds import KINDS, SPLITS, VERSION
+from experiments.open_benchmark.kinds import KINDS, SPLITS, VERSION, drawn_pairs
 from experiments.open_benchmark.score import score_set, summary
 
 NONE_WANTED = ("silent_beta", "silent_class", "false_unknown", "false_since")
@@ -26,6 +27,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--kind", nargs="+", default=list(KINDS), choices=list(KINDS), metavar="KIND")
     parser.add_argument("--split", default="validation", choices=SPLITS)
     parser.add_argument("--count", type=int, default=3, help="logs of each kind")
+    parser.add_argument("--pairs", type=int, default=0, help="logs of two kinds at once, in place of single ones")
     parser.add_argument("--without", type=int, default=0, help="of them scored without pressure too")
     parser.add_argument("--folder", nargs="+", type=Path, default=[], help="sets to score in place of made ones")
     parser.add_argument("--rows", type=Path, help="CSV file for a row a log")
@@ -45,12 +47,24 @@ def main(arguments: list[str]) -> int:
 def scored(options: argparse.Namespace, made: Path) -> Sequence[dict[str, Any]]:
     """Return a row a log, printing each set's line as it comes."""
     rows: list[dict[str, Any]] = []
-    for place in options.folder or options.kind:
-        folder = place if options.folder else write_set(place, options.split, options.count, made).parent
-        for pressure, count in ((True, options.count), (False, options.without)):
-            found = list(score_set(folder, count, pressure=pressure))
+    for folder, count in sets(options, made):
+        for pressure, logs in ((True, count), (False, min(count, options.without))):
+            found = list(score_set(folder, logs, pressure=pressure))
             if found:
                 line = summary(found).to_string(index=False, header=not rows, float_format="%.3g", col_space=6)
                 print(line, flush=True)
             rows += found
     return rows
+
+
+def sets(options: argparse.Namespace, made: Path) -> Iterator[tuple[Path, int]]:
+    """Yield the folder of each set, made when it is its turn, with the count of logs to score."""
+    if options.folder:
+        yield from ((folder, options.count) for folder in options.folder)
+    elif options.pairs:
+        for index, pair in enumerate(drawn_pairs(options.split, options.pairs)):
+            yield write_set(pair, options.split, 1, made, first=index).parent, 1
+    else:
+        yield from (
+            (write_set(kind, options.split, options.count, made).parent, options.count) for kind in options.kind
+        )

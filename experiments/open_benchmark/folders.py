@@ -88,19 +88,21 @@ def rig_text(name: str, note: str, entries: Mapping[str, float]) -> str:
     return "\n".join([*lines, *(f"{entry} = {value!r}" for entry, value in entries.items())]) + "\n"
 
 
-def write_set(kind: str, split: str, count: int, out: Path) -> Path:
+def write_set(kind: str, split: str, count: int, out: Path, first: int = 0) -> Path:
     """Write the first logs of a kind and split as a folder of the kind's name.
 
     Parameters
     ----------
     kind : str
-        One of `KINDS`.
+        One of `KINDS`, or two with a plus sign between them.
     split : str
         One of `SPLITS`.
     count : int
         Count of logs.
     out : Path
         Where the folder goes.
+    first : int
+        Index of the first of them.
 
     Returns
     -------
@@ -114,11 +116,11 @@ def write_set(kind: str, split: str, count: int, out: Path) -> Path:
     """
     if count < 1:
         raise HydrostateError(f"count must be at least 1, got {count!r}")
-    seed_of(kind, split, count - 1)
+    seed_of(kind, split, first)
     folder, rows = out / kind, list[dict[str, Any]]()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for index in range(count):
+        for index in range(first, first + count):
             made = make(kind, split, index)
             row = truth_of(made, split, index)
             made.log.to_csv(folder / str(row["file"]), index=False, float_format="%.9g", lineterminator="\n")

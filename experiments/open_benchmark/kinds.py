@@ -3,6 +3,7 @@
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ from experiments.open_benchmark.kind import Kind
 from experiments.open_benchmark.loggers import LOGGERS
 from experiments.open_benchmark.machine import Machine
 from experiments.open_benchmark.oil import stiffness
+from experiments.open_benchmark.pairs import BOTH, collide, pair_of
 from experiments.open_benchmark.rigs import RIGS
 from experiments.open_benchmark.run import run
 from experiments.open_benchmark.setups import Setup
@@ -57,6 +59,41 @@ class Made:
     bulk_modulus: tuple[float, float]
 
 
+def kind_of(name: str) -> Kind:
+    """Return a kind by its name; two names with a plus sign between them are the pair of both.
+
+    Parameters
+    ----------
+    name : str
+        One of `KINDS`, or two.
+
+    Raises
+    ------
+    HydrostateError
+        If there is no such kind, or the two collide.
+    """
+    first, both, second = name.partition(BOTH)
+    for one in (first, second) if both else (first,):
+        require_known("kind", one, KINDS)
+    return pair_of(KINDS[first], KINDS[second]) if both else KINDS[first]
+
+
+def drawn_pairs(split: str, count: int) -> list[str]:
+    """Return names of pairs of kinds that do not collide, drawn at random without return; the same for the same split.
+
+    Parameters
+    ----------
+    split : str
+        One of `SPLITS`.
+    count : int
+        How many, at most all that there are; of more, the first are the same.
+    """
+    require_known("split", split, SPLITS)
+    names = [f"{a.name}{BOTH}{b.name}" for a, b in combinations(KINDS.values(), 2) if not collide(a, b)]
+    order = np.random.default_rng([zlib.crc32(BOTH.encode()), SPLITS.index(split)]).permutation(len(names))
+    return [names[place] for place in order[:count]]
+
+
 def seed_of(kind: str, split: str, index: int) -> list[int]:
     """Return what seeds a log: no two of kind, split and index share it.
 
@@ -65,7 +102,7 @@ def seed_of(kind: str, split: str, index: int) -> list[int]:
     >>> seed_of("plain", "test", 3)[1:]
     [2, 3]
     """
-    require_known("kind", kind, KINDS)
+    kind_of(kind)
     require_known("split", split, SPLITS)
     if index < 0:
         raise HydrostateError(f"index must not be negative, got {index!r}")
@@ -78,14 +115,14 @@ def make(kind: str, split: str, index: int) -> Made:
     Parameters
     ----------
     kind : str
-        One of `KINDS`.
+        One of `KINDS`, or two with a plus sign between them.
     split : str
         One of `SPLITS`.
     index : int
         Which log, from 0.
     """
     drawing, driving, logging = np.random.default_rng(seed_of(kind, split, index)).spawn(3)
-    one = KINDS[kind]
+    one = kind_of(kind)
     condition = one.conditions[STRIDE * index % len(one.conditions)]
     drive = one.drives[index % len(one.drives)]
     setup = one.draw(draw_plain(condition, drive, drawing), drawing)

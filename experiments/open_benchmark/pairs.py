@@ -1,0 +1,106 @@
+"""Two strange things in one log: which kinds can be laid over each other, and the kind that both make."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from experiments.open_benchmark.draws import draw_plain
+from experiments.open_benchmark.drives import OPEN
+from experiments.open_benchmark.kind import OWN, UNKNOWN, Kind
+from experiments.open_benchmark.setups import Setup
+from plant.errors import HydrostateError
+
+BOTH = "+"
+"""Between the names of a pair."""
+
+
+def pair_of(first: Kind, second: Kind) -> Kind:
+    """Return the kind of log in which two kinds are at once, drawn one after the other.
+
+    Right is the class on which both agree; it may be unknown where one of them may be. Both causes must be named. The
+    drives are those of the kind that needs a position loop, where one does.
+
+    Parameters
+    ----------
+    first, second : Kind
+        Two that do not collide, see `collide`.
+
+    Raises
+    ------
+    HydrostateError
+        If they do.
+    """
+    if collide(first, second):
+        raise HydrostateError(f"kinds of a pair must not collide, got {first.name} and {second.name}")
+    patterns = [f"(?=.*(?:{kind.named}))" for kind in (first, second) if kind.named]
+    return Kind(
+        f"{first.name}{BOTH}{second.name}",
+        f"{first.strange}; {second.strange}",
+        lambda setup, rng: second.draw(first.draw(setup, rng), rng),
+        _accepted(first.accept, second.accept),
+        rf"\A(?s:{''.join(patterns)})" if patterns else "",
+        first.drives if first.drives != tuple(OPEN) else second.drives,
+        _shared(first, second),
+        first.severity and second.severity,
+    )
+
+
+def collide(first: Kind, second: Kind) -> bool:
+    """Return whether two kinds cannot be in one log.
+
+    They cannot where both change one and the same thing of machine, sensor, logger or rig file, where both are driven
+    in ways of their own, where no condition is in both, and where one changes nothing.
+
+    Parameters
+    ----------
+    first, second : Kind
+        Single kinds.
+    """
+    changes = touched(first), touched(second)
+    return not all(changes) or bool(changes[0] & changes[1]) or not _shared(first, second)
+
+
+def _shared(first: Kind, second: Kind) -> tuple[str, ...]:
+    return tuple(condition for condition in first.conditions if condition in second.conditions)
+
+
+def _accepted(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
+    """Return the verdicts that are right for both; classes of a kind that names its own count, not the condition."""
+    unknown = (UNKNOWN,) if UNKNOWN in (*first, *second) else ()
+    classes = [[verdict for verdict in one if verdict != UNKNOWN] for one in (first, second)]
+    own = [one for one in classes if one != [OWN]]
+    shared = (OWN,) if not own else tuple(verdict for verdict in own[0] if all(verdict in one for one in own))
+    return (*shared, *unknown)
+
+
+@cache
+def touched(kind: Kind) -> frozenset[str]:
+    """Return what a kind changes of a plain log, by where it stands; its own drives are among it.
+
+    Parameters
+    ----------
+    kind : Kind
+        A single kind.
+    """
+    plain = draw_plain(kind.conditions[0], kind.drives[0], np.random.default_rng(0))
+    before, after = _parts(plain), _parts(kind.draw(plain, np.random.default_rng(1)))
+    changed = {name for name in {*before, *after} if before.get(name) != after.get(name)}
+    return frozenset(changed | ({"drive"} if kind.drives != tuple(OPEN) else set()))
+
+
+def _parts(setup: Setup) -> Mapping[str, Any]:
+    """Return all that a log is made of, one value a name."""
+    logger, change = setup.logger, setup.change
+    parts: dict[str, Any] = {f"machine {name}": value for name, value in setup.machine._asdict().items()}
+    parts |= {f"change {one.name}": getattr(change, one.name) for one in fields(change)}
+    parts |= {
+        f"{channel} {one.name}": getattr(sensor, one.name)
+        for channel, sensor in logger.sensors.items()
+        for one in fields(sensor)
+    }
+    parts |= {f"logger {one.name}": getattr(logger, one.name) for one in fields(logger) if one.name != "sensors"}
+    parts |= {"rig": "said"} if setup.rig else {}
+    return parts | {"travel": setup.travel, "duration": setup.duration, "forward": setup.forward_first}
