@@ -11,13 +11,14 @@ from typing import TypeAlias
 
 import numpy as np
 
-from estimation.fits.descent import Point, descend
+from estimation.fits.descent import descend
 from estimation.fits.form_fit import weighed
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LATEST, Hypothesis
 from estimation.fits.promises import balanced_by, promised_beside, promising
+from estimation.fits.tried import Tried
 from estimation.fits.wide_problem import (
     delayed,
     flow_bounds,
@@ -43,6 +44,9 @@ NEAR = 2.0
 
 FINALISTS, CARRIED, NEARLY = 3, 2, 3.0
 """Hypotheses that are carried on, starts of each, and up to which share of the best start's cost the second is."""
+
+FIRSTS = 2
+"""Hypotheses with which pairs are tried where they explain a log about alike [count]."""
 
 FINEST_DELAY = 1e-3
 """Step in which a delay is sought [s]; what is left of it goes into the lag."""
@@ -102,34 +106,6 @@ class Explanation:
     delivery_open: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class _Tried:
-    """A set of hypotheses with the best that was found under it; void if that is not what they say."""
-
-    together: tuple[Hypothesis, ...]
-    point: Point
-    values: Mapping[str, float]
-    delays: Mapping[str, float]
-    rig: Mapping[str, float]
-    fits: tuple[GreyBoxFit, ...] = ()
-    """Once it is finished: the likelier balance first, by volume or by mass, then the other one if it counts."""
-    void: bool = False
-
-    @property
-    def cost(self) -> float:
-        return self.point.cost if self.meant and not self.void else np.inf
-
-    @property
-    def meant(self) -> bool:
-        """Whether what was found is what the hypotheses say, and no use of what they free beside."""
-        large = all(not one.least or abs(self.values[one.free[0]]) >= one.least for one in self.together)
-        return large and all(not one.lower or self.values[one.free[0]] < self.rig[one.free[0]] for one in self.together)
-
-    @property
-    def fit(self) -> GreyBoxFit:
-        return self.fits[0]
-
-
 Accepted: TypeAlias = Callable[[GreyBoxFit], bool]
 
 
@@ -176,16 +152,10 @@ def explain(
         known = finished[0].cost
         more = _likeliest(wide, _nearing(wide, others, starts, _hopeful(starts, screened), known), known)
         finished = _ranked([*finished, *more])
-    first = finished[0]
-    if paired and (first.void or not accepted(first.fit)):
-        late = delayed(wide, first.delays)
-        taken = {one.name for one in first.together}
-        others = [one for one in HYPOTHESES if one.name not in taken]
-        likely, others = promising(late, first.together, first.values, others)
-        tried = [*likely, *(one for one in others if one.far)]
-        pairs = _likeliest(late, [_screened(late, (*first.together, one), [first.values]) for one in tried], first.cost)
-        better = (one for one in pairs if one.cost < first.cost - WORTH)
-        finished = _ranked([first, *(replace(one, delays={**first.delays, **one.delays}) for one in better)])
+    if paired and (finished[0].void or not accepted(finished[0].fit)):
+        near = [one for one in finished[:FIRSTS] if one.cost <= NEARLY_AS_GOOD * finished[0].cost] or finished[:1]
+        pairs = (pair for one in near for pair in _paired(wide, one, starts[0], accepted))
+        finished = _ranked([finished[0], *pairs])
     best = finished[0]
     rivals = [one for one in finished[1:] if one.cost < best.cost + ALIKE]
     found = weighed([fit for one in (best, *rivals) for fit in one.fits])
@@ -199,14 +169,39 @@ def explain(
     return Explanation(names, values, best.delays, best.fit, len(rivals), usual_pressure(log, parameters), open_by)
 
 
-def _delivery_open(log: GreyBoxLog, best: _Tried) -> float:
+def _paired(log: GreyBoxLog, first: Tried, plain: Mapping[str, float], accepted: Accepted) -> list[Tried]:
+    """Return what explains a log together with a hypothesis that does not alone, and better; the best first.
+
+    What slopes promise most is tried first, and all else where that does not explain the log: slopes are taken where
+    the first hypothesis has gone to take up what the second one does. The best of it is fitted to the end in any case.
+    """
+    late = delayed(log, first.delays)
+    taken = {one.name for one in first.together}
+    likely, others = promising(late, first.together, first.values, [one for one in HYPOTHESES if one.name not in taken])
+    begun = [_begun_again(log, first), {**plain, **own_starts(log, first.together[-1])[0]}]
+    tried = [*likely, *(one for one in others if one.far)]
+    pairs = _likeliest(late, [_screened(late, (*first.together, one), begun) for one in tried], first.cost)
+    if pairs[0].void or not accepted(pairs[0].fit):
+        known = NEARLY * min(first.cost, pairs[0].cost)
+        rest = [_screened(late, (*first.together, one), begun, known) for one in others if not one.far]
+        pairs = _ranked([*pairs, *_likeliest(late, rest)])
+    better = (one for one in pairs if one.cost < first.cost - WORTH)
+    return [replace(one, delays={**first.delays, **one.delays}) for one in better]
+
+
+def _begun_again(log: GreyBoxLog, first: Tried) -> Mapping[str, float]:
+    """Return where a hypothesis ended with long model steps, as the next search takes them, nothing of it vanished."""
+    return {**first.coarse, **_gone(log, first.coarse)}
+
+
+def _delivery_open(log: GreyBoxLog, best: Tried) -> float:
     """Return how well a log tells what the pump delivers beside what explains it; see `Explanation`."""
     if DELIVERY.free[0] in best.values:
         return 0.0
     return promised_beside(delayed(log, best.delays), best.together, best.values, DELIVERY).deviation
 
 
-def _ranked(tried: Iterable[_Tried]) -> list[_Tried]:
+def _ranked(tried: Iterable[Tried]) -> list[Tried]:
     return sorted(tried, key=lambda one: one.cost)
 
 
@@ -215,24 +210,24 @@ def _screened(
     together: tuple[Hypothesis, ...],
     starts: Sequence[Mapping[str, float]],
     wanted: float = np.inf,
-) -> Iterator[_Tried]:
+) -> Iterator[Tried]:
     """Yield the best from each start after a few steps, with one model step a sample; fewer if it cannot be wanted."""
     absent = usual_values(log)
     asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
     problems = [(delays, freed(delayed(log, delays).coarsened(), together)) for delays in asked]
     begun = list(product(problems, own_starts(log, together[-1])))
     for start in starts:
-        tried: list[_Tried] = []
+        tried: list[Tried] = []
         for (delays, problem), own in begun:
             guess = problem.model.theta({**absent, **start, **own})
             bounds = flow_bounds(problem.model, [guess], log)
             point = descend(problem.at, guess, SCREENING, bounds, radius=NEAR, wanted=wanted)
-            tried.append(_Tried(together, point, problem.model.values(point.theta), delays, absent))
+            tried.append(Tried(together, point, problem.model.values(point.theta), delays, absent))
             wanted = min(wanted, NEARLY * tried[-1].cost)
         yield min(tried, key=lambda one: one.cost)
 
 
-def _hopeful(starts: Sequence[Mapping[str, float]], screened: Sequence[Sequence[_Tried]]) -> list[Mapping[str, float]]:
+def _hopeful(starts: Sequence[Mapping[str, float]], screened: Sequence[Sequence[Tried]]) -> list[Mapping[str, float]]:
     """Return the starts from which some of the hypotheses that came near ended near the best of their own."""
     bests = [min(one.cost for one in each) for each in screened]
     near = [each for each, best in zip(screened, bests, strict=True) if best <= NEARLY * min(bests)]
@@ -246,7 +241,7 @@ def _nearing(
     starts: Sequence[Mapping[str, float]],
     hopeful: Sequence[Mapping[str, float]],
     known: float,
-) -> Iterator[Sequence[_Tried]]:
+) -> Iterator[Sequence[Tried]]:
     """Yield hypotheses from their starts, those first of which slopes say nothing; none is followed far from the best.
 
     Those begin from every start, the others from the ``hopeful`` ones.
@@ -257,7 +252,7 @@ def _nearing(
         yield found
 
 
-def _settled(log: GreyBoxLog, tried: _Tried, wanted: float = np.inf) -> _Tried:
+def _settled(log: GreyBoxLog, tried: Tried, wanted: float = np.inf) -> Tried:
     """Return a set of hypotheses brought to its optimum, with one model step a sample, if its cost may be as wanted."""
     early = delayed(log, tried.delays).coarsened()
     best = _descended(early, tried, tried.point.theta, SETTLING, wanted=wanted)
@@ -278,39 +273,42 @@ def _settled(log: GreyBoxLog, tried: _Tried, wanted: float = np.inf) -> _Tried:
     return best
 
 
-def _revived(log: GreyBoxLog, tried: _Tried) -> Array | None:
+def _revived(log: GreyBoxLog, tried: Tried) -> Array | None:
     """Return a start with the rig's value of what has all but vanished, from where a logarithm finds no way back."""
+    gone = _gone(log, tried.values)
+    return freed(log, tried.together).model.theta({**tried.values, **gone}) if gone else None
+
+
+def _gone(log: GreyBoxLog, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the rig's values of what has all but vanished."""
     usual = usual_values(log)
-    gone = {name: usual[name] for name in MAY_VANISH if tried.values[name] < VANISHED * usual[name]}
-    if not gone:
-        return None
-    return freed(log, tried.together).model.theta({**tried.values, **gone})
+    return {name: usual[name] for name in MAY_VANISH if values[name] < VANISHED * usual[name]}
 
 
 def _descended(
-    log: GreyBoxLog, tried: _Tried, start: Array, evaluations: int, *more: str, wanted: float = np.inf
-) -> _Tried:
+    log: GreyBoxLog, tried: Tried, start: Array, evaluations: int, *more: str, wanted: float = np.inf
+) -> Tried:
     problem = freed(log, tried.together, *more)
     bounds = flow_bounds(problem.model, [start], log)
     point = descend(problem.at, start, evaluations, bounds, radius=NEAR, wanted=wanted)
     return replace(tried, point=point, values=problem.model.values(point.theta))
 
 
-def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
+def _finished(log: GreyBoxLog, tried: Tried) -> Tried:
     """Return a set of hypotheses fitted to the end, balanced by volume and by mass.
 
     Balanced by mass, the inner circuit yields as it does in the plain form. A log that does not tell the two apart is
     believed neither alone: they may differ by three deviations.
     """
     row = delayed(log, tried.delays)
-    done: list[tuple[_Tried, FreedProblem]] = []
+    done: list[tuple[Tried, FreedProblem]] = []
     for share, more in ((0.0, ()), (1.0, (STIFFNESS,))):
         own = balanced_by(row, share)
         problem, begun = freed(own, tried.together, *more), done[-1][0] if done else tried
         start = problem.model.theta({**usual_values(own), **begun.values})
         done.append((_to_its_end(own, begun, start, *more), problem))
     done.sort(key=lambda one: one[0].cost)
-    best = done[0][0]
+    best = replace(done[0][0], coarse=tried.values)
     count = [one for one in done if one[0].cost <= best.cost + ALIKE]
     first, *rivals = (concluded(problem, one.point, warned=False) for one, problem in count)
     found = ((one, one.free[0]) for one in best.together)
@@ -319,7 +317,7 @@ def _finished(log: GreyBoxLog, tried: _Tried) -> _Tried:
     return replace(best, void=True, fits=(replace(first, cost=NEVER),))
 
 
-def _to_its_end(log: GreyBoxLog, tried: _Tried, start: Array, *more: str) -> _Tried:
+def _to_its_end(log: GreyBoxLog, tried: Tried, start: Array, *more: str) -> Tried:
     """Return the end of a search with short model steps: where long ones end may be far from it."""
     best = _descended(log, tried, start, FINISHING, *more)
     for _ in range(ROUNDS - 1):
@@ -332,7 +330,7 @@ def _to_its_end(log: GreyBoxLog, tried: _Tried, start: Array, *more: str) -> _Tr
     return best
 
 
-def _likeliest(log: GreyBoxLog, tried: Iterable[Iterable[_Tried]], known: float = np.inf) -> list[_Tried]:
+def _likeliest(log: GreyBoxLog, tried: Iterable[Iterable[Tried]], known: float = np.inf) -> list[Tried]:
     """Return the likeliest of several sets of hypotheses, each tried from some starts, the best first.
 
     The first set is carried on in any case: a few steps from a start are no measure of what promises most. What cannot
@@ -342,7 +340,7 @@ def _likeliest(log: GreyBoxLog, tried: Iterable[Iterable[_Tried]], known: float 
     first, *others = [_ranked(one) for one in tried]
     sets = [first, *sorted(others, key=lambda one: one[0].cost)[: FINALISTS - 1]]
     carried = [[one[0], *(start for start in one[1:CARRIED] if start.cost < NEARLY * one[0].cost)] for one in sets]
-    settled: list[_Tried] = []
+    settled: list[Tried] = []
     for one in carried:
         wanted = min((known, *(other.cost for other in settled))) + CLOSE
         settled.append(_ranked(_settled(log, start, wanted) for start in one)[0])

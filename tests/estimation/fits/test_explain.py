@@ -13,10 +13,21 @@ from estimation.fits.delivery import contradicted
 from estimation.fits.descent import Point
 from estimation.fits.explain import CLOSE, NEVER, ROUNDS
 from estimation.fits.hypotheses import HYPOTHESES
+from estimation.fits.tried import Tried
 from plant.eha.model import EhaParameters
 from tests.estimation.fits.short_logs import made_fit
 
 HEALTHY = EhaParameters()
+
+FED = {"makeup_conductance": 1e-9}
+
+
+class _Made(Tried):
+    """What was tried, as the hypotheses say."""
+
+    @property
+    def meant(self) -> bool:
+        return True
 
 
 def ended(costs: Sequence[float], monkeypatch: pytest.MonkeyPatch) -> tuple[float, int]:
@@ -63,7 +74,7 @@ def relieved(setting: float, **more: Any) -> Any:
     """Return a relief valve that opens at this, where the rig file has 3 MPa."""
     (relief,) = (one for one in HYPOTHESES if one.name == "relief_low")
     values, point = {"relief_pressure": setting}, Point(np.zeros(1), 50.0, np.zeros(1), np.eye(1))
-    return explain._Tried((relief,), point, values, {}, {"relief_pressure": 3e6}, **more)  # pyright: ignore[reportPrivateUsage]
+    return Tried((relief,), point, values, {}, {"relief_pressure": 3e6}, **more)
 
 
 def test_a_relief_valve_set_above_the_rig_files_is_not_set_low() -> None:
@@ -98,6 +109,48 @@ def test_starts_are_dropped_from_which_no_hypothesis_that_came_near_ended_near_i
     assert explain._hopeful(starts, screened) == ["near", "near for one"]  # pyright: ignore[reportPrivateUsage]
     vain = [each(np.inf, np.inf, np.inf, np.inf)]
     assert explain._hopeful(starts, vain) == starts  # pyright: ignore[reportPrivateUsage]
+
+
+@pytest.mark.parametrize(("explains", "asked"), [(True, "likely far"), (False, "likely far hidden")])
+def test_all_else_is_asked_beside_a_hypothesis_where_what_slopes_promise_does_not_explain_a_log(
+    explains: bool, asked: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def hypothesis(name: str, **more: Any) -> Any:
+        return SimpleNamespace(name=name, far=False, **more)
+
+    likely, far, hidden = hypothesis("likely"), SimpleNamespace(name="far", far=True), hypothesis("hidden")
+    begun: list[tuple[str, Any]] = []
+    costs = {"likely": 80.0, "far": 90.0, "hidden": 70.0, "first": 100.0}
+
+    def screened(_: Any, together: Any, starts: Any, wanted: float = np.inf) -> Any:
+        begun.append((together[-1].name, list(starts)))
+        return [SimpleNamespace(together=together, cost=costs[together[-1].name], wanted=wanted)]
+
+    def finished(_: Any, one: Any) -> Any:
+        point, void = Point(np.zeros(1), one.cost, np.zeros(1), np.eye(1)), False
+        return _Made(one.together, point, {}, {"late": 1e-3}, {}, (made_fit(one.cost, 2e8, 1e5),), void)
+
+    monkeypatch.setattr(explain, "delayed", lambda log, _: log)
+    monkeypatch.setattr(explain, "promising", lambda *_: ([likely], [far, hidden]))
+    monkeypatch.setattr(explain, "own_starts", lambda *_: [{"offset": 1e5}])
+    monkeypatch.setattr(explain, "usual_values", lambda _: {"leakage_coefficient": 5e-12, "flow_bias": 2e-6} | FED)
+    monkeypatch.setattr(explain, "_screened", screened)
+    monkeypatch.setattr(explain, "_settled", lambda _, start, __: start)
+    monkeypatch.setattr(explain, "_finished", finished)
+    nothing: Any = None
+    at_end = {"leakage_coefficient": 1e-12, "flow_bias": 1e-6, "offset": 3e4, **FED}
+    coarse = {"leakage_coefficient": 1e-29, "flow_bias": 3e-6, "offset": 4e4, **FED}
+    place = Point(np.zeros(1), 100.0, np.zeros(1), np.eye(1))
+    first = _Made(
+        (hypothesis("first"),), place, at_end, {"speed": 2e-3}, {}, (made_fit(100.0, 2e8, 1e5),), coarse=coarse
+    )
+    found = explain._paired(nothing, first, {"leakage_coefficient": 2e-12}, lambda _: explains)  # pyright: ignore[reportPrivateUsage]
+    assert [name for name, _ in begun] == asked.split()
+    # from where its search with long steps ended, leakage revived, and from where it began
+    revived = {"leakage_coefficient": 5e-12, "flow_bias": 3e-6, "offset": 4e4, **FED}
+    assert all(starts == [revived, {"leakage_coefficient": 2e-12, "offset": 1e5}] for _, starts in begun)
+    assert found[0].together[-1].name == asked.split()[-1 if not explains else 0]
+    assert found[0].delays == {"speed": 2e-3, "late": 1e-3}
 
 
 @pytest.mark.parametrize(
