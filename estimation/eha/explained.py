@@ -7,9 +7,9 @@ import numpy as np
 
 from estimation.eha.changing_leakage import growth_note, leakage_over, step_note
 from estimation.finding import NORMAL_95
-from estimation.fits.explain import Explanation
 from estimation.fits.play import crossings
 from estimation.fits.teeth import EVENLY, Turning, delivering
+from estimation.fits.tried import Explanation
 from estimation.log_checks.bridging import POSITION, bridged
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.sensor_check import PRESSURE

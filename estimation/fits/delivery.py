@@ -8,7 +8,7 @@ from plant.eha.model import EhaParameters
 from plant.notes import Note
 
 if TYPE_CHECKING:
-    from estimation.fits.explain import Explanation
+    from estimation.fits.tried import Explanation
 
 
 def delivered(found: "Explanation", parameters: EhaParameters) -> float | None:

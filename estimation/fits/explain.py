@@ -5,7 +5,7 @@ of, then under the others, then under pairs with the likeliest; what is freed wi
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from typing import TypeAlias
 
@@ -18,7 +18,7 @@ from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LATEST, Hypothesis
 from estimation.fits.promises import balanced_by, promised_beside, promising
-from estimation.fits.tried import Tried
+from estimation.fits.tried import Explanation, Tried
 from estimation.fits.wide_problem import (
     delayed,
     flow_bounds,
@@ -45,9 +45,6 @@ NEAR = 2.0
 FINALISTS, CARRIED, NEARLY = 3, 2, 3.0
 """Hypotheses that are carried on, starts of each, and up to which share of the best start's cost the second is."""
 
-FIRSTS = 2
-"""Hypotheses with which pairs are tried where they explain a log about alike [count]."""
-
 FINEST_DELAY = 1e-3
 """Step in which a delay is sought [s]; what is left of it goes into the lag."""
 
@@ -72,38 +69,6 @@ WORTH = 10.0
 
 ALIKE = 15.0
 """Difference of log-likelihood up to which two sets of hypotheses are said to explain a log alike [dimensionless]."""
-
-
-@dataclass(frozen=True, eq=False)
-class Explanation:
-    """What explains a log that the plain flow form does not.
-
-    Parameters
-    ----------
-    names : tuple of str
-        The hypotheses that were accepted together.
-    values : Mapping[str, tuple of float]
-        Value and standard deviation by parameter, in SI.
-    delays : Mapping[str, float]
-        Times by which channels come late beside their lags [s].
-    fit : GreyBoxFit
-        The fit under them.
-    rivals : int
-        How many other sets of hypotheses explain the log about as well.
-    stated_pressure : float
-        Absolute pressure that bulk modulus is stated at, where the oil holds air [Pa].
-    delivery_open : float
-        How well the log tells what the pump delivers beside them, as a standard deviation of the logarithm
-        [dimensionless]; zero where that is part of the explanation.
-    """
-
-    names: tuple[str, ...]
-    values: Mapping[str, tuple[float, float]]
-    delays: Mapping[str, float]
-    fit: GreyBoxFit
-    rivals: int
-    stated_pressure: float
-    delivery_open: float = 0.0
 
 
 Accepted: TypeAlias = Callable[[GreyBoxFit], bool]
@@ -148,14 +113,17 @@ def explain(
     likely, others = promising(wide, (), starts[0], asked)
     screened = [[*_screened(wide, (one,), starts)] for one in likely]
     finished = _likeliest(wide, screened)
-    if others and (finished[0].void or not accepted(finished[0].fit)):
+    if others and not _explained(finished[0], accepted):
         known = finished[0].cost
         more = _likeliest(wide, _nearing(wide, others, starts, _hopeful(starts, screened), known), known)
         finished = _ranked([*finished, *more])
-    if paired and (finished[0].void or not accepted(finished[0].fit)):
-        near = [one for one in finished[:FIRSTS] if one.cost <= NEARLY_AS_GOOD * finished[0].cost] or finished[:1]
-        pairs = (pair for one in near for pair in _paired(wide, one, starts[0], accepted))
-        finished = _ranked([finished[0], *pairs])
+    if paired and not _explained(finished[0], accepted):
+        first, second = finished[0], finished[1] if len(finished) > 1 else None
+        pairs = _paired(wide, first, starts[0], accepted)
+        near = first.fit.chi_square[0] < NEARLY or (pairs and _explained(pairs[0], accepted))
+        if second and near and second.cost <= NEARLY_AS_GOOD * first.cost:
+            pairs += _paired(wide, second, starts[0], accepted)
+        finished = _distinct([first, *pairs])
     best = finished[0]
     rivals = [one for one in finished[1:] if one.cost < best.cost + ALIKE]
     found = weighed([fit for one in (best, *rivals) for fit in one.fits])
@@ -181,16 +149,20 @@ def _paired(log: GreyBoxLog, first: Tried, plain: Mapping[str, float], accepted:
     begun = [_begun_again(log, first), {**plain, **own_starts(log, first.together[-1])[0]}]
     tried = [*likely, *(one for one in others if one.far)]
     pairs = _likeliest(late, [_screened(late, (*first.together, one), begun) for one in tried], first.cost)
-    if pairs[0].void or not accepted(pairs[0].fit):
-        known = NEARLY * min(first.cost, pairs[0].cost)
+    if not _explained(pairs[0], accepted):
+        known = NEARLY_AS_GOOD * min(first.cost, pairs[0].cost)
         rest = [_screened(late, (*first.together, one), begun, known) for one in others if not one.far]
         pairs = _ranked([*pairs, *_likeliest(late, rest)])
     better = (one for one in pairs if one.cost < first.cost - WORTH)
     return [replace(one, delays={**first.delays, **one.delays}) for one in better]
 
 
+def _explained(tried: Tried, accepted: Accepted) -> bool:
+    return not tried.void and accepted(tried.fit)
+
+
 def _begun_again(log: GreyBoxLog, first: Tried) -> Mapping[str, float]:
-    """Return where a hypothesis ended with long model steps, as the next search takes them, nothing of it vanished."""
+    """Return where a hypothesis ended with long model steps, as the next search takes; nothing of it has vanished."""
     return {**first.coarse, **_gone(log, first.coarse)}
 
 
@@ -203,6 +175,14 @@ def _delivery_open(log: GreyBoxLog, best: Tried) -> float:
 
 def _ranked(tried: Iterable[Tried]) -> list[Tried]:
     return sorted(tried, key=lambda one: one.cost)
+
+
+def _distinct(tried: Iterable[Tried]) -> list[Tried]:
+    """Return the best of each set of hypotheses, in whatever order these came; the best first."""
+    best: dict[frozenset[str], Tried] = {}
+    for one in _ranked(tried):
+        best.setdefault(frozenset(each.name for each in one.together), one)
+    return [*best.values()]
 
 
 def _screened(

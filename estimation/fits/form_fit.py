@@ -11,7 +11,7 @@ from estimation.fits.teeth import EVENLY, Turning
 from plant.notes import Note
 
 if TYPE_CHECKING:
-    from estimation.fits.explain import Explanation
+    from estimation.fits.tried import Explanation
 
 LONGEST_STEP = 2.5e-4
 """Longest step of a form [s]; slower logs are sub-stepped."""

@@ -1,4 +1,4 @@
-"""A set of hypotheses with what a search under it has found."""
+"""A set of hypotheses with what a search under it has found, and what explains a log in the end."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -58,3 +58,35 @@ class Tried:
     def fit(self) -> GreyBoxFit:
         """Its fit by the likelier balance."""
         return self.fits[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """What explains a log that the plain flow form does not.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The hypotheses that were accepted together.
+    values : Mapping[str, tuple of float]
+        Value and standard deviation by parameter, in SI.
+    delays : Mapping[str, float]
+        Times by which channels come late beside their lags [s].
+    fit : GreyBoxFit
+        The fit under them.
+    rivals : int
+        How many other sets of hypotheses explain the log about as well.
+    stated_pressure : float
+        Absolute pressure that bulk modulus is stated at, where the oil holds air [Pa].
+    delivery_open : float
+        How well the log tells what the pump delivers beside them, as a standard deviation of the logarithm
+        [dimensionless]; zero where that is part of the explanation.
+    """
+
+    names: tuple[str, ...]
+    values: Mapping[str, tuple[float, float]]
+    delays: Mapping[str, float]
+    fit: GreyBoxFit
+    rivals: int
+    stated_pressure: float
+    delivery_open: float = 0.0

@@ -154,6 +154,46 @@ def test_all_else_is_asked_beside_a_hypothesis_where_what_slopes_promise_does_no
 
 
 @pytest.mark.parametrize(
+    ("second", "least", "beside", "names", "rivals"),
+    [
+        (105.0, 60.0, "worn relief", ("worn", "late"), 2),
+        (120.0, 60.0, "relief", ("relief", "late"), 1),  # it is not about as good
+        (105.0, 40.0, "relief", ("relief", "late"), 1),  # nothing explains the log
+    ],
+)
+def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
+    second: float, least: float, beside: str, names: tuple[str, ...], rivals: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def tried(cost: float, *together: str) -> Any:
+        point, fit = Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), made_fit(cost, 2e8, 1e5)
+        fit = replace(fit, std=dict.fromkeys(fit.values, 1.0))
+        return _Made(tuple(SimpleNamespace(name=name) for name in together), point, {}, {}, {}, (fit,))  # pyright: ignore[reportArgumentType]
+
+    asked: list[str] = []
+
+    def paired(_: Any, first: Any, *__: Any) -> Any:
+        asked.append(first.together[0].name)
+        own = [tried(50.0, "relief", "late")] if asked[-1] == "relief" else [tried(48.0, "worn", "late")]
+        return [*own, tried(51.0, *(["relief", "worn"] if asked[-1] == "relief" else ["worn", "relief"]))]
+
+    monkeypatch.setattr(explain, "widened", lambda *_: None)
+    monkeypatch.setattr(explain, "balanced_by", lambda *_: None)
+    monkeypatch.setattr(explain, "promising", lambda *_: ([], []))
+    monkeypatch.setattr(explain, "_likeliest", lambda *_: [tried(100.0, "relief"), tried(second, "worn")])
+    monkeypatch.setattr(explain, "_paired", paired)
+    monkeypatch.setattr(explain, "weighed", lambda _: {})
+    monkeypatch.setattr(explain, "usual_pressure", lambda *_: 0.0)
+    monkeypatch.setattr(explain, "_delivery_open", lambda *_: 0.0)
+    monkeypatch.setattr(explain, "ALIKE", 4.0)
+    nothing: Any = None
+    found = explain.explain(nothing, nothing, [{}], lambda fit: fit.cost < least)
+    assert " ".join(sorted(asked, reverse=True)) == beside
+    assert found.names == names
+    # the pair of both firsts is found twice and counts once
+    assert found.rivals == rivals
+
+
+@pytest.mark.parametrize(
     ("share", "said"),
     [(0.5, True), (0.59, True), (0.61, False), (0.8, False), (1.0, False), (1.24, False), (1.26, True), (2.0, True)],
 )

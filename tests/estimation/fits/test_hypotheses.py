@@ -14,11 +14,11 @@ from estimation.eha.explained import notes_of, rig_set_right, set_right
 from estimation.fits import explain as module
 from estimation.fits import flow_fit
 from estimation.fits.descent import Point
-from estimation.fits.explain import Explanation
 from estimation.fits.flow_fit import _near, _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
 from estimation.fits.flow_search import MAKEUP_TRIED, flow_starts
 from estimation.fits.hypotheses import HYPOTHESES, LATEST
 from estimation.fits.left_open import OPEN_DELIVERY
+from estimation.fits.tried import Explanation
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.first_belief import begins_in_motion, first_load
 from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters, grown_leakage

@@ -10,7 +10,6 @@ import pytest
 
 from estimation.fits import flow_fit, motion_fit
 from estimation.fits.descent import Point
-from estimation.fits.explain import _Tried
 from estimation.fits.flow_fit import _explains_all, _wanted, fit_flow
 from estimation.fits.flow_log import homed_at_stop
 from estimation.fits.greybox_fit import GreyBoxFit
@@ -19,6 +18,7 @@ from estimation.fits.motion_fit import _starts, _steps, motion_log, unseen
 from estimation.fits.motion_search import MOST_WORK, Begun, MotionSearch, explained, rough
 from estimation.fits.play import ShownPlay
 from estimation.fits.promises import Promise, slopes_of
+from estimation.fits.tried import Tried
 from estimation.fits.wide_problem import flow_bounds, freed, own_starts, widened
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
 from estimation.models.motion import MOTION_FORMS
@@ -166,7 +166,7 @@ def bounds_and_starts_of_hypotheses() -> dict[str, Any]:
     for one in HYPOTHESES:
         if one.least:
             tried = [
-                _Tried((one,), SimpleNamespace(cost=3.0), {one.free[0]: share * one.least}, {}, {})  # pyright: ignore[reportArgumentType]
+                Tried((one,), SimpleNamespace(cost=3.0), {one.free[0]: share * one.least}, {}, {})  # pyright: ignore[reportArgumentType]
                 for share in (0.99, -0.99, 1.0, -1.01)
             ]
             values["meant"].append([one.name, *(each.meant for each in tried)])

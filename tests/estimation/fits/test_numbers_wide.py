@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from estimation.fits import flow_fit, motion_fit
-from estimation.fits.explain import Explanation, explain
+from estimation.fits.explain import explain
 from estimation.fits.flow_fit import _asked, _near, _objections
 from estimation.fits.flow_search import _guess, _search, flow_starts
 from estimation.fits.force_scale import disagree
@@ -21,6 +21,7 @@ from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, PRESUMED
 from estimation.fits.motion_fit import _starts, _steps, motion_log
 from estimation.fits.motion_search import MotionSearch
 from estimation.fits.promises import Promise, promised
+from estimation.fits.tried import Explanation
 from estimation.fits.wide_problem import delayed, freed, own_starts, usual_values
 from estimation.models.flow import FLOW_FORM, STIFFNESS
 from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS
