@@ -154,18 +154,25 @@ def test_all_else_is_asked_beside_a_hypothesis_where_what_slopes_promise_does_no
 
 
 @pytest.mark.parametrize(
-    ("second", "least", "beside", "names", "rivals"),
+    ("second", "least", "chi", "beside", "names", "rivals"),
     [
-        (105.0, 60.0, "worn relief", ("worn", "late"), 2),
-        (120.0, 60.0, "relief", ("relief", "late"), 1),  # it is not about as good
-        (105.0, 40.0, "relief", ("relief", "late"), 1),  # nothing explains the log
+        (105.0, 60.0, 5.0, "worn relief", ("worn", "late"), 2),
+        (120.0, 60.0, 2.0, "relief", ("relief", "late"), 1),  # it is not about as good
+        (105.0, 40.0, 5.0, "relief", ("relief", "late"), 1),  # nothing explains the log
+        (105.0, 40.0, 2.0, "worn relief", ("worn", "late"), 2),  # nor here, but little is left
     ],
 )
 def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
-    second: float, least: float, beside: str, names: tuple[str, ...], rivals: int, monkeypatch: pytest.MonkeyPatch
+    second: float,
+    least: float,
+    chi: float,
+    beside: str,
+    names: tuple[str, ...],
+    rivals: int,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def tried(cost: float, *together: str) -> Any:
-        point, fit = Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), made_fit(cost, 2e8, 1e5)
+        point, fit = Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), made_fit(cost, 2e8, 1e5, chi=chi)
         fit = replace(fit, std=dict.fromkeys(fit.values, 1.0))
         return _Made(tuple(SimpleNamespace(name=name) for name in together), point, {}, {}, {}, (fit,))  # pyright: ignore[reportArgumentType]
 
