@@ -12,12 +12,13 @@ import numpy as np
 
 from estimation.identification.free_run.choose_linear import BLOCKS, Candidate, block_error, pooled
 from estimation.identification.free_run.data import Channels, blocks
-from estimation.identification.free_run.dense_polynomial import Asked, Judged, forms_tried, judged_recipes
+from estimation.identification.free_run.dense_polynomial import Asked, Judged, Recipe, forms_tried, judged_recipes
 from estimation.identification.free_run.linear_fit import LinearFit, fit_linear
 from estimation.identification.free_run.other_orders import disagreement, is_wild
 from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs
 from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, one_more, without_term
 from estimation.identification.free_run.rubbing import continued, rubbing
+from estimation.identification.free_run.selected_polynomial import Selection, forms_selected, judged_selections
 
 MOST_TERMS = 20
 """Products beside the linear terms."""
@@ -41,6 +42,9 @@ BASES, SCREENED, KEPT = 6, 3, 2
 COMPARED, LARGER = 16, 6
 """Models of every product, best on what was held back, that are fitted to all data and tried in other orders: of the
 sizes that are tried first, and of larger ones, so that neither leave out the other."""
+
+SELECTIONS = 5
+"""Models of few products, likewise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +83,7 @@ class PolynomialCandidate:
 def polynomial_candidates(
     linear: Sequence[Candidate], data: Channels, asked: Asked | None = None
 ) -> list[PolynomialCandidate]:
-    """Return polynomial models: grown from linear ones, and of every product.
+    """Return polynomial models: grown from linear ones, of every product, and of the few that explain most.
 
     Parameters
     ----------
@@ -90,8 +94,8 @@ def polynomial_candidates(
     asked : Asked, optional
         Sizes that the data do not choose.
     """
-    delays = min(linear, key=lambda one: one.held_back).form.delays
-    return [*_grown(linear, data), *_dense(data, delays, asked or Asked())]
+    delays, wanted = min(linear, key=lambda one: one.held_back).form.delays, asked or Asked()
+    return [*_grown(linear, data), *_dense(data, delays, wanted), *_selected(data, delays, wanted)]
 
 
 def _grown(linear: Sequence[Candidate], data: Channels) -> list[PolynomialCandidate]:
@@ -133,11 +137,23 @@ def _rubbing(linear: Sequence[Candidate], data: Channels) -> list["_Growth"]:
 def _dense(data: Channels, delays: tuple[int, ...], asked: Asked) -> list[PolynomialCandidate]:
     """Return the models of every product that do best on what was held back, but for those that leave their range."""
     parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
-    found: list[PolynomialCandidate] = []
     forms = forms_tried(delays, asked)
     judged = sorted(judged_recipes(data, parts, forms, asked), key=lambda one: one.held_back)
     first = [one for one in judged if one.recipe.form in forms][:COMPARED]
-    for one in first + [one for one in judged if one.recipe.form not in forms][:LARGER]:
+    return _kept([*first, *[one for one in judged if one.recipe.form not in forms][:LARGER]], data)
+
+
+def _selected(data: Channels, delays: tuple[int, ...], asked: Asked) -> list[PolynomialCandidate]:
+    """Return the models of few products that do best on what was held back, but for those that leave their range."""
+    parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
+    judged = judged_selections(data, parts, forms_selected(delays, asked))
+    return _kept(sorted(judged, key=lambda one: one.held_back)[:SELECTIONS], data)
+
+
+def _kept(judged: Sequence[Judged[Recipe]] | Sequence[Judged[Selection]], data: Channels) -> list[PolynomialCandidate]:
+    """Return models of all data that were judged without a block each, but for those that leave their range."""
+    found: list[PolynomialCandidate] = []
+    for one in judged:
         fit = one.recipe.fit(data)
         if fit is not None and not is_wild(fit, data):
             found.append(_candidate(fit, one.recipe.fit, one, data))
@@ -145,7 +161,10 @@ def _dense(data: Channels, delays: tuple[int, ...], asked: Asked) -> list[Polyno
 
 
 def _candidate(
-    fit: PolynomialFit, refit: Callable[[Channels], PolynomialFit | None], judged: Judged, data: Channels
+    fit: PolynomialFit,
+    refit: Callable[[Channels], PolynomialFit | None],
+    judged: Judged[Recipe] | Judged[Selection],
+    data: Channels,
 ) -> PolynomialCandidate:
     spread = disagreement(judged.fits, fit, data)
     return PolynomialCandidate(fit, refit, judged.held_back, judged.block_errors, spread, _bic(fit, data))

@@ -7,6 +7,7 @@ the penalty: one least squares of the one-step error, then, of the sizes that do
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -105,19 +106,25 @@ class Recipe:
         return fit
 
 
+Kind = TypeVar("Kind")
+"""Of recipe."""
+
+
 @dataclass(frozen=True, eq=False)
-class Judged:
+class Judged(Generic[Kind]):
     """A recipe with its fits to all blocks but one, and their errors there.
 
     Parameters
     ----------
+    recipe : object
+        Whose ``fit`` takes data.
     fits : tuple of PolynomialFit
         One a block.
     block_errors : tuple of float
         Of the free run on the block that each left out [dimensionless].
     """
 
-    recipe: Recipe
+    recipe: Kind
     fits: tuple[PolynomialFit, ...]
     block_errors: tuple[float, ...]
 
@@ -179,7 +186,7 @@ def forms_tried(delays: tuple[int, ...], asked: Asked) -> list[Form]:
 
 def judged_recipes(
     data: Channels, parts: Sequence[Channels], forms: Sequence[Form], asked: Asked | None = None
-) -> list[Judged]:
+) -> list[Judged[Recipe]]:
     """Return models of every product, each judged on blocks that its fits left out.
 
     The free run is descended for the sizes that do best by one least squares, and for larger ones beside the best of
@@ -201,7 +208,7 @@ def judged_recipes(
     list of Judged
         Only those that run; none where every size has too many terms.
     """
-    found: list[Judged] = []
+    found: list[Judged[Recipe]] = []
     best: dict[tuple[Form, int], float] = {}
     sizes = [(form, degree) for form in forms for degree in (2, 3)]
     for form, degree in sizes:
@@ -218,9 +225,9 @@ def judged_recipes(
     return [*found, *descended, *_climbed(descended, data, parts, asked or Asked())]
 
 
-def _descended(form: Form, degree: int, data: Channels, parts: Sequence[Channels]) -> list[Judged]:
+def _descended(form: Form, degree: int, data: Channels, parts: Sequence[Channels]) -> list[Judged[Recipe]]:
     """Return models of one size whose free run is descended under one penalty after the other."""
-    found: list[Judged] = []
+    found: list[Judged[Recipe]] = []
     for k in range(len(FREE_RUN)):
         one = _judged(Recipe(form, degree, BEGUN, FREE_RUN[: k + 1]), data, parts, found[-1] if found else None)
         if one is None:
@@ -229,9 +236,11 @@ def _descended(form: Form, degree: int, data: Channels, parts: Sequence[Channels
     return found
 
 
-def _climbed(found: Sequence[Judged], data: Channels, parts: Sequence[Channels], asked: Asked) -> list[Judged]:
+def _climbed(
+    found: Sequence[Judged[Recipe]], data: Channels, parts: Sequence[Channels], asked: Asked
+) -> list[Judged[Recipe]]:
     """Return models of a lag more than the best, and of more lags as long as each does clearly better."""
-    more: list[Judged] = []
+    more: list[Judged[Recipe]] = []
     best = min(found, key=lambda one: one.held_back, default=None)
     while best is not None:
         recipe = best.recipe
@@ -264,7 +273,9 @@ def larger(form: Form, asked: Asked) -> list[Form]:
     return found if asked.n_numerator is not None else [*found, replace(form, sizes=tuple(n + 1 for n in form.sizes))]
 
 
-def _judged(recipe: Recipe, data: Channels, parts: Sequence[Channels], before: Judged | None = None) -> Judged | None:
+def _judged(
+    recipe: Recipe, data: Channels, parts: Sequence[Channels], before: Judged[Recipe] | None = None
+) -> Judged[Recipe] | None:
     """Return a recipe's fits to all blocks but one, begun at those before; None where one of them runs away."""
     target, fits, errors = np.concatenate(data.y), list[PolynomialFit](), list[float]()
     for index, part in enumerate(parts):
@@ -277,8 +288,21 @@ def _judged(recipe: Recipe, data: Channels, parts: Sequence[Channels], before: J
     return Judged(recipe, tuple(fits), tuple(errors))
 
 
-def _one_step(variables: Variables, terms: IntArray, data: Channels, penalty: float) -> Array | None:
-    """Return coefficients of the least squares of the one-step error; None where there are too few samples."""
+def moments(variables: Variables, terms: IntArray, data: Channels) -> tuple[Array, Array, int]:
+    """Return sums of products of terms with each other and with the output, one step ahead.
+
+    Parameters
+    ----------
+    terms : ndarray of int, shape (k, 3)
+        Variables that each term multiplies; -1 stands for 1.
+    data : Channels
+        Scaled; outputs held back are NaN.
+
+    Returns
+    -------
+    tuple of ndarray (k, k), ndarray (k,) and int
+        The sums, and how many samples they are of.
+    """
     count = terms.shape[0]
     gram, right, n = np.zeros((count, count)), np.zeros(count), 0
     for u, y in zip(data.u, data.y, strict=True):
@@ -289,7 +313,13 @@ def _one_step(variables: Variables, terms: IntArray, data: Channels, penalty: fl
             used[lag:] &= known[:-lag]
         rows = products(variables, terms, u, np.where(known, y, 0.0))[used]
         gram, right, n = gram + rows.T @ rows, right + rows.T @ y[used], n + rows.shape[0]
-    if n < count:
+    return gram, right, n
+
+
+def _one_step(variables: Variables, terms: IntArray, data: Channels, penalty: float) -> Array | None:
+    """Return coefficients of the least squares of the one-step error; None where there are too few samples."""
+    gram, right, n = moments(variables, terms, data)
+    if n < terms.shape[0]:
         return None
     size = np.sqrt(np.diag(gram) / n)
     size[size == 0.0] = 1.0

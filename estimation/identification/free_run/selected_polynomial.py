@@ -1,0 +1,208 @@
+"""Polynomial models of few products, chosen one by one by how much of the one-step error each explains.
+
+Orthogonal least squares on lagged signals (Chen, Billings and Luo 1989; the error reduction ratio), begun at nothing.
+A growth on the free run begins at a linear model and cannot leave where a linear model follows the output badly; a
+model of every product spends its samples on products that are not there. This one takes neither risk, and is judged
+like both: each block that is held back has a selection of its own, which never saw it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.arrays import Array, IntArray
+from estimation.identification.free_run.choose_linear import block_error
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.dense_polynomial import STEPS, Asked, Judged, every_term, moments
+from estimation.identification.free_run.linear_fit import Form, LinearFit
+from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, Variables, variables_of
+
+LAGS = (2, 3, 4)
+"""Of the output and of each input, that terms are taken from."""
+
+COUNTS = (6, 9, 13, 18, 25)
+"""Terms that are kept."""
+
+MOST_POOL = 250
+"""Terms that are chosen from, at most; products of three are left out where there would be more."""
+
+INDEPENDENT = 1e-8
+"""Share of a term's square that the terms before it must leave, or it is passed over."""
+
+DESCENDED = 3
+"""Selections whose free run is descended."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """How a model of few products is fitted.
+
+    Parameters
+    ----------
+    form : Form
+        Lags.
+    count : int
+        Terms, the constant and linear ones among them.
+    descended : bool
+        Whether the one-step estimate is a start of the free run's descent.
+    """
+
+    form: Form
+    count: int
+    descended: bool = False
+
+    def fit(self, data: Channels) -> PolynomialFit | None:
+        """Return the model of given data; None where it runs away or there are too few samples.
+
+        Parameters
+        ----------
+        data : Channels
+            Scaled; outputs held back are NaN.
+        """
+        ordered = _ordered(self.form, data)
+        found = None if ordered is None else ordered.model(self.count, data)
+        return _descended(found, data) if self.descended else found
+
+
+def forms_selected(delays: tuple[int, ...], asked: Asked) -> list[Form]:
+    """Return the lags that terms are taken from.
+
+    Parameters
+    ----------
+    delays : tuple of int
+        Dead time of each input that is tried beside none and one sample [samples].
+    asked : Asked
+        What is given and not chosen.
+
+    Examples
+    --------
+    >>> [(one.order, one.delays) for one in forms_selected((1,), Asked(order=2))]
+    [(2, (0,)), (2, (1,))]
+    """
+    m = len(delays)
+    lags = LAGS if asked.order is None else (asked.order,)
+    late = [(0,) * m, (1,) * m, delays] if asked.delay is None else [(asked.delay,) * m]
+    return list(dict.fromkeys(Form(n, (asked.n_numerator or n,) * m, one) for n in lags for one in late))
+
+
+def judged_selections(data: Channels, parts: Sequence[Channels], forms: Sequence[Form]) -> list[Judged[Selection]]:
+    """Return models of few products, each judged on blocks that neither its terms nor its values have seen.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    parts : sequence of Channels
+        The same without one block each.
+    forms : sequence of Form
+        Lags that terms are taken from.
+    """
+    found: list[Judged[Selection]] = []
+    for form in forms:
+        ordered = [_ordered(form, part) for part in parts]
+        for count in COUNTS:
+            fits = [None if one is None else one.model(count, part) for one, part in zip(ordered, parts, strict=True)]
+            found += _judged(Selection(form, count), fits, data, parts)
+    for one in sorted(found, key=lambda one: one.held_back)[:DESCENDED]:
+        fits = [_descended(fit, part) for fit, part in zip(one.fits, parts, strict=True)]
+        found += _judged(Selection(one.recipe.form, len(one.fits[0].terms), descended=True), fits, data, parts)
+    return found
+
+
+def _judged(
+    recipe: Selection, fits: Sequence[PolynomialFit | None], data: Channels, parts: Sequence[Channels]
+) -> list[Judged[Selection]]:
+    """Return the selection with its errors, or nothing where a fit runs away."""
+    target, kept, errors = np.concatenate(data.y), list[PolynomialFit](), list[float]()
+    for fit, part in zip(fits, parts, strict=True):
+        ran = None if fit is None else Runs(fit.variables, fit.terms, data).run(fit.theta)
+        if fit is None or ran is None:
+            return []
+        kept.append(fit)
+        errors.append(block_error(ran[0] - target, np.isnan(np.concatenate(part.y)) & np.isfinite(target)))
+    return [Judged(recipe, tuple(kept), tuple(errors))]
+
+
+@dataclass(frozen=True, eq=False)
+class _Ordered:
+    """Terms in the order in which they explain the one-step error, and the moments of all."""
+
+    variables: Variables
+    terms: IntArray
+    gram: Array
+    right: Array
+
+    def model(self, count: int, data: Channels) -> PolynomialFit | None:
+        """Return the model of the first terms, run free; None where it runs away or there are not so many."""
+        if self.terms.shape[0] < count:
+            return None
+        terms = self.terms[:count]
+        size = np.sqrt(np.diag(self.gram)[:count])
+        unit = self.gram[:count, :count] / np.outer(size, size)
+        values = np.linalg.lstsq(unit, self.right[:count] / size, rcond=1e-12)[0] / size
+        runs = Runs(self.variables, terms, data)
+        theta = np.concatenate([values, runs.start_values()])
+        ran = runs.run(theta)
+        if ran is None:
+            return None
+        return PolynomialFit(self.variables, terms, theta, float(np.sum((ran[0] - runs.target)[runs.used] ** 2)))
+
+
+def _ordered(form: Form, data: Channels) -> _Ordered | None:
+    """Return the terms of some lags, best first; None where there are too many or too few samples."""
+    variables = variables_of(LinearFit(form, np.zeros(form.n_values), 0.0), data)[0]
+    pool = every_term(variables.lag.size, 3)
+    if pool.shape[0] > MOST_POOL:
+        pool = every_term(variables.lag.size, 2)
+    if pool.shape[0] > MOST_POOL:
+        return None
+    gram, right, n = moments(variables, pool, data)
+    if n < 2 * COUNTS[-1]:
+        return None
+    first = best_first(gram, right, COUNTS[-1])
+    return _Ordered(variables, pool[first], gram[np.ix_(first, first)], right[first])
+
+
+def best_first(gram: Array, right: Array, most: int) -> IntArray:
+    """Return which regressors explain most of what is wanted, each beside those before it.
+
+    Parameters
+    ----------
+    gram : ndarray, shape (k, k)
+        Products of regressors, summed.
+    right : ndarray, shape (k,)
+        Products with what is wanted, summed.
+    most : int
+        How many are wanted at most.
+
+    Returns
+    -------
+    ndarray of int, shape (most,) or less
+        Regressors, best first; those that others before them give already are left out.
+
+    Examples
+    --------
+    >>> best_first(np.array([[4.0, 0.0, 2.0], [0.0, 1.0, 0.0], [2.0, 0.0, 1.0]]), np.array([4.0, 3.0, 2.0]), 3).tolist()
+    [1, 0]
+    """
+    whole = np.diag(gram).copy()
+    left, wanted = whole.copy(), right.astype(np.float64).copy()
+    rows, taken = np.zeros((most, right.size)), list[int]()
+    for step in range(min(most, right.size)):
+        open_ = left > INDEPENDENT * whole
+        open_[taken] = False
+        if not open_.any():
+            break
+        gains = np.where(open_, wanted**2, 0.0) / np.where(open_, left, 1.0)
+        best = int(np.argmax(gains))
+        root = np.sqrt(left[best])
+        rows[step] = (gram[best] - rows[:step, best] @ rows[:step]) / root
+        wanted = wanted - rows[step] * (wanted[best] / root)
+        left = left - rows[step] ** 2
+        taken.append(best)
+    return np.array(taken, dtype=np.int64)
+
+
+def _descended(fit: PolynomialFit | None, data: Channels) -> PolynomialFit | None:
+    return None if fit is None else Runs(fit.variables, fit.terms, data).fit(fit.theta, STEPS) or fit
