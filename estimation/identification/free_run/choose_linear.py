@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.arrays import Array, BoolArray
-from estimation.identification.free_run.data import Channels, blocks
+from estimation.identification.free_run.data import Channels, blocks, halves
+from estimation.identification.free_run.linear_body import LinearBody
 from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem, extended, fit_linear, quick_fit
 
 BLOCKS = 4
@@ -177,6 +178,33 @@ def surely_better(errors: Sequence[float], others: Sequence[float]) -> bool:
     known = gains[~np.isnan(gains)]
     scatter = float(known.std(ddof=1)) / np.sqrt(known.size) if known.size > 1 else 0.0
     return known.size > 0 and bool(known.mean() > scatter)
+
+
+def halves_error(fit: LinearFit, data: Channels) -> float:
+    """Return the error of a free run over each half of every log by a fit to the other halves, root mean square.
+
+    A block lies between outputs that are fitted, and they pin a slow pole there; a half has only an initial state.
+
+    Parameters
+    ----------
+    fit : LinearFit
+        Of all data; each fit begins at it.
+    data : Channels
+        Scaled.
+
+    Returns
+    -------
+    float
+        Over the output's deviation; NaN where a half has too few outputs.
+    """
+    first, second = halves(data)
+    if min(first.n_samples, second.n_samples) < 2 * fit.theta.size:
+        return float("nan")
+    squares = list[Array]()
+    for part, other in ((first, second), (second, first)):
+        body = LinearBody.of(fit_linear(fit.form, part, [fit.f], bounded=fit.bounded))
+        squares += [(body.run(u, y) - y) ** 2 for u, y in zip(other.u, other.y, strict=True)]
+    return float(np.sqrt(np.nanmean(np.concatenate(squares))))
 
 
 def candidate(fit: LinearFit, data: Channels) -> Candidate:

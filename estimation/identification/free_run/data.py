@@ -171,3 +171,24 @@ def blocks(data: Channels, count: int) -> list[list[BoolArray]]:
         One mask a log, for each block.
     """
     return [[np.arange(y.size) * (count + 1) // max(y.size, 1) == 1 + index for y in data.y] for index in range(count)]
+
+
+def halves(data: Channels) -> tuple[Channels, Channels]:
+    """Return the first half of every log, and the second one.
+
+    Returns
+    -------
+    tuple of Channels
+        As many logs each.
+    """
+    cuts = [y.size // 2 for y in data.y]
+
+    def part(*, late: bool) -> Channels:
+        kept = [slice(cut, None) if late else slice(None, cut) for cut in cuts]
+        return replace(
+            data,
+            u=tuple(u[one] for u, one in zip(data.u, kept, strict=True)),
+            y=tuple(y[one] for y, one in zip(data.y, kept, strict=True)),
+        )
+
+    return part(late=False), part(late=True)

@@ -16,7 +16,13 @@ from estimation.identification.free_run.choose_hammerstein import (
     hammerstein_candidates,
     worthwhile,
 )
-from estimation.identification.free_run.choose_linear import Candidate, chosen, linear_candidates, surely_better
+from estimation.identification.free_run.choose_linear import (
+    Candidate,
+    chosen,
+    halves_error,
+    linear_candidates,
+    surely_better,
+)
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate, polynomial_candidates
 from estimation.identification.free_run.data import Channels, Scaling, scaled
 from estimation.identification.free_run.dense_polynomial import Asked
@@ -260,13 +266,20 @@ def _believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) ->
             taken = min(clean, key=lambda one: one.price)
             notes.append(IdentificationCode.SIMPLER_MODEL_TAKEN.note(order=best.form.order, taken=taken.form.order))
             best = taken
-    # a block lies between outputs that pin a slower pole to the drift of this record: it has to win by more than chance
+    # a block lies between outputs that pin a slower pole to the drift of this record: it has to win by more than
+    # chance, and where the halves of the record are run, which are pinned by nothing, are judged beside
     quick = [one for one in candidates if not (one.doubt or one.fit.bounded or one.outlasts_block(data))]
     if quick and best.outlasts_block(data):
         taken, said = _believable(quick, data, by)
-        if not surely_better(best.block_errors, taken.block_errors):
+        if not (surely_better(best.block_errors, taken.block_errors) and _carries_on(best, taken, data)):
             return taken, [*beyond, *said]
     return best, notes
+
+
+def _carries_on(slow: Candidate, quick: Candidate, data: Channels) -> bool:
+    """Return whether a slow model leaves less than a quick one on blocks and halves together."""
+    errors = [np.hypot(one.held_back, halves_error(one.fit, data)) for one in (slow, quick)]
+    return not errors[0] > errors[1]
 
 
 def _clearly_better(nonlinear: PolynomialCandidate, linear: Candidate) -> bool:

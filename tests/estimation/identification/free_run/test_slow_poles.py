@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 
 from estimation.arrays import Array
+from estimation.identification.free_run import identify
 from estimation.identification.free_run.choose_linear import (
     BLOCKS,
     Candidate,
     candidate,
     chosen,
+    halves_error,
     linear_candidates,
     slowest_pole,
 )
-from estimation.identification.free_run.data import Channels, channels_from, scaled
+from estimation.identification.free_run.data import Channels, channels_from, halves, scaled
 from estimation.identification.free_run.identify import _believable
 from estimation.identification.free_run.linear_fit import Form, LinearFit, fit_linear
 from estimation.identification.model.recursion import filtered
@@ -65,9 +67,10 @@ def test_a_block_ends_before_a_slow_pole_has_decayed(plain: tuple[Channels, Cand
     ],
 )
 def test_a_slow_pole_wins_by_more_than_blocks_scatter(
-    plain: tuple[Channels, Candidate], slow: tuple[float, ...], taken: str
+    plain: tuple[Channels, Candidate], slow: tuple[float, ...], taken: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data, one = plain
+    monkeypatch.setattr(identify, "halves_error", lambda fit, _: float(fit.cost))
     models = {"quick": with_pole(one, 0.7, (0.1,) * 4), "slow": with_pole(one, 0.998, slow)}
     models["slow"] = replace(models["slow"], bic=one.bic - 100.0)
     _, by = scaled(data)
@@ -75,6 +78,39 @@ def test_a_slow_pole_wins_by_more_than_blocks_scatter(
     # where nothing quicker may be taken, the slow one is
     doubted = replace(models["quick"], doubt="no_fit")
     assert _believable([doubted, models["slow"]], data, by)[0] is models["slow"]
+
+
+@pytest.mark.parametrize(
+    ("errors", "taken"),
+    [
+        ((0.3, 0.3), "slow"),
+        ((0.3, 0.295), "slow"),  # blocks and halves together are still less
+        ((0.3, 0.25), "quick"),
+        ((float("nan"), 0.25), "slow"),  # a half that cannot be fitted says nothing
+    ],
+)
+def test_a_slow_pole_carries_on_where_nothing_pins_it(
+    plain: tuple[Channels, Candidate], errors: tuple[float, float], taken: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data, one = plain
+    models = {"quick": with_pole(one, 0.7, (0.1,) * 4), "slow": with_pole(one, 0.998, (0.08,) * 4)}
+    models["slow"] = replace(models["slow"], bic=one.bic - 100.0)
+    told = dict(zip((0.998, 0.7), errors, strict=True))
+    monkeypatch.setattr(identify, "halves_error", lambda fit, _: told[round(-float(fit.f[1]), 3)])
+    assert _believable(list(models.values()), data, scaled(data)[1])[0] is models[taken]
+
+
+def test_a_half_is_run_by_a_fit_to_the_other(plain: tuple[Channels, Candidate]) -> None:
+    data, one = plain
+    first, second = halves(replace(data, u=(*data.u, data.u[0][:101]), y=(*data.y, data.y[0][:101])))
+    assert [y.size for y in first.y] == [300, 50]
+    assert [y.size for y in second.y] == [300, 51]
+    assert np.array_equal(second.u[1][:, 0], data.u[0][50:101, 0])
+    noise = 0.05 / np.sqrt(0.05**2 + np.var(filtered([0.0, 0.3], [1.0, -0.7], steps(1))))
+    assert halves_error(one.fit, data) == pytest.approx(noise, rel=0.1)
+    spoilt = replace(data, y=(np.where(np.arange(N) < 300, data.y[0], 3.0 - data.y[0]),))
+    assert halves_error(one.fit, spoilt) > 2.0, "each half has the other's sign and level"
+    assert np.isnan(halves_error(one.fit, replace(data, u=(data.u[0][:10],), y=(data.y[0][:10],))))
 
 
 def test_what_lies_beyond_the_record_is_still_told(plain: tuple[Channels, Candidate]) -> None:
