@@ -46,10 +46,10 @@ EARLY = "a relief valve that opens early"
 DELIVERIES = (0.7, 0.8, 0.9)
 """Shares of its displacement that a worn pump delivers [dimensionless]."""
 
-LIKELIER = 3.0
+LIKELIER = 10.0
 """How many times likelier than a sound pump a well worn one must be to be believed [dimensionless]: evidence is called
-substantial from there on (Jeffreys, Theory of Probability, 1961, appendix B). Of 16 sound training logs under major
-leakage and friction none comes to more than 1.4; of 10 with a worn pump 7 come to 5 and more."""
+strong from there on (Jeffreys, Theory of Probability, 1961, appendix B). Of 16 sound training logs under major leakage
+and friction none comes to more than 1.4."""
 
 WELL_WORN = 0.8
 """Share up to which a pump is a worn one whatever the rig file's displacement is worth [dimensionless]: an entry may be

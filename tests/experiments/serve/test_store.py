@@ -1,6 +1,8 @@
 """What a server keeps: it is there after the file is opened again, and nothing else is taken for it."""
 
 import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import pytest
@@ -11,21 +13,30 @@ from plant.errors import HydrostateError
 
 RESULT = {"outcome": "ok", "message": "normal", "value": 1.5}
 
+Opened = Callable[[str], Store]
 
-def test_what_was_finished_is_there_when_the_file_is_opened_beside_one_that_was_never_closed(tmp_path: Path) -> None:
-    first = Store(tmp_path / "a.sqlite")
+
+@pytest.fixture
+def opened(tmp_path: Path) -> Iterator[Opened]:
+    """Return what opens a file by its name, to be closed after the test."""
+    with ExitStack() as stack:
+        yield lambda name: stack.enter_context(closing(Store(tmp_path / name)))
+
+
+def test_what_was_finished_is_there_when_the_file_is_opened_beside_one_that_was_never_closed(opened: Opened) -> None:
+    first = opened("a.sqlite")
     first.add("a", "run.csv", "diagnose", 10)
     first.add("b", "rest.csv", "diagnose", 10)
     first.finish("a", DONE, RESULT, {"outcome": "ok"})
-    second = Store(tmp_path / "a.sqlite")
+    second = opened("a.sqlite")
     assert second.result("a") == RESULT
     assert [one.id for one in second.unfinished()] == ["b"]
     assert second.counts() == {"done": 1, "unfinished": 1}
     assert list(second.diagnosed()) == [("a", "run.csv", {"outcome": "ok"})]
 
 
-def test_a_log_that_was_deleted_stays_so_when_its_work_ends(tmp_path: Path) -> None:
-    store = Store(tmp_path / "a.sqlite")
+def test_a_log_that_was_deleted_stays_so_when_its_work_ends(opened: Opened) -> None:
+    store = opened("a.sqlite")
     store.add("a", "run.csv", "diagnose", 10)
     assert store.delete("a")
     store.finish("a", FAILED, RESULT)
@@ -34,8 +45,8 @@ def test_a_log_that_was_deleted_stays_so_when_its_work_ends(tmp_path: Path) -> N
     assert not store.delete("a")
 
 
-def test_the_revision_changes_with_what_the_fleet_is_made_of(tmp_path: Path) -> None:
-    store = Store(tmp_path / "a.sqlite")
+def test_the_revision_changes_with_what_the_fleet_is_made_of(opened: Opened) -> None:
+    store = opened("a.sqlite")
     seen = [store.revision()]
     for identity in ("a", "b"):
         store.add(identity, "run.csv", "diagnose", 10)
@@ -47,17 +58,17 @@ def test_the_revision_changes_with_what_the_fleet_is_made_of(tmp_path: Path) -> 
     assert len(set(seen)) == 4
 
 
-def test_events_are_kept_by_stream_and_the_oldest_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_events_are_kept_by_stream_and_the_oldest_go(opened: Opened, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_EVENTS", 3)
-    store = Store(tmp_path / "a.sqlite")
+    store = opened("a.sqlite")
     for number in range(5):
         store.add_event("press" if number % 2 else "lift", {"event": "alarm", "time_s": float(number)})
     assert [one["time_s"] for one in store.events("lift", 10)] == [2.0, 4.0]
     assert [one["time_s"] for one in store.events("press", 10)] == [3.0]
 
 
-def test_a_result_that_is_no_json_changes_nothing(tmp_path: Path) -> None:
-    store = Store(tmp_path / "a.sqlite")
+def test_a_result_that_is_no_json_changes_nothing(opened: Opened) -> None:
+    store = opened("a.sqlite")
     store.add("a", "run.csv", "diagnose", 10)
     with pytest.raises(ValueError, match="JSON"):
         store.finish("a", DONE, {**RESULT, "value": float("nan")})
@@ -75,8 +86,8 @@ def test_a_file_that_is_no_such_database_is_refused(tmp_path: Path) -> None:
         Store(tmp_path / "later.sqlite")
 
 
-def test_a_log_that_goes_while_it_is_added_is_said_to_be_gone(tmp_path: Path) -> None:
-    store = Store(tmp_path / "a.sqlite")
+def test_a_log_that_goes_while_it_is_added_is_said_to_be_gone(tmp_path: Path, opened: Opened) -> None:
+    store = opened("a.sqlite")
     with sqlite3.connect(tmp_path / "a.sqlite") as connection:
         connection.execute("CREATE TRIGGER gone AFTER INSERT ON logs BEGIN DELETE FROM logs WHERE id = new.id; END")
     connection.close()
