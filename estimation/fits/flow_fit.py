@@ -272,7 +272,7 @@ def _asked(
         return (), ()
     if loaded:  # a sensor that reads too much looks loaded at rest
         return (BEGUN, OFFSET_AT_REST), ()
-    if not _explains(swinging, log.passes_on) or most_late(swinging.late)[2] > WORTH:
+    if not _explains_all(swinging, log.passes_on) or most_late(swinging.late)[2] > WORTH:
         pulled = (MAKEUP_BENDS,) if outruns_pump(log, parameters) else ()
         return (BEGUN,) if moving else (*HYPOTHESES, *pulled), ()
     by_mass = balances_mass(swinging.model)

@@ -24,6 +24,7 @@ from estimation.fits.toothed import (
     ROUNDS,
     SETTLED,
     STANDS_OUT,
+    SURE,
     TEETH_WORTH,
     Toothed,
     toothed,
@@ -249,6 +250,14 @@ def test_an_offset_that_gains_little_or_breaks_its_promise_or_leaves_the_log_une
     assert found.log is PLAIN
     assert found.best.cost == 900.0
     assert not found.remarks
+
+
+def test_an_offset_that_leaves_more_than_the_noise_of_sensors_is_none() -> None:
+    """A piston with a rod on one side looks like one, and passed with bulk modulus 39 % too low."""
+    for left, taken in ((0.9 * SURE, True), (1.1 * SURE, False)):
+        after = replace(fit(400.0), chi_square=(1.0 + 0.2 * left,))
+        found = toothed(PLAIN, told(fit(900.0, off=(0.2, 500.0)), after)[0], well, 1.2)
+        assert bool(found.remarks) is taken
 
 
 def test_the_offset_is_that_of_the_balance_which_is_likeliest_with_an_offset_of_its_own() -> None:
