@@ -149,8 +149,8 @@ def _paired(log: GreyBoxLog, first: Tried, plain: Mapping[str, float], accepted:
     begun = [_begun_again(log, first), {**plain, **own_starts(log, first.together[-1])[0]}]
     tried = [*likely, *(one for one in others if one.far)]
     pairs = _likeliest(late, [_screened(late, (*first.together, one), begun) for one in tried], first.cost)
-    if not _explained(pairs[0], accepted):
-        known = NEARLY_AS_GOOD * min(first.cost, pairs[0].cost)
+    if not pairs or not _explained(pairs[0], accepted):
+        known = NEARLY_AS_GOOD * min(one.cost for one in (first, *pairs[:1]))
         rest = [_screened(late, (*first.together, one), begun, known) for one in others if not one.far]
         pairs = _ranked([*pairs, *_likeliest(late, rest)])
     better = (one for one in pairs if one.cost < first.cost - WORTH)

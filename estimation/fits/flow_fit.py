@@ -272,7 +272,7 @@ def _asked(
         return (), ()
     if loaded:  # a sensor that reads too much looks loaded at rest
         return (BEGUN, OFFSET_AT_REST), ()
-    if not _explains_all(swinging, log.passes_on) or most_late(swinging.late)[2] > WORTH:
+    if not _explains(swinging, log.passes_on) or most_late(swinging.late)[2] > WORTH:
         pulled = (MAKEUP_BENDS,) if outruns_pump(log, parameters) else ()
         return (BEGUN,) if moving else (*HYPOTHESES, *pulled), ()
     by_mass = balances_mass(swinging.model)
@@ -291,7 +291,7 @@ def _asked(
     asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > WORTH)
     remarks = () if DELIVERY in asked else wear_open(delivery.deviation)
     if not moving:
-        return asked, remarks
+        return asked if _explains_all(swinging, log.passes_on) else HYPOTHESES, remarks
     # chambers shut in far above the accumulator take no make-up for seconds, and a search from rest ends without any
     fed = swinging.values["makeup_conductance"] > VANISHED * parameters.makeup_conductance
     lost = swinging is best and not fed and swinging.chi_square[0] > DOUBTED

@@ -28,9 +28,9 @@ KEPT = 0.5
 or more."""
 
 SURE = 0.3
-"""Share of what no fit may leave that one with an offset of speed and no teeth may [fraction]; judged. A piston with a rod
-on one side looks like an offset: a log passed with one, bulk modulus 39 % too low, that left 12 % of its noise's variance
-too much. Of 160 plain training logs none leaves more than 6 %."""
+"""Share of what no fit may leave that one with an offset of speed and no teeth may [fraction]; judged. A piston with a
+rod on one side looks like an offset: a log passed with one, bulk modulus 39 % too low, that left 12 % of its noise's
+variance too much. Of 160 plain training logs none leaves more than 6 %."""
 
 LEAST_OFFSET = 0.01
 """Offset of speed from which it is told [rad/s]; judged: a tenth of a revolution a minute is what encoders drift by."""

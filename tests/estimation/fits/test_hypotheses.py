@@ -18,7 +18,7 @@ from estimation.fits.flow_fit import _near, _wanted, fit_flow  # pyright: ignore
 from estimation.fits.flow_search import MAKEUP_TRIED, flow_starts
 from estimation.fits.hypotheses import HYPOTHESES, LATEST
 from estimation.fits.left_open import OPEN_DELIVERY
-from estimation.fits.tried import Explanation
+from estimation.fits.tried import Explanation, Tried
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.first_belief import begins_in_motion, first_load
 from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters, grown_leakage
@@ -150,14 +150,14 @@ def test_a_delay_is_sought_no_longer_than_a_sensor_may_have(monkeypatch: pytest.
     (late,) = (one for one in HYPOTHESES if one.name == "pressure_late")
     plain = SimpleNamespace(coarsened=lambda: plain)
 
-    def falling(_: object, tried: module._Tried, *__: object, **___: object) -> module._Tried:
+    def falling(_: object, tried: Tried, *__: object, **___: object) -> Tried:
         delay = tried.delays.get(late.late, 0.0)
         return replace(tried, point=Point(np.zeros(1), 1e3 - delay, np.zeros(1), np.eye(1)))
 
     monkeypatch.setattr(module, "_descended", falling)
     monkeypatch.setattr(module, "_revived", lambda *_: None)
     monkeypatch.setattr(module, "delayed", lambda log, _: log)
-    begun = module._Tried((late,), Point(np.zeros(1), 1e3, np.zeros(1), np.eye(1)), {}, {}, {})
+    begun = Tried((late,), Point(np.zeros(1), 1e3, np.zeros(1), np.eye(1)), {}, {}, {})
     found = module._settled(cast("GreyBoxLog", plain), begun)
     assert found.delays[late.late] == pytest.approx(LATEST, abs=1e-3)
 

@@ -51,7 +51,7 @@ def concluded(
     calls = asked
     with patch.multiple(
         flow_fit,
-        balanced=lambda *_: fits,
+        balanced=lambda *_, **__: fits,
         promised_each=lambda *_, **__: [
             *(2 * [Promise(40.0, 0.2, 0.05)]),
             *(len(MAY_HIDE) * [Promise(0.0, 0.0, 0.05)]),
