@@ -32,6 +32,9 @@ SURE = 0.3
 rod on one side looks like an offset: a log passed with one, bulk modulus 39 % too low, that left 12 % of its noise's
 variance too much. Of 160 plain training logs none leaves more than 6 %."""
 
+CHANCE = 3.0
+"""Standard deviations of the mean of squared noise that are no misfit [dimensionless]: they count in short logs."""
+
 LEAST_OFFSET = 0.01
 """Offset of speed from which it is told [rad/s]; judged: a tenth of a revolution a minute is what encoders drift by."""
 
@@ -136,7 +139,7 @@ def toothed(
         found = _with_teeth(log, begun, fitted)
         if found is not None and found.best.cost < worth and explains(found.best):
             return found
-        sure = begun.best.chi_square[0] <= 1.0 + SURE * (largest - 1.0)
+        sure = begun.best.chi_square[0] <= 1.0 + SURE * (largest - 1.0) + CHANCE * (2.0 / len(log.drives)) ** 0.5
         if begun is shifted and sure and explains(begun.best) and begun.best.cost < plain.best.cost - OFFSET_WORTH:
             offset = begun.log.speed_offset
             told = _told_offset(offset, begun.best.speed_offset.std)
