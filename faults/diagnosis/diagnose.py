@@ -170,8 +170,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     found = replace(found, notes=(*found.notes, *named))
     if (stop := diagnosis.scoreboard.blocks.stop) is not None:
         found = replace(found, notes=(*found.notes, ClassCode.END_STOP.note(reach_mm=1e3 * stop)))
-    left = doubts_after(doubts, estimate, log, around, diagnosis.scoreboard)
-    against = distinct((*left, *diagnosis.against))
+    against = distinct((*doubts_after(doubts, estimate, log, around, diagnosis.scoreboard), *diagnosis.against))
     if against:  # nominal models alone are no judges of a circuit with another oil, but they say what is off
         against = distinct((*against, *verdict.against))
     severity = _severities(diagnosis, estimate, healthy, rig, pressure=PRESSURE in scores.channels)
@@ -212,10 +211,10 @@ def _of_clean(log: CleanLog, parameters: EhaParameters) -> Diagnosis:
 
 
 def _judged(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain) -> Loaded:
-    """Return the same with what the balance of flows says of the pump."""
+    """Return a diagnosis with what the balance of flows says of the pump."""
     found = _diagnosed(log, parameters, estimate, plain)
-    actuator = actuator_of(found.parameters)
-    return found._replace(diagnosis=whatever_the_pump_delivers(found.diagnosis, actuator, estimate))
+    told = whatever_the_pump_delivers(found.diagnosis, actuator_of(found.parameters), estimate)
+    return found._replace(diagnosis=told)
 
 
 def _diagnosed(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain) -> Loaded:
@@ -308,7 +307,8 @@ def diagnose_clean(
     pressure = board.blocks.pressure is not None
     region = float(np.max(region_scores(board.fits.best, board.fits.told, actuator)))
     against = (
-        *(*log.objections, *board.against),
+        *log.objections,
+        *board.against,
         *sensors_disagree(board.window, board.blocks),
         *reasons_against(board.blocks, board.fits, region, actuator),
     )

@@ -95,7 +95,8 @@ def polynomial_candidates(
         Sizes that the data do not choose.
     """
     delays, wanted = min(linear, key=lambda one: one.held_back).form.delays, asked or Asked()
-    return [*_grown(linear, data), *_dense(data, delays, wanted), *_selected(data, delays, wanted)]
+    parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
+    return [*_grown(linear, data), *_dense(data, parts, delays, wanted), *_selected(data, parts, delays, wanted)]
 
 
 def _grown(linear: Sequence[Candidate], data: Channels) -> list[PolynomialCandidate]:
@@ -134,18 +135,20 @@ def _rubbing(linear: Sequence[Candidate], data: Channels) -> list["_Growth"]:
     return [_Growth(fit, partial(continued, fit), data) for fit in best]
 
 
-def _dense(data: Channels, delays: tuple[int, ...], asked: Asked) -> list[PolynomialCandidate]:
+def _dense(
+    data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: Asked
+) -> list[PolynomialCandidate]:
     """Return the models of every product that do best on what was held back, but for those that leave their range."""
-    parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
     forms = forms_tried(delays, asked)
     judged = sorted(judged_recipes(data, parts, forms, asked), key=lambda one: one.held_back)
     first = [one for one in judged if one.recipe.form in forms][:COMPARED]
     return _kept([*first, *[one for one in judged if one.recipe.form not in forms][:LARGER]], data)
 
 
-def _selected(data: Channels, delays: tuple[int, ...], asked: Asked) -> list[PolynomialCandidate]:
+def _selected(
+    data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: Asked
+) -> list[PolynomialCandidate]:
     """Return the models of few products that do best on what was held back, but for those that leave their range."""
-    parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
     judged = judged_selections(data, parts, forms_selected(delays, asked))
     return _kept(sorted(judged, key=lambda one: one.held_back)[:SELECTIONS], data)
 

@@ -179,9 +179,22 @@ def forms_tried(delays: tuple[int, ...], asked: Asked) -> list[Form]:
     """
     m, order = len(delays), asked.order
     sizes = [one for one in SIZES if one[0] == order] or [(order, order)] if order is not None else SIZES
-    late = [(0,) * m, (1,) * m, delays] if asked.delay is None else [(asked.delay,) * m]
-    found = [Form(n, (asked.n_numerator or size,) * m, one) for n, size in sizes for one in late]
+    found = [Form(n, (asked.n_numerator or size,) * m, one) for n, size in sizes for one in late_by(delays, asked)]
     return list(dict.fromkeys(found))
+
+
+def late_by(delays: tuple[int, ...], asked: Asked) -> list[tuple[int, ...]]:
+    """Return the dead times of the inputs that are tried: none, one sample and those given, or what is asked.
+
+    Parameters
+    ----------
+    delays : tuple of int
+        Dead time of each input [samples].
+    asked : Asked
+        What is given and not chosen.
+    """
+    m = len(delays)
+    return [(0,) * m, (1,) * m, delays] if asked.delay is None else [(asked.delay,) * m]
 
 
 def judged_recipes(

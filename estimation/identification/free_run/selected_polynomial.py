@@ -14,7 +14,7 @@ import numpy as np
 from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.choose_linear import block_error
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.dense_polynomial import STEPS, Asked, Judged, every_term, moments
+from estimation.identification.free_run.dense_polynomial import STEPS, Asked, Judged, every_term, late_by, moments
 from estimation.identification.free_run.linear_fit import Form, LinearFit
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, Variables, variables_of
 
@@ -82,8 +82,8 @@ def forms_selected(delays: tuple[int, ...], asked: Asked) -> list[Form]:
     """
     m = len(delays)
     lags = LAGS if asked.order is None else (asked.order,)
-    late = [(0,) * m, (1,) * m, delays] if asked.delay is None else [(asked.delay,) * m]
-    return list(dict.fromkeys(Form(n, (asked.n_numerator or n,) * m, one) for n in lags for one in late))
+    found = [Form(n, (asked.n_numerator or n,) * m, one) for n in lags for one in late_by(delays, asked)]
+    return list(dict.fromkeys(found))
 
 
 def judged_selections(data: Channels, parts: Sequence[Channels], forms: Sequence[Form]) -> list[Judged[Selection]]:

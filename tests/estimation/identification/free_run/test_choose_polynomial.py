@@ -94,8 +94,7 @@ def test_of_the_models_of_every_product_sixteen_and_six_larger_ones_are_fitted_b
     monkeypatch.setattr(choose_polynomial, "judged_recipes", lambda *_: every)
     monkeypatch.setattr(choose_polynomial, "is_wild", lambda fit, _: fit.wild)
     monkeypatch.setattr(choose_polynomial, "disagreement", lambda *_: 0.25)
-    monkeypatch.setattr(choose_polynomial, "blocks", lambda *_: [])
-    found = _dense(DATA, (1,), Asked())
+    found = _dense(DATA, [], (1,), Asked())
     odd, even = range(1, 33, 2), range(2, 14, 2)
     assert [one.held_back for one in found] == [float(rank) for rank in (*odd, *even) if rank not in (3, 5)]
     assert found[0].price == pytest.approx(np.hypot(1.0, 0.25))
