@@ -9,6 +9,7 @@ from plant.errors import LogError, NoChannelError
 from plant.log.clock import FEWEST_SAMPLES, MOST_MISSING, Channels, Checked, long_enough, on_uniform_clock
 from plant.log.clock import Clock as Clock
 from plant.log.columns import TIME, TRUTH
+from plant.log.guess import absent
 from plant.log.notes import LogCode
 from plant.log.plausibility import implausible
 from plant.notes import Note
@@ -90,7 +91,7 @@ def _present(columns: Channels, required: Collection[str], source: str) -> None:
     missing = [wanted for wanted in required if not any(name in columns for name in alternatives(wanted))]
     if missing:
         known = ", ".join(columns) or "none that is known"
-        raise NoChannelError(f"column {' and '.join(missing)} is missing, the log has {known}", source)
+        raise NoChannelError(f"{absent(missing)}, the log has {known}", source)
     if set(columns) <= {TIME}:
         raise NoChannelError(f"at least one channel is needed beside {TIME}, the log has none that is known", source)
 

@@ -152,9 +152,17 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
     # those that no line holds leave the same single cells: the first of them stands for all
     tried = [one for one in DELIMITERS if one not in absent[1:]]
     block = max((_block(lines, one) for one in tried), key=lambda one: one.score)
-    if not block.score:
+    if not block.score or _header_parts_at_commas(lines, block):
         return _by_header(lines, encoding)
     return block.layout(lines, encoding)
+
+
+def _header_parts_at_commas(lines: Sequence[str], block: "_Block") -> bool:
+    """Return whether rows that read as one number each have the commas of the line above: `0,1` is two cells then."""
+    first, (cell, *others) = block.rows[0]
+    above = next((line for line in reversed(lines[:first]) if line.strip()), "")
+    commas = above.count(",")
+    return not others and cell.count(",") == commas > 0
 
 
 def _by_header(lines: Sequence[str], encoding: str) -> Layout:

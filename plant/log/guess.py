@@ -42,6 +42,7 @@ NAMES: Mapping[str, tuple[tuple[str, float], ...]] = {
             r"diff\w*_?(press|druck)|delta_?p|(press\w*|druck)_?diff|(^|_)dp(_|$)|(load|last)_?(press|druck)|(^|_)p_?(load|diff|l)(_|$)",
             5.0,
         ),
+        (r"^(pressure|press|druck)$", 2.5),
         (r"^(p|press\w*|druck)(_|$)", 1.0),
     ),
     "pressure_a_pa": ((r"(^|_)p(ress\w*)?_?(a|1)(_|$)|druck_?(a|1)(_|$)|(chamber|port|side|kammer)_?(a|1)(_|$)", 4.0),),
@@ -122,7 +123,7 @@ def points_by_name(heading: Heading, channel: str) -> float | None:
     fits = unit is not None and converts(unit, UNITS[channel])
     if unit is not None and not fits:
         return None
-    name = heading.stem
+    name = heading.stem.removesuffix("_pa") if unit == "pa" else heading.stem  # a unit, not a chamber A
     own = channel.removesuffix(unit_ending(UNITS[channel]))
     if name == own or heading.name == channel:
         said = 6.0
@@ -137,7 +138,7 @@ def points_by_name(heading: Heading, channel: str) -> float | None:
 
 
 _SUFFIX = re.compile(
-    r"(?:^|_)(rpm|mm_s|cm_s|m_s|rad_s|deg_s|mm|cm|um|ms|us|sec|bar|mbar|kpa|mpa|psi|pa|volts?|mv|rev_min)$"
+    r"(?:^|_)(rpm|mm_s|cm_s|m_s|rad_s|deg_s|mm|cm|um|ms|us|sec|bar|mbar|kpa|mpa|psi|(?<=_)pa|volts?|mv|rev_min)$"
 )
 
 
@@ -231,7 +232,37 @@ def missing_channels(wanted: Sequence[str], headings: Sequence[Heading], source:
     names = listed([one.name for one in headings])
     timeless = "; a log without time is read with --sample-time" if TIME in wanted else ""
     hint = hint_of([name for one in wanted for name in one.split(" or ")], headings)
-    return NoChannelError(f"column {' and '.join(wanted)} is missing, the log has {names}{hint}{timeless}", source)
+    return NoChannelError(f"{absent(wanted)}, the log has {names}{hint}{timeless}", source)
+
+
+def absent(wanted: Sequence[str]) -> str:
+    """Return the clause that says which columns are missing.
+
+    Examples
+    --------
+    >>> absent(["time_s"]), absent(["time_s", "position_m or velocity_m_s"])
+    ('column time_s is missing', 'columns time_s, and position_m or velocity_m_s are missing')
+    """
+    if len(wanted) == 1:
+        return f"column {wanted[0]} is missing"
+    return f"columns {', '.join(wanted[:-1])}, and {wanted[-1]} are missing"
+
+
+def overlooked(headings: Sequence[Heading], found: Collection[str]) -> tuple[Guess, ...]:
+    """Return columns left unread that may be what an estimate gains most by: pressure, or a second signal of motion.
+
+    Parameters
+    ----------
+    headings : sequence of Heading
+        Columns that were not read.
+    found : collection of str
+        Channels that were.
+    """
+    chambers = {"pressure_a_pa", "pressure_b_pa"}
+    known = "differential_pressure_pa" in found or chambers <= set(found)
+    wanted = [] if known else ["differential_pressure_pa", *sorted(chambers - set(found))]
+    wanted += [one for one in ("position_m", "velocity_m_s") if one not in found]
+    return tuple(one for one in guess_by_name(headings, wanted) if one.sure >= SHOWN and one.spec.isprintable())
 
 
 def hint_of(channels: Sequence[str], headings: Sequence[Heading]) -> str:

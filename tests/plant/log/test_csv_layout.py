@@ -88,3 +88,9 @@ def test_a_log_without_a_number_has_its_first_line_for_a_header_and_all_others_f
     made = layout("", "name;place", "press;hall", "lift;yard")
     assert (names(made), made.skipped, made.delimiter) == (["name", "place"], 2, ";")
     assert layout("name,place", "press,hall").skipped == 1
+
+
+def test_one_number_a_row_under_a_header_with_as_many_commas_is_two_cells() -> None:
+    made = layout("time_s,motor_speed_rad_s", "0,1", "1,x")
+    assert (names(made), made.delimiter, made.decimal_point) == (["time_s", "motor_speed_rad_s"], ",", ".")
+    assert layout("Weg", "0,1", "1,x").decimal_point == ","

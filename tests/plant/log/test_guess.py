@@ -1,11 +1,14 @@
+import warnings
 from pathlib import Path
 
 import pytest
 
-from plant.errors import LogError, MissingColumnError
+from plant.errors import LogError, LogWarning, MissingColumnError
 from plant.log.files import read_record
 from plant.log.guess import guess_by_name
 from plant.log.headings import Heading
+from plant.log.notes import LogCode
+from plant.notes import Note
 
 ROWS = "\n".join(f"{0.001 * k:.3f},{k % 7},{k % 5}" for k in range(20))
 
@@ -20,6 +23,8 @@ ROWS = "\n".join(f"{0.001 * k:.3f},{k % 7},{k % 5}" for k in range(20))
         ("Kolbenweg (mm)", "position_m"),
         ("PistonVelocity", "velocity_m_s"),
         ("Delta p / bar", "differential_pressure_pa"),
+        ("Druck", "differential_pressure_pa"),
+        ("pressure_pa", "differential_pressure_pa"),
         ("p_A [bar]", "pressure_a_pa"),
         ("Chamber B pressure [psi]", "pressure_b_pa"),
     ],
@@ -45,7 +50,7 @@ def test_a_missing_column_is_refused_with_headers_guess_and_the_command(tmp_path
     with pytest.raises(LogError) as caught:
         read_record(path)
     said = str(caught.value)
-    assert "column motor_speed_rad_s and position_m or velocity_m_s is missing, the log has 'Zeit [s]'" in said
+    assert "columns motor_speed_rad_s, and position_m or velocity_m_s are missing, the log has 'Zeit [s]'" in said
     assert "perhaps --columns 'position_m=Weg [mm]:mm,motor_speed_rad_s=n_Mot [rpm]:rpm'" in said
     assert "`hydrostate inspect FILE`" in said
 
@@ -55,3 +60,34 @@ def test_a_column_that_was_asked_for_and_is_not_there_is_refused_likewise(tmp_pa
     path.write_text("time_s,motor_speed_rpm,Weg [mm]\n" + ROWS)
     with pytest.raises(MissingColumnError, match=r"perhaps --columns 'position_m=Weg \[mm\]:mm'.*inspect FILE"):
         read_record(path, columns={"position_m": "POS:mm"})
+
+
+def notes_of(tmp_path: Path, header: str) -> list[Note]:
+    path = tmp_path / "run.csv"
+    path.write_text(header + "\n" + "\n".join(f"{0.001 * k:.3f},{k % 7},{0.01 * (k % 5)},{k % 3}" for k in range(99)))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        read_record(path)
+    return [one.message.note for one in caught if isinstance(one.message, LogWarning)]
+
+
+@pytest.mark.parametrize(
+    ("name", "option"),
+    [
+        ("dp", "differential_pressure_pa=dp:UNIT"),
+        ("Druck [bar]", "differential_pressure_pa=Druck [bar]:bar"),
+        ("p_A [bar]", "pressure_a_pa=p_A [bar]:bar"),
+        ("piston velocity [mm/s]", "velocity_m_s=piston velocity [mm/s]:mm/s"),
+    ],
+)
+def test_a_column_that_was_left_unread_and_may_be_needed_is_named(tmp_path: Path, name: str, option: str) -> None:
+    (told,) = notes_of(tmp_path, f"time_s,motor_speed_rad_s,position_m,{name}")
+    channel = option.partition("=")[0]
+    assert told == LogCode.COLUMN_OVERLOOKED.note(column=name, channel=channel, option=option)
+
+
+@pytest.mark.parametrize("name", ["differential_pressure_pa", "dp_set", "temperature [degC]", "y"])
+def test_other_columns_are_left_unread_without_a_word(tmp_path: Path, name: str) -> None:
+    assert LogCode.COLUMN_OVERLOOKED not in [
+        one.code for one in notes_of(tmp_path, f"time_s,motor_speed_rad_s,position_m,{name}")
+    ]
