@@ -55,7 +55,7 @@ def trusted(
     """
     notes: list[Note] = []
     with np.errstate(over="ignore", invalid="ignore"):  # a hostile 1e308 is refused or noted like others
-        complete = _derived(columns)
+        complete = _derived(columns, notes)
         _present(complete, [TIME, *required], source)
         long_enough(complete, source)
         _finite(complete, source)
@@ -120,10 +120,16 @@ def _share(count: int, total: int) -> str:
     return f"{count} of {total} samples ({100.0 * count / total:.2g} %)"
 
 
-def _derived(channels: Channels) -> Channels:
-    wanted, a, b = "differential_pressure_pa", "pressure_a_pa", "pressure_b_pa"
-    if wanted in channels or a not in channels or b not in channels:
+def _derived(channels: Channels, notes: list[Note]) -> Channels:
+    wanted, chambers = "differential_pressure_pa", ("pressure_a_pa", "pressure_b_pa")
+    logged = [one for one in chambers if one in channels]
+    if wanted in channels or not logged:
         return channels
+    if len(logged) == 1:
+        (other,) = set(chambers) - set(logged)
+        notes.append(LogCode.CHAMBER_ALONE.note(channel=logged[0], other=other))
+        return channels
+    a, b = chambers
     return {**channels, wanted: channels[a] - channels[b]}
 
 

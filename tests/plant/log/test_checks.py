@@ -264,7 +264,9 @@ def test_differential_pressure_is_derived_from_both_port_pressures() -> None:
     measured = 2.1e4 * SPEED
     kept = check(pressure_a_pa=a, pressure_b_pa=b, differential_pressure_pa=measured)
     np.testing.assert_array_equal(kept.channels["differential_pressure_pa"], measured)
-    assert "differential_pressure_pa" not in check(pressure_a_pa=a).channels
+    alone = check(pressure_a_pa=a)
+    assert "differential_pressure_pa" not in alone.channels
+    assert LogCode.CHAMBER_ALONE.note(channel="pressure_a_pa", other="pressure_b_pa") in alone.notes
 
 
 def test_the_clock_of_the_writer_is_used_only_where_the_times_agree_with_it() -> None:
