@@ -174,7 +174,7 @@ def read(
     plant.errors.LogError: none.csv: there is no such file
     """
     from experiments.actuators import DEFAULT, actuator
-    from experiments.command.logs import read_log
+    from experiments.command.logs import overheard, read_log
     from experiments.log_pages.log import ANY, options_by_name
     from plant.errors import NoChannelError
     from plant.log.any_columns import read_any
@@ -190,8 +190,9 @@ def read(
     more: dict[str, Any] = {"sample_time": sample_time, "beside": others}
     file = Path(path) if isinstance(path, str | Path) else frame_table(path)
     try:
-        with options_by_name():
-            return Log(read_log(file, bench.columns, dict(columns or {}), kind.required, **more), bench, kind.name)
+        with options_by_name(), overheard() as said:
+            record = read_log(file, bench.columns, dict(columns or {}), kind.required, **more)
+        return Log(record, bench, kind.name, said)
     except NoChannelError:
         if rig is not None or columns is not None or plant is not None or others:
             raise

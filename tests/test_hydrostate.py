@@ -56,6 +56,16 @@ def test_a_table_is_the_log_that_its_file_is(log: hs.Log, file: Path) -> None:
     assert hs.read(table.reset_index(drop=True), sample_time=1e-3).diagnose().condition == "minor_leakage"
 
 
+def test_a_report_says_what_reading_the_log_brought_up(log: hs.Log, tmp_path: Path) -> None:
+    whole = log.between(0.0, 1.0).to_frame().drop(columns=["pressure_a_pa", "pressure_b_pa"])
+    table = whole.rename(columns={"differential_pressure_pa": "dp"})
+    with pytest.warns(LogWarning, match="column 'dp' was not used, but it may be differential_pressure_pa"):
+        read = hs.read(table)
+    for part in (read, read.between(0.0, 0.9)):
+        part.estimate().report(tmp_path / "page.html")
+        assert "&#39;dp&#39; was not used" in (tmp_path / "page.html").read_text("utf-8")
+
+
 def test_estimate_and_diagnosis_are_one_answer(log: hs.Log, verdict: hs.Answer) -> None:
     found = log.estimate()
     assert found.believed

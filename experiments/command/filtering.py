@@ -7,10 +7,9 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.command.logs import caught, with_rig_columns
+from experiments.command.logs import noted, with_rig_columns
 from experiments.command.terminal import note
 from plant.errors import LogError
-from plant.notes import distinct
 
 if TYPE_CHECKING:
     import numpy as np
@@ -101,13 +100,11 @@ class Filtering:
 
         rest = iter(lines)
         header = next((line for line in rest if line.strip()), "")
-        with caught() as said:
-            stream = with_rig_columns(
-                lambda mapping: CsvStream(chain([header], rest), mapping, source=self.source), *self.columns
-            )
-        for one in distinct(warning.note for warning in said):
-            note(f"{self.source}: warning: {one}")
-        return stream
+
+        def opened(mapping: Mapping[str, str]) -> CsvStream:
+            return CsvStream(chain([header], rest), mapping, source=self.source)
+
+        return noted(self.source, lambda: with_rig_columns(opened, *self.columns))
 
     def _pieces(self, stream: "CsvStream") -> "Iterator[tuple[float, NDArray[np.float64], bool]]":
         """Yield rows; together those that a filter begins with, first and after a gap."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from experiments.command.json_output import Result, prepare_output, write_whole
-from experiments.command.logs import finish, read_log, run_logs
+from experiments.command.logs import finish, overheard, read_log, run_logs, with_said
 from experiments.command.options import figure_path, load_actuator, load_columns, understood
 from experiments.command.terminal import clauses, note
 from plant.errors import HydrostateError, require_known
@@ -63,7 +63,8 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     about |= {"condition": options["condition"]} if "condition" in options else {}
 
     def work(log: Path) -> Result:
-        record = read(log, beside)
+        with overheard() as said:
+            record = read(log, beside)
         found = chosen.run(record, rig, prepared)
         result: dict[str, Any] = {**chosen.blank, **about, **chosen.entries(found)}
         result["message"] = clauses([result["message"], *_agreement(result, found)])
@@ -72,7 +73,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
             chosen.figure(found, log.name, figure)
         page = figure_path(report, log, len(logs))
         if page is not None:
-            write_whole(page, page_of(chosen, {"file": str(log), **result}, found, record), "--report")
+            write_whole(page, page_of(chosen, with_said({"file": str(log), **result}, said), found, record), "--report")
         return result
 
     batch = run_logs(logs, work, {**chosen.blank, **about}, doing)

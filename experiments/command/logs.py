@@ -88,6 +88,55 @@ def caught() -> Generator[list[LogWarning]]:
             said += [one.message for one in raised if isinstance(one.message, LogWarning)]
 
 
+@contextmanager
+def overheard() -> Generator[list[LogWarning]]:
+    """Catch what is said of a log, as `caught` does, and say it again to whoever listens outside."""
+    said: list[LogWarning] = []
+    try:
+        with caught() as said:
+            yield said
+    finally:
+        for one in said:
+            warnings.warn(one, stacklevel=3)
+
+
+def noted(source: str, read: Callable[[], T]) -> T:
+    """Return what is read; what the reader should know of it goes to standard error.
+
+    Parameters
+    ----------
+    source : str
+        What the log or the stream is called.
+    read : callable
+        Reads it.
+
+    Returns
+    -------
+    object
+        What `read` returned.
+    """
+    with caught() as said:
+        found = read()
+    for one in distinct(warning.note for warning in said):
+        note(f"{source}: warning: {one}")
+    return found
+
+
+def with_said(result: Result, said: Iterable[LogWarning]) -> dict[str, Any]:
+    """Return the entries of a log with what reading it brought up, in front of its other warnings and notes.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries, with ``warnings`` and ``notes`` or without.
+    said : iterable of LogWarning
+        What was said; each remark counts once.
+    """
+    raised = distinct(one.note for one in said)
+    told = list(dict.fromkeys([*map(str, raised), *result.get("warnings", ())]))
+    return {**result, "warnings": told, "notes": [*(one.to_dict() for one in raised), *result.get("notes", ())]}
+
+
 def _one(log: Path, work: Work, blank: Result) -> Result:
     with caught() as said_of_it:
         try:
@@ -96,14 +145,12 @@ def _one(log: Path, work: Work, blank: Result) -> Result:
             result = _failure(blank, error.message if error.source == str(log) else str(error))
         except Exception as error:  # whatever a log brings up must not cost the others their results
             result = _failure(blank, unexpected(error))
-    raised = distinct(one.note for one in said_of_it)
-    said = list(dict.fromkeys([*map(str, raised), *result.get("warnings", ())]))
-    notes = [*(one.to_dict() for one in raised), *result.get("notes", ())]
-    for sentence in said:
+    result = with_said(result, said_of_it)
+    for sentence in result["warnings"]:
         note(f"{log}: warning: {sentence}")
     if result["outcome"] in {"failed", "diverged"}:
         note(f"{log}: {result['message']}")
-    return {"file": str(log), **result, "warnings": said, "notes": notes}
+    return {"file": str(log), **result}
 
 
 def _failure(blank: Result, message: str) -> dict[str, Any]:

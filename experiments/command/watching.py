@@ -1,18 +1,17 @@
 """What `hydrostate watch` does with a stream: rows to samples, and samples to a watch."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
-from experiments.command.logs import caught, read_log, with_rig_columns
+from experiments.command.logs import noted, read_log, with_rig_columns
 from experiments.command.options import PRESSURE
 from experiments.command.terminal import note
 from experiments.command.watch_told import Told
 from plant.errors import LogError
 from plant.log.stream_source import Received, stream_lines
-from plant.notes import distinct
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
     from faults.watch.watch import Watch
     from plant.eha.rig import Rig
     from plant.log.record import Record
-
-T = TypeVar("T")
 
 SAME_RATE = 0.01
 """By how much the rates of a healthy log and of what is watched may differ [fraction]."""
@@ -168,7 +165,7 @@ def watch_rows(told: Told, lines: Iterable[str], asked: Asked, source: str, stat
     def opened(mapping: Mapping[str, str]) -> CsvStream:
         return CsvStream(chain([header], rest), mapping, source=source)
 
-    stream = _noted(source, lambda: with_rig_columns(opened, asked.bench.columns, asked.columns))
+    stream = noted(source, lambda: with_rig_columns(opened, asked.bench.columns, asked.columns))
     _, pressure = _samples(dict.fromkeys(stream.channels, np.empty(0)), stream.sample_time, source)
     watch, travelled = _begun(asked, stream.sample_time, pressure, stream.start_time, source, state)
     T = watch.sample_time
@@ -235,13 +232,4 @@ def _samples(
 
 
 def _read(path: Path, asked: Asked) -> "Record":
-    return _noted(str(path), lambda: read_log(path, asked.bench.columns, asked.columns))
-
-
-def _noted(source: str, read: Callable[[], T]) -> T:
-    """Return what is read; what the reader should know of it goes to standard error."""
-    with caught() as said:
-        found = read()
-    for one in distinct(warning.note for warning in said):
-        note(f"{source}: warning: {one}")
-    return found
+    return noted(str(path), lambda: read_log(path, asked.bench.columns, asked.columns))

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from estimation.notes import RigCode
-from experiments.page.words import sentence
+from experiments.page.words import left_unread, sentence
 from faults.conditions import CONDITIONS
 from faults.notes import AdviceCode
 
@@ -141,11 +141,11 @@ def what_to_do(result: Mapping[str, Any]) -> list[str]:
     Returns
     -------
     list[str]
-        Work on the actuator first, then how to log next.
+        Work on the actuator first, then how to read this log, then how to log next.
     """
     found: list[str] = []
     if not result["unknown"]:
         condition = CONDITIONS[result["condition"]]
         work = WORK_ON_LEAKAGE.get(condition.leakage), WORK_ON_FRICTION.get(condition.friction)
         found += [one for one in work if one] or ([] if _soft_oil(result) else ["Nothing needs repair."])
-    return [*found, *(sentence(one) for one in result["advice"])]
+    return [*found, *left_unread(result), *(sentence(one) for one in result["advice"])]

@@ -10,7 +10,7 @@ from experiments.log_pages.channels import channel_charts
 from experiments.page.numbers import MISSING, number, percent_said, pretty_unit
 from experiments.page.render import render_page
 from experiments.page.tables import Column
-from experiments.page.words import sentence
+from experiments.page.words import left_unread, sentence
 
 if TYPE_CHECKING:
     from estimation.finding import Finding, Quantity
@@ -37,22 +37,24 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
     Parameters
     ----------
     result : Mapping
-        Its entries: ``file``, ``rig``, ``message`` and others.
+        Its entries: ``file``, ``rig``, ``message``, ``notes`` and others.
     """
     shown = {**found.quantities, **found.severities}
     shares = sorted(found.probabilities.items(), key=lambda item: -item[1])
     file = Path(result["file"]).name
+    advice = [sentence(str(note)) for note in found.advice]
+    noted = [sentence(one["text"]) for one in result["notes"]]
     facts = {
         "result": result,
         "file": file,
         "title": _title(found),
         "actuator": found.actuator,
         "message": sentence(result["message"]),
-        "to_do": [sentence(str(note)) for note in found.advice],
+        "to_do": [*left_unread(result), *advice],
         "doubts": [sentence(one) for one in dict.fromkeys(map(str, (*found.against, *found.gate.reasons)))],
         "duration": f"{record.duration:g}",
         "channels": ", ".join(found.channels),
-        "notes": [sentence(str(note)) for note in found.all_notes if note not in found.advice],
+        "notes": [one for one in noted if one not in left_unread(result) and one not in advice],
         "quantities": pd.DataFrame([_row(name, one) for name, one in shown.items()]),
         "probabilities": pd.DataFrame(
             [(name.replace("_", " "), percent_said(share)) for name, share in shares if share >= LEAST_SHARE],

@@ -1,7 +1,7 @@
 """A log in the hands of a Python user: its channels, and the verbs that say what it holds."""
 
 import re
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from estimation.finding import Finding
     from experiments.log_pages.relation import Relation
     from plant.eha.rig import Rig
+    from plant.errors import LogWarning
     from plant.log.record import Record
 
 
@@ -89,8 +90,10 @@ def known_options(options: Mapping[str, Any], known: Mapping[str, Any], verb: st
 class Log(Shown):
     """A log of one actuator."""
 
-    def __init__(self, record: "Record", rig: "Rig[Any]", plant: str = "eha") -> None:
-        self.record, self.rig, self.plant = record, rig, plant
+    def __init__(
+        self, record: "Record", rig: "Rig[Any]", plant: str = "eha", said: "Sequence[LogWarning]" = ()
+    ) -> None:
+        self.record, self.rig, self.plant, self._said = record, rig, plant, tuple(said)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -132,7 +135,7 @@ class Log(Shown):
         first, last = (round((at - self.record.start_time) / self.sample_time) for at in (begin, end))
         if not 0 <= first < last:
             refuse(f"a part of the log is needed from an earlier to a later time, got {begin:g} s to {end:g} s")
-        return Log(self.record.slice(first, last + 1), self.rig, self.plant)
+        return Log(self.record.slice(first, last + 1), self.rig, self.plant, self._said)
 
     def estimate(self, **options: Any) -> "Answer":
         """Estimate what cannot be measured: effective bulk modulus, leakage, and what the actuator's kind adds.
@@ -222,9 +225,10 @@ class Log(Shown):
 
         def page(title: str) -> str:
             from experiments.command.log_verb import page_of
+            from experiments.command.logs import with_said
 
             about = {"file": title, "plant": self.plant, "rig": rig.name, "seed": 2024, "expected": None}
-            return page_of(chosen, {**about, **entries}, found, self.record)
+            return page_of(chosen, with_said({**about, **entries}, self._said), found, self.record)
 
         return Answer(found, entries, lambda rows: chosen.screen(rows, asked), page)
 

@@ -1,7 +1,11 @@
 """Names in results as a reader wants them."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from experiments.page.condition_names import in_words
 from experiments.page.tables import Cell, Column
+from plant.log.notes import LogCode
 
 
 def in_short(condition: str) -> str:
@@ -27,6 +31,18 @@ def sentence(said: str) -> str:
     'Check the rig file.'
     """
     return f"{said[:1].upper()}{said[1:].rstrip('.')}."
+
+
+def left_unread(result: Mapping[str, Any]) -> list[str]:
+    """Return what to do about columns that were not used though they may be needed, as sentences.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of a log; its ``notes`` have what reading it brought up.
+    """
+    codes = (LogCode.COLUMN_OVERLOOKED, LogCode.CHAMBER_ALONE)
+    return [sentence(one["text"]) for one in result.get("notes", ()) if one["code"] in codes]
 
 
 CONDITION = Column("condition", words=lambda name: Cell(in_words(name), "name"))

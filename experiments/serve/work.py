@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.command.json_output import plain
 from experiments.command.log_verb import page_of
-from experiments.command.logs import caught, read_log
+from experiments.command.logs import caught, overheard, read_log, with_said
 from experiments.command.options import load_actuator
 from experiments.command.terminal import clauses, unexpected
 from plant.atomic import replacing
 from plant.errors import HydrostateError
-from plant.notes import distinct
 
 if TYPE_CHECKING:
     from experiments.actuator_kind import ActuatorKind, LogVerb
@@ -125,21 +124,19 @@ def work_on(task: Task) -> Worked:
             worked = _failed(task, blank, error.message if error.source == str(task.log) else str(error))
         except Exception as error:  # whatever a log brings up is told to whoever sent it
             worked = _failed(task, blank, unexpected(error))
-    raised = distinct(one.note for one in said)
-    told = list(dict.fromkeys([*map(str, raised), *worked.result.get("warnings", ())]))
-    notes = [*(one.to_dict() for one in raised), *worked.result.get("notes", ())]
-    result = plain({"file": task.name, **worked.result, "warnings": told, "notes": notes})
+    result = plain({"file": task.name, **with_said(worked.result, said)})
     return Worked(_without_path(result, task), plain(worked.entries))
 
 
 def _found(task: Task) -> Worked:
     kind, bench, chosen, rig, prepared = _prepared(task.plant, task.rig, task.verb)
-    record = read_log(task.log, bench.columns, dict(task.columns), kind.required)
+    with overheard() as said:
+        record = read_log(task.log, bench.columns, dict(task.columns), kind.required)
     task.phase.write_text(WORKING, encoding="utf-8")
     found = chosen.run(record, rig, prepared)
     result = {**chosen.blank, "plant": kind.name, "rig": bench.name, **chosen.entries(found)}
     task.phase.write_text(WRITING, encoding="utf-8")
-    _write(task, page_of(chosen, {"file": task.name, **result}, found, record))
+    _write(task, page_of(chosen, with_said({"file": task.name, **result}, said), found, record))
     if task.verb != "diagnose":
         return Worked(result, None)
     if kind.name == "eha":

@@ -1,6 +1,7 @@
 """Rows of a CSV that is still being written: lines in, samples on a uniform clock out."""
 
 import csv
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain, islice, pairwise
 from statistics import median
@@ -8,9 +9,11 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.errors import LogError
+from plant.errors import LogError, LogWarning
 from plant.log.cells import not_a_number, number, wrong_width
 from plant.log.columns import TIME, TRUTH, Column, resolve_columns
+from plant.log.guess import overlooked
+from plant.log.headings import cleaned
 
 FIRST_ROWS = 50
 """Rows from which the time between samples is found."""
@@ -38,6 +41,11 @@ class CsvStream:
         If there is no header, a column is missing or of an unknown unit, the first rows are broken or fewer than two,
         or time does not increase.
 
+    Warns
+    -----
+    LogWarning
+        If a column that was not read may be pressure, or a second signal of motion.
+
     Examples
     --------
     >>> rows = ["time_s,motor_speed_rpm,position_m\n", "0.0,60,0\n", "0.1,60,0\n", "0.2,60,0\n"]
@@ -60,6 +68,10 @@ class CsvStream:
         if not time:
             raise LogError(f"a column {TIME} is needed, or in another unit as time_ms, got {', '.join(names)}", source)
         self._columns = time + [one for one in columns if one.channel != TIME]
+        read = {one.position for one in columns}
+        left = [heading for place, heading in enumerate(cleaned(names)) if place not in read]
+        for said in overlooked(left, [one.channel for one in columns]):
+            warnings.warn(LogWarning(said, source), stacklevel=2)
         self.channels = tuple(one.channel for one in self._columns[1:])
         """Channels of the samples, in order."""
         self.cut = False

@@ -9,6 +9,8 @@ import numpy as np
 from plant.errors import NoChannelError
 from plant.log.columns import CHANNELS, TIME, UNITS, listed, unit_ending
 from plant.log.headings import Heading
+from plant.log.notes import LogCode
+from plant.notes import Note
 from plant.units import converts
 
 NAMES: Mapping[str, tuple[tuple[str, float], ...]] = {
@@ -248,8 +250,8 @@ def absent(wanted: Sequence[str]) -> str:
     return f"columns {', '.join(wanted[:-1])}, and {wanted[-1]} are missing"
 
 
-def overlooked(headings: Sequence[Heading], found: Collection[str]) -> tuple[Guess, ...]:
-    """Return columns left unread that may be what an estimate gains most by: pressure, or a second signal of motion.
+def overlooked(headings: Sequence[Heading], found: Collection[str]) -> tuple[Note, ...]:
+    """Return notes on columns left unread that may be what an estimate gains most by: pressure, or a second motion.
 
     Parameters
     ----------
@@ -262,7 +264,12 @@ def overlooked(headings: Sequence[Heading], found: Collection[str]) -> tuple[Gue
     known = "differential_pressure_pa" in found or chambers <= set(found)
     wanted = [] if known else ["differential_pressure_pa", *sorted(chambers - set(found))]
     wanted += [one for one in ("position_m", "velocity_m_s") if one not in found]
-    return tuple(one for one in guess_by_name(headings, wanted) if one.sure >= SHOWN and one.spec.isprintable())
+    notes = []
+    for one in guess_by_name(headings, wanted):
+        if one.sure >= SHOWN and one.spec.isprintable():
+            option = f"{one.channel}={one.spec[:60]}{':UNIT' if one.unit is None else ''}"
+            notes.append(LogCode.COLUMN_OVERLOOKED.note(column=one.name[:60], channel=one.channel, option=option))
+    return tuple(notes)
 
 
 def hint_of(channels: Sequence[str], headings: Sequence[Heading]) -> str:

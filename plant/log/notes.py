@@ -31,7 +31,7 @@ class LogCode(Code):
     CHANNEL_LEFT_OUT = "{channel} is missing in {count} of {total} samples ({percent:.2g} %); the channel is not used"
     COLUMNS_ABSENT = "the rig file names columns that the log does not have: {columns}"
     COLUMN_OVERLOOKED = "column {column!r} was not used, but it may be {channel}; if it is, add --columns '{option}'"
-    CHAMBER_ALONE = "{channel} was not used: differential pressure needs {other} too"
+    CHAMBER_ALONE = "the pressure of one chamber alone, {channel}, was not used: differential pressure needs {other}"
     METADATA_UNREADABLE = "the log's metadata are not a valid {wanted} and were ignored"
     SAMPLE_TIME_SHORT = (
         "the sample time is {sample_time_s:.3g} s, which is unusually short: check the unit (s read as ms?)"

@@ -1,6 +1,6 @@
 """The tables of a log, a logger or a group each: which column is which, when its rows were taken, one clock."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,6 @@ from plant.log.columns import TIME, TRUTH, Column, converted, listed, resolve_co
 from plant.log.guess import hint_of, missing_channels, overlooked
 from plant.log.headings import Heading, cleaned
 from plant.log.merging import Timed, merged
-from plant.log.notes import LogCode
 from plant.log.table import Table
 from plant.notes import Note
 
@@ -91,8 +90,8 @@ def gathered(
     return Gathered(columns, began, (*_overlooked(chosen, tables), *together.notes))
 
 
-def _overlooked(chosen: Chosen, tables: Sequence[Table]) -> Iterator[Note]:
-    """Yield a note for each column that was left unread and may be a channel that the log seems to lack."""
+def _overlooked(chosen: Chosen, tables: Sequence[Table]) -> tuple[Note, ...]:
+    """Return a note for each column that was left unread and may be a channel that the log seems to lack."""
     read = {id(table): {column.position for column in columns} for table, columns in chosen}
     left = [
         heading
@@ -100,11 +99,7 @@ def _overlooked(chosen: Chosen, tables: Sequence[Table]) -> Iterator[Note]:
         for place, heading in enumerate(table.headings)
         if place not in read.get(id(table), ())
     ]
-    for one in overlooked(left, [column.channel for _, columns in chosen for column in columns]):
-        unit = ":UNIT" if one.unit is None else ""
-        yield LogCode.COLUMN_OVERLOOKED.note(
-            column=one.name[:60], channel=one.channel, option=f"{one.channel}={one.spec[:60]}{unit}"
-        )
+    return overlooked(left, [column.channel for _, columns in chosen for column in columns])
 
 
 def resolve_tables(tables: Sequence[Table], mapping: Mapping[str, str] | None, source: str) -> Chosen:

@@ -1,5 +1,7 @@
 """One log with its figure and its page; files of other loggers go with one log."""
 
+import html
+import json
 from pathlib import Path
 
 import pytest
@@ -28,6 +30,21 @@ def test_an_estimate_is_drawn_and_written_as_a_page_where_asked(log: Path, tmp_p
     page = (tmp_path / "run.html").read_text("utf-8")
     assert "run.csv" in page
     assert "bulk modulus" in page
+
+
+@pytest.mark.parametrize("verb", ["estimate", "diagnose"])
+def test_a_page_says_first_what_reading_the_log_brought_up(verb: str, log: Path, tmp_path: Path) -> None:
+    rows = [line.split(",")[:5] for line in log.read_text().splitlines()[:1000]]  # without the chambers' pressures
+    assert rows[0][4] == '"differential_pressure_pa"'
+    rows[0][4] = "dp"
+    (tmp_path / "other.csv").write_text("\n".join(map(",".join, rows)) + "\n")
+    done = invoke(verb, tmp_path / "other.csv", "--report", tmp_path / "page.html", "--json")
+    assert done.exit_code == 0, done.output
+    (told,) = json.loads(done.stdout)
+    (said,) = [one["text"] for one in told["notes"] if one["code"] == "column_overlooked"]
+    assert told["warnings"].count(said) == 1
+    page = html.unescape((tmp_path / "page.html").read_text("utf-8"))
+    assert f"<li>C{said[1:]}." in page
 
 
 def test_files_of_other_loggers_go_with_one_log(log: Path, tmp_path: Path) -> None:

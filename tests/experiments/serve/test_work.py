@@ -35,6 +35,16 @@ def test_another_actuator_s_log_gets_its_condition_its_page_and_a_row(stack_log:
     assert (tmp_path / "phase").read_text(encoding="utf-8") == work.WRITING
 
 
+def test_the_page_says_what_reading_the_log_brought_up(tmp_path: Path) -> None:
+    log = tmp_path / "other.csv"
+    words = ["simulate", "--duration", "1", "--sample-time", "0.001", "--out", str(log)]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    log.write_text(log.read_text().replace("differential_pressure_pa", "x").replace("pressure_b_pa", "y"))
+    found = work_on(task(log, tmp_path, plant="eha", verb="estimate"))
+    assert [one["code"] for one in found.result["notes"]].count("chamber_alone") == 1
+    assert "differential pressure needs pressure_b_pa.</li>" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
 def test_an_estimate_has_no_row_and_no_place_on_the_server_is_told(stack_log: Path, tmp_path: Path) -> None:
     found = work_on(task(stack_log, tmp_path, verb="estimate"))
     assert found.entries is None

@@ -3,7 +3,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from plant.errors import LogError
+from plant.errors import LogError, LogWarning
 from plant.log.csv_stream import CsvStream
 
 HEADER = "time_ms,motor_speed_rpm,position_mm\n"
@@ -107,3 +107,9 @@ def test_blank_lines_and_quoted_cells_are_read() -> None:
     (time, samples, _), *more = _taken(lines, most=20)
     assert (time, more) == (pytest.approx(0.011), [])
     np.testing.assert_allclose(samples[:, 0], 2.0 * np.pi * np.arange(12))
+
+
+def test_a_column_that_was_left_unread_and_may_be_pressure_is_named() -> None:
+    lines = ["time_ms,motor_speed_rpm,position_mm,Druck [bar]\n", *(f"{k},1,2,3\n" for k in range(5))]
+    with pytest.warns(LogWarning, match=r"column 'Druck \[bar\]' was not used, but it may be differential_pressure_pa"):
+        CsvStream(lines, source="bench")
