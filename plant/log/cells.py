@@ -10,8 +10,12 @@ from plant.arrays import Array
 from plant.errors import LogError
 from plant.log.columns import TRUTH, Column
 
-MISSING = ("", "NaN", "nan", "-NaN", "-nan", "NA", "N/A", "n/a", "#N/A", "NULL", "null", "None")
-"""Cells that say that nothing was measured."""
+MISSING = (
+    *("", "NaN", "nan", "NAN", "-NaN", "-nan", "NA", "N/A", "n/a", "NULL", "null", "None"),
+    *("-", "--", "---", "OL", "#N/A", "#NUM!", "#DIV/0!", "#VALUE!", "#REF!"),
+    *("1.#QNAN", "1.#IND", "-1.#IND", "-nan(ind)"),
+)
+"""Cells that say that nothing was measured, as loggers, multimeters, spreadsheets and C write it."""
 
 
 def number(text: str) -> float:

@@ -3,22 +3,22 @@
 import csv
 import gzip
 import io
-from array import array
+import warnings
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO, cast
 
-import numpy as np
 import pyarrow as pa
 from pyarrow import csv as arrow_csv
 
 from plant.arrays import Array
-from plant.errors import LogError
+from plant.errors import LogError, LogWarning
 from plant.log.arrow import from_arrow, to_arrow
-from plant.log.cells import MISSING, not_a_number, number, wrong_width
-from plant.log.columns import TRUTH, Column
+from plant.log.cells import MISSING, not_a_number
+from plant.log.columns import Column
+from plant.log.csv_cells import read_cells
 from plant.log.csv_layout import BLANKS, Layout, layout_of
 from plant.log.packed import opened, packing_of
 from plant.log.table import Table
@@ -145,30 +145,14 @@ def _rows(text: TextIO, layout: Layout) -> Iterator[list[str]]:
 
 def _read_cells(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
     """Read what pyarrow will not, or say in which row and column it is no number."""
-    stamped = [column for column in chosen if column.position in layout.stamped]
-    cells: dict[Column, Any] = {column: [] if column in stamped else array("d") for column in chosen}
     try:
         with _text(path, layout) as text:
-            for row, values in enumerate(values for values in _rows(text, layout) if values):
-                if len(values) != len(layout.headings):
-                    raise wrong_width(str(path), len(layout.headings), len(values), row)
-                for column in list(cells):
-                    if column in stamped:
-                        cells[column].append(values[column.position])
-                    else:
-                        _append(cells, column, values[column.position], layout, path, row)
+            found = read_cells(_rows(text, layout), layout, chosen, str(path))
     except csv.Error as error:
         raise LogError(f"cannot be read as CSV: {error}", str(path)) from error
+    for said in found.notes:
+        warnings.warn(LogWarning(said, str(path)), stacklevel=2)
     return {
-        column: _stamps(values, column, path) if column in stamped else np.frombuffer(values, dtype=np.float64)
-        for column, values in cells.items()
+        column: _stamps(values, column, path) if column.position in layout.stamped else values
+        for column, values in found.columns.items()
     }
-
-
-def _append(cells: dict[Column, Any], column: Column, cell: str, layout: Layout, path: Path, row: int) -> None:
-    try:
-        cells[column].append(number(cell if layout.decimal_point == "." else cell.replace(",", ".")))
-    except ValueError as error:
-        if not column.channel.startswith(TRUTH):
-            raise not_a_number(str(path), column.name, row, cell) from error
-        del cells[column]

@@ -29,6 +29,8 @@ class LogCode(Code):
     SAMPLES_MASKED = "{channel} is missing in {count} of {total} samples ({percent:.2g} %); those samples are not used"
     CHANNEL_SLOWER = "{channel} has one value in {rows} rows"
     CHANNEL_LEFT_OUT = "{channel} is missing in {count} of {total} samples ({percent:.2g} %); the channel is not used"
+    LINES_SKIPPED = "lines among the rows that hold a comment or the header again were skipped: {count}"
+    END_LEFT_OUT = "lines after row {taken}, the last one of data, were left out: {count}"
     COLUMNS_ABSENT = "the rig file names columns that the log does not have: {columns}"
     COLUMN_OVERLOOKED = "column {column!r} was not used, but it may be {channel}; if it is, add --columns '{option}'"
     CHAMBER_ALONE = "the pressure of one chamber alone, {channel}, was not used: differential pressure needs {other}"
