@@ -3,7 +3,6 @@
 import csv
 import gzip
 import io
-import warnings
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import islice
@@ -14,11 +13,11 @@ import pyarrow as pa
 from pyarrow import csv as arrow_csv
 
 from plant.arrays import Array
-from plant.errors import LogError, LogWarning
+from plant.errors import LogError
 from plant.log.arrow import from_arrow, to_arrow
-from plant.log.cells import MISSING, not_a_number
+from plant.log.cells import MISSING
 from plant.log.columns import Column
-from plant.log.csv_cells import read_cells
+from plant.log.csv_cells import read_cells, stamps
 from plant.log.csv_layout import BLANKS, Layout, layout_of
 from plant.log.packed import opened, packing_of
 from plant.log.table import Table
@@ -121,19 +120,11 @@ def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Col
     out: dict[Column, Array] = {}
     for column, label in zip(chosen, wanted, strict=True):
         if label in texts:
-            out[column] = _stamps(table.column(label).to_pylist(), column, path)
+            out[column] = stamps(table.column(label).to_pylist(), column, str(path))
         else:
             out[column] = from_arrow(table.column(label))
         table = table.drop_columns([label])  # hands each column's memory back before the next is copied
     return out
-
-
-def _stamps(cells: Sequence[str | None], column: Column, path: Path) -> Any:
-    from plant.log.stamps import read_stamps
-
-    return read_stamps(
-        [cell or "" for cell in cells], lambda row, cell: not_a_number(str(path), column.name, row, cell)
-    )
 
 
 def _rows(text: TextIO, layout: Layout) -> Iterator[list[str]]:
@@ -147,12 +138,6 @@ def _read_cells(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Co
     """Read what pyarrow will not, or say in which row and column it is no number."""
     try:
         with _text(path, layout) as text:
-            found = read_cells(_rows(text, layout), layout, chosen, str(path))
+            return read_cells(_rows(text, layout), layout, chosen, str(path))
     except csv.Error as error:
         raise LogError(f"cannot be read as CSV: {error}", str(path)) from error
-    for said in found.notes:
-        warnings.warn(LogWarning(said, str(path)), stacklevel=2)
-    return {
-        column: _stamps(values, column, path) if column.position in layout.stamped else values
-        for column, values in found.columns.items()
-    }

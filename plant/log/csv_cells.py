@@ -1,22 +1,21 @@
-"""A text log cell by cell: what is a row of data, what is none, and which cell of which row is no number."""
+"""A log of text, or of a sheet, cell by cell: which lines are rows of data, and which cell is no number."""
 
 import re
+import warnings
 from array import array
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import takewhile
 from typing import Any
 
 import numpy as np
 
 from plant.arrays import Array
-from plant.errors import LogError
+from plant.errors import LogError, LogWarning
 from plant.log.cells import MISSING, not_a_number, number, wrong_width
 from plant.log.columns import TRUTH, Column
 from plant.log.csv_layout import Layout
 from plant.log.notes import LogCode
-from plant.log.stamps import is_stamp
-from plant.notes import Note
+from plant.log.stamps import is_stamp, read_stamps
 
 COMMENT = ("#", "%", "//")
 """What a line of comment begins with."""
@@ -34,38 +33,34 @@ _THOUSANDS = {
 """Numbers with separators of thousands, by decimal point: those that say both, for 1,234 may be either."""
 
 
-@dataclass(frozen=True, eq=False)
-class Cells:
-    """The rows of a text log.
-
-    Parameters
-    ----------
-    columns : dict[Column, ndarray or list of str]
-        Numbers, shape (n,), NaN in empty cells; stamps as text.
-    notes : tuple of Note
-        Lines that were left out.
-    """
-
-    columns: dict[Column, Any]
-    notes: tuple[Note, ...]
-
-
-def read_cells(rows: Iterable[list[str]], layout: Layout, chosen: Sequence[Column], source: str) -> Cells:
+def read_cells(
+    rows: Iterable[Sequence[str]], layout: Layout, chosen: Sequence[Column], source: str
+) -> dict[Column, Array]:
     """Return columns of rows; a line of comment, a header that comes again and a few lines at the end are left out.
 
     A logger that is switched off leaves its last line cut, and some write sums below the data.
 
     Parameters
     ----------
-    rows : iterable of list of str
+    rows : iterable of sequence of str
         Cells of each line below the header.
     chosen : sequence of Column
         Columns that are read; of the truth, those that hold no numbers are left out.
+
+    Returns
+    -------
+    dict[Column, ndarray of shape (n,)]
+        Numbers, NaN in empty cells; stamps as datetime64[ns].
 
     Raises
     ------
     LogError
         If a row has another width than the header, or a cell is no number, and rows of data come after it.
+
+    Warns
+    -----
+    LogWarning
+        If lines were left out.
     """
     names = [heading.name for heading in layout.headings]
     numeric = [one for one in chosen if one.position not in layout.stamped]
@@ -100,11 +95,26 @@ def read_cells(rows: Iterable[list[str]], layout: Layout, chosen: Sequence[Colum
             raise strange[0]
         lacking = 0
     _keep(kept, waiting[: len(waiting) - lacking])
-    notes = [LogCode.LINES_SKIPPED.note(count=between)] if between else []
+    if between:
+        warnings.warn(LogWarning(LogCode.LINES_SKIPPED.note(count=between), source), stacklevel=2)
     if lacking or strange:
-        notes.append(LogCode.END_LEFT_OUT.note(count=lacking + len(strange), taken=taken))
-    columns = {one: values if isinstance(values, list) else _array(values) for one, values in kept.items()}
-    return Cells(columns, tuple(notes))
+        left_out = LogCode.END_LEFT_OUT.note(count=lacking + len(strange), taken=taken)
+        warnings.warn(LogWarning(left_out, source), stacklevel=2)
+    return {
+        one: stamps(values, one, source) if one.position in layout.stamped else _array(values)
+        for one, values in kept.items()
+    }
+
+
+def stamps(cells: Sequence[str | None], column: Column, source: str) -> Any:
+    """Return a column of dates or times of the day.
+
+    Raises
+    ------
+    LogError
+        If a cell is none.
+    """
+    return read_stamps([cell or "" for cell in cells], lambda row, cell: not_a_number(source, column.name, row, cell))
 
 
 def _keep(kept: dict[Column, Any], rows: Sequence[Sequence[float | str | None]]) -> None:

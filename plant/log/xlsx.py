@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile, ZipFile
 
-import numpy as np
-
+from plant.arrays import Array
 from plant.errors import LogError
-from plant.log.cells import each_read, not_a_number, number
 from plant.log.columns import Column
-from plant.log.csv_layout import LINES, Layout, layout_of_lines
+from plant.log.csv_cells import read_cells
+from plant.log.csv_layout import LINES, layout_of_lines
 from plant.log.extras import library
 from plant.log.packed import most_unpacked, too_large
 from plant.log.table import Table
@@ -103,6 +102,8 @@ def _said(cell: Any) -> str:
         return repr(cell.total_seconds())
     if isinstance(cell, date):
         return cell.isoformat()
+    if isinstance(cell, bool):
+        return str(int(cell))
     return " ".join(str(cell).split()) if isinstance(cell, str) else repr(cell)
 
 
@@ -121,39 +122,11 @@ def _table(path: Path, title: str, rows: Cells) -> Table | None:
         return None
     body = [row for row in rows[layout.skipped :] if any(cell is not None for cell in row)]
 
-    def read(column: Column) -> Any:
-        return _read(body, layout, column, str(path))
+    def read(chosen: Sequence[Column]) -> dict[Column, Array]:
+        return read_cells(([_said(cell) for cell in _wide(row, width)] for row in body), layout, chosen, str(path))
 
-    return Table(str(path), layout.headings, lambda columns: each_read(columns, read), label=title)
+    return Table(str(path), layout.headings, read, label=title)
 
 
 def _wide(row: Sequence[Any], width: int) -> list[Any]:
     return [*row[:width], *[None] * (width - len(row))]
-
-
-def _read(rows: Cells, layout: Layout, column: Column, source: str) -> Any:
-    place = column.position
-    cells = [row[place] if place < len(row) else None for row in rows]
-    if place in layout.stamped:
-        from plant.log.stamps import read_stamps
-
-        return read_stamps(
-            [_said(cell) for cell in cells], lambda row, cell: not_a_number(source, column.name, row, cell)
-        )
-    out = np.empty(len(cells))
-    for row, cell in enumerate(cells):
-        try:
-            out[row] = _number(cell, layout.decimal_point)
-        except (TypeError, ValueError) as error:
-            raise not_a_number(source, column.name, row, cell) from error
-    return out
-
-
-def _number(cell: Any, decimal_point: str) -> float:
-    if cell is None:
-        return float("nan")
-    if isinstance(cell, timedelta):
-        return cell.total_seconds()
-    if isinstance(cell, str):
-        return number(cell if decimal_point == "." else cell.replace(",", "."))
-    return float(cell)

@@ -67,16 +67,11 @@ def test_too_many_cells_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         (None, ""),
         (" a \n b ", "a b"),
         (0.1, "0.1"),
+        (True, "1"),
     ],
 )
 def test_a_cell_is_said_as_a_text_log_would_have_it(cell: Any, said: str) -> None:
     assert xlsx._said(cell) == said
-
-
-def test_a_cell_is_a_number_of_seconds_a_missing_sample_or_a_decimal() -> None:
-    assert xlsx._number(timedelta(minutes=1), ".") == 60.0
-    assert np.isnan(xlsx._number(None, "."))
-    assert xlsx._number("1,5", ",") == 1.5
 
 
 def test_hdf5_gives_fields_named_columns_and_units_and_passes_over_what_is_no_vector(tmp_path: Path) -> None:

@@ -96,3 +96,20 @@ def test_thousands_may_be_apart_where_a_fraction_says_which_mark_is_which(
     path.write_text("\n".join((header, *rows)) + "\n")
     record, _ = read(path)
     assert set(record["differential_pressure_pa"]) == {-1234.5}
+
+
+def test_a_sheet_is_read_by_the_same_rules(tmp_path: Path) -> None:
+    book = pytest.importorskip("openpyxl").Workbook()
+    header = ("time_s", "motor_speed_rad_s", "position_m")
+    rows = [(0.001 * k, k % 7 or None, 0.01 * k if k % 2 else f"{0.01 * k:.2f}") for k in range(150)]
+    for row in (header, *rows[:70], ("# note", None, None), *rows[70:], (), ("Mean", 1, 2)):
+        book.active.append(row)
+    book.save(tmp_path / "run.xlsx")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        (table,) = open_tables(tmp_path / "run.xlsx")
+        found = table.numbers()
+    said = [one.message.note for one in caught if isinstance(one.message, LogWarning)]
+    assert said == [LogCode.LINES_SKIPPED.note(count=1), LogCode.END_LEFT_OUT.note(count=1, taken=150)]
+    np.testing.assert_allclose(found[2], 0.01 * np.arange(150))
+    assert np.isnan(found[1][::7]).all()

@@ -122,10 +122,6 @@ def cells_of_sheets() -> dict[str, Any]:
             )
         ],  # pyright: ignore[reportPrivateUsage]
         "wide": [xlsx._wide((1, 2, 3), width) for width in (2, 3, 5)],  # pyright: ignore[reportPrivateUsage]
-        "numbers": [
-            or_refused(lambda one=one: xlsx._number(*one))
-            for one in ((None, "."), ("1,5", ","), ("1,5", "."), (True, "."), (dt.timedelta(seconds=3), "."))
-        ],  # pyright: ignore[reportPrivateUsage]
     }
 
 
