@@ -12,6 +12,9 @@ from plant.log.extras import library
 from plant.log.packed import most_unpacked, too_large
 from plant.log.table import Table, table_of
 
+VIRTUAL = (3, 6)
+"""Types of channels of version 4 that are counted, and have no bytes in a record."""
+
 
 def open_mdf(path: Path) -> tuple[Table, ...]:
     """Open an MDF file.
@@ -49,6 +52,7 @@ def _tables(asammdf: Any, path: Path) -> tuple[Table, ...]:
         for number, group in enumerate(file.groups):
             if 8 * group.channel_group.cycles_nr > most:
                 raise too_large(str(path), most)
+            _require_within(group, str(path))
             columns: dict[str, Any] = {}
             units: dict[str, str | None] = {}
             master = file.masters_db.get(number)
@@ -65,6 +69,20 @@ def _tables(asammdf: Any, path: Path) -> tuple[Table, ...]:
     if not made:
         raise LogError("it holds no channel", str(path))
     return tuple(made)
+
+
+def _require_within(group: Any, source: str) -> None:
+    """Refuse a group with a channel outside its records: asammdf copies from there unchecked, and the process ends."""
+    bits = 8 * (group.channel_group.samples_byte_nr + getattr(group.channel_group, "invalidation_bytes_nr", 0))
+    for channel in group.channels:
+        if getattr(channel, "channel_type", 0) in VIRTUAL:
+            continue
+        if hasattr(channel, "byte_offset"):
+            begin = 8 * channel.byte_offset + channel.bit_offset
+        else:  # version 3
+            begin = channel.start_offset + 8 * getattr(channel, "additional_byte_offset", 0)
+        if not 0 <= begin <= begin + channel.bit_count <= bits:
+            raise LogError(f"channel {channel.name[:80]!r} lies outside its records; the file is damaged", source)
 
 
 def _last(name: str) -> str:

@@ -13,6 +13,7 @@ from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -21,6 +22,7 @@ import scipy.io
 from experiments.command.logs import read_log
 from plant.errors import LogError, LogWarning
 from plant.log.files import read_record
+from tests.ways.written import SI, mdf4
 
 N = 400
 TIME = 1e-3 * np.arange(N)
@@ -157,3 +159,18 @@ def test_complex_numbers_do_not_lose_their_imaginary_part(tmp_path: Path) -> Non
     columns = {"time_s": TIME, "motor_speed_rad_s": np.arange(N) + 0j, "position_m": TIME + 1j}
     scipy.io.savemat(tmp_path / "a.mat", columns)
     refused(tmp_path / "a.mat", r"column 'position_m' must hold numbers, got '.*1j\)?' in row 1")
+
+
+def test_an_mdf_channel_outside_its_records_is_refused_before_it_is_copied_from_there(tmp_path: Path) -> None:
+    pytest.importorskip("asammdf")
+    time = 1e-3 * np.arange(60)
+    log = pd.DataFrame(dict.fromkeys(SI, time))
+    path = mdf4(log, tmp_path)
+    content = bytearray(path.read_bytes())
+    offsets = [
+        one.start() + 92 for one in re.finditer(b"##CN", content)
+    ]  # where each begins in a record
+    (last,) = (at for at in offsets if struct.unpack_from("<I", content, at) == (32,))
+    struct.pack_into("<I", content, last, 1 << 19)
+    path.write_bytes(content)
+    refused(path, "channel 'Differential pressure' lies outside its records; the file is damaged")
