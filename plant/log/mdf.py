@@ -50,7 +50,7 @@ def _tables(asammdf: Any, path: Path) -> tuple[Table, ...]:
     most = most_unpacked(path.stat().st_size)
     with path.open("rb") as stream, asammdf.MDF(stream) as file:
         for number, group in enumerate(file.groups):
-            if 8 * group.channel_group.cycles_nr > most:
+            if max(8, group.channel_group.samples_byte_nr) * group.channel_group.cycles_nr > most:
                 raise too_large(str(path), most)
             _require_within(group, str(path))
             columns: dict[str, Any] = {}

@@ -161,16 +161,21 @@ def test_complex_numbers_do_not_lose_their_imaginary_part(tmp_path: Path) -> Non
     refused(tmp_path / "a.mat", r"column 'position_m' must hold numbers, got '.*1j\)?' in row 1")
 
 
-def test_an_mdf_channel_outside_its_records_is_refused_before_it_is_copied_from_there(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("block", "at", "was", "written", "said"),
+    [
+        (b"##CN", 92, 32, 1 << 19, "channel 'Differential pressure' lies outside its records; the file is damaged"),
+        (b"##CG", 96, 40, 0xFF000000, "it unpacks to more than"),
+    ],
+)
+def test_an_mdf_whose_records_are_not_what_they_say_is_refused_before_it_is_copied(
+    block: bytes, at: int, was: int, written: int, said: str, tmp_path: Path
+) -> None:
     pytest.importorskip("asammdf")
-    time = 1e-3 * np.arange(60)
-    log = pd.DataFrame(dict.fromkeys(SI, time))
-    path = mdf4(log, tmp_path)
+    path = mdf4(pd.DataFrame(dict.fromkeys(SI, 1e-3 * np.arange(60))), tmp_path)
     content = bytearray(path.read_bytes())
-    offsets = [
-        one.start() + 92 for one in re.finditer(b"##CN", content)
-    ]  # where each begins in a record
-    (last,) = (at for at in offsets if struct.unpack_from("<I", content, at) == (32,))
-    struct.pack_into("<I", content, last, 1 << 19)
+    places = [one.start() + at for one in re.finditer(block, content)]  # where a channel begins, how long a record is
+    (place,) = (one for one in places if struct.unpack_from("<I", content, one) == (was,))
+    struct.pack_into("<I", content, place, written)
     path.write_bytes(content)
-    refused(path, "channel 'Differential pressure' lies outside its records; the file is damaged")
+    refused(path, said)
