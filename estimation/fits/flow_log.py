@@ -33,6 +33,10 @@ make-up valves never open, no log tells a drain from leakage, and any drain woul
 LEAST_LEAKAGE = 1e-3
 """Least first guess of a leakage, as a share of the rated pump flow [fraction]; a logarithm cannot start at zero."""
 
+MOST_LEAD = 0.25
+"""Standard deviation of the motor's lead before a log is seen, over the sample time [dimensionless]: it is a twelfth of
+the sample time over the motor's lag, so that only a motor that settles within a sample leads by more."""
+
 FULLEST = 0.7
 """Share of a chamber that the piston is believed to sweep at most: an encoder's zero may be anywhere [fraction]."""
 
@@ -162,6 +166,7 @@ def flow_log(
         presumed={
             "case_leakage": (DRAIN_START * usual_leakage(parameters), PRESUMED_STD),
             "makeup_opening": (OPENING_START, PRESUMED_STD),
+            "speed_lead": (0.0, MOST_LEAD * record.sample_time / dict(FLOW_FORM.linear)["speed_lead"]),
             **dict.fromkeys((*CRACKS, BEND), (0.0, 1.0)),
         },
     )

@@ -15,7 +15,7 @@ from estimation.fits.descent import Point, descend
 from estimation.fits.drive_noise import drive_variance
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem, search_bounds
-from estimation.fits.lateness import changes_beside, lateness
+from estimation.fits.lateness import changes_beside, lateness, left_by
 from estimation.fits.play import NO_PLAY, ShownPlay, shown_play
 from estimation.fits.teeth import NO_OFFSET, ShownOffset, ShownTeeth, shown_teeth
 from estimation.models.greybox import GreyBoxModel
@@ -262,23 +262,19 @@ def concluded(
     """
     model, theta = problem.model, point.theta
     errors, all_slopes = problem.linearised(theta)
-    slopes = all_slopes
-    felt = np.flatnonzero(np.einsum("ij,ij->j", slopes, slopes) > LEAST_EFFECT**2)
+    effects = np.einsum("ij,ij->j", all_slopes, all_slopes)
+    felt = np.flatnonzero(effects > np.where(problem.prior > 0.0, 0.0, LEAST_EFFECT**2))
     noise, rig, late = np.full(len(theta), np.inf), dict[str, Array](), dict[str, tuple[float, float]]()
     play, teeth, offset = NO_PLAY, dict[int, ShownTeeth](), NO_OFFSET
     used = int(np.count_nonzero(errors))
     if len(felt) and used > len(theta):
-        if len(felt) < len(theta):
-            slopes = slopes[:, felt]
+        slopes = all_slopes if len(felt) == len(theta) else all_slopes[:, felt]
         bread, spread = least_squares_covariance(
             slopes, errors.ravel(), used, automatic_lags(errors.ravel()), problem.prior[felt], warned=warned
         )
 
         def response(shift: Array) -> Array:
             return bread @ (slopes.T @ shift.ravel())
-
-        def left(shift: Array) -> Array:
-            return shift - slopes @ response(shift)
 
         told = disturbed and asked
         known, moved = changes_beside(problem, theta) if told else (None, [])
@@ -293,9 +289,10 @@ def concluded(
             variance = variance + (offset.opened if shifted and not held else 0.0)
         # the window's estimate need not be positive: then nothing is known
         noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))
+        noise[effects <= LEAST_EFFECT**2] = np.inf  # what is known of it is not from this log
         if told:
             rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in _rig_slopes(problem, theta, response)}
-            timed = problem.log.timed
+            timed, left = problem.log.timed, left_by(slopes, bread, effects[felt] > LEAST_EFFECT**2)
             late = dict(lateness(timed, moved, errors.ravel(), left))
             play = shown_play(moved[len(timed) :], errors.ravel(), left)
     sizes = dict(model.linear)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.fits.greybox_problem import Problem
 from estimation.fits.hypotheses import LATEST
@@ -45,6 +46,33 @@ def changes_beside(problem: Problem, theta: Array) -> tuple[Array | None, list[A
     crossed = crossed_drives(problem) if POSITION in log.timed else []
     known, *found = problem.coarse.disturbed(theta, [log.drives, *forward, *crossed])
     return known, [one - known for one in found]
+
+
+def left_by(slopes: Array, bread: Array, told: NDArray[np.bool_]) -> Callable[[Array], Array]:
+    """Return what unknowns leave of a change of residuals: those alone that a log tells something of.
+
+    Only what is known beforehand keeps the others from going far, and as slopes have it a lead of the motor may be less
+    than none: it would take up most of a pressure that is late.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape (blocks, unknowns)
+        Derivatives of the normalised residuals [dimensionless].
+    bread : ndarray, shape (unknowns, unknowns)
+        Inverse of the normal equations of all of them, with what is known beforehand [dimensionless].
+    told : ndarray of bool, shape (unknowns,)
+        Whether the log tells something of each.
+
+    Returns
+    -------
+    callable
+        ``left(change)``, both of shape (blocks,).
+    """
+    if not np.all(told):  # the inverse of a part of a matrix, from the whole inverse
+        across = bread[np.ix_(told, ~told)]
+        bread = bread[np.ix_(told, told)] - across @ np.linalg.solve(bread[np.ix_(~told, ~told)], across.T)
+        slopes = slopes[:, told]
+    return lambda change: change - slopes @ (bread @ (slopes.T @ change))
 
 
 def lateness(

@@ -1,0 +1,55 @@
+"""An unknown whose unit is not felt may still be free by many of them, and then leaves others open."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.fits.flow_log import MOST_LEAD
+from estimation.fits.freed_problem import FreedProblem
+from estimation.fits.greybox_fit import LEAST_EFFECT, GreyBoxFit, concluded
+from estimation.models.flow import FLOW_FORM
+from tests.estimation.fits.short_logs import PAPER, WORN, log, seen
+
+BULK_MODULUS = "bulk_modulus"
+
+
+def fitted(lead_std: float, late: int = 0) -> GreyBoxFit:
+    """Return what a log says of which few samples of pressure are there, and of the motor's lead so much is known.
+
+    Pressure comes ``late`` by so many samples.
+    """
+    record = log(2.0)
+    pressure = np.roll(record["differential_pressure_pa"], late)
+    pressure = np.where(np.arange(len(record)) % 10 == 0, pressure, np.nan)
+    sparse = seen(record.replace(differential_pressure_pa=pressure), PAPER)
+    sparse = replace(sparse, presumed={**sparse.presumed, "speed_lead": (0.0, lead_std)})
+    problem = FreedProblem.of(FLOW_FORM, sparse)
+    values = {"makeup_conductance": 1e-9, "makeup_opening": 1e3, "case_leakage": 1e-13, "speed_lead": 1e-5}
+    values |= {name: getattr(WORN, name) for name in (BULK_MODULUS, "leakage_coefficient", "flow_bias")}
+    return concluded(problem, problem.at(problem.model.theta(values)), disturbed=late > 0)
+
+
+def test_a_lead_that_is_not_felt_by_its_unit_leaves_bulk_modulus_open() -> None:
+    free, held = fitted(25.0), fitted(1e-6)
+    place = free.model.unknowns.index("speed_lead")
+    assert np.linalg.norm(free.slopes[:, place]) < LEAST_EFFECT
+    assert np.isinf(free.std["speed_lead"])
+    assert free.std[BULK_MODULUS] > 1.1 * held.std[BULK_MODULUS]
+
+
+def test_what_is_known_of_a_lead_goes_with_the_sample_time() -> None:
+    for sample_time in (1e-3, 2e-3):
+        value, std = seen(log(1.0, sample_time)).presumed["speed_lead"]
+        assert value == 0.0
+        assert std * dict(FLOW_FORM.linear)["speed_lead"] == pytest.approx(MOST_LEAD * sample_time)
+
+
+def test_a_lead_that_is_not_felt_by_its_unit_takes_up_no_channel_that_is_late() -> None:
+    """As slopes have it, it would be less than none: a pressure 2 ms late passed, bulk modulus 2.3 % too low."""
+    free, held = fitted(25.0, late=2), fitted(1e-6, late=2)
+    place = free.model.unknowns.index("speed_lead")
+    assert 0.0 < np.linalg.norm(free.slopes[:, place]) < LEAST_EFFECT
+    assert held.late["motor_speed_rad_s"][1] > 10.0
+    for channel, told in held.late.items():
+        assert free.late[channel] == pytest.approx(told, rel=1e-3)
