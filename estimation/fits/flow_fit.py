@@ -11,7 +11,7 @@ from estimation.fits.delivery import contradicted
 from estimation.fits.explain import VANISHED, WORTH, explain
 from estimation.fits.flow_log import carried, flow_log, homed_at_stop, outruns_pump, without_strays
 from estimation.fits.flow_search import MAKEUP_TRIED, balanced, flow_starts
-from estimation.fits.form_fit import FormFit, weighed, with_structure
+from estimation.fits.form_fit import DISCRETISED, FormFit, weighed, with_structure
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import (
@@ -42,9 +42,10 @@ from estimation.fits.play import (
     sensed_play,
 )
 from estimation.fits.promises import promised, promised_each, slopes_of
+from estimation.fits.small_teeth import with_small_teeth
 from estimation.fits.speed_instead import speed_instead
 from estimation.fits.teeth import Turning
-from estimation.fits.toothed import toothed
+from estimation.fits.toothed import asked_for_teeth, toothed
 from estimation.models.completed_flow import CRACKS, balances_mass
 from estimation.models.flow import HELD_FLOW_FORM, STIFFNESS
 from estimation.models.inner_circuit import BEND
@@ -91,8 +92,7 @@ FARTHEST_LEAD = 0.99
 """Lead of the motor on the line between samples from which its speed may lag instead [sample times]: one is most."""
 
 TOO_WIDE = 20.0
-"""Conductance of the make-up valves, over that of the first guess, from which a search is begun with the guess too
-[dimensionless]."""
+"""Conductance of make-up valves over the first guess from which a search begins with the guess too [dimensionless]."""
 
 ALWAYS_ASKED = (DELIVERY, ENCODER_ZERO, *MAY_HIDE)
 """What a log that the plain form explains is asked all the same, where the slopes promise a gain: each may hide."""
@@ -102,8 +102,7 @@ MOST_ASKED = 50_000
 
 STRUCTURE = 2e-4
 """Relative standard deviation of bulk modulus from what the balance leaves out where no make-up valve may crack: in a
-log that the plain form does not explain, and in one with gaps in motor speed. The likeliest on 71 logs of the open
-benchmark's validation split. A plain fit needs none: it fits each valve and the accumulator [fraction]."""
+log that the plain form does not explain, and with gaps in motor speed. Likeliest on 71 validation logs [fraction]."""
 
 FILTERED = 1e-3
 """The same of a log whose pressure was filtered: the filter is fitted as a lag of first order. 16 training logs with a
@@ -187,7 +186,8 @@ def fit_flow(
     log, fits, teeth, teeth_left = toothed(unturned, fitted, explains, largest, speed_offset)
     turning = Turning(log.teeth, log.speed_offset)
     beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in fits]
-    best, found = min(fits, key=_cost), weighed(fits, SURER, beforehand)
+    best = min(fits, key=_cost)
+    found = with_small_teeth(weighed(fits, SURER, beforehand), best.small_teeth)
     swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
     stiff = replace(parameters, bulk_modulus=swinging.values["bulk_modulus"])
     stiffer = not log.passes_on and stiff.bulk_modulus > parameters.bulk_modulus  # noise counts more in stiff oil alone
@@ -207,7 +207,7 @@ def fit_flow(
         paired = any(one not in (*ALWAYS_ASKED, PLAY) for one in asked)
         homed = homed_at_stop(log)
         by_mass = balances_mass(swinging.model)
-        strange = explain(log, parameters, near, explains, asked=asked, paired=paired, by_mass=by_mass)
+        strange = explain(asked_for_teeth(log), parameters, near, explains, asked=asked, paired=paired, by_mass=by_mass)
         one = strange.fit
         if (
             _known(strange.names, one)
@@ -223,13 +223,13 @@ def fit_flow(
                 modulus = one.values["bulk_modulus"]
                 moved = abs(modulus / swinging.values["bulk_modulus"] - 1.0)
                 left, open_play = play_structure(moved, softer * modulus), ()
-            believed = with_structure(strange.values, left)
+            believed = with_structure(with_small_teeth(strange.values, one.small_teeth), left)
             shown = play_left(one.play, NO_PLAY if PLAY.name in strange.names else sensed)
             reasons = (*shown, *contradicted(strange, parameters))
             remarks = (*teeth, *wear_open(strange.delivery_open), *open_play)
             return FormFit(believed, bound, one.chi_square[0], reasons, one.rig_slopes, strange, remarks, turning)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
-    believed = with_structure(found, float(np.hypot(0.0 if sure else STRUCTURE, untaken)))
+    believed = with_structure(found, float(np.hypot(DISCRETISED if sure else STRUCTURE, untaken)))
     reasons = (*_objections(best, log.passes_on), *play_left(swinging.play, sensed)) or teeth_left
     if BEGUN in asked and not reasons and not explains(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)

@@ -17,6 +17,7 @@ from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem, search_bounds
 from estimation.fits.lateness import changes_beside, lateness, left_by
 from estimation.fits.play import NO_PLAY, ShownPlay, shown_play
+from estimation.fits.small_teeth import NOT_MOVED, small_teeth
 from estimation.fits.teeth import NO_OFFSET, ShownOffset, ShownTeeth, shown_teeth
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
@@ -79,6 +80,8 @@ class GreyBoxFit:
         What they say of the pump's teeth, by their count in a turn, where a fit was asked.
     speed_offset : ShownOffset
         What they say of an offset of the logged speed, the same.
+    small_teeth : tuple of Mapping[str, float]
+        By how much teeth that are not taken up move each coordinate, and add to its variance [dimensionless].
     """
 
     model: GreyBoxModel
@@ -94,6 +97,7 @@ class GreyBoxFit:
     slopes: Array = field(default_factory=lambda: np.empty((0, 0)))
     teeth: Mapping[int, ShownTeeth] = field(default_factory=dict[int, ShownTeeth])
     speed_offset: ShownOffset = NO_OFFSET
+    small_teeth: tuple[Mapping[str, float], Mapping[str, float]] = NOT_MOVED
 
 
 @dataclass(frozen=True)
@@ -313,6 +317,7 @@ def concluded(
         slopes=all_slopes,
         teeth=teeth,
         speed_offset=offset,
+        small_teeth=small_teeth({} if problem.log.teeth else teeth, [model.unknowns[place] for place in felt]),
         cost=point.cost,
         chi_square=tuple(map(float, squares / seen)),
         autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),

@@ -28,6 +28,10 @@ MOST_BETWEEN = 1.0
 LIKELIEST = 3
 """Counts of which the model is asked [count]: with two waves each and the log itself they run side by side."""
 
+LEAST_TEETH = 0.03
+"""Amplitude from which teeth are taken up, as a share of the flow [fraction]; judged. Smaller ones are integrated out,
+see `estimation.fits.small_teeth`."""
+
 MOST_OFFSET = 1.0
 """Largest offset of logged speed that is looked for [rad/s]: 10 revolutions a minute; judged."""
 
@@ -99,6 +103,10 @@ class ShownTeeth(NamedTuple):
         By how much the logged speed exceeds the shaft's with these teeth [rad/s].
     offset_std : float
         Standard deviation of that, where the drives hold an offset and these teeth [rad/s].
+    power : ndarray, shape (2, 2)
+        Inverse of the covariance of cosine and sine [dimensionless].
+    answers : ndarray, shape (unknowns, 2)
+        By how much the unknowns fall as cosine and sine grow [dimensionless].
     """
 
     teeth: Teeth
@@ -107,6 +115,8 @@ class ShownTeeth(NamedTuple):
     opened: Array
     offset: float = 0.0
     offset_std: float = 0.0
+    power: Array = np.eye(2)
+    answers: Array = np.zeros((1, 2))
 
 
 def with_teeth(log: GreyBoxLog, teeth: Sequence[Teeth], offset: float = 0.0) -> GreyBoxLog:
@@ -241,6 +251,8 @@ def shown_teeth(
             opened,
             offset[0] if offset else one.offset,
             float(spread[2, 2]) ** 0.5 if offset else 0.0,
+            np.asarray(np.linalg.inv(spread[:2, :2]), dtype=float),
+            answers[:, its][:, :2],
         )
     power, pulled = float(free[:, -1] @ free[:, -1]), float(along[-1])
     if power == 0.0:

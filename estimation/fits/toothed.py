@@ -9,7 +9,7 @@ import numpy as np
 from estimation.finding import NORMAL_95
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
-from estimation.fits.teeth import COUNTS, MOST_OFFSET, ShownTeeth, Teeth, with_teeth
+from estimation.fits.teeth import COUNTS, LEAST_TEETH, MOST_OFFSET, ShownTeeth, Teeth, with_teeth
 from estimation.notes import EstimateCode, RigCode
 from plant.notes import Note
 
@@ -38,9 +38,9 @@ CHANCE = 3.0
 LEAST_OFFSET = 0.01
 """Offset of speed from which it is told [rad/s]; judged: a tenth of a revolution a minute is what encoders drift by."""
 
-LEAST_TEETH = 0.03
-"""Amplitude from which teeth are taken up, as a share of the flow [fraction]; judged. With less they put bulk modulus
-off by less than noise does."""
+MOST_LINEAR = 0.5
+"""Deviations by which smaller teeth may move bulk modulus before they are taken up too [dimensionless]: to first order
+they moved one log by 0.06 %, and in full by none."""
 
 MOST_TEETH = 0.4
 """Amplitude up to which teeth are believed, as a share of the flow [fraction]; judged: a pump's flow does not pulse so.
@@ -127,7 +127,7 @@ def toothed(
     if log.gaps.size:
         return Toothed(log, fitted(log))
     guessed = with_teeth(log, (), offset) if offset else log
-    plain = Toothed(guessed, fitted(replace(guessed, counts=COUNTS)))
+    plain = Toothed(guessed, fitted(asked_for_teeth(guessed)))
     if not _hopeful(plain.fits, largest):
         return plain._replace(left=_left(plain.best))
     shifted = _shifted(log, plain, fitted)
@@ -145,6 +145,22 @@ def toothed(
             told = _told_offset(offset, begun.best.speed_offset.std)
             return begun._replace(log=replace(begun.log, counts=()), remarks=told)
     return plain._replace(left=_left(plain.best))
+
+
+def asked_for_teeth(log: GreyBoxLog) -> GreyBoxLog:
+    """Return a log of which a fit asks for teeth, where it holds none and the shaft's angle is known.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log.
+
+    Returns
+    -------
+    GreyBoxLog
+        The log.
+    """
+    return log if log.teeth or log.gaps.size else replace(log, counts=COUNTS)
 
 
 def _hopeful(fits: Sequence[GreyBoxFit], largest: float) -> bool:
@@ -202,17 +218,27 @@ def _believable(teeth: Sequence[Teeth], offset: float) -> bool:
     return abs(offset) <= MOST_OFFSET and all(one.amplitude < MOST_TEETH for one in teeth)
 
 
-def _shown(fit: GreyBoxFit) -> list[ShownTeeth]:
-    """Return the teeth that a fit's residuals show, the likeliest first; none if its size does not matter."""
+def _felt(fit: GreyBoxFit) -> float:
+    """Return by how many deviations small teeth move bulk modulus."""
+    moved, value = fit.small_teeth[0].get("bulk_modulus", 0.0), fit.values.get("bulk_modulus", 1.0)
+    return abs(moved) * value / fit.std["bulk_modulus"] if moved else 0.0
+
+
+def _shown(fit: GreyBoxFit, *, small: bool = False) -> list[ShownTeeth]:
+    """Return the teeth that a fit's residuals show, the likeliest first; none if their size does not matter.
+
+    ``small`` ones matter where they move bulk modulus.
+    """
     ranked = sorted(fit.teeth.values(), key=lambda one: -one.gain)
     if not ranked or ranked[0].gain < TEETH_WORTH:
         return []
-    return ranked if ranked[0].teeth.amplitude > LEAST_TEETH or ranked[0].offset != 0.0 else []
+    large = ranked[0].teeth.amplitude > LEAST_TEETH or ranked[0].offset != 0.0
+    return ranked if large or (small and _felt(fit) > MOST_LINEAR) else []
 
 
 def _asked_for(fit: GreyBoxFit) -> ShownTeeth | None:
     """Return the teeth that a fit's residuals ask for, if no other count does as well but their overtones."""
-    if not (ranked := _shown(fit)):
+    if not (ranked := _shown(fit, small=True)):
         return None
     count = ranked[0].teeth.count
     apart = [one for one in ranked[1:] if one.teeth.count % count and count % one.teeth.count]
