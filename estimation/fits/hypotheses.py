@@ -152,8 +152,9 @@ LEAKAGE_STEP = Hypothesis(
     ("leakage_before", "step_at", "step_width"),
     ({"leakage_before": -0.5},),
     from_change=True,
+    beside=CRACKS,
 )
-"""A seal gives way within the log."""
+"""A seal gives way within the log. Before it does, drops at which make-up valves open count as in a plain log."""
 
 MAKEUP_BLOCKED = Hypothesis(
     "makeup_blocked",

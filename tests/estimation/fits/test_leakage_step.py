@@ -9,11 +9,14 @@ import pytest
 from estimation.eha.explained import notes_of
 from estimation.fits.flow_fit import fit_flow
 from estimation.fits.flow_log import flow_log, without_strays
+from estimation.fits.greybox_fit import concluded
 from estimation.fits.greybox_log import GreyBoxLog
+from estimation.fits.hypotheses import LEAKAGE_STEP
 from estimation.fits.leakage_step import NO_STEP, likeliest_step
 from estimation.fits.promises import STEPPED
-from estimation.fits.wide_problem import widened
+from estimation.fits.wide_problem import freed, widened
 from estimation.log_checks.clean import clean_log
+from estimation.models.completed_flow import CRACKS
 from estimation.models.wide_flow import stepped_leakage
 from estimation.notes import RigCode
 from plant.eha.circuit_parameters import circuit_of
@@ -70,6 +73,21 @@ def test_a_seal_that_gives_way_is_named_and_bulk_modulus_is_right() -> None:
     assert note.data["last"] / note.data["first"] == pytest.approx(6.0, rel=0.05)
     value, std = fit.parameters["bulk_modulus"]
     assert abs(value - HEALTHY.bulk_modulus) < 3.0 * std
+
+
+def test_drops_at_which_make_up_valves_open_leave_bulk_modulus_open_beside_a_step() -> None:
+    """Held where the plain form had them, they made intervals too narrow."""
+    log = seen(stepping(6.0))
+    values = {"leakage_before": 1.0 / 6.0 - 1.0, "step_at": 0.4, "step_width": 1e-3, **dict.fromkeys(CRACKS, 0.0)}
+    values |= {"makeup_conductance": 1e-9, "makeup_opening": 1e3, "case_leakage": 1e-13, "speed_lead": 1e-5}
+    values |= {name: getattr(HEALTHY, name) for name in ("bulk_modulus", "flow_bias")}
+    values |= {"leakage_coefficient": 6.0 * HEALTHY.leakage_coefficient}
+    stds: list[float] = []
+    for one in (LEAKAGE_STEP, replace(LEAKAGE_STEP, beside=())):
+        problem = freed(log, (one,))
+        fit = concluded(problem, problem.at(problem.model.theta(values)), disturbed=False)
+        stds.append(fit.std["bulk_modulus"])
+    assert stds[0] > 1.2 * stds[1]
 
 
 def test_a_step_leaves_what_comes_after_it_and_runs_evenly() -> None:
