@@ -255,6 +255,10 @@ class RigCode(Code):
         "bulk modulus is {ratio:.2g} times that in the rig file: air in the oil, or a soft hose; the conditions were "
         "compared at the measured value"
     )
+    LEAKAGE_TURBULENT = (
+        "{percent:.0f} ± {half_width:.0f} % of the leakage at {at_pa:.3g} Pa goes with the root of pressure, as in turbulent "
+        "flow through a worn edge or a scratch, and leakage is stated at that pressure; this was taken up"
+    )
     CHECKS_CRACK = (
         "the make-up valves open {crack_pa:.3g} ± {half_width_pa:.2g} Pa below the accumulator pressure in the rig file"
         " on average, that of port {side} {later_pa:.3g} ± {later_half_width_pa:.2g} Pa lower than the other"

@@ -14,7 +14,7 @@ from estimation.log_checks.bridging import POSITION, bridged
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.sensor_check import PRESSURE
 from estimation.models.inner_circuit import BEND
-from estimation.models.wide_flow import CROSSED, GROWTH
+from estimation.models.wide_flow import CROSSED, GROWTH, TURBULENT_AT
 from estimation.notes import RigCode
 from plant.arrays import Array
 from plant.components.oil import ATMOSPHERE
@@ -183,6 +183,12 @@ def _relief(found: Explanation, p: EhaParameters) -> Note:
     return RigCode.RELIEF_LOW.note(setting_pa=setting, half_width_pa=NORMAL_95 * std, rig_pa=p.relief_pressure)
 
 
+def _turbulent(found: Explanation, _: EhaParameters) -> Note:
+    value = found.values["leakage_turbulent"][0]
+    half_width = 100.0 * _half_width(found, "leakage_turbulent")
+    return RigCode.LEAKAGE_TURBULENT.note(percent=100.0 * value, half_width=half_width, at_pa=TURBULENT_AT)
+
+
 def _blocked(found: Explanation, _: EhaParameters) -> Note:
     return RigCode.MAKEUP_BLOCKED.note(side="B" if found.values["makeup_share_b"][0] < 1.0 else "A")
 
@@ -225,6 +231,7 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "leakage_growth": growth_note,
     "leakage_rise": growth_note,
     "leakage_step": step_note,
+    "leakage_turbulent": _turbulent,
     "makeup_blocked": _blocked,
     "makeup_bends": _bends,
     "checks_crack": _crack,

@@ -156,6 +156,9 @@ LEAKAGE_STEP = Hypothesis(
 )
 """A seal gives way within the log. Before it does, drops at which make-up valves open count as in a plain log."""
 
+LEAKAGE_TURBULENT = Hypothesis("leakage_turbulent", ("leakage_turbulent",))
+"""A worn edge or a scratch leaks as an orifice does. A lag of the pressure took its place, bulk modulus 7 % too low."""
+
 MAKEUP_BLOCKED = Hypothesis(
     "makeup_blocked",
     ("makeup_share_b",),
@@ -204,6 +207,7 @@ HYPOTHESES = (
     Hypothesis("leakage_growth", ("leakage_growth", "leakage_bend")),
     LEAKAGE_RISE,
     LEAKAGE_STEP,
+    LEAKAGE_TURBULENT,
     MAKEUP_BLOCKED,
     Hypothesis(
         "single_rod",
@@ -239,6 +243,7 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "leakage_rise": (-6.0, 6.0),
     "leakage_before": (-0.99, 50.0),
     "step_at": (0.0, 1.0),
+    "leakage_turbulent": (0.0, 1.0),
     "step_width": (2e-4, 0.05),
     "area_difference": (-0.6, 0.6),
     "volume_difference": (-0.6, 0.6),

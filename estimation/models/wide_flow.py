@@ -13,7 +13,7 @@ from estimation.models.flow import STIFFNESS, delivered_flow, leaked_flow, port_
 from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.inner_circuit import BEND, USUAL_BEND, narrowed
-from plant.compiled.functions import Scalar, maximum, minimum, where
+from plant.compiled.functions import Scalar, maximum, minimum, sqrt, where
 from plant.components.check_valve import make_up_flow
 from plant.components.oil import ATMOSPHERE
 from plant.eha.circuit import chamber_volumes
@@ -28,6 +28,12 @@ AIR_RISE = 0.02
 
 STIFFEST = 0.01
 """Least compliance of a chamber over that at the stated pressure: a search may try more air than there can be there."""
+
+TURBULENT_AT = 5e5
+"""Differential pressure at which a turbulent share of the leakage is stated, and leakage with it [Pa]."""
+
+LAMINAR_BELOW = 1e4
+"""Differential pressure below which every leak is laminar [Pa]; judged: it moves 0.1 bar at most."""
 
 SHORTEST_LAG = 1e-6
 """Lag of a pressure sensor that has none [s]."""
@@ -70,6 +76,7 @@ class WideFlowParameters(FlowParameters):
     leakage_before: float = si(0.0, "1", "leakage before it stepped, over that after, less one", "fitted")
     step_at: float = si(0.5, "1", "middle of that step, in lengths of the log", "fitted")
     step_width: float = si(0.05, "1", "how long it takes, in lengths of the log", "fitted")
+    leakage_turbulent: float = si(0.0, "1", "share of leakage at 5 bar that goes with the root of pressure", "fitted")
     crack_pressure: float = si(0.0, "Pa", "drop at which the make-up valves crack, on average of the two", "fitted")
     crack_difference: float = si(0.0, "Pa", "drop at which valve A cracks over that of valve B", "fitted")
     makeup_share_b: float = si(1.0, "1", "conductance of valve B over that of A", "fitted")
@@ -107,7 +114,7 @@ def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Sc
     elapsed = begun + share * (next_begun - begun)
     grown = grown_leakage(elapsed, p.leakage_growth, p.leakage_bend, p.leakage_rise)
     grown = grown * stepped_leakage(elapsed, p.leakage_before, p.step_at, p.step_width)
-    leaked = leaked_flow(dp, p.leakage_coefficient * grown, p)
+    leaked = leaked_flow(dp, p.leakage_coefficient * grown * turbulent_leakage(dp, p.leakage_turbulent), p)
     opening, pilot, conductance = p.makeup_opening, p.pilot_share, p.makeup_conductance
     cracking, later = supply - p.crack_pressure, 0.5 * p.crack_difference
     from_1, from_2 = cracking - later - p.crack_a, cracking + later - p.crack_b
@@ -189,6 +196,28 @@ def stepped_leakage(elapsed: Scalar, before: Scalar, at: Scalar, width: Scalar) 
     return 1.0 + before * (1.0 - minimum(maximum((elapsed - at) / width + 0.5, 0.0), 1.0))
 
 
+def turbulent_leakage(dp: Scalar, share: Scalar) -> Scalar:
+    """Return leakage over what it would be in proportion to pressure, of which a share goes with the root of pressure.
+
+    Long narrow gaps leak in proportion; a worn edge or a scratch leaks as an orifice does (Merritt, Hydraulic Control
+    Systems, 1967, section 3-3).
+
+    Parameters
+    ----------
+    dp : float or Expression
+        Differential pressure [Pa].
+    share : float or Expression
+        What that share is at `TURBULENT_AT` [fraction].
+
+    Returns
+    -------
+    float or Expression
+        Dimensionless; 1 at `TURBULENT_AT`.
+    """
+    above = sqrt(dp * dp + LAMINAR_BELOW * LAMINAR_BELOW)
+    return 1.0 + share * (sqrt(TURBULENT_AT / above) - 1.0)
+
+
 def _at_rest(p: SimpleNamespace) -> tuple[Scalar, ...]:
     held, supply = p.start_pressure, p.accumulator_pressure + p.start_level
     return supply + maximum(held, 0.0), supply + maximum(-held, 0.0), -p.pressure_offset, p.accumulator_pressure
@@ -231,6 +260,7 @@ LINEAR = {
     "leakage_rise": 1.0,
     "leakage_before": 1.0,
     "step_at": 0.1,
+    "leakage_turbulent": 0.1,
     "crack_pressure": 1e4,
     "crack_difference": 1e4,
     **dict.fromkeys(CRACKS, USUAL_CRACK),

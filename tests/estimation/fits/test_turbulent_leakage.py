@@ -1,0 +1,57 @@
+"""A leak that goes with the root of pressure, as through a worn edge, leaves bulk modulus right and is named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.eha.explained import notes_of
+from estimation.fits.flow_fit import fit_flow
+from estimation.log_checks.clean import clean_log
+from estimation.models.wide_flow import LAMINAR_BELOW, TURBULENT_AT, turbulent_leakage
+from estimation.notes import RigCode
+from experiments.open_benchmark.draws import course_of, draw_plain
+from experiments.open_benchmark.run import run
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+RIG = EhaParameters()
+SHARE = 0.3
+
+
+def leaking(share: float) -> tuple[Record, float, float]:
+    """Return six seconds of an actuator of other equations, a share of whose leakage is turbulent at 5 bar.
+
+    Beside it stand its bulk modulus [Pa] and its leakage [m^3/(s Pa)].
+    """
+    drawing, driving, logging = np.random.default_rng(3).spawn(3)
+    drawn = draw_plain("minor_leakage_minor_friction", "prbs", drawing).with_machine(turbulent=share)
+    setup = replace(drawn, duration=6.0)
+    states = run(setup.machine, course_of(setup, driving))
+    table = setup.logger.log(states, logging)
+    channels = {name: table[name].to_numpy() for name in table.columns if name != "time_s"}
+    return Record(setup.logger.sample_time, channels), setup.machine.bulk_modulus, setup.machine.leakage
+
+
+def test_a_turbulent_share_of_the_leakage_is_named_and_leaves_bulk_modulus_right() -> None:
+    record, modulus, leakage = leaking(SHARE)
+    log = clean_log(record, RIG)
+    fit = fit_flow(log.record, RIG, RIG.bulk_modulus, {}, log.variances)
+    found = fit.explanation
+    assert found is not None
+    assert not fit.reasons
+    (value, std), (share, share_std) = fit.parameters["bulk_modulus"], found.values["leakage_turbulent"]
+    assert abs(value - modulus) < 3.0 * std < 0.02 * modulus
+    assert abs(share - SHARE) < max(3.0 * share_std, 0.03)
+    assert fit.parameters["leakage_coefficient"][0] == pytest.approx(leakage, rel=0.03)
+    (note,) = notes_of(found, RIG)
+    assert note.code is RigCode.LEAKAGE_TURBULENT
+    assert note.data["percent"] == pytest.approx(100.0 * share)
+
+
+def test_turbulent_leakage_is_an_orifices_at_high_pressure_and_laminar_at_low() -> None:
+    pressures = TURBULENT_AT * np.array([1.0, 4.0, 16.0])
+    assert turbulent_leakage(pressures, 1.0) == pytest.approx([1.0, 0.5, 0.25], rel=1e-3)
+    assert turbulent_leakage(pressures, 0.0) == pytest.approx(1.0)
+    low = turbulent_leakage(LAMINAR_BELOW * np.array([0.0, 1e-3]), 0.3)
+    assert low[1] == pytest.approx(low[0], rel=1e-6)
