@@ -256,8 +256,8 @@ class RigCode(Code):
         "compared at the measured value"
     )
     LEAKAGE_TURBULENT = (
-        "{percent:.0f} ± {half_width:.0f} % of the leakage at {at_pa:.3g} Pa goes with the root of pressure, as in turbulent "
-        "flow through a worn edge or a scratch, and leakage is stated at that pressure; this was taken up"
+        "{percent:.0f} ± {half_width:.0f} % of the leakage at {at_pa:.3g} Pa goes with the root of pressure, as in "
+        "turbulent flow through a worn edge or a scratch, and leakage is stated at that pressure; this was taken up"
     )
     CHECKS_CRACK = (
         "the make-up valves open {crack_pa:.3g} ± {half_width_pa:.2g} Pa below the accumulator pressure in the rig file"
