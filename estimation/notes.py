@@ -20,6 +20,10 @@ class SensorCode(Code):
         "{channel} has a new sample every {milliseconds:.3g} ms only and is repeated for {rows} rows; the repeated "
         "values were left out"
     )
+    BRIDGED = (
+        "{channel} has a new sample every {milliseconds:.3g} ms only and lies on straight lines in between; the {rows} "
+        "rows from sample to sample were taken as one"
+    )
     FILTERED = (
         "{channel} was filtered or averaged before it was logged: its noise is alike over {rows} rows, and one sample "
         "in {rows} was used"

@@ -1,15 +1,22 @@
-"""Held samples: a slow channel that its logger repeats until the next sample comes, told by its steps.
+"""Held samples: a slow channel that its logger repeats until the next sample comes, or bridges by straight lines.
 
-A repeated value is no measurement. It is left out, so that a fit sees a slow sensor and no late one.
+Neither is a measurement. It is left out, so that a fit sees a slow sensor and no late or noiseless one. Where all
+channels do so in the same rows, motor speed among them, a slow log was written in the rows of a faster clock.
 """
 
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.log_checks.sensor_check import PRESSURE, PRESSURES
 from estimation.notes import SensorCode
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
+
+SPEED = "motor_speed_rad_s"
 
 HELD = tuple(dict.fromkeys(("position_m", "velocity_m_s", PRESSURE, *PRESSURES)))
 """Channels that are asked: none can jump. A motor speed that is held may be how the motor was driven."""
@@ -24,9 +31,21 @@ RUN_ON, ON_TIME = 0.01, 0.9
 """Share of those steps that may follow another one row before, and share of them after which the next comes in the
 usual time, a row more or less [fraction]. A channel that is sampled in every row steps in most while it moves."""
 
+STRAIGHT, MOSTLY = 1e-3, 0.45
+"""A row bends by less than this share of what rows bend by (root mean square) where it lies on a line between its
+neighbours; and the least share of rows that do so in a channel that was bridged, every second one being sampled."""
+
+
+class _Slow(NamedTuple):
+    """A channel with a sample every so many rows, from the first of them on."""
+
+    rows: int
+    first: int
+    code: SensorCode
+
 
 def without_held(record: Record) -> tuple[Record, tuple[Note, ...]]:
-    """Return a log without the values that its logger only repeated.
+    """Return a log without the values that its logger only repeated, or put on lines between samples.
 
     Parameters
     ----------
@@ -36,17 +55,62 @@ def without_held(record: Record) -> tuple[Record, tuple[Note, ...]]:
     Returns
     -------
     tuple of (Record, tuple of Note)
-        The log, and a note for each channel that was held.
+        The log, and a note for each channel that was held or bridged. A log all of whose channels were, in the same
+        rows, has the clock of its samples.
     """
-    changed, notes = dict[str, Array](), list[Note]()
-    for name in HELD:
-        if name not in record or (rows := held_rows(record[name])) < 2:
-            continue
+    slow = {name: one for name in HELD if name in record and (one := _slow(record[name])) is not None}
+    if not slow:
+        return record, ()
+    every = next(iter(slow.values()))
+    asked = [name for name in (SPEED, *HELD) if name in record]
+    if all(_only_at(record[name], every) for name in asked):
+        return record.slice(every.first, None, every.rows), tuple(_notes(record, dict.fromkeys(asked, every)))
+    changed: dict[str, Array] = {}
+    for name, one in slow.items():
         values = record[name].copy()
-        values[1:][np.diff(record[name]) == 0.0] = np.nan
+        values[~_sampled(record[name], one)] = np.nan
         changed[name] = values
-        notes.append(SensorCode.HELD.note(channel=name, rows=rows, milliseconds=1e3 * rows * record.sample_time))
-    return (record.replace(**changed), tuple(notes)) if notes else (record, ())
+    return record.replace(**changed), tuple(_notes(record, slow))
+
+
+def _notes(record: Record, slow: Mapping[str, _Slow]) -> Iterator[Note]:
+    for name, one in slow.items():
+        milliseconds = 1e3 * one.rows * record.sample_time
+        yield one.code.note(channel=name, rows=one.rows, milliseconds=milliseconds)
+
+
+def _slow(values: Array) -> _Slow | None:
+    """Return how a channel is held or bridged; nothing where it is sampled in every row."""
+    if (rows := held_rows(values)) > 1:
+        return _Slow(rows, int(np.argmax(np.diff(values) != 0.0) + 1) % rows, SensorCode.HELD)
+    bends, straight = _bends(values)
+    if np.mean(straight) < MOSTLY or (knots := np.flatnonzero(~straight) + 1).size < LEAST_STEPS:
+        return None
+    bridged = _Slow(int(np.median(np.diff(knots))), 0, SensorCode.BRIDGED)
+    bridged = bridged._replace(first=int(knots[0]) % max(bridged.rows, 1))
+    return bridged if bridged.rows > 1 and _only_at(values, bridged) else None
+
+
+def _bends(values: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return by how much each row but the ends is off the line between its neighbours, and where that is nothing."""
+    bends = np.abs(np.diff(values, 2))
+    return bends, bends < STRAIGHT * np.sqrt(np.mean(bends**2))
+
+
+def _sampled(values: Array, one: _Slow) -> NDArray[np.bool_]:
+    """Return the rows in which a slow channel has a sample."""
+    if one.code is SensorCode.HELD:
+        return np.concatenate([[True], np.diff(values) != 0.0])
+    return np.arange(len(values)) % one.rows == one.first
+
+
+def _only_at(values: Array, one: _Slow) -> bool:
+    """Return whether a channel steps, or bends, in no other rows than those of the samples."""
+    if one.code is SensorCode.HELD:
+        moved = np.flatnonzero(np.diff(values) != 0.0) + 1
+    else:
+        moved = np.flatnonzero(~_bends(values)[1]) + 1
+    return bool(np.all(moved % one.rows == one.first)) and not np.any(np.isnan(values))
 
 
 def held_rows(values: Array) -> int:

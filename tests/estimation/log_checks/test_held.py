@@ -68,3 +68,49 @@ def test_a_clean_log_says_what_was_held() -> None:
     clean = clean_log(record.replace(**{PRESSURE: held(record[PRESSURE], 7)}), EhaParameters())
     assert [note.code for note in clean.left_out] == [SensorCode.HELD]
     assert np.mean(np.isfinite(clean.record[PRESSURE])) == pytest.approx(1.0 / 7.0, rel=0.1)
+
+
+def bridged(values: np.ndarray, rows: int, first: int) -> np.ndarray:
+    """Return values on straight lines between those of every so many rows, rounded as a file is."""
+    at = np.arange(len(values))
+    there = at[first::rows]
+    return np.array([float(f"{one:.9g}") for one in np.interp(at, there, values[there])])
+
+
+@pytest.mark.parametrize("rows", [2, 5, 10])
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("code", [SensorCode.HELD, SensorCode.BRIDGED])
+def test_a_slow_log_in_the_rows_of_a_fast_clock_gets_its_own_clock_back(
+    code: SensorCode, first: int, rows: int
+) -> None:
+    record = log("multisine")
+    names = ("motor_speed_rad_s", POSITION, "velocity_m_s", PRESSURE)
+    late = np.maximum((np.arange(len(record)) - first) // rows * rows + first, 0)
+    given = {
+        name: record[name][late] if code is SensorCode.HELD else bridged(record[name], rows, first) for name in names
+    }
+    found, notes = without_held(Record(record.sample_time, given))
+    assert {(note.code, note.data["channel"], note.data["rows"]) for note in notes} == {(code, n, rows) for n in names}
+    assert found.sample_time == pytest.approx(rows * record.sample_time)
+    assert found.start_time == pytest.approx(first * record.sample_time)
+    for name in names:
+        assert found[name] == pytest.approx(record[name][first::rows], rel=1e-8)
+
+
+def test_a_fast_speed_beside_slow_sensors_keeps_all_its_samples() -> None:
+    record = log("multisine")
+    slow = {name: held(record[name], 5) for name in (POSITION, "velocity_m_s", PRESSURE)}
+    found, notes = without_held(record.replace(**slow))
+    assert {note.data["channel"] for note in notes} == set(slow)
+    assert found.sample_time == record.sample_time
+    assert np.array_equal(found["motor_speed_rad_s"], record["motor_speed_rad_s"])
+
+
+@pytest.mark.parametrize("channel", [PRESSURE, POSITION])
+def test_a_channel_that_was_bridged_alone_keeps_its_own_samples(channel: str) -> None:
+    record = log("multisine")
+    given = bridged(record[channel], 4, 0)
+    found, (note,) = without_held(record.replace(**{channel: given}))
+    assert note.code is SensorCode.BRIDGED
+    assert note.data["rows"] == 4
+    assert np.array_equal(np.flatnonzero(np.isfinite(found[channel])), np.arange(0, len(record), 4))
