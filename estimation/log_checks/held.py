@@ -83,7 +83,7 @@ def _slow(values: Array) -> _Slow | None:
     """Return how a channel is held or bridged; nothing where it is sampled in every row."""
     if (rows := held_rows(values)) > 1:
         return _Slow(rows, int(np.argmax(np.diff(values) != 0.0) + 1) % rows, SensorCode.HELD)
-    bends, straight = _bends(values)
+    straight = _straight(values)
     if np.mean(straight) < MOSTLY or (knots := np.flatnonzero(~straight) + 1).size < LEAST_STEPS:
         return None
     bridged = _Slow(int(np.median(np.diff(knots))), 0, SensorCode.BRIDGED)
@@ -91,10 +91,10 @@ def _slow(values: Array) -> _Slow | None:
     return bridged if bridged.rows > 1 and _only_at(values, bridged) else None
 
 
-def _bends(values: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return by how much each row but the ends is off the line between its neighbours, and where that is nothing."""
-    bends = np.abs(np.diff(values, 2))
-    return bends, bends < STRAIGHT * np.sqrt(np.mean(bends**2))
+def _straight(values: Array) -> NDArray[np.bool_]:
+    """Return which rows but the ends lie on the line between their neighbours; none where a sample is missing."""
+    bends = np.diff(values, 2)
+    return np.abs(bends) < STRAIGHT * np.sqrt(np.mean(bends**2))
 
 
 def _sampled(values: Array, one: _Slow) -> NDArray[np.bool_]:
@@ -109,7 +109,7 @@ def _only_at(values: Array, one: _Slow) -> bool:
     if one.code is SensorCode.HELD:
         moved = np.flatnonzero(np.diff(values) != 0.0) + 1
     else:
-        moved = np.flatnonzero(~_bends(values)[1]) + 1
+        moved = np.flatnonzero(~_straight(values)) + 1
     return bool(np.all(moved % one.rows == one.first)) and not np.any(np.isnan(values))
 
 
