@@ -17,7 +17,14 @@ from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.inner_circuit import BEND
-from estimation.models.wide_flow import COURSES, CROSSED, LINEAR, WIDE_FLOW_FORM, WideFlowParameters
+from estimation.models.wide_flow import (
+    COURSES,
+    CROSSED,
+    LINEAR,
+    TURBULENT_FLOW_FORM,
+    WIDE_FLOW_FORM,
+    WideFlowParameters,
+)
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.solvers.steps import parameter_names, parameter_row
@@ -46,6 +53,8 @@ LEAST_GAS = 1.0
 stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
 
 POSITION, POSITION_ZERO = "position_m", "position_zero"
+
+TURBULENT = "leakage_turbulent"
 
 START_PRESSURE, START_LEVEL = "start_pressure", "start_level"
 
@@ -145,7 +154,8 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedP
     known = [name for name in plain.unknowns if name not in held]
     late = {one.late for one in together}
     log = replace(log, timed=tuple(channel for channel in log.timed if channel not in late))
-    return FreedProblem(WIDE_FLOW_FORM, log, tuple(dict.fromkeys((*known, *extra))), LINEAR)
+    form = TURBULENT_FLOW_FORM if TURBULENT in extra else WIDE_FLOW_FORM
+    return FreedProblem(form, log, tuple(dict.fromkeys((*known, *extra))), LINEAR)
 
 
 def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]]:

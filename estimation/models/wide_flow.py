@@ -4,7 +4,7 @@ Every addition has a value at which it is absent, so that one kernel serves ever
 held there.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -100,7 +100,9 @@ def _stiffness(pressure: Scalar, elapsed: Scalar, p: SimpleNamespace) -> Scalar:
     return oil / maximum(1.0 + short * short + softer * oil, STIFFEST)
 
 
-def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
+def _rates(
+    state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar, *, turbulent: bool = False
+) -> tuple[Scalar, ...]:
     speeds, (read, next_read), (begun, next_begun), (rate, next_rate), *courses, step = drives
     p1, p2, behind, supply = state
     side, next_side = _sides(courses, p)
@@ -114,7 +116,8 @@ def _rates(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Sc
     elapsed = begun + share * (next_begun - begun)
     grown = grown_leakage(elapsed, p.leakage_growth, p.leakage_bend, p.leakage_rise)
     grown = grown * stepped_leakage(elapsed, p.leakage_before, p.step_at, p.step_width)
-    leaked = leaked_flow(dp, p.leakage_coefficient * grown * turbulent_leakage(dp, p.leakage_turbulent), p)
+    through = turbulent_leakage(dp, p.leakage_turbulent) if turbulent else 1.0
+    leaked = leaked_flow(dp, p.leakage_coefficient * grown * through, p)
     opening, pilot, conductance = p.makeup_opening, p.pilot_share, p.makeup_conductance
     cracking, later = supply - p.crack_pressure, 0.5 * p.crack_difference
     from_1, from_2 = cracking - later - p.crack_a, cracking + later - p.crack_b
@@ -240,6 +243,14 @@ WIDE_FLOW_FORM = GreyBoxModel(
     jump=(0.5, -0.5, 0.0, 0.0),
 )
 """Without unknowns of its own: which of its parameters are free is a hypothesis, see `estimation.fits.hypotheses`."""
+
+
+def _turbulent(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
+    return _rates(state, drives, p, share, turbulent=True)
+
+
+TURBULENT_FLOW_FORM = replace(WIDE_FLOW_FORM, name="wide_flow_turbulent", rates=_turbulent)
+"""The same with a share of the leakage turbulent. Plain logs, which the wide form is asked of too, pay for no roots."""
 
 LINEAR = {
     "speed_lead": 1e-5,

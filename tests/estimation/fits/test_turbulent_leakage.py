@@ -7,8 +7,17 @@ import pytest
 
 from estimation.eha.explained import notes_of
 from estimation.fits.flow_fit import fit_flow
+from estimation.fits.flow_log import flow_log, without_strays
+from estimation.fits.hypotheses import LEAKAGE_RISE, LEAKAGE_TURBULENT
+from estimation.fits.wide_problem import freed, widened
 from estimation.log_checks.clean import clean_log
-from estimation.models.wide_flow import LAMINAR_BELOW, TURBULENT_AT, turbulent_leakage
+from estimation.models.wide_flow import (
+    LAMINAR_BELOW,
+    TURBULENT_AT,
+    TURBULENT_FLOW_FORM,
+    WIDE_FLOW_FORM,
+    turbulent_leakage,
+)
 from estimation.notes import RigCode
 from experiments.open_benchmark.draws import course_of, draw_plain
 from experiments.open_benchmark.run import run
@@ -55,3 +64,11 @@ def test_turbulent_leakage_is_an_orifices_at_high_pressure_and_laminar_at_low() 
     assert turbulent_leakage(pressures, 0.0) == pytest.approx(1.0)
     low = turbulent_leakage(LAMINAR_BELOW * np.array([0.0, 1e-3]), 0.3)
     assert low[1] == pytest.approx(low[0], rel=1e-6)
+
+
+def test_only_a_log_that_is_asked_for_a_turbulent_share_pays_for_its_roots() -> None:
+    record, *_ = leaking(0.0)
+    sound, variances = without_strays(record)
+    log = widened(flow_log(sound, RIG, {}, variances), RIG)
+    rates = [freed(log, asked).model.rates for asked in ((LEAKAGE_RISE,), (LEAKAGE_RISE, LEAKAGE_TURBULENT))]
+    assert rates == [WIDE_FLOW_FORM.rates, TURBULENT_FLOW_FORM.rates]
