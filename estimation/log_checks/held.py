@@ -37,11 +37,11 @@ neighbours; and the least share of rows that do so in a channel that was bridged
 
 
 class _Slow(NamedTuple):
-    """A channel with a sample every so many rows, from the first of them on."""
+    """A channel with a sample every so many rows, from the first of them on; repeated, or bridged by lines."""
 
     rows: int
     first: int
-    code: SensorCode
+    bridged: bool
 
 
 def without_held(record: Record) -> tuple[Record, tuple[Note, ...]]:
@@ -75,18 +75,21 @@ def without_held(record: Record) -> tuple[Record, tuple[Note, ...]]:
 
 def _notes(record: Record, slow: Mapping[str, _Slow]) -> Iterator[Note]:
     for name, one in slow.items():
-        milliseconds = 1e3 * one.rows * record.sample_time
-        yield one.code.note(channel=name, rows=one.rows, milliseconds=milliseconds)
+        yield (SensorCode.BRIDGED if one.bridged else SensorCode.HELD).note(
+            channel=name, rows=one.rows, milliseconds=1e3 * one.rows * record.sample_time
+        )
 
 
 def _slow(values: Array) -> _Slow | None:
     """Return how a channel is held or bridged; nothing where it is sampled in every row."""
     if (rows := held_rows(values)) > 1:
-        return _Slow(rows, int(np.argmax(np.diff(values) != 0.0) + 1) % rows, SensorCode.HELD)
+        return _Slow(rows, int(np.argmax(np.diff(values) != 0.0) + 1) % rows, bridged=False)
+    if len(values) < LEAST_STEPS:
+        return None
     straight = _straight(values)
     if np.mean(straight) < MOSTLY or (knots := np.flatnonzero(~straight) + 1).size < LEAST_STEPS:
         return None
-    bridged = _Slow(int(np.median(np.diff(knots))), 0, SensorCode.BRIDGED)
+    bridged = _Slow(int(np.median(np.diff(knots))), 0, bridged=True)
     bridged = bridged._replace(first=int(knots[0]) % max(bridged.rows, 1))
     return bridged if bridged.rows > 1 and _only_at(values, bridged) else None
 
@@ -99,18 +102,16 @@ def _straight(values: Array) -> NDArray[np.bool_]:
 
 def _sampled(values: Array, one: _Slow) -> NDArray[np.bool_]:
     """Return the rows in which a slow channel has a sample."""
-    if one.code is SensorCode.HELD:
+    if not one.bridged:
         return np.concatenate([[True], np.diff(values) != 0.0])
     return np.arange(len(values)) % one.rows == one.first
 
 
 def _only_at(values: Array, one: _Slow) -> bool:
     """Return whether a channel steps, or bends, in no other rows than those of the samples."""
-    if one.code is SensorCode.HELD:
-        moved = np.flatnonzero(np.diff(values) != 0.0) + 1
-    else:
-        moved = np.flatnonzero(~_straight(values)) + 1
-    return bool(np.all(moved % one.rows == one.first)) and not np.any(np.isnan(values))
+    moved = ~_straight(values) if one.bridged else np.diff(values) != 0.0
+    at = np.flatnonzero(moved) + 1
+    return bool(np.all(at % one.rows == one.first)) and not np.any(np.isnan(values))
 
 
 def held_rows(values: Array) -> int:

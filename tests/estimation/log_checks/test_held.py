@@ -114,3 +114,9 @@ def test_a_channel_that_was_bridged_alone_keeps_its_own_samples(channel: str) ->
     assert note.code is SensorCode.BRIDGED
     assert note.data["rows"] == 4
     assert np.array_equal(np.flatnonzero(np.isfinite(found[channel])), np.arange(0, len(record), 4))
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 50])
+def test_a_log_of_a_few_rows_is_neither(rows: int) -> None:
+    record = log("multisine").slice(0, rows)
+    assert without_held(record) == (record, ())
