@@ -25,6 +25,10 @@ class IdentificationCode(Code):
         "noise"
     )
     INPUT_BRIDGED = "input {channel!r} lacks {count} of {total} samples: they were interpolated linearly"
+    LOG_INTERPOLATED = (
+        "the log has a sample every {sample_time_s:.4g} s and was interpolated to {wanted_s:.4g} s: an input that is "
+        "held between samples becomes a ramp, so judge a model by a log of its own sample time, or fit with --resample"
+    )
     INPUT_SPLIT = (
         "input {channel!r} lacks {count} of {total} samples that cannot be interpolated: the log was split into "
         "{pieces} experiments, each with its own initial state"

@@ -11,6 +11,7 @@ import numpy as np
 from plant.arrays import Array
 from plant.errors import LogError, LogWarning
 from plant.log.checks import Clock, trusted
+from plant.log.clock import MOST_MISSING
 from plant.log.columns import TIME, UNITS, Column, listed, resolve_columns
 from plant.log.formats import open_tables
 from plant.log.headings import Heading, cleaned
@@ -35,7 +36,11 @@ TIME_STEM = re.compile(rf"(?:t|time|timestamp|zeit)(?:_({'|'.join(one for one in
 
 
 def read_any(
-    path: str | Path | Table, names: Sequence[str] | None = None, *, sample_time: float | None = None
+    path: str | Path | Table,
+    names: Sequence[str] | None = None,
+    *,
+    sample_time: float | None = None,
+    most_missing: float = MOST_MISSING,
 ) -> Record:
     """Read columns of a log as they stand, without knowing what they are.
 
@@ -48,6 +53,8 @@ def read_any(
         ``motor_speed_rad_s``. Every column that holds numbers unless told.
     sample_time : float, optional
         Time between samples [s]; a column of time is then not read. Without either, samples are 1 s apart.
+    most_missing : float
+        Share of the samples that may be missing [dimensionless].
 
     Returns
     -------
@@ -80,7 +87,7 @@ def read_any(
             warnings.warn(LogWarning(LogCode.CLOCK_ASSUMED.note(sample_time_s=1.0), source), stacklevel=2)
         clock = Clock(1.0 if step is None else step, 0.0)
         columns[TIME] = clock.sample_time * np.arange(len(next(iter(columns.values()))), dtype=np.float64)
-    checked = trusted(columns, source=source, required=tuple(names or ()), clock=clock)
+    checked = trusted(columns, source=source, required=tuple(names or ()), clock=clock, most_missing=most_missing)
     # nobody knows what these columns are, so no unit of theirs looks wrong
     amiss = implausible(checked.sample_time, checked.channels)
     for note in (one for one in checked.notes if one not in amiss):

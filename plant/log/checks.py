@@ -22,7 +22,12 @@ REQUIRED = ("motor_speed_rad_s", "position_m or velocity_m_s")
 
 
 def trusted(
-    columns: Channels, *, source: str, required: Collection[str] = REQUIRED, clock: Clock | None = None
+    columns: Channels,
+    *,
+    source: str,
+    required: Collection[str] = REQUIRED,
+    clock: Clock | None = None,
+    most_missing: float = MOST_MISSING,
 ) -> Checked:
     """Return a log on a uniform clock if it can be trusted.
 
@@ -34,6 +39,8 @@ def trusted(
         Channels that must be there; ``"position_m or velocity_m_s"`` asks for one of the two.
     clock : Clock, optional
         The clock that the log was written with; used where the time column agrees with it.
+    most_missing : float
+        Share of a channel's samples, or of the clock's, that may be missing [dimensionless].
 
     Returns
     -------
@@ -43,8 +50,8 @@ def trusted(
     Raises
     ------
     LogError
-        If a required channel is missing or over 5 % empty, a value is infinite, time does not increase or is
-        no clock's even if its jitter is mended, or there are fewer than 10 samples.
+        If a required channel is missing or over 5 % empty (or the share that is told), a value is infinite, time does
+        not increase or is no clock's even if its jitter is mended, or there are fewer than 10 samples.
 
     Examples
     --------
@@ -60,8 +67,8 @@ def trusted(
         long_enough(complete, source)
         _finite(complete, source)
         timed = _rows_with_time(complete, source, notes)
-        on_clock = on_uniform_clock(timed, source, clock, notes)
-        channels = _masked(on_clock.channels, required, source, notes)
+        on_clock = on_uniform_clock(timed, source, clock, notes, most_missing)
+        channels = _masked(on_clock.channels, required, source, notes, most_missing)
         if not SHORTEST <= on_clock.sample_time <= LONGEST:
             raise LogError(
                 f"the sample time must be from {SHORTEST:g} s to {LONGEST:g} s, got {on_clock.sample_time:.3g} s; "
@@ -142,13 +149,15 @@ def _slower(values: Array) -> int:
     return round(usual) if len(present) >= (1.0 - MOST_MISSING) * (len(values) / usual - 1.0) else 1
 
 
-def _masked(channels: Channels, required: Collection[str], source: str, notes: list[Note]) -> Channels:
+def _masked(
+    channels: Channels, required: Collection[str], source: str, notes: list[Note], most_missing: float
+) -> Channels:
     kept = dict(channels)
     for name, values in channels.items():
         count, total = int(np.isnan(values).sum()), len(values)
         if count == 0 or name.startswith(TRUTH):
             continue
-        if count <= MOST_MISSING * total:
+        if count <= most_missing * total:
             notes.append(LogCode.SAMPLES_MASKED.note(channel=name, **_counted(count, total)))
             continue
         if (rows := _slower(values)) > 1:
@@ -156,8 +165,10 @@ def _masked(channels: Channels, required: Collection[str], source: str, notes: l
             continue
         del kept[name]
         if not all(any(other in kept for other in alternatives(wanted)) for wanted in required):
-            raise LogError(f"{name} is missing in {_share(count, total)}, at most 5 % may be", source)
+            raise LogError(
+                f"{name} is missing in {_share(count, total)}, at most {100.0 * most_missing:g} % may be", source
+            )
         notes.append(LogCode.CHANNEL_LEFT_OUT.note(channel=name, **_counted(count, total)))
     if not kept:
-        raise LogError("no channel has 95 % of its samples", source)
+        raise LogError(f"no channel has {100.0 * (1.0 - most_missing):g} % of its samples", source)
     return kept

@@ -62,7 +62,9 @@ class Checked:
     notes: tuple[Note, ...] = ()
 
 
-def on_uniform_clock(columns: Channels, source: str, clock: Clock | None, notes: list[Note]) -> Checked:
+def on_uniform_clock(
+    columns: Channels, source: str, clock: Clock | None, notes: list[Note], most_missing: float = MOST_MISSING
+) -> Checked:
     """Return a log on a uniform clock; what was mended is added to the notes.
 
     Parameters
@@ -75,6 +77,8 @@ def on_uniform_clock(columns: Channels, source: str, clock: Clock | None, notes:
         The clock that the log was written with; used where the stamps agree with it.
     notes : list of Note
         Grows by what was mended.
+    most_missing : float
+        Share of the samples that rows of an even clock may leave out [dimensionless].
 
     Returns
     -------
@@ -84,7 +88,7 @@ def on_uniform_clock(columns: Channels, source: str, clock: Clock | None, notes:
     Raises
     ------
     LogError
-        If the stamps are no clock's, or over 5 % of the samples are left out.
+        If the stamps are no clock's, or over 5 % of the samples, or the share that is told, are left out.
     """
     time = columns[TIME]
     channels = {name: values for name, values in columns.items() if name != TIME}
@@ -96,7 +100,7 @@ def on_uniform_clock(columns: Channels, source: str, clock: Clock | None, notes:
     ticks = _whole_ticks(time)
     if ticks is None:
         return _mended(time, channels, source, notes)
-    _few_left_out(len(time), float(ticks.sum()) + 1.0, source)
+    _few_left_out(len(time), float(ticks.sum()) + 1.0, source, most_missing)
     sample_time = float((time[-1] - time[0]) / ticks.sum())
     jitter = float(np.abs(np.diff(time) / sample_time - ticks).max())
     if jitter > max(ROUNDING, _resolution(time, sample_time)):
@@ -225,10 +229,11 @@ def _whole_ticks(time: Array) -> Array | None:
     return ticks if np.all(ticks >= 1.0) and np.max(off) <= WHOLE + ROUNDING else None
 
 
-def _few_left_out(there: int, total: float, source: str) -> None:
-    if not there >= (1.0 - MOST_MISSING) * total:
+def _few_left_out(there: int, total: float, source: str, most: float = MOST_MISSING) -> None:
+    if not there >= (1.0 - most) * total:
         said = "{:.0f} of {:.0f}" if total < 1e15 else "{:.3g} of {:.3g}"
-        raise LogError(f"{TIME} leaves out {said.format(total - there, total)} samples, wanted at most 5 %", source)
+        left_out = said.format(total - there, total)
+        raise LogError(f"{TIME} leaves out {left_out} samples, wanted at most {100.0 * most:g} %", source)
 
 
 def _agrees(time: Array, clock: Clock) -> bool:

@@ -65,18 +65,26 @@ def channels_of(
     Warns
     -----
     LogWarning
-        If samples of an input are bridged, or a log is split.
+        If samples of an input are bridged, a log is split, or it has fewer samples a second than are wanted.
     """
     if output in inputs:
         raise HydrostateError(f"input and output must be different channels, got {output!r} for both")
     wanted = max(one.sample_time for one in records) if sample_time is None else sample_time
     u, y = list[Array](), list[Array]()
     for record in records:
-        for part in pieces(record, inputs) if split else [record]:
-            whole = list[Array]()
-            for name in inputs:  # up to Python 3.11 a comprehension is a caller, and the warning would name this line
-                whole.append(without_gaps(part[name], name))
-            columns = [_on_clock(one, part.sample_time, wanted) for one in whole]
+        if record.sample_time > (1.0 + SAME_CLOCK) * wanted:
+            said = IdentificationCode.LOG_INTERPOLATED.note(sample_time_s=record.sample_time, wanted_s=wanted)
+            warnings.warn(LogWarning(said), stacklevel=2)
+        parts = pieces(record, inputs) if split else [record]
+        for name in inputs:  # told once, however many parts there are
+            lacking = sum(int(np.count_nonzero(np.isnan(part[name]))) for part in parts)
+            if lacking:
+                said = IdentificationCode.INPUT_BRIDGED.note(
+                    channel=name, count=lacking, total=sum(len(part) for part in parts)
+                )
+                warnings.warn(LogWarning(said), stacklevel=2)
+        for part in parts:
+            columns = [_on_clock(bridged(part[name]), part.sample_time, wanted) for name in inputs]
             answer = _on_clock(part[output], part.sample_time, wanted)
             if part.start_time > record.start_time:  # it may still answer, after a dead time, to what is not known
                 answer[: min(LONGEST_ANSWER, answer.size // 20)] = np.nan

@@ -86,3 +86,20 @@ def test_a_known_channel_that_is_not_there_in_any_unit_is_named(tmp_path: Path) 
     path = written(tmp_path / "a.csv", "t,motor_speed_rpm", RAMP, RAMP)
     with pytest.raises(LogError, match="column 'position_m' is needed; the log has 't', 'motor_speed_rpm'"):
         read_any(path, ["position_m"])
+
+
+def test_as_many_samples_may_be_missing_as_are_allowed(tmp_path: Path) -> None:
+    keep = np.r_[0:8, 12:20]
+    path = written(tmp_path / "a.csv", "t,u", RAMP[keep], RAMP[keep])
+    with pytest.raises(LogError, match="time_s leaves out 4 of 20 samples, wanted at most 5 %"):
+        read_any(path, ["u"])
+    with pytest.raises(LogError, match="wanted at most 15 %"):
+        read_any(path, ["u"], most_missing=0.15)
+    with pytest.warns(LogWarning, match="u is missing in 4 of 20 samples"):
+        record = read_any(path, ["u"], most_missing=0.5)
+    assert np.isnan(record["u"][8:12]).all()
+    empty = written(tmp_path / "b.csv", "t,u", RAMP, np.where(RAMP % 7 < 3, np.nan, RAMP))
+    with pytest.raises(LogError, match=r"u is missing in 9 of 20 samples .*, at most 20 % may be"):
+        read_any(empty, ["u"], most_missing=0.2)
+    with pytest.warns(LogWarning, match="u is missing in 9 of 20"):
+        assert np.isfinite(read_any(empty, ["u"], most_missing=0.5)["u"]).sum() == 11

@@ -102,3 +102,21 @@ def test_parts_that_are_less_than_a_two_hundredth_of_a_log_are_left_out() -> Non
         with pytest.warns(LogWarning):
             parts = pieces(Record(T, {"u": seen, "y": u}), ["u"])
         assert [len(part) for part in parts] == kept
+
+
+def test_bridged_samples_of_all_parts_are_told_once() -> None:
+    record = log(binary(), *(slice(start, start + 2) for start in range(52, N - 40, 60)))  # 49, of which 30 split it
+    with pytest.warns(LogWarning) as said:
+        channels_of([record], ["u"], "y", split=True)
+    told = [str(one.message) for one in said if "interpolated linearly" in str(one.message)]
+    assert len(told) == 1
+    assert "lacks 38 of 2940 samples" in told[0]
+
+
+def test_a_log_that_is_slower_than_a_model_says_that_it_is_interpolated() -> None:
+    record = log(binary())
+    half = Record(2.0 * T, {name: record[name][::2] for name in ("u", "y")})
+    with pytest.warns(LogWarning, match="a sample every 0.02 s and was interpolated to 0.01 s") as said:
+        data = channels_of([half], ["u"], "y", T)
+    assert {one.filename for one in said} == {__file__}
+    assert data.y[0].size == pytest.approx(N, abs=1)
