@@ -141,7 +141,7 @@ def _named(headings: Sequence[Heading], name: str, source: str) -> Column:
         for column in resolve_columns(headings, None, source):
             if column.channel == name:
                 return column
-    near = get_close_matches(name, known, n=1)
+    near = get_close_matches(name, known, n=1) or [one for one in known if name.lower() in one.lower()][:1]
     hint = f"; did you mean {near[0]!r}?" if near else ""
     raise LogError(f"column {name!r} is needed; the log has {listed(known)}{hint}", source)
 

@@ -58,6 +58,12 @@ def test_a_column_that_is_not_there_once_is_refused(name: str, said: str, tmp_pa
         read_any(path, [name])
 
 
+def test_a_part_of_a_name_is_told_the_whole(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv", "t,Valve Cmd [V],Pos. [mm]", RAMP, RAMP, RAMP)
+    with pytest.raises(LogError, match=r"did you mean 'Valve Cmd \[V\]'"):
+        read_any(path, ["valve"])
+
+
 def test_a_log_without_a_column_of_numbers_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("t,note\n" + "".join(f"{k},text\n" for k in range(15)))
