@@ -62,6 +62,7 @@ VALUES: dict[str, tuple[float, float]] = {
     "drain_share_b": (0.3, 0.1),
     "leakage_growth": (0.4, 0.05),
     "leakage_rise": (0.1, 0.05),
+    "leakage_turbulent": (0.3, 0.05),
 }
 
 
