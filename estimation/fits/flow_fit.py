@@ -7,6 +7,7 @@ from operator import attrgetter
 
 import numpy as np
 
+from estimation.fits.between_samples import with_course
 from estimation.fits.delivery import contradicted
 from estimation.fits.explain import VANISHED, WORTH, explain
 from estimation.fits.flow_log import carried, flow_log, homed_at_stop, outruns_pump, without_strays
@@ -182,7 +183,7 @@ def fit_flow(
     starts = flow_starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
     explains = partial(_explains, noisy=log.passes_on)
     largest = NOISY[0] if log.passes_on else LARGEST_CHI_SQUARE
-    unturned, fitted = log, partial(balanced, parameters=parameters, starts=starts)
+    unturned = with_course(log, fitted := partial(balanced, parameters=parameters, starts=starts), parameters)
     log, fits, teeth, teeth_left = toothed(unturned, fitted, explains, largest, speed_offset)
     turning = Turning(log.teeth, log.speed_offset)
     beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in fits]
@@ -205,14 +206,13 @@ def fit_flow(
         near = _near(swinging, starts, explains, in_motion=loaded or moving)
         near = [best.values, *near] if best is not swinging and explains(best) else near
         paired = any(one not in (*ALWAYS_ASKED, PLAY) for one in asked)
-        homed = homed_at_stop(log)
         by_mass = balances_mass(swinging.model)
         strange = explain(asked_for_teeth(log), parameters, near, explains, asked=asked, paired=paired, by_mass=by_mass)
         one = strange.fit
         if (
             _known(strange.names, one)
             and explains(one)
-            and one.cost < _wanted(strange.names, best, swinging, homed=homed, late=filtered)
+            and one.cost < _wanted(strange.names, best, swinging, homed=homed_at_stop(log), late=filtered)
         ):
             place = (strange.values, parameters.pump_displacement, one.cost - WORTH)
             if not speed_offset and (turned := speed_instead(unturned, fitted, *place)):

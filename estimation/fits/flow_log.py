@@ -7,6 +7,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.fits.averaged import averaged
+from estimation.fits.course import SLOW
 from estimation.fits.form_fit import LONGEST_STEP
 from estimation.fits.greybox_log import GreyBoxLog, greybox_log
 from estimation.fits.speed_course import straightened
@@ -151,7 +152,8 @@ def flow_log(
     speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
     swept = _swept_share(log.drives[:, position], parameters)
     drives = log.drives.copy()
-    drives[:, speed] = straightened(log.drives[:, speed])
+    if record.sample_time < SLOW:
+        drives[:, speed] = straightened(log.drives[:, speed])
     passed_on = swept * position_variance(record["position_m"]) ** 0.5
     open_gaps = speed_gaps(record, parameters, variances["differential_pressure_pa"] ** 0.5)
     log = replace(

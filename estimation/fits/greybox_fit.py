@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.fits.course import opened, vanished
 from estimation.fits.covariance import automatic_lags, least_squares_covariance
 from estimation.fits.descent import Point, descend
 from estimation.fits.drive_noise import drive_variance
@@ -273,8 +274,12 @@ def concluded(
     used = int(np.count_nonzero(errors))
     if len(felt) and used > len(theta):
         slopes = all_slopes if len(felt) == len(theta) else all_slopes[:, felt]
+        prior, told_of = problem.prior[felt], effects[felt] > LEAST_EFFECT**2
+        if problem.log.course is not None and (gone := vanished(problem, theta, errors, felt)):
+            slopes, prior = np.column_stack([slopes, *gone]), np.append(prior, np.zeros(len(gone)))
+            told_of = np.append(told_of, np.ones(len(gone), dtype=bool))
         bread, spread = least_squares_covariance(
-            slopes, errors.ravel(), used, automatic_lags(errors.ravel()), problem.prior[felt], warned=warned
+            slopes, errors.ravel(), used, automatic_lags(errors.ravel()), prior, warned=warned
         )
 
         def response(shift: Array) -> Array:
@@ -282,7 +287,8 @@ def concluded(
 
         told = disturbed and asked
         known, moved = changes_beside(problem, theta) if told else (None, [])
-        variance = np.diag(spread) + (NOISE_DOUBT * (bread @ problem.untilted(theta, errors)[felt])) ** 2
+        tilt = bread[:, : len(felt)] @ problem.untilted(theta, errors)[felt]
+        variance = np.diag(spread) + (NOISE_DOUBT * tilt) ** 2
         variance = variance + (drive_variance(problem, theta, bread, slopes, known) if disturbed else 0.0)
         held = [one.count for one in problem.log.teeth]
         counts = problem.log.counts if asked else held
@@ -291,12 +297,15 @@ def concluded(
             teeth, offset = shown_teeth(problem, theta, errors.ravel(), bread, slopes, counts)
             variance = variance + sum(teeth[count].opened for count in held if count in teeth)
             variance = variance + (offset.opened if shifted and not held else 0.0)
+        if problem.log.course is not None and disturbed:  # a window's estimate of few turns is poor
+            variance = variance + np.maximum(np.diag(bread - spread), 0.0)
+            variance = variance + opened(problem, theta, errors, bread, slopes)
         # the window's estimate need not be positive: then nothing is known
-        noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))
+        noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))[: len(felt)]
         noise[effects <= LEAST_EFFECT**2] = np.inf  # what is known of it is not from this log
         if told:
             rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in _rig_slopes(problem, theta, response)}
-            timed, left = problem.log.timed, left_by(slopes, bread, effects[felt] > LEAST_EFFECT**2)
+            timed, left = problem.log.timed, left_by(slopes, bread, told_of)
             late = dict(lateness(timed, moved, errors.ravel(), left))
             play = shown_play(moved[len(timed) :], errors.ravel(), left)
     sizes = dict(model.linear)
@@ -341,5 +350,5 @@ def _rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Arra
 def _spread_out(values: Array, places: NDArray[np.intp], length: int) -> Array:
     """Return values at their places, zero elsewhere."""
     whole = np.zeros(length)
-    whole[places] = values
+    whole[places] = values[: len(places)]
     return whole

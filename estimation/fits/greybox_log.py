@@ -15,6 +15,7 @@ from plant.runs import steps_a_sample
 from plant.solvers.steps import Parameters, parameter_row
 
 if TYPE_CHECKING:
+    from estimation.fits.course import Course
     from estimation.fits.teeth import Teeth
 
 BLOCK = 1e-3
@@ -101,6 +102,8 @@ class GreyBoxLog:
         Those whose delivery the drives hold; how large it is stays open.
     speed_offset : float
         What was subtracted from motor speed [rad/s]; where it is not 0, it stays open too.
+    course : Course, optional
+        What is open of the motor's course between the samples of a slow log, see `estimation.fits.course`.
     """
 
     drives: Array
@@ -118,6 +121,7 @@ class GreyBoxLog:
     counts: tuple[int, ...] = ()
     teeth: tuple["Teeth", ...] = ()
     speed_offset: float = 0.0
+    course: "Course | None" = None
 
     def beginning(self, samples: int) -> "GreyBoxLog":
         """Return the log's first part.
@@ -148,6 +152,26 @@ class GreyBoxLog:
     def passes_on(self) -> bool:
         """Whether noise of a driving channel counts with an unknown."""
         return any(noise.passed_on > 0.0 for noise in self.noise)
+
+    def walks(self, block: int) -> tuple[Array, Array]:
+        """Return what the random walk of each output gains after each block, and what else is open of its mean.
+
+        Parameters
+        ----------
+        block : int
+            Samples a block [count].
+
+        Returns
+        -------
+        tuple of ndarray, shapes (outputs, walks) and (outputs, places)
+            The last number counts for all blocks that follow [SI squared].
+        """
+        walk = np.array([[noise.walk * block * self.sample_time] for noise in self.noise])
+        beside = np.zeros_like(walk)
+        if self.course is None:
+            return walk, beside
+        samples = len(self.measured)
+        return walk + self.course.walk(samples, block), beside + self.course.beside(samples, block)
 
     def taken_at(self, value: float) -> "GreyBoxLog":
         """Return the log with the noise that driving channels pass on as it is where the unknown has a value.

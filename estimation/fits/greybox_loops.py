@@ -1,8 +1,7 @@
 """Kernels that predict a log by a grey-box model and sum up the normal equations of its misfit, in one pass.
 
 The model's step is traced once; its derivatives by state and unknown parameters are written beside it, and the loop
-along the log is pasted to them. Nothing as long as the log is stored unless asked for: a log of ten million samples
-takes no more memory to fit than one of a thousand.
+along the log is pasted to them. Nothing as long as the log is stored unless asked for.
 """
 
 import math
@@ -26,8 +25,7 @@ from plant.compiled.paste import kernel_text, pasted
 from plant.solvers.steps import parameter_names, parameter_symbols, ros2_step
 
 Kernel: TypeAlias = Callable[..., tuple[float, Array, Array]]
-"""``run(theta, drives, measured, parameters, sample_time, substeps, block, variance, walk, gaps, outlier, errors,
-slopes)``, see `run`."""
+"""See `run`, without its kernel."""
 
 RUNAWAY = 1e6
 """Largest normalised residual that counts [dimensionless]: a try that runs away keeps a finite cost."""
@@ -86,6 +84,7 @@ def run(
     block: int,
     variance: Array,
     walk: Array,
+    open_at: Array,
     gaps: Array,
     outlier: float,
     errors: Array,
@@ -109,8 +108,9 @@ def run(
         Model steps up to each sample.
     block : int
         Samples a block.
-    variance, walk : ndarray, shape (outputs,)
-        White noise of each output [SI squared], and random walk [SI squared a block].
+    variance, walk, open_at : ndarray, shapes (outputs,), (outputs, walks), (outputs, places)
+        White noise of each output, what its random walk gains after each block, and what else is open of each block's
+        mean; the last number counts for all blocks that follow [SI squared].
     gaps : ndarray, shape (gaps, 3)
         First and last sample that a gap in the drives acts on, and the variance of `GreyBoxModel.jump` over each.
     outlier : float
@@ -175,7 +175,7 @@ def run(
             for i in range(outputs):
                 if present[i] > 0.0:
                     rows[i] /= present[i]
-                    total = spread[i] + variance[i] / present[i]
+                    total = spread[i] + variance[i] / present[i] + open_at[i, min(k // block, open_at.shape[1] - 1)]
                     gain = spread[i] / total
                     cost += absorb(rows[i], levels[i], gain, 1.0 / math.sqrt(total), outlier, gradient, gram)
                     spread[i] -= gain * spread[i]
@@ -185,7 +185,7 @@ def run(
                         slopes[i, k // block] = rows[i, 1:]
                     rows[i] = 0.0
                     present[i] = 0.0
-                spread[i] += walk[i]
+                spread[i] += walk[i, min(k // block, walk.shape[1] - 1)]
     return cost, gradient, gram
 
 

@@ -31,8 +31,8 @@ MANY = 2 * LANES
 """The same where there are more: two vectors a step, of which one is worked on while the other waits, take from 1.3
 to 1.6 times as long as one."""
 
-ResidualsRun: TypeAlias = Callable[[Array, Array, Array, float, IntArray, int, Array, Array, Array], None]
-"""``run(parameters, drives, measured, sample_time, substeps, block, variance, walk, errors)``, which fills errors."""
+ResidualsRun: TypeAlias = Callable[[Array, Array, Array, float, IntArray, int, Array, Array, Array, Array], None]
+"""``run(parameters, drives, measured, sample_time, substeps, block, variance, walk, open_at, errors)`` fills errors."""
 
 
 @cache

@@ -46,6 +46,7 @@ def residuals_side_by_side(
     block: int,
     variance: Array,
     walk: Array,
+    open_at: Array,
     errors: Array,
 ) -> None:
     """Fill in the normalised residuals of a model under several parameter sets.
@@ -64,8 +65,9 @@ def residuals_side_by_side(
         Steps up to each sample.
     block : int
         Samples a block.
-    variance, walk : ndarray, shape (outputs,)
-        White noise of each output [SI squared], and random walk [SI squared a block].
+    variance, walk, open_at : ndarray, shapes (outputs,), (outputs, walks), (outputs, places)
+        White noise of each output, what its random walk gains after each block, and what else is open of each block's
+        mean; the last number counts for all blocks that follow [SI squared].
     errors : ndarray, shape (outputs, blocks, lanes)
         Room for the residuals; those of missing blocks are left as they are.
     """
@@ -112,12 +114,12 @@ def residuals_side_by_side(
         if (k + 1) % block == 0 or k == n - 1:
             for i in range(kernel.OUTPUTS):
                 if present[i] > 0.0:
-                    total = spread[i] + variance[i] / present[i]
+                    total = spread[i] + variance[i] / present[i] + open_at[i, min(k // block, open_at.shape[1] - 1)]
                     gain = spread[i] / total
                     absorb(kernel, excess[i], level[i], present[i], gain, math.sqrt(total), errors[i, k // block])
                     spread[i] -= gain * spread[i]
                     present[i] = 0.0
-                spread[i] += walk[i]
+                spread[i] += walk[i, min(k // block, walk.shape[1] - 1)]
 
 
 def absorb(

@@ -129,7 +129,7 @@ def toothed(
     guessed = with_teeth(log, (), offset) if offset else log
     plain = Toothed(guessed, fitted(asked_for_teeth(guessed)))
     if not _hopeful(plain.fits, largest):
-        return plain._replace(left=_left(plain.best))
+        return plain._replace(left=_left(plain))
     shifted = _shifted(log, plain, fitted)
     if offset:
         plain, shifted = shifted or plain, None
@@ -144,7 +144,7 @@ def toothed(
             offset = begun.log.speed_offset
             told = _told_offset(offset, begun.best.speed_offset.std)
             return begun._replace(log=replace(begun.log, counts=()), remarks=told)
-    return plain._replace(left=_left(plain.best))
+    return plain._replace(left=_left(plain))
 
 
 def asked_for_teeth(log: GreyBoxLog) -> GreyBoxLog:
@@ -246,8 +246,9 @@ def _asked_for(fit: GreyBoxFit) -> ShownTeeth | None:
     return ranked[0] if ranked[0].gain > TEETH_WORTH + STANDS_OUT * max(other, 0.0) else None
 
 
-def _left(fit: GreyBoxFit) -> tuple[Note, ...]:
-    shown = [one.teeth for one in _shown(fit)[:1]]
+def _left(found: Toothed) -> tuple[Note, ...]:
+    """Return what residuals show of teeth; in a slow log they average away, and the motor's course looks like some."""
+    shown = [] if found.log.course is not None else [one.teeth for one in _shown(found.best)[:1]]
     return tuple(EstimateCode.TEETH_LEFT.note(percent=100.0 * one.amplitude, teeth=one.count) for one in shown)
 
 

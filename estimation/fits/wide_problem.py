@@ -211,7 +211,8 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     most = rig["pump_displacement"] * float(np.max(np.abs(log.drives[:, 0])))
     relief = (0.0, max(most / (SHARPEST_RELIEF * rig["relief_pressure"]), rig["relief_conductance"]))
     stiffest = ADIABATIC * rig["accumulator_pressure"] / (LEAST_GAS * rig["chamber_volume"])
-    limits = {"speed_lead": (0.0, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
+    latest = 0.0 if log.course is None else -log.sample_time
+    limits = {"speed_lead": (latest, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
     limits[START_LEVEL] = (-rig["accumulator_pressure"], _shut_in(log))
     stiff = max(rig["bulk_modulus"], *(model.values(guess)["bulk_modulus"] for guess in guesses))
     volume = rig["chamber_volume"]

@@ -100,7 +100,8 @@ def test_a_run_that_escapes_keeps_a_finite_residual_and_leaves_its_neighbours_al
         log.steps,
         1,
         np.array([noise.variance]),
-        np.zeros(1),
+        np.zeros((1, 1)),
+        np.zeros((1, 1)),
         errors,
     )
     assert np.max(np.abs(errors[..., 3])) == RUNAWAY
@@ -174,7 +175,8 @@ def test_the_loop_run_as_python_gives_what_its_kernel_gives(
     drives = problem.log.drives[200 : 200 + n, :2, None] * (1.0 + 0.1 * np.arange(LANES if own else 1))
     measured = problem.log.measured[200 : 200 + n].copy()
     measured[4:6] = np.nan
-    given = measured, 1e-3, np.array([0, *[2] * (n - 3), 3, 3]), 2, np.array([1e7]), np.array([1e6])
+    given = measured, 1e-3, np.array([0, *[2] * (n - 3), 3, 3]), 2, np.array([1e7])
+    given = *given, np.array([[1e6, 0.0, 2e6]]), np.array([[0.0, 3e7]])
     text = text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(FLOW_FORM, LANES))
     file = functions_of(text)
     plain = SimpleNamespace(**vars(file))
