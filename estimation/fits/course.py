@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from estimation.arrays import Array, IntArray
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem
+from estimation.fits.speed_course import steady_bend
 from plant.solvers.steps import parameter_names
 
 SLOW = 1.5e-3
@@ -125,10 +126,11 @@ def turns(log: GreyBoxLog) -> Array:
     Returns
     -------
     ndarray, shape (n,)
-        Second differences, less what its noise makes of them [rad/s].
+        Second differences that are not steady, less what its noise makes of them [rad/s].
     """
     speed = log.drives[:, 0]
-    turn = np.abs(np.diff(speed, n=2, prepend=speed[0], append=speed[-1]))
+    bend = np.diff(speed, n=2, prepend=speed[0], append=speed[-1])
+    turn = np.where(steady_bend(speed) == 0.0, np.abs(bend), 0.0)
     return np.maximum(np.maximum(turn, np.append(0.0, turn[:-1])) - OWN_NOISE * log.drive_std[0], 0.0)
 
 

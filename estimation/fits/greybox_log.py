@@ -103,7 +103,7 @@ class GreyBoxLog:
     speed_offset : float
         What was subtracted from motor speed [rad/s]; where it is not 0, it stays open too.
     course : Course, optional
-        What is open of the motor's course between the samples of a slow log, see `estimation.fits.course`.
+        What is open of the motor's course between the samples of a slow log, see `estimation.fits.course` [Pa].
     """
 
     drives: Array

@@ -71,3 +71,11 @@ def test_bulk_modulus_of_a_log_of_200_hz_is_within_its_interval(seed: int) -> No
     value, std = fit_flow(logged(200, seed), HEALTHY, HEALTHY.bulk_modulus).parameters["bulk_modulus"]
     assert abs(value - HEALTHY.bulk_modulus) < 2.5 * std
     assert std < 0.005 * value
+
+
+def test_a_steady_bend_leaves_nothing_open() -> None:
+    log = still(200, 1.0)
+    log.drives[:, 0] = 500.0 * np.sin(0.05 * np.arange(200))
+    bent = turns(log)[2:-2]
+    assert np.mean(bent == 0.0) > 0.8
+    assert np.max(bent) < 0.5 * np.max(np.abs(np.diff(log.drives[:, 0], n=2)))
