@@ -61,7 +61,7 @@ def test_a_position_on_another_scale_is_objected_to() -> None:
 def test_an_offset_of_speed_does_not_pass_for_one_of_pressure() -> None:
     rng = np.random.default_rng(3)
     p = circuit_of(parameters_for(CONDITIONS["major_leakage_major_friction"]))
-    record = simulate(CIRCUIT, make_drive("steps", 5.0, 2e-3, p, rng), 2e-3, p, sensors=BENCH, rng=rng)
+    record = simulate(CIRCUIT, make_drive("steps", 5.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     fit = fit_flow(record.replace(motor_speed_rad_s=record["motor_speed_rad_s"] - 2.0), HEALTHY, 2e8)
     assert fit.turning.offset == pytest.approx(-2.0, abs=0.05)
     assert fit.explanation is None
