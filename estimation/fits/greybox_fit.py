@@ -4,7 +4,7 @@ The variance of an estimate has three parts, told apart: noise of the outputs, n
 well the rig's own parameters are known. The last two are read off the fit's linear response to them.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,11 +18,11 @@ from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem, search_bounds
 from estimation.fits.lateness import changes_beside, lateness, left_by
 from estimation.fits.play import NO_PLAY, ShownPlay, shown_play
+from estimation.fits.rig_response import rig_slopes
 from estimation.fits.small_teeth import NOT_MOVED, small_teeth
 from estimation.fits.teeth import NO_OFFSET, ShownOffset, ShownTeeth, shown_teeth
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
-from plant.solvers.steps import parameter_names
 from plant.spare_processors import each
 
 LEAST_EFFECT = 1.0
@@ -43,9 +43,6 @@ EXPLAINED = 1.2
 NOISE_DOUBT = 0.2
 """Standard deviation of the share of a driving channel's noise that is counted with the slopes: its size is known to
 some percent, and it is white in theory alone [fraction]."""
-
-RIG_NUDGE = 1e-3
-"""Relative change of a rig parameter by which the fit's response to it is read off [fraction]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,10 +301,12 @@ def concluded(
         noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))[: len(felt)]
         noise[effects <= LEAST_EFFECT**2] = np.inf  # what is known of it is not from this log
         if told:
-            rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in _rig_slopes(problem, theta, response)}
+            rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in rig_slopes(problem, theta, response)}
             timed, left = problem.log.timed, left_by(slopes, bread, told_of)
             late = dict(lateness(timed, moved, errors.ravel(), left))
             play = shown_play(moved[len(timed) :], errors.ravel(), left)
+    # teeth that are taken up are not small, and the course of a slow log's motor looks like some
+    asked_of_teeth = {} if problem.log.teeth or problem.log.course is not None else teeth
     sizes = dict(model.linear)
     values = model.values(theta)
     unit = np.array([sizes.get(name, values[name]) for name in model.unknowns])
@@ -326,25 +325,11 @@ def concluded(
         slopes=all_slopes,
         teeth=teeth,
         speed_offset=offset,
-        small_teeth=small_teeth({} if problem.log.teeth else teeth, [model.unknowns[place] for place in felt]),
+        small_teeth=small_teeth(asked_of_teeth, [model.unknowns[place] for place in felt]),
         cost=point.cost,
         chi_square=tuple(map(float, squares / seen)),
         autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),
     )
-
-
-def _rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Array]) -> Iterator[tuple[str, Array]]:
-    """Yield by how much the unknowns would differ per relative change of each uncertain parameter of the rig."""
-    names, row = parameter_names(problem.model.parameters), problem.log.parameters
-    asked = [
-        name
-        for name, relative in problem.log.uncertainties.items()
-        if relative > 0.0 and name in names and name not in problem.model.unknowns
-    ]
-    nudged = [np.where(np.arange(len(row)) == names.index(name), row * (1.0 + RIG_NUDGE), row) for name in asked]
-    known, *shifted = problem.residuals_of(theta, [row, *nudged])
-    for name, errors in zip(asked, shifted, strict=True):
-        yield name, -response(errors - known) / RIG_NUDGE
 
 
 def _spread_out(values: Array, places: NDArray[np.intp], length: int) -> Array:
