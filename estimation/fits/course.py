@@ -155,7 +155,7 @@ def likeliest(problem: Problem, theta: Array, course: Course) -> tuple[float, fl
     (noise,) = log.noise
     still = problem.on(replace(log, course=None, noise=(replace(noise, walk=0.0),)))
     samples, block = len(log.measured), max(1, round(log.block / log.sample_time))
-    left = still.residuals(theta)[0][:LONGEST] * (noise.variance / block) ** 0.5
+    left = _without_offset(still, theta)[:LONGEST] * (noise.variance / block) ** 0.5
     walk, beside = np.append(0.0, unit.walk(samples, block)), unit.beside(samples, block)
     share, staying, passing = (one.ravel() for one in np.meshgrid(SHARES, TRIED, TRIED, indexing="ij"))
     white, walks, passes = share * noise.variance / block, staying**2, passing**2
@@ -172,6 +172,20 @@ def likeliest(problem: Problem, theta: Array, course: Course) -> tuple[float, fl
         spread -= gain * spread
     at = int(np.argmin(cost))
     return float(staying[at]), float(passing[at])
+
+
+def _without_offset(problem: Problem, theta: Array) -> Array:
+    """Return residuals less what an offset of motor speed and the unknowns make of them, shape (blocks,).
+
+    An offset leaves pressure off for long. A walk of the pressure would take it up, and none would be found.
+    """
+    errors, slopes = problem.linearised(theta)
+    drives = problem.log.drives
+    nudged = drives.copy()
+    nudged[:, 0] += NUDGE
+    known, moved = problem.disturbed(theta, [drives, nudged])
+    columns = np.column_stack([(moved - known).ravel() / NUDGE, slopes])
+    return errors.ravel() - columns @ np.linalg.lstsq(columns, errors.ravel(), rcond=None)[0]
 
 
 def ways(speed: Array) -> Array:

@@ -271,13 +271,12 @@ def concluded(
     used = int(np.count_nonzero(errors))
     if len(felt) and used > len(theta):
         slopes = all_slopes if len(felt) == len(theta) else all_slopes[:, felt]
-        prior, told_of = problem.prior[felt], effects[felt] > LEAST_EFFECT**2
+        left_over, prior, lags = errors.ravel(), problem.prior[felt], automatic_lags(errors.ravel())
+        bread, spread = least_squares_covariance(slopes, left_over, used, lags, prior, warned=warned)
+        fitted = slopes, bread  # what doubts are asked beside; deviations also hold what the fit has put to nothing
         if problem.log.course is not None and (gone := vanished(problem, theta, errors, felt)):
             slopes, prior = np.column_stack([slopes, *gone]), np.append(prior, np.zeros(len(gone)))
-            told_of = np.append(told_of, np.ones(len(gone), dtype=bool))
-        bread, spread = least_squares_covariance(
-            slopes, errors.ravel(), used, automatic_lags(errors.ravel()), prior, warned=warned
-        )
+            bread, spread = least_squares_covariance(slopes, left_over, used, lags, prior, warned=warned)
 
         def response(shift: Array) -> Array:
             return bread @ (slopes.T @ shift.ravel())
@@ -287,24 +286,25 @@ def concluded(
         tilt = bread[:, : len(felt)] @ problem.untilted(theta, errors)[felt]
         variance = np.diag(spread) + (NOISE_DOUBT * tilt) ** 2
         variance = variance + (drive_variance(problem, theta, bread, slopes, known) if disturbed else 0.0)
-        held = [one.count for one in problem.log.teeth]
-        counts = problem.log.counts if asked else held
-        shifted = problem.log.speed_offset != 0.0
-        if (disturbed and counts) or shifted:
-            teeth, offset = shown_teeth(problem, theta, errors.ravel(), bread, slopes, counts)
-            variance = variance + sum(teeth[count].opened for count in held if count in teeth)
-            variance = variance + (offset.opened if shifted and not held else 0.0)
         if problem.log.course is not None and disturbed:  # a window's estimate of few turns is poor
             variance = variance + np.maximum(np.diag(bread - spread), 0.0)
             variance = variance + opened(problem, theta, errors, bread, slopes)
         # the window's estimate need not be positive: then nothing is known
-        noise[felt] = np.sqrt(np.where(np.diag(spread) > 0.0, variance, np.inf))[: len(felt)]
+        variance = np.where(np.diag(spread) > 0.0, variance, np.inf)[: len(felt)]
+        held = [one.count for one in problem.log.teeth]
+        counts = problem.log.counts if asked else held
+        shifted = problem.log.speed_offset != 0.0
+        if (disturbed and counts) or shifted:
+            teeth, offset = shown_teeth(problem, theta, left_over, fitted[1], fitted[0], counts)
+            variance = variance + sum(teeth[count].opened for count in held if count in teeth)
+            variance = variance + (offset.opened if shifted and not held else 0.0)
+        noise[felt] = np.sqrt(variance)
         noise[effects <= LEAST_EFFECT**2] = np.inf  # what is known of it is not from this log
         if told:
             rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in rig_slopes(problem, theta, response)}
-            timed, left = problem.log.timed, left_by(slopes, bread, told_of)
-            late = dict(lateness(timed, moved, errors.ravel(), left))
-            play = shown_play(moved[len(timed) :], errors.ravel(), left)
+            timed, left = problem.log.timed, left_by(*fitted, effects[felt] > LEAST_EFFECT**2)
+            late = dict(lateness(timed, moved, left_over, left))
+            play = shown_play(moved[len(timed) :], left_over, left)
     # teeth that are taken up are not small, and the course of a slow log's motor looks like some
     asked_of_teeth = {} if problem.log.teeth or problem.log.course is not None else teeth
     sizes = dict(model.linear)

@@ -18,7 +18,7 @@ from estimation.fits.wide_problem import freed, usual_values, widened
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
 from estimation.models.greybox import GreyBoxModel
-from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters
+from estimation.models.wide_flow import TURBULENT_FLOW_FORM, WIDE_FLOW_FORM, WideFlowParameters
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
@@ -51,7 +51,7 @@ def alone(problem: FreedProblem, theta: np.ndarray) -> np.ndarray:
     row = problem.log.parameters.copy()
     for name, value in problem.model.values(theta).items():
         row[parameter_names(WideFlowParameters).index(name)] = value
-    return Problem(WIDE_FLOW_FORM, problem.log).residuals(np.empty(0), parameters=row)
+    return Problem(TURBULENT_FLOW_FORM, problem.log).residuals(np.empty(0), parameters=row)
 
 
 def test_several_points_together_cost_what_each_costs_alone(problem: FreedProblem) -> None:
