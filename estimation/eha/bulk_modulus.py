@@ -17,10 +17,10 @@ from estimation.fits.delivery import delivered
 from estimation.fits.flow_fit import FLOW_CHANNELS, REPORTED, fit_flow
 from estimation.fits.form_fit import FormFit
 from estimation.fits.motion_fit import MOTION_CHANNELS, fit_motion
-from estimation.log_checks.channel_physics import FARTHEST, POSITION, RPM, TURNS
+from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES
+from estimation.log_checks.channel_physics import FARTHEST, RPM, TURNS
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.log_checks.first_belief import START_STD, begins_in_motion, first_belief, first_load
-from estimation.log_checks.sensor_check import PRESSURE, PRESSURES
 from estimation.models.eha_forms import FORMS
 from estimation.notes import ChannelCode
 from estimation.trust.bounds import bulk_modulus_bound

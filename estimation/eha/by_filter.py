@@ -11,9 +11,9 @@ from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide
 from estimation.filters.iterated_smoother import LONGEST
 from estimation.filters.run import METHODS, Estimate, available_channels, run_filter
 from estimation.finding import Gate, Outcome
+from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, first_belief
-from estimation.log_checks.sensor_check import PRESSURE
 from estimation.models.augment import AUGMENTABLE, augmented, augmented_prior
 from estimation.models.eha_forms import BULK_MODULUS
 from estimation.models.model import ProcessModel

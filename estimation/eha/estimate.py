@@ -4,8 +4,8 @@ from estimation.eha.bulk_modulus import DEFAULT_OPTIONS, FITTED, EstimateOptions
 from estimation.eha.explained import notes_of
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Finding, Outcome, Quantity
+from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
-from estimation.log_checks.sensor_check import PRESSURE
 from estimation.notes import EstimateCode, RigCode
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig

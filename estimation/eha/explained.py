@@ -11,8 +11,8 @@ from estimation.fits.play import crossings
 from estimation.fits.teeth import EVENLY, Turning, delivering
 from estimation.fits.tried import Explanation
 from estimation.log_checks.bridging import POSITION, bridged
+from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog
-from estimation.log_checks.sensor_check import PRESSURE
 from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import CROSSED, GROWTH, TURBULENT_AT
 from estimation.notes import RigCode

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.log_checks.bridging import bridged
-from estimation.log_checks.sensor_check import PRESSURE
+from estimation.log_checks.channel_names import PRESSURE
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.log.record import Record

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from estimation.arrays import Array
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.notes import GuessCode
 from plant.eha.model import EhaParameters
 from plant.log.columns import CHANNELS, TIME, UNITS
@@ -21,8 +22,7 @@ from plant.log.plausibility import LIMITS, SAMPLE_TIME
 from plant.notes import Note
 from plant.units import conversion_to
 
-SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
-PRESSURE, PORTS, VOLTAGE = "differential_pressure_pa", ("pressure_a_pa", "pressure_b_pa"), "motor_voltage_v"
+PORTS, VOLTAGE = ("pressure_a_pa", "pressure_b_pa"), "motor_voltage_v"
 
 BLOCKS = 300
 """Blocks that a log is averaged over [count]."""

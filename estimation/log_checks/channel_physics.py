@@ -18,14 +18,12 @@ from estimation.log_checks.channel_blocks import (
     gone_together,
     power_of,
 )
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.measurement_noise import position_variance
-from estimation.log_checks.sensor_check import PRESSURE
 from estimation.notes import ChannelCode
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
-
-SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
 
 SHORT, MIDDLE, LONG = 0.01, 0.02, 0.05
 """Blocks over which velocity is compared with position, flows are balanced, and the piston follows the pump [s]."""

@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from estimation.log_checks.channel_names import PRESSURE, PRESSURES
 from estimation.log_checks.channel_physics import channel_mistakes
 from estimation.log_checks.filtered import independent_variance, without_correlated_noise
 from estimation.log_checks.held import without_held
 from estimation.log_checks.hum import without_hum
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
 from estimation.log_checks.outliers import without_gross_outliers
-from estimation.log_checks.sensor_check import PRESSURE, PRESSURES, sensor_objections, without_saturated
+from estimation.log_checks.sensor_check import sensor_objections, without_saturated
 from estimation.log_checks.velocity_offset import without_velocity_offset
 from estimation.notes import SensorCode
 from plant.eha.model import EhaParameters

@@ -6,9 +6,8 @@ sees a slow sensor, and finds the filter's lag as any other.
 
 import numpy as np
 
-from estimation.log_checks.channel_physics import SPEED
+from estimation.log_checks.channel_names import PRESSURE, PRESSURES, SPEED
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE
-from estimation.log_checks.sensor_check import PRESSURE, PRESSURES
 from estimation.notes import SensorCode
 from plant.arrays import Array
 from plant.log.record import Record

@@ -10,13 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.log_checks.sensor_check import PRESSURE, PRESSURES
+from estimation.log_checks.channel_names import PRESSURE, PRESSURES, SPEED
 from estimation.notes import SensorCode
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
-
-SPEED = "motor_speed_rad_s"
 
 HELD = tuple(dict.fromkeys(("position_m", "velocity_m_s", PRESSURE, *PRESSURES)))
 """Channels that are asked: none can jump. A motor speed that is held may be how the motor was driven."""

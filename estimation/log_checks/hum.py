@@ -9,8 +9,8 @@ import numpy as np
 
 from estimation.fits.convolution import smooth_length
 from estimation.log_checks.bridging import bridged
+from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.order import median
-from estimation.log_checks.sensor_check import PRESSURE
 from estimation.notes import SensorCode
 from plant.arrays import Array
 from plant.log.record import Record

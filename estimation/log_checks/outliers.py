@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 
 from estimation.log_checks.bridging import bridged
+from estimation.log_checks.channel_names import PRESSURES
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.order import percentile
-from estimation.log_checks.sensor_check import PRESSURES
 from estimation.notes import SensorCode
 from plant.arrays import Array
 from plant.log.record import Record

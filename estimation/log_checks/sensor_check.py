@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.log_checks.bridging import bridged
+from estimation.log_checks.channel_names import PRESSURE, PRESSURES
+from estimation.log_checks.filtered import independent_rows
 from estimation.log_checks.frozen_encoder import jumped, missed_motion
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.order import median
@@ -17,11 +19,6 @@ from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
-
-PRESSURE = "differential_pressure_pa"
-
-PRESSURES = (PRESSURE, "pressure_a_pa", "pressure_b_pa")
-"""Channels of which clipped samples are taken out."""
 
 LONGEST_HOLD = 0.05
 """A live sensor does not repeat one value for longer while the quantity moves [s]."""
@@ -213,10 +210,11 @@ def _slid(record: Record, stretch: slice) -> tuple[bool, bool]:
     velocity = velocity[np.isfinite(velocity)]
     if len(velocity) < FEWEST_HELD:
         return False, False
-    noise = float(np.std(np.diff(velocity))) / 2.0**0.5
+    alike = independent_rows(record["velocity_m_s"], record.sample_time)  # an average adds up like fewer, longer rows
+    noise = float(np.std(velocity[alike:] - velocity[:-alike])) / 2.0**0.5 if len(velocity) > 2 * alike else 0.0
     step = 0.5 * (stretch.stop - stretch.start) * record.sample_time / len(velocity)
     travelled = np.cumsum(velocity) * step
-    allowed = 6.0 * noise * step * len(velocity) ** 0.5
+    allowed = 6.0 * noise * step * (alike * len(velocity)) ** 0.5
     slid = bool(np.ptp(travelled) > max(allowed, UNDELIVERED * _quantum(record["position_m"])))
     return slid, not slid and noise > 0.0
 

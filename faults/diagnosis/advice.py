@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from estimation.finding import Quantity
-from estimation.log_checks.sensor_check import PRESSURE
+from estimation.log_checks.channel_names import PRESSURE
 from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
 from faults.notes import AdviceCode, AgainstCode, ClassCode
 from plant.log.record import Record

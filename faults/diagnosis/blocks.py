@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from estimation.arrays import IntArray
 from estimation.eha.explained import LEAKAGE_COURSE
 from estimation.log_checks.bridging import bridged, filled
+from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.first_belief import begins_in_motion
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
-from estimation.log_checks.sensor_check import PRESSURE
 from plant.arrays import Array
 from plant.errors import LogError
 from plant.log.record import Record

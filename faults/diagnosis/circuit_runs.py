@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from estimation.arrays import IntArray
-from estimation.log_checks.sensor_check import PRESSURE
+from estimation.log_checks.channel_names import PRESSURE
 from faults.diagnosis.blocks import Blocks
 from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters, circuit_values, longest_stroke

@@ -17,8 +17,8 @@ from estimation.eha.explained import OUTSIDE, at_pump_speed, rig_set_right, set_
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Finding, Outcome, Quantity
 from estimation.identification.model.linear_model import LinearModel
+from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
-from estimation.log_checks.sensor_check import PRESSURE
 from estimation.notes import RigCode
 from faults.diagnosis.advice import advice_for, oil_advice
 from faults.diagnosis.another_oil import whatever_the_oil

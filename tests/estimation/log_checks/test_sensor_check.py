@@ -185,3 +185,17 @@ def test_a_still_velocity_is_not_accused_by_an_encoder_that_is_not_there() -> No
     gone = np.where(frozen.time < 2.9, frozen["position_m"], np.nan)
     for other in (frozen.replace(position_m=None), frozen.replace(position_m=gone)):
         assert "velocity_m_s" not in {note.data["channel"] for note in sensor_objections(other, RIG_PARAMETERS)}
+
+
+def test_the_noise_of_an_averaged_velocity_is_no_motion_of_a_piston_that_is_stuck() -> None:
+    rows, still, moving = 5, slice(3000, 3100), 0.03 * (np.arange(6000) // 1500 % 2)
+    position = 1e-6 * np.round(1e3 * np.cumsum(moving) + np.arange(6000) / 50)  # an encoder of 1 um
+    position[still] = position[still.start]
+    accused = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        noise = np.convolve(1e-3 * rng.standard_normal(6000 + rows - 1), np.ones(rows) / rows, "valid")
+        record = Record(1e-3, {"position_m": position, "velocity_m_s": moving + noise})
+        assert not _slid(record, still)[0]
+        accused += _slid(record.replace(velocity_m_s=moving + noise + 3e-3), still)[0]
+    assert accused == 40  # three millimetres a second are motion
