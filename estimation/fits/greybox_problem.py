@@ -246,7 +246,7 @@ class Problem:
         """
         errors, slopes = self._room(), self._room(len(theta))
         self._run(theta, errors, slopes)
-        return errors, self._tilted(theta, errors, slopes).reshape(-1, len(theta))
+        return errors, self._tilted(theta, errors, slopes).reshape(errors.size, len(theta))
 
     def _room(self, *columns: int) -> Array:
         return np.zeros((self.log.measured.shape[1], -(-len(self.log.measured) // self._block), *columns))
