@@ -273,7 +273,8 @@ def concluded(
         slopes = all_slopes if len(felt) == len(theta) else all_slopes[:, felt]
         left_over, prior, lags = errors.ravel(), problem.prior[felt], automatic_lags(errors.ravel())
         bread, spread = least_squares_covariance(slopes, left_over, used, lags, prior, warned=warned)
-        fitted = slopes, bread  # what doubts are asked beside; deviations also hold what the fit has put to nothing
+        # doubts are asked beside what was fitted; deviations also hold what the fit has put to nothing
+        fitted_slopes, fitted_bread = slopes, bread
         if problem.log.course is not None and (gone := vanished(problem, theta, errors, felt)):
             slopes, prior = np.column_stack([slopes, *gone]), np.append(prior, np.zeros(len(gone)))
             bread, spread = least_squares_covariance(slopes, left_over, used, lags, prior, warned=warned)
@@ -295,14 +296,14 @@ def concluded(
         counts = problem.log.counts if asked else held
         shifted = problem.log.speed_offset != 0.0
         if (disturbed and counts) or shifted:
-            teeth, offset = shown_teeth(problem, theta, left_over, fitted[1], fitted[0], counts)
+            teeth, offset = shown_teeth(problem, theta, left_over, fitted_bread, fitted_slopes, counts)
             variance = variance + sum(teeth[count].opened for count in held if count in teeth)
             variance = variance + (offset.opened if shifted and not held else 0.0)
         noise[felt] = np.sqrt(variance)
         noise[effects <= LEAST_EFFECT**2] = np.inf  # what is known of it is not from this log
         if told:
             rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in rig_slopes(problem, theta, response)}
-            timed, left = problem.log.timed, left_by(*fitted, effects[felt] > LEAST_EFFECT**2)
+            timed, left = problem.log.timed, left_by(fitted_slopes, fitted_bread, effects[felt] > LEAST_EFFECT**2)
             late = dict(lateness(timed, moved, left_over, left))
             play = shown_play(moved[len(timed) :], left_over, left)
     # teeth that are taken up are not small, and the course of a slow log's motor looks like some

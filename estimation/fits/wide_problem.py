@@ -10,7 +10,7 @@ from estimation.fits.form_fit import LONGEST_STEP
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import search_bounds
-from estimation.fits.hypotheses import LIMITS, PRESUMED, Hypothesis
+from estimation.fits.hypotheses import LEAKAGE_TURBULENT, LIMITS, PRESUMED, Hypothesis
 from estimation.fits.leakage_step import likeliest_step
 from estimation.fits.play import crossings
 from estimation.models.completed_flow import CRACKS
@@ -53,8 +53,6 @@ LEAST_GAS = 1.0
 stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
 
 POSITION, POSITION_ZERO = "position_m", "position_zero"
-
-TURBULENT = "leakage_turbulent"
 
 START_PRESSURE, START_LEVEL = "start_pressure", "start_level"
 
@@ -154,7 +152,7 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedP
     known = [name for name in plain.unknowns if name not in held]
     late = {one.late for one in together}
     log = replace(log, timed=tuple(channel for channel in log.timed if channel not in late))
-    form = TURBULENT_FLOW_FORM if TURBULENT in extra else WIDE_FLOW_FORM
+    form = TURBULENT_FLOW_FORM if set(LEAKAGE_TURBULENT.free) <= set(extra) else WIDE_FLOW_FORM
     return FreedProblem(form, log, tuple(dict.fromkeys((*known, *extra))), LINEAR)
 
 

@@ -42,7 +42,7 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
     shown = {**found.quantities, **found.severities}
     shares = sorted(found.probabilities.items(), key=lambda item: -item[1])
     file = Path(result["file"]).name
-    advice = [sentence(str(note)) for note in found.advice]
+    to_do = [*left_unread(result), *(sentence(str(note)) for note in found.advice)]
     noted = [sentence(one["text"]) for one in result["notes"]]
     facts = {
         "result": result,
@@ -50,11 +50,11 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
         "title": _title(found),
         "actuator": found.actuator,
         "message": sentence(result["message"]),
-        "to_do": [*left_unread(result), *advice],
+        "to_do": to_do,
         "doubts": [sentence(one) for one in dict.fromkeys(map(str, (*found.against, *found.gate.reasons)))],
         "duration": f"{record.duration:g}",
         "channels": ", ".join(found.channels),
-        "notes": [one for one in noted if one not in left_unread(result) and one not in advice],
+        "notes": [one for one in noted if one not in to_do],
         "quantities": pd.DataFrame([_row(name, one) for name, one in shown.items()]),
         "probabilities": pd.DataFrame(
             [(name.replace("_", " "), percent_said(share)) for name, share in shares if share >= LEAST_SHARE],

@@ -13,12 +13,9 @@ from plant.arrays import Array
 from plant.errors import LogError, LogWarning
 from plant.log.cells import MISSING, not_a_number, number, wrong_width
 from plant.log.columns import TRUTH, Column
-from plant.log.csv_layout import Layout
+from plant.log.csv_layout import COMMENT, Layout
 from plant.log.notes import LogCode
 from plant.log.stamps import is_stamp, read_stamps
-
-COMMENT = ("#", "%", "//")
-"""What a line of comment begins with."""
 
 MOST_AFTER, SHARE_AFTER = 20, 0.01
 """Lines below the last row of data that are left out: at most so many [count], and of the rows above [fraction]."""
@@ -63,17 +60,14 @@ def read_cells(
         If lines were left out.
     """
     names = [heading.name for heading in layout.headings]
-    numeric = [one for one in chosen if one.position not in layout.stamped]
-    kept: dict[Column, Any] = {one: array("d") if one in numeric else [] for one in chosen}
+    kept: dict[Column, Any] = {one: [] if one.position in layout.stamped else array("d") for one in chosen}
     waiting: list[list[float | str | None]] = []
     strange: list[LogError] = []
     between = taken = 0
     for row, cells in enumerate(cells for cells in rows if cells):
         first = cells[0].strip()
-        if first.startswith(COMMENT) and first not in MISSING:
-            between += 1
-            continue
-        if first == names[0] and [cell.strip() for cell in cells] == names:
+        comment = COMMENT.match(first) and first not in MISSING
+        if comment or (first == names[0] and [cell.strip() for cell in cells] == names):
             between += 1
             continue
         try:

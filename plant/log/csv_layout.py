@@ -27,7 +27,9 @@ BLANKS = " "
 
 DELIMITERS = (",", ";", "\t", "|", BLANKS)
 _NUMBER = re.compile(r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][-+]?\d+)?")
-_COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
+COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
+"""How a line of comment begins."""
+
 _WIDEST = 10_000
 
 
@@ -169,7 +171,7 @@ def _by_header(lines: Sequence[str], encoding: str) -> Layout:
     """Return the layout of a log without a row of numbers: its first line is the header."""
     first = next(place for place, line in enumerate(lines) if line.strip())
     delimiter = max(",;\t", key=lines[first].count)
-    names = [_COMMENT.sub("", name) for name in cells_of(lines[first], delimiter)]
+    names = [COMMENT.sub("", name) for name in cells_of(lines[first], delimiter)]
     return Layout(tuple(map(Heading, names)), first + 1, delimiter, ".", encoding)
 
 
@@ -262,7 +264,7 @@ def _above(lines: Sequence[str], delimiter: str, width: int, *, closed: bool) ->
             if found:
                 break
             continue
-        plain = _COMMENT.sub("", line)
+        plain = COMMENT.sub("", line)
         cells = [cell.strip().removeprefix("\ufeff") for cell in cells_of(plain, delimiter)]
         if delimiter == BLANKS and len(cells) != width:
             cells = [cell.strip() for cell in re.split(r"\s{2,}|\t", plain.strip())]

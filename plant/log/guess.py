@@ -1,7 +1,7 @@
 """Which column is which channel, guessed by what it is called and in what unit; what it does is looked at later."""
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -264,12 +264,12 @@ def overlooked(headings: Sequence[Heading], found: Collection[str]) -> tuple[Not
     known = "differential_pressure_pa" in found or chambers <= set(found)
     wanted = [] if known else ["differential_pressure_pa", *sorted(chambers - set(found))]
     wanted += [one for one in ("position_m", "velocity_m_s") if one not in found]
-    notes = []
-    for one in guess_by_name(headings, wanted):
-        if one.sure >= SHOWN and one.spec.isprintable():
-            option = f"{one.channel}={one.spec[:60]}{':UNIT' if one.unit is None else ''}"
-            notes.append(LogCode.COLUMN_OVERLOOKED.note(column=one.name[:60], channel=one.channel, option=option))
-    return tuple(notes)
+    return tuple(
+        LogCode.COLUMN_OVERLOOKED.note(
+            column=one.name[:60], channel=one.channel, option=option if one.unit is not None else f"{option}:UNIT"
+        )
+        for one, option in _shown(headings, wanted)
+    )
 
 
 def hint_of(channels: Sequence[str], headings: Sequence[Heading]) -> str:
@@ -282,8 +282,13 @@ def hint_of(channels: Sequence[str], headings: Sequence[Heading]) -> str:
     headings : sequence of Heading
         What the columns are called.
     """
-    known = [one for one in channels if one in UNITS]
-    found = [one for one in guess_by_name(headings, known) if one.sure >= SHOWN and one.spec.isprintable()]
-    option = ",".join(f"{one.channel}={one.spec[:60]}" for one in found)
+    option = ",".join(option for _, option in _shown(headings, [one for one in channels if one in UNITS]))
     may = f"; perhaps --columns '{option}'" if option else ""
     return f"{may}; `hydrostate inspect FILE` shows its columns and guesses which is which"
+
+
+def _shown(headings: Sequence[Heading], channels: Sequence[str]) -> Iterator[tuple[Guess, str]]:
+    """Yield the guesses that are sure enough to be shown, each with the option that reads it."""
+    for one in guess_by_name(headings, channels):
+        if one.sure >= SHOWN and one.spec.isprintable():
+            yield one, f"{one.channel}={one.spec[:60]}"

@@ -77,12 +77,7 @@ def channels_of(
             warnings.warn(LogWarning(said), stacklevel=2)
         parts = pieces(record, inputs) if split else [record]
         for name in inputs:  # told once, however many parts there are
-            lacking = sum(int(np.count_nonzero(np.isnan(part[name]))) for part in parts)
-            if lacking:
-                said = IdentificationCode.INPUT_BRIDGED.note(
-                    channel=name, count=lacking, total=sum(len(part) for part in parts)
-                )
-                warnings.warn(LogWarning(said), stacklevel=2)
+            _tell_bridged([part[name] for part in parts], name, stacklevel=3)
         for part in parts:
             columns = [_on_clock(bridged(part[name]), part.sample_time, wanted) for name in inputs]
             answer = _on_clock(part[output], part.sample_time, wanted)
@@ -186,9 +181,13 @@ def without_gaps(values: Array, name: str) -> Array:
     LogWarning
         If samples are bridged.
     """
-    n_missing = int(np.count_nonzero(np.isnan(values)))
-    if n_missing == 0:
-        return values
-    said = IdentificationCode.INPUT_BRIDGED.note(channel=name, count=n_missing, total=values.size)
-    warnings.warn(LogWarning(said), stacklevel=3)
-    return bridged(values)
+    return bridged(values) if _tell_bridged([values], name, stacklevel=4) else values
+
+
+def _tell_bridged(parts: Sequence[Array], name: str, *, stacklevel: int) -> bool:
+    """Warn of the samples that parts of an input lack; return whether any does."""
+    lacking = sum(int(np.count_nonzero(np.isnan(one))) for one in parts)
+    if lacking:
+        said = IdentificationCode.INPUT_BRIDGED.note(channel=name, count=lacking, total=sum(map(len, parts)))
+        warnings.warn(LogWarning(said), stacklevel=stacklevel)
+    return lacking > 0
