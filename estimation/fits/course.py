@@ -6,6 +6,7 @@ until it leaks off: pressure walks. And a motor that nears its new speed over a 
 each time, which comes back by itself: the samples beside a turn are off, those after it are not.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,7 +39,8 @@ MAY_VANISH = ("leakage_coefficient", "flow_bias")
 """Unknowns that a slow log may put to nothing, and so far from what they are that bulk modulus follows."""
 
 NUDGE = 1e-2
-"""Change by which the answer to them is read off, as a share of the rig's value [fraction]."""
+"""Change by which an answer is read off: of those unknowns as a share of the rig's value, of what is added to motor
+speed as a share of that [fraction]."""
 
 
 IN_VOLUME = 0.5 * np.array([[1.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
@@ -180,12 +182,16 @@ def _without_offset(problem: Problem, theta: Array) -> Array:
     An offset leaves pressure off for long. A walk of the pressure would take it up, and none would be found.
     """
     errors, slopes = problem.linearised(theta)
-    drives = problem.log.drives
-    nudged = drives.copy()
-    nudged[:, 0] += NUDGE
-    known, moved = problem.disturbed(theta, [drives, nudged])
-    columns = np.column_stack([(moved - known).ravel() / NUDGE, slopes])
+    columns = np.column_stack([_answers(problem, theta, [np.ones(len(problem.log.drives))]), slopes])
     return errors.ravel() - columns @ np.linalg.lstsq(columns, errors.ravel(), rcond=None)[0]
+
+
+def _answers(problem: Problem, theta: Array, speeds: Iterable[Array]) -> Array:
+    """Return how residuals answer to what is added to motor speed, shape (outputs * blocks, several)."""
+    drives = problem.log.drives
+    others = [np.column_stack([NUDGE * one, np.zeros_like(drives[:, 1:])]) for one in speeds]
+    known, *moved = problem.disturbed(theta, [drives, *(drives + other for other in others)])
+    return np.stack([(one - known).ravel() for one in moved], axis=-1) / NUDGE
 
 
 def ways(speed: Array) -> Array:
@@ -234,10 +240,7 @@ def opened(problem: Problem, theta: Array, errors: Array, bread: Array, slopes: 
     ndarray, shape (felt,)
         [dimensionless]
     """
-    drives = problem.log.drives
-    others = [np.column_stack([NUDGE * way, np.zeros_like(drives[:, 1:])]) for way in ways(drives[:, 0])]
-    known, *moved = problem.coarse.disturbed(theta, [drives, *(drives + other for other in others)])
-    columns = np.stack([(one - known).ravel() for one in moved], axis=-1) / NUDGE
+    columns = _answers(problem.coarse, theta, ways(problem.log.drives[:, 0]))
     answers = bread @ (slopes.T @ columns)
     free = columns - slopes @ answers
     spread = np.linalg.inv(free.T @ free + IN_VOLUME.T @ IN_VOLUME / USUAL**2)

@@ -10,7 +10,7 @@ from estimation.fits.averaged import averaged
 from estimation.fits.course import SLOW
 from estimation.fits.form_fit import LONGEST_STEP
 from estimation.fits.greybox_log import GreyBoxLog, greybox_log
-from estimation.fits.speed_course import steady_bend, straightened
+from estimation.fits.speed_course import straightened
 from estimation.log_checks.bridging import bridged, within_gaps
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance, struck_variance
 from estimation.log_checks.outliers import without_outliers
@@ -152,9 +152,7 @@ def flow_log(
     speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
     swept = _swept_share(log.drives[:, position], parameters)
     drives = log.drives.copy()
-    slow = record.sample_time >= SLOW
-    bent = log.drives[:, speed]
-    drives[:, speed] = bent - steady_bend(bent) / 12.0 if slow else straightened(bent)
+    drives[:, speed] = straightened(log.drives[:, speed], slow=record.sample_time >= SLOW)
     passed_on = swept * position_variance(record["position_m"]) ** 0.5
     open_gaps = speed_gaps(record, parameters, variances["differential_pressure_pa"] ** 0.5)
     log = replace(

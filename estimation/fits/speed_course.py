@@ -8,7 +8,7 @@ ALIKE = 0.5
 """Range of three second differences, over the middle one, up to which a bend is steady [fraction]; judged."""
 
 
-def straightened(speed: Array) -> Array:
+def straightened(speed: Array, *, slow: bool = False) -> Array:
     """Return motor speed as straight lines between samples must have it, so that the oil pumped comes out right.
 
     A motor that nears its new speed bends its course between samples, and the trapezoidal rule is off by a twelfth of
@@ -20,6 +20,8 @@ def straightened(speed: Array) -> Array:
     ----------
     speed : ndarray, shape (n,)
         Motor speed at the samples [rad/s], none missing.
+    slow : bool
+        Whether the log is slower than its motor: then only a `steady_bend` is known.
 
     Returns
     -------
@@ -38,7 +40,7 @@ def straightened(speed: Array) -> Array:
     """
     before, here, after = _bends(speed)
     median = np.maximum(np.minimum(before, here), np.minimum(np.maximum(before, here), after))
-    return speed - median / 12.0
+    return speed - (steady_bend(speed) if slow else median) / 12.0
 
 
 def _bends(speed: Array) -> tuple[Array, Array, Array]:
