@@ -1,105 +1,51 @@
 """`fit_flow(record, parameters, ...) -> FormFit`: bulk modulus, leakage and flow bias of a log, by the flow form."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from operator import attrgetter
 
 import numpy as np
 
+from estimation.fits.asked import ALWAYS_ASKED, asked_of, near_starts
 from estimation.fits.between_samples import with_course
 from estimation.fits.delivery import contradicted
-from estimation.fits.explain import VANISHED, WORTH, explain
-from estimation.fits.flow_log import carried, flow_log, homed_at_stop, outruns_pump, without_strays
-from estimation.fits.flow_search import MAKEUP_TRIED, balanced, flow_starts
+from estimation.fits.explain import WORTH, explain
+from estimation.fits.flow_log import carried, flow_log, homed_at_stop, without_strays
+from estimation.fits.flow_search import balanced, flow_starts
 from estimation.fits.form_fit import DISCRETISED, FormFit, weighed, with_structure
 from estimation.fits.greybox_fit import GreyBoxFit
-from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import (
     BEGUN,
-    DELIVERY,
     ENCODER_ZERO,
-    HYPOTHESES,
-    LEAST_DELIVERY,
-    LEAST_ZERO,
-    MAKEUP_BENDS,
-    MAY_HIDE,
-    OFFSET_AT_REST,
     PLAY,
     PRESSURE_LATE,
-    SPEED_LATE,
-    START_LOAD,
-    Hypothesis,
 )
-from estimation.fits.lateness import most_late
 from estimation.fits.left_open import valves_unseen, wear_open
+from estimation.fits.objections import DOUBTED, LARGEST_CHI_SQUARE, NOISY, fit_explains, fit_explains_all, objections
 from estimation.fits.play import (
     NO_PLAY,
-    PLAY_SENSED,
-    ShownPlay,
     play_left,
     play_structure,
     play_untaken,
     sensed_play,
 )
-from estimation.fits.promises import promised, promised_each, slopes_of
 from estimation.fits.small_teeth import with_small_teeth
 from estimation.fits.speed_instead import speed_instead
 from estimation.fits.teeth import Turning
 from estimation.fits.toothed import asked_for_teeth, toothed
 from estimation.models.completed_flow import CRACKS, balances_mass
-from estimation.models.flow import HELD_FLOW_FORM, STIFFNESS
-from estimation.models.inner_circuit import BEND
+from estimation.models.flow import HELD_FLOW_FORM
 from estimation.notes import EstimateCode
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
 from plant.log.record import Record
-from plant.notes import Note
 
 FLOW_CHANNELS = ("position_m", "differential_pressure_pa")
 """Channels that the flow form needs beside motor speed."""
 
 REPORTED = ("leakage_coefficient", "flow_bias")
 """What is worth telling of the parameters found along with bulk modulus."""
-
-LARGEST_CHI_SQUARE = 1.2
-"""Mean squared normalised residual above which the model is said to leave something out [dimensionless]."""
-
-DOUBTED = 1.1
-"""The same above which a log that begins under load or in motion is not explained: its fit has many valleys, and the
-sensors' noise is known to a twentieth [dimensionless]."""
-
-LARGEST_AUTOCORRELATION = 0.1
-"""Correlation of neighbouring residuals above which the same is said [dimensionless]."""
-
-NOISY = (1.44, 0.3)
-"""The same two where noise of position counts: it is known to a fifth, and an encoder's steps are not white."""
-
-LATE_WORTH = 20.0
-"""Gain in log-likelihood from which speed or position is said to come late or early, if no hypothesis says more. On
-logs of 18 kinds of strange rigs, and on 18 of a foreign bench, the gain of a right explanation is 6 at most, and that
-of a position that lags by 3 ms is 390 to 2800. A log is asked from `WORTH` on: half a millisecond may gain 10, and move
-bulk modulus by seven deviations [dimensionless]."""
-
-LATE_SHARE = 0.25
-"""Share of what a log leaves unexplained that this must take up to be named beside it [fraction]."""
-
-ZERO_WORTH = 30.0
-"""Gain in log-likelihood that the slopes must promise before a log that the plain form explains is asked for its
-encoder's zero [dimensionless]. They promise 100 at least where one is off by 60 mm or more, 2.5 at most on logs of 30
-other kinds, and 14 on one of a play, which a zero would explain wrongly."""
-
-FARTHEST_LEAD = 0.99
-"""Lead of the motor on the line between samples from which its speed may lag instead [sample times]: one is most."""
-
-TOO_WIDE = 20.0
-"""Conductance of make-up valves over the first guess from which a search begins with the guess too [dimensionless]."""
-
-ALWAYS_ASKED = (DELIVERY, ENCODER_ZERO, *MAY_HIDE)
-"""What a log that the plain form explains is asked all the same, where the slopes promise a gain: each may hide."""
-
-MOST_ASKED = 50_000
-"""A longer log is not asked what is strange about it: the answer takes minutes [samples]."""
 
 STRUCTURE = 2e-4
 """Relative standard deviation of bulk modulus from what the balance leaves out where no make-up valve may crack: in a
@@ -181,7 +127,7 @@ def fit_flow(
     again = partial(fit_flow, record, uncertainties=uncertainties, variances=variances, **how)
     log = flow_log(record, parameters, uncertainties or {}, variances)
     starts = flow_starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
-    explains = partial(_explains, noisy=log.passes_on)
+    explains = partial(fit_explains, noisy=log.passes_on)
     largest = NOISY[0] if log.passes_on else LARGEST_CHI_SQUARE
     unturned = with_course(log, fitted := partial(balanced, parameters=parameters, starts=starts), parameters)
     log, fits, teeth, teeth_left = toothed(unturned, fitted, explains, largest, speed_offset)
@@ -195,15 +141,15 @@ def fit_flow(
     if stiffer and explains(swinging) and flow_log(record, stiff, uncertainties or {}, variances).passes_on:
         return again(stiff, stiff.bulk_modulus, speed_offset=speed_offset)
     log = carried(log, parameters, swinging.values)
-    asked, open_ends = _asked(log, parameters, swinging, best, sensed, loaded=loaded, moving=moving)
+    asked, open_ends = asked_of(log, parameters, swinging, best, sensed, loaded=loaded, moving=moving)
     asked = (PRESSURE_LATE, *asked) if filtered and PRESSURE_LATE not in asked else asked
     remarks = (*teeth, *open_ends, *valves_unseen(best))
     softer = parameters.piston_area * sensed.yields / parameters.chamber_volume
     untaken, play = play_untaken(sensed, softer * swinging.values["bulk_modulus"])
     if BEGUN in asked:  # so many valleys that one is believed only where sensors' noise is all that it leaves
-        explains = partial(_explains_all, noisy=log.passes_on)
+        explains = partial(fit_explains_all, noisy=log.passes_on)
     if asked:
-        near = _near(swinging, starts, explains, in_motion=loaded or moving)
+        near = near_starts(swinging, starts, explains, in_motion=loaded or moving)
         near = [best.values, *near] if best is not swinging and explains(best) else near
         paired = any(one not in (*ALWAYS_ASKED, PLAY) for one in asked)
         by_mass = balances_mass(swinging.model)
@@ -230,7 +176,7 @@ def fit_flow(
             return FormFit(believed, bound, one.chi_square[0], reasons, one.rig_slopes, strange, remarks, turning)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     believed = with_structure(found, float(np.hypot(DISCRETISED if sure else STRUCTURE, untaken)))
-    reasons = (*_objections(best, log.passes_on), *play_left(swinging.play, sensed)) or teeth_left
+    reasons = (*objections(best, log.passes_on), *play_left(swinging.play, sensed)) or teeth_left
     if BEGUN in asked and not reasons and not explains(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
     (value, std), remarks = found["bulk_modulus"], (*remarks, *play)
@@ -253,98 +199,6 @@ def _wanted(names: Sequence[str], best: GreyBoxFit, swinging: GreyBoxFit, *, hom
     return best.cost - WORTH
 
 
-def _asked(
-    log: GreyBoxLog,
-    parameters: EhaParameters,
-    swinging: GreyBoxFit,
-    best: GreyBoxFit,
-    sensed: ShownPlay = NO_PLAY,
-    *,
-    loaded: bool,
-    moving: bool,
-) -> tuple[tuple[Hypothesis, ...], tuple[Note, ...]]:
-    """Return what a log is asked beside the plain form, given its likelier fit with volumes that swing, and its best.
-
-    A remark says what it leaves open. Held volumes may explain a log whose encoder was homed at a stop: it is asked all
-    the same.
-    """
-    if len(log.drives) > MOST_ASKED:
-        return (), ()
-    if loaded:  # a sensor that reads too much looks loaded at rest
-        return (BEGUN, OFFSET_AT_REST), ()
-    if not _explains(swinging, log.passes_on) or most_late(swinging.late)[2] > WORTH:
-        pulled = (MAKEUP_BENDS,) if outruns_pump(log, parameters) else ()
-        return (BEGUN,) if moving else (*HYPOTHESES, *pulled), ()
-    by_mass = balances_mass(swinging.model)
-    delivery, zero, *hidden = promised_each(
-        log, parameters, swinging.values, ALWAYS_ASKED, by_mass=by_mass, slopes=slopes_of(swinging, log)
-    )
-    shows_zero = best is swinging or homed_at_stop(log)
-    if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
-        zero = max(zero, promised(log, parameters, best.values, ENCODER_ZERO))
-    worn = delivery.gain > WORTH and delivery.size > LEAST_DELIVERY
-    shifted = shows_zero and zero.gain > ZERO_WORTH and zero.size > LEAST_ZERO
-    plays = bool(play_left(swinging.play, sensed)) or sensed.gain > PLAY_SENSED
-    behind = swinging.values.get("speed_lead", 0.0) > FARTHEST_LEAD * log.sample_time
-    tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays), (SPEED_LATE, behind)
-    asked = tuple(one for one, worthwhile in tried if worthwhile)
-    asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > WORTH)
-    remarks = () if DELIVERY in asked else wear_open(delivery.deviation)
-    if not moving:
-        return asked if _explains_all(swinging, log.passes_on) else HYPOTHESES, remarks
-    # chambers shut in far above the accumulator take no make-up for seconds, and a search from rest ends without any
-    fed = swinging.values["makeup_conductance"] > VANISHED * parameters.makeup_conductance
-    lost = swinging is best and not fed and swinging.chi_square[0] > DOUBTED
-    begun = promised(log.coarsened(), parameters, swinging.values, START_LOAD, by_mass=by_mass)
-    return (BEGUN, *asked) if lost or begun.gain > WORTH else asked, remarks
-
-
-def _near(
-    fit: GreyBoxFit,
-    starts: Sequence[Mapping[str, float]],
-    explains: Callable[[GreyBoxFit], bool],
-    *,
-    in_motion: bool,
-) -> Sequence[Mapping[str, float]]:
-    """Return where the search for what is strange begins: a fit that explains the log is in no wrong valley.
-
-    But one that begins at rest may be where the log does not (``in_motion``): without make-up, which is then tried too.
-    So it is where make-up valves ended far wider than any, since the model is too rough there to find a way back.
-    """
-    fed = {**fit.values, "makeup_conductance": MAKEUP_TRIED[0]}
-    if explains(fit):
-        return [fit.values, fed] if in_motion else [fit.values]
-    usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
-    lost = fit.values["makeup_conductance"] > TOO_WIDE * MAKEUP_TRIED[0]
-    near = [fit.values, fed] if lost else [fit.values]
-    held = (STIFFNESS, *CRACKS, BEND)
-    return [*({name: value for name, value in one.items() if name not in held} for one in near), *usual]
-
-
 def _known(names: Sequence[str], fit: GreyBoxFit) -> bool:
     """Return whether a play's fit leaves no more than the sensors' noise: what is left is how the piston crosses it."""
     return PLAY.name not in names or fit.chi_square[0] <= DOUBTED
-
-
-def _explains(fit: GreyBoxFit, noisy: bool) -> bool:
-    return not _objections(fit, noisy)
-
-
-def _explains_all(fit: GreyBoxFit, noisy: bool) -> bool:
-    return _explains(fit, noisy) and (noisy or fit.chi_square[0] <= DOUBTED)
-
-
-def _objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
-    """Return what speaks against a fit, ``noisy`` where the position's noise counts with the slopes."""
-    reasons: list[Note] = []
-    largest, correlated = NOISY if noisy else (LARGEST_CHI_SQUARE, LARGEST_AUTOCORRELATION)
-    if fit.chi_square[0] > largest:
-        reasons.append(EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=fit.chi_square[0] ** 0.5))
-    if abs(fit.autocorrelation[0]) > correlated:
-        reasons.append(EstimateCode.PRESSURE_RESIDUALS_CORRELATED.note(correlation=fit.autocorrelation[0]))
-    channel, late, gain = most_late(fit.late)
-    wanted = LATE_SHARE * fit.cost * (1.0 - 1.0 / fit.chi_square[0]) if reasons else 0.0
-    if gain > max(LATE_WORTH, wanted):
-        when = "late" if late > 0.0 else "early"
-        reasons.insert(0, EstimateCode.CHANNEL_LATE.note(channel=channel, milliseconds=1e3 * abs(late), when=when))
-    return tuple(reasons)

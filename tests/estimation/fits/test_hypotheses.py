@@ -11,10 +11,11 @@ from scipy.signal import lfilter
 
 from estimation.eha.estimate import estimate_log
 from estimation.eha.explained import notes_of, rig_set_right, set_right
+from estimation.fits import asked
 from estimation.fits import explain as module
-from estimation.fits import flow_fit
+from estimation.fits.asked import near_starts
 from estimation.fits.descent import Point
-from estimation.fits.flow_fit import _near, _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
+from estimation.fits.flow_fit import _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
 from estimation.fits.flow_search import MAKEUP_TRIED, flow_starts
 from estimation.fits.hypotheses import HYPOTHESES, LATEST
 from estimation.fits.left_open import OPEN_DELIVERY
@@ -56,7 +57,7 @@ def test_a_speed_that_lags_by_little_more_than_a_sample_is_no_lead_of_the_motor(
     lag, std = found.values["speed_lag"]
     assert 1.0 < lag / record.sample_time < 1.6  # half a sample of it is how lines between samples follow steps
     assert std < 0.02 * lag
-    monkeypatch.setattr(flow_fit, "FARTHEST_LEAD", np.inf)
+    monkeypatch.setattr(asked, "FARTHEST_LEAD", np.inf)
     assert fit_flow(lagged, HEALTHY, HEALTHY.bulk_modulus).explanation is None
 
 
@@ -204,7 +205,7 @@ def test_an_encoder_homed_elsewhere_is_named_where_held_volumes_explain_the_log_
 def test_a_search_begins_with_usual_valves_too_where_a_fit_ended_with_far_wider_ones(times: float, begun: int) -> None:
     plain = made_fit(100.0, 1.9e8, 1e6)
     fit = replace(plain, values={**plain.values, "makeup_conductance": times * MAKEUP_TRIED[0]})
-    near = _near(fit, flow_starts(HEALTHY, 3e8), lambda _: False, in_motion=False)
+    near = near_starts(fit, flow_starts(HEALTHY, 3e8), lambda _: False, in_motion=False)
     assert [one["bulk_modulus"] for one in near[:begun]] == begun * [1.9e8]
     assert near[begun - 1]["makeup_conductance"] == (fit.values if begun == 1 else near[-1])["makeup_conductance"]
     assert near[begun]["bulk_modulus"] != 1.9e8

@@ -8,14 +8,16 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
+from estimation.fits import asked as asking
 from estimation.fits import flow_fit, motion_fit
 from estimation.fits.descent import Point
-from estimation.fits.flow_fit import _explains_all, _wanted, fit_flow
+from estimation.fits.flow_fit import _wanted, fit_flow
 from estimation.fits.flow_log import homed_at_stop
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.hypotheses import BEGUN, HYPOTHESES, MAY_HIDE
 from estimation.fits.motion_fit import _starts, _steps, motion_log, unseen
 from estimation.fits.motion_search import MOST_WORK, Begun, MotionSearch, explained, rough
+from estimation.fits.objections import fit_explains_all
 from estimation.fits.play import ShownPlay
 from estimation.fits.promises import Promise, slopes_of
 from estimation.fits.tried import Tried
@@ -49,17 +51,18 @@ def concluded(
         return explanation
 
     calls = asked
-    with patch.multiple(
-        flow_fit,
-        balanced=lambda *_, **__: fits,
-        promised_each=lambda *_, **__: [
-            *(2 * [Promise(40.0, 0.2, 0.05)]),
-            *(len(MAY_HIDE) * [Promise(0.0, 0.0, 0.05)]),
-        ],
-        promised=lambda *_, **__: Promise(0.0, 0.0, 0.05),
-        explain=explained,
-        contradicted=lambda *_: (),
-        sensed_play=lambda _: sensed or ShownPlay(0.0, 0.0),
+    promises = [*(2 * [Promise(40.0, 0.2, 0.05)]), *(len(MAY_HIDE) * [Promise(0.0, 0.0, 0.05)])]
+    with (
+        patch.multiple(
+            asking, promised_each=lambda *_, **__: promises, promised=lambda *_, **__: Promise(0.0, 0.0, 0.05)
+        ),
+        patch.multiple(
+            flow_fit,
+            balanced=lambda *_, **__: fits,
+            explain=explained,
+            contradicted=lambda *_: (),
+            sensed_play=lambda _: sensed or ShownPlay(0.0, 0.0),
+        ),
     ):
         found = fit_flow(log(0.2), PAPER, 2e8, **how)
     return {
@@ -117,7 +120,7 @@ def conclusions_of_the_flow_form() -> dict[str, Any]:
         for late in (False, True)
     }
     told["all explained up to"] = [
-        edge(lambda chi, noisy=noisy: _explains_all(plain(1.0, chi=chi), noisy), 0.5, 2.0, 20)
+        edge(lambda chi, noisy=noisy: fit_explains_all(plain(1.0, chi=chi), noisy), 0.5, 2.0, 20)
         for noisy in (False, True)
     ]
     return told

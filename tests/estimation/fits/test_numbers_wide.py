@@ -9,9 +9,9 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from estimation.fits import flow_fit, motion_fit
+from estimation.fits import asked, motion_fit
+from estimation.fits.asked import asked_of, near_starts
 from estimation.fits.explain import explain
-from estimation.fits.flow_fit import _asked, _near, _objections
 from estimation.fits.flow_search import _guess, _search, flow_starts
 from estimation.fits.force_scale import disagree
 from estimation.fits.form_fit import weighed, with_structure
@@ -20,6 +20,7 @@ from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, PRESUMED
 from estimation.fits.motion_fit import _starts, _steps, motion_log
 from estimation.fits.motion_search import MotionSearch
+from estimation.fits.objections import objections
 from estimation.fits.promises import Promise, promised
 from estimation.fits.tried import Explanation
 from estimation.fits.wide_problem import delayed, freed, own_starts, usual_values
@@ -37,10 +38,10 @@ def objections_on_either_side() -> dict[str, Any]:
     told: dict[str, Any] = {}
     for noisy in (False, True):
         for chi in (1.19, 1.21, 1.43, 1.45):
-            told[f"chi-square {chi}, noisy: {noisy}"] = noted(_objections(made_fit(100.0, 2e8, 1e6, chi=chi), noisy))
+            told[f"chi-square {chi}, noisy: {noisy}"] = noted(objections(made_fit(100.0, 2e8, 1e6, chi=chi), noisy))
         for correlated in (0.09, -0.11, 0.29, 0.31):
             told[f"correlation {correlated}, noisy: {noisy}"] = noted(
-                _objections(made_fit(100.0, 2e8, 1e6, correlated=correlated), noisy)
+                objections(made_fit(100.0, 2e8, 1e6, correlated=correlated), noisy)
             )
     for name, late, gain, chi in (
         ("late", 1e-3, 21.0, 1.0),
@@ -53,7 +54,7 @@ def objections_on_either_side() -> dict[str, Any]:
         ("a fifth of the misfit", 1e-3, 100.0, 2.0),
         ("a third of it", 1e-3, 150.0, 2.0),
     ):
-        told[name] = noted(_objections(made_fit(1000.0, 2e8, 1e6, chi=chi, late=late, gain=gain), False))
+        told[name] = noted(objections(made_fit(1000.0, 2e8, 1e6, chi=chi, late=late, gain=gain), False))
     told["weighed"] = {
         name: list(pair)
         for name, pair in weighed(
@@ -68,8 +69,8 @@ def objections_on_either_side() -> dict[str, Any]:
 @contextmanager
 def all_promise(one: Promise) -> Iterator[None]:
     """Let every hypothesis promise the same."""
-    each = [one] * len(flow_fit.ALWAYS_ASKED)
-    with patch.multiple(flow_fit, promised=lambda *_, **__: one, promised_each=lambda *_, **__: each):
+    each = [one] * len(asked.ALWAYS_ASKED)
+    with patch.multiple(asked, promised=lambda *_, **__: one, promised_each=lambda *_, **__: each):
         yield
 
 
@@ -90,10 +91,10 @@ def what_is_asked_of_a_log() -> dict[str, Any]:
         (31.0, 0.49, 0.05),
     ):
         with all_promise(Promise(gain, size, deviation)):
-            asked, remarks = _asked(base, PAPER, sound, sound, loaded=False, moving=False)
+            asked, remarks = asked_of(base, PAPER, sound, sound, loaded=False, moving=False)
         told[f"gain {gain:g}, size {size:g}, deviation {deviation:g}"] = [[one.name for one in asked], noted(remarks)]
     poor = made_fit(1.0, 2e8, 1e6, chi=2.0)
-    told["of a poor fit"] = [one.name for one in _asked(base, PAPER, poor, poor, loaded=False, moving=False)[0]]
+    told["of a poor fit"] = [one.name for one in asked_of(base, PAPER, poor, poor, loaded=False, moving=False)[0]]
     for gain, fed, chi, likeliest in (
         (9.0, 1.0, 1.15, True),
         (11.0, 1.0, 1.0, True),
@@ -106,19 +107,19 @@ def what_is_asked_of_a_log() -> dict[str, Any]:
         plain = made_fit(1.0, 2e8, 1e6, chi=chi)
         fit = replace(plain, values={**plain.values, "makeup_conductance": fed * PAPER.makeup_conductance})
         with all_promise(Promise(gain, 0.0, 0.05)):
-            asked, _ = _asked(base, PAPER, fit, fit if likeliest else sound, loaded=False, moving=True)
+            asked, _ = asked_of(base, PAPER, fit, fit if likeliest else sound, loaded=False, moving=True)
         told[f"in motion: {gain:g}, {fed:g}, {chi:g}, {likeliest}"] = [one.name for one in asked]
     lengths = (np.zeros((count, 2)) for count in (50000, 50001))
     told["of long logs under load"] = [
-        [one.name for one in _asked(replace(base, drives=drives), PAPER, sound, sound, loaded=True, moving=False)[0]]
+        [one.name for one in asked_of(replace(base, drives=drives), PAPER, sound, sound, loaded=True, moving=False)[0]]
         for drives in lengths
     ]
     starts = flow_starts(PAPER, 3e8)
     sound = replace(sound, values={**sound.values, "makeup_conductance": PAPER.makeup_conductance})
-    told["near a fit"] = [dict(one) for one in _near(sound, starts, lambda _: True, in_motion=False)]
-    told["near none"] = [dict(one) for one in _near(sound, starts, lambda _: False, in_motion=False)[:2]]
+    told["near a fit"] = [dict(one) for one in near_starts(sound, starts, lambda _: True, in_motion=False)]
+    told["near none"] = [dict(one) for one in near_starts(sound, starts, lambda _: False, in_motion=False)[:2]]
     told["near a fit that begins otherwise"] = [
-        dict(one) for one in _near(sound, starts, lambda _: True, in_motion=True)[:2]
+        dict(one) for one in near_starts(sound, starts, lambda _: True, in_motion=True)[:2]
     ]
     return told
 

@@ -10,14 +10,18 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
+from estimation.fits import asked
 from estimation.fits import flow_fit as module
-from estimation.fits.flow_fit import ALWAYS_ASKED, DOUBTED, PLAY_SENSED, fit_flow
+from estimation.fits.asked import ALWAYS_ASKED
+from estimation.fits.flow_fit import fit_flow
 from estimation.fits.flow_search import balanced, flow_starts
 from estimation.fits.form_fit import FormFit
 from estimation.fits.hypotheses import PLAY, Hypothesis
+from estimation.fits.objections import DOUBTED
 from estimation.fits.play import (
     NO_PLAY,
     PLAY_OPEN,
+    PLAY_SENSED,
     PLAY_SHOWN,
     PLAY_STRUCTURE,
     ShownPlay,
@@ -243,7 +247,7 @@ def concluded(
         return explanation
 
     monkeypatch.setattr(module, "balanced", lambda *_, **__: [fit])
-    monkeypatch.setattr(module, "promised_each", lambda *_, **__: len(ALWAYS_ASKED) * [Promise(0.0, 0.0, 0.01)])
+    monkeypatch.setattr(asked, "promised_each", lambda *_, **__: len(ALWAYS_ASKED) * [Promise(0.0, 0.0, 0.01)])
     monkeypatch.setattr(module, "explain", explained)
     return fit_flow(record or logged("normal", "prbs", 0.0), PAPER, PAPER.bulk_modulus)
 
