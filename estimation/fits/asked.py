@@ -33,6 +33,10 @@ from estimation.models.inner_circuit import BEND
 from plant.eha.model import EhaParameters
 from plant.notes import Note
 
+MORE_THAN_CHANCE = 7.7
+"""Root of the number of samples times how far the same is above one by chance in one log of a thousand. The variance of
+white noise over what `measurement_variances` reads off it scatters by 2.45 over that root [dimensionless]."""
+
 ZERO_WORTH = 30.0
 """Gain in log-likelihood that the slopes must promise before a log that the plain form explains is asked for its
 encoder's zero [dimensionless]. They promise 100 at least where one is off by 60 mm or more, 2.5 at most on logs of 30
@@ -110,7 +114,8 @@ def asked_of(
     asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > WORTH)
     remarks = () if DELIVERY in asked else wear_open(delivery.deviation)
     if not moving:
-        doubted = not log.passes_on and swinging.chi_square[0] > DOUBTED
+        by_chance = 1.0 + MORE_THAN_CHANCE / len(log.drives) ** 0.5
+        doubted = not log.passes_on and swinging.chi_square[0] > max(DOUBTED, by_chance)
         return HYPOTHESES if doubted else asked, remarks
     # chambers shut in far above the accumulator take no make-up for seconds, and a search from rest ends without any
     fed = swinging.values["makeup_conductance"] > VANISHED * parameters.makeup_conductance
