@@ -57,6 +57,7 @@ def test_every_block_runs_in_turn_and_what_it_claims_holds(name: str, tmp_path: 
     assert worked_through(name, tmp_path)
 
 
+@pytest.mark.slow
 def test_from_a_log_to_a_controller_with_the_same_numbers(tmp_path: Path) -> None:
     compiler("gcc")
     if shutil.which("make") is None:

@@ -23,6 +23,7 @@ from plant.errors import HydrostateError, LogError
 from plant.log.files import read_record
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, IDEAL
+from tests.thinned import thinned
 
 HEALTHY = EhaParameters()
 TRUTH = HEALTHY.bulk_modulus
@@ -40,7 +41,9 @@ def last(record: Record, parameters: EhaParameters = HEALTHY) -> tuple[float, fl
     return estimate.settled(BULK_MODULUS, 0.5 / len(estimate.mean))
 
 
-@pytest.mark.parametrize("condition", ["normal", "minor_leakage", "major_leakage_major_friction"])
+@pytest.mark.parametrize(
+    "condition", thinned(["normal", "minor_leakage", "major_leakage_major_friction"], ["minor_leakage"])
+)
 def test_it_finds_bulk_modulus_and_leakage_without_being_told_the_condition(condition: str) -> None:
     record, truth = run(condition)
     estimate = filter_flow(record, HEALTHY).online
@@ -50,7 +53,7 @@ def test_it_finds_bulk_modulus_and_leakage_without_being_told_the_condition(cond
     assert deviation < 1e-12
 
 
-@pytest.mark.parametrize("condition", ["minor_leakage", "major_friction"])
+@pytest.mark.parametrize("condition", thinned(["minor_leakage", "major_friction"], ["minor_leakage"]))
 def test_on_the_circuit_it_comes_to_the_truth_where_the_pressure_form_stays_low(condition: str) -> None:
     record = on_circuit(condition, 0)
     found = chamber_ekf(record)
@@ -60,7 +63,7 @@ def test_on_the_circuit_it_comes_to_the_truth_where_the_pressure_form_stays_low(
     assert low < TRUTH < high
 
 
-@pytest.mark.parametrize("start", [0.0, 0.5e8, 5e8])
+@pytest.mark.parametrize("start", thinned([0.0, 0.5e8, 5e8], [0.0]))
 def test_from_any_first_guess_it_comes_to_the_same_value(start: float) -> None:
     record = on_circuit("normal", 1, duration=4.0)
     found, near = chamber_ekf(record, start=start), chamber_ekf(record)

@@ -20,6 +20,7 @@ from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError, LogError
 from plant.log.record import Record
 from tests.c_compiler import SANITIZED, compiled, compiler, ran
+from tests.thinned import thinned
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 SHORT, LONG = 3_000, 100_000
@@ -52,7 +53,7 @@ def apart(found: np.ndarray, wanted: np.ndarray) -> float:
 
 
 @EVERY_FORM
-@pytest.mark.parametrize("using", ["gcc", "clang"])
+@pytest.mark.parametrize("using", thinned(["gcc", "clang"], ["gcc"]))
 def test_every_form_gives_in_c_what_it_gives_in_python(form: str, using: str, tmp_path: Path) -> None:
     problem = task(form, "minor_friction", SHORT)
     assert apart(in_c(tmp_path, problem, using=using)[0], in_python(problem)) < 1e-12
@@ -105,7 +106,7 @@ def test_nine_interacting_filters_give_in_c_what_they_give_in_python(tmp_path: P
     assert likelihood == pytest.approx(METHODS["imm"](problem).log_likelihood, rel=1e-12)
 
 
-@EVERY_FORM
+@pytest.mark.parametrize("form", thinned(EXPORTED_FORMS, ["chambers_by_mass"]))
 def test_it_runs_clean_under_sanitizers(form: str, tmp_path: Path) -> None:
     assert np.all(np.isfinite(in_c(tmp_path, task(form, "normal", 500), "ekf", EXACT, *SANITIZED)[0]))
 

@@ -11,13 +11,14 @@ from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.eha_forms import FORMS
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
-from faults.conditions import CONDITIONS, Condition, parameters_for
+from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import sine
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, REDUCED, simulate
 from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, drop_samples
+from tests.thinned import thinned
 
 STEPS = 5_000
 
@@ -54,10 +55,10 @@ def assert_equal(ours: Estimate, theirs: Estimate, tolerance: float = 1e-9) -> N
     assert dict(theirs.nis) == pytest.approx(dict(ours.nis), rel=tolerance)
 
 
-@pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
+@pytest.mark.parametrize("condition", thinned(CONDITIONS, ["normal", "major_leakage_major_friction"]))
 @pytest.mark.parametrize("form", FORMS)
-def test_both_engines_agree_over_5000_steps(form: str, condition: Condition) -> None:
-    parameters = parameters_for(condition)
+def test_both_engines_agree_over_5000_steps(form: str, condition: str) -> None:
+    parameters = parameters_for(CONDITIONS[condition])
     ours, theirs = both(form, logged(form, parameters), parameters)
     assert_equal(ours, theirs)
 

@@ -20,6 +20,7 @@ from plant.eha.model import EhaParameters, piston_areas
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
+from tests.thinned import thinned
 
 HEALTHY = EhaParameters()
 NOISY = replace(BENCH, position_noise=3e-5, position_quantum=1e-5)
@@ -42,7 +43,7 @@ def deviations(record: Record, true: float) -> float:
     return (value - true) / std
 
 
-@pytest.mark.parametrize("condition", ["normal", "major_leakage"])
+@pytest.mark.parametrize("condition", thinned(["normal", "major_leakage"], ["normal"]))
 def test_noise_of_position_does_not_pass_for_soft_oil(condition: str, monkeypatch: pytest.MonkeyPatch) -> None:
     record, true = log(condition, 5)
     assert abs(deviations(record, true)) < 3.0

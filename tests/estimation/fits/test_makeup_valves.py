@@ -52,6 +52,7 @@ def test_a_valve_that_never_opens_tells_no_drop() -> None:
     assert not cracks.told(1e5, np.inf)
 
 
+@pytest.mark.slow
 def test_a_valve_that_is_stuck_shut_does_not_crack_late() -> None:
     clean = clean_log(logged(1e3, 2.7e5), PAPER)
     fit = fit_flow(clean.record, PAPER, PAPER.bulk_modulus, {}, clean.variances)
