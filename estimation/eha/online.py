@@ -19,11 +19,11 @@ from estimation.models.augment import augmented
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError, LogError
 from plant.kept import read_kept, write_kept
+from plant.log.chamber_pressures import with_difference
 from plant.log.record import Record
 from plant.solvers.steps import parameter_row
 
 FORMAT = "hydrostate filter 2"
-PRESSURE, CHAMBERS = "differential_pressure_pa", ("pressure_a_pa", "pressure_b_pa")
 
 SAME_RATE = 0.01
 """By how much the rates of a state and of a stream may differ [fraction]."""
@@ -69,11 +69,11 @@ def begun(asked: Asked, first: Record, like: Record | None = None) -> OnlineFilt
     LogError
         If the stream lacks what the form needs, or the log another channel or rate.
     """
-    told = with_difference(first)
+    told = _with_pressure(first)
     full = Record(told.sample_time, {name: told[name][_whole(told)] for name in told})
     task = filter_task(full, asked.parameters, asked.form, states=asked.states, tuned=asked.tuned and like is None)
     if like is not None:
-        other = filter_task(with_difference(like), asked.parameters, asked.form, states=asked.states, tuned=asked.tuned)
+        other = filter_task(_with_pressure(like), asked.parameters, asked.form, states=asked.states, tuned=asked.tuned)
         if other.channels != task.channels or abs(like.sample_time / first.sample_time - 1.0) > SAME_RATE:
             raise LogError(
                 f"the log must have the stream's channels ({', '.join(task.channels)}) at its rate, "
@@ -83,16 +83,13 @@ def begun(asked: Asked, first: Record, like: Record | None = None) -> OnlineFilt
     return OnlineFilter(task, asked.method)
 
 
+def _with_pressure(record: Record) -> Record:
+    return record.replace(**with_difference(record.channels))
+
+
 def _whole(record: Record) -> NDArray[np.bool_]:
     """Return which samples have every channel; noise is read off these."""
     return np.all([np.isfinite(record[name]) for name in record], axis=0)
-
-
-def with_difference(record: Record) -> Record:
-    """Return a record with differential pressure, where it has both chambers' or nothing to add."""
-    if PRESSURE in record or not all(name in record for name in CHAMBERS):
-        return record
-    return record.replace(**{PRESSURE: record[CHAMBERS[0]] - record[CHAMBERS[1]]})
 
 
 def samples_of(filtered: OnlineFilter, channels: Mapping[str, Array]) -> tuple[Array, Array]:
@@ -113,9 +110,7 @@ def samples_of(filtered: OnlineFilter, channels: Mapping[str, Array]) -> tuple[A
     LogError
         If a channel is missing.
     """
-    known = dict(channels)
-    if PRESSURE not in known and all(name in known for name in CHAMBERS):
-        known[PRESSURE] = known[CHAMBERS[0]] - known[CHAMBERS[1]]
+    known = with_difference(channels)
     wanted = (*filtered.problem.model.drives, *filtered.problem.channels)
     missing = [name for name in wanted if name not in known]
     if missing:

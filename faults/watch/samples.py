@@ -6,6 +6,7 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError
+from plant.log.chamber_pressures import PRESSURE, with_difference
 
 
 def watched_samples(channels: Mapping[str, Array], sample_time: float, travelled: float = 0.0) -> tuple[Array, bool]:
@@ -36,20 +37,15 @@ def watched_samples(channels: Mapping[str, Array], sample_time: float, travelled
     if missing:
         raise LogError(missing)
     speed = channels["motor_speed_rad_s"]
-    pressure, difference = True, np.zeros(len(speed))
-    if "differential_pressure_pa" in channels:
-        difference = channels["differential_pressure_pa"]
-    elif "pressure_a_pa" in channels and "pressure_b_pa" in channels:
-        difference = channels["pressure_a_pa"] - channels["pressure_b_pa"]
-    else:
-        pressure = False
+    difference = with_difference(channels).get(PRESSURE)
     if "position_m" in channels:
         position = channels["position_m"]
     else:
         velocity = channels["velocity_m_s"]
         position = travelled + np.cumsum(np.nan_to_num(velocity)) * sample_time
         position[np.isnan(velocity)] = np.nan
-    return np.column_stack([speed, position, difference]), pressure
+    told = difference is not None
+    return np.column_stack([speed, position, difference if told else np.zeros(len(speed))]), told
 
 
 def missing_channels(channels: Sequence[str]) -> str:

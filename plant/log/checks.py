@@ -6,6 +6,7 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError, NoChannelError
+from plant.log.chamber_pressures import CHAMBERS, tells_difference, with_difference
 from plant.log.clock import FEWEST_SAMPLES, MOST_MISSING, Channels, Checked, long_enough, on_uniform_clock
 from plant.log.clock import Clock as Clock
 from plant.log.columns import TIME, TRUTH
@@ -128,16 +129,11 @@ def _share(count: int, total: int) -> str:
 
 
 def _derived(channels: Channels, notes: list[Note]) -> Channels:
-    wanted, chambers = "differential_pressure_pa", ("pressure_a_pa", "pressure_b_pa")
-    logged = [one for one in chambers if one in channels]
-    if wanted in channels or not logged:
-        return channels
-    if len(logged) == 1:
-        (other,) = set(chambers) - set(logged)
+    logged = [one for one in CHAMBERS if one in channels]
+    if logged and not tells_difference(channels):
+        (other,) = set(CHAMBERS) - set(logged)
         notes.append(LogCode.CHAMBER_ALONE.note(channel=logged[0], other=other))
-        return channels
-    a, b = chambers
-    return {**channels, wanted: channels[a] - channels[b]}
+    return with_difference(channels)
 
 
 def _slower(values: Array) -> int:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from plant.errors import NoChannelError
+from plant.log.chamber_pressures import CHAMBERS, PRESSURE, tells_difference
 from plant.log.columns import CHANNELS, TIME, UNITS, listed, unit_ending
 from plant.log.headings import Heading
 from plant.log.notes import LogCode
@@ -260,10 +261,8 @@ def overlooked(headings: Sequence[Heading], found: Collection[str]) -> tuple[Not
     found : collection of str
         Channels that were.
     """
-    chambers = {"pressure_a_pa", "pressure_b_pa"}
-    known = "differential_pressure_pa" in found or chambers <= set(found)
-    wanted = [] if known else ["differential_pressure_pa", *sorted(chambers - set(found))]
-    wanted += [one for one in ("position_m", "velocity_m_s") if one not in found]
+    pressures = () if tells_difference(found) else (PRESSURE, *CHAMBERS)
+    wanted = [one for one in (*pressures, "position_m", "velocity_m_s") if one not in found]
     return tuple(
         LogCode.COLUMN_OVERLOOKED.note(
             column=one.name[:60], channel=one.channel, option=option if one.unit is not None else f"{option}:UNIT"

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.eha.online import Asked, begun, load_filter, samples_of, save_filter, with_difference
+from estimation.eha.online import Asked, begun, load_filter, samples_of, save_filter
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
@@ -27,14 +27,6 @@ def stream(seed: int = 0) -> Record:
 def chambers(record: Record) -> Record:
     high = 5e6 + 0.5 * record[PRESSURE]
     return record.replace(**{PRESSURE: None}, pressure_a_pa=high, pressure_b_pa=high - record[PRESSURE])
-
-
-def test_chamber_pressures_give_their_difference_and_nothing_else_is_added() -> None:
-    record = stream()
-    assert with_difference(record) is record
-    assert with_difference(chambers(record))[PRESSURE] == pytest.approx(record[PRESSURE], abs=1e-6)
-    alone = record.replace(**{PRESSURE: None})
-    assert with_difference(alone) is alone
 
 
 def test_noise_is_that_of_another_log_of_the_same_bench() -> None:

@@ -1,0 +1,43 @@
+"""Differential pressure of a log whose sensors sit in the two chambers: the one place that knows what makes it."""
+
+from collections.abc import Collection, Mapping
+
+from plant.arrays import Array
+
+PRESSURE, CHAMBERS = "differential_pressure_pa", ("pressure_a_pa", "pressure_b_pa")
+"""The channel of the difference, and those of the two chambers."""
+
+
+def tells_difference(channels: Collection[str]) -> bool:
+    """Return whether a log tells the differential pressure: by a channel of its own, or by both chambers'.
+
+    Parameters
+    ----------
+    channels : collection of str
+        Channels of the log.
+
+    Examples
+    --------
+    >>> tells_difference(["pressure_a_pa", "pressure_b_pa"]), tells_difference(["pressure_a_pa"])
+    (True, False)
+    """
+    return PRESSURE in channels or all(one in channels for one in CHAMBERS)
+
+
+def with_difference(channels: Mapping[str, Array]) -> Mapping[str, Array]:
+    """Return channels with the differential pressure where both chambers' are logged, and it is not.
+
+    Parameters
+    ----------
+    channels : Mapping[str, ndarray, shape (n,)]
+        Channels in SI.
+
+    Returns
+    -------
+    Mapping[str, ndarray, shape (n,)]
+        They, and the difference [Pa] as the last; the same object where there is nothing to add.
+    """
+    if PRESSURE in channels or not tells_difference(channels):
+        return channels
+    a, b = CHAMBERS
+    return {**channels, PRESSURE: channels[a] - channels[b]}
