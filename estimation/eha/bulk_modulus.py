@@ -17,7 +17,7 @@ from estimation.fits.delivery import delivered
 from estimation.fits.flow_fit import FLOW_CHANNELS, REPORTED, fit_flow
 from estimation.fits.form_fit import FormFit
 from estimation.fits.motion_fit import MOTION_CHANNELS, fit_motion
-from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES
+from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED
 from estimation.log_checks.channel_physics import FARTHEST, RPM, TURNS
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.log_checks.first_belief import START_STD, begins_in_motion, first_belief, first_load
@@ -30,8 +30,6 @@ from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError, LogWarning, require_known
 from plant.log.record import Record
 from plant.notes import Note
-
-SPEED = "motor_speed_rad_s"
 
 LEAST_SQUARES = "least-squares"
 """The method of the forms that are fitted."""

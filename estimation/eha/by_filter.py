@@ -11,7 +11,7 @@ from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide
 from estimation.filters.iterated_smoother import LONGEST
 from estimation.filters.run import METHODS, Estimate, available_channels, run_filter
 from estimation.finding import Gate, Outcome
-from estimation.log_checks.channel_names import PRESSURE
+from estimation.log_checks.channel_names import POSITION, PRESSURE
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, first_belief
 from estimation.models.augment import AUGMENTABLE, augmented, augmented_prior
@@ -269,7 +269,7 @@ def conclude(
         bound=bound,
         gate=gate,
         form=form,
-        channels=estimate.channels if form != "flow" else ("position_m", *estimate.channels),
+        channels=estimate.channels if form != "flow" else (POSITION, *estimate.channels),
         nis=estimate.nis,
         others={name: estimate.settled(name, fraction) for name in names if known},
         estimate=estimate,

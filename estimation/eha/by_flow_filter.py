@@ -13,6 +13,7 @@ import numpy as np
 
 from estimation.eha.chamber_bank import Member, run_bank
 from estimation.filters.run import Estimate, filter_problem, in_si
+from estimation.log_checks.channel_names import PRESSURE, SPEED
 from estimation.log_checks.first_belief import first_load
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.chambers import CHAMBERS, CHAMBERS_BY_MASS, CHAMBERS_HELD, FLOOR_NOISE, MAKEUP, chamber_belief
@@ -88,7 +89,7 @@ def filter_flow(
         If a channel is missing.
     """
     CHAMBERS.require_drives(record)
-    load = first_load(record, variances) if "differential_pressure_pa" in record else 0.0
+    load = first_load(record, variances) if PRESSURE in record else 0.0
     centre = parameters.bulk_modulus
     wanted = max(guess if guess is not None else centre, LEAST_MODULUS * centre)
     moduli = sorted({*(multiple * centre for multiple in MODULI), wanted})
@@ -125,7 +126,6 @@ def drive_noise(record: Record, p: EhaParameters, variances: Mapping[str, float]
     float
         Density [Pa^2/s].
     """
-    speed = "motor_speed_rad_s"
-    known = variances if variances is not None and speed in variances else measurement_variances(record, (speed,))
+    known = variances if variances is not None and SPEED in variances else measurement_variances(record, (SPEED,))
     rate = p.bulk_modulus / (2.0 * p.chamber_volume) * p.pump_displacement
-    return FLOOR_NOISE + rate**2 * known[speed] * record.sample_time
+    return FLOOR_NOISE + rate**2 * known[SPEED] * record.sample_time

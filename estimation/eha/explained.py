@@ -10,8 +10,8 @@ from estimation.finding import NORMAL_95
 from estimation.fits.play import crossings
 from estimation.fits.teeth import EVENLY, Turning, delivering
 from estimation.fits.tried import Explanation
-from estimation.log_checks.bridging import POSITION, bridged
-from estimation.log_checks.channel_names import PRESSURE
+from estimation.log_checks.bridging import bridged
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.clean import CleanLog
 from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import CROSSED, GROWTH, TURBULENT_AT
@@ -24,8 +24,6 @@ from plant.notes import Note
 
 WORN = 0.9
 """Delivery over the pump's displacement below which the pump counts as worn, and not the rig file as rounded."""
-
-SPEED, VELOCITY = "motor_speed_rad_s", "velocity_m_s"
 
 LAGS: Mapping[str, str] = {PRESSURE: "pressure_lag", SPEED: "speed_lag", POSITION: "position_lag"}
 """The lag of each channel that may come late, beside its delay."""

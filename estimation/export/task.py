@@ -8,6 +8,7 @@ from estimation.eha.by_flow_filter import drive_noise
 from estimation.engine.contract import FilterProblem
 from estimation.export.flow import FLOW_FILTER, STATES, STDS
 from estimation.filters.run import available_channels, filter_problem
+from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, START_STD, first_belief, first_load
 from estimation.models.augment import augmented, augmented_prior
 from estimation.models.chambers import chamber_belief
@@ -27,8 +28,6 @@ EXPORTED_FORMS: Mapping[str, ProcessModel] = {
     **{name: model for name, (model, _) in CHAMBER_FORMS.items()},
 }
 """Process models that a filter can be exported with, by name."""
-
-PRESSURE = "differential_pressure_pa"
 
 
 def filter_task(

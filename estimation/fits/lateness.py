@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from estimation.fits.greybox_problem import Problem
 from estimation.fits.hypotheses import LATEST
 from estimation.fits.play import crossed_drives
-from estimation.log_checks.bridging import POSITION
+from estimation.log_checks.channel_names import POSITION
 from plant.arrays import Array
 
 LEAST_LATE = 2e-4

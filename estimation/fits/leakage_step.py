@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.fits.greybox_log import GreyBoxLog
+from estimation.log_checks.channel_names import POSITION, SPEED
 from estimation.models.wide_flow import WIDE_FLOW_FORM
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
@@ -90,7 +91,7 @@ def _averaged(log: GreyBoxLog) -> tuple[Array, Array, Array]:
     """
     named = {name: log.drives[:, at] for at, name in enumerate(WIDE_FLOW_FORM.drives)}
     rig = dict(zip(parameter_names(WIDE_FLOW_FORM.parameters), log.parameters.tolist(), strict=True))
-    speed, position, pressure = named["motor_speed_rad_s"], named["position_m"], log.measured[:, 0]
+    speed, position, pressure = named[SPEED], named[POSITION], log.measured[:, 0]
     ends = np.unique(np.linspace(0, len(speed) - 1, PIECES + 1).astype(np.intp))
     count, time = np.diff(ends), log.sample_time * np.diff(ends)
     means = np.add.reduceat(np.stack([speed, pressure, np.sign(speed)])[:, : ends[-1]], ends[:-1], axis=1) / count

@@ -13,11 +13,10 @@ import numpy as np
 from estimation.arrays import Array, BoolArray, IntArray
 from estimation.fits.greybox_problem import Problem
 from estimation.fits.hypotheses import LEAST_PLAY
-from estimation.log_checks.bridging import POSITION, bridged
-from estimation.log_checks.channel_names import PRESSURE
+from estimation.log_checks.bridging import bridged
+from estimation.log_checks.channel_names import POSITION, PRESSURE, VELOCITY
 from estimation.log_checks.measurement_noise import position_variance
 from estimation.log_checks.order import percentile
-from estimation.log_checks.outliers import VELOCITY
 from estimation.notes import EstimateCode, RigCode
 from plant.log.record import Record
 from plant.notes import Note

@@ -13,6 +13,7 @@ from estimation.fits.greybox_problem import search_bounds
 from estimation.fits.hypotheses import LEAKAGE_TURBULENT, LIMITS, PRESUMED, Hypothesis
 from estimation.fits.leakage_step import likeliest_step
 from estimation.fits.play import crossings
+from estimation.log_checks.channel_names import POSITION
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
@@ -52,7 +53,7 @@ LEAST_GAS = 1.0
 """Least gas of the inner circuit's accumulator, in chamber volumes; judged. With less its pressure would follow every
 stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
 
-POSITION, POSITION_ZERO = "position_m", "position_zero"
+POSITION_ZERO = "position_zero"
 
 START_PRESSURE, START_LEVEL = "start_pressure", "start_level"
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.log_checks.channel_names import POSITION
 from estimation.log_checks.order import median
 from estimation.models.model import OPENING, ProcessModel
 from plant.arrays import Array
@@ -20,8 +21,6 @@ from plant.compiled.functions import Scalar
 from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.solvers.steps import Parameters
-
-POSITION = "position_m"
 
 WIDE = 1.5
 """Samples farther apart than this many times what is usual for the channel leave a gap [dimensionless]."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.log_checks.bridging import bridged
-from estimation.log_checks.channel_names import PRESSURE
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -83,14 +83,14 @@ def channel_blocks(record: Record, p: EhaParameters, length: float) -> ChannelBl
         whole = _whole(record, name)
         return None if whole is None else np.diff(whole[::size][: (len(record) - 1) // size + 1]) / span
 
-    speed = mean("motor_speed_rad_s")
+    speed = mean(SPEED)
     return ChannelBlocks(
         span,
         None if speed is None else p.pump_displacement * speed,
-        slope("position_m"),
-        mean("position_m"),
-        mean("velocity_m_s"),
-        slope("velocity_m_s"),
+        slope(POSITION),
+        mean(POSITION),
+        mean(VELOCITY),
+        slope(VELOCITY),
         mean(PRESSURE),
         slope(PRESSURE),
     )

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from estimation.log_checks.channel_names import PRESSURE, PRESSURES
+from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED, VELOCITY
 from estimation.log_checks.channel_physics import channel_mistakes
 from estimation.log_checks.filtered import independent_variance, without_correlated_noise
 from estimation.log_checks.held import without_held
@@ -17,7 +17,7 @@ from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
 
-CLEANED = ("motor_speed_rad_s", "position_m", "velocity_m_s", PRESSURE)
+CLEANED = (SPEED, POSITION, VELOCITY, PRESSURE)
 """Channels whose gross outliers are left out."""
 
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.eha_forms import BULK_MODULUS
 from estimation.models.gaussian import Gaussian
@@ -43,13 +44,13 @@ def first_belief(model: ProcessModel, record: Record, start: float, start_std: f
     Gaussian
         The prior.
     """
-    firsts = {"position_m": _first(record, "position_m"), BULK_MODULUS: start}
-    firsts["differential_pressure_pa"] = _first(record, "differential_pressure_pa")
+    firsts = {POSITION: _first(record, POSITION), BULK_MODULUS: start}
+    firsts[PRESSURE] = _first(record, PRESSURE)
     spreads = {
-        "position_m": 1e-5,
-        "velocity_m_s": 1e-3,
+        POSITION: 1e-5,
+        VELOCITY: 1e-3,
         "acceleration_m_s2": 10.0,
-        "differential_pressure_pa": 1e5,
+        PRESSURE: 1e5,
         BULK_MODULUS: start_std,
     }
     mean = np.array([firsts.get(state.name, 0.0) for state in model.states])
@@ -76,8 +77,8 @@ def first_load(record: Record, variances: Mapping[str, float] | None = None) -> 
     >>> first_load(Record(1e-3, {"differential_pressure_pa": np.array([np.nan, -4e5, -5e5, -6e5])}))
     -400000.0
     """
-    channel = "differential_pressure_pa"
-    first, noise = _first(record, channel), (variances or measurement_variances(record, (channel,)))[channel] ** 0.5
+    first = _first(record, PRESSURE)
+    noise = (variances or measurement_variances(record, (PRESSURE,)))[PRESSURE] ** 0.5
     return first if abs(first) > AT_REST + 5.0 * noise else 0.0
 
 
@@ -96,8 +97,8 @@ def begins_in_motion(record: Record, share: float = TURNING) -> bool:
     bool
         Whether the first motor speed is more.
     """
-    speed = record["motor_speed_rad_s"]
-    first = abs(_first(record, "motor_speed_rad_s"))
+    speed = record[SPEED]
+    first = abs(_first(record, SPEED))
     return first > 0.0 and first > share * float(np.sqrt(np.nanmean(speed**2)))
 
 

@@ -3,11 +3,10 @@
 import numpy as np
 
 from estimation.log_checks.bridging import bridged
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
-
-PRESSURE = "differential_pressure_pa"
 
 BLOCK, FEWEST = 0.02, 25
 """Length of the blocks over which flows are balanced [s], and blocks outside of the hold that are needed [count]."""
@@ -46,13 +45,13 @@ def jumped(record: Record, hold: slice, p: EhaParameters) -> bool:
     bool
         False too where the log ends with the hold.
     """
-    present = np.flatnonzero(np.isfinite(record["position_m"]))
-    rate = np.abs(np.diff(record["position_m"][present])) / (np.diff(present) * record.sample_time)
+    present = np.flatnonzero(np.isfinite(record[POSITION]))
+    rate = np.abs(np.diff(record[POSITION][present])) / (np.diff(present) * record.sample_time)
     after = int(np.searchsorted(present, hold.stop)) - 1
-    if not 0 <= after < len(rate) or "motor_speed_rad_s" not in record:
+    if not 0 <= after < len(rate) or SPEED not in record:
         return False
     others = np.delete(rate, after)
-    fastest = float(np.nanmax(np.abs(record["motor_speed_rad_s"]))) * p.pump_displacement / p.piston_area
+    fastest = float(np.nanmax(np.abs(record[SPEED]))) * p.pump_displacement / p.piston_area
     return bool(rate[after] > max(JUMP * float(np.max(others, initial=0.0)), BEYOND_PUMP * fastest))
 
 
@@ -76,15 +75,15 @@ def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
     bool
         Whether the piston must have moved.
     """
-    if PRESSURE not in record or "motor_speed_rad_s" not in record:
+    if PRESSURE not in record or SPEED not in record:
         return False
     there = np.isfinite(record[PRESSURE])
     if not np.any(there) or np.mean(there[hold]) <= 0.5 * np.mean(there):  # it may have been any
         return False
     size = max(2, round(BLOCK / record.sample_time))
     span, count = size * record.sample_time, (len(record) - 1) // size
-    speed, pressure = (_means(bridged(record[name]), size, count) for name in ("motor_speed_rad_s", PRESSURE))
-    swept, rise = (np.diff(bridged(record[name])[::size][: count + 1]) for name in ("position_m", PRESSURE))
+    speed, pressure = (_means(bridged(record[name]), size, count) for name in (SPEED, PRESSURE))
+    swept, rise = (np.diff(bridged(record[name])[::size][: count + 1]) for name in (POSITION, PRESSURE))
     pumped = p.pump_displacement * speed
     losses = np.column_stack([pressure, np.where(np.abs(pumped) > 0.0, np.sign(pumped), 0.0), rise / span])
     blocks = np.arange(count)

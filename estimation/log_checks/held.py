@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.log_checks.channel_names import PRESSURE, PRESSURES, SPEED
+from estimation.log_checks.channel_names import POSITION, PRESSURES, SPEED, VELOCITY
 from estimation.notes import SensorCode
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
 
-HELD = tuple(dict.fromkeys(("position_m", "velocity_m_s", PRESSURE, *PRESSURES)))
+HELD = (POSITION, VELOCITY, *PRESSURES)
 """Channels that are asked: none can jump. A motor speed that is held may be how the motor was driven."""
 
 LEAST_STEPS = 100

@@ -9,14 +9,14 @@ import numpy as np
 
 from estimation.fits.convolution import smooth_length
 from estimation.log_checks.bridging import bridged
-from estimation.log_checks.channel_names import PRESSURE
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
 from estimation.log_checks.order import median
 from estimation.notes import SensorCode
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
 
-MOVING = ("motor_speed_rad_s", "position_m")
+MOVING = (SPEED, POSITION)
 """Channels whose lines are motion."""
 
 LOWEST = 40.0

@@ -6,14 +6,15 @@ from math import comb
 
 import numpy as np
 
+from estimation.log_checks.channel_names import POSITION, PRESSURE, VELOCITY
 from estimation.log_checks.order import median
 from plant.arrays import Array
 from plant.log.record import Record
 
 SMALLEST_VARIANCE: Mapping[str, float] = {
-    "position_m": 1e-12,
-    "velocity_m_s": 1e-10,
-    "differential_pressure_pa": 1e2,
+    POSITION: 1e-12,
+    VELOCITY: 1e-10,
+    PRESSURE: 1e2,
 }
 """Least variance that a filter is given [SI squared]: the paper's R for position (equation 7.7), and for the others
 well below any bench sensor, so that a noiseless simulation stays solvable."""
@@ -186,7 +187,7 @@ def _position_variance(position: Array) -> float:
     bends, steps = np.diff(position, n=SMOOTH), np.abs(np.diff(position))
     moved = steps[steps > 0.0]
     if not (len(bends) and len(moved)):
-        return SMALLEST_VARIANCE["position_m"]
+        return SMALLEST_VARIANCE[POSITION]
     parts = np.array_split(bends, max(1, len(bends) // WINDOW))
     variance = median(np.array([float(np.mean(part**2)) for part in parts])) / comb(2 * SMOOTH, SMOOTH)
     return float(max(variance, np.min(moved) ** 2 / 12.0))

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from estimation.log_checks.bridging import bridged
-from estimation.log_checks.channel_names import PRESSURES
+from estimation.log_checks.channel_names import POSITION, PRESSURES, VELOCITY
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.order import percentile
 from estimation.notes import SensorCode
@@ -14,8 +14,6 @@ from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
 from plant.sensors.sensors import differentiated
-
-POSITION, VELOCITY = "position_m", "velocity_m_s"
 
 WINDOWS = ((7, 1), (11, 2))
 """Samples of the running medians that an outlier stands out from, and how many ranks beside the median show how the

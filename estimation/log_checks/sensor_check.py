@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.log_checks.bridging import bridged
-from estimation.log_checks.channel_names import PRESSURE, PRESSURES
+from estimation.log_checks.channel_names import CHAMBERS, POSITION, PRESSURE, PRESSURES, SPEED, VELOCITY
 from estimation.log_checks.filtered import independent_rows
 from estimation.log_checks.frozen_encoder import jumped, missed_motion
 from estimation.log_checks.measurement_noise import measurement_variances
@@ -80,7 +80,7 @@ def sensor_objections(record: Record, parameters: EhaParameters) -> tuple[Note, 
     """
     accused = {
         PRESSURE: _frozen_pressure(record, parameters) or _dead_pressure(record),
-        "velocity_m_s": _frozen_velocity(record),
+        VELOCITY: _frozen_velocity(record),
     }
     believed = record.replace(**{channel: None for channel, note in accused.items() if note})
     found = (*accused.values(), _frozen_position(believed, parameters))
@@ -137,29 +137,29 @@ def _hold_of(record: Record, channel: str) -> slice | None:
 
 def _frozen_velocity(record: Record) -> Note | None:
     """Compare a still velocity sensor with the encoder; a stuck piston's velocity is zero, and its encoder still."""
-    stretch = _hold_of(record, "velocity_m_s")
-    if stretch is None or "position_m" not in record:
+    stretch = _hold_of(record, VELOCITY)
+    if stretch is None or POSITION not in record:
         return None
-    position, velocity = record["position_m"][stretch], float(record["velocity_m_s"][stretch][0])
+    position, velocity = record[POSITION][stretch], float(record[VELOCITY][stretch][0])
     there = np.flatnonzero(np.isfinite(position))
     if len(there) < FEWEST_HELD:
         return None
     position = position[there]
-    travelled, quantum = float(position[-1] - position[0]), _quantum(record["position_m"])
+    travelled, quantum = float(position[-1] - position[0]), _quantum(record[POSITION])
     said = velocity * record.sample_time * float(there[-1] - there[0])
     strayed = max(abs(travelled - said), float(np.ptp(position)) - abs(said))
-    return _says_frozen("velocity_m_s", stretch, record) if strayed > UNDELIVERED * max(quantum, 1e-6) else None
+    return _says_frozen(VELOCITY, stretch, record) if strayed > UNDELIVERED * max(quantum, 1e-6) else None
 
 
 def _frozen_pressure(record: Record, p: EhaParameters) -> Note | None:
     """Compare a still pressure with the pump: while that delivers unevenly, pressure is never the same for long."""
     stretch = _hold_of(record, PRESSURE)
-    if stretch is None or "motor_speed_rad_s" not in record:
+    if stretch is None or SPEED not in record:
         return None
     value = record[PRESSURE][stretch.start]
     if np.all(np.isnan(record[PRESSURE]) | (record[PRESSURE] == value)):
         return SensorCode.SENSOR_CONSTANT.note(channel=PRESSURE, value=float(value))
-    speed = bridged(record["motor_speed_rad_s"])[stretch]
+    speed = bridged(record[SPEED])[stretch]
     volume = np.cumsum(_pumped(speed, p)) * record.sample_time
     if np.ptp(speed) == 0.0:
         return None
@@ -186,14 +186,14 @@ def _says_frozen(channel: str, stretch: slice, record: Record) -> Note:
 
 def _frozen_position(record: Record, p: EhaParameters) -> Note | None:
     """Compare a still encoder with what the other sensors say moved meanwhile; a stuck piston's is still too."""
-    if "position_m" not in record:
+    if POSITION not in record:
         return None
-    stretch = _longest_hold(record["position_m"], record.sample_time)
+    stretch = _longest_hold(record[POSITION], record.sample_time)
     if stretch is None:
         return None
     slid, rests = _slid(record, stretch)
     if slid or jumped(record, stretch, p) or (not rests and missed_motion(record, stretch, p)):
-        return _says_frozen("position_m", stretch, record)
+        return _says_frozen(POSITION, stretch, record)
     return None
 
 
@@ -203,19 +203,19 @@ def _slid(record: Record, stretch: slice) -> tuple[bool, bool]:
     Velocity may be differentiated from the encoder over a window, so the ends of the stretch do not count, and a
     velocity that is still too says nothing.
     """
-    if "velocity_m_s" not in record:
+    if VELOCITY not in record:
         return False, False
     quarter = (stretch.stop - stretch.start) // 4
-    velocity = record["velocity_m_s"][stretch.start + quarter : stretch.stop - quarter]
+    velocity = record[VELOCITY][stretch.start + quarter : stretch.stop - quarter]
     velocity = velocity[np.isfinite(velocity)]
     if len(velocity) < FEWEST_HELD:
         return False, False
-    alike = independent_rows(record["velocity_m_s"], record.sample_time)  # an average adds up like fewer, longer rows
+    alike = independent_rows(record[VELOCITY], record.sample_time)  # an average adds up like fewer, longer rows
     noise = float(np.std(velocity[alike:] - velocity[:-alike])) / 2.0**0.5 if len(velocity) > 2 * alike else 0.0
     step = 0.5 * (stretch.stop - stretch.start) * record.sample_time / len(velocity)
     travelled = np.cumsum(velocity) * step
     allowed = 6.0 * noise * step * (alike * len(velocity)) ** 0.5
-    slid = bool(np.ptp(travelled) > max(allowed, UNDELIVERED * _quantum(record["position_m"])))
+    slid = bool(np.ptp(travelled) > max(allowed, UNDELIVERED * _quantum(record[POSITION])))
     return slid, not slid and noise > 0.0
 
 
@@ -226,10 +226,10 @@ def _quantum(values: Array) -> float:
 
 def _dead_pressure(record: Record) -> Note | None:
     """Look for the load in the pressure: noise and nothing else, while the motor turns, is no live sensor's."""
-    if PRESSURE not in record or "motor_speed_rad_s" not in record:
+    if PRESSURE not in record or SPEED not in record:
         return None
     pressure = record[PRESSURE][np.isfinite(record[PRESSURE])]
-    if len(pressure) < FEWEST_HELD or np.ptp(pressure) == 0.0 or np.ptp(record["motor_speed_rad_s"]) == 0.0:
+    if len(pressure) < FEWEST_HELD or np.ptp(pressure) == 0.0 or np.ptp(record[SPEED]) == 0.0:
         return None
     white = 0.5 * float(np.var(np.diff(pressure)))
     if white < NOISE_SHARE * float(np.var(pressure)):
@@ -285,7 +285,7 @@ def _is_difference(record: Record) -> bool:
     """Return whether the differential pressure is that of the two chambers' sensors, and no sensor's own."""
     if any(channel not in record for channel in PRESSURES):
         return False
-    difference = record["pressure_a_pa"] - record["pressure_b_pa"]
+    difference = record[CHAMBERS[0]] - record[CHAMBERS[1]]
     there = np.isfinite(difference) & np.isfinite(record[PRESSURE])
     return bool(np.allclose(record[PRESSURE][there], difference[there]))
 

@@ -2,13 +2,11 @@
 
 import numpy as np
 
-from estimation.log_checks.bridging import POSITION
+from estimation.log_checks.channel_names import POSITION, VELOCITY
 from estimation.notes import SensorCode
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
-
-VELOCITY = "velocity_m_s"
 
 PARTS = 16
 """Parts of a log over which mean velocity is compared with what position gained [count]."""

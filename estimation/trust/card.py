@@ -7,9 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.arrays import Array
-
-PRESSURE = "differential_pressure_pa"
-"""The channel without which a stuck piston says nothing."""
+from estimation.log_checks.channel_names import PRESSURE
 
 OBSERVABLE = 0.03
 """Relative standard deviation above which a parameter is called not observable (errata E13) [fraction]."""
