@@ -27,8 +27,8 @@ from experiments.open_benchmark.loaders import read_truth, rows_of
 from experiments.open_benchmark.score import COEFFICIENTS
 from experiments.published.library import read_library
 from faults.conditions import CONDITIONS
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.circuit_runs import coordinates_of
-from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import ClassFits
 from faults.diagnosis.evidence import EVIDENCES, weigh
 from faults.diagnosis.onset import last_part

@@ -11,8 +11,8 @@ import pandas as pd
 from experiments.log_pages.log import Log
 from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class, named
 from experiments.open_benchmark.loaders import read_truth, rows_of
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.circuit_runs import coordinates_of
-from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.severity import severities_at
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError

@@ -6,13 +6,11 @@ from functools import cache
 
 import numpy as np
 
-from faults.conditions import CONDITIONS, parameters_for
+from faults.conditions import CONDITIONS
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks, root_mean_square
-from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
 from plant.arrays import Array
-from plant.eha.circuit_parameters import CircuitParameters, circuit_of, longest_stroke
-from plant.eha.model import EhaParameters
-from plant.eha.steady_state import steady_state
 
 STEP = 0.02
 """Step of the finite differences in the logarithms [dimensionless]."""
@@ -59,54 +57,6 @@ WITHIN = _prior((0.12, 0.12, 0.12, 0.10, 0.08, 0.2, SEALS), 0.08)
 
 WEAK = _prior((0.5, 0.5, 0.3, 0.3, 0.2, 0.3, SEALS), 0.5)
 """What is believed of an actuator in no known condition, about the nearest one: covariance, shape (7, 7)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Actuator:
-    """A healthy actuator and its nine conditions as points.
-
-    Parameters
-    ----------
-    circuit : CircuitParameters
-        The healthy circuit.
-    rated : float
-        Its velocity at rated speed [m/s].
-    conditions : ndarray, shape (9, 7)
-        Coordinates of the nine nominal circuits, in the order of `CONDITIONS`.
-    load_doubt : float
-        Standard deviation of the constant force on its rod, where a log had to tell that [N]; 0 as the rig file has it.
-    """
-
-    circuit: CircuitParameters
-    rated: float
-    conditions: Array
-    load_doubt: float = 0.0
-
-    @staticmethod
-    def of(rig: EhaParameters) -> "Actuator":
-        """Return the actuator of a rig.
-
-        Parameters
-        ----------
-        rig : EhaParameters
-            The healthy actuator.
-
-        Returns
-        -------
-        Actuator
-            It, and its conditions.
-
-        Raises
-        ------
-        RigError
-            If no circuit fits around it.
-        """
-        rated = steady_state(rig.rated_speed, rig)[0]
-        points = [coordinates_of(parameters_for(condition, rig), rated) for condition in CONDITIONS.values()]
-        circuit = circuit_of(rig)
-        if rig.stroke is None:
-            circuit = replace(circuit, stroke=float(longest_stroke(circuit)))
-        return Actuator(circuit, rated, np.array(points))
 
 
 @dataclass(frozen=True, eq=False)

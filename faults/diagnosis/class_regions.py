@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faults.conditions import CONDITIONS
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES
 from faults.diagnosis.class_fit import (
@@ -19,7 +20,6 @@ from faults.diagnosis.class_fit import (
     STARTS,
     WEAK,
     WITHIN,
-    Actuator,
     PointFit,
     about,
     fit_freely,

@@ -6,7 +6,7 @@ estimated once, and where its gate refuses the fit the class is unknown for the 
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -20,13 +20,14 @@ from estimation.identification.model.linear_model import LinearModel
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.notes import RigCode
+from faults.diagnosis.actuator import Actuator, actuator_of
 from faults.diagnosis.advice import advice_for, oil_advice
 from faults.diagnosis.another_oil import whatever_the_oil
 from faults.diagnosis.calibration import Calibration, shipped_calibration
-from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.class_regions import region_scores
 from faults.diagnosis.drift import over_drift
-from faults.diagnosis.evidence import Scoreboard, weigh
+from faults.diagnosis.evidence import weigh
 from faults.diagnosis.failed_search import doubts_after
 from faults.diagnosis.load import Loaded, under_load
 from faults.diagnosis.models_verdict import models_verdict, ranked
@@ -50,45 +51,6 @@ PUMP_AND_PISTON, ANOTHER = ("pump_displacement", "piston_area"), 0.1
 
 HEALTHY = ("leakage_coefficient", "flow_bias", "friction_quadratic", "friction_linear", "friction_coulomb")
 """Entries from which a class and its severities count."""
-
-
-@dataclass(frozen=True, eq=False)
-class Diagnosis:
-    """What the fitted circuit and the banks say of a log, when the log ends.
-
-    Parameters
-    ----------
-    condition : str
-        The most probable of the nine conditions.
-    probabilities : Mapping[str, float]
-        Of each, should the log be in one of them [probability].
-    against : tuple of Note
-        What speaks against all nine.
-    severity : Mapping[str, Quantity]
-        How bad, by the names of `faults.diagnosis.severity.UNITS` [each in the unit given there].
-    healthy : Mapping[str, float]
-        The same of the healthy actuator [each in the same unit].
-    limits : Mapping[str, float]
-        Where it stops being sound, from `faults.diagnosis.severity.limits_of` [each in the same unit].
-    not_told : tuple of Note
-        What the log does not determine.
-    scoreboard : Scoreboard
-        The evidences, and the circuit that was fitted.
-    """
-
-    condition: str
-    probabilities: Mapping[str, float]
-    against: tuple[Note, ...]
-    severity: Mapping[str, Quantity]
-    healthy: Mapping[str, float]
-    limits: Mapping[str, float]
-    not_told: tuple[Note, ...]
-    scoreboard: Scoreboard
-
-    @property
-    def unknown(self) -> bool:
-        """Whether something speaks against all nine."""
-        return bool(self.against)
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,7 +279,6 @@ def diagnose_clean(
     probabilities = board.probabilities(numbers) if worn is None else summed_over_wear(board, worn, numbers)
     found = severities(board.fits, actuator, numbers.widths(pressure))
     return Diagnosis(
-        max(probabilities, key=lambda name: probabilities[name]),
         probabilities,
         (*against, *others.against),
         found,
@@ -326,25 +287,3 @@ def diagnose_clean(
         (*what_is_not_told(board.fits, found, pressure=pressure), *others.open),
         board,
     )
-
-
-@lru_cache(maxsize=8)
-def actuator_of(parameters: EhaParameters) -> Actuator:
-    """Return the actuator of a rig with its nine conditions, kept for the next log.
-
-    Parameters
-    ----------
-    parameters : EhaParameters
-        The healthy actuator.
-
-    Returns
-    -------
-    Actuator
-        It, and its conditions.
-
-    Raises
-    ------
-    RigError
-        If no circuit fits around it.
-    """
-    return Actuator.of(parameters)

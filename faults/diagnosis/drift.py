@@ -7,7 +7,6 @@ rig file's oil at the end of the log, halfway and at the beginning, and summed.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,14 +15,12 @@ from estimation.finding import Quantity
 from estimation.log_checks.clean import CleanLog
 from estimation.notes import RigCode
 from faults.diagnosis.calibration import Calibration, shipped_calibration
+from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.evidence import Scoreboard, models_scores
 from faults.diagnosis.load import Loaded
 from faults.notes import AgainstCode
 from plant.arrays import Array
 from plant.notes import Note
-
-if TYPE_CHECKING:
-    from faults.diagnosis.diagnose import Diagnosis
 
 EARLIER = (0.5, 0.0)
 """Where the rig file's oil may stand besides the end of a log [fraction of it]: over the factor of 2 of a log that
@@ -60,18 +57,16 @@ def over_drift(diagnosed: Callable[[CleanLog], Loaded], log: CleanLog, notes: Se
     there = [float(course[round(share * (len(course) - 1))]) for share in EARLIER]
     found = [last.diagnosis, *(diagnosed(_with_oil_of(log, one)).diagnosis for one in there)]
     placed = next((one for one in found if not any(note.code in PLACED for note in one.against)), last.diagnosis)
-    probabilities = weighed(found, shipped_calibration())
     diagnosis = replace(
         last.diagnosis,
-        condition=max(probabilities, key=lambda name: probabilities[name]),
-        probabilities=probabilities,
+        probabilities=weighed(found, shipped_calibration()),
         against=placed.against,
         severity={name: _whatever_the_oil(name, found) for name in last.diagnosis.severity},
     )
     return last._replace(diagnosis=diagnosis)
 
 
-def weighed(found: Sequence["Diagnosis"], calibration: Calibration) -> Mapping[str, float]:
+def weighed(found: Sequence[Diagnosis], calibration: Calibration) -> Mapping[str, float]:
     """Return the probability of each condition over diagnoses of one log, which are alike beforehand.
 
     Parameters
@@ -109,7 +104,7 @@ def _with_oil_of(log: CleanLog, leakage: float) -> CleanLog:
     return replace(log, record=log.record.replace(**{LEAKAGE_COURSE: course}))
 
 
-def _whatever_the_oil(name: str, found: Sequence["Diagnosis"]) -> Quantity:
+def _whatever_the_oil(name: str, found: Sequence[Diagnosis]) -> Quantity:
     """Return a severity as at the end of a log, with a total interval that holds those of all places."""
     each = [one.severity[name] for one in found]
     ends = [one.ci95 for one in each if one.ci95 is not None]

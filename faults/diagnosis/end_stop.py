@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks
-from faults.diagnosis.class_fit import LASTING, Actuator, misfit
+from faults.diagnosis.class_fit import LASTING, misfit
 from faults.diagnosis.class_regions import ClassFits, fit_classes
 
 RESTS = 0.05

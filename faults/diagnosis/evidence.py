@@ -8,10 +8,10 @@ import numpy as np
 from estimation.finding import Change
 from estimation.identification.model.linear_model import LinearModel
 from faults.conditions import CONDITIONS
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.calibration import Calibration
 from faults.diagnosis.circuit_runs import COORDINATES
-from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import ClassFits, is_stuck, told_apart
 from faults.diagnosis.innovation_bank import innovation_scores
 from faults.diagnosis.onset import last_part

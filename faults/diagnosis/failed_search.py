@@ -11,8 +11,9 @@ from estimation.eha.result import BulkModulusEstimate
 from estimation.fits.motion_values import share_at
 from estimation.log_checks.clean import CleanLog
 from estimation.notes import EstimateCode
+from faults.diagnosis.actuator import Actuator, actuator_of
 from faults.diagnosis.circuit_runs import COLUMN, parameter_rows
-from faults.diagnosis.class_fit import Actuator, PointFit
+from faults.diagnosis.class_fit import PointFit
 from faults.diagnosis.evidence import Scoreboard
 from faults.diagnosis.out_of_model import UNEXPLAINED
 from faults.diagnosis.rivals import doubts_left
@@ -66,7 +67,7 @@ def doubts_after(
     large = next((note for note in left if note.code is EstimateCode.POSITION_RESIDUALS_LARGE), None)
     if large is None or estimate.form != "motion":
         return left
-    values = values_of(board.fits.best, Actuator.of(healthy))
+    values = values_of(board.fits.best, actuator_of(healthy))
     share = share_at(log.record, healthy, values, log.variances["motor_speed_rad_s"])
     failed = share <= min(UNEXPLAINED[0], LESS * float(large.data["motion_percent"]) / 100.0)
     return tuple(note for note in left if note.code not in NOT_THE_LOGS) if failed else left

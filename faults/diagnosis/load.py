@@ -7,21 +7,19 @@ the sliding piston tells, and a circuit fitted under it has to follow the log.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import interval_95
 from faults.diagnosis.blocks import Blocks
+from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.class_fit import LASTING, misfit
 from faults.diagnosis.force_balance import LEAST, SURE, Loads, force_balance, friction_believed
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.model import EhaParameters
 from plant.notes import Note
-
-if TYPE_CHECKING:
-    from faults.diagnosis.diagnose import Diagnosis
 
 LOADS_TRIED = 3
 """Circuits that are fitted under a load at most: what a bias asks for is read off one linear step."""
@@ -43,12 +41,12 @@ class Loaded(NamedTuple):
         The loads by name.
     """
 
-    diagnosis: "Diagnosis"
+    diagnosis: Diagnosis
     parameters: EhaParameters
     notes: tuple[Note, ...] = ()
 
 
-Diagnosed: TypeAlias = Callable[[EhaParameters, float], "Diagnosis"]
+Diagnosed: TypeAlias = Callable[[EhaParameters, float], Diagnosis]
 """What the circuit fitted around an actuator says of a log, where the force on its rod is known so well [N]."""
 
 
@@ -155,7 +153,7 @@ def _followed(
     return None
 
 
-def _told(found: "Diagnosis", loaded: EhaParameters, seen: Loads | None, rig: EhaParameters) -> Loaded | None:
+def _told(found: Diagnosis, loaded: EhaParameters, seen: Loads | None, rig: EhaParameters) -> Loaded | None:
     """Return a diagnosis with its loads by name; None where the force balance has them otherwise."""
     more = loaded.load_force - rig.load_force
     force, std = _force(seen, rig)
@@ -175,11 +173,11 @@ def _told(found: "Diagnosis", loaded: EhaParameters, seen: Loads | None, rig: Eh
     return Loaded(found, loaded, tuple(notes))
 
 
-def _asks(found: "Diagnosis") -> bool:
+def _asks(found: Diagnosis) -> bool:
     return any(note.code in ASKING for note in found.against)
 
 
-def _better(found: "Diagnosis", first: "Diagnosis") -> bool:
+def _better(found: Diagnosis, first: Diagnosis) -> bool:
     """Return whether a circuit under a load follows a log better than one without, and no more speaks against it."""
     (under, loaded), (free, without) = ((one.scoreboard.blocks, one.scoreboard.fits) for one in (found, first))
     if len(found.against) > len(first.against):

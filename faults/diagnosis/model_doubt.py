@@ -13,9 +13,10 @@ from types import MappingProxyType
 
 import numpy as np
 
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COLUMN, parameter_rows, predicted
-from faults.diagnosis.class_fit import WEAK, Actuator, PointFit
+from faults.diagnosis.class_fit import WEAK, PointFit
 from plant.arrays import Array
 
 SELDOM_KNOWN: Mapping[str, float] = MappingProxyType(

@@ -13,9 +13,10 @@ import numpy as np
 
 from estimation.finding import Change
 from faults.conditions import CONDITIONS
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import LONGEST, Blocks, blocks_of
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
-from faults.diagnosis.class_fit import LASTING, WEAK, Actuator, PointFit, least_scales, nominal_runs
+from faults.diagnosis.class_fit import LASTING, WEAK, PointFit, least_scales, nominal_runs
 from faults.diagnosis.class_regions import ClassFits, fit_classes, lasting_misfit
 from faults.diagnosis.end_stop import stopped
 from faults.diagnosis.out_of_model import unexplained

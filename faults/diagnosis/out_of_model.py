@@ -14,9 +14,10 @@ import numpy as np
 from estimation.fits.averaged import samples_a_block
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, severity
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks, blocks_of
 from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
-from faults.diagnosis.class_fit import LASTING, SEALS, STEP, WEAK, Actuator, PointFit, fit_freely
+from faults.diagnosis.class_fit import LASTING, SEALS, STEP, WEAK, PointFit, fit_freely
 from faults.diagnosis.class_regions import ClassFits, region_scores
 from faults.notes import AgainstCode
 from plant.eha.circuit_parameters import CircuitParameters

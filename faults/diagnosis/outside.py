@@ -16,9 +16,10 @@ import numpy as np
 from estimation.eha.rig_share import DELIVERY_ENTRY
 from estimation.fits.hypotheses import PRESUMED
 from faults.conditions import CONDITIONS
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
-from faults.diagnosis.class_fit import Actuator, PointFit, misfit, nominal_runs
+from faults.diagnosis.class_fit import PointFit, misfit, nominal_runs
 from faults.diagnosis.class_regions import ClassFits, fit_classes, is_stuck
 from faults.notes import AgainstCode, ClassCode
 from plant.arrays import Array

@@ -12,9 +12,10 @@ import numpy as np
 
 from estimation.notes import EstimateCode
 from faults.conditions import CONDITIONS
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import SETTLING, Blocks
 from faults.diagnosis.circuit_runs import COORDINATES
-from faults.diagnosis.class_fit import LASTING, Actuator, PointFit, fit_freely, least_scales, scales_of
+from faults.diagnosis.class_fit import LASTING, PointFit, fit_freely, least_scales, scales_of
 from faults.diagnosis.model_doubt import LOOKS
 from plant.arrays import Array
 from plant.notes import Note

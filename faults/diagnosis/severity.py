@@ -8,8 +8,9 @@ import numpy as np
 from estimation.finding import Quantity
 from estimation.log_checks.order import percentile
 from faults.conditions import CONDITIONS
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows
-from faults.diagnosis.class_fit import WEAK, Actuator
+from faults.diagnosis.class_fit import WEAK
 from faults.diagnosis.class_regions import ClassFits
 from faults.notes import ClassCode
 from plant.arrays import Array

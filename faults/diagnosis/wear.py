@@ -9,15 +9,15 @@ leaves less leakage to it, and bulk modulus is larger by as much.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from estimation.eha.result import BulkModulusEstimate
 from estimation.eha.rig_share import wear_left_open
 from estimation.fits.hypotheses import OFFSET
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.calibration import Calibration, shipped_calibration
-from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.evidence import Scoreboard, bounded
 from faults.diagnosis.outside import DELIVERIES, presumed_of_wear
@@ -28,13 +28,8 @@ from plant.notes import Note
 OFFSETS = {OFFSET.name, "pressure_drift"}
 """Hypotheses that an offset of the speed may pass for."""
 
-if TYPE_CHECKING:
-    from faults.diagnosis.diagnose import Diagnosis
 
-
-def whatever_the_pump_delivers(
-    diagnosis: "Diagnosis", actuator: Actuator, estimate: BulkModulusEstimate
-) -> "Diagnosis":
+def whatever_the_pump_delivers(diagnosis: Diagnosis, actuator: Actuator, estimate: BulkModulusEstimate) -> Diagnosis:
     """Return a diagnosis with what the balance of flows says of the pump.
 
     Parameters
@@ -57,7 +52,7 @@ def whatever_the_pump_delivers(
     found = probabilities_over_wear(diagnosis.scoreboard, actuator, estimate.remarks, shipped_calibration())
     if found is None:
         return diagnosis
-    return replace(diagnosis, condition=max(found, key=lambda name: found[name]), probabilities=found)
+    return replace(diagnosis, probabilities=found)
 
 
 def known_of_flow(estimate: BulkModulusEstimate) -> frozenset[AgainstCode]:

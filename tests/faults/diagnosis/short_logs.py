@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks, blocks_of
 from faults.diagnosis.class_fit import (
-    Actuator,
     PointFit,
 )
 from faults.diagnosis.class_regions import (

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import FORGOTTEN, SETTLING, blocks_of
-from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.rivals import creeps
 from plant.eha.drives import make_drive

@@ -8,9 +8,9 @@ import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import circuit_runs
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import BLOCK, Blocks, blocks_of
 from faults.diagnosis.circuit_runs import COLUMN, _between_stops, coordinates_of, parameter_rows, predicted
-from faults.diagnosis.class_fit import Actuator
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate

@@ -9,9 +9,10 @@ import pytest
 
 from faults.conditions import CONDITIONS
 from faults.diagnosis import class_fit
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import parameter_rows, predicted
-from faults.diagnosis.class_fit import FARTHEST, LASTING, WEAK, Actuator, _most_gained, fit_freely, misfit
+from faults.diagnosis.class_fit import FARTHEST, LASTING, WEAK, _most_gained, fit_freely, misfit
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 

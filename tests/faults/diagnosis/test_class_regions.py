@@ -7,9 +7,10 @@ import pytest
 
 from faults.conditions import CONDITIONS
 from faults.diagnosis import class_regions
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
-from faults.diagnosis.class_fit import WITHIN, Actuator, PointFit
+from faults.diagnosis.class_fit import WITHIN, PointFit
 from faults.diagnosis.class_regions import (
     ALIKE,
     PRESSURE_SCALE,

@@ -12,10 +12,11 @@ from estimation.log_checks.clean import clean_log
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import diagnose
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_runs import coordinates_of
-from faults.diagnosis.class_fit import Actuator
-from faults.diagnosis.diagnose import Diagnosis, diagnose_clean
+from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.diagnose import diagnose_clean
 from faults.diagnosis.evidence import EVIDENCES
 from faults.diagnosis.outside import Outside
 from faults.diagnosis.severity import severities_at

@@ -12,8 +12,10 @@ from estimation.eha.explained import LEAKAGE_COURSE
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.calibration import shipped_calibration
-from faults.diagnosis.diagnose import Diagnosis, actuator_of, diagnose_clean
+from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.diagnose import diagnose_clean
 from faults.diagnosis.drift import over_drift, weighed
 from faults.diagnosis.load import Loaded
 from faults.diagnosis.severity import severities_at

@@ -9,9 +9,9 @@ import pytest
 
 from faults.conditions import CONDITIONS
 from faults.diagnosis import end_stop
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
-from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.end_stop import NEAR, RESTS, stopped

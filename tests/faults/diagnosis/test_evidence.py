@@ -7,10 +7,10 @@ import pytest
 
 from estimation.identification import LinearModel
 from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.calibration import Calibration
 from faults.diagnosis.circuit_runs import COORDINATES
-from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import is_stuck
 from faults.diagnosis.evidence import FARTHEST, Scoreboard, bounded, friction_left_open, weigh, within_reach
 from faults.diagnosis.rmse import score_transfer_functions

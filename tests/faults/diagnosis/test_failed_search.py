@@ -12,8 +12,8 @@ from estimation.models.motion import UNKNOWNS
 from estimation.notes import EstimateCode, SensorCode
 from faults.conditions import CONDITIONS
 from faults.diagnosis import failed_search
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.circuit_runs import coordinates_of
-from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.evidence import Scoreboard
 from faults.diagnosis.failed_search import doubts_after, values_of
 from plant.eha.model import EhaParameters

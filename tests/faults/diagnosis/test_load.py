@@ -14,7 +14,7 @@ from estimation.log_checks.clean import clean_log
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import load
-from faults.diagnosis.class_fit import Actuator
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.diagnose import diagnose_clean, diagnose_log
 from faults.diagnosis.force_balance import Loads
 from faults.diagnosis.load import Loaded, first_guesses, under_load

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
-from faults.diagnosis.class_fit import WEAK, Actuator, PointFit
+from faults.diagnosis.class_fit import WEAK, PointFit
 from faults.diagnosis.model_doubt import LOOKS, SELDOM_KNOWN, doubt_of, seldom_known_slopes, spreads_of
 from plant.eha.model import EhaParameters
 

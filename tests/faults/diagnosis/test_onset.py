@@ -13,10 +13,12 @@ from estimation.log_checks.clean import clean_log
 from experiments.open_benchmark.kinds import make
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import onset
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks, blocks_of
-from faults.diagnosis.class_fit import Actuator, PointFit
+from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.class_fit import PointFit
 from faults.diagnosis.class_regions import fit_classes
-from faults.diagnosis.diagnose import Diagnosis, diagnose_clean
+from faults.diagnosis.diagnose import diagnose_clean
 from faults.diagnosis.onset import (
     MOST_ALARMS,
     SOFTENED,

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, severity
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks, blocks_of
 from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
-from faults.diagnosis.class_fit import Actuator, PointFit, scales_of
+from faults.diagnosis.class_fit import PointFit, scales_of
 from faults.diagnosis.class_regions import ClassFits, fit_classes, region_scores
 from faults.diagnosis.out_of_model import (
     EARLIER,

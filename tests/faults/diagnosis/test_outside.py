@@ -9,9 +9,9 @@ import pytest
 from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import outside
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
-from faults.diagnosis.class_fit import Actuator
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.diagnose import diagnose_clean
 from faults.diagnosis.outside import DELIVERIES, faults_outside, largest_pressure, odds_of_wear

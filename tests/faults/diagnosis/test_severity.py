@@ -7,8 +7,9 @@ import pytest
 
 from estimation.finding import Quantity
 from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of
-from faults.diagnosis.class_fit import WEAK, Actuator, PointFit
+from faults.diagnosis.class_fit import WEAK, PointFit
 from faults.diagnosis.class_regions import ClassFits
 from faults.diagnosis.severity import (
     OF_KIND,

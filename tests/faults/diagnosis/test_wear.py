@@ -14,8 +14,10 @@ from estimation.notes import RigCode
 from experiments.open_benchmark.kinds import make
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import wear
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.calibration import shipped_calibration
-from faults.diagnosis.diagnose import Diagnosis, actuator_of, diagnose_log
+from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.evidence import Scoreboard, bounded, weigh
 from faults.diagnosis.outside import DELIVERIES
 from faults.diagnosis.wear import probabilities_over_wear, whatever_the_pump_delivers
@@ -114,7 +116,7 @@ def test_a_balance_that_holds_knows_pump_and_speed_better_than_a_circuit(
     others = AgainstCode.OUTSIDE_CONDITIONS
     against = (PUMP.note(percent=-15.0), SPEED.note(bias_rad_s=4.7), others.note())
     found = board.probabilities(shipped_calibration())
-    diagnosis = Diagnosis("minor_leakage", found, against, {}, {}, {}, (), board)
+    diagnosis = Diagnosis(found, against, {}, {}, {}, (), board)
     judged = whatever_the_pump_delivers(diagnosis, ACTUATOR, estimate)
     assert [note.code for note in judged.against] == [*kept, others]
     assert judged.probabilities == found
@@ -123,9 +125,7 @@ def test_a_balance_that_holds_knows_pump_and_speed_better_than_a_circuit(
 def test_a_circuit_may_doubt_the_pump_where_the_balance_leaves_wear_open(board: Scoreboard) -> None:
     found = board.probabilities(shipped_calibration())
     off = AgainstCode.PUMP_OFF.note(percent=-15.0)
-    judged = whatever_the_pump_delivers(
-        Diagnosis("minor_leakage", found, (off,), {}, {}, {}, (), board), ACTUATOR, said(remarks=OPEN)
-    )
+    judged = whatever_the_pump_delivers(Diagnosis(found, (off,), {}, {}, {}, (), board), ACTUATOR, said(remarks=OPEN))
     assert judged.against == (off,)
     assert judged.probabilities != found
 

@@ -1,0 +1,49 @@
+"""What the fitted circuit and the banks say of a log, as `faults.diagnosis.diagnose` makes it and others change it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from estimation.finding import Quantity
+from faults.diagnosis.evidence import Scoreboard
+from plant.notes import Note
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What the fitted circuit and the banks say of a log, when the log ends.
+
+    Parameters
+    ----------
+    probabilities : Mapping[str, float]
+        Of each of the nine conditions, should the log be in one of them [probability].
+    against : tuple of Note
+        What speaks against all nine.
+    severity : Mapping[str, Quantity]
+        How bad, by the names of `faults.diagnosis.severity.UNITS` [each in the unit given there].
+    healthy : Mapping[str, float]
+        The same of the healthy actuator [each in the same unit].
+    limits : Mapping[str, float]
+        Where it stops being sound, from `faults.diagnosis.severity.limits_of` [each in the same unit].
+    not_told : tuple of Note
+        What the log does not determine.
+    scoreboard : Scoreboard
+        The evidences, and the circuit that was fitted.
+    """
+
+    probabilities: Mapping[str, float]
+    against: tuple[Note, ...]
+    severity: Mapping[str, Quantity]
+    healthy: Mapping[str, float]
+    limits: Mapping[str, float]
+    not_told: tuple[Note, ...]
+    scoreboard: Scoreboard
+
+    @property
+    def condition(self) -> str:
+        """The most probable of the nine conditions."""
+        return max(self.probabilities, key=lambda name: self.probabilities[name])
+
+    @property
+    def unknown(self) -> bool:
+        """Whether something speaks against all nine."""
+        return bool(self.against)
