@@ -17,17 +17,10 @@ from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LATEST, Hypothesis
-from estimation.fits.promises import balanced_by, promised_beside, promising
+from estimation.fits.promises import promised_beside, promising
 from estimation.fits.tried import Explanation, Tried
-from estimation.fits.wide_problem import (
-    delayed,
-    flow_bounds,
-    freed,
-    own_starts,
-    usual_pressure,
-    usual_values,
-    widened,
-)
+from estimation.fits.wide_log import balanced_by, delayed, usual_pressure, usual_values, widened
+from estimation.fits.wide_problem import flow_bounds, freed, own_starts
 from estimation.models.flow import STIFFNESS
 from estimation.models.wide_flow import GROWTH, grown_leakage
 from plant.arrays import Array

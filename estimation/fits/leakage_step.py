@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.fits.greybox_log import GreyBoxLog
+from estimation.fits.wide_log import usual_values
 from estimation.log_checks.channel_names import POSITION, SPEED
 from estimation.models.wide_flow import WIDE_FLOW_FORM
 from plant.arrays import Array
-from plant.solvers.steps import parameter_names
 
 PIECES = 200
 """Pieces of the log in which flows and pressure are averaged [count]: a step is then known to half a percent of it."""
@@ -90,7 +90,7 @@ def _averaged(log: GreyBoxLog) -> tuple[Array, Array, Array]:
     That is the flow bias, with the speed's sign, and the rise of pressure; each of its own size.
     """
     named = {name: log.drives[:, at] for at, name in enumerate(WIDE_FLOW_FORM.drives)}
-    rig = dict(zip(parameter_names(WIDE_FLOW_FORM.parameters), log.parameters.tolist(), strict=True))
+    rig = usual_values(log)
     speed, position, pressure = named[SPEED], named[POSITION], log.measured[:, 0]
     ends = np.unique(np.linspace(0, len(speed) - 1, PIECES + 1).astype(np.intp))
     count, time = np.diff(ends), log.sample_time * np.diff(ends)

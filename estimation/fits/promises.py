@@ -9,13 +9,12 @@ import numpy as np
 
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
-from estimation.fits.hypotheses import LEAKAGE_STEP, Hypothesis
+from estimation.fits.hypotheses import Hypothesis
 from estimation.fits.leakage_step import likeliest_step
-from estimation.fits.wide_problem import freed, usual_values, widened
-from estimation.models.wide_flow import WideFlowParameters
+from estimation.fits.wide_log import balanced_by, usual_values, widened
+from estimation.fits.wide_problem import freed
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
-from plant.solvers.steps import parameter_names
 
 LIKELIEST = 4
 """Hypotheses that are tried first, of which the slopes of the fit so far promise most."""
@@ -129,26 +128,6 @@ def promised_beside(
     return _promises(log, together, found, (one,))[0]
 
 
-def balanced_by(log: GreyBoxLog, mass: float) -> GreyBoxLog:
-    """Return a log whose wide form balances mass (1), or volume (0).
-
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log, widened.
-    mass : float
-        1 or 0 [dimensionless].
-
-    Returns
-    -------
-    GreyBoxLog
-        The log.
-    """
-    parameters = log.parameters.copy()
-    parameters[parameter_names(WideFlowParameters).index("by_mass")] = mass
-    return replace(log, parameters=parameters)
-
-
 def promising(
     log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], asked: Sequence[Hypothesis]
 ) -> tuple[list[Hypothesis], list[Hypothesis]]:
@@ -171,8 +150,8 @@ def promising(
         The `LIKELIEST`, and the others.
     """
     promises = _promises(log.coarsened(), together, found, asked)
-    stepped = LEAKAGE_STEP in asked and likeliest_step(log).share > STEPPED
-    gains = [np.inf if stepped and one is LEAKAGE_STEP else promises[i].gain for i, one in enumerate(asked)]
+    stepped = any(one.from_change for one in asked) and likeliest_step(log).share > STEPPED
+    gains = [np.inf if stepped and one.from_change else promises[i].gain for i, one in enumerate(asked)]
     order = sorted(range(len(asked)), key=lambda i: -gains[i])
     likely = [asked[i] for i in order if not asked[i].far][:LIKELIEST]
     return likely, [one for one in asked if one not in likely]

@@ -1,8 +1,7 @@
-"""A log as the wide flow form sees it, and the least-squares problem of some hypotheses."""
+"""The least-squares problem of a log under hypotheses, where its searches begin, and how far they may go."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
-from types import MappingProxyType
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,25 +9,19 @@ from estimation.fits.form_fit import LONGEST_STEP
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import search_bounds
-from estimation.fits.hypotheses import LEAKAGE_TURBULENT, LIMITS, PRESUMED, Hypothesis
+from estimation.fits.hypotheses import LEAKAGE_TURBULENT, LIMITS, Hypothesis
 from estimation.fits.leakage_step import likeliest_step
-from estimation.fits.play import crossings
+from estimation.fits.wide_log import usual_values
 from estimation.log_checks.channel_names import POSITION
-from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
-from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import (
-    COURSES,
-    CROSSED,
     LINEAR,
     TURBULENT_FLOW_FORM,
     WIDE_FLOW_FORM,
-    WideFlowParameters,
 )
 from plant.arrays import Array
-from plant.eha.model import EhaParameters
-from plant.solvers.steps import parameter_names, parameter_row
+from plant.solvers.steps import parameter_names
 
 RELIEF_START = 1e-10
 """Slope of a relief valve that opens early, first guess [m^3/(s Pa)]."""
@@ -66,67 +59,6 @@ LEVELS_TRIED = (0.0, 0.3)
 MOST_BIASED = 2.0
 """Factor by which position's noise may have put the first bulk modulus off [dimensionless]. Far above it there is a
 second valley, where all that the log shows is noise that the oil's stiffness makes large."""
-
-
-def widened(
-    log: GreyBoxLog, parameters: EhaParameters, found: Mapping[str, float] = MappingProxyType({})
-) -> GreyBoxLog:
-    """Return a log as the wide flow form sees it: share of the log, rate of position and courses of play are drives.
-
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log, as the plain flow form sees it.
-    parameters : EhaParameters
-        The actuator.
-    found : Mapping[str, float], optional
-        What the plain form found; of it `STIFFNESS`, `CRACKS` and `BEND` are held, as they would take up what is
-        strange [SI].
-
-    Returns
-    -------
-    GreyBoxLog
-        The log, with what is presumed.
-    """
-    samples, position = len(log.drives), log.drives[:, FLOW_FORM.drives.index(POSITION)]
-    courses = crossings(position, log.measured[:, 0], log.sample_time)
-    rate = np.gradient(position) / log.sample_time
-    known = {one.name: getattr(parameters, one.name) for one in fields(parameters)}
-    return replace(
-        log,
-        drives=np.column_stack([log.drives, np.arange(samples) / samples, rate, courses]),
-        drive_std=(*log.drive_std, *(0.0 for _ in WIDE_FLOW_FORM.drives[len(log.drive_std) :])),
-        parameters=parameter_row(
-            WideFlowParameters(
-                **known,
-                **{name: found.get(name, 0.0) for name in (STIFFNESS, *CRACKS, BEND)},
-                stated_pressure=usual_pressure(log, parameters),
-            )
-        ),
-        presumed={
-            **log.presumed,
-            **{name: (known[name], std) for name, std in PRESUMED.items()},
-            **dict.fromkeys(CROSSED, (0.0, 1.0)),
-        },
-    )
-
-
-def usual_pressure(log: GreyBoxLog, parameters: EhaParameters) -> float:
-    """Return the pressure of the loaded side that a log has by root mean square.
-
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log.
-    parameters : EhaParameters
-        The actuator.
-
-    Returns
-    -------
-    float
-        Absolute [Pa].
-    """
-    return parameters.accumulator_pressure + float(np.sqrt(np.nanmean(log.measured**2)))
 
 
 def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedProblem:
@@ -226,55 +158,3 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
 def _shut_in(log: GreyBoxLog) -> float:
     """Return the most that a loaded chamber passes to the other one while no make-up flows: half of what loaded it."""
     return max(0.5 * float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)
-
-
-def usual_values(log: GreyBoxLog) -> dict[str, float]:
-    """Return the parameters of a widened log by name.
-
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log, widened.
-
-    Returns
-    -------
-    dict
-        What the rig file says, and what is strange absent [SI].
-    """
-    return dict(zip(parameter_names(WideFlowParameters), log.parameters.tolist(), strict=True))
-
-
-def delayed(log: GreyBoxLog, delays: Mapping[str, float]) -> GreyBoxLog:
-    """Return a log whose channels are brought forward.
-
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log, widened.
-    delays : Mapping[str, float]
-        How late channels come [s]; what is no drive is the output. A drive may be early: its time is negative, and it
-        is put back.
-
-    Returns
-    -------
-    GreyBoxLog
-        The log, its last outputs missing; its first where a drive is early.
-    """
-    measured, drives = log.measured, log.drives
-    for channel, delay in delays.items():
-        samples = round(delay / log.sample_time)
-        if samples == 0:
-            continue
-        late = slice(-samples, None) if samples > 0 else slice(None, -samples)
-        if channel in FLOW_FORM.drives:
-            names = (channel, "position_rate", *COURSES) if channel == POSITION else (channel,)
-            columns = [WIDE_FLOW_FORM.drives.index(name) for name in names]
-            drives, measured = drives.copy(), measured.copy()
-            if samples > 0:
-                drives[:-samples, columns] = log.drives[samples:, columns]
-            else:
-                drives[-samples:, columns] = log.drives[:samples, columns]
-            measured[late] = np.nan
-        else:
-            measured = np.vstack([measured[samples:], np.full_like(measured[late], np.nan)])
-    return replace(log, measured=measured, drives=drives)

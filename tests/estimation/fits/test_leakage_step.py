@@ -14,7 +14,8 @@ from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import LEAKAGE_STEP
 from estimation.fits.leakage_step import NO_STEP, likeliest_step
 from estimation.fits.promises import STEPPED
-from estimation.fits.wide_problem import freed, widened
+from estimation.fits.wide_log import widened
+from estimation.fits.wide_problem import freed
 from estimation.log_checks.clean import clean_log
 from estimation.models.completed_flow import CRACKS
 from estimation.models.wide_flow import stepped_leakage

@@ -21,7 +21,8 @@ from estimation.fits.objections import fit_explains_all
 from estimation.fits.play import ShownPlay
 from estimation.fits.promises import Promise, slopes_of
 from estimation.fits.tried import Tried
-from estimation.fits.wide_problem import flow_bounds, freed, own_starts, widened
+from estimation.fits.wide_log import widened
+from estimation.fits.wide_problem import flow_bounds, freed, own_starts
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
 from estimation.models.motion import MOTION_FORMS
 from plant.log.record import Record

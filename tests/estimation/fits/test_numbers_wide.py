@@ -23,7 +23,8 @@ from estimation.fits.motion_search import MotionSearch
 from estimation.fits.objections import objections
 from estimation.fits.promises import Promise, promised
 from estimation.fits.tried import Explanation
-from estimation.fits.wide_problem import delayed, freed, own_starts, usual_values
+from estimation.fits.wide_log import delayed, usual_values
+from estimation.fits.wide_problem import freed, own_starts
 from estimation.models.flow import FLOW_FORM, STIFFNESS
 from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS
 from plant.log.record import Record

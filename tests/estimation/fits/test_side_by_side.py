@@ -14,7 +14,8 @@ from estimation.fits.greybox_problem import OUTLIER, Problem
 from estimation.fits.hypotheses import HYPOTHESES
 from estimation.fits.side_by_side import LANES, MANY, compile_side_by_side
 from estimation.fits.side_by_side_loops import residuals_side_by_side
-from estimation.fits.wide_problem import freed, usual_values, widened
+from estimation.fits.wide_log import usual_values, widened
+from estimation.fits.wide_problem import freed
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
 from estimation.models.greybox import GreyBoxModel

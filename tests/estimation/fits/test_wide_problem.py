@@ -8,7 +8,8 @@ import pytest
 from estimation.fits import freed_problem
 from estimation.fits.greybox_log import greybox_log
 from estimation.fits.hypotheses import BEGUN, ENCODER_ZERO, HYPOTHESES, OFFSET_AT_REST, Hypothesis
-from estimation.fits.wide_problem import POSITION_ZERO, flow_bounds, freed, own_starts, usual_values, widened
+from estimation.fits.wide_log import usual_values, widened
+from estimation.fits.wide_problem import POSITION_ZERO, flow_bounds, freed, own_starts
 from estimation.models.flow import FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
 from plant.eha.model import EhaParameters
